@@ -1,1 +1,1 @@
-"""What can be built: families of filters, and spaces of them."""
+"""Filters: families, design spaces and batches of designs."""

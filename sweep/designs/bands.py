@@ -1,4 +1,4 @@
-"""Bands between two edges each: what families whose parameters are edges and depths have in common."""
+"""Bands between two edges each, for families whose parameters are edges and depths."""
 
 from __future__ import annotations
 
@@ -22,7 +22,18 @@ LEFT, LEFT_WIDTH, RIGHT, RIGHT_WIDTH, DEPTH = range(_PER_BAND)
 
 
 def band_parameters(number: int | None = None) -> tuple[Parameter, ...]:
-    """Edges and depth of one band; `number` goes into the names when there are several."""
+    """Return the parameters of one band: edges, widths and depth.
+
+    Parameters
+    ----------
+    number : int, optional
+        Number of the band, part of the names if there are several.
+
+    Returns
+    -------
+    tuple of Parameter
+        Five parameters.
+    """
     n = "" if number is None else str(number)
     return (
         Parameter(f"left{n}_nm", 200, 2000),
@@ -34,7 +45,7 @@ def band_parameters(number: int | None = None) -> tuple[Parameter, ...]:
 
 
 class Bands:
-    """The sum of k bands, each e(l; left) - e(l; right) times its depth, and the conditions that keep it in 0..1."""
+    """Sum of bands, each depth times e(l; left) - e(l; right), and the conditions that keep it between 0 and 1."""
 
     def __init__(self, wavelength_nm: FloatArray, count: int) -> None:
         self._wave = wavelength_nm
@@ -45,11 +56,33 @@ class Bands:
         self._conditions = self._condition_matrix()
 
     def shape(self, x: FloatArray) -> FloatArray:
-        """Sum of the bands: ndarray[n_designs, 5 k] -> ndarray[n_designs, n_wavelengths]."""
+        """Return the sum of the bands.
+
+        Parameters
+        ----------
+        x : ndarray of shape (n_designs, n_parameters)
+            Parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n_wavelengths)
+            Sum, 0 to 1 for well-formed designs.
+        """
         return np.asarray(sum(self._depth(x, band) * self._open(x, band) for band in range(self._count)), dtype=float)
 
     def gradient(self, x: FloatArray) -> FloatArray:
-        """Derivative of `shape` at one design: ndarray[5 k] -> ndarray[5 k, n_wavelengths]."""
+        """Return the derivative of `shape` at one design.
+
+        Parameters
+        ----------
+        x : ndarray of shape (n_parameters,)
+            Parameters of one design.
+
+        Returns
+        -------
+        ndarray of shape (n_parameters, n_wavelengths)
+            Derivative, per unit of parameter.
+        """
         bands = x.reshape(self._count, _PER_BAND)
         ends = bands[:, :DEPTH].reshape(-1, 2)
         slopes = edge_gradient(self._wave, ends[:, :1], ends[:, 1:])
@@ -62,7 +95,18 @@ class Bands:
         return rows.reshape(-1, self._wave.size)
 
     def reach(self, low: FloatArray, high: FloatArray) -> FloatArray:
-        """1 where a band of the box `low`..`high` can be open, else 0: ndarray[n_wavelengths]."""
+        """Return where a band of the box can be open.
+
+        Parameters
+        ----------
+        low, high : ndarray of shape (n_parameters,)
+            Ends of the box of parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_wavelengths,)
+            0 or 1.
+        """
         open_at = np.zeros(self._wave.size)
         for at in range(0, self._count * _PER_BAND, _PER_BAND):
             start = low[at + LEFT] - _HALF * high[at + LEFT_WIDTH]
@@ -71,10 +115,20 @@ class Bands:
         return open_at
 
     def range(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """No `shape` of the box lies outside, whatever the order of its edges: ndarray[n_wavelengths] each.
+        """Return bounds on `shape` in a box, for any order of the edges.
 
-        An edge falls with its center, and with its width it falls behind the center and rises before it. So its
-        extremes are at the ends of both.
+        An edge falls with its center; with its width it falls behind the center and rises before it. Its extremes are
+        therefore at the ends of both.
+
+        Parameters
+        ----------
+        low, high : ndarray of shape (n_parameters,)
+            Ends of the box of parameters.
+
+        Returns
+        -------
+        low, high : ndarray of shape (n_wavelengths,)
+            Bounds.
         """
         least, most = np.zeros(self._wave.size), np.zeros(self._wave.size)
         for at in range(0, self._count * _PER_BAND, _PER_BAND):
@@ -92,12 +146,23 @@ class Bands:
         return least, most
 
     def produced(self, off: Off) -> Bands:
-        """The bands that come out."""
+        """Return the bands as production makes them.
+
+        Parameters
+        ----------
+        off : Off
+            Production error.
+
+        Returns
+        -------
+        Bands
+            Shifted bands.
+        """
         return Bands(off.nominal_nm(self._wave), self._count)
 
     @property
     def dimensions(self) -> dict[str, FloatArray]:
-        """Rows of the narrowest edge (10 to 90 %) and the narrowest band (between its 50 % points), nm."""
+        """Rows whose smallest product with the parameters is the narrowest edge (10 to 90 %) and band, nm."""
         identity = np.eye(self._count * _PER_BAND)
         first = np.arange(self._count) * _PER_BAND
         return {
@@ -106,20 +171,52 @@ class Bands:
         }
 
     def violation(self, x: FloatArray) -> FloatArray:
-        """Edges out of order, nm, ndarray[n_designs, 3 k - 1].
+        """Return the order of the edges.
 
         Start and end of a left edge must not lie behind those of its right edge, and a band must end before the next
         begins.
+
+        Parameters
+        ----------
+        x : ndarray of shape (n_designs, n_parameters)
+            Parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, 3 k - 1)
+            Edges out of order, nm; met where <= 0.
         """
         return row_products(x, self._conditions.T)
 
     def violation_gradient(self, x: FloatArray) -> FloatArray:
-        """Constant, ndarray[3 k - 1, 5 k]."""
+        """Return the derivative of `violation`, which is constant.
+
+        Parameters
+        ----------
+        x : ndarray of shape (n_parameters,)
+            Parameters of one design.
+
+        Returns
+        -------
+        ndarray of shape (3 k - 1, n_parameters)
+            Derivative.
+        """
         assert x.shape == (self._count * _PER_BAND,)
         return self._conditions
 
     def edges(self, centers_and_widths: FloatArray) -> FloatArray:
-        """Rising edges: ndarray[n, 2] -> ndarray[n, n_wavelengths]."""
+        """Return rising edges.
+
+        Parameters
+        ----------
+        centers_and_widths : ndarray of shape (n, 2)
+            Center and width of each edge, nm.
+
+        Returns
+        -------
+        ndarray of shape (n, n_wavelengths)
+            Edges, 0 to 1.
+        """
         return edge(self._wave, centers_and_widths[:, :1], centers_and_widths[:, 1:])
 
     def _open(self, x: FloatArray, band: int) -> FloatArray:
@@ -131,7 +228,7 @@ class Bands:
         return np.asarray(left - right, dtype=float)
 
     def _each_once(self, centers_and_widths: FloatArray) -> FloatArray:
-        """`edges`, where the designs of a grid share many: each is computed once."""
+        """Return `edges`; each distinct edge of a grid is computed once."""
         unique, which = np.unique(centers_and_widths, axis=0, return_inverse=True)
         return self.edges(unique)[which.ravel()]
 
@@ -155,7 +252,7 @@ class Bands:
 
 
 class Banded:
-    """What families whose parameters are those of bands have in common."""
+    """Base class of families whose parameters are those of bands."""
 
     start_dimensions: int | None = None
 
@@ -173,19 +270,63 @@ class Banded:
         return self._bands.dimensions
 
     def produced(self, off: Off) -> Self:
-        """The same curves to go between, with the bands moved; see `Family.produced`."""
+        """Return the family with shifted bands between the same curves; see `Family.produced`.
+
+        Parameters
+        ----------
+        off : Off
+            Production error.
+
+        Returns
+        -------
+        Family
+            The family as production makes it.
+        """
         made = copy(self)
         made._bands = self._bands.produced(off)
         return made
 
     def start(self, points: FloatArray) -> FloatArray:
-        """Not needed: a search starts anywhere in its box."""
+        """Raise an error: a search starts anywhere in the box.
+
+        Parameters
+        ----------
+        points : ndarray of shape (n, start_dimensions)
+            Points of the unit cube.
+
+        Returns
+        -------
+        ndarray of shape (n, n_parameters)
+            Starting designs.
+        """
         return points
 
     def violation(self, x: FloatArray) -> FloatArray:
-        """Edges out of order, nm; see `Bands.violation`."""
+        """Return edges out of order, nm; see `Bands.violation`.
+
+        Parameters
+        ----------
+        x : ndarray of shape (n_designs, n_parameters)
+            Parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n_conditions)
+            Values of the conditions, met where <= 0.
+        """
         return self._bands.violation(x)
 
     def violation_gradient(self, x: FloatArray) -> FloatArray:
-        """See `Bands.violation_gradient`."""
+        """Return the derivative; see `Bands.violation_gradient`.
+
+        Parameters
+        ----------
+        x : ndarray of shape (n_parameters,)
+            Parameters of one design.
+
+        Returns
+        -------
+        ndarray of shape (n_conditions, n_parameters)
+            Derivatives of the conditions.
+        """
         return self._bands.violation_gradient(x)

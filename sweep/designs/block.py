@@ -1,8 +1,8 @@
-"""Blocks of designs, as the image chain needs them: products of their filters with weights, and shapes of the curves.
+"""Batches of designs for the forward model: products of filters with weights, and shapes of the curves.
 
 Two routes with one signature. `CurveBlock` takes any filters, as one matrix product. `EdgeBlock` takes designs of a
-grid of stopbands: N = base + depth (target - base) (e_left - e_right), so a product is that of the base and two
-look-ups in tables over the grid's edges, exact up to rounding; no spectrum is touched per design.
+grid of stopbands: N = base + depth (target - base) (e_left - e_right), so that a product is that of the base and two
+look-ups in tables over the edges of the grid, exact up to rounding, without a spectrum per design.
 """
 
 from __future__ import annotations
@@ -31,30 +31,74 @@ _MANY = 64
 
 
 class Block(Protocol):
-    """Designs with one modified channel or several."""
+    """Batch of designs with one or several modified channels."""
 
     def __len__(self) -> int:
-        """Number of designs."""
+        """Return the number of designs."""
 
     def curves(self) -> FloatArray:
-        """QE of the modified channels, ndarray[n_designs, n_modified, n_wavelengths]."""
+        """Return the QE of the modified channels.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE of the modified channels.
+        """
 
     def product(self, weights: FloatArray, nodes: IndexArray) -> FloatArray:
-        """Sum over modified channels and `nodes` of QE times `weights` ([n_modified x n_nodes, k]): [n_designs, k]."""
+        """Sum QE times weights over modified channels and wavelengths.
+
+        Parameters
+        ----------
+        weights : ndarray of shape (n_modified * n_nodes, k)
+            Weights.
+        nodes : ndarray of int, shape (n_nodes,)
+            Wavelengths of the weights.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, k)
+            Sums over modified channels and wavelengths.
+        """
 
     def shapes(self, base_qe: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Largest step between neighboring wavelengths, and smallest ratio to `base_qe`, ndarray[n_designs] each.
+        """Return slope and transmission of the curves, over all modified channels.
 
-        Over all modified channels; `base_qe`: ndarray[n_modified, n_wavelengths]. Where it is 0 the ratio is 1.
+        Parameters
+        ----------
+        base_qe : ndarray of shape (n_modified, n_wavelengths)
+            QE of the replaced curves.
+
+        Returns
+        -------
+        steepest, lowest : ndarray of shape (n_designs,)
+            Largest step between neighboring wavelengths, and smallest ratio to the base, 1 where the base is 0.
         """
 
     def some(self, which: IndexArray | slice) -> Block:
-        """Those of its designs."""
+        """Return some of the designs.
+
+        Parameters
+        ----------
+        which : ndarray of int or slice
+            Indices of designs.
+
+        Returns
+        -------
+        Block
+            The selected designs.
+        """
 
 
 @dataclass(frozen=True)
 class CurveBlock:
-    """Any filters: `qe`, ndarray[n_designs, n_modified, n_wavelengths]."""
+    """Filters given by their curves.
+
+    Parameters
+    ----------
+    qe : ndarray of shape (n_designs, n_modified, n_wavelengths)
+        QE of the modified channels.
+    """
 
     qe: FloatArray
 
@@ -62,21 +106,62 @@ class CurveBlock:
         return len(self.qe)
 
     def curves(self) -> FloatArray:
-        """See `Block.curves`."""
+        """Return the QE of the modified channels.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE of the modified channels.
+        """
         return self.qe
 
     def product(self, weights: FloatArray, nodes: IndexArray) -> FloatArray:
-        """See `Block.product`; in the precision of the weights."""
+        """Sum QE times weights, in the precision of the weights.
+
+        Parameters
+        ----------
+        weights : ndarray of shape (n_modified * n_nodes, k)
+            Weights.
+        nodes : ndarray of int, shape (n_nodes,)
+            Wavelengths of the weights.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, k)
+            Sums over modified channels and wavelengths.
+        """
         seen = self.qe if nodes.size == self.qe.shape[2] else self.qe[:, :, nodes]
         flat = seen.reshape(len(self.qe), -1)
         return row_products(flat.astype(weights.dtype, copy=False), weights)
 
     def some(self, which: IndexArray | slice) -> CurveBlock:
-        """See `Block.some`."""
+        """Return some of the designs.
+
+        Parameters
+        ----------
+        which : ndarray of int or slice
+            Indices of designs.
+
+        Returns
+        -------
+        CurveBlock
+            The selected designs.
+        """
         return CurveBlock(self.qe[which])
 
     def shapes(self, base_qe: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """See `Block.shapes`."""
+        """Return slope and transmission of the curves.
+
+        Parameters
+        ----------
+        base_qe : ndarray of shape (n_modified, n_wavelengths)
+            QE of the replaced curves.
+
+        Returns
+        -------
+        steepest, lowest : ndarray of shape (n_designs,)
+            Largest step between neighboring wavelengths, and smallest ratio to the base, 1 where the base is 0.
+        """
         steepest, lowest = np.zeros(len(self.qe)), np.full(len(self.qe), np.inf)
         for channel, base in enumerate(np.asarray(base_qe, dtype=float)):
             curves = np.ascontiguousarray(self.qe[:, channel], dtype=float)
@@ -89,7 +174,15 @@ class CurveBlock:
 
 @dataclass(frozen=True)
 class EdgeSums:
-    """Weighted sums: of the base, ndarray[n], and of the change times each edge, ndarray[n_edges, n]."""
+    """Weighted sums of the base, and of the change times each edge.
+
+    Parameters
+    ----------
+    base : ndarray of shape (n,)
+        Sums of the base.
+    left, right : ndarray of shape (n_edges, n)
+        Sums of each edge.
+    """
 
     base: FloatArray
     left: FloatArray
@@ -97,7 +190,7 @@ class EdgeSums:
 
 
 class KnownShapes(NamedTuple):
-    """What `compiled.shapes_of_edges` knows of a grid before it sees a design."""
+    """Shapes of a grid's edges for `compiled.shapes_of_edges`, computed before its designs."""
 
     inverse: FloatArray
     dark: FloatArray
@@ -111,7 +204,7 @@ class KnownShapes(NamedTuple):
 
 @dataclass
 class Tables:
-    """All edges of a grid, ndarray[n_edges, n_wavelengths] each, and what they give with weights."""
+    """All edges of a grid and their products with weights."""
 
     base: FloatArray
     change: FloatArray
@@ -122,13 +215,26 @@ class Tables:
 
     @cached_property
     def spans(self) -> tuple[IndexArray, IndexArray]:
-        """Where each edge rises, see `compiled.spans`."""
+        """Range in which each edge rises, see `compiled.spans`."""
         from .compiled import spans  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         return spans(self.left), spans(self.right)
 
     def shapes(self, base_qe: FloatArray, deep: float) -> KnownShapes:
-        """What is known of the shapes of designs of a depth; `base_qe`: ndarray[n_wavelengths]."""
+        """Return the shapes of the grid's edges at one depth; cached.
+
+        Parameters
+        ----------
+        base_qe : ndarray of shape (n_wavelengths,)
+            QE of the replaced curve.
+        deep : float
+            Depth.
+
+        Returns
+        -------
+        KnownShapes
+            Shapes.
+        """
         from .compiled import edge_shapes, outside, ranges_of  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         def made() -> KnownShapes:
@@ -141,7 +247,20 @@ class Tables:
         return self._shapes.get((deep, base_qe.tobytes()), made)
 
     def product(self, weights: FloatArray, nodes: IndexArray) -> EdgeSums:
-        """The weighted sums of the base, and of the change times each edge."""
+        """Return weighted sums of the base and of the change times each edge; cached.
+
+        Parameters
+        ----------
+        weights : ndarray of shape (n_modified * n_nodes, k)
+            Weights.
+        nodes : ndarray of int, shape (n_nodes,)
+            Wavelengths of the weights.
+
+        Returns
+        -------
+        EdgeSums
+            Sums.
+        """
 
         def made() -> EdgeSums:
             changed = self.change[nodes, None] * weights
@@ -154,7 +273,21 @@ class Tables:
 
 @dataclass(frozen=True)
 class EdgeBlock:
-    """Designs of a grid of stopbands by the numbers of their edges; `numbers`: their own in the grid."""
+    """Designs of a grid of stopbands by the indices of their edges.
+
+    Parameters
+    ----------
+    space : Space
+        Grid.
+    numbers : ndarray of int, shape (n_designs,)
+        Numbers of the designs in the grid.
+    tables : Tables
+        Edges of the grid.
+    at_left, at_right : ndarray of int, shape (n_designs,)
+        Edges of each design.
+    depth : ndarray of shape (n_designs,)
+        Depth of each design.
+    """
 
     space: Space
     numbers: IndexArray
@@ -167,16 +300,46 @@ class EdgeBlock:
         return len(self.depth)
 
     def curves(self) -> FloatArray:
-        """See `Block.curves`."""
+        """Return the QE of the modified channel.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE of the modified channels.
+        """
         return self.space.curves(self.space.points_of(self.numbers), self.tables.base.size)
 
     def some(self, which: IndexArray | slice) -> EdgeBlock:
-        """See `Block.some`."""
+        """Return some of the designs.
+
+        Parameters
+        ----------
+        which : ndarray of int or slice
+            Indices of designs.
+
+        Returns
+        -------
+        EdgeBlock
+            The selected designs.
+        """
         ends = (self.at_left[which], self.at_right[which], self.depth[which])
         return EdgeBlock(self.space, self.numbers[which], self.tables, *ends)
 
     def product(self, weights: FloatArray, nodes: IndexArray) -> FloatArray:
-        """See `Block.product`."""
+        """Sum QE times weights by table lookup.
+
+        Parameters
+        ----------
+        weights : ndarray of shape (n_modified * n_nodes, k)
+            Weights.
+        nodes : ndarray of int, shape (n_nodes,)
+            Wavelengths of the weights.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, k)
+            Sums over modified channels and wavelengths.
+        """
         from .compiled import through_edges  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         found = np.empty((len(self), weights.shape[1]))
@@ -185,7 +348,18 @@ class EdgeBlock:
         return found
 
     def shapes(self, base_qe: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """See `Block.shapes`; `base_qe` is the family's own."""
+        """Return slope and transmission of the curves by table lookup.
+
+        Parameters
+        ----------
+        base_qe : ndarray of shape (n_modified, n_wavelengths)
+            QE of the replaced curves.
+
+        Returns
+        -------
+        steepest, lowest : ndarray of shape (n_designs,)
+            Largest step between neighboring wavelengths, and smallest ratio to the base, 1 where the base is 0.
+        """
         from .compiled import shapes_of_edges  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         steepest, lowest = np.empty(len(self)), np.empty(len(self))
@@ -198,12 +372,12 @@ class EdgeBlock:
 
 
 def _inverse(base: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """1 / base and 0; where the base is 0, 0 and 1, so that the ratio to it is 1."""
+    """Return 1 / base and 0; where the base is 0, 0 and 1, so that the ratio to it is 1."""
     return np.divide(1.0, base, out=np.zeros_like(base), where=base > 0), np.where(base > 0, 0.0, 1.0)
 
 
 def _shapes(curves: FloatArray, inverse: FloatArray, dark: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Of each curve what `compiled.shapes` says, of few without what is compiled."""
+    """Return slope and transmission of each curve, without compiled code for few curves."""
     if len(curves) < _MANY:
         steps = np.abs(np.diff(curves, axis=1))
         return steps.max(axis=1, initial=0.0), (curves * inverse + dark).min(axis=1)
@@ -220,12 +394,23 @@ _known: Cache[int, tuple[Space, Tables | None]] = Cache(_KEPT_TABLES)
 
 
 def by_edges(space: Space) -> bool:
-    """Whether `edges_of` takes the designs of a space."""
+    """Return whether `edges_of` takes the designs of a space.
+
+    Parameters
+    ----------
+    space : Space
+        Designs.
+
+    Returns
+    -------
+    bool
+        True for grids of separable families whose tables are not too large.
+    """
     return _separable(space) is not None
 
 
 def _separable(space: Space) -> tuple[SeparableFamily, FloatArray, FloatArray] | None:
-    """Family, base and change of a grid; None where the family is not separable, or its tables were too large."""
+    """Return family, base and change of a grid; None if the family is not separable or its tables are too large."""
     family = None if space.filter is None else space.filter.family
     if not space.gridded or not isinstance(family, SeparableFamily):
         return None
@@ -235,12 +420,38 @@ def _separable(space: Space) -> tuple[SeparableFamily, FloatArray, FloatArray] |
 
 
 def edges_of(space: Space, start: int, stop: int) -> EdgeBlock | None:
-    """Designs `start`..`stop`-1 of a grid by their edges; see `edges_of_some`."""
+    """Return consecutive designs of a grid by their edges.
+
+    Parameters
+    ----------
+    space : Space
+        Grid.
+    start, stop : int
+        Range of the designs.
+
+    Returns
+    -------
+    EdgeBlock or None
+        None if the family is not separable or its tables are too large.
+    """
     return edges_of_some(space, np.arange(start, stop))
 
 
 def edges_of_some(space: Space, numbers: IndexArray) -> EdgeBlock | None:
-    """Designs of a grid by their edges; None where the family is not separable, or its tables were too large."""
+    """Return designs of a grid by their edges.
+
+    Parameters
+    ----------
+    space : Space
+        Grid.
+    numbers : ndarray of int, shape (n_designs,)
+        Numbers of the designs.
+
+    Returns
+    -------
+    EdgeBlock or None
+        None if the family is not separable or its tables are too large.
+    """
     _, tables = _known.get(id(space), lambda: (space, _tables_of(space)))
     if tables is None:
         return None
@@ -251,7 +462,7 @@ def edges_of_some(space: Space, numbers: IndexArray) -> EdgeBlock | None:
 
 
 def _tables_of(space: Space) -> Tables | None:
-    """The tables of a grid's edges; those of equal grids are the same ones."""
+    """Return the tables of a grid's edges; equal grids share them."""
     found = _separable(space)
     if found is None:
         return None

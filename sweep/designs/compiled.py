@@ -1,7 +1,6 @@
-"""Compiled inner loops: values through edges and shapes of curves, without an array per step.
+"""Compiled inner loops: values through edges, and shapes of curves, without an array per step.
 
-They release the GIL and are compiled once per machine (Numba's cache). Sums keep their order, so that results are those
-of the same sums in NumPy.
+They release the GIL. Sums keep their order, so results equal those of the same sums in NumPy.
 """
 
 from __future__ import annotations
@@ -26,9 +25,20 @@ def through_edges(
     depth: FloatArray,
     out: FloatArray,
 ) -> None:
-    """base + depth (left - right) of each design, ndarray[n_designs, n]: `left`, `right`: ndarray[n_edges, n].
+    """Compute base + depth (left - right) of each design.
 
-    `at_left`, `at_right`, `depth`: ndarray[n_designs].
+    Parameters
+    ----------
+    base : ndarray of shape (n,)
+        Values of the base.
+    left, right : ndarray of shape (n_edges, n)
+        Values of each edge.
+    at_left, at_right : ndarray of int, shape (n_designs,)
+        Edges of each design.
+    depth : ndarray of shape (n_designs,)
+        Depth of each design.
+    out : ndarray of shape (n_designs, n)
+        Results.
     """
     for d in range(depth.size):
         one, other, deep = at_left[d], at_right[d], depth[d]
@@ -48,10 +58,16 @@ def _shape(curve: FloatArray, inverse: FloatArray, dark: FloatArray) -> tuple[fl
 
 @njit(cache=True, nogil=True, fastmath=_NUMBERS)
 def shapes(curves: FloatArray, inverse: FloatArray, dark: FloatArray, steepest: FloatArray, lowest: FloatArray) -> None:
-    """Largest step between neighboring wavelengths, and smallest ratio to a base curve.
+    """Compute the largest step between neighboring wavelengths, and the smallest ratio to a base curve.
 
-    `curves`: ndarray[n_designs, n_wavelengths]; `inverse`, `dark`: ndarray[n_wavelengths], 1 / base and 0, or 0 and 1
-    where the base is 0. `steepest`, `lowest`: ndarray[n_designs].
+    Parameters
+    ----------
+    curves : ndarray of shape (n_designs, n_wavelengths)
+        QE.
+    inverse, dark : ndarray of shape (n_wavelengths,)
+        1 / base and 0, or 0 and 1 where the base is 0.
+    steepest, lowest : ndarray of shape (n_designs,)
+        Results.
     """
     for d in range(curves.shape[0]):
         steepest[d], lowest[d] = _shape(curves[d], inverse, dark)
@@ -59,7 +75,18 @@ def shapes(curves: FloatArray, inverse: FloatArray, dark: FloatArray, steepest: 
 
 @njit(cache=True, nogil=True)
 def spans(edges: FloatArray) -> IndexArray:
-    """Where each edge rises: its first value that is not 0, and one after the last that is not 1: [n_edges, 2]."""
+    """Return the range in which each edge rises: its first nonzero value, and one after its last value below 1.
+
+    Parameters
+    ----------
+    edges : ndarray of shape (n_edges, n_wavelengths)
+        Edges.
+
+    Returns
+    -------
+    ndarray of int, shape (n_edges, 2)
+        Ranges.
+    """
     found = np.empty((edges.shape[0], 2), np.intp)
     for e in range(edges.shape[0]):
         begin, end = 0, edges.shape[1]
@@ -73,7 +100,18 @@ def spans(edges: FloatArray) -> IndexArray:
 
 @njit(cache=True, nogil=True, fastmath=_NUMBERS)
 def outside(base: FloatArray, inverse: FloatArray, dark: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """`_shape` of the base curve's first w wavelengths, and of those from w on: two ndarray[n_wavelengths + 1, 2]."""
+    """Return the shape of the base curve's first w wavelengths, and of those from w on.
+
+    Parameters
+    ----------
+    base, inverse, dark : ndarray of shape (n_wavelengths,)
+        Base curve; see `shapes`.
+
+    Returns
+    -------
+    before, after : ndarray of shape (n_wavelengths + 1, 2)
+        Steepest step and lowest ratio for each w.
+    """
     n = base.size
     before, after = np.empty((n + 1, 2)), np.empty((n + 1, 2))
     before[0, 0] = after[n, 0] = 0.0
@@ -91,7 +129,18 @@ def outside(base: FloatArray, inverse: FloatArray, dark: FloatArray) -> tuple[Fl
 
 @njit(cache=True, nogil=True, fastmath=_NUMBERS)
 def ranges_of(curve: FloatArray, inverse: FloatArray, dark: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Steepest step and lowest value, as of `_shape`, of 2^k wavelengths from each on: ndarray[k, n_wavelengths]."""
+    """Return steepest step and lowest ratio of 2^k wavelengths from each on.
+
+    Parameters
+    ----------
+    curve, inverse, dark : ndarray of shape (n_wavelengths,)
+        Curve; see `shapes`.
+
+    Returns
+    -------
+    steps, lows : ndarray of shape (n_levels, n_wavelengths)
+        Steepest step and lowest ratio.
+    """
     n = curve.size
     levels = 1
     while 1 << levels <= n:
@@ -113,9 +162,23 @@ def ranges_of(curve: FloatArray, inverse: FloatArray, dark: FloatArray) -> tuple
 def edge_shapes(
     base: FloatArray, change: FloatArray, edges: FloatArray, spans: IndexArray, inverse: FloatArray, dark: FloatArray
 ) -> FloatArray:
-    """`_shape` where each edge rises or falls alone, with the steps to both sides: ndarray[n_edges, 2].
+    """Return the shape where each edge rises or falls alone, with the steps to both sides.
 
-    `edges`: what the change is multiplied by, ndarray[n_edges, n_wavelengths].
+    Parameters
+    ----------
+    base, change : ndarray of shape (n_wavelengths,)
+        Base curve, and target minus base.
+    edges : ndarray of shape (n_edges, n_wavelengths)
+        Factor of the change.
+    spans : ndarray of int, shape (n_edges, 2)
+        Range of each edge.
+    inverse, dark : ndarray of shape (n_wavelengths,)
+        See `shapes`.
+
+    Returns
+    -------
+    ndarray of shape (n_edges, 2)
+        Steepest step and lowest ratio.
     """
     found, curve = np.empty((edges.shape[0], 2)), np.empty(base.size)
     for e in range(edges.shape[0]):
@@ -136,7 +199,7 @@ def _between_edges(
 
 @njit(cache=True, nogil=True, fastmath=_NUMBERS)
 def _inner_shape(steps: FloatArray, lows: FloatArray, begin: int, end: int) -> tuple[float, float]:
-    """`_shape` of the wavelengths begin..end-1, at least one, by `ranges_of`."""
+    """Return the shape of wavelengths begin..end-1, at least one, from `ranges_of`."""
     n, k, step = end - begin, 0, 0.0
     while 1 << (k + 1) <= n:
         k += 1
@@ -170,12 +233,30 @@ def shapes_of_edges(
     steepest: FloatArray,
     lowest: FloatArray,
 ) -> None:
-    """`shapes` of base + change depth (left - right), without keeping a curve.
+    """Compute `shapes` of base + change depth (left - right), without keeping a curve.
 
-    `base`, `change`: ndarray[n_wavelengths]; `left`, `right`: ndarray[n_edges, n_wavelengths]; their `spans`; the rest
-    as in `through_edges`. Where both edges are 0, or both 1, the curve is its base: `before` and `after`, of `outside`.
-    Where one edge rises before the other, the curve between them is known from `steps` and `lows`, of `ranges_of`, and
-    where one rises, from the `edge_shapes` `of_left`, `of_right`: those of designs whose depth is `deep`.
+    Where both edges are 0, or both 1, the curve is its base: `before` and `after` of `outside`. Where one edge rises
+    before the other, the curve between them follows from `steps` and `lows` of `ranges_of`; where one edge rises, from
+    the `edge_shapes` `of_left` and `of_right`, for designs of depth `deep`.
+
+    Parameters
+    ----------
+    base, change : ndarray of shape (n_wavelengths,)
+        Base curve, and target minus base.
+    left, right : ndarray of shape (n_edges, n_wavelengths)
+        Edges.
+    left_spans, right_spans : ndarray of int, shape (n_edges, 2)
+        Ranges of the edges.
+    at_left, at_right, depth : ndarray of shape (n_designs,)
+        As in `through_edges`.
+    deep : float
+        Depth of the known shapes.
+    inverse, dark : ndarray of shape (n_wavelengths,)
+        See `shapes`.
+    before, after, steps, lows, of_left, of_right : ndarray
+        Known shapes.
+    steepest, lowest : ndarray of shape (n_designs,)
+        Results.
     """
     curve, n = np.empty(base.size), base.size
     for d in range(depth.size):

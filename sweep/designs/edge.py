@@ -1,4 +1,4 @@
-"""The edge of a filter: from 0 to 1 over a stated width, exactly 0 and 1 outside it."""
+"""Edge of a filter: from 0 to 1 over a stated width, exactly 0 and 1 outside it."""
 
 from __future__ import annotations
 
@@ -15,9 +15,21 @@ _WALL_NM = 1e-9
 
 
 def edge(wavelength_nm: FloatArray, center_nm: FloatArray, width_nm: FloatArray) -> FloatArray:
-    """Rising edge, 0.5 at `center_nm`, from 10 % to 90 % within `width_nm`; the arguments broadcast.
+    """Return a rising edge, a quintic with two continuous derivatives (Perlin's smootherstep).
 
-    A quintic with two continuous derivatives (Perlin's smootherstep). Width 0 is a brick wall with 0.5 at its center.
+    Parameters
+    ----------
+    wavelength_nm : ndarray
+        Wavelengths, nm; all arguments broadcast.
+    center_nm : ndarray
+        Center, where the edge is 0.5, nm.
+    width_nm : ndarray
+        Width from 10 to 90 %, nm; 0 is a step with 0.5 at its center.
+
+    Returns
+    -------
+    ndarray
+        0 to 1.
     """
     t = _position(wavelength_nm, center_nm, width_nm)
     return np.asarray(t * t * t * (t * (6 * t - 15) + 10), dtype=float)
@@ -26,7 +38,18 @@ def edge(wavelength_nm: FloatArray, center_nm: FloatArray, width_nm: FloatArray)
 def edge_gradient(
     wavelength_nm: FloatArray, center_nm: FloatArray, width_nm: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Derivatives of `edge` by center and by width, 1/nm. 0 for a brick wall, whose derivative is a distribution."""
+    """Return the derivatives of `edge`; 0 for a step, whose derivative is a distribution.
+
+    Parameters
+    ----------
+    wavelength_nm, center_nm, width_nm : ndarray
+        As in `edge`.
+
+    Returns
+    -------
+    by_center, by_width : ndarray
+        Derivatives, 1/nm.
+    """
     t = _position(wavelength_nm, center_nm, width_nm)
     slope = 30 * t * t * (1 - t) * (1 - t)
     span = np.asarray(width_nm, dtype=float) * SPAN_PER_WIDTH

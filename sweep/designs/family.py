@@ -1,4 +1,4 @@
-"""What every family of filters offers."""
+"""Interface of families of filters."""
 
 from __future__ import annotations
 
@@ -12,7 +12,17 @@ from .tolerance import Off
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of a family: its name with its unit, the range it is defined on, and a default if it has one."""
+    """Parameter of a family.
+
+    Parameters
+    ----------
+    name : str
+        Name with its unit.
+    low, high : float
+        Range of definition.
+    default : float, optional
+        Default.
+    """
 
     name: str
     low: float
@@ -21,10 +31,10 @@ class Parameter:
 
 
 class Family(Protocol):
-    """A filter as a function of its parameters, for blocks of designs.
+    """Filter as a function of its parameters, for batches of designs.
 
-    `kind` names the family, `n_modified` is the number of channels that it replaces. `needs_target`: whether it goes
-    from its base to a target. `Options`: what it needs beside its parameters, from a study.
+    `kind` names the family, `n_modified` is the number of channels that it replaces, `needs_target` states whether it
+    needs a target curve, and `Options` is the schema of its options in a study.
     """
 
     kind: ClassVar[str]
@@ -36,70 +46,199 @@ class Family(Protocol):
     def of_study(
         cls, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None, options: Section
     ) -> Family:
-        """The family over curves of a study, ndarray[n_wavelengths] each; no `target` where it needs none.
+        """Make the family over curves of a study.
 
-        Raises SweepError for what does not fit together.
+        Parameters
+        ----------
+        wavelength_nm : ndarray of shape (n_wavelengths,)
+            Wavelengths, nm.
+        base : ndarray of shape (n_wavelengths,)
+            QE of the replaced curve.
+        target : ndarray of shape (n_wavelengths,) or None
+            QE that the filter takes inside its band.
+        options : Section
+            Options of the family.
+
+        Returns
+        -------
+        Family
+            The family.
+
+        Raises
+        ------
+        SweepError
+            If curves and options do not fit together.
         """
 
     @property
     def start_dimensions(self) -> int | None:
-        """Dimensions of the unit cube that `start` takes; None where any point of the box is a good start."""
+        """Dimensions of the unit cube that `start` takes; None if any point of the box is a good start."""
 
     @property
     def parameters(self) -> Sequence[Parameter]:
-        """The parameters, in the order of the columns of `x`."""
+        """Parameters in the order of the columns of `x`."""
 
     def curves(self, x: FloatArray) -> FloatArray:
-        """QE of the modified channels: [n_designs, n_parameters] -> [n_designs, n_modified, n_wavelengths]."""
+        """Return the QE of the modified channels.
+
+        Parameters
+        ----------
+        x : ndarray of shape (n_designs, n_parameters)
+            Parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE of the modified channels.
+        """
 
     def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
-        """No well-formed filter of the box `low`..`high` exceeds this, ndarray[n_modified, n_wavelengths]."""
+        """Return an upper bound on all well-formed filters of a box.
+
+        Parameters
+        ----------
+        low, high : ndarray of shape (n_parameters,)
+            Ends of the box of parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_modified, n_wavelengths)
+            Upper bound on the QE.
+        """
 
     def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
-        """No well-formed filter of the box is below this, ndarray[n_modified, n_wavelengths]; see `upper`."""
+        """Return a lower bound on all well-formed filters of a box.
+
+        Parameters
+        ----------
+        low, high : ndarray of shape (n_parameters,)
+            Ends of the box of parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_modified, n_wavelengths)
+            Lower bound on the QE.
+        """
 
     def hull(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """No filter of the box, well formed or not, is below the first or above the second: see `upper`."""
+        """Return bounds on all filters of a box, well formed or not.
+
+        Parameters
+        ----------
+        low, high : ndarray of shape (n_parameters,)
+            Ends of the box of parameters.
+
+        Returns
+        -------
+        low, high : ndarray of shape (n_modified, n_wavelengths)
+            Bounds on the QE.
+        """
 
     def gradient(self, x: FloatArray) -> FloatArray:
-        """Derivative of `curves` at one design: [n_parameters] -> [n_parameters, n_modified, n_wavelengths]."""
+        """Return the derivative of `curves` at one design.
+
+        Parameters
+        ----------
+        x : ndarray of shape (n_parameters,)
+            Parameters of one design.
+
+        Returns
+        -------
+        ndarray of shape (n_parameters, n_modified, n_wavelengths)
+            QE per unit of parameter.
+        """
 
     @property
     def dimensions(self) -> Mapping[str, FloatArray]:
-        """Lengths that a producer asks for, nm: name -> rows r, ndarray[n, n_parameters]; a length is min(r @ x)."""
+        """Lengths in production by name: rows r, ndarray of shape (n, n_parameters); a length is min(r @ x), nm."""
 
     def produced(self, off: Off) -> Self:
-        """The same family as production has it."""
+        """Return the family as production makes it.
+
+        Parameters
+        ----------
+        off : Off
+            Production error.
+
+        Returns
+        -------
+        Family
+            Family with this production error.
+        """
 
     def start(self, points: FloatArray) -> FloatArray:
-        """Well-formed designs to start a search from: [n, start_dimensions] in 0..1 -> [n, n_parameters]."""
+        """Return well-formed designs to start a search from.
+
+        Parameters
+        ----------
+        points : ndarray of shape (n, start_dimensions)
+            Points of the unit cube.
+
+        Returns
+        -------
+        ndarray of shape (n, n_parameters)
+            Starting designs.
+        """
 
     def violation(self, x: FloatArray) -> FloatArray:
-        """Conditions of a well-formed design, met where <= 0: [n_designs, n_parameters] to [n_designs, n]."""
+        """Return the conditions of a well-formed design.
+
+        Parameters
+        ----------
+        x : ndarray of shape (n_designs, n_parameters)
+            Parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n_conditions)
+            Values of the conditions, met where <= 0.
+        """
 
     def violation_gradient(self, x: FloatArray) -> FloatArray:
-        """Derivative of `violation` at one design: [n_parameters] to [n, n_parameters]."""
+        """Return the derivative of `violation` at one design.
+
+        Parameters
+        ----------
+        x : ndarray of shape (n_parameters,)
+            Parameters of one design.
+
+        Returns
+        -------
+        ndarray of shape (n_conditions, n_parameters)
+            Derivatives of the conditions.
+        """
 
 
 @runtime_checkable
 class MovedFamily(Protocol):
-    """A family whose filter is fixed + carrier x shape: production moves the shape, and nothing else."""
+    """Family whose filter is fixed + base transmission times shape: production moves the shape alone."""
 
     @property
     def moved(self) -> tuple[FloatArray, FloatArray]:
-        """What is fixed, and the carrier of the shape, ndarray[n_wavelengths] each."""
+        """Fixed curve, and base transmission of the shape, ndarray of shape (n_wavelengths,) each."""
 
 
 @runtime_checkable
 class SeparableFamily(Protocol):
-    """A family whose filter is base + depth change (e(left) - e(right)).
+    """Family whose filter is base + depth change (e(left) - e(right)).
 
     Its parameters are left, left width, right, right width and depth.
     """
 
     @property
     def separable(self) -> tuple[FloatArray, FloatArray]:
-        """Base and change, ndarray[n_wavelengths] each."""
+        """Base and change, ndarray of shape (n_wavelengths,) each."""
 
     def edges(self, centers_and_widths: FloatArray) -> FloatArray:
-        """Rising edges, ndarray[n, 2] -> ndarray[n, n_wavelengths]."""
+        """Return rising edges.
+
+        Parameters
+        ----------
+        centers_and_widths : ndarray of shape (n, 2)
+            Center and width of each edge, nm.
+
+        Returns
+        -------
+        ndarray of shape (n, n_wavelengths)
+            Edges, 0 to 1.
+        """

@@ -1,4 +1,4 @@
-"""A family that a user wrote, or that an installed package offers; only its parameters and its curves are asked for."""
+"""Family of user code, or of an installed package."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ _SLACK = 1e-9
 
 
 class PluginFamily:
-    """A family by a class of one's own: FILE.py:CLASS, or the name by which an installed package offers it.
+    """Family by a class of user code: FILE.py:CLASS, or the name by which an installed package offers it.
 
-    The class has `parameters`, a list of (name, low, high) or (name, low, high, default), is made of (wavelength_nm,
-    base, target), and has `curves(x)`: ndarray[n_designs, n_parameters] -> QE, ndarray[n_designs, n_wavelengths]. It
-    may have `violation(x)`, ndarray[n_designs, n], met where <= 0, and `below_base = True`, which promises that no
-    curve of a well-formed design is above the base. Such curves are checked to be within 0 and 1, and below the base
-    where that is promised, so that these bounds hold for all of them. Gradients are central differences. A row of
-    `curves(x)` must not depend on the other rows.
+    The class has `parameters`, a list of (name, low, high) or (name, low, high, default), is constructed with
+    (wavelength_nm, base, target), and has `curves(x)`: ndarray of shape (n_designs, n_parameters) to QE, ndarray of
+    shape (n_designs, n_wavelengths). It may have `violation(x)`, ndarray of shape (n_designs, n), met where <= 0, and
+    `below_base = True`, which states that no curve of a well-formed design is above the base. Curves are checked to be
+    within 0 and 1, and below the base if that is stated. Gradients are central differences. A row of `curves(x)` must
+    not depend on the other rows.
 
-    A worker process gets the text of a file, not the file; an installed package it must have.
+    Worker processes get the text of a file; an installed package must be installed there.
     """
 
     n_modified = 1
@@ -47,7 +47,7 @@ class PluginFamily:
         return PluginFamily, self._given
 
     def _array(self, name: str, x: FloatArray, width: int | None) -> FloatArray:
-        """What a method gives for a block of designs, ndarray[n_designs, width]; else raises SweepError."""
+        """Call a method of the class and check its result, ndarray of shape (n_designs, width)."""
         try:
             found = np.asarray(self._given[0].called(getattr(self._own, name), x.copy()), dtype=float)
         except (TypeError, ValueError):
@@ -60,9 +60,22 @@ class PluginFamily:
         return found
 
     def curves(self, x: FloatArray) -> FloatArray:
-        """QE of the modified channel, ndarray[n_designs, 1, n_wavelengths]; see `Family.curves`.
+        """Return the QE of the modified channel; see `Family.curves`.
 
-        Raises SweepError where that of a well-formed design is out of its bounds; others are cut off at 0 and 1.
+        Parameters
+        ----------
+        x : ndarray of shape (n_designs, n_parameters)
+            Parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE of the modified channels.
+
+        Raises
+        ------
+        SweepError
+            If the curve of a well-formed design is out of its bounds; others are clipped to 0 and 1.
         """
         found = self._array("curves", x, self._base.size)
         well_formed = found[(self.violation(x) <= _SLACK).all(axis=1)]
@@ -74,29 +87,95 @@ class PluginFamily:
         return np.clip(found, 0.0, 1.0)[:, None, :]
 
     def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
-        """The base or 1, which every well-formed curve is checked against; see `Family.upper`."""
+        """Return the base or 1, which every well-formed curve is checked against.
+
+        Parameters
+        ----------
+        low, high : ndarray of shape (n_parameters,)
+            Ends of the box of parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_modified, n_wavelengths)
+            Upper bound on the QE.
+        """
         assert low.shape == high.shape
         return np.asarray((self._base if self.below_base else np.ones_like(self._base))[None], dtype=float)
 
     def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
-        """0; see `Family.lower`."""
+        """Return 0.
+
+        Parameters
+        ----------
+        low, high : ndarray of shape (n_parameters,)
+            Ends of the box of parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_modified, n_wavelengths)
+            Lower bound on the QE.
+        """
         assert low.shape == high.shape
         return np.zeros((1, self._base.size))
 
     def hull(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """0 and 1, at which all curves are cut off; see `Family.hull`."""
+        """Return 0 and 1, to which all curves are clipped.
+
+        Parameters
+        ----------
+        low, high : ndarray of shape (n_parameters,)
+            Ends of the box of parameters.
+
+        Returns
+        -------
+        low, high : ndarray of shape (n_modified, n_wavelengths)
+            Bounds on the QE.
+        """
         return self.lower(low, high), np.ones((1, self._base.size))
 
     def gradient(self, x: FloatArray) -> FloatArray:
-        """By central differences, one-sided at the ends of a parameter; see `Family.gradient`."""
+        """Return central differences, one-sided at the ends of a parameter.
+
+        Parameters
+        ----------
+        x : ndarray of shape (n_parameters,)
+            Parameters of one design.
+
+        Returns
+        -------
+        ndarray of shape (n_parameters, n_modified, n_wavelengths)
+            QE per unit of parameter.
+        """
         return self._differences(x, self.curves)
 
     def violation(self, x: FloatArray) -> FloatArray:
-        """The class's own conditions; one that is always met where it has none."""
+        """Return the conditions of the class; a condition that is always met if it has none.
+
+        Parameters
+        ----------
+        x : ndarray of shape (n_designs, n_parameters)
+            Parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n_conditions)
+            Values of the conditions, met where <= 0.
+        """
         return self._array("violation", x, None) if hasattr(self._own, "violation") else np.zeros((len(x), 1))
 
     def violation_gradient(self, x: FloatArray) -> FloatArray:
-        """By differences, ndarray[n, n_parameters]."""
+        """Return differences of the conditions.
+
+        Parameters
+        ----------
+        x : ndarray of shape (n_parameters,)
+            Parameters of one design.
+
+        Returns
+        -------
+        ndarray of shape (n_conditions, n_parameters)
+            Derivatives of the conditions.
+        """
         return self._differences(x, self.violation).T
 
     def _differences(self, x: FloatArray, function: Callable[[FloatArray], FloatArray]) -> FloatArray:
@@ -109,22 +188,44 @@ class PluginFamily:
 
     @property
     def dimensions(self) -> Mapping[str, FloatArray]:
-        """None: nothing is known of its edges."""
+        """None, since the edges are unknown."""
         return {}
 
     def produced(self, off: Off) -> PluginFamily:
-        """The same where nothing is off; a study with tolerances does not take it."""
+        """Return the same family; a study with production tolerances refuses it.
+
+        Parameters
+        ----------
+        off : Off
+            Production error.
+
+        Returns
+        -------
+        PluginFamily
+            The same family.
+        """
         if any(off):
             raise SweepError(Fault(f"{self.kind} has no edges that production could shift"))
         return self
 
     def start(self, points: FloatArray) -> FloatArray:
-        """Not needed: a search starts anywhere in its box."""
+        """Raise an error: a search starts anywhere in the box.
+
+        Parameters
+        ----------
+        points : ndarray of shape (n, start_dimensions)
+            Points of the unit cube.
+
+        Returns
+        -------
+        ndarray of shape (n, n_parameters)
+            Starting designs.
+        """
         return points
 
 
 def _parameters(kind: str, said: Any) -> tuple[Parameter, ...]:
-    """The parameters that a class says."""
+    """Check and return the parameters of a class."""
     try:
         found = tuple(Parameter(str(name), *map(float, numbers)) for name, *numbers in said)
     except (TypeError, ValueError):

@@ -1,4 +1,4 @@
-"""A product whose rows do not depend on their company."""
+"""Matrix product whose rows do not depend on each other."""
 
 from __future__ import annotations
 
@@ -11,11 +11,22 @@ _FEW_TERMS = 8
 
 
 def row_products(rows: FloatArray, matrix: FloatArray) -> FloatArray:
-    """`rows @ matrix`, each row by the same call: on one machine its sums are the same alone and in any block.
+    """Multiply each row by a matrix in a call of its own.
 
-    `rows`: ndarray[n, k]; `matrix`: ndarray[k, m]. BLAS sums in an order that depends on shapes, strides and, on some
-    processors, a row's place among others. So every row is multiplied by itself. On another machine, or by another
-    route, sums are equal to rounding.
+    BLAS sums in an order that depends on shapes, strides and the place of a row among others. Here the sums of a row
+    are the same alone and in any block, on one machine.
+
+    Parameters
+    ----------
+    rows : ndarray of shape (n, k)
+        Rows.
+    matrix : ndarray of shape (k, m)
+        Matrix.
+
+    Returns
+    -------
+    ndarray of shape (n, m)
+        Products.
     """
     if 0 < len(matrix) <= _FEW_TERMS:
         columns = np.ascontiguousarray(rows.T)

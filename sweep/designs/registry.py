@@ -1,4 +1,4 @@
-"""Every family that a study can name, found in `families`, and how one is made from a study's words."""
+"""Families that a study can name, collected from `families`."""
 
 from __future__ import annotations
 
@@ -24,17 +24,23 @@ FAMILIES = _found()
 
 
 def _optional(kinds: dict[str, type[Family]]) -> dict[str, Any]:
-    """The options of all families, each of which may be left out."""
+    """Return the options of all families as optional fields."""
     every = {name: field for family in kinds.values() for name, field in family.Options.model_fields.items()}
     return {name: (field.rebuild_annotation() | None, None) for name, field in every.items()}
 
 
 class FamilyOptions(create_model("_FamilyOptions", __base__=Section, **_optional(FAMILIES))):  # type: ignore[misc]
-    """What a family needs beside its parameters; each family has options of its own."""
+    """Options of the family; each family has options of its own."""
 
 
 def told() -> str:
-    """The families in words, with their options."""
+    """Return the families with their options, for messages.
+
+    Returns
+    -------
+    str
+        Text.
+    """
     each = []
     for kind, family in FAMILIES.items():
         options = ", ".join(family.Options.model_fields)
@@ -45,9 +51,26 @@ def told() -> str:
 def build_family(
     kind: str, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None, options: FamilyOptions
 ) -> Family:
-    """The family `kind` over `base`.
+    """Make a family.
 
-    Raises SweepError when there is no such family, and when it lacks a target or an option, or has one too many.
+    Parameters
+    ----------
+    kind : str
+        Name of the family.
+    wavelength_nm, base, target : ndarray of shape (n_wavelengths,)
+        Wavelengths, nm, and curves; see `Family.of_study`.
+    options : FamilyOptions
+        Options of the study.
+
+    Returns
+    -------
+    Family
+        The family.
+
+    Raises
+    ------
+    SweepError
+        If there is no such family, or if a target or option is missing or superfluous.
     """
     family = FAMILIES.get(kind)
     if family is None:

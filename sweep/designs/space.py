@@ -1,4 +1,4 @@
-"""Design spaces: the designs that a study names, counted and addressable without making them."""
+"""Design spaces: designs of a study, counted and addressable without making them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,19 @@ Kind = Literal["reference", "design", "sweep", "search"]
 
 @dataclass(frozen=True)
 class Filter:
-    """A family bound to its curves: which curve of the sensor it replaces in each channel, and by what it works."""
+    """Family bound to its curves.
+
+    Parameters
+    ----------
+    family : Family
+        Family.
+    bases : mapping of str to str
+        Modified channel to the curve that it replaces.
+    target : str
+        Curve that the filter takes inside its band.
+    technology : Technology, optional
+        Physical principle.
+    """
 
     family: Family
     bases: Mapping[str, str]
@@ -29,16 +41,28 @@ class Filter:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """The channels that it replaces."""
+        """Channels that it replaces."""
         return tuple(self.bases)
 
 
 @dataclass(frozen=True)
 class Space:
-    """A set of designs on one CFA: a full-factorial grid, `rows`, or a box that is searched but not swept.
+    """Set of designs on one CFA: a full-factorial grid, `rows`, or a box that is searched but not swept.
 
-    `axes`: the values of each parameter of the family; in a grid the last one runs fastest. A plain CFA has no filter,
-    no axes and one design.
+    Parameters
+    ----------
+    kind : str
+        `reference`, `design`, `sweep` or `search`.
+    name, cfa : str
+        Names of the space and its CFA.
+    filter : Filter, optional
+        Left out for a plain CFA, which has no axes and one design.
+    axes : tuple
+        Values of each parameter; in a grid the last one runs fastest.
+    gridded : bool
+        False for a box that is searched but not swept.
+    rows : Ungridded, optional
+        Designs that are no grid.
     """
 
     kind: Kind
@@ -62,7 +86,18 @@ class Space:
         return () if self.filter is None else tuple(p.name for p in self.filter.family.parameters)
 
     def digits(self, numbers: IndexArray) -> list[IndexArray]:
-        """For each axis of a grid the index of its value in the designs of these numbers, ndarray[n_designs]."""
+        """Return the index on each axis of a grid.
+
+        Parameters
+        ----------
+        numbers : ndarray of int, shape (n_designs,)
+            Numbers of designs.
+
+        Returns
+        -------
+        list of ndarray of int, shape (n_designs,)
+            Index of the value, one array per axis.
+        """
         rest = numbers
         found = []
         for axis in reversed(self.axes):  # mixed radix: NumPy's own unravel_index stops at 64 axes
@@ -72,11 +107,33 @@ class Space:
         return found[::-1]
 
     def points(self, start: int, stop: int) -> FloatArray:
-        """Parameters of designs start..stop-1: ndarray[stop - start, n_parameters]."""
+        """Return the parameters of consecutive designs.
+
+        Parameters
+        ----------
+        start, stop : int
+            Range of the designs.
+
+        Returns
+        -------
+        ndarray of shape (stop - start, n_parameters)
+            Parameters.
+        """
         return self.points_of(np.arange(start, stop))
 
     def points_of(self, numbers: IndexArray) -> FloatArray:
-        """Parameters of the designs of these numbers, one at least: ndarray[n_designs, n_parameters]."""
+        """Return the parameters of designs.
+
+        Parameters
+        ----------
+        numbers : ndarray of int, shape (n_designs,)
+            Numbers of the designs, at least one.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n_parameters)
+            Parameters.
+        """
         if self.rows is not None:
             start = int(numbers.min())
             return self.rows.points(self.axes, start, int(numbers.max()) + 1)[numbers - start]
@@ -85,9 +142,21 @@ class Space:
         return np.stack(columns, axis=1) if columns else np.empty((len(numbers), 0))
 
     def curves(self, points: FloatArray, n_wavelengths: int, off: Off = AS_DESIGNED) -> FloatArray:
-        """QE of the modified channels: ndarray[n_designs, n_modified, n_wavelengths]; none for a plain CFA.
+        """Return the QE of the modified channels.
 
-        `off`: how production has them.
+        Parameters
+        ----------
+        points : ndarray of shape (n_designs, n_parameters)
+            Parameters.
+        n_wavelengths : int
+            Size of the grid.
+        off : Off
+            Production error.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE; n_modified is 0 for a plain CFA.
         """
         if self.filter is None:
             return np.empty((len(points), 0, n_wavelengths))
@@ -95,7 +164,18 @@ class Space:
         return (family.produced(off) if any(off) else family).curves(points)
 
     def violation(self, points: FloatArray) -> FloatArray:
-        """Largest violation of the family's own conditions, ndarray[n_designs]; 0 where a design is well formed."""
+        """Return the largest violation of the family's own conditions.
+
+        Parameters
+        ----------
+        points : ndarray of shape (n_designs, n_parameters)
+            Parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_designs,)
+            0 where a design is well formed.
+        """
         if self.filter is None:
             return np.zeros(len(points))
         return np.asarray(np.maximum(self.filter.family.violation(points).max(axis=1), 0.0), dtype=float)

@@ -1,4 +1,4 @@
-"""By what a filter works: a pigment stays where it is, an interference filter moves with the angle of the light."""
+"""Physical principle of a filter: a pigment is fixed, an interference filter moves with the angle of the light."""
 
 from __future__ import annotations
 
@@ -28,22 +28,22 @@ class Technology(Section):
 
     @property
     def index(self) -> float:
-        """The effective index; infinite for a pigment, which does not move."""
+        """Effective index; infinite for a pigment, which does not move."""
         return math.inf if self.interference is None else self.interference.effective_index
 
     @property
     def told(self) -> str:
-        """In words."""
+        """Text for messages."""
         return PIGMENT if self.interference is None else f"interference (effective index {self.index:g})"
 
     @model_serializer
     def _as_written(self) -> str | dict[str, dict[str, float]]:
-        """As a study file says it."""
+        """Return the value of a study file."""
         return PIGMENT if self.interference is None else {"interference": {"effective_index": self.index}}
 
 
 def _technology(value: Any) -> Any:
-    """`pigment`, or a mapping with `interference`."""
+    """Convert `pigment`, or a mapping with `interference`."""
     if value == PIGMENT:
         return Technology()
     if value is None or isinstance(value, Technology) or (isinstance(value, dict) and value.get("interference")):
@@ -59,5 +59,16 @@ Stated = Annotated[
 
 
 def index_of(technology: Technology | None) -> float:
-    """The effective index; infinite for a filter that does not move, or of which nothing is stated."""
+    """Return the effective index of a technology.
+
+    Parameters
+    ----------
+    technology : Technology or None
+        Physical principle.
+
+    Returns
+    -------
+    float
+        Effective index; infinite for a filter that does not move, or if nothing is stated.
+    """
     return math.inf if technology is None else technology.index

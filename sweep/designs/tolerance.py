@@ -1,4 +1,4 @@
-"""What production does to a filter: edges that come out elsewhere, and films that are too thick."""
+"""Production errors of a filter: shifted edges, and films of another thickness."""
 
 from __future__ import annotations
 
@@ -12,13 +12,32 @@ SHIFTS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 
 
 class Off(NamedTuple):
-    """How a filter came out: what should be at l nm is at l (1 + thickness) + shift_nm."""
+    """Production error: a feature designed at l nm is at l (1 + thickness) + shift_nm.
+
+    Parameters
+    ----------
+    shift_nm : float
+        Shift, nm.
+    thickness : float
+        Relative error of the thickness.
+    """
 
     shift_nm: float = 0.0
     thickness: float = 0.0
 
     def nominal_nm(self, wavelength_nm: FloatArray) -> FloatArray:
-        """Where what is at these wavelengths should be, ndarray[n_wavelengths]."""
+        """Return the designed wavelengths of features.
+
+        Parameters
+        ----------
+        wavelength_nm : ndarray of shape (n_wavelengths,)
+            Wavelengths as produced, nm.
+
+        Returns
+        -------
+        ndarray of shape (n_wavelengths,)
+            Wavelengths as designed, nm.
+        """
         moved = wavelength_nm - self.shift_nm
         return moved / (1 + self.thickness) if self.thickness else moved
 
@@ -28,8 +47,15 @@ AS_DESIGNED = Off()
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How far off a filter may come out: edges by up to `edge_shift_nm` to either side, and all films too thick or too
-    thin by up to the share `thickness`, which moves every wavelength of an interference filter by that share.
+    """Tolerance of production.
+
+    Parameters
+    ----------
+    edge_shift_nm : float
+        Largest shift of all edges to either side, nm.
+    thickness : float
+        Largest relative error of the thickness of all films, which moves every wavelength of an
+        interference filter.
     """
 
     edge_shift_nm: float = 0.0
@@ -39,18 +65,38 @@ class Tolerance:
         return self.edge_shift_nm > 0 or self.thickness > 0
 
     def scaled(self, factor: float) -> Tolerance:
-        """So many times as far off."""
+        """Return a tolerance that is larger by a factor.
+
+        Parameters
+        ----------
+        factor : float
+            Factor.
+
+        Returns
+        -------
+        Tolerance
+            Scaled tolerance.
+        """
         return Tolerance(factor * self.edge_shift_nm, factor * self.thickness)
 
     def at(self, edge: float, film: float) -> Off:
-        """Edges and films so many times their tolerance off, -1 to 1."""
+        """Return a production error within the tolerance.
+
+        Parameters
+        ----------
+        edge, film : float
+            Shift and thickness error, -1 to 1 times their tolerance.
+
+        Returns
+        -------
+        Off
+            Production error.
+        """
         return Off(edge * self.edge_shift_nm + 0.0, film * self.thickness + 0.0)  # no negative zeros
 
     @property
     def places(self) -> tuple[Off, ...]:
-        """Where the worst case is looked for: from all at the one end to all at the other, and, where there are both,
-        with edges at one end and films at the other.
-        """
+        """Production errors at which the worst case is searched: both from end to end, and two mixed corners."""
         if not self:
             return (AS_DESIGNED,)
         both = self.edge_shift_nm > 0 and self.thickness > 0

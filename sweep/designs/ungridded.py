@@ -1,4 +1,4 @@
-"""Designs that are no grid: drawn from a box, or listed one by one. Each is made from its number alone."""
+"""Designs that are no grid: drawn from a box, or listed. Each follows from its number alone."""
 
 from __future__ import annotations
 
@@ -21,30 +21,69 @@ class Ungridded(Protocol):
 
     @property
     def size(self) -> int:
-        """How many there are."""
+        """Number of designs."""
 
     def points(self, axes: Axes, start: int, stop: int) -> FloatArray:
-        """Parameters of designs start..stop-1: ndarray[stop - start, n_parameters]."""
+        """Return the parameters of consecutive designs.
+
+        Parameters
+        ----------
+        axes : tuple
+            Values of each parameter.
+        start, stop : int
+            Range of the designs.
+
+        Returns
+        -------
+        ndarray of shape (stop - start, n_parameters)
+            Parameters.
+        """
 
 
 @dataclass(frozen=True)
 class Paired:
-    """Design i has the i-th value of every axis; an axis of one value holds for all."""
+    """Designs of which the i-th has the i-th value of every axis; an axis of one value holds for all.
+
+    Parameters
+    ----------
+    size : int
+        Number of designs.
+    """
 
     size: int
 
     def points(self, axes: Axes, start: int, stop: int) -> FloatArray:
-        """See `Ungridded.points`."""
+        """Return the parameters of consecutive designs.
+
+        Parameters
+        ----------
+        axes : tuple
+            Values of each parameter.
+        start, stop : int
+            Range of the designs.
+
+        Returns
+        -------
+        ndarray of shape (stop - start, n_parameters)
+            Parameters.
+        """
         columns = [np.asarray(axis[start:stop] if len(axis) > 1 else axis * (stop - start)) for axis in axes]
         return np.stack(columns, axis=1).astype(float)
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """`size` designs between the smallest and the largest value of every axis, by SciPy's `qmc`.
+    """Designs between the smallest and largest value of every axis, by SciPy's `qmc`.
 
-    `sobol`: the first ones of a scrambled Sobol sequence, so that fewer designs are the first ones of more. `lhs`: a
-    Latin hypercube, which has one design in each of `size` equal parts of every axis. One seed gives one set.
+    Parameters
+    ----------
+    method : str
+        `sobol`: first points of a scrambled Sobol sequence, so that fewer designs are the first of more;
+        `lhs`: Latin hypercube.
+    size : int
+        Number of designs.
+    seed : int
+        Seed.
     """
 
     method: Method
@@ -52,13 +91,26 @@ class Drawn:
     seed: int
 
     def points(self, axes: Axes, start: int, stop: int) -> FloatArray:
-        """See `Ungridded.points`; all are drawn, once."""
+        """Return the parameters of consecutive designs; all are drawn, once.
+
+        Parameters
+        ----------
+        axes : tuple
+            Values of each parameter.
+        start, stop : int
+            Range of the designs.
+
+        Returns
+        -------
+        ndarray of shape (stop - start, n_parameters)
+            Parameters.
+        """
         shares = _drawn.get((self, len(axes)), lambda: self._shares(len(axes)))[start:stop]
         low, high = (np.array([end(axis) for axis in axes], dtype=float) for end in (min, max))
         return np.asarray(np.minimum(low + shares * (high - low), high), dtype=float)
 
     def _shares(self, n_parameters: int) -> FloatArray:
-        """Places in the box, from 0 to 1, ndarray[size, n_parameters]."""
+        """Return points of the unit cube, ndarray of shape (size, n_parameters)."""
         from scipy.stats import qmc  # noqa: PLC0415  (slow to import; only a study that draws designs needs it)
 
         random = np.random.default_rng(self.seed)

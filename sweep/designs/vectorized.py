@@ -1,6 +1,6 @@
-"""Smaller and larger of two numbers in compiled loops, of which the compiler takes several at once.
+"""Smaller and larger of two numbers in compiled loops, as vector instructions.
 
-Python's `min` and `max` become branches there, and a loop that keeps the smallest value goes number by number.
+Python's `min` and `max` become branches there, which are not vectorized.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""The best design, and the proof of how good any could be."""
+"""Constrained search for the best design, and the upper bound on any filter."""

@@ -1,8 +1,8 @@
-"""All places of the sensor, as a limit's linear programs know them: a few image heights, and more where they bind.
+"""All field positions in the linear programs of the upper bound: a few image heights, and more where they bind.
 
-A program that keeps signals apart at some heights has no fewer filters than one that does so at all of them, so that
-what no filter of it exceeds holds for all places, too. Its best filter says which heights to add: the worst ones, as
-they are found; until they are no worse than those that the program knows.
+A program with constraints at some heights has no fewer filters than one with constraints at all heights, so that its
+bound holds for all positions, too. Its best filter determines the heights to add: the worst ones, until they are no
+worse than the known ones.
 """
 
 from __future__ import annotations
@@ -26,7 +26,13 @@ _MOST_HEIGHTS = 60
 
 
 class AnyHeight:
-    """The problem at those image heights that are known; `whole` asks for all places of the sensor."""
+    """Problem at the known image heights.
+
+    Parameters
+    ----------
+    whole : Problem
+        Problem over all field positions.
+    """
 
     def __init__(self, whole: Problem) -> None:
         field = whole.setup.scene.field
@@ -40,14 +46,14 @@ class AnyHeight:
 
     @property
     def problem(self) -> Problem:
-        """The problem at the known heights."""
+        """Problem at the known heights."""
         heights = tuple(sorted(self._heights))
         field = SensorField(heights=heights, cra_deg=tuple(map(self._field.cra_at, heights)))
         scene = self._whole.setup.scene.model_copy(update={"field": field})
         return replace(self._whole, setup=replace(self._whole.setup, scene=scene))
 
     def _worst(self, curve: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Smallest distance of each pair for a filter, ndarray[n_wavelengths], DN, and its height, ndarray[n_pairs]."""
+        """Return the smallest distance of each pair, DN, and its height, ndarray of shape (n_pairs,) each."""
         setup = self._whole.setup
 
         def at_height(height: float) -> FloatArray:
@@ -60,11 +66,33 @@ class AnyHeight:
         return refined_heights(self._looked_at, known, at_height)
 
     def least(self, curve: FloatArray) -> dict[str, float]:
-        """The smallest distances over all places for a filter, ndarray[n_wavelengths]; DN, by the name of the CSD."""
+        """Return the smallest distances over all field positions.
+
+        Parameters
+        ----------
+        curve : ndarray of shape (n_wavelengths,)
+            QE of the filter.
+
+        Returns
+        -------
+        dict of str to float
+            CSD by column name, DN.
+        """
         return dict(zip(self._pairs, self._worst(curve)[0].tolist(), strict=True))
 
     def more(self, curve: FloatArray) -> bool:
-        """Add the worst heights for a filter; False where they are no worse than the known ones."""
+        """Add the worst heights of a filter.
+
+        Parameters
+        ----------
+        curve : ndarray of shape (n_wavelengths,)
+            QE of the filter.
+
+        Returns
+        -------
+        bool
+            False if they are no worse than the known ones.
+        """
         known, setup = len(self._heights), self.problem.setup
         for pair, distance_dn, height in zip(self._pairs.values(), *self._worst(curve), strict=True):
             if distance_dn < smooth_csd(setup, curve[None, None], pair)[0] - _WORSE_DN:

@@ -1,4 +1,4 @@
-"""What linear programs of filters find: which sides are decided, and weights that prove a bound."""
+"""Results of linear programs over filters: decided sides, and weights that prove a bound."""
 
 from __future__ import annotations
 
@@ -14,21 +14,49 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Sides:
-    """Pairs of signals with a decided side: their indices, and +1 where the first signal is above the other, or -1."""
+    """Pairs of signals with a decided side.
+
+    Parameters
+    ----------
+    pairs : tuple of int
+        Indices of pairs.
+    signs : tuple of float
+        +1 if the first signal is above the other, -1 if it is below.
+    """
 
     pairs: tuple[int, ...] = ()
     signs: tuple[float, ...] = ()
 
     def joined(self, pairs: IndexArray, signs: FloatArray) -> Sides:
-        """These and more pairs."""
+        """Return these and further decided sides.
+
+        Parameters
+        ----------
+        pairs : ndarray of int, shape (n,)
+            Indices of pairs.
+        signs : ndarray of shape (n,)
+            Their sides.
+
+        Returns
+        -------
+        Sides
+            All of them.
+        """
         return Sides((*self.pairs, *map(int, pairs)), (*self.signs, *map(float, signs)))
 
 
 @dataclass(frozen=True)
 class Certificate:
-    """Weights y of rows and of pairs with a decided side, and V(y): they bound what filters reach at any sensitivity.
+    """Weights y of rows and decided pairs, and V(y), which bound filters at any sensitivity.
 
-    `rows`, `pairs`: those whose `row_weights` and `pair_weights` are above 0, ndarray[n] each; `most`: V(y).
+    Parameters
+    ----------
+    rows, pairs : ndarray of int
+        Rows and pairs with a weight above 0.
+    row_weights, pair_weights : ndarray
+        Their weights.
+    most : float
+        V(y).
     """
 
     rows: IndexArray
@@ -40,10 +68,20 @@ class Certificate:
 
 @dataclass(frozen=True)
 class Solved:
-    """What a linear program for a t and some sides found, in the objective's unit.
+    """Result of a linear program for a t and some sides, in the objective's unit.
 
-    `beyond`: no filter with these sides reaches more (-inf: there is none), and already those of `needs` say so, by
-    `certificate`. `curve`: the filter with the largest `margin` above t, QE; None where no filter was found.
+    Parameters
+    ----------
+    beyond : float
+        Upper bound on filters with these sides (-inf: there is none).
+    margin : float
+        Largest margin above t.
+    curve : ndarray of shape (n_wavelengths,), optional
+        QE of the filter with this margin.
+    needs : Sides
+        Sides that suffice for the bound.
+    certificate : Certificate, optional
+        Proof of the bound.
     """
 
     beyond: float

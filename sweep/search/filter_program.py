@@ -1,11 +1,12 @@
-"""All filters that a study allows, as a linear program, with bounds that hold whatever the solver's tolerance.
+"""All filters that a study allows as a linear program, with bounds that hold for any tolerance of the solver.
 
-A filter N lies between the least transmission and the base curve and keeps slope and sensitivities: rows a @ N >= h(t),
-where t is what the objective is to reach. A pair of signals whose side is decided is one more row: the difference of
-its responses in the modified channel. Weights y >= 0 of the rows give a bound that holds for any y: a filter that
-reaches t has y @ A N >= y @ h(t), but no filter of the box has more than V(y), the sum over the wavelengths of the
-larger of (A' y) low and (A' y) high. So none reaches a t with y @ h(t) > V(y). The solver's dual values only make it
-tight (Neumaier and Shcherbina, "Safe bounds in linear and mixed-integer linear programming", Math. Program. 99, 2004).
+A filter N lies between the least transmission and the base curve and meets constraints on slope and sensitivities:
+rows a @ N >= h(t), where t is the value that the objective is to reach. A pair of signals with a decided side is one
+more row: the difference of its responses in the modified channel. Weights y >= 0 of the rows give a bound that holds
+for any y: a filter that reaches t has y @ A N >= y @ h(t), but no filter of the box has more than V(y), the sum over
+the wavelengths of the larger of (A' y) low and (A' y) high. So no filter reaches a t with y @ h(t) > V(y). The
+solver's dual values only make it tight (Neumaier and Shcherbina, "Safe bounds in linear and mixed-integer linear
+programming", Math. Program. 99, 2004).
 """
 
 from __future__ import annotations
@@ -43,8 +44,9 @@ _SOLVED, _INFEASIBLE = 0, 2
 
 @dataclass(frozen=True)
 class _Rows:
-    """Rows a @ N >= h(t) = max(least, rate t) - constant, each an ndarray[n]; `slack`: how far a design that counts as
-    feasible may be below `least`; `rate`: 0 where t does not matter.
+    """Rows a @ N >= h(t) = max(least, rate t) - constant, each an ndarray of shape (n,).
+
+    `slack` is the amount by which a feasible design may be below `least`; `rate` is 0 where t does not matter.
     """
 
     matrix: csr_matrix
@@ -54,23 +56,37 @@ class _Rows:
     constant: FloatArray
 
     def needed(self, t: float, *, relaxed: bool = False) -> FloatArray:
-        """h(t), ndarray[n]; `relaxed`: for designs that only count as feasible."""
+        """Return h(t), ndarray of shape (n,); with `relaxed` for designs that only count as feasible.
+
+        Parameters
+        ----------
+        t : float
+            Value of the objective.
+        relaxed : bool
+            Subtract the slack.
+
+        Returns
+        -------
+        ndarray of shape (n,)
+            h(t).
+        """
         least = self.least - self.slack if relaxed else self.least
         return np.asarray(np.maximum(least, np.where(self.rate > 0, self.rate * t, -np.inf)) - self.constant)
 
 
 class FilterProgram:
-    """The filters of a problem, and every pair of signals that may come too near.
+    """Filters of a problem, and every pair of signals that may come too near.
 
-    `apart`: ndarray[n_pairs, n_wavelengths], DN per QE, the difference of each pair in the modified channel; a pair is
-    that of two signals, or known members of their population, in one place of the light. `added`: how much more that is
-    at most with the first signal above the other, or below it (`Distances`), ndarray[n_pairs, 2]. `reach`, of the same
-    shape: no filter with the first signal above the other, or below it, reaches more. `top`: no filter at all reaches
-    more (-inf: there is none). `solved` counts the linear programs.
+    Parameters
+    ----------
+    problem : Problem
+        Problem with one modified channel.
+    members : MemberPairs, optional
+        Members of worst cases.
     """
 
     def __init__(self, problem: Problem, members: MemberPairs | None = None) -> None:
-        """`members`: those of worst cases."""
+        """Compute the rows of constraints and pairs."""
         self.problem = problem
         self._members = members
         self.base = problem.setup.camera.base_qe[0]
@@ -89,9 +105,9 @@ class FilterProgram:
         self.solved = 0
 
     def _fixed_rows(self) -> tuple[_Rows, FloatArray]:
-        """Every quantity that is linear in the filter and constrained, or part of the objective.
+        """Return the rows of constrained quantities that are linear in the filter.
 
-        Second, `least` of each row over the least sensitivity that is asked for; 0 for other rows.
+        Also return `least` of each row relative to the least sensitivity; 0 for other rows.
         """
         matrices: list[csr_matrix] = [csr_matrix((0, self.base.size))]
         columns: list[FloatArray] = [np.empty((0, 5))]
@@ -117,7 +133,7 @@ class FilterProgram:
         return _Rows(vstack(matrices).tocsr(), *own_columns), per_sensitivities
 
     def _distances(self) -> Iterator[tuple[str, Distances]]:
-        """Each distance's name, and its pairs."""
+        """Yield the name and the pairs of each distance."""
         setup = self.problem.setup
         imager, channel = linear_model(setup), setup.camera.modified[0]
         # Exposure does not depend on N, so the response to a filter is linear, plus what does not depend on it.
@@ -160,7 +176,7 @@ class FilterProgram:
         self.reach = np.where(most < (self._least - self._slack)[:, None], -np.inf, reach)
 
     def _noise(self, imager: LinearModel) -> tuple[FloatArray, FloatArray]:
-        """The least variance in the modified channel, ndarray[n_cases, n_signals], and those of the others, DN^2."""
+        """Return the least variance in the modified channel and the variances of the others, DN^2, [n_cases, n_signals]."""
         row, least = np.zeros_like(self.base), 0.0
         bound = self.problem.constraints.get(SENSITIVITY)
         if bound is not None and bound.min is not None:
@@ -170,12 +186,23 @@ class FilterProgram:
 
     @property
     def noisy(self) -> bool:
-        """Whether any distance of the problem is in units of the noise, whose least is that of its sensitivity."""
+        """True if a distance is in units of the noise."""
         asked = {*self.problem.objective.weights, *self.problem.constraints} & self.problem.pairs.keys()
         return any(self.problem.quantities[name].apart == "noise" for name in asked)
 
     def reaches(self, curve: FloatArray) -> float:
-        """The objective of a filter as this program counts it: with the least noise, no less than what it has."""
+        """Return the objective of a filter with the least noise, which is no less than its own.
+
+        Parameters
+        ----------
+        curve : ndarray of shape (n_wavelengths,)
+            QE of the filter.
+
+        Returns
+        -------
+        float
+            Objective.
+        """
         pairs, rows = self._rate > 0, self._rows.rate > 0
         far = np.sqrt(self._squared + (self.apart @ curve) ** 2)[pairs] / self._rate[pairs]
         linear = (self._rows.matrix @ curve + self._rows.constant)[rows] / self._rows.rate[rows]
@@ -187,9 +214,21 @@ class FilterProgram:
         self._slack, self._rate = self._slack[wanted], self._rate[wanted]
 
     def needed(self, t: float, margin: float = 0.0, *, relaxed: bool = False) -> FloatArray:
-        """By how much each pair must differ in the modified channel for a t, DN, ndarray[n_pairs]; 0: anything goes.
+        """Return the difference in the modified channel that each pair needs to reach t.
 
-        `margin`: how much more is wanted, in the objective's unit.
+        Parameters
+        ----------
+        t : float
+            Value of the objective.
+        margin : float
+            Additional margin, in the objective's unit.
+        relaxed : bool
+            For designs that only count as feasible.
+
+        Returns
+        -------
+        ndarray of shape (n_pairs,)
+            Difference, DN; 0 if none is needed.
         """
         least = self._least - self._slack if relaxed else self._least
         asked = np.maximum(least, t * self._rate)
@@ -198,7 +237,20 @@ class FilterProgram:
         return np.asarray(np.where(found > 0, found + inside + self._rate * margin, 0.0), dtype=float)
 
     def solve(self, t: float, sides: Sides) -> Solved:
-        """The filter with the largest margin above t, and how far filters with these sides can reach at most."""
+        """Find the filter with the largest margin above t, and a bound for all filters with these sides.
+
+        Parameters
+        ----------
+        t : float
+            Value of the objective.
+        sides : Sides
+            Decided sides.
+
+        Returns
+        -------
+        Solved
+            Filter and bound.
+        """
         self.solved += 1
         pairs, signs = np.array(sides.pairs, dtype=np.intp), np.array(sides.signs)
         some = self.needed(t)[pairs] > 0
@@ -224,17 +276,30 @@ class FilterProgram:
         return Solved(beyond, float(found[-1]), found[:-1], needs, certificate)
 
     def _added(self, pairs: IndexArray, signs: FloatArray) -> FloatArray:
-        """How much more each of some pairs differs at most on its side, DN."""
+        """Return the largest additional difference of some pairs on their side, DN."""
         return np.asarray(self.added[pairs, (signs < 0).astype(np.intp)], dtype=float)
 
     def differ(self, curve: FloatArray, side: float) -> FloatArray:
-        """By how much at most each pair differs for a filter, with the first signal above (1) or below (-1), DN."""
+        """Return the largest difference of each pair on one side.
+
+        Parameters
+        ----------
+        curve : ndarray of shape (n_wavelengths,)
+            QE of the filter.
+        side : float
+            1 with the first signal above, -1 with it below.
+
+        Returns
+        -------
+        ndarray of shape (n_pairs,)
+            Difference, DN.
+        """
         return np.asarray(side * (self.apart @ curve) + self.added[:, int(side < 0)], dtype=float)
 
     def _best_margin(
         self, rows: csr_matrix, floor: FloatArray, rate: FloatArray
     ) -> tuple[int, FloatArray | None, FloatArray | None]:
-        """HiGHS' status, row weights and solution (N, m) of: maximize m subject to rows @ N >= floor + rate m."""
+        """Solve: maximize m subject to rows @ N >= floor + rate m; return status, row weights and (N, m)."""
         found = linprog(
             c=np.append(np.zeros(self.base.size), -1.0),
             A_ub=hstack([-rows, csr_matrix(rate[:, None])]).tocsr(),
@@ -260,10 +325,23 @@ class FilterProgram:
     def beyond(
         self, certificate: Certificate, sensitivity: float | None = None, at_least: float = 0.0, near: float = 0.0
     ) -> float:
-        """No filter with the sides of a certificate reaches more; inf where its weights do not say.
+        """Return the bound of a certificate at another sensitivity.
 
-        `sensitivity`: the least one that is asked of filters, instead of the problem's. `at_least`: what less is said
-        of is not wanted; -inf is returned then. `near`: how much larger than the bound of the weights it may be.
+        Parameters
+        ----------
+        certificate : Certificate
+            Weights.
+        sensitivity : float, optional
+            Least sensitivity, instead of the problem's.
+        at_least : float
+            Smaller bounds are returned as -inf.
+        near : float
+            Accuracy: the result may exceed the bound of the weights by this.
+
+        Returns
+        -------
+        float
+            Upper bound on filters with the certificate's sides; inf if the weights give none.
         """
         rows, per = self._rows, self._per_sensitivity
         if sensitivity is not None:

@@ -1,8 +1,8 @@
-"""The smooth model of a search problem with exact derivatives: unquantized, unclipped, one simulation per point.
+"""Smooth model of a search problem with exact derivatives: unquantized, unclipped, one simulation per point.
 
 Every quantity is written as rows of smooth functions: a CSD is the root of the smallest of its squared pair distances,
-a slope the largest of the curve's differences, an error the one with the fewest decades below 1. A solver takes the
-rows, so nothing that it sees has a kink.
+a slope the largest of the curve's differences, an error the one with the fewest decades below 1. The solver uses the
+rows, so that all its functions are smooth.
 """
 
 from __future__ import annotations
@@ -45,11 +45,23 @@ _CONDITION_NM = 100.0
 
 @dataclass(frozen=True)
 class Point:
-    """Everything that one simulation gives.
+    """Result of one simulation.
 
-    `terms`: the objective's weighted quantities as rows, squared, as they are where one may be below 0, or as decades
-    below 1 of what is to be the least; `power`: 2 or 1. `term`: ndarray[n], the term that each row belongs to
-    (all 0 for a minimum). `conditions`: met where <= 0. `quantities`: rows of each constrained quantity.
+    Parameters
+    ----------
+    evaluation : Evaluation
+        Logged values.
+    terms : Rows
+        Rows of the objective's weighted quantities: squared, as they are if they may be negative, or as
+        decades below 1.
+    power : int
+        2 for squared rows, else 1.
+    term : ndarray of int, shape (n,)
+        Term of each row (all 0 for a minimum).
+    conditions : Rows
+        Met where <= 0.
+    quantities : mapping of str to Rows
+        Rows of each constrained quantity.
     """
 
     evaluation: Evaluation
@@ -61,7 +73,7 @@ class Point:
 
     @property
     def term_values(self) -> FloatArray:
-        """Value of each term, ndarray[n_terms]."""
+        """Value of each term, ndarray of shape (n_terms,)."""
         least = [self.terms.values[self.term == k].min() for k in range(int(self.term.max()) + 1)]
         return np.sqrt(least) if self.power == 2 else np.array(least)
 
@@ -79,7 +91,7 @@ def _drawn_of(problem: Problem) -> LampsAndCameras:
 
 
 def _finite(point: Point) -> Point:
-    """The point as it is, or with zeros for what is not a number: a NaN would end the search; it is never feasible."""
+    """Return the point with zeros for NaN, which would end the search; it is never feasible."""
     if point.terms.finite and point.conditions.finite and np.isfinite(point.evaluation.objective):
         return point
     return replace(
@@ -92,7 +104,7 @@ def _finite(point: Point) -> Point:
 
 
 class Model:
-    """The smooth problem in units of the box; one simulation per point, shared by objective and constraints."""
+    """Smooth problem in units of the box; objective and constraints share one simulation per point."""
 
     def __init__(self, problem: Problem, run: SearchRun, budget: int) -> None:
         self._problem = problem
@@ -119,9 +131,17 @@ class Model:
         self._seen: dict[bytes, Point] = {}
 
     def at(self, u: FloatArray) -> Point:
-        """The simulation at `u`, made and logged once; past the budget it stops the search that uses this model.
+        """Simulate and log a point once; beyond the budget, or where `u` is NaN, stop the search.
 
-        And where `u` is no number: an algorithm's own arithmetic fails on some machines, and nothing comes after it.
+        Parameters
+        ----------
+        u : ndarray of shape (n_free,)
+            Free parameters in units of the box.
+
+        Returns
+        -------
+        Point
+            Result of the simulation.
         """
         # A copy, since `u` is nlopt's own buffer.
         u = np.clip(np.array(u, dtype=float), 0.0, 1.0)
@@ -145,7 +165,7 @@ class Model:
 
     @property
     def settled(self) -> bool:
-        """Whether the latest evaluations all lie in one place, and are worth the same."""
+        """True if the latest evaluations are at one point with one value."""
         latest = self._latest
         if len(latest) < _SETTLED_EVALUATIONS or (np.abs(latest[-1] - latest[0]) > _SETTLED).any():
             return False
@@ -179,7 +199,7 @@ class Model:
         return Point(evaluation, Rows.joined(terms), self._power, term, Rows.joined(conditions), quantities)
 
     def _terms(self, made: Mapping[Off, SmoothDesign]) -> tuple[list[Rows], float]:
-        """The rows of each weighted quantity of the objective, see `Point`, and the objective's value."""
+        """Return the rows of the objective's weighted quantities, and its value."""
         terms, columns = [], {}
         for name, weight in self._weights.items():
             quantity, rows = self._quantities[name], self._rows(name, made)
@@ -190,14 +210,14 @@ class Model:
         return terms, float(self._problem.objective.of(columns)[0])
 
     def _rows(self, name: str, made: Mapping[Off, SmoothDesign]) -> Rows:
-        """The rows from which the quantity follows, see `Quantity.value`."""
+        """Return the rows of a quantity."""
         smooth = self._quantities[name].smooth
         assert smooth is not None
         return Rows.joined([smooth(made[off]) for off in self._produced[name]])
 
 
 def _term(quantity: Quantity, rows: Rows, weight: float, rule: Rule, power: int) -> Rows:
-    """The rows of a weighted quantity as the objective's, see `Point`."""
+    """Return the rows of a weighted quantity in the objective."""
     if rule.wanted == "less" and quantity.rows == "values":
         rows = rows.logarithms()
     if rule.wanted == "less":
@@ -208,7 +228,7 @@ def _term(quantity: Quantity, rows: Rows, weight: float, rule: Rule, power: int)
 
 
 def _back_off(problem: Problem, name: str, bound: Bound) -> float:
-    """How far inside a bound to keep, relative: not at all where it is the end of what the quantity can be."""
+    """Return the relative distance to keep from a bound; 0 if the bound is the end of the quantity's range."""
     most = problem.quantities[name].most
     if name in problem.family.dimensions:
         rows = problem.family.dimensions[name]
@@ -218,7 +238,7 @@ def _back_off(problem: Problem, name: str, bound: Bound) -> float:
 
 
 def _conditions(quantity: Quantity, bound: Bound, rows: Rows, back_off: float) -> list[Rows]:
-    """Rows that are <= 0 where the bound is kept, `back_off` inside, relative to its scale."""
+    """Return rows that are <= 0 where a bound is met, with a relative margin of `back_off`."""
     found, scale = [], bound.scale
     if quantity.rows == "decades" and bound.max is not None:
         least = -math.log10(bound.max)

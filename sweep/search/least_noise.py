@@ -1,11 +1,11 @@
-"""The least noise that any filter leaves: what makes a bound on d' of one on distances.
+"""Least noise of any filter, which turns a bound on distances into one on d'.
 
 d'^2 = sum of D^2 / S over the channels, where S, the mean variance of the two signals, grows with the light in the
-modified channel. Put in its place the least that any filter of the program has there, and no filter's d' is above
+modified channel. With the least S of any filter of the program, no filter's d' is above
 
     d'^2 <= sum over the other channels of D^2 / S + D_N^2 / (least S_N),
 
-which is a distance in units of a noise that does not depend on the filter. The least light of a signal under a least
+a distance in units of a noise that does not depend on the filter. The least light of a signal under a least
 sensitivity is a fractional knapsack: light is taken where it costs least sensitivity. Its bound is that of the
 multiplier y, min l @ N >= y h + sum of min((l - y a) low, (l - y a) high) for a @ N >= h, and holds for any y >= 0.
 """
@@ -24,10 +24,25 @@ _ROUNDING = 1e-12
 def least_variance(
     imager: LinearModel, base: FloatArray, box: tuple[FloatArray, FloatArray], row: FloatArray, least: float
 ) -> FloatArray:
-    """Variance in the only modified channel that none of the filters goes below, DN^2, ndarray[n_cases, n_signals].
+    """Return a lower bound on the variance in the modified channel.
 
-    Filters lie in the `box`, ndarray[n_wavelengths] each, and have row @ N >= least, for a row >= 0. The variance grows
-    with the light of every pixel. `base`: the curve at which the variance is known.
+    Parameters
+    ----------
+    imager : LinearModel
+        Scene and camera with one modified channel.
+    base : ndarray of shape (n_wavelengths,)
+        Curve at which the variance is known; it grows with the light.
+    box : tuple of ndarray of shape (n_wavelengths,)
+        Bounds on the filters.
+    row : ndarray of shape (n_wavelengths,)
+        Coefficients of the sensitivity, >= 0.
+    least : float
+        Least sensitivity: row @ N >= least.
+
+    Returns
+    -------
+    ndarray of shape (n_cases, n_signals)
+        Lower bound, DN^2.
     """
     pixel, channel = imager.readout.pixel, imager.setup.camera.modified[0]
     per_qe = imager.spread_per_qe(0, base[None])
@@ -41,7 +56,7 @@ def least_variance(
 
 
 def _least_light(light: FloatArray, box: tuple[FloatArray, FloatArray], row: FloatArray, least: float) -> FloatArray:
-    """A bound of min light @ N, ndarray[...] of ndarray[..., n_wavelengths]."""
+    """Return a lower bound on light @ N for light of shape (..., n_wavelengths)."""
     low, high = box
     used = row > 0
     ratio = np.divide(light, row, out=np.zeros_like(light), where=used)

@@ -1,12 +1,12 @@
-"""The limit of any filter: the best of all filters for one modified channel, not only those of a family.
+"""Upper bound on any filter in one modified channel, not only on those of a family.
 
-All filters means: every N between the least transmission and the base curve that meets the study's bounds on slope,
-sensitivities and CSDs, whichever of two signals it makes the brighter one. The limit is that of the response before
-clipping and quantization, in the scene of the search. Of d' it is a bound with the least noise (`least_noise.py`), near
-which no filter need be. The certificate is a bracket: a filter that attains the lower end, and linear programs that no
-filter above the upper end could meet. Worst cases of CSDs are over the population of the lights, and over production
-where that moves the whole shape of a filter, as it does the family's (`produced.py`). What only some families have
-(widths of edges and bands) is left out, and so are other worst cases: of more filters the upper end stays true.
+It holds for every N between the least transmission and the base curve that meets the study's constraints on slope,
+sensitivities and CSDs, whichever of two signals N makes the brighter one, for the response before clipping and
+quantization in the scene of the search. For d' it is a bound with the least noise (`least_noise.py`), which no filter
+need approach. The result is a bracket: a filter that attains the lower end, and linear programs which prove that no
+filter is above the upper end. Worst cases of CSDs are over the population of the lights, and over production where
+that moves the whole shape of a filter (`produced.py`). Constraints that only some families have (widths of edges and
+bands) are left out, and so are other worst cases: with more filters the upper end stays true.
 """
 
 from __future__ import annotations
@@ -51,13 +51,24 @@ _SHARES = (0.0, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5)
 
 @dataclass(frozen=True)
 class Limit:
-    """The bracket of the limit, in the objective's unit, and the filter that attains its lower end, QE.
+    """Upper bound, and a filter near it, in the objective's unit.
 
-    `attained`: the objective for `curve` (ndarray[n_wavelengths]), evaluated like any design; no filter at all reaches
-    more than `proven`. Both are -inf when no filter meets the constraints; where none is known that does, `attained` is
-    -inf and `curve` is None. `left_out`: what the study asks for beyond the limit's own constraints. `programs`: number
-    of linear programs solved for it; `open_parts`: parts of the proof that were left open, so that the bracket is wider
-    than it was to be; 0: none. `elsewhere`: what the same proof says of filters with other sensitivities at least.
+    Parameters
+    ----------
+    attained : float
+        Objective of `curve`, evaluated like any design; -inf if no feasible filter is known.
+    proven : float
+        Upper bound on any filter; -inf if no filter meets the constraints.
+    curve : ndarray of shape (n_wavelengths,) or None
+        QE of the filter.
+    left_out : tuple of str
+        Constraints of the study that the bound does not use.
+    programs : int
+        Linear programs that were solved.
+    open_parts : int
+        Parts of the proof that were left open, so that the bracket is wider; 0 if none.
+    elsewhere : tuple of float
+        Upper bounds at other least sensitivities.
     """
 
     attained: float
@@ -75,11 +86,28 @@ def limit_of(
     most_programs: int = _MOST_PROGRAMS,
     sensitivities: Sequence[float] = (),
 ) -> Limit:
-    """The limit of a problem with one modified channel, to `tolerance_dn` (1e-6 for an objective without a CSD).
+    """Compute the upper bound of a problem with one modified channel.
 
-    `sensitivities`: where `elsewhere` is wanted, of a problem with a least sensitivity.
-    At most about `most_programs` linear programs are solved for it; the bracket is wider where that is too few. Raises
-    SweepError where the response would not be linear; see `why_not`.
+    Parameters
+    ----------
+    problem : Problem
+        Objective, constraints and scene.
+    tolerance_dn : float
+        Width of the bracket, DN (1e-6 for an objective without a CSD).
+    most_programs : int
+        Linear programs, approximately at most; the bracket is wider if they are too few.
+    sensitivities : sequence of float
+        Least sensitivities for `Limit.elsewhere`.
+
+    Returns
+    -------
+    Limit
+        The upper bound.
+
+    Raises
+    ------
+    SweepError
+        If the response is not linear; see `why_not`.
     """
     refused = why_not(problem)
     if refused is not None:
@@ -108,7 +136,22 @@ def limit_of(
 
 
 def check_bound(value: float, proven: float, where: str = "") -> None:
-    """Raise BrokenProofError where a filter's value before quantization is above its proven upper bound."""
+    """Raise an error if a value before quantization exceeds its upper bound.
+
+    Parameters
+    ----------
+    value : float
+        Objective of a filter.
+    proven : float
+        Upper bound.
+    where : str
+        Scene, for the message.
+
+    Raises
+    ------
+    BrokenProofError
+        If the value exceeds the bound.
+    """
     if not value <= proven + _PROOF_TOLERANCE * max(1.0, proven):
         raise BrokenProofError(
             Fault(
@@ -119,7 +162,25 @@ def check_bound(value: float, proven: float, where: str = "") -> None:
 
 
 def gap_between(value: float, proven: float) -> float:
-    """Relative gap of a value to its upper bound; raises BrokenProofError, see `check_bound`."""
+    """Return the relative gap of a value to its upper bound.
+
+    Parameters
+    ----------
+    value : float
+        Objective of a filter.
+    proven : float
+        Upper bound.
+
+    Returns
+    -------
+    float
+        (proven - value) / proven.
+
+    Raises
+    ------
+    BrokenProofError
+        If the value exceeds the bound.
+    """
     check_bound(value, proven)
     return 1 - min(value, proven) / proven
 
@@ -139,7 +200,7 @@ def _any_height_of(problem: Problem) -> AnyHeight:
 def _proof(
     problem: Problem, members: MemberPairs | None, tolerance: float, most_programs: int
 ) -> tuple[FilterProgram, Proof]:
-    """The linear programs of a problem, and what no filter exceeds."""
+    """Return the linear programs of a problem, and the proof of the bound."""
     from .filter_program import FilterProgram  # noqa: PLC0415  (slow to import: kept off the start-up path)
     from .sides import SideSearch  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
@@ -155,10 +216,10 @@ def _proof(
 def _attaining(
     problem: Problem, curve: FloatArray, members: MemberPairs | None, heights: AnyHeight | None, tolerance: float
 ) -> tuple[float, FloatArray | None, int]:
-    """What a program's filter attains in all worst cases, the filter, and the number of programs solved for it.
+    """Return the value of a program's filter in all worst cases, the filter, and the number of further programs.
 
-    A program knows some members and places, so its filter may lack a little of a worst case that is bounded. Then the
-    bounds are raised by twice what is lacking, until a filter keeps those of the problem; None where none does.
+    A program knows some members and positions, so that its filter may miss a bounded worst case. Then the bounds are
+    raised by twice the violation until a filter meets those of the problem; None if none does.
     """
     asked, solved = problem, 0
     for _ in range(_ATTEMPTS):
@@ -183,7 +244,18 @@ def _attaining(
 
 
 def why_not(problem: Problem) -> str | None:
-    """Why a problem has no linear limit; None when it has."""
+    """Return the reason why a problem has no linear upper bound.
+
+    Parameters
+    ----------
+    problem : Problem
+        Search problem.
+
+    Returns
+    -------
+    str or None
+        None if it has one.
+    """
     unknown = [name for name in problem.objective.weights if not problem.quantities[name].has_limit]
     why = _NOT_LINEAR
     if any(problem.quantities[name].states for name in unknown):
@@ -214,22 +286,21 @@ def why_not(problem: Problem) -> str | None:
 
 
 def _most_sensitive(problem: Problem) -> float:
-    """The largest sensitivity that the study lets a filter have, 1 where it says none, or none as it comes out."""
+    """Return the largest sensitivity that the study allows, 1 if it states none."""
     bound = problem.constraints.get(SENSITIVITY)
     return 1.0 if bound is None or bound.max is None or _moves(problem) else min(1.0, bound.max)
 
 
 def _moves(problem: Problem) -> bool:
-    """Whether filters count as they come out of production, too."""
+    """Return whether filters also count as production makes them."""
     asked = (*problem.constraints, *problem.objective.weights)
     return len(ways_of(problem)) > 1 and any(problem.worst_distance(name) for name in asked)
 
 
 def _relaxed(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
-    """The problem without what only families of edges have, and what was left out.
+    """Return the problem without constraints that only families of edges have, and their names.
 
-    Worst cases of CSDs over a population or production stay; others become nominal ones, which are no worse: a bound on
-    the better end of a worst case says nothing of these. What a share of lamps has says nothing of the nominal lights.
+    Worst cases of CSDs over a population or production stay; others become nominal ones, which are no worse.
     """
     quantities = problem.quantities
     asked = (*problem.constraints, *problem.objective.weights)
@@ -261,7 +332,7 @@ def _relaxed(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
 
 
 def _shifts_left_out(nominal: Sequence[str], problem: Problem) -> list[str]:
-    """What production does that the limit does not know; `nominal`: quantities whose worst cases it takes for them."""
+    """Return a note on production errors that the bound leaves out."""
     if len(ways_of(problem)) == 1:
         return ["edge shifts"]
     some = [] if all_ways(problem) else ["some edge shifts"]
@@ -269,14 +340,14 @@ def _shifts_left_out(nominal: Sequence[str], problem: Problem) -> list[str]:
 
 
 def _top(problem: Problem) -> FloatArray:
-    """No filter of the box exceeds this curve, however it comes out in a worst case, ndarray[n_wavelengths]."""
+    """Return an upper bound on the filters of the box, in any worst case, ndarray of shape (n_wavelengths,)."""
     moved = ways_of(problem)[1:] if _moves(problem) else ()
     tops = [problem.family.upper(problem.low, problem.high)[0], *(way.high for way in moved)]
     return np.asarray(np.max(tops, axis=0), dtype=float)
 
 
 def _clips(problem: Problem) -> bool:
-    """Whether the base curve's response, the largest that any of the filters has, is cut off when it is read out."""
+    """Return whether the response of the base curve, the largest of all filters, is clipped."""
     setup = problem.setup
     smooth = smooth_response(setup, setup.camera.base_qe[None])
     top_dn = unquantized(np.array(setup.camera.pixel.saturation_e), setup.camera.pixel)
@@ -286,9 +357,9 @@ def _clips(problem: Problem) -> bool:
 def _inside(
     problem: Problem, curve: FloatArray, inside: FloatArray | None, members: MemberPairs | None
 ) -> tuple[float, FloatArray]:
-    """A solver's filter, moved by its tolerance toward the base curve or one that is `inside`; and what it attains.
+    """Return the value of a solver's filter, moved by its tolerance toward a feasible one, and the filter.
 
-    Of worst cases by the members that are known, as the program counts them.
+    Worst cases are over the known members, as the program counts them.
     """
     base = problem.setup.camera.base_qe[0]
     for end in (base,) if inside is None else (base, inside):
@@ -302,9 +373,9 @@ def _inside(
 
 
 def _attained(problem: Problem, curve: FloatArray, over: Mapping[str, float]) -> float:
-    """The objective for a filter as the search evaluates it; -inf when it does not meet the constraints.
+    """Return the objective of a filter as the search evaluates it; -inf if it does not meet the constraints.
 
-    `over`: worst cases, or distances of which a scene has no smaller ones.
+    `over` has worst cases, or smallest distances of the scene, that are already known.
     """
     curves = curve[None, None]
     found = designed_quantities(problem.setup, curves) | {name: np.array([value]) for name, value in over.items()}

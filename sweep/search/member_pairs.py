@@ -1,9 +1,8 @@
-"""Worst cases of CSDs, as a limit's linear programs know them: only those members that bind.
+"""Worst cases of CSDs in the linear programs of the upper bound: only those members that bind.
 
-A filter must keep every two members of a population of lights apart, however production makes it, and there are
-endlessly many. A program that knows some of them has no fewer filters, so that what no filter of it exceeds holds for
-all, too. Its best filter says which to add: the nearest ones, found exactly; until they are no nearer than those that
-the program knows.
+A filter must separate every two members of a population of lights, however production makes it, which are infinitely
+many. A program that knows some of them has no fewer filters, so that its bound holds for all. Its best filter
+determines the members to add: the nearest ones, found exactly, until they are no nearer than the known ones.
 """
 
 from __future__ import annotations
@@ -25,9 +24,18 @@ _NEARER_DN = 0.01
 
 @dataclass(frozen=True)
 class _Known:
-    """Two members each: how the filter comes out, place of the field, the spectra below their shifts, the shares above.
+    """Known pairs of members.
 
-    The last two are ndarray[n, 2].
+    Parameters
+    ----------
+    way : ndarray of int, shape (n,)
+        Production error.
+    case : ndarray of int, shape (n,)
+        Field position.
+    below : ndarray of int, shape (n, 2)
+        Spectra below the shifts.
+    share : ndarray of shape (n, 2)
+        Share of the next spectra.
     """
 
     way: IndexArray
@@ -36,7 +44,20 @@ class _Known:
     share: FloatArray
 
     def joined(self, others: _Known, some: BoolArray) -> _Known:
-        """These and some of others."""
+        """Return these and some other pairs.
+
+        Parameters
+        ----------
+        others : _Known
+            Further pairs.
+        some : ndarray of bool
+            Pairs that are added.
+
+        Returns
+        -------
+        _Known
+            All of them.
+        """
         return _Known(
             np.concatenate([self.way, others.way[some]]),
             np.concatenate([self.case, others.case[some]]),
@@ -45,16 +66,27 @@ class _Known:
         )
 
     def difference(self, values: FloatArray) -> FloatArray:
-        """First minus second member; `values`: ndarray[n_cases, n_spectra, n] -> ndarray[n_known, n]."""
+        """Return first minus second member.
+
+        Parameters
+        ----------
+        values : ndarray of shape (n_cases, n_spectra, n)
+            Values of the spectra.
+
+        Returns
+        -------
+        ndarray of shape (n_known, n)
+            Differences.
+        """
         low, high = (values[self.case[:, None], self.below + step] for step in (0, 1))
         both = low + self.share[..., None] * (high - low)
         return np.asarray(both[:, 0] - both[:, 1], dtype=float)
 
 
 class MemberPairs:
-    """The members that are known of each worst case; first, the nearest ones of the base curve.
+    """Known members of each worst case; at first the nearest ones of the base curve.
 
-    Without a population each light is its own only member.
+    Without a population each light is its only member.
     """
 
     def __init__(self, problem: Problem, names: Sequence[str]) -> None:
@@ -71,7 +103,18 @@ class MemberPairs:
         self._known = {name: self._nearest(name, base[0], self._ways[:1])[0] for name in names}
 
     def distances(self, name: str) -> Distances:
-        """Those of each two known members, for every filter."""
+        """Return the distances of known pairs, for every filter.
+
+        Parameters
+        ----------
+        name : str
+            Column name of a CSD.
+
+        Returns
+        -------
+        Distances
+            Distances.
+        """
         known = self._known[name]
         if name not in self._made:
             rows, added = known.difference(self._gain), np.zeros((known.case.size, 2))
@@ -82,22 +125,72 @@ class MemberPairs:
         return self._made[name]
 
     def counted(self, name: str, curve: FloatArray) -> float:
-        """The smallest distance of known members for a filter as the program counts it, ndarray[n_wavelengths]; DN."""
+        """Return the smallest distance of known members as the program counts it.
+
+        Parameters
+        ----------
+        name : str
+            Column name of a CSD.
+        curve : ndarray of shape (n_wavelengths,)
+            QE of the filter.
+
+        Returns
+        -------
+        float
+            Distance, DN.
+        """
         return self.distances(name).least(curve)
 
     def least_known(self, name: str, curve: FloatArray) -> float:
-        """The same, as the filter comes out."""
+        """Return the smallest distance of known members of the filter as produced.
+
+        Parameters
+        ----------
+        name : str
+            Column name of a CSD.
+        curve : ndarray of shape (n_wavelengths,)
+            QE of the filter.
+
+        Returns
+        -------
+        float
+            Distance, DN.
+        """
         known = self._known[name]
         produced = np.stack([way.curve(curve) for way in self._ways])[known.way]
         apart = (known.difference(self._gain) * produced).sum(axis=1)
         return float(np.sqrt((apart**2 + (known.difference(self._others) ** 2).sum(axis=1)).min()))
 
     def least(self, name: str, curve: FloatArray) -> float:
-        """The smallest distance of all members for a filter, DN."""
+        """Return the smallest distance of all members.
+
+        Parameters
+        ----------
+        name : str
+            Column name of a CSD.
+        curve : ndarray of shape (n_wavelengths,)
+            QE of the filter.
+
+        Returns
+        -------
+        float
+            Distance, DN.
+        """
         return float(np.sqrt(self._nearest(name, curve)[1].min()))
 
     def more(self, curve: FloatArray) -> bool:
-        """Add the nearest members for a filter; False where they are no nearer than the known ones."""
+        """Add the nearest members of a filter.
+
+        Parameters
+        ----------
+        curve : ndarray of shape (n_wavelengths,)
+            QE of the filter.
+
+        Returns
+        -------
+        bool
+            False if they are no nearer than the known ones.
+        """
         added = False
         for name in self.names:
             found, squared = self._nearest(name, curve)
@@ -109,10 +202,7 @@ class MemberPairs:
         return added
 
     def _nearest(self, name: str, curve: FloatArray, ways: Sequence[Produced] = ()) -> tuple[_Known, FloatArray]:
-        """The nearest members of each two lights and part of their shifts for a filter, and their squared distances.
-
-        For each of the first `ways` that the filter may come out, or all of them, and each place of the field.
-        """
+        """Return the nearest members of each two lights and part of their shifts, and their squared distances."""
         parts = []
         for number, way in enumerate(ways or self._ways):
             response = self._seen.imager.smooth(way.curve(curve)[None, None])[0]

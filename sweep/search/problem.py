@@ -1,4 +1,4 @@
-"""The search as a mathematical problem: box, objective, constraints, and the log of what was evaluated."""
+"""Search problem: box, objective, constraints, and the log of evaluations."""
 
 from __future__ import annotations
 
@@ -22,12 +22,30 @@ from ..vision.section import SeededVision
 
 @dataclass(frozen=True)
 class Problem:
-    """Maximize `objective` over the box `low`..`high` (ndarray[n_parameters]) under `constraints`.
+    """Maximize an objective over a box under constraints.
 
-    Quantities are those of `metrics.registry` with smooth rows; the worst ones are over edges that come out up to
-    `edge_shift_nm` and films that come out up to the share `thickness` off, and over the population of the setup's
-    lights. `states`: signal types that noise may confuse; `seed`: of random lamps and cameras; `vision`: images that
-    readers of signal heads are shown.
+    Parameters
+    ----------
+    setup : Setup
+        Scene and camera.
+    family : Family
+        Filters.
+    low, high : ndarray of shape (n_parameters,)
+        Box.
+    objective : Objective
+        Objective.
+    constraints : mapping of str to Bound
+        Bounds of quantities.
+    edge_shift_nm, thickness : float
+        Production tolerances of worst cases.
+    states : tuple of str
+        Signal types that noise may confuse.
+    own : tuple of OwnMetric
+        Metrics of user code.
+    seed : int
+        Seed of random lamps and cameras.
+    vision : SeededVision, optional
+        Images for readers of signal heads.
     """
 
     setup: Setup
@@ -45,7 +63,7 @@ class Problem:
 
     @property
     def quantities(self) -> Mapping[str, Quantity]:
-        """What objective and constraints may name."""
+        """Quantities that objective and constraints may name."""
         tasks = () if self.setup.tasks is None else self.setup.tasks.keys
         asked = Asked(self.setup.lights.classes, self.states, edge_shift=True, tasks=tasks, own=self.own)
         population = self.setup.lights.population
@@ -55,35 +73,68 @@ class Problem:
 
     @property
     def population(self) -> bool:
-        """Whether worst cases are over a population of the lights, too."""
+        """True if worst cases are over a population of the lights."""
         return self.setup.lights.population is not None
 
     def over_population(self, quantity: str) -> bool:
-        """Whether a quantity is a worst case over the population of the lights."""
+        """Return whether a quantity is a worst case over the population of the lights.
+
+        Parameters
+        ----------
+        quantity : str
+            Column name.
+
+        Returns
+        -------
+        bool
+            True if it is.
+        """
         return self.population and self.worst_distance(quantity)
 
     def of_a_share(self, quantity: str) -> bool:
-        """Whether a quantity is what a share of random lamps and cameras has."""
+        """Return whether a quantity is the value that a share of random lamps and cameras has.
+
+        Parameters
+        ----------
+        quantity : str
+            Column name.
+
+        Returns
+        -------
+        bool
+            True if it is.
+        """
         return self.quantities[quantity].extreme == OF_A_SHARE
 
     def worst_distance(self, quantity: str) -> bool:
-        """Whether a quantity is the worst case of a CSD."""
+        """Return whether a quantity is the worst case of a CSD.
+
+        Parameters
+        ----------
+        quantity : str
+            Column name.
+
+        Returns
+        -------
+        bool
+            True if it is.
+        """
         asked = self.quantities[quantity]
         return asked.extreme == WORST_CASE and asked.apart == DN
 
     @property
     def own_goal(self) -> bool:
-        """Whether the objective is of an own metric."""
+        """True if the objective is a metric of user code."""
         return any(self.quantities[name].needs == "own" for name in self.objective.weights)
 
     @property
     def signed_goal(self) -> bool:
-        """Whether the objective may be below 0, and of any size."""
+        """True if the objective may be negative, and of any size."""
         return any(self.quantities[name].signed for name in self.objective.weights)
 
     @property
     def pairs(self) -> dict[str, Pair]:
-        """The pair of signal types of each distance, be it in DN or in units of the noise."""
+        """Signal types of each distance, in DN or in units of the noise."""
         own = [q for q in self.quantities.values() if q.apart and not q.extreme]
         return {q.name: q.pair for q in own if q.pair is not None}
 
@@ -94,15 +145,37 @@ class Problem:
 
     @property
     def tolerance(self) -> Tolerance:
-        """How far off filters may come out."""
+        """Tolerance of production."""
         return Tolerance(self.edge_shift_nm, self.thickness)
 
     def produced(self, quantity: str) -> tuple[Off, ...]:
-        """How filters may come out, over which a quantity is the smallest."""
+        """Return the production errors over which a quantity is the smallest.
+
+        Parameters
+        ----------
+        quantity : str
+            Column name.
+
+        Returns
+        -------
+        tuple of Off
+            Production errors.
+        """
         return self.tolerance.places if self.quantities[quantity].extreme == WORST_CASE else (AS_DESIGNED,)
 
     def from_unit(self, u: FloatArray) -> FloatArray:
-        """Parameters from the free ones in units of the box: ndarray[..., n_free] -> ndarray[..., n_parameters]."""
+        """Convert free parameters in units of the box to parameters.
+
+        Parameters
+        ----------
+        u : ndarray of shape (..., n_free)
+            Free parameters in units of the box.
+
+        Returns
+        -------
+        ndarray of shape (..., n_parameters)
+            Parameters.
+        """
         x = np.broadcast_to(self.low, (*u.shape[:-1], self.low.size)).copy()
         # Clipped: low + 1 * (high - low) may round to above high.
         x[..., self.free] = np.clip(
@@ -113,14 +186,25 @@ class Problem:
         return x
 
     def to_unit(self, x: FloatArray) -> FloatArray:
-        """The free parameters in units of the box, clipped to it: [..., n_parameters] -> [..., n_free]."""
+        """Convert parameters to free ones in units of the box, clipped to it.
+
+        Parameters
+        ----------
+        x : ndarray of shape (..., n_parameters)
+            Parameters.
+
+        Returns
+        -------
+        ndarray of shape (..., n_free)
+            Free parameters in units of the box.
+        """
         low, span = self.low[self.free], (self.high - self.low)[self.free]
         return np.asarray(np.clip((x[..., self.free] - low) / span, 0.0, 1.0), dtype=float)
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """One logged evaluation: parameters, smooth objective, sensitivities, largest violation (0: feasible)."""
+    """Logged evaluation: parameters, smooth objective, sensitivities, and largest violation (0 if feasible)."""
 
     x: FloatArray
     objective: float
@@ -131,7 +215,7 @@ class Evaluation:
 
 @dataclass
 class SearchRun:
-    """What one start brought: the log of all evaluations, and how nlopt ended."""
+    """Log of one start: all evaluations, and nlopt's final status."""
 
     start: int
     status: str = "not started"
@@ -139,13 +223,39 @@ class SearchRun:
 
 
 def best_feasible(log: Sequence[Evaluation]) -> Evaluation | None:
-    """The feasible evaluation with the largest objective, the earlier one on a tie; None when none is feasible."""
+    """Return the feasible evaluation with the largest objective, the first one on a tie.
+
+    Parameters
+    ----------
+    log : sequence of Evaluation
+        Evaluations.
+
+    Returns
+    -------
+    Evaluation or None
+        None if none is feasible.
+    """
     feasible = [e for e in log if e.violation <= FEASIBLE and np.isfinite(e.objective)]
     return max(feasible, key=lambda e: e.objective, default=None)
 
 
 def starting_points(problem: Problem, starts: int, seed: int) -> FloatArray:
-    """Starting points from a scrambled Sobol set in units of the box, ndarray[starts, n_free]; one seed, one set."""
+    """Return starting points from a scrambled Sobol sequence.
+
+    Parameters
+    ----------
+    problem : Problem
+        Search problem.
+    starts : int
+        Number of points.
+    seed : int
+        Seed.
+
+    Returns
+    -------
+    ndarray of shape (starts, n_free)
+        Points in units of the box.
+    """
     from scipy.stats import qmc  # noqa: PLC0415  (slow to import; only a search draws points)
 
     free = problem.free

@@ -1,11 +1,11 @@
-"""How any filter comes out of production, for a limit's linear programs: its shape, moved by whole steps of the grid.
+"""Filters as production makes them, in the linear programs of the upper bound: shapes moved by whole steps of the grid.
 
-A filter N = fixed + carrier x shape, of which production moves the shape by whole steps, has the shape s(l - d) at the
-wavelength l: N comes out as fixed(l) + carrier(l) (N - fixed)(l - d) / carrier(l - d), which is linear in N. So what
-production does is more rows of the same program. Of moves by part of a step, and of films that are too thick, nodes of
-the grid do not say where the shape stands: those are left out, and a worst case over fewer is no smaller. Where N does
-not say what moves in (beyond the ends of the grid, and where the carrier is next to nothing), it may be all that the
-box of the family has there.
+A filter N = fixed + carrier times shape, of which production moves the shape by whole steps, has the shape s(l - d) at
+the wavelength l: it comes out as fixed(l) + carrier(l) (N - fixed)(l - d) / carrier(l - d), which is linear in N.
+Production is therefore more rows of the same program. Moves by part of a step and thickness errors are left out, since
+the shape is known at the nodes of the grid alone; a worst case over fewer moves is no smaller. Where N does not
+determine what moves in (beyond the ends of the grid, and where the carrier is next to nothing), it may take any value
+of the family's box.
 """
 
 from __future__ import annotations
@@ -28,10 +28,16 @@ _WHOLE = 1e-9
 
 @dataclass(frozen=True)
 class Distances:
-    """Two lights each: their squared distance is `squared` + (rows @ N + what is not known)^2.
+    """Squared distances of pairs of lights: `squared` + (rows @ N + unknown part)^2.
 
-    `rows`: in the modified channel, DN per QE, ndarray[n, n_wavelengths]; `added`: what is not known is at most the
-    first, and its negative at most the second, ndarray[n, 2]; `squared`: in the other channels, DN^2, ndarray[n].
+    Parameters
+    ----------
+    rows : ndarray of shape (n, n_wavelengths)
+        Differences in the modified channel, DN per QE.
+    squared : ndarray of shape (n,)
+        In the other channels, DN^2.
+    added : ndarray of shape (n, 2)
+        Upper bounds on the unknown part and on its negative, DN.
     """
 
     rows: FloatArray
@@ -39,7 +45,18 @@ class Distances:
     added: FloatArray
 
     def least(self, curve: FloatArray) -> float:
-        """The smallest one that a filter may have, ndarray[n_wavelengths]; DN."""
+        """Return a lower bound on the smallest distance of a filter.
+
+        Parameters
+        ----------
+        curve : ndarray of shape (n_wavelengths,)
+            QE of the filter.
+
+        Returns
+        -------
+        float
+            Distance, DN.
+        """
         apart = self.rows @ curve
         most = np.maximum(apart + self.added[:, 0], self.added[:, 1] - apart)
         return float(np.sqrt(self.squared + most**2).min())
@@ -47,9 +64,16 @@ class Distances:
 
 @dataclass(frozen=True)
 class Produced:
-    """A filter that comes out is scale x N[source] + constant where it is `known`, else between `low` and `high`.
+    """Filter as produced: scale times N[source] + constant where it is `known`, else between `low` and `high`.
 
-    All are ndarray[n_wavelengths].
+    Parameters
+    ----------
+    source : ndarray of int, shape (n_wavelengths,)
+        Wavelength of the designed filter.
+    known : ndarray of bool, shape (n_wavelengths,)
+        True where N determines the filter.
+    scale, constant, low, high : ndarray of shape (n_wavelengths,)
+        Coefficients and bounds.
     """
 
     source: IndexArray
@@ -60,13 +84,34 @@ class Produced:
     high: FloatArray
 
     def curve(self, curve: FloatArray) -> FloatArray:
-        """How a filter comes out that has most where N does not say it, ndarray[n_wavelengths]."""
+        """Return the produced filter, at its upper bound where it is unknown.
+
+        Parameters
+        ----------
+        curve : ndarray of shape (n_wavelengths,)
+            QE of the filter.
+
+        Returns
+        -------
+        ndarray of shape (n_wavelengths,)
+            QE.
+        """
         return np.where(self.known, self.scale * curve[self.source] + self.constant, self.high)
 
     def rows(self, apart: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Sums over the filter that comes out, as sums over N; `apart`: their weights, ndarray[n, n_wavelengths].
+        """Convert sums over the produced filter to sums over N.
 
-        Second, what must be added: at most, and at most to the negative of the sum, ndarray[n, 2].
+        Parameters
+        ----------
+        apart : ndarray of shape (n, n_wavelengths)
+            Weights.
+
+        Returns
+        -------
+        rows : ndarray of shape (n, n_wavelengths)
+            Weights of N.
+        added : ndarray of shape (n, 2)
+            Upper bounds on the unknown part of the sums and on its negative.
         """
         rows = np.zeros_like(apart)
         known = np.flatnonzero(self.known)  # each has a source of its own
@@ -78,16 +123,35 @@ class Produced:
 
 
 def ways_of(problem: Problem) -> tuple[Produced, ...]:
-    """How filters come out that a program knows: as designed, and with each move by whole steps that the study has.
+    """Return the filters as produced that a program knows: as designed, and moved by whole steps.
 
-    Where all places of the light or the sensor count, only as designed.
+    Parameters
+    ----------
+    problem : Problem
+        Search problem.
+
+    Returns
+    -------
+    tuple of Produced
+        Only as designed where all sampling phases or field positions count.
     """
     anywhere = problem.setup.all_heights or problem.setup.all_phases
     return (_as_designed(problem.setup.camera.base_qe[0]), *(() if anywhere else _moves(problem)))
 
 
 def all_ways(problem: Problem) -> bool:
-    """Whether these are all places at which a worst case is looked for."""
+    """Return whether these are all production errors at which a worst case is searched.
+
+    Parameters
+    ----------
+    problem : Problem
+        Search problem.
+
+    Returns
+    -------
+    bool
+        True if they are.
+    """
     return len(ways_of(problem)) == len({AS_DESIGNED, *problem.tolerance.places})
 
 

@@ -1,9 +1,9 @@
-"""On which side of the other each signal lies: a proof over all choices, by branch and bound.
+"""Proof over all choices of the brighter signal of each pair, by branch and bound.
 
-A filter may put some signals of a type above and others below those of the other type, so a bound for one choice of
-sides is none for all filters. A part of the choices is closed when a linear program over the filters with the sides
-that are decided so far reaches no more than the best filter known; else the pair that its best filter keeps least
-apart is decided either way. What is left open when the number of programs runs out counts with its own bound.
+A filter may put some signals of a type above and others below those of the other type, so that a bound for one choice
+of sides is none for all filters. A part of the choices is closed when a linear program with its decided sides reaches
+no more than the best known filter; else the pair that its best filter separates least is decided either way. Parts
+that are open when the number of programs runs out count with their own bound.
 """
 
 from __future__ import annotations
@@ -29,10 +29,20 @@ _MET = 1e-7
 
 @dataclass(frozen=True)
 class Proof:
-    """What was found, in the objective's unit: no filter reaches more than `proven`, `curve` reaches `attained`.
+    """Result of branch and bound, in the objective's unit.
 
-    `open_parts`: parts of the choice of sides that were not brought down to `attained` and the tolerance. `parts`: all
-    that any filter belongs to, with what bounds them.
+    Parameters
+    ----------
+    attained : float
+        Objective of `curve`.
+    curve : ndarray of shape (n_wavelengths,) or None
+        Best filter.
+    proven : float
+        Upper bound on any filter.
+    open_parts : int
+        Parts that were not closed.
+    parts : tuple of Covered
+        Parts that cover all filters, with their bounds.
     """
 
     attained: float
@@ -42,9 +52,21 @@ class Proof:
     parts: tuple[Covered, ...] = ()
 
     def proven_at(self, program: FilterProgram, sensitivity: float) -> float:
-        """No filter with at least this sensitivity reaches more, whatever sensitivity the proof was made for.
+        """Return the upper bound at another least sensitivity.
 
         The weights of a linear program stay a proof where its right side changes, so this is a tangent, to `_NEAR`.
+
+        Parameters
+        ----------
+        program : FilterProgram
+            Linear programs of the proof.
+        sensitivity : float
+            Least sensitivity.
+
+        Returns
+        -------
+        float
+            Upper bound.
         """
         most = -np.inf
         for part in self.parts:
@@ -59,15 +81,24 @@ class Proof:
 
 @dataclass(frozen=True)
 class Covered:
-    """Some choices of sides: filters there reach no more than `cap`, and than each of the `certificates` says."""
+    """Part of the choices of sides.
+
+    Parameters
+    ----------
+    cap : float
+        Upper bound on its filters.
+    certificates : tuple of Certificate
+        Further bounds.
+    """
 
     cap: float
     certificates: tuple[Certificate, ...] = ()
 
 
 class _Conflicts:
-    """Sets of sides that were closed: what holds them all is closed, and what holds all but one has that on the other
-    side. For each pair two literals: 2 pair with the first signal above, 2 pair + 1 below.
+    """Closed sets of sides: any superset is closed, and a set with all but one has that one on the other side.
+
+    For each pair two literals: 2 pair with the first signal above, 2 pair + 1 below.
     """
 
     def __init__(self, n_pairs: int) -> None:
@@ -76,13 +107,30 @@ class _Conflicts:
         self._starts: list[int] = []
 
     def add(self, sides: Sides) -> None:
-        """Remember that no part with these sides is left."""
+        """Store a closed set of sides.
+
+        Parameters
+        ----------
+        sides : Sides
+            Sides.
+        """
         if sides.pairs:
             self._starts.append(len(self._literals))
             self._literals += _literals(sides).tolist()
 
     def applied(self, sides: Sides) -> Sides | None:
-        """The sides with all that follows from them; None where they are closed."""
+        """Return the sides with all that follow from them.
+
+        Parameters
+        ----------
+        sides : Sides
+            Sides.
+
+        Returns
+        -------
+        Sides or None
+            None if they are closed.
+        """
         literals, starts = np.array(self._literals, dtype=np.intp), np.array(self._starts, dtype=np.intp)
         while starts.size:
             outside = np.ones(2 * self._n, dtype=bool)
@@ -107,8 +155,10 @@ def _literals(sides: Sides) -> IndexArray:
 class SideSearch:
     """Branch and bound over the sides of a program's pairs.
 
-    `value`: the objective of a filter as a search evaluates it, with the filter moved inside the constraints by
-    rounding; -inf where it does not meet them.
+    Parameters
+    ----------
+    value : callable
+        Objective of a filter, moved inside the constraints by rounding; -inf if it does not meet them.
     """
 
     def __init__(
@@ -128,7 +178,13 @@ class SideSearch:
         self._curve: FloatArray | None = None
 
     def run(self) -> Proof:
-        """Close every part, the one that may reach most first, or as many as the number of programs allows."""
+        """Close every part, the one with the largest bound first, within the number of programs.
+
+        Returns
+        -------
+        Proof
+            The proof.
+        """
         if self._program.top < 0:
             return Proof(-np.inf, None, -np.inf, 0)
         self._offer(self._program.base)
@@ -158,20 +214,17 @@ class SideSearch:
 
     @property
     def _closing(self) -> float:
-        """A part that reaches no more than this is closed."""
+        """Bound at which a part is closed."""
         return self._best + self._tolerance
 
     def _offer(self, curve: FloatArray) -> None:
-        """Take a filter as the best one if it is."""
+        """Keep a filter if it is the best one."""
         value, moved = self._value(curve, self._curve)
         if value > self._best:
             self._best, self._curve = value, moved
 
     def _divided(self, beyond: float, sides: Sides, part: Covered) -> tuple[float, Covered, list[tuple[Sides, float]]]:
-        """What a part can reach at most, the part with what says so, and those that it falls into with their reach.
-
-        None where it is closed or stays open.
-        """
+        """Return the bound of a part, the part, and its children with their bounds, if any."""
         t = beyond
         solved = self._program.solve(t, sides)
         beyond = min(beyond, solved.beyond)
@@ -203,7 +256,7 @@ class SideSearch:
         )
 
     def _dive(self, side: float) -> None:
-        """Look for a good filter with all pairs on one side: decide the worst ones, and lower t from above."""
+        """Search a good filter with all pairs on one side: decide the worst ones, and lower t."""
         program, beyond, sides = self._program, self._program.top, Sides()
         for _ in range(_DIVE_STEPS):
             if beyond <= self._closing or program.solved >= self._most:

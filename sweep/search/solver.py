@@ -1,9 +1,9 @@
-"""Constrained search for the best design; the only file that knows nlopt.
+"""Constrained search for the best design; the only module that uses nlopt.
 
-Maximize a study's objective, such as the smallest distance of a pair of signal types. The minimum over pairs is not
-smooth, so it is written in the epigraph form: maximize t subject to (distance of every pair)^2 >= t^2, with exact
-gradients; where errors are to be the least, t is a bound of their decades below 1. The search sees the smooth response
-(unquantized, unclipped); every evaluation is logged, and the answer is the best feasible one of the log.
+The smallest distance of a pair of signal types is not smooth, so it is written in epigraph form: maximize t subject to
+(distance of every pair)^2 >= t^2, with exact gradients; errors are minimized by a bound t on their decades below 1.
+The search uses the smooth response (unquantized, unclipped). Every evaluation is logged, and the answer is the best
+feasible one of the log.
 """
 
 from __future__ import annotations
@@ -48,12 +48,27 @@ _UNKNOWN = 1e9
 def search_from(
     problem: Problem, start: int, u0: FloatArray, algorithm: str, max_evaluations: int, seed: int = 1
 ) -> SearchRun:
-    """Search from one starting point with at most `max_evaluations` simulations.
+    """Search from one starting point.
 
-    `u0`: ndarray[n_free], in units of the box. The status is nlopt's word for how it ended, or `settled`, where a
-    search by gradients no longer came away from where it was; an early end is no error, since the log keeps every
-    evaluation. `seed` and `start` set the random numbers of the algorithms that use
-    them (ISRES).
+    Parameters
+    ----------
+    problem : Problem
+        Search problem.
+    start : int
+        Number of the start, part of the seed of random algorithms.
+    u0 : ndarray of shape (n_free,)
+        Starting point in units of the box.
+    algorithm : str
+        Algorithm of nlopt.
+    max_evaluations : int
+        Simulations at most.
+    seed : int
+        Seed of random algorithms (ISRES).
+
+    Returns
+    -------
+    SearchRun
+        Log, with nlopt's status, or `settled` if a gradient search stayed at one point.
     """
     run = SearchRun(start)
     model = Model(problem, run, max_evaluations)
@@ -80,14 +95,27 @@ def search_from(
 
 
 def smooth_objective(problem: Problem, x: FloatArray) -> float:
-    """The objective of one design as the search sees it; `x`: ndarray[n_parameters]."""
+    """Return the objective of one design before clipping and quantization.
+
+    Parameters
+    ----------
+    problem : Problem
+        Search problem.
+    x : ndarray of shape (n_parameters,)
+        Parameters.
+
+    Returns
+    -------
+    float
+        Objective.
+    """
     return Model(problem, SearchRun(0), 1).at(problem.to_unit(x)).evaluation.objective
 
 
 def _epigraph(
     problem: Problem, model: Model, first: Point, u0: FloatArray, algorithm: str
 ) -> tuple[nlopt.opt, list[float]]:
-    """Maximize the rule of the t_k (a minimum has one t) subject to rows of term k >= t_k^2 and the conditions.
+    """Set up: maximize the rule of the t_k subject to rows of term k >= t_k^2 and the conditions.
 
     z = (u, t); each t_k is in units of its term's first value. Rows that are no squares are >= t_k.
     """
@@ -135,7 +163,7 @@ def _epigraph(
 def _direct(
     problem: Problem, model: Model, first: Point, u0: FloatArray, algorithm: str
 ) -> tuple[nlopt.opt, list[float]]:
-    """Maximize the objective itself, subject to the worst of the conditions."""
+    """Set up: maximize the objective itself, subject to the worst of the conditions."""
     rule = problem.objective.rule
 
     def whole(terms: FloatArray) -> float:
@@ -155,8 +183,23 @@ def _direct(
 
 
 def best_reachable(problem: Problem, quantity: str, starts: FloatArray, max_evaluations: int) -> float:
-    """The extreme that `quantity` reaches in the box when no other constraint counts: its largest value if the study
-    asks for a minimum, else its smallest. `starts`: ndarray[n, n_free].
+    """Return the extreme of a quantity in the box without other constraints.
+
+    Parameters
+    ----------
+    problem : Problem
+        Search problem.
+    quantity : str
+        Column name.
+    starts : ndarray of shape (n, n_free)
+        Starting points in units of the box.
+    max_evaluations : int
+        Simulations of each start at most.
+
+    Returns
+    -------
+    float
+        Largest value if the study asks for a minimum, else the smallest one.
     """
     alone = replace(problem, constraints={quantity: problem.constraints[quantity]})
     own = problem.quantities[quantity]
@@ -167,7 +210,7 @@ def best_reachable(problem: Problem, quantity: str, starts: FloatArray, max_eval
 
 
 def _extremes(problem: Problem, quantity: str, sign: float, u0: FloatArray, max_evaluations: int) -> list[float]:
-    """Worst rows of a quantity at well-formed designs on the way to their extreme: maximize t, sign x rows >= t."""
+    """Return the worst rows of a quantity on the way to its extreme: maximize t, sign times rows >= t."""
     n_own = problem.family.violation(problem.low[None]).shape[1]
     model = Model(problem, SearchRun(0), max_evaluations)
     first = model.at(u0).quantities[quantity]

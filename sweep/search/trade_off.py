@@ -1,4 +1,4 @@
-"""The trade-off that a search traces: the best design at each level of sensitivity, and the limit there."""
+"""Trade-off of the search: the best design at each level of sensitivity, and the upper bound there."""
 
 from __future__ import annotations
 
@@ -28,9 +28,20 @@ _NO_LIMIT = 0.05
 
 @dataclass(frozen=True)
 class FrontPoint:
-    """The best design with at least `level` of sensitivity (None: none was found), and the limit there.
+    """Best design with at least one level of sensitivity.
 
-    `onward`: sensitivities up to the next level, and what no filter with at least that much exceeds.
+    Parameters
+    ----------
+    level : float
+        Least sensitivity.
+    best : Evaluation or None
+        Best design; None if none was found.
+    runs : tuple of SearchRun
+        Searches.
+    limit : Limit or None
+        Upper bound.
+    onward : tuple of (float, float)
+        Sensitivities up to the next level, and the upper bound at each.
     """
 
     level: float
@@ -42,8 +53,18 @@ class FrontPoint:
 
 @dataclass(frozen=True)
 class Effort:
-    """How a problem is searched: nlopt's algorithm, starting points in units of the box, ndarray[n_starts, n_free],
-    evaluations of each start, and the seed of algorithms that draw.
+    """Effort of a search.
+
+    Parameters
+    ----------
+    algorithm : str
+        Algorithm of nlopt.
+    starts : ndarray of shape (n_starts, n_free)
+        Starting points in units of the box.
+    evaluations : int
+        Simulations of each start at most.
+    seed : int
+        Seed of random algorithms.
     """
 
     algorithm: str
@@ -53,20 +74,62 @@ class Effort:
 
 
 def check_proof(best: Evaluation | None, limit: Limit | None, where: str = "") -> None:
-    """Raise BrokenProofError where a design that the search found is better than what is proven to be out of reach."""
+    """Raise an error if a design of the search exceeds the upper bound.
+
+    Parameters
+    ----------
+    best : Evaluation or None
+        Answer of the search.
+    limit : Limit or None
+        Upper bound.
+    where : str
+        Scene, for the message.
+
+    Raises
+    ------
+    BrokenProofError
+        If it does.
+    """
     if best is not None and limit is not None:
         check_bound(best.objective, limit.proven, where)
 
 
 def gap_of(best: Evaluation, limit: Limit) -> float | None:
-    """Relative gap of an answer to the upper bound; None where the bound itself is within its own accuracy."""
+    """Return the relative gap of an answer to the upper bound.
+
+    Parameters
+    ----------
+    best : Evaluation
+        Answer of the search.
+    limit : Limit
+        Upper bound.
+
+    Returns
+    -------
+    float or None
+        None if the bound is within its own accuracy of 0.
+    """
     return None if limit.proven <= _NO_LIMIT else gap_between(best.objective, limit.proven)
 
 
 def calls_at_levels(problem: Problem, levels: Sequence[float], effort: Effort, *, limited: bool) -> list[Call]:
-    """The limit at each level, where the problem is `limited`, and then the first searches of each.
+    """Return the independent calls: the upper bound and the first searches at each level.
 
-    None of them needs what another one finds.
+    Parameters
+    ----------
+    problem : Problem
+        Search problem.
+    levels : sequence of float
+        Least sensitivities.
+    effort : Effort
+        Effort of each search.
+    limited : bool
+        The problem has an upper bound.
+
+    Returns
+    -------
+    list of Call
+        Calls.
     """
     if not levels:
         return []
@@ -79,7 +142,18 @@ def calls_at_levels(problem: Problem, levels: Sequence[float], effort: Effort, *
 
 
 def most_searches(n_levels: int, n_starts: int) -> int:
-    """Searches of `trade_off` at most: those from a few points, and those from what each level's neighbors found."""
+    """Return the largest number of searches of `trade_off`.
+
+    Parameters
+    ----------
+    n_levels, n_starts : int
+        Numbers of levels and starts.
+
+    Returns
+    -------
+    int
+        Searches.
+    """
     return n_levels * min(n_starts, _FRONT_STARTS) + 2 * max(0, n_levels - 1)
 
 
@@ -93,10 +167,34 @@ def trade_off(
     *,
     limited: bool,
 ) -> tuple[FrontPoint, ...]:
-    """The same search with at least each level of sensitivity: from a few points, then from what its neighbors found.
+    """Search at each level of sensitivity: from a few points, then from the answers of neighboring levels.
 
-    `answers`: of `calls_at_levels`; `parallel` runs further calls over the cores. Raises BrokenProofError, see
-    `check_proof`.
+    Parameters
+    ----------
+    problem : Problem
+        Search problem.
+    levels : sequence of float
+        Least sensitivities.
+    effort : Effort
+        Effort of each search.
+    answers : iterator
+        Answers of `calls_at_levels`.
+    parallel : callable
+        Runs further calls on the cores.
+    progress : callable
+        Called with a phase, work done and work in total.
+    limited : bool
+        The problem has an upper bound.
+
+    Returns
+    -------
+    tuple of FrontPoint
+        One point per level.
+
+    Raises
+    ------
+    BrokenProofError
+        If a design exceeds its upper bound.
     """
     limits: list[Limit | None] = [*islice(answers, len(levels))] if limited else [None] * len(levels)
     runs: list[list[SearchRun]] = [[] for _ in levels]
@@ -127,20 +225,20 @@ def trade_off(
 
 
 def _searches(problem: Problem, effort: Effort, first: int, points: Iterable[FloatArray]) -> list[Call]:
-    """A search from each point; `first`: the number of the first one."""
+    """Return the call of a search from each point; `first` is the number of the first one."""
     own = effort.algorithm, effort.evaluations, effort.seed
     return [delayed(search_from, problem, at, u, *own) for at, u in enumerate(points, first)]
 
 
 def _between(levels: Sequence[float]) -> list[tuple[float, ...]]:
-    """Sensitivities between each two levels."""
+    """Return sensitivities between neighboring levels."""
     return [tuple(map(float, np.linspace(a, b, _BETWEEN + 2)[1:-1])) for a, b in pairwise(levels)]
 
 
 def _tangents(
     between: Sequence[tuple[float, ...]], limits: Sequence[Limit | None]
 ) -> Iterator[tuple[tuple[float, float], ...]]:
-    """Of each two levels the smaller bound of both proofs, at the sensitivities between them."""
+    """Yield the smaller bound of both neighboring proofs at the sensitivities between them."""
     for own, (below, above) in zip(between, pairwise(limits), strict=True):
         if below is None or above is None:
             yield ()
@@ -150,7 +248,22 @@ def _tangents(
 
 
 def with_least(problem: Problem, name: str, level: float) -> Problem:
-    """The problem with a quantity of `level` or more; a largest value that is smaller than that is given up."""
+    """Return the problem with a least value of a quantity; a smaller upper bound on it is dropped.
+
+    Parameters
+    ----------
+    problem : Problem
+        Search problem.
+    name : str
+        Column name.
+    level : float
+        Least value.
+
+    Returns
+    -------
+    Problem
+        The problem.
+    """
     given = problem.constraints.get(name)
     top = None if given is None or given.max is None or given.max < level else given.max
     return replace(problem, constraints={**problem.constraints, name: Bound(min=level, max=top)})

@@ -1,1 +1,1 @@
-"""Families of filters that a study can name: every class of a file here that has a `kind`."""
+"""Families of filters that a study can name: every class of a module here with a `kind`."""

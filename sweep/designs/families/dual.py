@@ -1,4 +1,4 @@
-"""Two modified channels whose mean stays the base curve: separation without any loss of mean sensitivity."""
+"""Two modified channels with the base curve as their mean: separation without loss of mean sensitivity."""
 
 from __future__ import annotations
 
@@ -10,11 +10,19 @@ from ..bands import Banded
 
 
 class Dual(Banded):
-    """N_a = base - swing, N_b = base + swing, so N_a + N_b = 2 base exactly.
+    """Two channels with a constant sum.
 
-    swing = depth (e(l; left) - e(l; right)) min(base, ceiling - base): where the band is open and `depth` is 1, the
-    swing is the largest that keeps 0 <= N_a and N_b <= ceiling. `base`, `ceiling`: QE, ndarray[n_wavelengths], ceiling
-    >= base (such as the clear pixel).
+    N_a = base - swing, N_b = base + swing, with swing = depth (e(l; left) - e(l; right)) min(base, ceiling - base).
+    With an open band and depth 1, the swing is the largest that keeps 0 <= N_a and N_b <= ceiling.
+
+    Parameters
+    ----------
+    wavelength_nm : ndarray of shape (n_wavelengths,)
+        Wavelengths, nm.
+    base : ndarray of shape (n_wavelengths,)
+        QE of the replaced curve.
+    ceiling : ndarray of shape (n_wavelengths,)
+        Upper bound on the QE, such as the clear pixel.
     """
 
     kind = "dual"
@@ -29,7 +37,29 @@ class Dual(Banded):
 
     @classmethod
     def of_study(cls, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None, options: Section) -> Dual:
-        """See `Family.of_study`; raises SweepError for a ceiling that is nowhere above the base."""
+        """Make the family over curves of a study.
+
+        Parameters
+        ----------
+        wavelength_nm : ndarray of shape (n_wavelengths,)
+            Wavelengths, nm.
+        base : ndarray of shape (n_wavelengths,)
+            QE of the replaced curve.
+        target : ndarray of shape (n_wavelengths,) or None
+            QE that the filter takes inside its band.
+        options : Section
+            Options of the family.
+
+        Returns
+        -------
+        Dual
+            The family.
+
+        Raises
+        ------
+        SweepError
+            If the ceiling is nowhere above the base.
+        """
         assert target is not None
         assert not options.model_fields_set
         if not (target > base).any():
@@ -37,24 +67,79 @@ class Dual(Banded):
         return Dual(wavelength_nm, base, target)
 
     def curves(self, x: FloatArray) -> FloatArray:
-        """QE of both channels, ndarray[n_designs, 2, n_wavelengths]; see `Family.curves`."""
+        """Return the QE of both channels.
+
+        Parameters
+        ----------
+        x : ndarray of shape (n_designs, n_parameters)
+            Parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE of the modified channels.
+        """
         swing = self._room * self._bands.shape(x)
         return np.stack([self._base - swing, self._base + swing], axis=1)
 
     def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
-        """The base, and the base with the whole swing where the band can reach; see `Family.upper`."""
+        """Return the base, and the base plus the whole swing where the band can reach.
+
+        Parameters
+        ----------
+        low, high : ndarray of shape (n_parameters,)
+            Ends of the box of parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_modified, n_wavelengths)
+            Upper bound on the QE.
+        """
         return np.stack([self._base, self._base + self._room * self._bands.reach(low, high)])
 
     def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
-        """The base without the whole swing where the band can reach, and the base; see `Family.lower`."""
+        """Return the base minus the whole swing where the band can reach, and the base.
+
+        Parameters
+        ----------
+        low, high : ndarray of shape (n_parameters,)
+            Ends of the box of parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_modified, n_wavelengths)
+            Lower bound on the QE.
+        """
         return np.stack([self._base - self._room * self._bands.reach(low, high), self._base])
 
     def hull(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The base with the least and the most swing; see `Family.hull`."""
+        """Return the base with the least and the most swing.
+
+        Parameters
+        ----------
+        low, high : ndarray of shape (n_parameters,)
+            Ends of the box of parameters.
+
+        Returns
+        -------
+        low, high : ndarray of shape (n_modified, n_wavelengths)
+            Bounds on the QE.
+        """
         least, most = (self._room * shape for shape in self._bands.range(low, high))
         return np.stack([self._base - most, self._base + least]), np.stack([self._base - least, self._base + most])
 
     def gradient(self, x: FloatArray) -> FloatArray:
-        """Derivative by each parameter, ndarray[5, 2, n_wavelengths]; see `Family.gradient`."""
+        """Return the derivative of `curves` at one design.
+
+        Parameters
+        ----------
+        x : ndarray of shape (n_parameters,)
+            Parameters of one design.
+
+        Returns
+        -------
+        ndarray of shape (n_parameters, n_modified, n_wavelengths)
+            QE per unit of parameter.
+        """
         slope = self._room * self._bands.gradient(x)
         return np.stack([-slope, slope], axis=1)

@@ -1,4 +1,4 @@
-"""A filter free at every node of a grid of its own."""
+"""Filter of any shape, with a free transmission at each node."""
 
 from __future__ import annotations
 
@@ -35,10 +35,23 @@ class Nodes(Section):
 
 
 class FreeForm:
-    """N = base x transmission, which is piecewise linear between nodes and 1 outside the first and the last node.
+    """Filter with a free transmission at each node.
 
-    Linear in its parameters, so it is the natural family to come near the limit. `nodes_nm`: ndarray[n_nodes].
-    `off`: how production has it.
+    Notes
+    -----
+    = base times transmission, which is piecewise linear between nodes and 1 outside them. N is linear in
+    its parameters.
+
+    Parameters
+    ----------
+    wavelength_nm : ndarray of shape (n_wavelengths,)
+        Wavelengths, nm.
+    base : ndarray of shape (n_wavelengths,)
+        QE of the replaced curve.
+    nodes_nm : ndarray of shape (n_nodes,)
+        Nodes, nm.
+    off : Off
+        Production error.
     """
 
     kind = "free_form"
@@ -47,7 +60,7 @@ class FreeForm:
     start_dimensions: int | None = 3
 
     class Options(Section):
-        """Where the transmission is free."""
+        """Options: nodes of the transmission."""
 
         nodes: Nodes
 
@@ -67,7 +80,29 @@ class FreeForm:
     def of_study(
         cls, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None, options: Section
     ) -> FreeForm:
-        """See `Family.of_study`; raises SweepError for nodes outside the wavelengths."""
+        """Make the family over curves of a study.
+
+        Parameters
+        ----------
+        wavelength_nm : ndarray of shape (n_wavelengths,)
+            Wavelengths, nm.
+        base : ndarray of shape (n_wavelengths,)
+            QE of the replaced curve.
+        target : ndarray of shape (n_wavelengths,) or None
+            QE that the filter takes inside its band.
+        options : Section
+            Options of the family.
+
+        Returns
+        -------
+        FreeForm
+            The family.
+
+        Raises
+        ------
+        SweepError
+            If nodes lie outside the wavelengths.
+        """
         assert target is None
         assert isinstance(options, FreeForm.Options)
         nodes = options.nodes
@@ -84,55 +119,154 @@ class FreeForm:
         return tuple(Parameter(f"transmission_{node:g}_nm", 0, 1, default=None) for node in self.nodes_nm)
 
     def curves(self, x: FloatArray) -> FloatArray:
-        """QE of the modified channel, ndarray[n_designs, 1, n_wavelengths]; see `Family.curves`."""
+        """Return the QE of the modified channel.
+
+        Parameters
+        ----------
+        x : ndarray of shape (n_designs, n_parameters)
+            Parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE of the modified channels.
+        """
         return np.asarray((self._fixed + row_products(x, self._hats))[:, None, :], dtype=float)
 
     def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
-        """Every transmission at its largest; see `Family.upper`."""
+        """Return the curve with every transmission at its largest.
+
+        Parameters
+        ----------
+        low, high : ndarray of shape (n_parameters,)
+            Ends of the box of parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_modified, n_wavelengths)
+            Upper bound on the QE.
+        """
         assert low.shape == high.shape
         return np.asarray(self.curves(high[None])[0], dtype=float)
 
     def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
-        """Every transmission at its smallest; see `Family.lower`."""
+        """Return the curve with every transmission at its smallest.
+
+        Parameters
+        ----------
+        low, high : ndarray of shape (n_parameters,)
+            Ends of the box of parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_modified, n_wavelengths)
+            Lower bound on the QE.
+        """
         assert low.shape == high.shape
         return np.asarray(self.curves(low[None])[0], dtype=float)
 
     def hull(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Every transmission at its smallest and at its largest; see `Family.hull`."""
+        """Return the curves with every transmission at its smallest and largest.
+
+        Parameters
+        ----------
+        low, high : ndarray of shape (n_parameters,)
+            Ends of the box of parameters.
+
+        Returns
+        -------
+        low, high : ndarray of shape (n_modified, n_wavelengths)
+            Bounds on the QE.
+        """
         lower, upper = self.curves(np.stack([low, high]))
         return lower, upper
 
     def gradient(self, x: FloatArray) -> FloatArray:
-        """Constant, ndarray[n_nodes, 1, n_wavelengths]; see `Family.gradient`."""
+        """Return the derivative of `curves`, which is constant.
+
+        Parameters
+        ----------
+        x : ndarray of shape (n_parameters,)
+            Parameters of one design.
+
+        Returns
+        -------
+        ndarray of shape (n_parameters, n_modified, n_wavelengths)
+            QE per unit of parameter.
+        """
         assert x.shape == self.nodes_nm.shape
         return np.asarray(self._hats[:, None, :], dtype=float)
 
     @property
     def dimensions(self) -> Mapping[str, FloatArray]:
-        """None: it has no bands."""
+        """None, since it has no bands."""
         return {}
 
     def produced(self, off: Off) -> FreeForm:
-        """The whole transmission moved; see `Family.produced`."""
+        """Return the family with its transmission moved.
+
+        Parameters
+        ----------
+        off : Off
+            Production error.
+
+        Returns
+        -------
+        FreeForm
+            The family as production makes it.
+        """
         return FreeForm(*self._made_of, self.nodes_nm, off)
 
     @property
     def moved(self) -> tuple[FloatArray, FloatArray]:
-        """Nothing, and the base, which the transmission is on; see `MovedFamily`."""
+        """Zero, and the base, which the transmission multiplies; see `MovedFamily`."""
         base = self._made_of[1]
         return np.zeros_like(base), base
 
     def start(self, points: FloatArray) -> FloatArray:
-        """Smooth dips of different place, breadth and depth: random nodes would be a filter of spikes."""
+        """Return smooth dips of different position, width and depth.
+
+        Parameters
+        ----------
+        points : ndarray of shape (n, start_dimensions)
+            Points of the unit cube.
+
+        Returns
+        -------
+        ndarray of shape (n, n_parameters)
+            Starting designs.
+        """
         span = self.nodes_nm[-1] - self.nodes_nm[0]
         center = self.nodes_nm[0] + span * points[:, :1]
         breadth = span * (0.05 + 0.35 * points[:, 1:2])
         return np.asarray(1 - points[:, 2:] * np.exp(-0.5 * ((self.nodes_nm - center) / breadth) ** 2), dtype=float)
 
     def violation(self, x: FloatArray) -> FloatArray:
-        """None: every transmission in 0..1 is well formed. ndarray[n_designs, 1] of zeros."""
+        """Return zeros: every transmission from 0 to 1 is well formed.
+
+        Parameters
+        ----------
+        x : ndarray of shape (n_designs, n_parameters)
+            Parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n_conditions)
+            Values of the conditions, met where <= 0.
+        """
         return np.zeros((len(x), 1))
 
     def violation_gradient(self, x: FloatArray) -> FloatArray:
-        """Zeros, ndarray[1, n_nodes]."""
+        """Return zeros.
+
+        Parameters
+        ----------
+        x : ndarray of shape (n_parameters,)
+            Parameters of one design.
+
+        Returns
+        -------
+        ndarray of shape (n_conditions, n_parameters)
+            Derivatives of the conditions.
+        """
         return np.zeros((1, x.size))

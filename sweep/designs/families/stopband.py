@@ -10,11 +10,22 @@ from ..bands import Banded
 
 
 class MultiStopband(Banded):
-    """N = base + sum over bands of depth (target - base) (e(l; left) - e(l; right)).
+    """Filter with several stopbands.
 
-    `base`, `target`: QE, ndarray[n_wavelengths]. With the edges
-    in order, the bands lie between 0 and 1 and do not overlap, so N lies between its base and its target at every
-    wavelength, and is exactly the base outside the bands.
+    Notes
+    -----
+    = base + sum over bands of depth (target - base) (e(l; left) - e(l; right)). With edges in order, bands
+    do not overlap, so that N lies between base and target at every wavelength, and equals the base outside
+    the bands.
+
+    Parameters
+    ----------
+    wavelength_nm : ndarray of shape (n_wavelengths,)
+        Wavelengths, nm.
+    base, target : ndarray of shape (n_wavelengths,)
+        QE of the replaced curve, and inside the bands.
+    bands : int
+        Number of bands.
     """
 
     kind = "multi_stopband"
@@ -22,7 +33,7 @@ class MultiStopband(Banded):
     needs_target = True
 
     class Options(Section):
-        """How many bands."""
+        """Options: number of bands."""
 
         bands: int = Field(ge=1, le=8)
 
@@ -35,40 +46,120 @@ class MultiStopband(Banded):
     def of_study(
         cls, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None, options: Section
     ) -> MultiStopband:
-        """See `Family.of_study`."""
+        """Make the family over curves of a study.
+
+        Parameters
+        ----------
+        wavelength_nm : ndarray of shape (n_wavelengths,)
+            Wavelengths, nm.
+        base : ndarray of shape (n_wavelengths,)
+            QE of the replaced curve.
+        target : ndarray of shape (n_wavelengths,) or None
+            QE that the filter takes inside its band.
+        options : Section
+            Options of the family.
+
+        Returns
+        -------
+        MultiStopband
+            The family.
+        """
         assert target is not None
         assert isinstance(options, MultiStopband.Options)
         return MultiStopband(wavelength_nm, base, target, options.bands)
 
     def curves(self, x: FloatArray) -> FloatArray:
-        """QE of the modified channel, ndarray[n_designs, 1, n_wavelengths]; see `Family.curves`."""
+        """Return the QE of the modified channel.
+
+        Parameters
+        ----------
+        x : ndarray of shape (n_designs, n_parameters)
+            Parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE of the modified channels.
+        """
         return (self._base + self._change * self._bands.shape(x))[:, None, :]
 
     def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
-        """The base, or the target where it is higher and a band can reach; see `Family.upper`."""
+        """Return the base, or the target where it is higher and a band can reach.
+
+        Parameters
+        ----------
+        low, high : ndarray of shape (n_parameters,)
+            Ends of the box of parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_modified, n_wavelengths)
+            Upper bound on the QE.
+        """
         return (self._base + np.maximum(self._change, 0.0) * self._bands.reach(low, high))[None, :]
 
     def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
-        """The base, or the target where it is lower and a band can reach; see `Family.lower`."""
+        """Return the base, or the target where it is lower and a band can reach.
+
+        Parameters
+        ----------
+        low, high : ndarray of shape (n_parameters,)
+            Ends of the box of parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_modified, n_wavelengths)
+            Lower bound on the QE.
+        """
         return (self._base + np.minimum(self._change, 0.0) * self._bands.reach(low, high))[None, :]
 
     def hull(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Base and change where the bands are least and most open; see `Family.hull`."""
+        """Return base and change with the bands least and most open.
+
+        Parameters
+        ----------
+        low, high : ndarray of shape (n_parameters,)
+            Ends of the box of parameters.
+
+        Returns
+        -------
+        low, high : ndarray of shape (n_modified, n_wavelengths)
+            Bounds on the QE.
+        """
         ends = np.stack([self._base + self._change * shape for shape in self._bands.range(low, high)])
         return ends.min(axis=0)[None, :], ends.max(axis=0)[None, :]
 
     def gradient(self, x: FloatArray) -> FloatArray:
-        """Derivative by each parameter, ndarray[n_parameters, 1, n_wavelengths]; see `Family.gradient`."""
+        """Return the derivative of `curves` at one design.
+
+        Parameters
+        ----------
+        x : ndarray of shape (n_parameters,)
+            Parameters of one design.
+
+        Returns
+        -------
+        ndarray of shape (n_parameters, n_modified, n_wavelengths)
+            QE per unit of parameter.
+        """
         return (self._change * self._bands.gradient(x))[:, None, :]
 
     @property
     def moved(self) -> tuple[FloatArray, FloatArray]:
-        """Base and change: bands move, the curves between which they go stay; see `MovedFamily`."""
+        """Base and change: bands move, the curves stay; see `MovedFamily`."""
         return self._base, self._change
 
 
 class Stopband(MultiStopband):
-    """One band: the paper's N_x with base Y and target G."""
+    """Filter with one stopband: the paper's N_x with base Y and target G.
+
+    Parameters
+    ----------
+    wavelength_nm : ndarray of shape (n_wavelengths,)
+        Wavelengths, nm.
+    base, target : ndarray of shape (n_wavelengths,)
+        QE of the replaced curve, and inside the band.
+    """
 
     kind = "stopband"
     Options = Section  # type: ignore[assignment]  # it has none
@@ -80,7 +171,24 @@ class Stopband(MultiStopband):
     def of_study(
         cls, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None, options: Section
     ) -> Stopband:
-        """See `Family.of_study`."""
+        """Make the family over curves of a study.
+
+        Parameters
+        ----------
+        wavelength_nm : ndarray of shape (n_wavelengths,)
+            Wavelengths, nm.
+        base : ndarray of shape (n_wavelengths,)
+            QE of the replaced curve.
+        target : ndarray of shape (n_wavelengths,) or None
+            QE that the filter takes inside its band.
+        options : Section
+            Options of the family.
+
+        Returns
+        -------
+        Stopband
+            The family.
+        """
         assert target is not None
         assert not options.model_fields_set
         return Stopband(wavelength_nm, base, target)
@@ -91,5 +199,16 @@ class Stopband(MultiStopband):
         return self._base, self._change
 
     def edges(self, centers_and_widths: FloatArray) -> FloatArray:
-        """See `SeparableFamily.edges`."""
+        """Return rising edges; see `SeparableFamily.edges`.
+
+        Parameters
+        ----------
+        centers_and_widths : ndarray of shape (n, 2)
+            Center and width of each edge, nm.
+
+        Returns
+        -------
+        ndarray of shape (n, n_wavelengths)
+            Edges, 0 to 1.
+        """
         return self._bands.edges(centers_and_widths)
