@@ -1,1 +1,1 @@
-"""What a readout is worth, and when it is allowed."""
+"""Metrics of a readout, constraints and objectives."""

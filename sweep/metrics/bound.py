@@ -1,4 +1,4 @@
-"""Constraints that a study states on quantities of a design."""
+"""Constraints of a study on quantities of a design."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _LEAST_SCALE = 1e-6
 
 
 class Bound(Section):
-    """An allowed range; at least one end: 0, or 1e-30 to 1e30 in magnitude."""
+    """Allowed range of a quantity, with at least one end."""
 
     min: Number | None = None
     max: Number | None = None
@@ -36,12 +36,23 @@ class Bound(Section):
 
     @property
     def scale(self) -> float:
-        """What a violation is relative to: the larger end; where that is 0, one unit of the quantity."""
+        """Scale of a relative violation: the larger end, or one unit of the quantity if that is 0."""
         end = max(abs(self.min or 0.0), abs(self.max or 0.0))
         return max(end, _LEAST_SCALE) if end > 0 else 1.0
 
     def violation(self, values: FloatArray) -> FloatArray:
-        """Return how far `values` are outside, relative to `scale`, >= 0; NaN where the value is unknown (NaN)."""
+        """Return the violation of the bound.
+
+        Parameters
+        ----------
+        values : ndarray
+            Values of the quantity.
+
+        Returns
+        -------
+        ndarray of the same shape
+            Distance outside the range, relative to `scale`, >= 0; NaN where the value is NaN.
+        """
         below = 0.0 if self.min is None else self.min - values
         above = 0.0 if self.max is None else values - self.max
         return np.maximum(np.maximum(below, above), 0.0) / self.scale
@@ -54,10 +65,23 @@ class Bound(Section):
 def total_violation(
     columns: Mapping[str, FloatArray], constraints: Mapping[str, Bound], own: FloatArray, leave_out: Iterable[str] = ()
 ) -> FloatArray:
-    """Largest violation of each design, relative to the bound for a study's constraints: ndarray[n_designs].
+    """Return the largest violation of each design.
 
-    `own`: violation of the family's conditions. `leave_out`: quantities that are not looked at. 0 is feasible; NaN,
-    where a quantity is unknown, is not.
+    Parameters
+    ----------
+    columns : mapping of str to ndarray of shape (n_designs,)
+        Quantities.
+    constraints : mapping of str to Bound
+        Constraints of the study.
+    own : ndarray of shape (n_designs,)
+        Violation of the family's conditions.
+    leave_out : iterable of str
+        Quantities that are ignored.
+
+    Returns
+    -------
+    ndarray of shape (n_designs,)
+        Relative violation: 0 is feasible; NaN, where a quantity is unknown, is not.
     """
     worst = own
     for quantity, bound in constraints.items():

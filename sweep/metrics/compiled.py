@@ -1,4 +1,4 @@
-"""Compiled inner loops of errors: how often digital numbers occur, and how far those of two signals overlap."""
+"""Compiled inner loops of errors: distributions of digital numbers, and their overlap."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _MOST_NATS = 100.0
 
 @njit(cache=True, nogil=True)
 def _counts(electrons: float, prnu: float, most: int) -> tuple[int, FloatArray]:
-    """First count and how often each occurs; `most` takes all higher ones. The gain of the pixel is Gaussian."""
+    """Return the first count and the probability of each, for a Gaussian gain; `most` takes all higher counts."""
     spread = 1.0 + _TAIL * prnu
     high = electrons * spread
     low = electrons * max(2.0 - spread, 0.0)
@@ -46,9 +46,17 @@ def _counts(electrons: float, prnu: float, most: int) -> tuple[int, FloatArray]:
 
 @njit(cache=True, nogil=True)
 def bin_shares(sigma: float) -> FloatArray:
-    """Shares of a Gaussian in bins of width 1, for places of its mean in one: ndarray[n_places + 1, 2 reach + 1].
+    """Return shares of a Gaussian in bins of width 1, for positions of its mean at most 1/64 sigma apart.
 
-    `sigma`: in bins. Places are at most 1/64 sigma apart.
+    Parameters
+    ----------
+    sigma : float
+        Standard deviation, bins.
+
+    Returns
+    -------
+    ndarray of shape (n_positions + 1, 2 reach + 1)
+        Shares.
     """
     reach = int(_TAIL * sigma) + 1
     places = int(64 / sigma) + 1
@@ -74,10 +82,29 @@ def pixel_numbers(
     n_bins: int,
     table: FloatArray,
 ) -> tuple[int, FloatArray]:
-    """First bin of digital numbers that occurs, and how often each does, for one pixel.
+    """Return the distribution of the digital numbers of one pixel.
 
-    `most`: the count from which the well is full. `line`: bins per electron, and where no electron is, in bins from
-    the first one's lower edge. `table`: of `bin_shares`, of size 0 without read noise.
+    Parameters
+    ----------
+    electrons : float
+        Expected electrons.
+    most : int
+        Count at which the well is full.
+    well_e, prnu, read_e : float
+        Full well, electrons; PRNU; read noise, electrons.
+    line : tuple of float
+        Bins per electron, and position of no electron from the lower edge of the first bin.
+    n_bins : int
+        Number of bins.
+    table : ndarray
+        Result of `bin_shares`; of size 0 without read noise.
+
+    Returns
+    -------
+    first : int
+        First bin that occurs.
+    shares : ndarray
+        Probability of each bin from there on.
     """
     first, shares = _counts(electrons, prnu, most)
     # Counts are taken together where that adds less than 1/700 to the variance of both and read noise hides it.
@@ -122,7 +149,7 @@ def pixel_numbers(
 
 @njit(cache=True, nogil=True)
 def _sum_of(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Shares of the sum of two numbers, from the sum of their first ones on."""
+    """Return the distribution of the sum of two numbers."""
     found = np.zeros(one.size + other.size - 1)
     for i in range(one.size):
         if one[i] > RARE:
@@ -143,9 +170,23 @@ def channel_numbers(
     n_bins: int,
     table: FloatArray,
 ) -> tuple[IndexArray, IndexArray, FloatArray]:
-    """How often each sum of pixels occurs: first bin, ndarray[n]; where its shares begin, ndarray[n + 1]; all shares.
+    """Return the distribution of sums of pixels.
 
-    `electrons`: ndarray[n, n_pixels]; the rest as in `pixel_numbers`.
+    Parameters
+    ----------
+    electrons : ndarray of shape (n, n_pixels)
+        Expected electrons.
+    most, well_e, prnu, read_e, line, n_bins, table
+        As in `pixel_numbers`.
+
+    Returns
+    -------
+    firsts : ndarray of int, shape (n,)
+        First bin of each sum.
+    starts : ndarray of int, shape (n + 1,)
+        Start of its shares.
+    shares : ndarray
+        All shares.
     """
     firsts, starts = np.empty(len(electrons), np.intp), np.zeros(len(electrons) + 1, np.intp)
     values = np.empty(4096)
@@ -175,9 +216,21 @@ def channel_numbers(
 
 @njit(cache=True, nogil=True)
 def overlaps(firsts: IndexArray, starts: IndexArray, roots: FloatArray, rows: IndexArray) -> FloatArray:
-    """Bhattacharyya coefficient of each two signals of a design, ndarray[n_signals, n_signals].
+    """Return the Bhattacharyya coefficient of each two signals of a design.
 
-    `rows`: ndarray[n_channels, n_signals], the row of `firsts` and `starts` that each has; `roots`: of the shares.
+    Parameters
+    ----------
+    firsts, starts : ndarray of int
+        As in `channel_numbers`.
+    roots : ndarray
+        Roots of the shares.
+    rows : ndarray of int, shape (n_channels, n_signals)
+        Row of each signal in each channel.
+
+    Returns
+    -------
+    ndarray of shape (n_signals, n_signals)
+        Coefficients.
     """
     found = np.ones((rows.shape[1], rows.shape[1]))
     for a in range(rows.shape[1]):
@@ -199,7 +252,7 @@ def overlaps(firsts: IndexArray, starts: IndexArray, roots: FloatArray, rows: In
 
 @njit(cache=True, nogil=True)
 def _common(firsts: IndexArray, starts: IndexArray, one: int, other: int) -> tuple[int, int, int]:
-    """Where the bins that two rows share begin in each, and how many there are."""
+    """Return where the bins that two rows share begin in each, and their number."""
     low = max(firsts[one], firsts[other])
     high = min(firsts[one] + starts[one + 1] - starts[one], firsts[other] + starts[other + 1] - starts[other])
     return starts[one] + low - firsts[one], starts[other] + low - firsts[other], max(high - low, 0)
@@ -209,7 +262,7 @@ def _common(firsts: IndexArray, starts: IndexArray, one: int, other: int) -> tup
 def _ratios(
     firsts: IndexArray, starts: IndexArray, roots: FloatArray, logs: FloatArray, one: int, other: int, step: float
 ) -> tuple[int, FloatArray]:
-    """Overlap of one channel by the logarithm of the likelihood ratio, in steps: the first step, shares from it on."""
+    """Return the overlap of one channel by the logarithm of the likelihood ratio, in steps."""
     i, j, n = _common(firsts, starts, one, other)
     most = int(_MOST_NATS / step)
     found = np.zeros(2 * most + 1)
@@ -227,7 +280,7 @@ def _ratios(
 
 @njit(cache=True, nogil=True)
 def _sum_of_few(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Shares of the sum of two numbers, from the sum of their first ones on, of which few occur in a long range."""
+    """Return the distribution of the sum of two numbers, few of which occur in a long range."""
     found, occurring = np.zeros(one.size + other.size - 1), np.flatnonzero(other)
     for i in range(one.size):
         if one[i] > RARE:
@@ -247,10 +300,10 @@ def _least_error(
     b: int,
     step: float,
 ) -> float:
-    """Error of the most likely of two equally frequent signals.
+    """Return the error of the maximum likelihood rule for two equally frequent signals.
 
     Half the sum of min(p, q), that is of sqrt(p q) exp(-|ln(p / q)| / 2); the logarithms of independent channels add.
-    Each is off by half a step at most, so that the error is exact within exp(n_channels step / 4).
+    Each is off by at most half a step, so that the error is exact within exp(n_channels step / 4).
     """
     # Two halves of the channels, so that their sum over both need not be written out.
     first, one, other = 0, np.ones(1), np.ones(1)
@@ -267,7 +320,7 @@ def _least_error(
 
 @njit(cache=True, nogil=True)
 def _mean_decay(one: FloatArray, other: FloatArray, first: int, rate: float) -> float:
-    """Sum of one[i] other[j] exp(-rate |first + i + j|), by the sums of `other` on either side of where that turns."""
+    """Return the sum of one[i] other[j] exp(-rate |first + i + j|)."""
     n, decay = other.size, math.exp(-rate)
     before, after = np.zeros(n + 1), np.zeros(n + 1)  # of other[m] exp(-rate |j - m|), for m < j and m >= j
     for m in range(n):
@@ -293,10 +346,25 @@ def largest_error(
     rows: IndexArray,
     step: float,
 ) -> float:
-    """Largest error of two signals over the pairs of two types: those whose overlap leaves room for it, largest first.
+    """Return the largest error over the pairs of two types; pairs with a small overlap are skipped.
 
-    `overlap`, `firsts`, `starts`, `roots`, `rows`: as in `overlaps`; `logs`: of the roots; `first`, `second`: signals
-    of each type.
+    Parameters
+    ----------
+    overlap : ndarray of shape (n_signals, n_signals)
+        Result of `overlaps`.
+    first, second : ndarray of int
+        Signals of each type.
+    firsts, starts, roots, rows : ndarray
+        As in `overlaps`.
+    logs : ndarray
+        Logarithms of the roots.
+    step : float
+        Step of the logarithms.
+
+    Returns
+    -------
+    float
+        Error probability.
     """
     found = 0.0
     bound = 0.5 * overlap[first][:, second].ravel()

@@ -13,7 +13,7 @@ _FLAT = 1e-12
 
 @njit(cache=True, nogil=True)
 def _on_side(start: FloatArray, end: FloatArray) -> tuple[float, float]:
-    """Squared distance of a straight line between two points from the origin, and where, 0 at `start` to 1."""
+    """Return the squared distance of a line segment from the origin, and the position, 0 at `start` to 1."""
     slope, along = 0.0, 0.0
     for c in range(start.size):
         step = end[c] - start[c]
@@ -29,10 +29,7 @@ def _on_side(start: FloatArray, end: FloatArray) -> tuple[float, float]:
 
 @njit(cache=True, nogil=True)
 def _on_triangle(corners: FloatArray, weights: FloatArray) -> float:
-    """Squared distance of a triangle from the origin; `corners`: ndarray[3, n_channels].
-
-    `weights`: ndarray[3], takes those of the corners in the nearest point.
-    """
+    """Return the squared distance of a triangle from the origin; `weights` takes those of the nearest point."""
     best = np.inf
     for one in range(3):
         other = (one + 1) % 3
@@ -70,7 +67,7 @@ def _on_triangle(corners: FloatArray, weights: FloatArray) -> float:
 
 @njit(cache=True, nogil=True)
 def _corner(response: FloatArray, one: int, other: int, share: FloatArray, corner: FloatArray) -> float:
-    """Puts the difference of two members into `corner`, ndarray[n_channels]; its squared length."""
+    """Put the difference of two members into `corner`, and return its squared length."""
     squared = 0.0
     for c in range(corner.size):
         x = response[one, c] + share[0] * (response[one + 1, c] - response[one, c])
@@ -95,14 +92,26 @@ def nearest_members(
     at: IndexArray,
     where: FloatArray,
 ) -> None:
-    """Squared distance of the nearest members of each two lights, in each part of their region.
+    """Compute the squared distance of the nearest members of each two lights, in each part of their region.
 
-    `response`: ndarray[n_spectra, n_channels]; `first`, `second`: where the spectra of each light begin. `which`:
-    region of each two, ndarray[n_first, n_second]; `starts`: where the triangles of each region begin, and the end;
-    `cells`, `shares`: those of a `ShiftRegion`; `part`: of each triangle. `alone`: only the smallest of all distances
-    is wanted, others may be too large. `out`: ndarray[n_first, n_second, n_parts], infinite where there is nothing or
-    it is not wanted; `at`, `where`: ndarray[..., 2], the whole steps and the shares above them of the two nearest
-    members.
+    Parameters
+    ----------
+    response : ndarray of shape (n_spectra, n_channels)
+        Response to each spectrum.
+    first, second : ndarray of int
+        First spectrum of each light.
+    which : ndarray of int, shape (n_first, n_second)
+        Region of each two lights.
+    starts : ndarray of int
+        First triangle of each region, and the end.
+    cells, shares, part : ndarray
+        Triangles of the regions (see `ShiftRegion`), and the part of each.
+    alone : bool
+        Only the smallest of all distances is requested; others may be too large.
+    out : ndarray of shape (n_first, n_second, n_parts)
+        Squared distances; infinite where there are none.
+    at, where : ndarray of shape (..., 2)
+        Whole steps and shares of the two nearest members.
     """
     corners, weights = np.empty((3, response.shape[1])), np.empty(3)
     steps = np.empty(response.shape[0] - 1)

@@ -1,7 +1,7 @@
-"""How often digital numbers confuse two signal types: exact sums over the numbers that occur, where they are few.
+"""Error probability of two signal types by exact sums over the digital numbers, where these are few.
 
-Each channel's value is the sum of a few independent pixels that read Poisson electrons, full well, read noise, pedestal
-and ADC range, rounded. `electrons`, ndarray[n_designs, n_signals, n_pixels], are what each pixel expects.
+Each channel's value is the sum of a few independent pixels with Poisson electrons, full well, read noise, pedestal and
+ADC range, rounded.
 """
 
 from __future__ import annotations
@@ -34,7 +34,15 @@ _MOST_BINS = 1_000_000
 
 @dataclass(frozen=True)
 class Errors:
-    """By pair of types the error of the worst two signals and the bound; that of all types; ndarray[n_designs]."""
+    """Errors of a batch of designs, ndarray of shape (n_designs,) each.
+
+    Parameters
+    ----------
+    error, bound : dict of pair to ndarray
+        Error of the worst two signals, and bound, by pair of types.
+    state_bound : ndarray
+        Bound over all types.
+    """
 
     error: dict[tuple[str, str], FloatArray]
     bound: dict[tuple[str, str], FloatArray]
@@ -42,18 +50,28 @@ class Errors:
 
 
 def _bins(pixel: Pixel) -> tuple[int, float, int]:
-    """How many digital numbers a bin holds, the read noise in bins, and how many bins there are.
+    """Return digital numbers per bin, read noise in bins, and number of bins.
 
-    A bin is a quarter of the noise that every count has, or of an electron.
+    A bin is a quarter of the noise of every count, or of an electron.
     """
     wide = max(1, int(max(pixel.read_noise_e, 1.0) * min(pixel.dn_per_e, pixel.full_scale_dn) / 4))
     return wide, pixel.read_noise_e * pixel.dn_per_e / wide, pixel.full_scale_dn // wide + 1
 
 
 def affordable(pixel: Pixel, channels: Sequence[IndexArray]) -> bool:
-    """Whether the digital numbers of any signal take at most `_MOST_SUMS` additions, and `_MOST_BINS` bins.
+    """Return whether the sums of any signal take at most `_MOST_SUMS` additions and `_MOST_BINS` bins.
 
-    Counted for the brightest signal whose numbers differ: more electrons fill the well for certain.
+    Parameters
+    ----------
+    pixel : Pixel
+        Full well, gain, noise and ADC.
+    channels : sequence of ndarray of int
+        Pixels of each channel.
+
+    Returns
+    -------
+    bool
+        True if exact sums are used.
     """
     (wide, sigma, n_bins), prnu = _bins(pixel), pixel.prnu
     most = math.ceil(pixel.well_e)
@@ -71,10 +89,7 @@ def affordable(pixel: Pixel, channels: Sequence[IndexArray]) -> bool:
 def _numbers(
     electrons: FloatArray, channels: Sequence[IndexArray], pixel: Pixel
 ) -> tuple[IndexArray, IndexArray, FloatArray, IndexArray]:
-    """First bin of each distinct signal of a channel, where its roots of shares begin, and these roots.
-
-    Last, which of these each design's signal has, ndarray[n_channels, n_designs, n_signals].
-    """
+    """Return first bin, start and roots of shares of each distinct signal, and the row of each design's signal."""
     from .compiled import bin_shares, channel_numbers  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     wide, sigma, n_bins = _bins(pixel)
@@ -96,11 +111,27 @@ def _numbers(
 def errors(
     electrons: FloatArray, channels: Sequence[IndexArray], pixel: Pixel, members: Mapping[str, IndexArray]
 ) -> Errors:
-    """Errors and bounds of a block of designs; `channels`: of each the pixels that it sums, `members`: type -> signals.
+    """Compute errors and bounds of a batch of designs.
 
-    The error of two signals is that of the most likely one, the least that any rule reaches: half the sum of the lesser
-    of both probabilities over all readouts. The bound is the sum over the signals of other types of their
-    Bhattacharyya coefficients, for the signal that errs most often.
+    The error of two signals is that of the maximum likelihood rule, the least of any rule: half the sum of the smaller
+    of both probabilities over all readouts. The bound is the sum of the Bhattacharyya coefficients with signals of
+    other types, for the worst signal.
+
+    Parameters
+    ----------
+    electrons : ndarray of shape (n_designs, n_signals, n_pixels)
+        Expected electrons of each pixel.
+    channels : sequence of ndarray of int
+        Pixels of each channel.
+    pixel : Pixel
+        Full well, gain, noise and ADC.
+    members : mapping of str to ndarray of int
+        Signals of each type.
+
+    Returns
+    -------
+    Errors
+        Errors and bounds.
     """
     from . import compiled as kernels  # noqa: PLC0415  (compiled: kept off the start-up path)
 

@@ -1,12 +1,11 @@
-"""How often noise confuses two signal types: from mean and variance of what the readout gives for each signal.
+"""Error probability of two signal types from mean and variance of the readout of each signal.
 
-The channels of a mosaic are read from different pixels, so their noise is independent and a covariance is diagonal.
-All functions take `mean` and `variance`, ndarray[n_designs, n_signals, n_channels] (DN, DN^2), and the signal indices
-`first`, `second` of the two types; they return ndarray[n_designs]. A channel without variance tells two signals
-apart for certain, unless their means there are the same; then it tells nothing.
+The channels of a mosaic are read from different pixels, so their noise is independent and a covariance is diagonal. A
+channel without variance separates two signals for certain, unless their means are equal; then it has no effect.
 
-With a `NoiseShape`, errors are those of Gaussians in the channels whose noise is one, or Bennett's bound from all of
-them, whichever is less: to leave channels out is a rule, too; 1e-12 is the least. Without one, all noise is Gaussian.
+With a `NoiseShape`, errors are those of Gaussians in the channels with Gaussian noise, or Bennett's bound from all
+channels, whichever is less: leaving channels out is a rule, too; 1e-12 is the least. Without one, all noise is
+Gaussian.
 """
 
 from __future__ import annotations
@@ -30,10 +29,22 @@ _LEFT_OUT = 1e-12
 
 
 def contrast_to_noise(mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
-    """CSD over the noise floor: the standard deviation, along the line of the nearest pair, of its two points.
+    """Return CSD over noise: the standard deviation along the line between the nearest two points.
 
-    The floor is sqrt(u' (Sa + Sb) / 2 u) for the unit vector u from one point to the other; of several pairs at
-    exactly the same distance, the one with the most noise counts. 0 for coincident points.
+    The noise is sqrt(u' (Sa + Sb) / 2 u) for the unit vector u from one point to the other. Of several pairs at
+    exactly the same distance, the one with the most noise counts.
+
+    Parameters
+    ----------
+    mean, variance : ndarray of shape (n_designs, n_signals, n_channels)
+        Mean, DN, and variance, DN^2.
+    first, second : ndarray of int
+        Signals of each type.
+
+    Returns
+    -------
+    ndarray of shape (n_designs,)
+        Ratio; 0 for coincident points.
     """
     found = np.empty(len(mean))
     for block, _, difference, ours, theirs in _pairs(mean, variance, first, second):
@@ -48,9 +59,21 @@ def contrast_to_noise(mean: FloatArray, variance: FloatArray, first: IndexArray,
 
 
 def detectability(mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
-    """d', the smallest over the pairs of the two types: sqrt(D' S^-1 D), S the mean covariance of the two points.
+    """Return d', the smallest over the pairs of two types: sqrt(D' S^-1 D), S the mean covariance of the two points.
 
     This is d_a of signal detection theory for unequal variances (Simpson and Fitter, 1973), in several channels.
+
+    Parameters
+    ----------
+    mean, variance : ndarray of shape (n_designs, n_signals, n_channels)
+        Mean, DN, and variance, DN^2.
+    first, second : ndarray of int
+        Signals of each type.
+
+    Returns
+    -------
+    ndarray of shape (n_designs,)
+        d'.
     """
     found = np.empty(len(mean))
     for block, _, difference, ours, theirs in _pairs(mean, variance, first, second):
@@ -62,11 +85,25 @@ def detectability(mean: FloatArray, variance: FloatArray, first: IndexArray, sec
 def pairwise_error(
     mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray, shape: NoiseShape | None = None
 ) -> FloatArray:
-    """Largest probability that noise moves one point of a pair over to the other, ndarray[n_designs].
+    """Return the largest probability that noise moves one point of a pair beyond the other.
 
-    The pair is divided by a plane with normal S^-1 D, S the mean covariance, placed so that both points err equally
-    often: Q(D' S^-1 D / (s_a + s_b)), with the standard deviation s of each along the normal (Fukunaga,
-    "Introduction to Statistical Pattern Recognition", linear classifiers). 0.5 for coincident points.
+    The pair is divided by a plane with normal S^-1 D, S the mean covariance, at which both points err equally often:
+    Q(D' S^-1 D / (s_a + s_b)), with the standard deviation s of each along the normal (Fukunaga, "Introduction to
+    Statistical Pattern Recognition", linear classifiers).
+
+    Parameters
+    ----------
+    mean, variance : ndarray of shape (n_designs, n_signals, n_channels)
+        Mean, DN, and variance, DN^2.
+    first, second : ndarray of int
+        Signals of each type.
+    shape : NoiseShape, optional
+        Shape of the noise; left out, Gaussian.
+
+    Returns
+    -------
+    ndarray of shape (n_designs,)
+        Probability; 0.5 for coincident points.
     """
     found = np.empty((len(mean), len(first) * len(second)))
     for block, both, difference, ours, theirs in _pairs(mean, variance, first, second):
@@ -88,29 +125,79 @@ def pairwise_error(
 
 @dataclass(frozen=True)
 class NoiseShape:
-    """Where noise is Gaussian, and how far any pixel moves a channel, DN; arrays of the shape of `mean`."""
+    """Shape of the noise.
+
+    Parameters
+    ----------
+    gaussian : ndarray of bool
+        True where it is Gaussian; same shape as the means.
+    reach_dn : ndarray
+        Largest effect of a pixel on a channel, DN.
+    """
 
     gaussian: BoolArray
     reach_dn: FloatArray
 
     @classmethod
     def of_cases(cls, read: NoisyReadout) -> tuple[FloatArray, FloatArray, NoiseShape]:
-        """Mean, variance and shape of a readout, whose cases stand one after the other as if they were designs."""
+        """Return mean, variance and shape of a readout, with cases and designs on one axis.
+
+        Parameters
+        ----------
+        read : NoisyReadout
+            Readout with noise.
+
+        Returns
+        -------
+        mean, variance : ndarray of shape (n_designs * n_cases, n_signals, n_channels)
+            Moments, DN and DN^2.
+        shape : NoiseShape
+            Shape of the noise.
+        """
         shape = (-1, *read.mean.shape[2:])
         noise = cls(read.gaussian.reshape(shape), read.reach_dn.reshape(shape))
         return read.mean.reshape(shape), read.variance.reshape(shape), noise
 
     def seen(self, block: slice, both: _Both, difference: FloatArray) -> FloatArray:
-        """Differences in the channels in which both points have Gaussian noise, 0 in the others."""
+        """Return the differences in channels with Gaussian noise at both points, 0 in others.
+
+        Parameters
+        ----------
+        block : slice
+            Designs.
+        both : tuple of ndarray of int
+            Signals of each pair.
+        difference : ndarray of shape (n, n_pairs, n_channels)
+            Differences of the means, DN.
+
+        Returns
+        -------
+        ndarray of the same shape
+            Differences, DN.
+        """
         gaussian = self.gaussian[block]
         return np.where(gaussian[:, both[0]] & gaussian[:, both[1]], difference, 0.0)
 
     def bound(self, block: slice, both: _Both, difference: FloatArray, total: FloatArray) -> FloatArray:
-        """Bound of the error on either side of a plane, for independent pixels of any distribution.
+        """Return a bound on the error on either side of a plane, for independent pixels of any distribution.
 
         Chernoff's bound exp((L_a(s) + L_b(-s)) / 2) for some s > 0, with the normal S^-1 D, and Bennett's inequality
         (1962) for the logarithms L of the moment generating functions: v / m^2 (exp(s m) - 1 - s m) for a sum of
         variance v whose terms are within m of their means.
+
+        Parameters
+        ----------
+        block : slice
+            Designs.
+        both : tuple of ndarray of int
+            Signals of each pair.
+        difference, total : ndarray of shape (n, n_pairs, n_channels)
+            Differences, DN, and sums of both variances, DN^2.
+
+        Returns
+        -------
+        ndarray of shape (n, n_pairs)
+            Bound.
         """
         found = np.full(difference.shape[:2], np.inf)
         # Each design for itself: what stands beside it in a block changes nothing.
@@ -135,11 +222,25 @@ class NoiseShape:
 def error_bounds(
     mean: FloatArray, variance: FloatArray, members: Mapping[str, IndexArray], noise: NoiseShape | None = None
 ) -> tuple[dict[Pair, FloatArray], FloatArray]:
-    """Bounds on how often the best rule takes a signal for one of the wrong type, for the worst signal.
+    """Return bounds on the error of the best rule, for the worst signal.
 
-    Of each pair of the types of `members` (type -> signal indices), and of all types at once: how often the state is
-    told wrong at most. The sum over the signals of the other types of each pair's Bhattacharyya coefficient (Kailath,
-    1967), at most 1.
+    The sum over the signals of other types of each pair's Bhattacharyya coefficient (Kailath, 1967), at most 1.
+
+    Parameters
+    ----------
+    mean, variance : ndarray of shape (n_designs, n_signals, n_channels)
+        Mean, DN, and variance, DN^2.
+    members : mapping of str to ndarray of int
+        Signals of each type.
+    noise : NoiseShape, optional
+        Shape of the noise; left out, Gaussian.
+
+    Returns
+    -------
+    by_pair : dict of pair to ndarray of shape (n_designs,)
+        Bound of each pair of types.
+    state_bound : ndarray of shape (n_designs,)
+        Bound over all types.
     """
     each = {}
     state = np.zeros(mean.shape[:2])
@@ -164,10 +265,10 @@ def error_bounds(
 
 
 def _distance(difference: FloatArray, ours: FloatArray, theirs: FloatArray) -> FloatArray:
-    """Bhattacharyya distance of Gaussians: D'S^-1 D / 8 + ln(S / sqrt(Sa Sb)) / 2, ndarray[n_designs, n_pairs].
+    """Return the Bhattacharyya distance of Gaussians: D'S^-1 D / 8 + ln(S / sqrt(Sa Sb)) / 2.
 
-    Where one of the two variances is 0 the logarithm is left out: digital numbers are steps, so that a point and a
-    Gaussian around it are not told apart for certain. Without it the coefficient is larger, so that it still bounds.
+    Where one variance is 0 the logarithm is left out, since digital numbers are steps; the coefficient is then larger,
+    and still a bound.
     """
     z = _ratio(difference, np.sqrt(ours + theirs))
     both = (ours > 0) & (theirs > 0)
@@ -179,13 +280,13 @@ def _distance(difference: FloatArray, ours: FloatArray, theirs: FloatArray) -> F
 
 
 def _ratio(over: FloatArray, under: FloatArray) -> FloatArray:
-    """Ratio of non-negative numbers; 0 / 0 is 0, anything else over 0 is infinite, and NaN stays NaN."""
+    """Return the ratio of non-negative numbers; 0 / 0 is 0, NaN stays NaN."""
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         return np.where((over == 0) & (under == 0), 0.0, over / under)
 
 
 def _length(vectors: FloatArray) -> FloatArray:
-    """L2 norm over the last axis without squares; NaN where any component is (to `hypot` an infinite one is enough)."""
+    """Return the L2 norm over the last axis without squares; NaN where a component is NaN."""
     length, unknown = np.abs(vectors[..., 0]), np.isnan(vectors[..., 0])
     for at in range(1, vectors.shape[-1]):  # few, and a reduction over few is slow
         length = np.hypot(length, vectors[..., at])
@@ -196,10 +297,7 @@ def _length(vectors: FloatArray) -> FloatArray:
 def _pairs(
     mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray
 ) -> Iterator[tuple[slice, _Both, FloatArray, FloatArray, FloatArray]]:
-    """Blocks of designs: their slice, both signals of every pair, and of these the difference and both variances.
-
-    The last three are ndarray[n, n_pairs, n_channels].
-    """
+    """Yield blocks of designs: slice, both signals of every pair, their difference and both variances."""
     for block, one, other in pair_blocks(mean.shape, first, second):
         ours, theirs = variance[block][:, one], variance[block][:, other]
         yield block, (one, other), np.abs(mean[block][:, one] - mean[block][:, other]), ours, theirs

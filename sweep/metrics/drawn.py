@@ -1,10 +1,10 @@
-"""Random lamps and cameras: draws of two lights and of how a filter comes out, the same for all designs.
+"""Random lamps and cameras: draws of two lights and a production error, the same for all designs.
 
-The distance that the wanted share of them has is an order statistic, whose derivative is that of a single draw. What is
-told and searched is the mean of the draws that rank right below it instead, a tenth of those that may have less: its
-derivative is the mean of theirs, which changes little as draws pass one another, and it is never above the order
-statistic. That one's rank is so low that with 95 % confidence the share of all lamps and cameras has no less, not of
-the draws alone; but of a design that a search has chosen by these very draws, nothing is said of others.
+The distance that the wanted share of them has is an order statistic, whose derivative is that of a single draw. The
+column and the search use the mean of the draws that rank right below it, a tenth of those that may have less: its
+derivative changes little as draws pass one another, and it is never above the order statistic. That rank is so low
+that with 95 % confidence the share of all lamps and cameras has no less; for a design that a search chose by these
+very draws, nothing follows for other draws.
 """
 
 from __future__ import annotations
@@ -34,10 +34,20 @@ _HELD = 4_000_000
 
 @dataclass(frozen=True)
 class Draws:
-    """Two lights and a camera each, those whose filters come out alike one after the other.
+    """Two lights and a camera per draw, sorted by production error.
 
-    `offs`: how filters come out; `starts`: where the draws of each begin, and the end. `below`, `share`: of both lights
-    the spectrum below their shift, and how far above it, ndarray[n, 2]; `place`: of the field, 0 to 1, ndarray[n].
+    Parameters
+    ----------
+    offs : tuple of Off
+        Production errors.
+    starts : ndarray of int
+        First draw of each production error, and the end.
+    below : ndarray of int, shape (n, 2)
+        Spectrum below the shift of both lights.
+    share : ndarray of shape (n, 2)
+        Share of the next spectrum.
+    place : ndarray of shape (n,)
+        Field position, 0 to 1.
     """
 
     offs: tuple[Off, ...]
@@ -48,19 +58,39 @@ class Draws:
 
     @property
     def size(self) -> int:
-        """How many there are."""
+        """Number of draws."""
         return int(self.place.size)
 
     def distances(self, off: int, response: FloatArray, out: FloatArray) -> None:
-        """Puts the distances of those whose filter comes out in one of the ways into `out`, DN, ndarray[n].
+        """Compute the distances of the draws with one production error.
 
-        `response`: of that filter to every spectrum, ndarray[n_cases, n_spectra, n_channels].
+        Parameters
+        ----------
+        off : int
+            Index of the production error.
+        response : ndarray of shape (n_cases, n_spectra, n_channels)
+            Response of that filter to every spectrum, DN.
+        out : ndarray of shape (n,)
+            Distances, DN; changed in place.
         """
         own = slice(int(self.starts[off]), int(self.starts[off + 1]))
         out[own] = np.sqrt((self.apart(own, response) ** 2).sum(axis=-1))
 
     def apart(self, some: slice | IndexArray, response: FloatArray) -> FloatArray:
-        """First minus second light of some draws: ndarray[..., n_cases, n_spectra, n] -> ndarray[..., n_some, n]."""
+        """Return first minus second light of some draws.
+
+        Parameters
+        ----------
+        some : slice or ndarray of int
+            Draws.
+        response : ndarray of shape (..., n_cases, n_spectra, n)
+            Values of every spectrum.
+
+        Returns
+        -------
+        ndarray of shape (..., n_some, n)
+            Differences.
+        """
         n_cases, below, share = response.shape[-3], self.below[some], self.share[some]
         case = np.minimum((self.place[some] * n_cases).astype(np.intp), n_cases - 1)
         low, high = (response[..., case[:, None], below + step, :] for step in (0, 1))
@@ -69,7 +99,24 @@ class Draws:
 
 
 def draws_of(members: Members, pair: Pair, tolerance: Tolerance, seed: Sequence[int]) -> Draws:
-    """The draws of two types, evenly; every number is drawn whatever the design, so that all see the same."""
+    """Draw lights and production errors uniformly, independent of the design.
+
+    Parameters
+    ----------
+    members : Members
+        Population of the lights.
+    pair : tuple of str
+        Two signal types.
+    tolerance : Tolerance
+        Production tolerance.
+    seed : sequence of int
+        Seed.
+
+    Returns
+    -------
+    Draws
+        The draws.
+    """
     population = members.population
     rng, n = np.random.default_rng(seed), population.draws
     ambient, heating, u, chosen, edge, place, film = (rng.random((n, k)) for k in (2, 2, 2, 4, 1, 1, 1))
@@ -97,7 +144,7 @@ def draws_of(members: Members, pair: Pair, tolerance: Tolerance, seed: Sequence[
 
 
 def _offs(tolerance: Tolerance, edge: FloatArray, film: FloatArray) -> tuple[tuple[Off, ...], IndexArray]:
-    """How filters come out, and which of these each draw is: from numbers in 0..1, ndarray[n_draws] each."""
+    """Return production errors, and which of them each draw has, from numbers in 0..1."""
     kinds = tolerance.edge_shift_nm > 0, tolerance.thickness > 0
     parts = _PARTS_OF_BOTH if all(kinds) else _PARTS
     edges, films = (parts if kind else 1 for kind in kinds)
@@ -108,10 +155,21 @@ def _offs(tolerance: Tolerance, edge: FloatArray, film: FloatArray) -> tuple[tup
 
 
 def rank_below(draws: int, share: float) -> int:
-    """The highest rank, from below and from 1, of a draw with no more than a share of all has, but for `_MISTAKEN`.
+    """Return the highest rank, from below and from 1, with no more than a share of all, but for `_MISTAKEN`.
 
-    So many draws or more lie in the rest of all, whose number is binomial (Clopper and Pearson, Biometrika 26, 404,
-    1934, one-sided).
+    The number of draws in the rest of all is binomial (Clopper and Pearson, Biometrika 26, 404, 1934, one-sided).
+
+    Parameters
+    ----------
+    draws : int
+        Number of draws.
+    share : float
+        Share.
+
+    Returns
+    -------
+    int
+        Rank.
     """
     from scipy.special import bdtr  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
@@ -119,24 +177,44 @@ def rank_below(draws: int, share: float) -> int:
 
 
 class LampsAndCameras:
-    """The draws of a scene, made once for each two types; others than those by which a yield is counted in the end."""
+    """Draws of a scene for each two types; independent of those that count a yield."""
 
     def __init__(self, seen: PopulationImager, tolerance: Tolerance, seed: int) -> None:
-        """`seen`: the scene with all members of its lights, of which a share is wanted."""
+        """Store the scene with all members of its lights, the tolerance and the seed."""
         self.seen, self._tolerance, self._seed = seen, tolerance, seed
         self._draws: dict[Pair, Draws] = {}
 
     def draws(self, pair: Pair) -> Draws:
-        """Those of two types."""
+        """Return the draws of two types.
+
+        Parameters
+        ----------
+        pair : tuple of str
+            Two signal types.
+
+        Returns
+        -------
+        Draws
+            The draws.
+        """
         if pair not in self._draws:
             self._draws[pair] = draws_of(self.seen.members, pair, self._tolerance, (self._seed, 2))
         return self._draws[pair]
 
     def kept(self, curves: FloatArray, pairs: Sequence[Pair]) -> dict[Pair, tuple[float, IndexArray]]:
-        """What the wanted share of lamps and cameras has of a design, DN, and the draws of which that is the mean.
+        """Return the distance that the wanted share has, for one design.
 
-        For each pair. `curves`: how it comes out, in the order of the draws' `offs`, ndarray[n_offs, n_modified,
-        n_wavelengths]. NaN where a response is no number.
+        Parameters
+        ----------
+        curves : ndarray of shape (n_offs, n_modified, n_wavelengths)
+            QE with each production error.
+        pairs : sequence of pair
+            Pairs of signal types.
+
+        Returns
+        -------
+        dict of pair to (float, ndarray of int)
+            Distance, DN, and the draws whose mean it is; NaN where a response is NaN.
         """
         imager = self.seen.imager
         found = {pair: np.empty(self.draws(pair).size) for pair in pairs}
@@ -150,7 +228,7 @@ class LampsAndCameras:
         return {pair: self._of_share(distances) for pair, distances in found.items()}
 
     def _of_share(self, distances: FloatArray) -> tuple[float, IndexArray]:
-        """What the wanted share has of all distances, ndarray[n_draws], and the draws of which that is the mean."""
+        """Return the distance that the wanted share has, and the draws whose mean it is."""
         below, count = self._ranks
         lowest = np.argpartition(distances, below - 1)[:below]
         chosen = lowest[np.argsort(distances[lowest], kind="stable")[below - count :]]
@@ -159,10 +237,22 @@ class LampsAndCameras:
     def columns(
         self, made: Callable[[Off, slice], FloatArray], n_designs: int, pairs: Sequence[Pair]
     ) -> dict[str, FloatArray]:
-        """The same of several designs for each pair, by the name of its CSD, ndarray[n_designs].
+        """Return the distance that the wanted share has, for several designs.
 
-        `made`: how some of them come out, ndarray[n_some, n_modified, n_wavelengths]; so many are made at once that no
-        more than `_HELD` values are held.
+        Parameters
+        ----------
+        made : callable
+            From production error and slice of designs to QE, ndarray of shape (n_some, n_modified,
+            n_wavelengths).
+        n_designs : int
+            Number of designs.
+        pairs : sequence of pair
+            Pairs of signal types.
+
+        Returns
+        -------
+        dict of str to ndarray of shape (n_designs,)
+            Distance, DN, by the name of the CSD.
         """
         offs, setup = self.draws(pairs[0]).offs, self.seen.setup
         step = max(1, _HELD // (len(offs) * max(1, len(setup.camera.modified)) * setup.camera.grid.size))
@@ -176,7 +266,7 @@ class LampsAndCameras:
 
     @property
     def _ranks(self) -> tuple[int, int]:
-        """How many draws may have less than what the wanted share has, and of how many of these the mean is taken."""
+        """Number of draws that may have less than the wanted share has, and number of them whose mean is taken."""
         population = self.seen.members.population
         assert population.wanted_yield is not None
         below = rank_below(population.draws, population.wanted_yield)

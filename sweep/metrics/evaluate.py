@@ -1,4 +1,4 @@
-"""Pure evaluation: a block of designs in a scene -> every column that its light and its filters give."""
+"""Evaluation of a batch of designs in a scene: every column of light and filters."""
 
 from __future__ import annotations
 
@@ -42,23 +42,60 @@ _CSD = [metric for metric in METRICS if isinstance(metric, ColorSeparation)]
 
 
 def designed_quantities(setup: Setup, designs: FloatArray | Block) -> Columns:
-    """What designs give without any light, each ndarray[n_designs].
+    """Return the quantities of designs without light.
 
-    `designs`: a block, or the QE of its modified channels, ndarray[n_designs, n_modified, n_wavelengths].
+    Parameters
+    ----------
+    setup : Setup
+        Scene and camera.
+    designs : Block or ndarray of shape (n_designs, n_modified, n_wavelengths)
+        Designs, or QE of the modified channels.
+
+    Returns
+    -------
+    dict of str to ndarray of shape (n_designs,)
+        Columns.
     """
     block = _block(designs)
     return _joined([metric.of_designs(setup, block) for metric in METRICS if isinstance(metric, DesignMetric)])
 
 
 def family_quantities(family: Family | None, points: FloatArray) -> Columns:
-    """What the parameters of designs say, each ndarray[n_designs]; `points`: ndarray[n_designs, n_parameters]."""
+    """Return the quantities that the parameters of designs determine.
+
+    Parameters
+    ----------
+    family : Family or None
+        Family; None for plain CFAs.
+    points : ndarray of shape (n_designs, n_parameters)
+        Parameters.
+
+    Returns
+    -------
+    dict of str to ndarray of shape (n_designs,)
+        Columns.
+    """
     return _joined([metric.of_parameters(family, points) for metric in METRICS if isinstance(metric, FamilyMetric)])
 
 
 def image_quantities(setup: Setup, curves: FloatArray, vision: Vision | None, seed: int) -> Columns:
-    """What images of signal heads give, each ndarray[n_designs]; nothing where a study does not ask.
+    """Return the quantities of images of signal heads.
 
-    `curves`: ndarray[n_designs, n_modified, n_wavelengths]; `seed`: the study's.
+    Parameters
+    ----------
+    setup : Setup
+        Scene and camera.
+    curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
+        QE of the modified channels.
+    vision : Vision or None
+        Benchmark; None if the study has none.
+    seed : int
+        Seed of the study.
+
+    Returns
+    -------
+    dict of str to ndarray of shape (n_designs,)
+        Columns.
     """
     if vision is None:
         return {}
@@ -79,33 +116,27 @@ def _csd_names(setup: Setup) -> list[str]:
 
 
 def _by_phase(model: ForwardModel, cases: Columns, n_places: int) -> FloatArray:
-    """CSDs at each phase or field position, the smallest over the moments, ndarray[n_designs, n_pairs, n_places].
-
-    `cases`: ndarray[n_cases x n_moments, n_designs] by column.
-    """
+    """Return CSDs at each phase or field position, the smallest over the moments, [n_designs, n_pairs, n_places]."""
     names = _csd_names(model.setup)
     distances = np.stack([cases[name] for name in names])  # [n_pairs, n_cases x n_moments, n_designs]
     return np.moveaxis(distances.reshape(len(names), n_places, -1, distances.shape[-1]).min(axis=2), -1, 0)
 
 
 def _csds(model: ForwardModel, curves: FloatArray) -> FloatArray:
-    """CSDs of one design at each phase, the smallest over the moments, ndarray[n_pairs, n_phases]."""
+    """Return CSDs of one design at each phase, the smallest over the moments, ndarray of shape (n_pairs, n_phases)."""
     response = model.read(curves)[0]
     cases = {csd_name(pair): dn[:, None] for pair, dn in separations(response[0], model.setup.members).items()}
     return np.asarray(_by_phase(model, cases, model.n_cases)[0])
 
 
 def _bends_over_pulse(setup: Setup) -> bool:
-    """True where a CSD may be smallest at any moment of a pulse: behind a readout that clips, and has no steps."""
+    """Return whether a CSD may be smallest at any moment of a pulse: behind a readout that clips without rounding."""
     drive, steps = setup.scene.drive, setup.scene.noise is None and setup.computes("quantization")
     return drive is not None and setup.computes("flicker") and not setup.linear and not steps
 
 
 def _over_pulse(model: ForwardModel, curves: FloatArray, pairs: Sequence[int], phases: Phases | None) -> FloatArray:
-    """Smallest CSDs of some pairs of one design at one phase over the moments of a pulse, ndarray[n_pairs].
-
-    Moments around the worst one are read until they lie close together.
-    """
+    """Return the smallest CSDs of some pairs of one design at one phase over the moments of a pulse."""
 
     def distances(moments: FloatArray) -> list[FloatArray]:
         response = model.at(phases, moments).read(curves)[0][0]
@@ -127,7 +158,7 @@ def _over_pulse(model: ForwardModel, curves: FloatArray, pairs: Sequence[int], p
 
 
 def _refine_moments(model: ForwardModel, block: Block, columns: Columns) -> None:
-    """Put the smallest distances over all moments of a pulse into the columns; of a light at one phase."""
+    """Refine the smallest distances over the moments of a pulse in the columns, for one phase."""
     names = _csd_names(model.setup)
     for design in np.flatnonzero(np.isfinite(columns[names[0]])):
         curves = block.some(slice(design, design + 1)).curves()
@@ -137,7 +168,7 @@ def _refine_moments(model: ForwardModel, block: Block, columns: Columns) -> None
 
 
 def _refine_phases(model: ForwardModel, block: Block, columns: Columns) -> None:
-    """Put the extremes over all sampling phases into the columns, which hold those over the lattice."""
+    """Refine the extremes over all sampling phases in the columns."""
     setup = model.setup
     if not setup.accuracy.finest_phase_px:
         return
@@ -165,7 +196,7 @@ def _refine_phases(model: ForwardModel, block: Block, columns: Columns) -> None:
 
 
 def _refine_heights(model: ForwardModel, block: Block, cases: Columns, columns: Columns) -> None:
-    """Put the smallest distances over all places of the sensor into the columns, which hold those of some heights."""
+    """Refine the smallest distances over all field positions in the columns."""
     setup = model.setup
     names, heights = _csd_names(setup), field_heights(setup)
     if not setup.accuracy.finest_phase_px:
@@ -219,9 +250,21 @@ def _whole_readout(
 
 
 def by_case(response: FloatArray, members: Mapping[str, IndexArray], metrics: Sequence[ReadoutMetric]) -> Columns:
-    """Evaluate metrics of the readout in each case, ndarray[n_cases, n_designs]; as many at once as a cache holds.
+    """Evaluate metrics of the readout in each case, in blocks of the size of a cache.
 
-    `response`: ndarray[n_designs, n_cases, n_signals, n_channels].
+    Parameters
+    ----------
+    response : ndarray of shape (n_designs, n_cases, n_signals, n_channels)
+        Readout, DN.
+    members : mapping of str to ndarray of int
+        Signals of each type.
+    metrics : sequence of ReadoutMetric
+        Metrics.
+
+    Returns
+    -------
+    dict of str to ndarray of shape (n_cases, n_designs)
+        Columns.
     """
     n_designs, n_cases = response.shape[:2]
     step, parts = max(1, _COMPARED_AT_ONCE // max(1, n_designs)), []
@@ -235,9 +278,19 @@ def by_case(response: FloatArray, members: Mapping[str, IndexArray], metrics: Se
 
 
 def over_cases(imager: ForwardModel, cases: Columns) -> Columns:
-    """The worst of all cases, and of CSDs the largest over the places of the smallest over the moments.
+    """Return the worst of all cases, and for CSDs the largest over the phases of the smallest over the moments.
 
-    `cases`: ndarray[n_cases, n_designs] each.
+    Parameters
+    ----------
+    imager : ForwardModel
+        Model of the scene.
+    cases : mapping of str to ndarray of shape (n_cases, n_designs)
+        Columns.
+
+    Returns
+    -------
+    dict of str to ndarray of shape (n_designs,)
+        Columns.
     """
     quantities = quantities_of(Asked(imager.setup.lights.classes, any_place=True))
     best = {quantity.of: name for name, quantity in quantities.items() if quantity.extreme == "best place"}
@@ -262,14 +315,29 @@ def evaluate(
     own: Sequence[OwnMetric] = (),
     spent: Spent | None = None,
 ) -> Columns:
-    """Evaluate a block of designs as the camera reads them out.
+    """Evaluate a batch of designs as the camera reads them out.
 
-    `designs`: see `designed_quantities`. Returns the columns of all metrics but those of a family, each
-    ndarray[n_designs]; `states`: signal types that noise may confuse, `probabilities`: with their CDP; `own`:
-    metrics of a user's own; `spent` is added to. CSDs are the smallest over the phases of the light, the field
-    positions and the moments of its pulses; `best_place_csd_<a>_<b>` is the largest over the phases of the smallest
-    over the moments. Where all phases or all places of the sensor count, the CSDs are refined between those of the
-    lattice; other metrics are the worst over the lattice.
+    CSDs are the smallest over sampling phases, field positions and moments of a pulse; ``best_place_csd_<a>_<b>`` is
+    the largest over the phases of the smallest over the moments. Where all phases or field positions count, CSDs are
+    refined; other metrics are the worst over the lattice.
+
+    Parameters
+    ----------
+    model : ForwardModel
+        Model of the scene.
+    designs : Block or ndarray of shape (n_designs, n_modified, n_wavelengths)
+        Designs, or QE of the modified channels.
+    states : sequence of str
+        Signal types that noise may confuse.
+    probabilities : bool
+        Compute their contrast detection probability.
+    own : sequence of OwnMetric
+        Metrics of user code.
+
+    Returns
+    -------
+    dict of str to ndarray of shape (n_designs,)
+        Columns.
     """
     block, extra, setup = _block(designs), partial(_whole_readout, model, own, spent or Spent()), model.setup
     changing = None if states else model.read_changing(block)
@@ -296,14 +364,14 @@ def evaluate(
 
 
 def _merged(which: BoolArray, some: FloatArray, others: FloatArray) -> FloatArray:
-    """Values of designs, the last axis, from those that are `which` and those that are not."""
+    """Merge values of designs, the last axis, from two groups."""
     merged = np.empty((*some.shape[:-1], which.size))
     merged[..., which], merged[..., ~which] = some, others
     return merged
 
 
 def _distances_along(model: ForwardModel, changing: Changing, extra: _Extra) -> tuple[Columns, Columns]:
-    """CSDs in each case, and the columns, of designs that differ in one channel alone."""
+    """Return CSDs in each case, and the columns, of designs that differ in one channel alone."""
     n, names = int(changing.which.sum()), _csd_names(model.setup)
     cases = {name: np.empty((len(changing.fixed), n)) for name in names}
     for start in range(0, n, _AT_ONCE):
@@ -320,7 +388,7 @@ def _distances_along(model: ForwardModel, changing: Changing, extra: _Extra) -> 
 def _read(
     model: ForwardModel, block: Block, extra: _Extra, states: Sequence[str] = (), *, probabilities: bool = False
 ) -> tuple[Columns, Columns]:
-    """CSDs in each case, and the columns, of any designs; with `states`, what noise does to them, too."""
+    """Return CSDs in each case, and the columns, of any designs; with `states`, those of noise, too."""
     curves, members, apart = block.curves(), model.setup.members, Columns()
     if states:
         read = model.read_with_noise(curves)

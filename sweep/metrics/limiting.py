@@ -1,4 +1,4 @@
-"""Which two lights limit a separation: the nearest ones, at the worst place and moment of the light."""
+"""Limiting lights of a separation: the nearest two, at the worst phase and moment."""
 
 from __future__ import annotations
 
@@ -19,15 +19,35 @@ LimitingLights = Mapping[Pair, NDArray[np.object_]]
 
 
 def limited_by_name(pair: Pair) -> str:
-    """How a table calls the two lights that limit a pair's CSD."""
+    """Return the column name of the two lights that limit a pair's CSD.
+
+    Parameters
+    ----------
+    pair : tuple of str
+        Two signal types.
+
+    Returns
+    -------
+    str
+        Name.
+    """
     return pair_name("limited_by", pair)
 
 
 def limiting_lights(setup: Setup, response: FloatArray) -> LimitingLights:
-    """The two lights that limit each CSD of designs, the first of the first type of a pair, ndarray[n_designs] each.
+    """Return the two lights that limit each CSD.
 
-    `response`: readouts, DN, ndarray[n_designs, n_cases, n_signals, n_channels]. Of a light that may fall anywhere, the
-    places are those of the method's lattice.
+    Parameters
+    ----------
+    setup : Setup
+        Scene and camera.
+    response : ndarray of shape (n_designs, n_cases, n_signals, n_channels)
+        Readout, DN.
+
+    Returns
+    -------
+    dict of str to ndarray of shape (n_designs,)
+        Names, the light of the first type first; over the lattice where all phases count.
     """
     from .nearest import nearest_pairs  # noqa: PLC0415  (compiled: kept off the start-up path)
 
@@ -41,14 +61,27 @@ def limiting_lights(setup: Setup, response: FloatArray) -> LimitingLights:
 
 
 def _named(setup: Setup, lights: IndexArray) -> NDArray[np.object_]:
-    """Names of two lights each; `lights`: ndarray[n_designs, 2], -1 where there are none."""
+    """Return the names of two lights each; empty for -1."""
     each, which = np.unique(lights, axis=0, return_inverse=True)
     names = [None if one < 0 else BETWEEN.join((setup.lights.names[one], setup.lights.names[two])) for one, two in each]
     return np.array(names, dtype=object)[which.reshape(-1)]
 
 
 def limiting_lights_of(imager: ForwardModel, block: Block) -> LimitingLights:
-    """`limiting_lights` of a block of designs, read out by the same route as `evaluate` reads them."""
+    """Return the limiting lights of a batch of designs.
+
+    Parameters
+    ----------
+    imager : ForwardModel
+        Model of the scene.
+    block : Block
+        Designs.
+
+    Returns
+    -------
+    dict of str to ndarray of shape (n_designs,)
+        As `limiting_lights`.
+    """
     changing = imager.read_changing(block)
     if changing is None:
         return limiting_lights(imager.setup, imager.read(block.curves())[0])

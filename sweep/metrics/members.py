@@ -1,7 +1,7 @@
-"""The worst case over a population of lights: the nearest of all members of two signal types.
+"""Worst case over a population of lights: the nearest members of two signal types.
 
 It is that of the response before clipping and rounding, which is linear in a spectrum's shift between whole steps of
-the grid (see `curves.members`): the smallest distance over all shifts is found exactly, not by samples of them.
+the grid (see `curves.members`): the smallest distance over all shifts is found exactly, not by samples.
 """
 
 from __future__ import annotations
@@ -30,10 +30,16 @@ _HELD = 4_000_000
 
 @dataclass(frozen=True)
 class NearestMembers:
-    """The nearest members of each two lights of two types, in each part of their region.
+    """Nearest members of each two lights of two types, in each part of their region.
 
-    `squared`: DN^2, ndarray[n_first, n_second, n_parts], infinite where there are none; `steps`, `shares`: ndarray[...,
-    2], of both. `first`, `second`: where the spectra of each light begin.
+    Parameters
+    ----------
+    squared : ndarray of shape (n_first, n_second, n_parts)
+        Squared distance, DN^2; infinite where there are none.
+    steps, shares : ndarray of shape (..., 2)
+        Whole steps and shares of both members.
+    first, second : ndarray of int
+        First spectrum of each light.
     """
 
     squared: FloatArray
@@ -43,36 +49,55 @@ class NearestMembers:
     second: IndexArray
 
     def of(self, values: FloatArray, side: int) -> FloatArray:
-        """What the nearest members on one side (0 or 1) have; ndarray[..., n_spectra, n] -> [..., *squared, n]."""
+        """Return values of the nearest members on one side.
+
+        Parameters
+        ----------
+        values : ndarray of shape (..., n_spectra, n)
+            Values of every spectrum.
+        side : int
+            0 or 1.
+
+        Returns
+        -------
+        ndarray
+            Shape (..., n_first, n_second, n_parts, n).
+        """
         starts = self.first[:, None, None] if side == 0 else self.second[None, :, None]
         rows, share = starts + self.steps[..., side], self.shares[..., side, None]
         return np.asarray(values[..., rows, :] * (1 - share) + values[..., rows + 1, :] * share, dtype=float)
 
 
 class PopulationImager:
-    """A scene whose lights are all members of their population.
-
-    `parts`: of a region of shifts, whose nearest members search and limit see apart.
-    """
+    """Scene with all members of the population of its lights."""
 
     parts = 5
 
     def __init__(self, setup: Setup) -> None:
-        """Everything is on, whatever the plan of `setup` leaves out: plans promise nothing of other members."""
+        """Store the setup with every effect, since a plan's bounds do not cover other members."""
         self.members = Members(setup.lights, setup.camera.grid)
         self.setup = replace(setup.with_all_effects, lights=self.members.lights)
         self._tables: dict[Pair, tuple[NDArray[Any], ...]] = {}
 
     @cached_property
     def imager(self) -> LinearModel:
-        """The smooth response to every spectrum of the members."""
+        """Linear model of every spectrum of the members."""
         return linear_model(self.setup)
 
     def worst(self, curves: FloatArray, pairs: Sequence[Pair] = ()) -> dict[str, FloatArray]:
-        """The smallest CSD of each pair over all members and places, DN, by the name of the CSD, ndarray[n_designs].
+        """Return the smallest CSD of each pair over all members and field positions.
 
-        `curves`: QE of the modified channels, ndarray[n_designs, n_modified, n_wavelengths]; `pairs`: all, if none are
-        named. NaN where the response is no number.
+        Parameters
+        ----------
+        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE of the modified channels.
+        pairs : sequence of pair
+            Pairs; all if there are none.
+
+        Returns
+        -------
+        dict of str to ndarray of shape (n_designs,)
+            CSD by its name, DN; NaN where the response is NaN.
         """
         pairs = pairs or class_pairs(self.setup.lights.classes)
         found = {pair: np.full(len(curves), np.nan) for pair in pairs}
@@ -86,7 +111,24 @@ class PopulationImager:
         return {csd_name(pair): values for pair, values in found.items()}
 
     def nearest(self, response: FloatArray, pair: Pair, *, parts: int = 1, alone: bool = False) -> NearestMembers:
-        """The nearest members of two types; `response`: ndarray[n_spectra, n_channels]; `alone`: of all, only."""
+        """Return the nearest members of two types.
+
+        Parameters
+        ----------
+        response : ndarray of shape (n_spectra, n_channels)
+            Response to every spectrum, DN.
+        pair : tuple of str
+            Two signal types.
+        parts : int
+            Parts of a region of shifts whose nearest members are kept.
+        alone : bool
+            Only the smallest distance is requested.
+
+        Returns
+        -------
+        NearestMembers
+            Nearest members.
+        """
         from .compiled_members import nearest_members  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         first, second, which, starts, cells, spans, along = self._table(pair)
@@ -98,7 +140,7 @@ class PopulationImager:
         return NearestMembers(squared, steps, shares, first, second)
 
     def _table(self, pair: Pair) -> tuple[NDArray[Any], ...]:
-        """The regions of two types, as `nearest_members` takes them, and where their triangles are along them."""
+        """Return the regions of two types as `nearest_members` takes them."""
         if pair not in self._tables:
             regions, which = self.members.regions(pair)
             starts = np.cumsum([0, *(len(region.cells) for region in regions)])
@@ -111,5 +153,16 @@ _imagers: Cache[bytes, PopulationImager] = Cache(16)
 
 
 def population_imager(setup: Setup) -> PopulationImager:
-    """The members of a setup whose lights have a population; the latest ones are kept."""
+    """Return the population of a setup's lights; recent ones are cached.
+
+    Parameters
+    ----------
+    setup : Setup
+        Scene and camera.
+
+    Returns
+    -------
+    PopulationImager
+        Scene with all members.
+    """
     return _imagers.get(hashlib.sha256(pickle.dumps(setup)).digest(), lambda: PopulationImager(setup))

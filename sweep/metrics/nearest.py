@@ -1,8 +1,7 @@
 """Compiled inner loops: distances of pairs, without an array per step.
 
-NumPy has to write every difference of every pair to memory; these keep them in registers and leave out the pairs that
-cannot be the nearest. They release the GIL and are compiled once per machine (Numba's cache). Sums keep their order, so
-that results are those of the same sums in NumPy.
+NumPy writes every difference of every pair to memory; these keep them in registers and skip pairs that cannot be the
+nearest. They release the GIL. Sums keep their order, so results equal those of the same sums in NumPy.
 """
 
 from __future__ import annotations
@@ -21,12 +20,16 @@ _LANES, _AT_ONCE = 64, 16
 
 @njit(cache=True, nogil=True, fastmath=_NUMBERS)
 def nearest_squared(response: FloatArray, bounds: IndexArray, out: FloatArray) -> None:
-    """Smallest squared distance of each pair of classes.
+    """Compute the smallest squared distance of each pair of classes.
 
-    `response`: C-ordered ndarray[n_designs, 4, n_signals], finite, one class of signals after the other, in which fewer
-    channels are filled up with zeros;
-    `bounds`: ndarray[n_classes + 1], where each class begins. `out`: ndarray[n_designs, n_pairs], pairs in the order of
-    `curves.lights.class_pairs`.
+    Parameters
+    ----------
+    response : ndarray of shape (n_designs, 4, n_signals)
+        C-ordered and finite, one class after the other; missing channels are 0.
+    bounds : ndarray of int, shape (n_classes + 1,)
+        Start of each class.
+    out : ndarray of shape (n_designs, n_pairs)
+        Squared distances, in the order of `curves.lights.class_pairs`.
     """
     for d in range(response.shape[0]):
         values = response[d]
@@ -48,11 +51,18 @@ def nearest_squared(response: FloatArray, bounds: IndexArray, out: FloatArray) -
 
 @njit(cache=True, nogil=True)
 def nearest_pairs(response: FloatArray, order: IndexArray, bounds: IndexArray, out: IndexArray) -> None:
-    """The two nearest signals of each pair of classes, over all cases; of equally near ones the first.
+    """Find the two nearest signals of each pair of classes over all cases; of equally near ones the first.
 
-    `response`: C-ordered ndarray[n_designs, n_cases, n_signals, n_channels]; `order`: its signals, one class after the
-    other; `bounds`: ndarray[n_classes + 1], where each class begins in `order`. `out`: ndarray[n_designs, n_pairs, 2],
-    signals, pairs in the order of `curves.lights.class_pairs`; -1 where a distance is not finite.
+    Parameters
+    ----------
+    response : ndarray of shape (n_designs, n_cases, n_signals, n_channels)
+        C-ordered.
+    order : ndarray of int
+        Signals, one class after the other.
+    bounds : ndarray of int, shape (n_classes + 1,)
+        Start of each class in `order`.
+    out : ndarray of int, shape (n_designs, n_pairs, 2)
+        Signals, in the order of `curves.lights.class_pairs`; -1 where a distance is not finite.
     """
     for d in range(response.shape[0]):
         pair = 0
@@ -79,11 +89,20 @@ def nearest_pairs(response: FloatArray, order: IndexArray, bounds: IndexArray, o
 def nearest_along_squared(
     values: FloatArray, fixed: FloatArray, first: IndexArray, second: IndexArray, starts: IndexArray, out: FloatArray
 ) -> None:
-    """Smallest squared distance of each pair of classes for designs that differ in one channel alone.
+    """Compute the smallest squared distance of each pair of classes for designs that differ in one channel alone.
 
-    `values`: C-ordered ndarray[n_designs, n_signals], that channel; `fixed`: squared distances in the other channels,
-    sorted within each pair of classes; `first`, `second`: the signals of each; `starts`: where each pair of classes
-    begins, and the end. `out`: ndarray[n_pairs, n_designs], which means nothing for values that are not finite.
+    Parameters
+    ----------
+    values : ndarray of shape (n_designs, n_signals)
+        That channel, C-ordered.
+    fixed : ndarray
+        Squared distances in the other channels, ascending within each pair of classes.
+    first, second : ndarray of int
+        Signals of each pair.
+    starts : ndarray of int, shape (n_pairs + 1,)
+        Start of each pair of classes, and the end.
+    out : ndarray of shape (n_pairs, n_designs)
+        Squared distances; undefined for values that are not finite.
     """
     for begin in range(0, len(values), _LANES):  # designs side by side, so that one instruction serves several
         block = np.ascontiguousarray(values[begin : begin + _LANES].T)

@@ -1,4 +1,4 @@
-"""What a study maximizes: one quantity, or several weighted ones under a rule."""
+"""Objective of a study: one quantity, or several weighted ones under a rule."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ _FIELDS: dict[str, Any] = {name: (dict[str, Weight], {}) for name in RULES}
 
 
 class Objective(create_model("_Rules", __base__=Section, **_FIELDS)):  # type: ignore[misc]
-    """Maximize weight x quantity of several quantities under one rule: the smallest (`minimum`), the `sum`, or of
-    errors the `least`, which is -log10 of the largest weight x error.
+    """Maximize weight times quantity under one rule.
 
-    A name alone is that quantity; a list is the smallest of its members.
+    The smallest of several (`minimum`), their `sum`, or for errors the `least`, which is -log10 of the largest weight
+    times error. A name alone is that quantity; a list is the smallest of its members.
     """
 
     @model_validator(mode="before")
@@ -47,7 +47,7 @@ class Objective(create_model("_Rules", __base__=Section, **_FIELDS)):  # type: i
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        """What a file may say: a name, a list of names, or the mapping."""
+        """Return the schema of a name, a list of names, or the mapping."""
         name = {"type": "string"}
         return {"anyOf": [name, {"type": "array", "items": name, "minItems": 1}, handler(core_schema)]}
 
@@ -60,23 +60,34 @@ class Objective(create_model("_Rules", __base__=Section, **_FIELDS)):  # type: i
 
     @property
     def rule(self) -> Rule:
-        """How the weighted quantities become one number."""
+        """Rule that combines the weighted quantities."""
         return next(rule for name, rule in RULES.items() if getattr(self, name))
 
     @property
     def weights(self) -> Mapping[str, float]:
-        """Quantity -> weight."""
+        """Weight of each quantity."""
         found: Mapping[str, float] = getattr(self, self.rule.name)
         return found
 
     @property
     def column(self) -> str:
-        """Column of the result table that holds it."""
+        """Name of its column in the result table."""
         alone = list(self.weights.values()) == [1.0] and self.rule.wanted == "more"
         return next(iter(self.weights)) if alone else COMBINED
 
     def of(self, columns: Mapping[str, FloatArray]) -> FloatArray:
-        """Its value from the quantities, ndarray[n_designs] each."""
+        """Return the value of the objective.
+
+        Parameters
+        ----------
+        columns : mapping of str to ndarray of shape (n_designs,)
+            Quantities.
+
+        Returns
+        -------
+        ndarray of shape (n_designs,)
+            Values.
+        """
         return self.rule.of(np.stack([weight * columns[name] for name, weight in self.weights.items()]))
 
     def __str__(self) -> str:
@@ -85,7 +96,20 @@ class Objective(create_model("_Rules", __base__=Section, **_FIELDS)):  # type: i
 
 
 def columns_of(asked: Asked, objective: Objective) -> Mapping[str, Quantity]:
-    """The quantities of a study's result table, in order: those of all metrics, and a combined objective."""
+    """Return the quantities of a study's result table.
+
+    Parameters
+    ----------
+    asked : Asked
+        Requested quantities.
+    objective : Objective
+        Objective.
+
+    Returns
+    -------
+    mapping of str to Quantity
+        Quantities of all metrics, and a combined objective, in order.
+    """
     if objective.column != COMBINED:
         return quantities_of(asked)
     whole = Quantity(COMBINED, COMBINED, f"the study's objective: {objective}", wanted="more")

@@ -1,4 +1,4 @@
-"""A metric that a user wrote, or that an installed package offers: numbers from what the camera reads, and no more."""
+"""Metrics of user code or of an installed package: numbers from the readout alone."""
 
 from __future__ import annotations
 
@@ -21,11 +21,18 @@ _MOST_DIGITS = 12
 
 @dataclass(frozen=True)
 class Readings:
-    """What the camera reads of a block of designs at one place and moment of the light; an own metric gets it.
+    """Readout of a batch of designs at one sampling phase and moment, the argument of a user's metric.
 
-    `dn`: digital numbers, ndarray[n_designs, n_signals, n_channels], with the pedestal `pedestal_dn` in them; in a
-    search they are neither clipped nor rounded. `types`, `names`: signal type and name of each signal, `channels`:
-    name of each channel of the CFA.
+    Parameters
+    ----------
+    dn : ndarray of shape (n_designs, n_signals, n_channels)
+        Digital numbers, DN, including the pedestal; neither clipped nor rounded in a search.
+    types, names : tuple of str
+        Signal type and name of each signal.
+    channels : tuple of str
+        Channels of the CFA.
+    pedestal_dn : float
+        Pedestal, DN.
     """
 
     dn: FloatArray
@@ -36,24 +43,48 @@ class Readings:
 
     @staticmethod
     def of_setup(setup: Setup, dn: FloatArray) -> Readings:
-        """Digital numbers, which the metric cannot change, of the signals and channels of a setup."""
+        """Return read-only digital numbers with the signals and channels of a setup.
+
+        Parameters
+        ----------
+        setup : Setup
+            Scene and camera.
+        dn : ndarray of shape (n_designs, n_signals, n_channels)
+            Digital numbers, DN.
+
+        Returns
+        -------
+        Readings
+            Readings.
+        """
         fixed = np.asarray(dn, dtype=float).view()
         fixed.flags.writeable = False
         lights = setup.lights
         return Readings(fixed, lights.types, lights.names, setup.camera.mosaic.channels, setup.camera.pixel.offset_dn)
 
     def of(self, kind: str) -> FloatArray:
-        """Digital numbers of one signal type's signals, ndarray[n_designs, n_of_the_type, n_channels]."""
+        """Return the digital numbers of one signal type.
+
+        Parameters
+        ----------
+        kind : str
+            Signal type.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n_of_the_type, n_channels)
+            Digital numbers, DN.
+        """
         return self.dn[:, [own == kind for own in self.types]]
 
 
 @dataclass(frozen=True)
 class OwnMetric:
-    """A function of `Readings`, or a class with a method `of` of them, made without arguments.
+    """Metric of user code: a function of `Readings`, or a class with a method `of`, constructed without arguments.
 
-    It returns a number per design, ndarray[n_designs]; or several, ndarray[n_designs, n], of which the worst counts,
-    so that a search sees each of them; or None for a CFA that does not have it. A row must not depend on the other
-    rows. It may have `name`, `unit`, `label`, `digits` and `wanted`, `more` or `less`.
+    It returns ndarray of shape (n_designs,); or (n_designs, n), of which the worst counts, so that a search sees each
+    of them; or None for a CFA that it does not apply to. A row must not depend on other rows. Optional attributes:
+    `name`, `unit`, `label`, `digits` and `wanted` (`more` or `less`).
     """
 
     code: OwnCode
@@ -68,7 +99,7 @@ class OwnMetric:
 
     @property
     def name(self) -> str:
-        """Its column. Raises SweepError for what is no name."""
+        """Column name; raises SweepError for an invalid one."""
         usual = own_name(self.code.name)
         found = self._said("name", usual)
         if not _NAME.fullmatch(found):
@@ -78,17 +109,17 @@ class OwnMetric:
 
     @property
     def unit(self) -> str:
-        """Its unit; empty for a ratio."""
+        """Unit; empty for a ratio."""
         return self._said("unit", "")
 
     @property
     def label(self) -> str:
-        """Its name as people write it."""
+        """Name in texts."""
         return self._said("label", self.name.replace("_", " "))
 
     @property
     def wanted(self) -> Literal["more", "less"]:
-        """Whether more of it is better, or less. Raises SweepError for anything else."""
+        """`more` or `less`; raises SweepError for anything else."""
         found = self._said("wanted", "more")
         if found not in ("more", "less"):
             raise SweepError(Fault(f"{self.code.name}: no such `wanted`", value=found, allowed="more, less"))
@@ -96,7 +127,7 @@ class OwnMetric:
 
     @property
     def digits(self) -> int:
-        """After the point. Raises SweepError for what is no such number."""
+        """Digits after the point; raises SweepError for anything else."""
         found = self.code.called(getattr, self._made, "digits", 4)
         if isinstance(found, bool) or not isinstance(found, int) or not 0 <= found <= _MOST_DIGITS:
             allowed = f"a whole number, 0 to {_MOST_DIGITS}"
@@ -110,9 +141,24 @@ class OwnMetric:
         return found
 
     def parts(self, readings: Readings, *, finite: bool = True) -> FloatArray | None:
-        """Its numbers, ndarray[n_designs, n], of which the worst counts; None where the CFA has none.
+        """Call the metric.
 
-        Raises SweepError for what is raised, what is no number, what has another shape, and what is not `finite`.
+        Parameters
+        ----------
+        readings : Readings
+            Readout.
+        finite : bool
+            Refuse values that are not finite.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n) or None
+            Values, of which the worst counts; None if the CFA has none.
+
+        Raises
+        ------
+        SweepError
+            If the code raises, or returns something else.
         """
         made, n = self._made, len(readings.dn)
         with np.errstate(all="ignore"):
@@ -131,9 +177,19 @@ class OwnMetric:
         return np.asarray(values.reshape(n, -1), dtype=float)
 
     def of_cases(self, setup: Setup, response: FloatArray) -> FloatArray:
-        """The worst over the cases, ndarray[n_designs], NaN where the CFA has none.
+        """Return the worst over the cases.
 
-        `response`: ndarray[n_designs, n_cases, n_signals, n_channels], DN.
+        Parameters
+        ----------
+        setup : Setup
+            Scene and camera.
+        response : ndarray of shape (n_designs, n_cases, n_signals, n_channels)
+            Readout, DN.
+
+        Returns
+        -------
+        ndarray of shape (n_designs,)
+            Values; NaN if the CFA has none.
         """
         each = [self.parts(Readings.of_setup(setup, response[:, case])) for case in range(response.shape[1])]
         some = [values for values in each if values is not None]
@@ -144,5 +200,20 @@ class OwnMetric:
 
 
 def own_quantities(own: Sequence[OwnMetric], setup: Setup, response: FloatArray) -> dict[str, FloatArray]:
-    """The column of each metric; see `OwnMetric.of_cases`."""
+    """Return the column of each metric of user code.
+
+    Parameters
+    ----------
+    own : sequence of OwnMetric
+        Metrics.
+    setup : Setup
+        Scene and camera.
+    response : ndarray of shape (n_designs, n_cases, n_signals, n_channels)
+        Readout, DN.
+
+    Returns
+    -------
+    dict of str to ndarray of shape (n_designs,)
+        Columns.
+    """
     return {metric.name: metric.of_cases(setup, response) for metric in own}

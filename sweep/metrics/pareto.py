@@ -8,7 +8,20 @@ from ..base.types import BoolArray, FloatArray
 
 
 def hypervolume(values: FloatArray, reference: FloatArray) -> float:
-    """Volume that rows of ndarray[n, n_objectives], all maximized, dominate above `reference`."""
+    """Return the volume that points dominate.
+
+    Parameters
+    ----------
+    values : ndarray of shape (n, n_objectives)
+        Points, all objectives maximized.
+    reference : ndarray of shape (n_objectives,)
+        Reference point.
+
+    Returns
+    -------
+    float
+        Hypervolume.
+    """
     import moocore  # noqa: PLC0415  (pulls in pandas: kept off the start-up path)
 
     inside = np.isfinite(values).all(axis=1) & (values > reference).all(axis=1)
@@ -16,10 +29,17 @@ def hypervolume(values: FloatArray, reference: FloatArray) -> float:
 
 
 def knee(values: FloatArray) -> int | None:
-    """Row of a front, ndarray[n, 2], that is farthest beyond the straight line between the front's ends.
+    """Return the knee of a front: the point farthest beyond the line between its ends.
 
-    Both quantities are maximized and scaled to the front's own range. None for fewer than three different points, or
-    where none is beyond the line.
+    Parameters
+    ----------
+    values : ndarray of shape (n, 2)
+        Points, both objectives maximized and scaled to the range of the front.
+
+    Returns
+    -------
+    int or None
+        Row; None for fewer than three different points, or if none is beyond the line.
     """
     if len(values) < 3 or not np.isfinite(values).all():
         return None
@@ -33,10 +53,19 @@ def knee(values: FloatArray) -> int | None:
 
 
 def non_dominated(values: FloatArray, eligible: BoolArray | None = None) -> BoolArray:
-    """Return which rows of ndarray[n, n_objectives], all maximized, no other eligible row dominates: bool ndarray[n].
+    """Return the rows that no other eligible row dominates.
 
-    Rows with a NaN and rows that are not `eligible` are never in the set and dominate nothing. Rows that are equal
-    in every objective are all kept.
+    Parameters
+    ----------
+    values : ndarray of shape (n, n_objectives)
+        Points, all objectives maximized.
+    eligible : ndarray of bool, shape (n,), optional
+        Rows that may be in the set; other rows, and rows with NaN, dominate nothing.
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
+        True for non-dominated rows; equal rows are all kept.
     """
     import moocore  # noqa: PLC0415  (pulls in pandas: kept off the start-up path)
 

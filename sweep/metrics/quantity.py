@@ -1,4 +1,4 @@
-"""What a column of the result table is: everything that the other rooms need to know of a quantity."""
+"""Columns of the result table, and metrics that compute them."""
 
 from __future__ import annotations
 
@@ -47,11 +47,30 @@ End = Literal["min", "max"]
 
 @dataclass(frozen=True)
 class Column:
-    """A column in words and facts, as a run keeps them.
+    """Column in words and facts, as a run keeps it.
 
-    `metric`: what is measured, the same for all pairs of signal types. `unit`: empty for a ratio. `role`: `separation`
-    (how well colors are told apart) or `light` (what that costs). `extreme`: of which kind of extreme over what, if
-    any, of the quantity named `of`. `wanted`: whether more of it is better, or less. `pair`: of signal types.
+    Parameters
+    ----------
+    name : str
+        Column name.
+    metric : str
+        Metric, the same for all pairs of signal types.
+    meaning : str
+        Meaning.
+    unit : str
+        Unit; empty for a ratio.
+    label : str
+        Name in texts.
+    digits : int
+        Digits after the point.
+    wanted : {'more', 'less', ''}
+        Direction of improvement.
+    role : {'separation', 'light', ''}
+        Separation of colors, or its cost.
+    extreme, of : str
+        Kind of extreme, and the quantity that it is of.
+    pair : tuple of str, optional
+        Signal types.
     """
 
     name: str
@@ -68,34 +87,76 @@ class Column:
 
     @property
     def words(self) -> str:
-        """Its name as people write it."""
+        """Name in texts."""
         return self.label or self.name
 
     @property
     def axis(self) -> str:
-        """Its name with its unit, if it has one."""
+        """Name with unit, for an axis."""
         return f"{self.words} / {self.unit}" if self.unit else self.words
 
     def amount(self, value: float, digits: int | None = None) -> str:
-        """A value with its unit, with `digits` after the point instead of its own; a ratio always has its own."""
+        """Format a value with its unit.
+
+        Parameters
+        ----------
+        value : float
+            Value.
+        digits : int, optional
+            Digits after the point, instead of those of the column.
+
+        Returns
+        -------
+        str
+            Text.
+        """
         own = self.digits if digits is None else digits
         return f"{value:.{own}f} {self.unit}" if self.unit else f"{value:.{self.digits}f}"
 
     def told(self, value: float) -> str:
-        """A value as sentences, plots and large numbers say it: in DN whole from 10 on."""
+        """Format a value for sentences and plots: in DN whole from 10 on.
+
+        Parameters
+        ----------
+        value : float
+            Value.
+
+        Returns
+        -------
+        str
+            Text.
+        """
         return self.amount(value, 0 if self.unit == DN and abs(value) >= 10 else None)
 
     def told_bound(self, value: float) -> str:
-        """What nothing exceeds, as sentences say it: rounded up at the next digit, so that nothing exceeds that."""
+        """Format an upper bound, rounded up.
+
+        Parameters
+        ----------
+        value : float
+            Upper bound.
+
+        Returns
+        -------
+        str
+            Text.
+        """
         digits = 1 if self.unit == DN and abs(value) >= 10 else self.digits
         return self.amount(math.ceil(value * 10**digits) / 10**digits, digits)
 
 
 @dataclass(frozen=True)
 class LinearRows:
-    """A quantity as rows of the curve N of one modified channel: rows @ N + constant is `scale` times each of them.
+    """Quantity as rows of the curve N of one modified channel: rows @ N + constant is `scale` times each of them.
 
-    The smallest is the quantity where more of it is wanted, else the largest. `rows`: [n, n_wavelengths].
+    The smallest is the quantity if more is wanted, else the largest.
+
+    Parameters
+    ----------
+    rows : csr_matrix of shape (n, n_wavelengths)
+        Coefficients.
+    constant, scale : float
+        Constant and scale.
     """
 
     rows: csr_matrix
@@ -105,17 +166,38 @@ class LinearRows:
 
 @dataclass(frozen=True)
 class Quantity(Column):
-    """A column that is computed, with what constraints, search and limit need.
+    """Column that is computed, with the properties that constraints, search and upper bound need.
 
-    `ends`: ends of a constraint on it. `goal`: a search may make it large, or small where less is wanted, and it has a
-    worst case unless it is `nominal`. `needs`: it exists only with a modified channel, in a family that has it, or in
-    CFAs of which an own metric says something.
-    `infinite`: it may be so. `signed`: it may be below 0. `promised`: a plan's promise holds for it. `rows`: what its
-    smooth rows are: its values, their squares, or their number of decades below 1, -log10. `apart`: it is the smallest
-    distance of two signals, in DN or in units of the noise. `most`: no filter reaches more. `share`: it is the smallest
-    ratio of N to the curve that N replaces. `states`: the signal types that noise may confuse in it. `slopes`: its rows
-    have derivatives, else only searches without these know it. `smooth_members`: its smooth rows over the population of
-    the lights; `smooth_drawn`: over random lamps and cameras.
+    Parameters
+    ----------
+    ends : tuple of str
+        Ends that a constraint may have.
+    goal : bool
+        A search may maximize it (or minimize it, if less is wanted).
+    needs : {'modified', 'family', 'own', ''}
+        It exists only with a modified channel, in some families, or for some CFAs.
+    infinite, signed : bool
+        It may be infinite, or negative.
+    promised : bool
+        The error bound of a plan covers it.
+    nominal : bool
+        It has no worst case.
+    rows : {'values', 'squares', 'decades'}
+        Form of its smooth rows.
+    apart : {'', 'DN', 'noise'}
+        Smallest distance of two signals in this unit.
+    most : float
+        Upper bound on any filter.
+    share : bool
+        Smallest ratio of a curve to its base.
+    states : tuple of str
+        Signal types that noise may confuse.
+    slopes : bool
+        Its rows have derivatives.
+    smooth, smooth_members, smooth_drawn : callable, optional
+        Smooth rows of a design, over a population, over random lamps and cameras.
+    linear : callable, optional
+        Linear rows.
     """
 
     ends: tuple[End, ...] = ()
@@ -138,16 +220,27 @@ class Quantity(Column):
 
     @property
     def has_limit(self) -> bool:
-        """Whether the limit of any filter knows it."""
+        """True if an upper bound on any filter exists."""
         return bool(self.apart) or self.share or self.linear is not None
 
     @property
     def column(self) -> Column:
-        """What a run keeps of it."""
+        """The part that a run keeps."""
         return Column(**{each.name: getattr(self, each.name) for each in fields(Column)})
 
     def worst(self, over: Sequence[str]) -> Quantity:
-        """Its worst case `over` all of something."""
+        """Return the worst case of the quantity.
+
+        Parameters
+        ----------
+        over : sequence of str
+            Sets that the worst case is over, in words.
+
+        Returns
+        -------
+        Quantity
+            Worst case.
+        """
         meaning = f"the worst case of `{self.name}` over {' and '.join(over)}"
         label = f"worst-case {self.words}"
         return replace(
@@ -155,7 +248,18 @@ class Quantity(Column):
         )
 
     def of_share(self, share: float) -> Quantity:
-        """What a share of the drawn lamps and cameras has of it: no linear program knows that."""
+        """Return the value that a share of the drawn lamps and cameras has.
+
+        Parameters
+        ----------
+        share : float
+            Share.
+
+        Returns
+        -------
+        Quantity
+            Yield.
+        """
         told = f"{100 * share:.10g} %"
         meaning = (
             f"at least {told} of the drawn lamps and cameras (`population`, `production`) have this `{self.name}`, and "
@@ -168,26 +272,74 @@ class Quantity(Column):
         return replace(unknown, rows="values", smooth=self.smooth_drawn, smooth_drawn=None)
 
     def value(self, rows: Rows) -> float:
-        """The quantity from its smooth rows."""
+        """Return the quantity from its smooth rows.
+
+        Parameters
+        ----------
+        rows : Rows
+            Smooth rows.
+
+        Returns
+        -------
+        float
+            Value.
+        """
         most = self.wanted == "less" and self.rows != "decades"
         return self.of_row(float(rows.values.max() if most else rows.values.min()))
 
     def of_row(self, row: float) -> float:
-        """The value that a smooth row stands for; a probability is at most 1."""
+        """Return the value that a smooth row stands for; a probability is at most 1.
+
+        Parameters
+        ----------
+        row : float
+            Smooth row.
+
+        Returns
+        -------
+        float
+            Value.
+        """
         if self.rows == "decades":
             return float(min(10.0**-row, 1.0))
         return math.sqrt(max(row, 0.0)) if self.rows == "squares" else row
 
     def worse(self, values: FloatArray | Sequence[FloatArray]) -> FloatArray:
-        """The worst of several cases, ndarray[n_designs]."""
+        """Return the worst of several cases.
+
+        Parameters
+        ----------
+        values : sequence of ndarray of shape (n_designs,)
+            Values of each case.
+
+        Returns
+        -------
+        ndarray of shape (n_designs,)
+            Worst values.
+        """
         return np.asarray(np.max(values, axis=0) if self.wanted == "less" else np.min(values, axis=0), dtype=float)
 
 
 @dataclass(frozen=True)
 class Asked:
-    """What a study asks for: signal types, states that noise may confuse, any place of the light, shifts of edges, a
-    population of its lights and a share of random ones (0: none), probabilities of detection and separation, tasks, a
-    benchmark of vision, and own metrics. `brightest`: the curve whose light is 1, where that is no clear pixel.
+    """Quantities requested by a study.
+
+    Parameters
+    ----------
+    classes, states : tuple of str
+        Signal types, and those that noise may confuse.
+    any_place, edge_shift, population : bool
+        Best sampling phase, worst case over edges, worst case over lamps.
+    wanted_yield : float
+        Share of random lamps and cameras; 0: none.
+    tasks : tuple of TaskName
+        Tasks.
+    probabilities, vision : bool
+        Contrast detection probability; benchmark of vision.
+    own : tuple of OwnMetric
+        Metrics of user code.
+    brightest : str
+        Curve whose light is 1, if there is no clear pixel.
     """
 
     classes: tuple[str, ...]
@@ -204,39 +356,70 @@ class Asked:
 
 
 class Metric(ABC):
-    """Columns that are computed together. A file in `metrics/columns/` holds a class of one of the kinds below.
-
-    `order`: where its columns stand among those of the others.
-    """
+    """Columns that are computed together; a class in `metrics/columns/`. `order` is their position in the table."""
 
     order: ClassVar[int]
 
     @abstractmethod
     def quantities(self, asked: Asked) -> Sequence[Quantity]:
-        """Its columns in a study; none where they are not asked for."""
+        """Return the columns in a study.
+
+        Parameters
+        ----------
+        asked : Asked
+            Requested quantities.
+
+        Returns
+        -------
+        sequence of Quantity
+            Columns; none if they are not requested.
+        """
 
 
 class DesignMetric(Metric):
-    """What designs give without any light."""
+    """Metric of designs without light."""
 
     @abstractmethod
     def of_designs(self, setup: Setup, block: Block) -> Columns:
-        """Each column, ndarray[n_designs]."""
+        """Compute the columns.
+
+        Parameters
+        ----------
+        setup : Setup
+            Scene and camera.
+        block : Block
+            Designs.
+
+        Returns
+        -------
+        dict of str to ndarray of shape (n_designs,)
+            Columns.
+        """
 
 
 class ReadoutMetric(Metric):
-    """What the digital numbers of a scene give."""
+    """Metric of the digital numbers of a scene."""
 
     @abstractmethod
     def of_readout(self, response: FloatArray, members: Mapping[str, IndexArray]) -> Columns:
-        """Each column at one place and moment of the light, ndarray[n_designs]; the worst one of all counts.
+        """Compute the columns at one sampling phase and moment; the worst of all counts.
 
-        `response`: ndarray[n_designs, n_signals, n_channels], DN; `members`: signal type -> indices of its signals.
+        Parameters
+        ----------
+        response : ndarray of shape (n_designs, n_signals, n_channels)
+            Readout, DN.
+        members : mapping of str to ndarray of int
+            Signals of each type.
+
+        Returns
+        -------
+        dict of str to ndarray of shape (n_designs,)
+            Columns.
         """
 
 
 class NoiseMetric(Metric):
-    """What mean and variance of a noisy scene give. `extra`: only where a study asks for probabilities."""
+    """Metric of mean and variance of a noisy scene; `extra`: only if a study requests probabilities."""
 
     extra: ClassVar[bool] = False
 
@@ -244,27 +427,67 @@ class NoiseMetric(Metric):
     def of_noise(
         self, imager: ForwardModel, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
     ) -> Columns:
-        """Each column, the worst over all places and moments, ndarray[n_designs].
+        """Compute the columns, the worst over all phases and moments.
 
-        `read`: what the camera reads of `curves`, ndarray[n_designs, n_modified, n_wavelengths]; `members`: state ->
-        indices of its signals.
+        Parameters
+        ----------
+        imager : ForwardModel
+            Model of the scene.
+        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE of the modified channels.
+        read : NoisyReadout
+            Readout of these designs.
+        members : mapping of str to ndarray of int
+            Signals of each state.
+
+        Returns
+        -------
+        dict of str to ndarray of shape (n_designs,)
+            Columns.
         """
 
 
 class VisionMetric(Metric):
-    """What images of signal heads give, where a study asks for a benchmark of vision."""
+    """Metric of images of signal heads."""
 
     @abstractmethod
     def of_images(self, setup: Setup, curves: FloatArray, vision: Vision, seed: int) -> Columns:
-        """Each column, ndarray[n_designs]; `seed`: the study's.
+        """Compute the columns.
 
-        `curves`: ndarray[n_designs, n_modified, n_wavelengths].
+        Parameters
+        ----------
+        setup : Setup
+            Scene and camera.
+        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE of the modified channels.
+        vision : Vision
+            Benchmark.
+        seed : int
+            Seed of the study.
+
+        Returns
+        -------
+        dict of str to ndarray of shape (n_designs,)
+            Columns.
         """
 
 
 class FamilyMetric(Metric):
-    """What parameters of a family say."""
+    """Metric of the parameters of a family."""
 
     @abstractmethod
     def of_parameters(self, family: Family | None, points: FloatArray) -> Columns:
-        """Each column, ndarray[n_designs], NaN where a design has none; `points`: ndarray[n_designs, n_parameters]."""
+        """Compute the columns.
+
+        Parameters
+        ----------
+        family : Family or None
+            Family.
+        points : ndarray of shape (n_designs, n_parameters)
+            Parameters.
+
+        Returns
+        -------
+        dict of str to ndarray of shape (n_designs,)
+            Columns.
+        """

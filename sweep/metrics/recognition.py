@@ -1,4 +1,4 @@
-"""Raw patches of a noisy scene, drawn pixel by pixel, and how often a state is recognized from them."""
+"""Raw patches of a noisy scene, drawn pixel by pixel, and the accuracy of classifiers on them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .share import share_interval
 
 
 def _nearest_centroid(train: FloatArray, truth: IndexArray, test: FloatArray) -> IndexArray:
-    """The state whose mean patch is nearest."""
+    """Return the state with the nearest mean patch."""
     from scipy.spatial.distance import cdist  # noqa: PLC0415  (few studies need it)
 
     centers = np.stack([train[truth == state].mean(axis=0, dtype=float) for state in range(truth.max() + 1)])
@@ -21,7 +21,7 @@ def _nearest_centroid(train: FloatArray, truth: IndexArray, test: FloatArray) ->
 
 
 def _lda(train: FloatArray, truth: IndexArray, test: FloatArray) -> IndexArray:
-    """Fisher's linear discriminant with equal priors; shrinkage keeps it stable with more pixels than patches."""
+    """Return the state by Fisher's linear discriminant with equal priors and a shrunk covariance."""
     groups = [train[truth == state].astype(float) for state in range(int(truth.max()) + 1)]
     means = np.stack([group.mean(axis=0) for group in groups])
     covariance = np.mean([_shrunk_covariance(group) for group in groups], axis=0)
@@ -31,7 +31,7 @@ def _lda(train: FloatArray, truth: IndexArray, test: FloatArray) -> IndexArray:
 
 
 def _shrunk_covariance(patches: FloatArray) -> FloatArray:
-    """Covariance of patches, ndarray[n, n_pixels], of unit variance shrunk towards a sphere, and scaled back.
+    """Return the covariance of patches, ndarray of shape (n, n_pixels), shrunk toward a sphere at unit variance.
 
     Source: Ledoit and Wolf, J. Multivariate Analysis 88, 365 (2004), lemma 3.3.
     """
@@ -64,7 +64,13 @@ DECIDERS = (MOST_LIKELY, *CLASSIFIERS)
 
 
 def columns() -> tuple[str, ...]:
-    """Names of what `recognize` finds: accuracy of each rule with its 95 % interval, and its worst state's."""
+    """Return the names of the results of `recognize`.
+
+    Returns
+    -------
+    tuple of str
+        Accuracy of each rule with its 95 % interval, and that of its worst state.
+    """
     return tuple(name for rule in DECIDERS for name in _columns_of(rule))
 
 
@@ -75,13 +81,30 @@ def _columns_of(rule: str) -> tuple[str, ...]:
 def recognize(
     imager: AllPhases, curves: FloatArray, states: Sequence[str], patches: int, rng: np.random.Generator
 ) -> dict[str, float]:
-    """Accuracy of every rule for one design, as `columns` names it; `curves`: ndarray[1, n_modified, n_wavelengths].
+    """Train and test classifiers on raw patches of one design.
 
-    `patches` raw patches (the pixels that the scene's readout takes) of every signal are drawn, each at one of the
-    scene's places with its own Poisson electrons and gain errors. The classifiers see raw digital numbers (of a patch
-    with more than 1,024 pixels a random choice of so many, the same for all), train on one half and are tested on the
-    other. The most likely rule takes the channels' readout and the signal with the largest Gaussian likelihood at the
-    patch's place, and says its state. Intervals: see `share_interval`.
+    `patches` raw patches of every signal are drawn, each at a phase of the scene with its own Poisson electrons and
+    gain errors. The classifiers take raw digital numbers (at most 1,024 pixels, chosen at random), train on one half
+    and are tested on the other. The maximum likelihood rule takes the channels' readout and the signal with the
+    largest Gaussian likelihood at the patch's phase.
+
+    Parameters
+    ----------
+    imager : AllPhases
+        Model of the scene.
+    curves : ndarray of shape (1, n_modified, n_wavelengths)
+        QE of the modified channels.
+    states : sequence of str
+        Signal types.
+    patches : int
+        Patches of every signal.
+    rng : numpy.random.Generator
+        Source of random numbers.
+
+    Returns
+    -------
+    dict of str to float
+        Accuracies by the names of `columns`; intervals as of `share_interval`.
     """
     members = [imager.setup.members[name] for name in states]
     signals = np.concatenate(members)
@@ -117,7 +140,7 @@ def recognize(
 
 
 def _likeliest(values: FloatArray, mean: FloatArray, variance: FloatArray) -> IndexArray:
-    """The signal with the largest Gaussian likelihood at readouts, ndarray[n, n_channels]; of several the first."""
+    """Return the signal with the largest Gaussian likelihood at readouts, ndarray of shape (n, n_channels)."""
     unlike = np.zeros((len(values), len(mean)))
     for c in range(values.shape[1]):
         unlike += (values[:, None, c] - mean[:, c]) ** 2 / variance[:, c] + np.log(variance[:, c])

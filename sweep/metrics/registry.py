@@ -1,4 +1,4 @@
-"""Every metric, found in `columns`, and the columns of a study."""
+"""Metrics, collected from `columns`, and the columns of a study."""
 
 from __future__ import annotations
 
@@ -17,7 +17,18 @@ METRICS = tuple(sorted(made_in(columns, Metric), key=lambda metric: metric.order
 
 
 def listed(asked: Asked) -> list[Quantity]:
-    """The columns of a study in order, worst cases and those of a share last; names of pairs may coincide."""
+    """Return the columns of a study in order, worst cases and yields last.
+
+    Parameters
+    ----------
+    asked : Asked
+        Requested quantities.
+
+    Returns
+    -------
+    list of Quantity
+        Columns; names of pairs may coincide.
+    """
     found = [quantity for metric in METRICS for quantity in metric.quantities(asked)]
     worst = [own for quantity in found if (own := _worst(quantity, asked)) is not None]
     drawn = [quantity for quantity in found if asked.wanted_yield and quantity.smooth_drawn is not None]
@@ -25,7 +36,7 @@ def listed(asked: Asked) -> list[Quantity]:
 
 
 def _worst(quantity: Quantity, asked: Asked) -> Quantity | None:
-    """The worst case of a quantity that may be maximized: over the edges, and of lights over their population."""
+    """Return the worst case of a quantity that may be maximized, over edges and over the population of lights."""
     over = [EDGES] if asked.edge_shift else []
     seen = quantity.smooth_members if asked.population else None
     if seen is not None:
@@ -37,5 +48,16 @@ def _worst(quantity: Quantity, asked: Asked) -> Quantity | None:
 
 @lru_cache(maxsize=64)
 def quantities_of(asked: Asked) -> dict[str, Quantity]:
-    """The columns of a study by their names, in order."""
+    """Return the columns of a study by name.
+
+    Parameters
+    ----------
+    asked : Asked
+        Requested quantities.
+
+    Returns
+    -------
+    dict of str to Quantity
+        Columns in order.
+    """
     return {quantity.name: quantity for quantity in listed(asked)}

@@ -1,4 +1,4 @@
-"""How several weighted quantities become one number that a search maximizes."""
+"""Rules that combine several weighted quantities to one objective."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from ..base.types import FloatArray
 
 
 class Rule(ABC):
-    """A rule that never gets worse where one of its terms gets better. A file in `metrics/rules/` holds one.
+    """Rule that never gets worse where one of its terms gets better; a class in `metrics/rules/`.
 
-    `name`: its key in a study. `wanted`: whether more of its terms is better, or less. `smallest`: whether it is as
-    good as its worst term, which a search bounds from below by one number, and a limit can be proven of.
+    `name` is its key in a study, `wanted` states whether more of its terms is better, or less, and `smallest` whether
+    it equals its worst term, so that a search bounds it by one number and an upper bound exists.
     """
 
     name: ClassVar[str]
@@ -22,12 +22,45 @@ class Rule(ABC):
 
     @abstractmethod
     def of(self, terms: FloatArray) -> FloatArray:
-        """The objective, ndarray[...]; `terms`: weight times quantity, >= 0, ndarray[n_terms, ...]."""
+        """Return the objective.
+
+        Parameters
+        ----------
+        terms : ndarray of shape (n_terms, ...)
+            Weight times quantity, >= 0.
+
+        Returns
+        -------
+        ndarray of shape (...)
+            Objective.
+        """
 
     @abstractmethod
     def gradient(self, terms: FloatArray) -> FloatArray:
-        """Its derivative by each term, ndarray[n_terms], >= 0 where more is wanted; `terms`: ndarray[n_terms]."""
+        """Return the derivative by each term.
+
+        Parameters
+        ----------
+        terms : ndarray of shape (n_terms,)
+            Weight times quantity, >= 0.
+
+        Returns
+        -------
+        ndarray of shape (n_terms,)
+            Derivatives, >= 0 if more is wanted.
+        """
 
     @abstractmethod
     def words(self, terms: Sequence[str]) -> str:
-        """The objective in words, of terms in words: two or more, or one of which less is wanted."""
+        """Return the objective in words.
+
+        Parameters
+        ----------
+        terms : sequence of str
+            Terms in words.
+
+        Returns
+        -------
+        str
+            Text.
+        """

@@ -1,4 +1,4 @@
-"""Color separation distance and sensitivity."""
+"""Color separation distance (CSD) and CFA sensitivity."""
 
 from __future__ import annotations
 
@@ -20,16 +20,38 @@ _SMALLEST = 1e-140
 
 
 def csd_name(pair: Pair) -> str:
-    """Column name of a pair's color separation distance, in DN."""
+    """Return the column name of a pair's CSD.
+
+    Parameters
+    ----------
+    pair : tuple of str
+        Two signal types.
+
+    Returns
+    -------
+    str
+        Name.
+    """
     return pair_name("csd", pair)
 
 
 def separation(response: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
-    """Color separation distance of two signal types for a block of designs.
+    """Compute the color separation distance of two signal types (the paper's CSD).
 
-    `response`: ndarray[n_designs, n_signals, n_channels], DN. `first`, `second`: signal indices of the two types.
-    Returns ndarray[n_designs], DN: the smallest L2 distance between a point of one and a point of the other (the
-    paper's CSD). Differences are taken before squares, so nearly coincident points at large offsets lose no digits.
+    The smallest L2 distance between a point of one type and a point of the other. Differences are taken before
+    squares, so that nearly coincident points at large offsets lose no digits.
+
+    Parameters
+    ----------
+    response : ndarray of shape (n_designs, n_signals, n_channels)
+        Readout, DN.
+    first, second : ndarray of int
+        Signals of each type.
+
+    Returns
+    -------
+    ndarray of shape (n_designs,)
+        CSD, DN.
     """
     response = np.asarray(response, dtype=float)
     found = np.empty(len(response))
@@ -52,9 +74,19 @@ def separation(response: FloatArray, first: IndexArray, second: IndexArray) -> F
 def pair_blocks(
     shape: tuple[int, ...], first: IndexArray, second: IndexArray
 ) -> Iterator[tuple[slice, IndexArray, IndexArray]]:
-    """Blocks of designs small enough for all pairs at once: their slice, and both signal indices of every pair.
+    """Yield blocks of designs that are small enough for all pairs at once.
 
-    `shape`: (n_designs, n_signals, n_channels).
+    Parameters
+    ----------
+    shape : tuple of int
+        (n_designs, n_signals, n_channels).
+    first, second : ndarray of int
+        Signals of each type.
+
+    Yields
+    ------
+    block, one, other : slice, ndarray of int, ndarray of int
+        Designs, and both signals of every pair.
     """
     one, other = np.repeat(first, len(second)), np.tile(second, len(first))
     step = max(1, _BLOCK_PAIRS // max(1, one.size * shape[2]))
@@ -63,7 +95,20 @@ def pair_blocks(
 
 
 def separations(response: FloatArray, members: Mapping[str, IndexArray]) -> dict[Pair, FloatArray]:
-    """CSD of every pair of signal types; `members` maps a type to its signal indices. Shapes as in `separation`."""
+    """Compute the CSD of every pair of signal types.
+
+    Parameters
+    ----------
+    response : ndarray of shape (n_designs, n_signals, n_channels)
+        Readout, DN.
+    members : mapping of str to ndarray of int
+        Signals of each type.
+
+    Returns
+    -------
+    dict of pair to ndarray of shape (n_designs,)
+        CSD, DN.
+    """
     n_designs, _, n_channels = response.shape
     pairs = class_pairs(list(members))
     if n_designs < _MANY or n_channels > _MOST_CHANNELS or not np.isfinite(response).all():
@@ -81,10 +126,23 @@ def separations(response: FloatArray, members: Mapping[str, IndexArray]) -> dict
 def separations_along(
     fixed: FloatArray, channel: int, values: FloatArray, members: Mapping[str, IndexArray]
 ) -> dict[Pair, FloatArray]:
-    """`separations` of designs that differ in one channel alone.
+    """Compute the CSD of every pair for designs that differ in one channel alone.
 
-    `fixed`: ndarray[n_signals, n_channels], DN, what they share in the others; `values`: ndarray[n_designs, n_signals],
-    that of `channel`.
+    Parameters
+    ----------
+    fixed : ndarray of shape (n_signals, n_channels)
+        Shared channels, DN.
+    channel : int
+        Channel that differs.
+    values : ndarray of shape (n_designs, n_signals)
+        Values of that channel, DN.
+    members : mapping of str to ndarray of int
+        Signals of each type.
+
+    Returns
+    -------
+    dict of pair to ndarray of shape (n_designs,)
+        CSD, DN.
     """
     others = np.delete(fixed, channel, axis=1)
     odd = np.asarray(~np.isfinite(values).all(axis=1) | (not np.isfinite(others).all()))
@@ -110,7 +168,7 @@ def separations_along(
 def _distances(
     squared: FloatArray, odd: BoolArray, members: Mapping[str, IndexArray], response: Callable[[BoolArray], FloatArray]
 ) -> dict[Pair, FloatArray]:
-    """Roots of ndarray[n_pairs, n_designs]; those of odd designs, and of squares beyond a float, by `separation`."""
+    """Return roots of ndarray of shape (n_pairs, n_designs); non-finite designs and extreme squares by `separation`."""
     found = dict(zip(class_pairs(list(members)), np.sqrt(squared), strict=True))
     for (a, b), distance in found.items():
         some = odd | ~((distance >= _SMALLEST) & (distance <= 1 / _SMALLEST))
@@ -125,7 +183,7 @@ _apart: Cache[bytes, _Apart] = Cache(16)
 
 
 def _pairs_apart(others: FloatArray, members: Mapping[str, IndexArray]) -> _Apart:
-    """Pairs of signals as `nearest_along_squared` takes them; `others`: DN of the shared channels."""
+    """Return the pairs of signals as `nearest_along_squared` takes them, from DN of the shared channels."""
 
     def made() -> _Apart:
         nearest = []
@@ -144,10 +202,21 @@ def _pairs_apart(others: FloatArray, members: Mapping[str, IndexArray]) -> _Apar
 
 
 def cfa_sensitivity(total_qe: FloatArray, counts: IndexArray, clear_qe: FloatArray) -> FloatArray:
-    """Total QE, averaged over the pixels of the tile, divided by that of the clear pixel.
+    """Return the total QE, averaged over the pixels of the tile, relative to the clear pixel.
 
-    `total_qe`: ndarray[..., n_channels], QE summed over the wavelengths; `counts`: pixels per tile of each channel. 1
-    means a sensor without color filters. Returns ndarray[...].
+    Parameters
+    ----------
+    total_qe : ndarray of shape (..., n_channels)
+        QE summed over the wavelengths.
+    counts : ndarray of int, shape (n_channels,)
+        Pixels of each channel per tile.
+    clear_qe : ndarray of shape (n_wavelengths,)
+        QE of the clear pixel.
+
+    Returns
+    -------
+    ndarray of shape (...)
+        1 for a sensor without color filters.
     """
     weighted = np.moveaxis(total_qe * counts, -1, 0)
     mean = sum(weighted[1:], start=weighted[0]) / counts.sum()  # few channels of many designs

@@ -1,4 +1,4 @@
-"""Shares: how far one that was counted is trusted, and how they are told."""
+"""Confidence intervals and text of shares."""
 
 from __future__ import annotations
 
@@ -13,14 +13,38 @@ _ROUNDING = 1e-12
 
 
 def share_interval(kept: int, n: int) -> tuple[float, float]:
-    """The 95 % interval of a share, of which `kept` of `n` were counted (Wilson, J. Am. Stat. Assoc. 22, 209, 1927)."""
+    """Return the 95 % interval of a share (Wilson, J. Am. Stat. Assoc. 22, 209, 1927).
+
+    Parameters
+    ----------
+    kept, n : int
+        Number of successes and of trials.
+
+    Returns
+    -------
+    low, high : float
+        Interval.
+    """
     share, z = kept / n, _Z**2 / n
     middle, half = share + z / 2, _Z * math.sqrt(share * (1 - share) / n + z / (4 * n))
     return max(0.0, (middle - half) / (1 + z)), min(1.0, (middle + half) / (1 + z))
 
 
 def told_share(share: float, digits: int = 1) -> str:
-    """Percent with `digits` after the point, and with more where rounding would say none or all of what is neither."""
+    """Format a share in percent, with more digits where rounding would give 0 or 100 %.
+
+    Parameters
+    ----------
+    share : float
+        0 to 1.
+    digits : int
+        Digits after the point.
+
+    Returns
+    -------
+    str
+        Text.
+    """
     if min(abs(share), abs(1 - share)) < _ROUNDING:
         return f"{share:.0%}"
     enough = (few for few in range(digits, _MOST_DIGITS) if float(f"{share:.{few}%}"[:-1]) not in (0, 100))

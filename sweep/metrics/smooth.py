@@ -1,4 +1,4 @@
-"""Smooth rows of a design: what a search with exact derivatives sees of a quantity."""
+"""Smooth rows of a design: quantities with exact derivatives, for the search."""
 
 from __future__ import annotations
 
@@ -28,52 +28,102 @@ _SMALLEST = 1e-300
 
 @dataclass(frozen=True)
 class Rows:
-    """Smooth functions at a point, ndarray[n], with their derivatives by the free parameters, ndarray[n, n_free]."""
+    """Smooth functions at a point with their derivatives.
+
+    Parameters
+    ----------
+    values : ndarray of shape (n,)
+        Values.
+    by_u : ndarray of shape (n, n_free)
+        Derivatives by the free parameters.
+    """
 
     values: FloatArray
     by_u: FloatArray
 
     def scaled(self, factor: float, offset: float = 0.0) -> Rows:
-        """factor x rows + offset."""
+        """Return factor times rows plus offset.
+
+        Parameters
+        ----------
+        factor, offset : float
+            Numbers.
+
+        Returns
+        -------
+        Rows
+            Rows.
+        """
         return Rows(factor * self.values + offset, factor * self.by_u)
 
     def squares(self) -> Rows:
-        """Their squares."""
+        """Return the squares.
+
+        Returns
+        -------
+        Rows
+            Rows.
+        """
         return Rows(self.values**2, 2 * self.values[:, None] * self.by_u)
 
     def roots(self) -> Rows:
-        """Their roots, with no slope where they are 0."""
+        """Return the roots, with zero slope where they are 0.
+
+        Returns
+        -------
+        Rows
+            Rows.
+        """
         values = np.sqrt(np.maximum(self.values, 0.0))
         per = np.divide(0.5, values, out=np.zeros_like(values), where=values > 0)
         return Rows(values, per[:, None] * self.by_u)
 
     def logarithms(self) -> Rows:
-        """-log10 of them, with no slope where they are 0 or less."""
+        """Return -log10 of the rows, with zero slope where they are 0 or less.
+
+        Returns
+        -------
+        Rows
+            Rows.
+        """
         values = np.maximum(self.values, _SMALLEST)
         per = np.where(self.values > _SMALLEST, -1 / (np.log(10) * values), 0.0)
         return Rows(-np.log10(values), per[:, None] * self.by_u)
 
     @staticmethod
     def joined(parts: list[Rows]) -> Rows:
-        """All rows, in order."""
+        """Concatenate rows.
+
+        Parameters
+        ----------
+        parts : list of Rows
+            Rows.
+
+        Returns
+        -------
+        Rows
+            Rows.
+        """
         return Rows(np.concatenate([p.values for p in parts]), np.concatenate([p.by_u for p in parts]))
 
     @property
     def finite(self) -> bool:
-        """Whether all of it is numbers."""
+        """True if all values and derivatives are finite."""
         return bool(np.isfinite(self.values).all() and np.isfinite(self.by_u).all())
 
     def cleaned(self) -> Rows:
-        """Zeros for what is not a number."""
+        """Return the rows with zeros for NaN and infinity.
+
+        Returns
+        -------
+        Rows
+            Rows.
+        """
         return Rows(*(np.nan_to_num(v, posinf=0, neginf=0) for v in (self.values, self.by_u)))
 
 
 class SmoothDesign:
-    """One design of a family in a straight scene, with derivatives by the free parameters of a box.
-
-    `x`: its parameters, ndarray[n_parameters]; `span`: length of the box along each free one, `free`: their indices.
-    `curves`: ndarray[n_modified, n_wavelengths]; `by_u`: ndarray[n_free, n_modified, n_wavelengths].
-    """
+    """One design of a family in a linear scene, with derivatives by the free parameters of a box."""
 
     def __init__(
         self,
@@ -86,10 +136,7 @@ class SmoothDesign:
         drawn: LampsAndCameras | None = None,
         images: SeededVision | None = None,
     ) -> None:
-        """`members`, `drawn`: the population of the scene's lights, and draws of it, where quantities ask for them.
-
-        `images`: the same of images of signal heads.
-        """
+        """Compute curves and derivatives."""
         self.images = images
         self.setup: Setup = imager.setup
         self._members, self._drawn = members, drawn
@@ -100,7 +147,20 @@ class SmoothDesign:
         self._made: dict[str, Any] = {}
 
     def once(self, key: str, make: Callable[[], Made]) -> Made:
-        """What several quantities need of this design, made for the first of them."""
+        """Return a value that several quantities share, computed at its first use.
+
+        Parameters
+        ----------
+        key : str
+            Name.
+        make : callable
+            Computes the value.
+
+        Returns
+        -------
+        object
+            The value.
+        """
         if key not in self._made:
             self._made[key] = make()
         found: Made = self._made[key]
@@ -112,30 +172,52 @@ class SmoothDesign:
 
     @property
     def response(self) -> FloatArray:
-        """Unclipped, unrounded response, DN, ndarray[n_cases, n_signals, n_channels]."""
+        """Unclipped, unrounded response, DN, ndarray of shape (n_cases, n_signals, n_channels)."""
         return self._response[0]
 
     @property
     def response_by_u(self) -> FloatArray:
-        """Its derivative, ndarray[n_free, n_cases, n_signals, n_channels]."""
+        """Derivative of the response, ndarray of shape (n_free, n_cases, n_signals, n_channels)."""
         return self._response[1]
 
     @cached_property
     def variance(self) -> FloatArray:
-        """Variance of the response's noise, DN^2, ndarray[n_cases, n_signals, n_channels]."""
+        """Variance of the noise, DN^2, ndarray of shape (n_cases, n_signals, n_channels)."""
         return np.asarray(self._imager.variance(self.curves[None])[0], dtype=float)
 
     @cached_property
     def variance_by_u(self) -> FloatArray:
-        """Its derivative, ndarray[n_free, n_cases, n_signals, n_channels]."""
+        """Derivative of the variance, ndarray of shape (n_free, n_cases, n_signals, n_channels)."""
         return self._imager.variance_gradient(self.curves, self.by_u)
 
     def linear(self, matrix: FloatArray) -> Rows:
-        """Rows of sums over the parameters; `matrix`: ndarray[n, n_parameters]."""
+        """Return linear functions of the parameters.
+
+        Parameters
+        ----------
+        matrix : ndarray of shape (n, n_parameters)
+            Coefficients.
+
+        Returns
+        -------
+        Rows
+            Rows.
+        """
         return Rows(matrix @ self.x, matrix[:, self._free] * self._span)
 
     def squared_distances(self, pair: Pair) -> Rows:
-        """Squared distances of all pairs of signals of two types, in every case, DN^2."""
+        """Return squared distances of all pairs of signals of two types, in every case, DN^2.
+
+        Parameters
+        ----------
+        pair : tuple of str
+            Two signal types.
+
+        Returns
+        -------
+        Rows
+            Rows.
+        """
         first, second = (self._imager.members[name] for name in pair)
         response, by_u = self._response
         apart = (response[:, first, None] - response[:, None, second]).reshape(-1, response.shape[-1])
@@ -143,10 +225,19 @@ class SmoothDesign:
         return Rows((apart**2).sum(axis=1), 2 * (apart_by_u * apart).sum(axis=2).T)
 
     def squared_distances_of_members(self, pair: Pair) -> Rows:
-        """Squared distances of the nearest members of each two lights, in every case and part of their shifts, DN^2.
+        """Return squared distances of the nearest members of each two lights, by case and part of their shifts, DN^2.
 
-        The nearest members change with the design; where they do not jump, that adds nothing to the derivative. NaN
-        where the response is no number.
+        Nearest members change with the design; where they do not jump, that adds nothing to the derivative.
+
+        Parameters
+        ----------
+        pair : tuple of str
+            Two signal types.
+
+        Returns
+        -------
+        Rows
+            Rows.
         """
         assert self._members is not None
         response, by_u = self._response_of_members
@@ -163,7 +254,18 @@ class SmoothDesign:
         return Rows(np.concatenate(values), np.concatenate(slopes, axis=1).T)
 
     def distance_of_a_share(self, pair: Pair) -> Rows:
-        """What the wanted share of random lamps and cameras has, DN, one row; see `LampsAndCameras.kept`."""
+        """Return the distance that the wanted share of random lamps and cameras has, DN, as one row.
+
+        Parameters
+        ----------
+        pair : tuple of str
+            Two signal types.
+
+        Returns
+        -------
+        Rows
+            Rows.
+        """
         assert self._drawn is not None
         draws, imager = self._drawn.draws(pair), self._drawn.seen.imager
         made = [self.family.produced(off) if any(off) else self.family for off in draws.offs]
@@ -189,15 +291,40 @@ class SmoothDesign:
 
 
 def smooth_response(setup: Setup, curves: FloatArray) -> FloatArray:
-    """Unquantized, unclipped response, DN: ndarray[n_designs, n_cases, n_signals, n_channels].
+    """Return the unquantized, unclipped response.
 
-    `curves`: ndarray[n_designs, n_modified, n_wavelengths].
+    Parameters
+    ----------
+    setup : Setup
+        Scene and camera.
+    curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
+        QE of the modified channels.
+
+    Returns
+    -------
+    ndarray of shape (n_designs, n_cases, n_signals, n_channels)
+        Response, DN.
     """
     return linear_model(setup).smooth(curves)
 
 
 def smooth_csd(setup: Setup, curves: FloatArray, pair: Pair) -> FloatArray:
-    """CSD of the smooth response, the smallest over the cases, DN, ndarray[n_designs]."""
+    """Return the CSD of the smooth response, the smallest over the cases.
+
+    Parameters
+    ----------
+    setup : Setup
+        Scene and camera.
+    curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
+        QE of the modified channels.
+    pair : tuple of str
+        Two signal types.
+
+    Returns
+    -------
+    ndarray of shape (n_designs,)
+        CSD, DN.
+    """
     response = smooth_response(setup, curves)
     first, second = (setup.members[name] for name in pair)
     over = [separation(response[:, case], first, second) for case in range(response.shape[1])]

@@ -1,9 +1,7 @@
-"""Errors under noise as smooth rows with exact derivatives: what a search sees of them.
+"""Errors under noise as smooth rows with exact derivatives, for the search.
 
 Every row is a closed form of the means and variances of two signals in the smooth response, whose noise is Gaussian
-(`camera/linear.py`); `discrimination.py` has the same forms for the digital numbers. Differences D of the means and
-variances a and b of the two signals are ndarray[..., n_pairs, n_channels], DN and DN^2, real or complex with a
-derivative, see `tasks.colorimetry`; a function of them is ndarray[..., n_pairs].
+(`camera/linear.py`); `discrimination.py` has the same forms for the digital numbers.
 """
 
 from __future__ import annotations
@@ -28,20 +26,55 @@ _OfPairs = Callable[[Smooth, Smooth, Smooth], Smooth]
 
 
 def squared_detectability(difference: Smooth, first: Smooth, second: Smooth) -> Smooth:
-    """d'^2 = D' S^-1 D for the mean S of both variances."""
+    """Return d'^2 = D' S^-1 D for the mean S of both variances.
+
+    Parameters
+    ----------
+    difference, first, second : ndarray of shape (..., n_pairs, n_channels)
+        Differences of the means, DN, and variances of both signals, DN^2; real, or complex with a
+        derivative.
+
+    Returns
+    -------
+    ndarray of shape (..., n_pairs)
+        Values.
+    """
     return np.asarray((difference**2 / ((first + second) / 2)).sum(axis=-1))
 
 
 def squared_contrast(difference: Smooth, first: Smooth, second: Smooth) -> Smooth:
-    """Squared distance over the variance along the line of the two points: (D'D)^2 / (D' S D); 0 where they meet."""
+    """Return the squared distance over the variance along the line of the two points: (D'D)^2 / (D' S D).
+
+    Parameters
+    ----------
+    difference, first, second : ndarray of shape (..., n_pairs, n_channels)
+        Differences of the means, DN, and variances of both signals, DN^2; real, or complex with a
+        derivative.
+
+    Returns
+    -------
+    ndarray of shape (..., n_pairs)
+        Values; 0 where the points coincide.
+    """
     length = (difference**2).sum(axis=-1)
     return np.asarray(length * _ratio(length, (difference**2 * ((first + second) / 2)).sum(axis=-1)))
 
 
 def margin(difference: Smooth, first: Smooth, second: Smooth) -> Smooth:
-    """Standard deviations from both points to the plane of `discrimination.pairwise_error`: D' S^-1 D / (p + q).
+    """Return the standard deviations from both points to the plane of `discrimination.pairwise_error`.
 
-    p and q are the deviations of both signals along the normal S^-1 D. 0 where the points meet.
+    D' S^-1 D / (p + q), with the deviations p and q of both signals along the normal S^-1 D.
+
+    Parameters
+    ----------
+    difference, first, second : ndarray of shape (..., n_pairs, n_channels)
+        Differences of the means, DN, and variances of both signals, DN^2; real, or complex with a
+        derivative.
+
+    Returns
+    -------
+    ndarray of shape (..., n_pairs)
+        Values; 0 where the points coincide.
     """
     normal = difference / (first + second)
     p, q = (root((normal**2 * variance).sum(axis=-1)) for variance in (first, second))
@@ -49,7 +82,19 @@ def margin(difference: Smooth, first: Smooth, second: Smooth) -> Smooth:
 
 
 def error_decades(difference: Smooth, first: Smooth, second: Smooth) -> Smooth:
-    """-log10 of the error Q(z) on either side of the plane, z being the `margin`."""
+    """Return -log10 of the error Q(z) on either side of the plane, z being the `margin`.
+
+    Parameters
+    ----------
+    difference, first, second : ndarray of shape (..., n_pairs, n_channels)
+        Differences of the means, DN, and variances of both signals, DN^2; real, or complex with a
+        derivative.
+
+    Returns
+    -------
+    ndarray of shape (..., n_pairs)
+        Values.
+    """
     from scipy.special import log_ndtr  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
     z = margin(difference, first, second)
@@ -61,7 +106,19 @@ def error_decades(difference: Smooth, first: Smooth, second: Smooth) -> Smooth:
 
 
 def overlap(difference: Smooth, first: Smooth, second: Smooth) -> Smooth:
-    """Bhattacharyya distance of two Gaussians: D' S^-1 D / 8 + ln(S / sqrt(a b)) / 2, summed over the channels."""
+    """Return the Bhattacharyya distance of two Gaussians: D' S^-1 D / 8 + ln(S / sqrt(a b)) / 2, summed over channels.
+
+    Parameters
+    ----------
+    difference, first, second : ndarray of shape (..., n_pairs, n_channels)
+        Differences of the means, DN, and variances of both signals, DN^2; real, or complex with a
+        derivative.
+
+    Returns
+    -------
+    ndarray of shape (..., n_pairs)
+        Values.
+    """
     total = first + second
     form = difference**2 / (4 * total) + np.log(total / (2 * np.sqrt(first * second))) / 2
     return np.asarray(form.sum(axis=-1))
@@ -72,14 +129,39 @@ def _ratio(over: Smooth, under: Smooth) -> Smooth:
 
 
 def pair_rows(design: SmoothDesign, *, of: _OfPairs, pairs: Sequence[Pair]) -> Rows:
-    """A row for each two signals of the pairs of types, in every case of the scene."""
+    """Return a row for each two signals of the pairs of types, in every case of the scene.
+
+    Parameters
+    ----------
+    design : SmoothDesign
+        Design with derivatives.
+    of : callable
+        Function of difference and variances.
+    pairs : sequence of pair
+        Pairs of signal types.
+
+    Returns
+    -------
+    Rows
+        Rows.
+    """
     return Rows.joined([_between(design, pair, of) for pair in pairs])
 
 
 def bound_rows(design: SmoothDesign, *, types: Sequence[str]) -> Rows:
-    """-log10 of the sum of the overlaps of each signal with those of the other types, in every case of the scene.
+    """Return -log10 of the sum of the overlaps of each signal with those of other types, in every case of the scene.
 
-    See `discrimination.state_error_bound`.
+    Parameters
+    ----------
+    design : SmoothDesign
+        Design with derivatives.
+    types : sequence of str
+        Signal types.
+
+    Returns
+    -------
+    Rows
+        Rows.
     """
     sums: dict[str, list[Rows]] = {name: [] for name in types}  # [n_cases x n_own x n_others] of each other type
     n_cases, sizes = len(design.response), {name: len(index) for name, index in design.setup.members.items()}
@@ -104,7 +186,7 @@ def _summed(parts: list[Rows]) -> Rows:
 
 
 def _between(design: SmoothDesign, pair: Pair, of: _OfPairs) -> Rows:
-    """Rows of two types, [n_cases x n_first x n_second]."""
+    """Return the rows of two types, [n_cases x n_first x n_second]."""
     return design.once(f"{of.__name__} of {' and '.join(pair)}", lambda: _of_signals(design, pair, of))
 
 
@@ -133,7 +215,22 @@ def _of_signals(design: SmoothDesign, pair: Pair, of: _OfPairs) -> Rows:
 
 
 def smooth_detectability(setup: Setup, curves: FloatArray, pair: Pair) -> FloatArray:
-    """d' of the smooth response, the smallest over the cases, ndarray[n_designs]; see `smooth.smooth_csd`."""
+    """Return d' of the smooth response, the smallest over the cases.
+
+    Parameters
+    ----------
+    setup : Setup
+        Scene and camera.
+    curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
+        QE of the modified channels.
+    pair : tuple of str
+        Two signal types.
+
+    Returns
+    -------
+    ndarray of shape (n_designs,)
+        Values.
+    """
     imager = linear_model(setup)
     mean, variance = imager.smooth(curves), imager.variance(curves)
     both = setup.members[pair[0]], setup.members[pair[1]]

@@ -176,7 +176,7 @@ class FilterProgram:
         self.reach = np.where(most < (self._least - self._slack)[:, None], -np.inf, reach)
 
     def _noise(self, imager: LinearModel) -> tuple[FloatArray, FloatArray]:
-        """Return the least variance in the modified channel and the variances of the others, DN^2, [n_cases, n_signals]."""
+        """Return the least variance in the modified channel and the others' variances, DN^2, [n_cases, n_signals]."""
         row, least = np.zeros_like(self.base), 0.0
         bound = self.problem.constraints.get(SENSITIVITY)
         if bound is not None and bound.min is not None:

@@ -1,1 +1,1 @@
-"""Every column of the result table: a file is a metric."""
+"""Columns of the result table: a module is a metric."""

@@ -1,4 +1,4 @@
-"""Color separation distance: how far two signal types are apart in the digital numbers of a CFA."""
+"""Color separation distance (CSD): distance of two signal types in the digital numbers of a CFA."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ CSD = "csd"
 
 
 class ColorSeparation(ReadoutMetric):
-    """The CSD of each pair of signal types; over all places of the light the best one, too."""
+    """CSD of each pair of signal types, and the best one over all sampling phases."""
 
     order = 0
 
@@ -69,5 +69,18 @@ class ColorSeparation(ReadoutMetric):
         return (*nearest, *best) if asked.any_place else tuple(nearest)
 
     def of_readout(self, response: FloatArray, members: Mapping[str, IndexArray]) -> Columns:
-        """See `separation.separations`."""
+        """Compute the columns; see `separation.separations`.
+
+        Parameters
+        ----------
+        response : ndarray of shape (n_designs, n_signals, n_channels)
+            Readout, DN.
+        members : mapping of str to ndarray of int
+            Signals of each type.
+
+        Returns
+        -------
+        dict of str to ndarray of shape (n_designs,)
+            Columns.
+        """
         return {csd_name(pair): distances for pair, distances in separations(response, members).items()}

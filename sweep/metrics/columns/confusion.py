@@ -1,4 +1,4 @@
-"""How noise confuses signal types: contrast to noise, d', errors and their bounds, for each pair of states."""
+"""Confusion of signal types by noise: contrast to noise, d', errors and their bounds, for each pair of states."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _LESS = (ERROR, ERROR_BOUND, STATE_ERROR, STATE_ERROR_BOUND)
 
 
 class Confusion(NoiseMetric):
-    """The worst over the places of the light and the moments of its pulses."""
+    """The worst over sampling phases and moments."""
 
     order = 5
 
@@ -50,7 +50,24 @@ class Confusion(NoiseMetric):
     def of_noise(
         self, imager: ForwardModel, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
     ) -> Columns:
-        """Exact sums over the digital numbers of a few pixels; where these are too many, Gaussian errors or bounds."""
+        """Compute exact sums over the digital numbers of a few pixels, else Gaussian errors or bounds.
+
+        Parameters
+        ----------
+        imager : ForwardModel
+            Model of the scene.
+        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE of the modified channels.
+        read : NoisyReadout
+            Readout of these designs.
+        members : mapping of str to ndarray of int
+            Signals of each state.
+
+        Returns
+        -------
+        dict of str to ndarray of shape (n_designs,)
+            Columns.
+        """
         mean, variance, _ = NoiseShape.of_cases(read)
         error, bound, state_bound = _errors(imager, curves, read, members)
         found: Columns = {}
@@ -92,7 +109,22 @@ def _quantity(metric: str, name: str, types: tuple[str, ...]) -> Quantity:
 
 
 def state_errors(imager: ForwardModel, curves: FloatArray, states: Sequence[str]) -> FloatArray:
-    """`STATE_ERROR` of designs, ndarray[n_designs], and nothing else; `curves`: see `designed_quantities`."""
+    """Return the error of the worst pair of states alone.
+
+    Parameters
+    ----------
+    imager : ForwardModel
+        Model of the scene.
+    curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
+        QE of the modified channels.
+    states : sequence of str
+        Signal types.
+
+    Returns
+    -------
+    ndarray of shape (n_designs,)
+        Error probability.
+    """
     members = {name: imager.setup.members[name] for name in states}
     exact = _exact(imager, curves, members)
     if exact is not None:
@@ -104,7 +136,7 @@ def state_errors(imager: ForwardModel, curves: FloatArray, states: Sequence[str]
 def _exact(
     imager: ForwardModel, curves: FloatArray, members: Mapping[str, IndexArray]
 ) -> list[confusion.Errors] | None:
-    """Errors and bounds in each case by sums over the digital numbers; None where these are too many."""
+    """Return errors and bounds in each case by exact sums; None if these are too many."""
     few = imager.few_pixels
     if few is None or not confusion.affordable(imager.readout.pixel, few):
         return None
@@ -113,7 +145,7 @@ def _exact(
 
 
 def _gaussian(read: NoisyReadout, members: Mapping[str, IndexArray]) -> _ByPair:
-    """The error of each pair, Gaussian or a bound: the largest over the cases."""
+    """Return the error of each pair, Gaussian or a bound: the largest over the cases."""
     mean, variance, shape = NoiseShape.of_cases(read)
     return {
         (a, b): pairwise_error(mean, variance, members[a], members[b], shape).reshape(read.mean.shape[:2]).max(axis=1)
@@ -124,7 +156,7 @@ def _gaussian(read: NoisyReadout, members: Mapping[str, IndexArray]) -> _ByPair:
 def _errors(
     imager: ForwardModel, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
 ) -> tuple[_ByPair, _ByPair, FloatArray]:
-    """Error and bound of each pair, and the bound of all states, the largest over the cases."""
+    """Return error and bound of each pair, and the bound of all states, the largest over the cases."""
     exact, pairs = _exact(imager, curves, members), class_pairs(list(members))
     if exact is not None:
         return (

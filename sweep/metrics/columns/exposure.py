@@ -1,4 +1,4 @@
-"""Exposure: how long a scene is exposed for a design."""
+"""Exposure time of a scene for each design."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ EXPOSURE = "exposure_s"
 
 
 class Exposure(Metric):
-    """What the readout of every scene gives by itself."""
+    """Exposure time, part of every readout."""
 
     order = 3
 

@@ -1,4 +1,4 @@
-"""Lengths of a family's design that a producer asks for."""
+"""Widths of a family's edges and bands."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _MEANINGS = {
 
 
 class Lengths(FamilyMetric):
-    """The narrowest edge and band."""
+    """Narrowest edge and band."""
 
     order = 4
 
@@ -40,7 +40,20 @@ class Lengths(FamilyMetric):
         )
 
     def of_parameters(self, family: Family | None, points: FloatArray) -> Columns:
-        """NaN for what the family does not have, nm."""
+        """Return widths, nm; NaN where the family has none.
+
+        Parameters
+        ----------
+        family : Family or None
+            Family.
+        points : ndarray of shape (n_designs, n_parameters)
+            Parameters.
+
+        Returns
+        -------
+        dict of str to ndarray of shape (n_designs,)
+            Columns.
+        """
         rows = {} if family is None else family.dimensions
         nothing = np.full((len(points), 1), np.nan)
         lengths = {name: row_products(points, rows[name].T) if name in rows else nothing for name in _MEANINGS}

@@ -1,4 +1,4 @@
-"""Metrics of a user's own, where a study names some."""
+"""Columns of metrics of user code."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _STEP = 1e-5
 
 
 class OwnColumns(Metric):
-    """What the readout gives is computed with it, see `own_quantities`."""
+    """Columns that `own_quantities` computes with the readout."""
 
     order = 9
 
@@ -42,10 +42,7 @@ class OwnColumns(Metric):
 
 
 def _rows(design: SmoothDesign, *, metric: OwnMetric) -> Rows:
-    """A row for each of its numbers in every case of the scene, with derivatives by differences.
-
-    The response's own derivatives are exact: the metric sees it moved a little along each of them.
-    """
+    """Return a row for each of its numbers in every case, with derivatives by differences along the response's."""
     response, by_u = design.response, design.response_by_u
     moved = np.concatenate([response[None], response + _STEP * by_u, response - _STEP * by_u])
     parts = [_parts(metric, design, moved[:, case]) for case in range(len(response))]

@@ -1,10 +1,10 @@
-"""The contrast detection probability (CDP), which is discussed for IEEE P2020.
+"""Contrast detection probability (CDP), discussed for IEEE P2020.
 
-It is the probability that the Weber contrast K of two noisy readouts, bright over dark less 1, is within a share of the
+The probability that the Weber contrast K of two noisy readouts, bright over dark less 1, is within a share of the
 contrast of their means: P(K (1 - e) <= K measured <= K (1 + e)); Geese, Seger, Paolillo, "Detection probabilities:
 performance prediction for sensors of autonomous vehicles" (Electronic Imaging 2018); Artmann, Geese, Gaede, "Contrast
-detection probability: implementation and use cases" (2019). Here the pedestal is taken away, noise is Gaussian, e is
-1/2, and of two signals the channel with the largest CDP counts.
+detection probability: implementation and use cases" (2019). Here the pedestal is subtracted, noise is Gaussian, e is
+1/2, and the channel with the largest CDP counts.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _MEANING = (
 
 
 class Probabilities(NoiseMetric):
-    """The least over the places of the light and the moments of its pulses."""
+    """The least over sampling phases and moments."""
 
     order = 6
     extra = True
@@ -57,7 +57,24 @@ class Probabilities(NoiseMetric):
     def of_noise(
         self, imager: ForwardModel, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
     ) -> Columns:
-        """From mean and variance of the digital numbers."""
+        """Compute the columns from mean and variance of the digital numbers.
+
+        Parameters
+        ----------
+        imager : ForwardModel
+            Model of the scene.
+        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE of the modified channels.
+        read : NoisyReadout
+            Readout of these designs.
+        members : mapping of str to ndarray of int
+            Signals of each state.
+
+        Returns
+        -------
+        dict of str to ndarray of shape (n_designs,)
+            Columns.
+        """
         found: Columns = {}
         mean, variance, _ = NoiseShape.of_cases(read)
         for pair in class_pairs(list(members)):
@@ -68,11 +85,22 @@ class Probabilities(NoiseMetric):
 
 
 def detection(mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
-    """CDP of the worst two signals of two types in their best channel, ndarray[n_designs].
+    """Return the CDP of the worst two signals of two types in their best channel.
 
-    `mean` (DN, without pedestal), `variance`: ndarray[n_designs, n_signals, n_channels]. Where the darker readout is
-    above 0, the contrast of two Gaussians is within its ends where bright - r dark is above 0 for the lower ratio r and
-    below it for the higher one. Darker readouts below 0, whose contrast means nothing, count against it.
+    If the darker readout is above 0, the contrast of two Gaussians is within its ends if bright - r dark is above 0
+    for the lower ratio r and below it for the higher one. Darker readouts below 0 count against it.
+
+    Parameters
+    ----------
+    mean, variance : ndarray of shape (n_designs, n_signals, n_channels)
+        Mean without pedestal, DN, and variance, DN^2.
+    first, second : ndarray of int
+        Signals of each type.
+
+    Returns
+    -------
+    ndarray of shape (n_designs,)
+        Probability.
     """
     least = np.ones(len(mean))
     for signal in first:
@@ -91,6 +119,6 @@ def detection(mean: FloatArray, variance: FloatArray, first: IndexArray, second:
 
 
 def _beyond(apart: FloatArray, bright: FloatArray, dark: FloatArray, ratio: FloatArray) -> FloatArray:
-    """A distance over the noise of bright - ratio x dark; 0 where there is no distance, infinite without noise."""
+    """Return a distance over the noise of bright - ratio times dark; 0 for no distance, infinite without noise."""
     noise = np.sqrt(bright + np.where(dark > 0, ratio**2 * dark, 0.0))
     return np.where(apart > 0, np.divide(apart, noise, out=np.full(apart.shape, np.inf), where=noise > 0), 0.0)

@@ -1,4 +1,4 @@
-"""Sensitivity: how much light a design's filters let through."""
+"""Sensitivity: light that a design's filters transmit."""
 
 from __future__ import annotations
 
@@ -17,13 +17,24 @@ SENSITIVITY, CFA_SENSITIVITY = "sensitivity", "cfa_sensitivity"
 
 
 def reference_of(brightest: str) -> str:
-    """The sensor whose light is 1; `brightest`: its curve, where the study has no clear pixel."""
+    """Return the name of the sensor whose CFA sensitivity is 1.
+
+    Parameters
+    ----------
+    brightest : str
+        Brightest curve, if the study has no clear pixel.
+
+    Returns
+    -------
+    str
+        Text.
+    """
     alone = f"a sensor of {brightest} pixels alone, its brightest curve"
     return alone if brightest else "a sensor without color filters"
 
 
 class Sensitivity(DesignMetric):
-    """Total QE of the modified channels over that of the curves that they replace; that of the CFA over a clear one."""
+    """Total QE of the modified channels relative to the replaced curves, and of the CFA relative to a clear sensor."""
 
     order = 1
 
@@ -56,7 +67,20 @@ class Sensitivity(DesignMetric):
         return own, whole
 
     def of_designs(self, setup: Setup, block: Block) -> Columns:
-        """The paper's sensitivity of N, with Y as the reference (NaN without a modified channel); see `separation`."""
+        """Compute the paper's sensitivity of N relative to Y (NaN without a modified channel), and the CFA sensitivity.
+
+        Parameters
+        ----------
+        setup : Setup
+            Scene and camera.
+        block : Block
+            Designs.
+
+        Returns
+        -------
+        dict of str to ndarray of shape (n_designs,)
+            Columns.
+        """
         modified, counts = list(setup.camera.modified), setup.camera.mosaic.counts
         each = np.repeat(
             np.eye(len(modified)), setup.camera.grid.size, axis=0
@@ -71,9 +95,19 @@ class Sensitivity(DesignMetric):
 
 
 def sensitivities_gradient(setup: Setup, curves_gradient: FloatArray) -> Columns:
-    """Exact derivatives of `sensitivity` and `cfa_sensitivity`, ndarray[n_parameters].
+    """Return exact derivatives of `sensitivity` and `cfa_sensitivity`.
 
-    `curves_gradient`: ndarray[n_parameters, n_modified, n_wavelengths].
+    Parameters
+    ----------
+    setup : Setup
+        Scene and camera.
+    curves_gradient : ndarray of shape (n_parameters, n_modified, n_wavelengths)
+        Derivative of the QE.
+
+    Returns
+    -------
+    dict of str to ndarray of shape (n_parameters,)
+        Derivatives.
     """
     total = curves_gradient.sum(axis=-1)
     counts = setup.camera.mosaic.counts
@@ -84,7 +118,20 @@ def sensitivities_gradient(setup: Setup, curves_gradient: FloatArray) -> Columns
 
 
 def cfa_sensitivity_at(setup: Setup, sensitivity: float) -> float | None:
-    """The CFA's sensitivity where that of its only modified channel is known; None where several are modified."""
+    """Return the CFA sensitivity for a sensitivity of the only modified channel.
+
+    Parameters
+    ----------
+    setup : Setup
+        Scene and camera.
+    sensitivity : float
+        Sensitivity of the modified channel.
+
+    Returns
+    -------
+    float or None
+        None if several channels are modified.
+    """
     if len(setup.camera.modified) != 1:
         return None
     whole = _whole_share(setup)
@@ -92,7 +139,18 @@ def cfa_sensitivity_at(setup: Setup, sensitivity: float) -> float | None:
 
 
 def light_of(design: SmoothDesign) -> Columns:
-    """Both sensitivities of one design, ndarray[1] each."""
+    """Return both sensitivities of one design.
+
+    Parameters
+    ----------
+    design : SmoothDesign
+        Design.
+
+    Returns
+    -------
+    dict of str to ndarray of shape (1,)
+        Sensitivities.
+    """
     block = CurveBlock(design.curves[None])
     return design.once("light", lambda: Sensitivity().of_designs(design.setup, block))
 
@@ -103,13 +161,13 @@ def _row(design: SmoothDesign, *, name: str) -> Rows:
 
 
 def _own_share(setup: Setup) -> LinearRows:
-    """Of a filter in the only modified channel."""
+    """Return the linear rows of the sensitivity of the only modified channel."""
     base = setup.camera.base_qe[0]
     return _one_row(np.full(base.size, 1 / base.sum()))
 
 
 def _whole_share(setup: Setup) -> LinearRows:
-    """The same for the CFA: the other channels' part is constant."""
+    """Return the linear rows of the CFA sensitivity."""
     counts, modified = setup.camera.mosaic.counts, setup.camera.modified[0]
     whole = counts.sum() * setup.camera.clear_qe.sum()
     others = float(np.delete(setup.camera.qe.sum(axis=1) * counts, modified).sum())

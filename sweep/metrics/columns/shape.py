@@ -1,4 +1,4 @@
-"""Shape of a filter: how steep it is, and the least of its base that it lets through."""
+"""Shape of a filter: steepest slope, and smallest transmission relative to its base."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _SLOPE, _LEAST = "slope_per_nm", "min_transmission"
 
 
 class Shape(DesignMetric):
-    """What a producer of filters asks of their curves."""
+    """Slope and smallest transmission."""
 
     order = 2
 
@@ -45,7 +45,20 @@ class Shape(DesignMetric):
         return slope, least
 
     def of_designs(self, setup: Setup, block: Block) -> Columns:
-        """The steepest slope and the smallest ratio over the wavelengths; NaN without a modified channel."""
+        """Compute the steepest slope and the smallest ratio over the wavelengths; NaN without a modified channel.
+
+        Parameters
+        ----------
+        setup : Setup
+            Scene and camera.
+        block : Block
+            Designs.
+
+        Returns
+        -------
+        dict of str to ndarray of shape (n_designs,)
+            Columns.
+        """
         if not setup.camera.modified:
             return dict.fromkeys((_SLOPE, _LEAST), np.full(len(block), np.nan))
         steepest, lowest = block.shapes(np.asarray(setup.camera.base_qe, dtype=float))
@@ -53,7 +66,7 @@ class Shape(DesignMetric):
 
 
 def _slopes(design: SmoothDesign) -> Rows:
-    """Up and down slopes at every wavelength, 1/nm."""
+    """Return slopes up and down at every wavelength, 1/nm."""
     step = design.setup.camera.grid.step_nm
     steep = np.diff(design.curves, axis=-1).ravel() / step
     by_u = np.diff(design.by_u, axis=-1).reshape(len(design.by_u), -1).T / step
@@ -61,7 +74,7 @@ def _slopes(design: SmoothDesign) -> Rows:
 
 
 def _ratios(design: SmoothDesign) -> Rows:
-    """Curve over base at every wavelength where there is a base."""
+    """Return curve over base at every wavelength with a base above 0."""
     base = design.setup.camera.base_qe.ravel()
     some = base > 0
     by_u = design.by_u.reshape(len(design.by_u), -1).T
@@ -69,7 +82,7 @@ def _ratios(design: SmoothDesign) -> Rows:
 
 
 def _steps(setup: Setup) -> LinearRows:
-    """Differences of neighboring wavelengths, down and up."""
+    """Return differences of neighboring wavelengths, down and up."""
     from scipy.sparse import csr_matrix, diags_array, vstack  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
     size = setup.camera.grid.size

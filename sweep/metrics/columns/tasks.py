@@ -1,4 +1,4 @@
-"""What a study's tasks measure: color, low light, and separations of other lamps and of surfaces."""
+"""Columns of a study's tasks: color, low light, and separations of other lamps and of surfaces."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PREFIX = "task_"
 
 
 class TaskFigures(DesignMetric):
-    """Nothing where a study has no tasks."""
+    """Columns of tasks; none if a study has no tasks."""
 
     order = 6
 
@@ -47,7 +47,20 @@ class TaskFigures(DesignMetric):
         )
 
     def of_designs(self, setup: Setup, block: Block) -> Columns:
-        """See `judge.task_columns`."""
+        """Compute the columns; see `judge.task_columns`.
+
+        Parameters
+        ----------
+        setup : Setup
+            Scene and camera.
+        block : Block
+            Designs.
+
+        Returns
+        -------
+        dict of str to ndarray of shape (n_designs,)
+            Columns.
+        """
         if setup.tasks is None:
             return {}
         from ..tasks.judge import task_columns
@@ -56,7 +69,7 @@ class TaskFigures(DesignMetric):
 
 
 def _rows(design: SmoothDesign, *, task: str, what: str, case: Case) -> Rows:
-    """A figure's rows with their derivatives; the figures of a task share what they need."""
+    """Return a figure's rows with derivatives; figures of a task share common parts."""
     from ..tasks.colorimetry import COMPLEX_STEP
 
     rows = design.once(task, partial(_judged, design, task)).rows(what, case)

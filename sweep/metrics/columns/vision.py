@@ -1,4 +1,4 @@
-"""How often the ideal observer reads images of signal heads wrongly: no reader of these images errs less on average."""
+"""Error of the ideal observer of images of signal heads, the least of any reader of these images on average."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ VISION_ERROR = "vision_error"
 
 
 class ImageReading(VisionMetric):
-    """The ideal observer over the images of the benchmark's first seed, with the lenses in any order."""
+    """Ideal observer over the images of the benchmark's first seed, with the lenses in any order."""
 
     order = 8
 
@@ -37,14 +37,31 @@ class ImageReading(VisionMetric):
         return (found,) if asked.vision else ()
 
     def of_images(self, setup: Setup, curves: FloatArray, vision: Vision, seed: int) -> Columns:
-        """The mean of what each image leaves in doubt: one less the probability of its most probable state."""
+        """Compute the mean over the images of one less the probability of the most probable state.
+
+        Parameters
+        ----------
+        setup : Setup
+            Scene and camera.
+        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE of the modified channels.
+        vision : Vision
+            Benchmark.
+        seed : int
+            Seed of the study.
+
+        Returns
+        -------
+        dict of str to ndarray of shape (n_designs,)
+            Columns.
+        """
         from ...vision.readers import observer_error  # noqa: PLC0415  (only where a study asks for images)
 
         return {VISION_ERROR: np.array([observer_error(setup, each, vision, (seed, 0)) for each in curves])}
 
 
 def _rows(design: SmoothDesign) -> Rows:
-    """Its value, of the same scenes and random numbers for all designs: it changes with whole digital numbers."""
+    """Return its value, for the same scenes and random numbers of all designs."""
     assert design.images is not None
     found = ImageReading().of_images(design.setup, design.curves[None], *design.images)[VISION_ERROR]
     return Rows(found, np.zeros((1, len(design.by_u))))

@@ -1,1 +1,1 @@
-"""Every rule of an objective: a file is a rule."""
+"""Rules of an objective: every class of a module here."""

@@ -14,7 +14,7 @@ _SMALLEST = 1e-300
 
 
 class Least(Rule):
-    """The largest of the terms, errors of which less is wanted: -log10 of it, so that more is better."""
+    """-log10 of the largest term, for errors, so that more is better."""
 
     name = "least"
     smallest = True
@@ -24,7 +24,18 @@ class Least(Rule):
         return np.asarray(-np.log10(np.maximum(terms.max(axis=0), _SMALLEST)), dtype=float)
 
     def gradient(self, terms: FloatArray) -> FloatArray:
-        """That of the largest one, the first of several."""
+        """Return the derivative of the largest term, the first of several.
+
+        Parameters
+        ----------
+        terms : ndarray of shape (n_terms,)
+            Weight times quantity.
+
+        Returns
+        -------
+        ndarray of shape (n_terms,)
+            Derivatives.
+        """
         worst = np.argmax(terms)
         slope = np.zeros(len(terms))
         slope[worst] = -1 / (np.log(10) * max(terms[worst], _SMALLEST))
@@ -35,7 +46,7 @@ class Least(Rule):
 
 
 class Minimum(Rule):
-    """As good as its worst term."""
+    """The smallest term."""
 
     name = "minimum"
     smallest = True
@@ -44,7 +55,18 @@ class Minimum(Rule):
         return np.asarray(terms.min(axis=0), dtype=float)
 
     def gradient(self, terms: FloatArray) -> FloatArray:
-        """1 for the smallest, the first one of several."""
+        """Return 1 for the smallest term, the first of several.
+
+        Parameters
+        ----------
+        terms : ndarray of shape (n_terms,)
+            Weight times quantity.
+
+        Returns
+        -------
+        ndarray of shape (n_terms,)
+            Derivatives.
+        """
         return np.asarray(np.arange(len(terms)) == np.argmin(terms), dtype=float)
 
     def words(self, terms: Sequence[str]) -> str:
@@ -52,7 +74,7 @@ class Minimum(Rule):
 
 
 class Sum(Rule):
-    """What one term loses another may gain."""
+    """Sum of the terms."""
 
     name = "sum"
 

@@ -1,1 +1,1 @@
-"""What designs are worth for tasks beside the traffic lights; everything is a smooth function of expected electrons."""
+"""Tasks beside the traffic lights, as smooth functions of expected electrons."""

@@ -1,7 +1,6 @@
-"""What a CFA's colors are worth: color matrices that weigh noise, and the figures that follow from them.
+"""Color of a CFA: noise-optimal color matrices, and figures that follow from them.
 
-`electrons`: expected electrons of each patch in a pixel of each channel, ndarray[n, n_patches, n_channels]; `noise`:
-see `ChannelNoise`. All of it may be complex, see `colorimetry`.
+Arrays may be complex, with a derivative as imaginary part; see `colorimetry`.
 """
 
 from __future__ import annotations
@@ -24,25 +23,52 @@ _LEAST = 1e-12
 
 @dataclass(frozen=True)
 class ChannelNoise:
-    """Photon and read noise of what four pixels of a CFA see: variances of the channels' means, in electrons^2.
+    """Photon and read noise of four pixels of a CFA: variances of the channels' means, electrons^2.
 
-    `shares`: of the tile's pixels, ndarray[n_channels].
+    Parameters
+    ----------
+    shares : ndarray of shape (n_channels,)
+        Share of the tile's pixels.
+    read_noise_e : float
+        Read noise, electrons.
     """
 
     shares: FloatArray
     read_noise_e: float
 
     def of(self, electrons: Smooth) -> Smooth:
-        """Variances of ndarray[..., n_channels]."""
+        """Return the variances of the channels.
+
+        Parameters
+        ----------
+        electrons : ndarray of shape (..., n_channels)
+            Expected electrons.
+
+        Returns
+        -------
+        ndarray of the same shape
+            Variance, electrons^2.
+        """
         return self.photons(electrons) + self.read
 
     def photons(self, electrons: Smooth) -> Smooth:
-        """The photons' part."""
+        """Return the part of photon noise.
+
+        Parameters
+        ----------
+        electrons : ndarray of shape (..., n_channels)
+            Expected electrons.
+
+        Returns
+        -------
+        ndarray of the same shape
+            Variance, electrons^2.
+        """
         return np.asarray(electrons / (PIXELS * self.shares))
 
     @property
     def read(self) -> FloatArray:
-        """The part of read noise, ndarray[n_channels]."""
+        """Part of read noise, ndarray of shape (n_channels,)."""
         return np.asarray(self.read_noise_e**2 / (PIXELS * self.shares), dtype=float)
 
 
@@ -50,7 +76,12 @@ class ChannelNoise:
 class Looks:
     """Designs before patches that fill the field, on axis, in clear air.
 
-    `modified`: QE of the modified channels, ndarray[n, n_modified, n_wavelengths], complex where it has a derivative.
+    Parameters
+    ----------
+    setup : Setup
+        Camera and tasks.
+    modified : ndarray of shape (n, n_modified, n_wavelengths)
+        QE of the modified channels, complex with a derivative.
     """
 
     setup: Setup
@@ -58,16 +89,38 @@ class Looks:
 
     @classmethod
     def along(cls, setup: Setup, curves: FloatArray, by_u: FloatArray) -> Looks:
-        """One design, once for each free parameter, with its derivative by that; see `SmoothDesign`.
+        """Return one design once per free parameter, with its derivative by that parameter.
 
-        `curves`: ndarray[n_modified, n_wavelengths]; `by_u`: ndarray[n_free, n_modified, n_wavelengths].
+        Parameters
+        ----------
+        setup : Setup
+            Scene and camera.
+        curves : ndarray of shape (n_modified, n_wavelengths)
+            QE.
+        by_u : ndarray of shape (n_free, n_modified, n_wavelengths)
+            Derivatives.
+
+        Returns
+        -------
+        Looks
+            Designs.
         """
         return cls(setup, curves + 1j * COMPLEX_STEP * by_u)
 
     def electrons(self, photons: FloatArray, exposure_s: float) -> Smooth:
-        """Expected electrons of a pixel of each channel, ndarray[n, ..., n_channels].
+        """Return expected electrons of a pixel of each channel.
 
-        `photons`: radiance, photons/s/sr/m^2/nm, ndarray[..., n_wavelengths].
+        Parameters
+        ----------
+        photons : ndarray of shape (..., n_wavelengths)
+            Radiance, photons/s/sr/m2/nm.
+        exposure_s : float
+            Exposure time, s.
+
+        Returns
+        -------
+        ndarray of shape (n, ..., n_channels)
+            Electrons.
         """
         setup = self.setup
         factor = irradiance_factor(setup.scene.optics) * setup.camera.area_step_m2_nm * exposure_s
@@ -81,14 +134,31 @@ class Looks:
 
     @property
     def qe(self) -> Smooth:
-        """QE of all channels, ndarray[n, n_channels, n_wavelengths]."""
+        """Return the QE of all channels.
+
+        Returns
+        -------
+        ndarray of shape (n, n_channels, n_wavelengths)
+            QE.
+        """
         found = np.empty((len(self.modified), *self.setup.camera.qe.shape), dtype=self.modified.dtype)
         found[:] = self.setup.camera.qe
         found[:, list(self.setup.camera.modified)] = self.modified
         return found
 
     def noise(self, read_noise_e: float) -> ChannelNoise:
-        """Of four pixels of the CFA."""
+        """Return the noise of four pixels of the CFA.
+
+        Parameters
+        ----------
+        read_noise_e : float
+            Read noise, electrons.
+
+        Returns
+        -------
+        ChannelNoise
+            Noise.
+        """
         counts = self.setup.camera.mosaic.counts
         return ChannelNoise(np.asarray(counts / counts.sum(), dtype=float), read_noise_e)
 
@@ -96,12 +166,28 @@ class Looks:
 def color_matrix(
     electrons: Smooth, xyz: FloatArray, white: FloatArray, noise: ChannelNoise, regularization: float = 1.0
 ) -> Smooth:
-    """The matrix from electrons to XYZ over its white that errs least, ndarray[n, n_channels, 3].
+    """Return the matrix from electrons to XYZ relative to white with the least expected error.
 
-    It minimizes the expected sum, over the patches, of weights times |M (n + noise) - XYZ / white|^2. A weight is the
-    square of how much a patch's CIE lightness changes with its luminance. The noise's part counts `regularization`
-    times: 1 is the noise-optimal matrix, less trusts noisy channels more. `xyz`: ndarray[n_patches, 3], `white`:
-    ndarray[3].
+    It minimizes the expected sum over the patches of weight times |M (n + noise) - XYZ / white|^2. A weight is the
+    squared change of a patch's CIE lightness with its luminance.
+
+    Parameters
+    ----------
+    electrons : ndarray of shape (n, n_patches, n_channels)
+        Expected electrons of each patch.
+    xyz : ndarray of shape (n_patches, 3)
+        Tristimulus values.
+    white : ndarray of shape (3,)
+        Tristimulus values of the white.
+    noise : ChannelNoise
+        Noise.
+    regularization : float
+        Factor of the noise: 1 is the noise-optimal matrix.
+
+    Returns
+    -------
+    ndarray of shape (n, n_channels, 3)
+        Matrix.
     """
     weights = (116 / 3 * np.maximum(xyz[:, 1], _LEAST) ** (-2 / 3)) ** 2
     left = np.einsum("npc,p,npd->ncd", electrons, weights, electrons)
@@ -112,15 +198,46 @@ def color_matrix(
 
 
 def luminance_noise(matrix: Smooth, gray: Smooth, noise: ChannelNoise) -> Smooth:
-    """Luminance of gray over its standard deviation after the matrix, ndarray[n]; `gray`: ndarray[n, n_channels]."""
+    """Return the luminance SNR of gray after the matrix.
+
+    Parameters
+    ----------
+    matrix : ndarray of shape (n, n_channels, 3)
+        Color matrix.
+    gray : ndarray of shape (n, n_channels)
+        Expected electrons of gray.
+    noise : ChannelNoise
+        Noise.
+
+    Returns
+    -------
+    ndarray of shape (n,)
+        Ratio.
+    """
     row = matrix[:, :, 1]
     return np.asarray((row * gray).sum(axis=1) / (row**2 * noise.of(gray)).sum(axis=1) ** 0.5)
 
 
 def least_illuminance(matrix: Smooth, gray: Smooth, noise: ChannelNoise, ratio: float) -> Smooth:
-    """Illuminance at which luminance over noise reaches `ratio`, lx, ndarray[n]; `gray`: electrons for each lx.
+    """Return the illuminance at which the luminance SNR reaches a ratio.
 
-    With the luminance a E and its variance b E + c this is the root of ratio^2 (b E + c) = (a E)^2.
+    With the luminance a E and its variance b E + c, the root of ratio^2 (b E + c) = (a E)^2.
+
+    Parameters
+    ----------
+    matrix : ndarray of shape (n, n_channels, 3)
+        Color matrix.
+    gray : ndarray of shape (n, n_channels)
+        Electrons of gray per lx.
+    noise : ChannelNoise
+        Noise.
+    ratio : float
+        SNR.
+
+    Returns
+    -------
+    ndarray of shape (n,)
+        Illuminance, lx.
     """
     row = matrix[:, :, 1]
     a = (row * gray).sum(axis=1)
@@ -130,10 +247,21 @@ def least_illuminance(matrix: Smooth, gray: Smooth, noise: ChannelNoise, ratio: 
 
 
 def vora(responses: Smooth, matching: FloatArray) -> Smooth:
-    """Vora value: how much of the color-matching functions' space a camera's responses span, 0..1, ndarray[n].
+    """Return the Vora value: share of the space of color-matching functions that the responses span.
 
-    trace(P_V P_M) / 3 of the projections onto both spaces (Vora and Trussell, 1993). `responses`: per radiant power,
-    ndarray[n, n_channels, n_wavelengths]; `matching`: ndarray[3, n_wavelengths].
+    trace(P_V P_M) / 3 of the projections onto both spaces (Vora and Trussell, 1993).
+
+    Parameters
+    ----------
+    responses : ndarray of shape (n, n_channels, n_wavelengths)
+        Responses per radiant power.
+    matching : ndarray of shape (3, n_wavelengths)
+        Color-matching functions.
+
+    Returns
+    -------
+    ndarray of shape (n,)
+        0 to 1.
     """
     basis = np.linalg.qr(matching.T)[0]
     scaled = responses / np.sqrt((responses.real**2).sum(axis=-1, keepdims=True) + _LEAST)
@@ -143,10 +271,24 @@ def vora(responses: Smooth, matching: FloatArray) -> Smooth:
 
 
 def metamerism_index(electrons: Smooth, xyz: FloatArray, white: FloatArray) -> Smooth:
-    """Sensitivity metamerism index, ISO 17321-1: 100 - 5.5 times the mean CIELAB distance of the patches, ndarray[n].
+    """Return the sensitivity metamerism index of ISO 17321-1: 100 - 5.5 times the mean CIELAB distance of the patches.
 
-    The matrix is the one with the least mean, found by Gauss-Newton steps on it, weighted by the inverse distances.
-    100 is a camera with the eye's own color space; noise is left out.
+    The matrix has the least mean, found by Gauss-Newton steps weighted by the inverse distances. 100 is a camera with
+    the eye's color space; noise is left out.
+
+    Parameters
+    ----------
+    electrons : ndarray of shape (n, n_patches, n_channels)
+        Expected electrons of each patch.
+    xyz : ndarray of shape (n_patches, 3)
+        Tristimulus values.
+    white : ndarray of shape (3,)
+        Tristimulus values of the white.
+
+    Returns
+    -------
+    ndarray of shape (n,)
+        Index.
     """
     target = lab(xyz / white, np.ones(3))
     scale = electrons.real.mean(axis=(1, 2), keepdims=True)
@@ -159,7 +301,7 @@ def metamerism_index(electrons: Smooth, xyz: FloatArray, white: FloatArray) -> S
 
 
 def _step(seen: Smooth, matrix: Smooth, target: FloatArray) -> Smooth:
-    """A Gauss-Newton step of the matrix toward the least sum of distances, ndarray[n, n_channels, 3]."""
+    """Return the matrix after a Gauss-Newton step toward the least sum of distances."""
     n, patches, channels = seen.shape
     ratio = seen @ matrix
     colors = lab(ratio, np.ones(3))

@@ -1,4 +1,4 @@
-"""The figures of a task: what is measured, in which unit, and whether more of it is better."""
+"""Figures of tasks: definition, unit, and direction of improvement."""
 
 from __future__ import annotations
 
@@ -16,9 +16,26 @@ LUX, SNR_AT_1_LX = "lux", "snr_at_1_lx"
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure of a task. `each`: it has a value for each of the task's lights. `first`: a scorecard shows it.
+    """Figure of a task.
 
-    `signed`: it may be negative.
+    Parameters
+    ----------
+    what : str
+        Key.
+    words, meaning : str
+        Name in texts, and meaning.
+    wanted : {'more', 'less'}
+        Direction of improvement.
+    unit : str
+        Unit.
+    digits : int
+        Digits after the point.
+    each : bool
+        It has a value for each of the task's lights.
+    first : bool
+        A scorecard shows it.
+    signed : bool
+        It may be negative.
     """
 
     what: str
@@ -115,7 +132,18 @@ FIGURES: dict[Measure, tuple[Figure, ...]] = {
 
 
 def figures_of(task: TaskName) -> Iterator[tuple[str, Figure, Case]]:
-    """(column, figure, light) of everything that a task measures."""
+    """Yield all figures of a task.
+
+    Parameters
+    ----------
+    task : TaskName
+        Task.
+
+    Yields
+    ------
+    column, figure, case : str, Figure, Case
+        Column name, figure and light.
+    """
     for figure in FIGURES[task.metric]:
         for case in task.cases if figure.each else ("",):
             yield task.column(figure.what, case), figure, case

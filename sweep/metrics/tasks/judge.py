@@ -1,6 +1,6 @@
-"""The figures of a study's tasks, of blocks of designs, and of one design with derivatives.
+"""Figures of a study's tasks, for batches of designs, and for one design with derivatives.
 
-A figure is the smallest of its rows where more of it is wanted, else the largest: rows are smooth, figures have kinks.
+A figure is the smallest of its rows if more is wanted, else the largest: rows are smooth, figures are not.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _MOST_DISTANCES = 2_000_000
 
 
 class JudgedTask:
-    """A task for some designs; what several figures share is made once."""
+    """Task for some designs; common parts of several figures are computed once."""
 
     def __init__(self, task: GriddedTask, looks: Looks, conditions: Conditions) -> None:
         self._task, self._looks, self._conditions = task, looks, conditions
@@ -54,7 +54,20 @@ class JudgedTask:
         }
 
     def rows(self, what: str, case: Case) -> Smooth:
-        """The rows of a figure, ndarray[n, n_rows]."""
+        """Return the rows of a figure.
+
+        Parameters
+        ----------
+        what : str
+            Key of the figure.
+        case : Case
+            Light.
+
+        Returns
+        -------
+        ndarray of shape (n, n_rows)
+            Rows.
+        """
         return self._rows[what](case)
 
     def _once(self, key: str, case: Case, make: Callable[[], Smooth]) -> Smooth:
@@ -66,13 +79,13 @@ class JudgedTask:
         return self._task.key.cases.index(case)
 
     def _signals(self, case: Case) -> Smooth:
-        """Electrons of each spectrum of a separation, as many photons as the study's lights have."""
+        """Return electrons of each spectrum of a separation, with the photons of the study's lights."""
         assert self._task.photons is not None
         photons = self._task.photons[self._at(case)] * self._looks.setup.scene.photon_radiance
         return self._once("signals", case, lambda: self._looks.electrons(photons, self._conditions.exposure_s))
 
     def _apart(self, case: Case) -> tuple[Smooth, Smooth, Smooth]:
-        """Differences of the pairs of spectra of two classes, and both variances, ndarray[n, n_pairs, n_channels]."""
+        """Return differences of the pairs of spectra of two classes, and both variances, [n, n_pairs, n_channels]."""
         signals, (one, other) = self._signals(case), self._task.pairs
         variance = self._noise.of(signals)
         return signals[:, one] - signals[:, other], variance[:, one], variance[:, other]
@@ -90,11 +103,11 @@ class JudgedTask:
         return self._once("patches", case, lambda: self._looks.electrons(photons, self._conditions.exposure_s))
 
     def _gray(self, case: Case) -> Smooth:
-        """Electrons of 18 % gray for each lx, ndarray[n, n_channels]."""
+        """Return electrons of 18 % gray per lx, ndarray of shape (n, n_channels)."""
         return self._looks.electrons(self._chart.gray[self._at(case)], self._conditions.exposure_s)
 
     def _matrix(self, case: Case) -> Smooth:
-        """The noise-optimal color matrix at the conditions' illuminance."""
+        """Return the noise-optimal color matrix at the conditions' illuminance."""
         xyz, white = self._chart.xyz[self._at(case)], self._chart.white[self._at(case)]
         return self._once("matrix", case, lambda: color.color_matrix(self._patches(case), xyz, white, self._noise))
 
@@ -123,7 +136,18 @@ class JudgedTask:
 
 
 def pair_errors(z: Smooth) -> Smooth:
-    """Probability that Gaussian noise goes beyond a plane at this `margin`, with its derivative."""
+    """Return the probability that Gaussian noise goes beyond a plane, with its derivative.
+
+    Parameters
+    ----------
+    z : ndarray
+        Distance to the plane in standard deviations.
+
+    Returns
+    -------
+    ndarray of the same shape
+        Probability.
+    """
     error = share_below(-z.real)
     if not np.iscomplexobj(z):
         return np.asarray(error)
@@ -131,13 +155,30 @@ def pair_errors(z: Smooth) -> Smooth:
 
 
 def color_errors(electrons: Smooth, matrix: Smooth, chart: Chart, case: int) -> Smooth:
-    """CIEDE2000 of each patch of a chart after a color matrix, ndarray[n, n_patches]."""
+    """Return CIEDE2000 of each patch of a chart after a color matrix.
+
+    Parameters
+    ----------
+    electrons : ndarray of shape (n, n_patches, n_channels)
+        Expected electrons.
+    matrix : ndarray of shape (n, n_channels, 3)
+        Color matrix.
+    chart : Chart
+        Patches and lights.
+    case : int
+        Index of the light.
+
+    Returns
+    -------
+    ndarray of shape (n, n_patches)
+        Color differences.
+    """
     target = lab(chart.xyz[case], chart.white[case])
     return delta_e_2000(lab(electrons @ matrix, np.ones(3)), target)
 
 
 def _percentile(values: Smooth, share: float) -> Smooth:
-    """The percentile over the last axis, linear between neighbors in order, ndarray[n, 1]."""
+    """Return the percentile over the last axis, linear between neighbors in order, ndarray of shape (n, 1)."""
     ordered = np.take_along_axis(values, np.argsort(values.real, axis=1, kind="stable"), axis=1)
     at, rest = divmod(share * (values.shape[1] - 1), 1.0)
     low, high = ordered[:, int(at)], ordered[:, min(int(at) + 1, values.shape[1] - 1)]
@@ -145,7 +186,20 @@ def _percentile(values: Smooth, share: float) -> Smooth:
 
 
 def task_columns(setup: Setup, block: Block) -> Columns:
-    """Every figure of a setup's tasks, ndarray[n_designs] each."""
+    """Return every figure of a setup's tasks.
+
+    Parameters
+    ----------
+    setup : Setup
+        Scene and camera.
+    block : Block
+        Designs.
+
+    Returns
+    -------
+    dict of str to ndarray of shape (n_designs,)
+        Columns.
+    """
     tasks = setup.tasks
     assert tasks is not None
     curves = block.curves()
@@ -165,9 +219,23 @@ def task_columns(setup: Setup, block: Block) -> Columns:
 
 
 def traded(looks: Looks, chart: Chart, case: int, conditions: Conditions) -> tuple[FloatArray, FloatArray]:
-    """Color error against noise of one design under one light of a chart, for each of `REGULARIZATIONS`.
+    """Return color error against noise of one design under one light, for each of `REGULARIZATIONS`.
 
-    Mean CIEDE2000 of the chart, and luminance SNR of 18 % gray, ndarray[n] each.
+    Parameters
+    ----------
+    looks : Looks
+        Designs before patches.
+    chart : Chart
+        Patches and lights.
+    case : int
+        Index of the light.
+    conditions : Conditions
+        Exposure, read noise and illuminance.
+
+    Returns
+    -------
+    delta_e, snr : ndarray of shape (n,)
+        Mean CIEDE2000 of the chart, and luminance SNR of 18 % gray.
     """
     noise = looks.noise(conditions.read_noise_e)
     patches = looks.electrons(chart.photons[case] * conditions.illuminance_lx, conditions.exposure_s)
@@ -184,10 +252,27 @@ def traded(looks: Looks, chart: Chart, case: int, conditions: Conditions) -> tup
 def rendered_areas(
     looks: Looks, chart: Chart, case: int, photons: FloatArray, conditions: Conditions
 ) -> tuple[FloatArray, FloatArray]:
-    """Areas of a picture through the noise-optimal matrix for a chart under a light, with the noise of four pixels.
+    """Return the areas of a picture through the noise-optimal matrix, with the noise of four pixels.
 
-    `photons`: ndarray[n_areas, n_wavelengths]. XYZ over its white, ndarray[n_areas, 3], and covariances, ndarray[
-    n_areas, 3, 3].
+    Parameters
+    ----------
+    looks : Looks
+        Designs before patches.
+    chart : Chart
+        Patches and lights.
+    case : int
+        Index of the light.
+    photons : ndarray of shape (n_areas, n_wavelengths)
+        Radiance of each area.
+    conditions : Conditions
+        Exposure, read noise and illuminance.
+
+    Returns
+    -------
+    xyz : ndarray of shape (n_areas, 3)
+        XYZ relative to white.
+    covariance : ndarray of shape (n_areas, 3, 3)
+        Covariances.
     """
     noise = looks.noise(conditions.read_noise_e)
     patches = looks.electrons(chart.photons[case] * conditions.illuminance_lx, conditions.exposure_s)
