@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -213,26 +211,13 @@ def _refine_heights(model: ForwardModel, block: Block, cases: Columns, columns: 
             columns[name][design] = least
 
 
-@dataclass
-class Spent:
-    """Seconds that metrics of the whole readout took, with the readouts that are made for them alone."""
-
-    seconds: float = 0.0
-
-
-def whole_readout_metrics(asked: Asked) -> list[str]:
-    """Columns of a study that need the whole readout of every design: those of own metrics, and more that are found."""
-    names = [quantity.name for metric in OTHERS for quantity in metric.quantities(asked)]
-    return [*names, *(metric.name for metric in asked.own)]
-
-
 def _whole_readout(
-    model: ForwardModel, own: Sequence[OwnMetric], spent: Spent, n: int, whole: Callable[[slice], FloatArray]
+    model: ForwardModel, own: Sequence[OwnMetric], n: int, whole: Callable[[slice], FloatArray]
 ) -> Columns:
     """Columns of n designs by own metrics and those of `OTHERS`; `whole`: the readout of a part of the designs."""
     if not (own or OTHERS):
         return {}
-    started, setup = time.perf_counter(), model.setup
+    setup = model.setup
     # A CFA of which an own metric says nothing says so of one design, and no more are read for it.
     first = own_quantities(own, setup, whole(slice(0, 1))) if own else {}
     columns = {name: np.full(n, values[0]) for name, values in first.items()}
@@ -245,7 +230,6 @@ def _whole_readout(
             others = over_cases(model, by_case(response, setup.members, OTHERS)) if OTHERS else {}
             parts.append(others | own_quantities(present, setup, response))
         columns |= {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    spent.seconds += time.perf_counter() - started
     return columns
 
 
@@ -313,7 +297,6 @@ def evaluate(
     *,
     probabilities: bool = False,
     own: Sequence[OwnMetric] = (),
-    spent: Spent | None = None,
 ) -> Columns:
     """Evaluate a batch of designs as the camera reads them out.
 
@@ -339,7 +322,7 @@ def evaluate(
     dict of str to ndarray of shape (n_designs,)
         Columns.
     """
-    block, extra, setup = _block(designs), partial(_whole_readout, model, own, spent or Spent()), model.setup
+    block, extra, setup = _block(designs), partial(_whole_readout, model, own), model.setup
     changing = None if states else model.read_changing(block)
     if changing is None:
         cases, columns = _read(model, block, extra, states, probabilities=probabilities)

@@ -1,4 +1,4 @@
-"""Files that are whole or not there: written under a hidden name, synced and renamed."""
+"""Atomic files: written under a hidden name, synced and renamed."""
 
 from __future__ import annotations
 
@@ -15,10 +15,24 @@ LEFT_OVER = r"\.tmp-\d+-.*"
 
 @contextmanager
 def atomic(path: Path) -> Iterator[Path]:
-    """Give a hidden name beside `path`; on success it is synced and takes the name of `path`, else it is removed.
+    """Give a hidden name beside a path; on success it is synced and renamed to the path, else removed.
 
-    A symbolic link at `path` is replaced, not followed. A reader sees the old file or the new one, never a part. Raises
-    OutputError when the disk refuses (full, read-only, no permission).
+    A symbolic link at the path is replaced, not followed. A reader sees the old file or the new one, never a part.
+
+    Parameters
+    ----------
+    path : Path
+        File.
+
+    Yields
+    ------
+    Path
+        Hidden name to write to.
+
+    Raises
+    ------
+    OutputError
+        If the disk refuses (full, read-only, no permission).
     """
     hidden = path.with_name(f".tmp-{os.getpid()}-{path.name}")
     try:
@@ -37,11 +51,37 @@ def atomic(path: Path) -> Iterator[Path]:
 
 
 def write_bytes(content: bytes, path: Path) -> None:
-    """Write one file atomically; errors as for `atomic`."""
+    """Write one file atomically.
+
+    Parameters
+    ----------
+    content : bytes
+        Content.
+    path : Path
+        File.
+
+    Raises
+    ------
+    OutputError
+        If the disk refuses.
+    """
     with atomic(path) as hidden:
         hidden.write_bytes(content)
 
 
 def write_text(text: str, path: Path) -> None:
-    """Write one UTF-8 text file atomically; errors as for `atomic`."""
+    """Write one UTF-8 text file atomically.
+
+    Parameters
+    ----------
+    content : str
+        Content.
+    path : Path
+        File.
+
+    Raises
+    ------
+    OutputError
+        If the disk refuses.
+    """
     write_bytes(text.encode("utf-8"), path)

@@ -1,4 +1,4 @@
-"""Curves that a run keeps: a long table with a row per curve and wavelength, and the same as objects."""
+"""Curves that a run keeps: a long table with one row per curve and wavelength, and the same as objects."""
 
 from __future__ import annotations
 
@@ -50,12 +50,12 @@ class KeptCurves:
 
     @property
     def designs(self) -> dict[int, FilterCurves]:
-        """All designs that were kept."""
+        """All designs whose curves were kept."""
         return {**self.drawn, **self.on_front}
 
     @property
     def bundles(self) -> dict[str, FloatArray]:
-        """Signal type -> photon spectra, ndarray[n_signals, n_wavelengths]."""
+        """Photon spectra of each signal type, ndarray of shape (n_signals, n_wavelengths)."""
         types: dict[str, list[FloatArray]] = {}
         for (kind, _), photons in self.lights.items():
             types.setdefault(kind, []).append(photons)
@@ -72,7 +72,13 @@ class KeptCurves:
         yield from ((_LIMIT, cfa, values, None, None, None) for cfa, values in self.limits.items())
 
     def table(self) -> pa.Table:
-        """Return the long table, of SCHEMA."""
+        """Return the long table.
+
+        Returns
+        -------
+        pyarrow.Table
+            Table of schema SCHEMA.
+        """
         kinds, names, values, types, ids, channels = zip(*self._rows(), strict=True)
         at = np.repeat(np.arange(len(kinds)), self.wavelength_nm.size)
         columns = (
@@ -88,7 +94,23 @@ class KeptCurves:
 
     @classmethod
     def of_table(cls, table: pa.Table) -> KeptCurves:
-        """Make the curves from the long table; raises ValueError where they are not all on one grid."""
+        """Make the curves from the long table.
+
+        Parameters
+        ----------
+        table : pyarrow.Table
+            Table.
+
+        Returns
+        -------
+        KeptCurves
+            Curves.
+
+        Raises
+        ------
+        ValueError
+            If they are not all on one grid.
+        """
         table = table.select(SCHEMA.names).cast(SCHEMA)
         wavelength_nm = table["wavelength_nm"].to_numpy()
         size = len(np.unique(wavelength_nm))

@@ -1,4 +1,4 @@
-"""From a finished run back to its study, and from a row of the result table back to its design."""
+"""Studies and designs of a finished run."""
 
 from __future__ import annotations
 
@@ -31,7 +31,20 @@ _Key = TypeVar("_Key")
 
 
 def row_space(study: Study, row: Mapping[Any, Any]) -> Space:
-    """Return the space that a row belongs to."""
+    """Return the design space of a row.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    row : mapping
+        Row of the result table.
+
+    Returns
+    -------
+    Space
+        Space.
+    """
     if row["kind"] == "search":
         assert study.search is not None
         return study.search.space
@@ -40,14 +53,40 @@ def row_space(study: Study, row: Mapping[Any, Any]) -> Space:
 
 
 def row_curves(study: Study, row: Mapping[Any, Any]) -> tuple[Space, Any]:
-    """Return the space that a row belongs to and its filters' curves, ndarray[1, n_modified, n_wavelengths]."""
+    """Return the design space and the curves of a row.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    row : mapping
+        Row of the result table.
+
+    Returns
+    -------
+    space : Space
+        Space.
+    curves : ndarray of shape (1, n_modified, n_wavelengths)
+        QE.
+    """
     space = row_space(study, row)
     point = np.array([[row[name] for name in space.parameters]], dtype=float)
     return space, space.curves(point, study.grid.size)
 
 
 def computed_rows(*tables: pd.DataFrame) -> list[dict[Any, Any]]:
-    """Return the rows of tables, each design once; not those that failed."""
+    """Return the rows of tables, each design once, without those that failed.
+
+    Parameters
+    ----------
+    *tables : pandas.DataFrame
+        Result tables.
+
+    Returns
+    -------
+    list of dict
+        Rows.
+    """
     rows: dict[Any, dict[Any, Any]] = {}
     for table in tables:
         for row in table[table["status"] == "ok"].to_dict("records"):
@@ -56,17 +95,40 @@ def computed_rows(*tables: pd.DataFrame) -> list[dict[Any, Any]]:
 
 
 def few_rows(table: pd.DataFrame) -> list[dict[Any, Any]]:
-    """Return the rows of plain CFAs, named designs and the search's answer; not those that failed."""
+    """Return the rows of plain CFAs, named designs and the search's answer, without those that failed.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        Result table.
+
+    Returns
+    -------
+    list of dict
+        Rows.
+    """
     return computed_rows(table[table["kind"].isin(FEW)])
 
 
 def find_row(output: Output, key: str) -> Mapping[Any, Any]:
-    """Return the row of a name, of a filter_id or of `best`; of one that occurs in several scenarios the first.
+    """Return the row of a design; if it occurs in several scenarios, the first.
+
+    Parameters
+    ----------
+    output : Output
+        Run.
+    key : str
+        Name, filter_id, or `best`.
+
+    Returns
+    -------
+    mapping
+        Row.
 
     Raises
     ------
     SweepError
-        There is no such design, with the nearest name, or it failed.
+        If there is no such design, with the nearest name, or if it failed.
     """
     table = output.table
     named = table[table["name"] == key]
@@ -131,7 +193,20 @@ def study_of(output: Output, data: Path | None, *, allow_code: bool = False) -> 
 
 
 def check_kept(output: Output, kept: Mapping[_Key, FloatArray], made: Mapping[_Key, FloatArray]) -> None:
-    """Compare curves with those that the run kept under these names; raises OutputError where they differ."""
+    """Compare curves with those that the run kept.
+
+    Parameters
+    ----------
+    output : Output
+        Run.
+    kept, made : mapping of key to ndarray
+        Curves of the run, and curves to compare.
+
+    Raises
+    ------
+    OutputError
+        If they differ.
+    """
 
     def same(one: FloatArray, other: FloatArray) -> bool:
         return one.shape == other.shape and bool(np.abs(one - other).max(initial=0.0) <= _SAME)

@@ -1,4 +1,4 @@
-"""Data dictionary: content of the files of a run and meaning of the columns, as the documentation prints it."""
+"""Data dictionary: content of the files of a run and meaning of the columns, as printed in the documentation."""
 
 from __future__ import annotations
 
@@ -69,7 +69,17 @@ KEYS = tuple(name for names in (*_KEYS, *_VERDICTS) for name in names)
 def described(schema: pa.Schema, columns: Mapping[str, Column]) -> pa.Schema:
     """Return a schema whose fields carry `unit` and `meaning`, which pandas reads as `DataFrame.attrs`.
 
-    `columns`: the quantities of a study by name.
+    Parameters
+    ----------
+    schema : pyarrow.Schema
+        Schema.
+    columns : mapping of str to Column
+        Quantities of a study.
+
+    Returns
+    -------
+    pyarrow.Schema
+        Schema with metadata.
     """
     meanings = {name: text for names, text in (_KEYS | _VERDICTS).items() for name in names}
     meanings |= {name: column.meaning for name, column in columns.items()}
@@ -88,7 +98,13 @@ def described(schema: pa.Schema, columns: Mapping[str, Column]) -> pa.Schema:
 
 
 def columns_table() -> list[str]:
-    """Return a table of Markdown: column, unit, meaning; `<a>`, `<b>`: any two signal types, `<task>`: a task."""
+    """Return a Markdown table of columns, units and meanings.
+
+    Returns
+    -------
+    list of str
+        Lines; `<a>`, `<b>` stand for any two signal types, `<task>` for a task.
+    """
     types = ("<a>", "<b>")
     rows = [_row(names, "", meaning) for names, meaning in _KEYS.items()]
     tasks = tuple(TaskName("<task>", metric, ("<light>",)) for metric in get_args(Measure))
@@ -158,7 +174,13 @@ FILES = {
 
 
 def files_table() -> list[str]:
-    """Return a table of Markdown: file, content."""
+    """Return a Markdown table of files and contents.
+
+    Returns
+    -------
+    list of str
+        Lines.
+    """
     return ["| file | what it holds |", "| --- | --- |", *(f"| `{name}` | {what} |" for name, what in FILES.items())]
 
 

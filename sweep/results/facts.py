@@ -72,7 +72,7 @@ class CheckFacts(_Facts):
 
     @property
     def passed(self) -> bool:
-        """Result of the check: no difference is larger than allowed; rounding of the arithmetic is not counted."""
+        """True if no difference is larger than allowed, except for rounding of the arithmetic."""
         return self.largest_dn <= self.allowed_dn * (1 + 1e-9) + 1e-9
 
     @property
@@ -150,7 +150,20 @@ class Provenance(_Facts):
 
 
 def lacking(kind: type[BaseModel], facts: Mapping[str, Any]) -> list[str]:
-    """Return the keys that an object of this kind needs and these facts lack, or have with another type."""
+    """Return the keys that facts lack, or have with another type.
+
+    Parameters
+    ----------
+    kind : type
+        Class of facts.
+    facts : mapping
+        Content of a file.
+
+    Returns
+    -------
+    list of str
+        Keys.
+    """
     try:
         kind.model_validate(facts)
     except ValidationError as error:
@@ -159,13 +172,46 @@ def lacking(kind: type[BaseModel], facts: Mapping[str, Any]) -> list[str]:
 
 
 def checked_facts(path: Path, kind: type[_Model], facts: Mapping[str, Any]) -> _Model:
-    """Return the facts of a file as an object; raises OutputError that names the keys that it lacks."""
+    """Convert the facts of a file to an object.
+
+    Parameters
+    ----------
+    path : Path
+        File.
+    kind : type
+        Class of facts.
+    facts : mapping
+        Content of the file.
+
+    Returns
+    -------
+    object
+        Facts.
+
+    Raises
+    ------
+    OutputError
+        If keys are missing, with their names.
+    """
     if lacks := lacking(kind, facts):
         raise lacking_in(path, lacks[:_MOST_SHOWN])
     return kind.model_validate(facts)
 
 
 def lacking_in(path: Path, names: Sequence[str]) -> OutputError:
-    """Return the error of a file that lacks something."""
+    """Return the error of a file with missing parts.
+
+    Parameters
+    ----------
+    path : Path
+        File.
+    names : sequence of str
+        Missing parts.
+
+    Returns
+    -------
+    OutputError
+        Error.
+    """
     again = "delete it, and `sweep run` of the study makes it again"
     return OutputError(Fault(f"lacks {', '.join(names)}; {again}", str(path)))

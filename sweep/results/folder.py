@@ -1,4 +1,4 @@
-"""Folder that a run works in: its own, beside that of another study of the same name."""
+"""Folder of a run, beside that of another study of the same name."""
 
 from __future__ import annotations
 
@@ -17,18 +17,43 @@ _MOST_SHOWN = 3
 
 
 def held_by(folder: Path) -> Inventory | None:
-    """Return the run in a folder, or None; files of others under the names of a run's have an empty fingerprint.
+    """Return the run in a folder.
 
-    Raises OutputError for a damaged `run.json`.
+    Parameters
+    ----------
+    folder : Path
+        Output folder.
+
+    Returns
+    -------
+    Inventory or None
+        Run; files of others under the names of a run's have an empty fingerprint.
+
+    Raises
+    ------
+    OutputError
+        If `run.json` is damaged.
     """
     inventory = Inventory(folder)
     return inventory if inventory.fingerprint or inventory.strangers() else None
 
 
 def output_folder(base: Path, study: Study) -> tuple[Path, str | None]:
-    """Return the folder of a study's run, and a note where it is not `base`.
+    """Return the folder of a study's run.
 
-    Where `base` holds another study, it is `base-2` and so on; the note says the difference.
+    Parameters
+    ----------
+    base : Path
+        Preferred folder.
+    study : Study
+        Study.
+
+    Returns
+    -------
+    folder : Path
+        `base`, or `base-2` and so on if it holds another study.
+    note : str or None
+        Difference to that study.
     """
     note = None
     for number in count(1):
@@ -44,7 +69,25 @@ def output_folder(base: Path, study: Study) -> tuple[Path, str | None]:
 
 
 def begin(folder: Path, study: Study) -> Inventory:
-    """Write into the folder which run it holds; raises OutputError when it holds another one, or files of others."""
+    """Write into the folder which run it holds.
+
+    Parameters
+    ----------
+    folder : Path
+        Output folder.
+    study : Study
+        Study.
+
+    Returns
+    -------
+    Inventory
+        Files of the run.
+
+    Raises
+    ------
+    OutputError
+        If it holds another run, or files of others.
+    """
     inventory = Inventory(folder)
     if not inventory.fingerprint:
         inventory.begin(fingerprint(study), {"identity": identity(study), "designs": study.n_designs})
@@ -55,7 +98,7 @@ def begin(folder: Path, study: Study) -> Inventory:
 
 
 def _changed(held: Inventory, study: Study) -> str:
-    """The keys that differ with their values, the first few."""
+    """Return the first few keys that differ, with their values."""
     before, after = (dict(_flat(x)) for x in (held.facts.get("identity"), json.loads(json.dumps(identity(study)))))
     if not before.keys() & after.keys():
         return "of an earlier version"

@@ -1,4 +1,4 @@
-"""Identity of a run: two runs of one identity have the same rows."""
+"""Identity of a run: runs with equal identity have equal rows."""
 
 from __future__ import annotations
 
@@ -15,7 +15,18 @@ CHUNK = 4096
 
 
 def identity(study: Study) -> dict[str, Any]:
-    """Return all that a run depends on: the checked study, digests of its curves, the version of the model."""
+    """Return everything that a run depends on.
+
+    Parameters
+    ----------
+    study : Study
+        Study.
+
+    Returns
+    -------
+    dict
+        Checked study, digests of its curves, and version of the model.
+    """
     curves, lights = hashlib.sha256(), hashlib.sha256()
     for name, curve in sorted(study.sensor.qe.items()):
         curves.update(name.encode() + curve.tobytes())
@@ -36,5 +47,16 @@ def identity(study: Study) -> dict[str, Any]:
 
 
 def fingerprint(study: Study) -> str:
-    """Return the SHA-256 of the canonical JSON of `identity`."""
+    """Return the SHA-256 of the canonical JSON of `identity`.
+
+    Parameters
+    ----------
+    study : Study
+        Study.
+
+    Returns
+    -------
+    str
+        Hexadecimal digest.
+    """
     return hashlib.sha256(json.dumps(identity(study), sort_keys=True).encode()).hexdigest()

@@ -56,17 +56,28 @@ class Inventory:
 
     @property
     def fingerprint(self) -> str:
-        """Fingerprint of the run's study; empty where there is no run."""
+        """Fingerprint of the run's study; empty without a run."""
         return str(self.facts.get("fingerprint", ""))
 
     @property
     def finished(self) -> bool:
-        """True where all files that the list names are there, provenance among them."""
+        """True if all listed files are there, provenance among them."""
         listed = self.files.keys() & MADE_BY_RUN
         return PROVENANCE in listed and not self.wrong(listed, quick=True)
 
     def path(self, name: str) -> Path:
-        """Return the path of a file of the run."""
+        """Return the path of a file of the run.
+
+        Parameters
+        ----------
+        name : str
+            Name of the file.
+
+        Returns
+        -------
+        Path
+            Path.
+        """
         return self.folder / name
 
     def wrong(self, names: Iterable[str] | None = None, *, quick: bool = False) -> dict[str, str]:
@@ -94,38 +105,85 @@ class Inventory:
         return faults
 
     def unlisted(self) -> list[str]:
-        """Return the files of a finished run that the damaged list does not name; provenance is written last."""
+        """Return the files of a finished run that a damaged list does not name; provenance is written last.
+
+        Returns
+        -------
+        list of str
+            Names.
+        """
         finished = os.path.lexists(self.path(PROVENANCE))
         return [name for name in self._present() if finished and is_own(name) and name not in self.files]
 
     def _present(self) -> list[str]:
-        """Names of the files in the folder and among its figures."""
+        """Return the names of the files in the folder and among its figures."""
         return sorted([*_names(self.folder), *(f"{FIGURES}/{name}" for name in _names(self.folder / FIGURES))])
 
     def _linked(self, name: str) -> bool:
-        """True where a link leads out of the folder on the way to a file."""
+        """Return whether a link on the way to a file leads out of the folder."""
         return name.startswith(f"{FIGURES}/") and is_link(self.folder / FIGURES)
 
     def require(self, names: Iterable[str]) -> None:
-        """Raise OutputError, naming each file, unless all of them are what the run wrote."""
+        """Check that files are as the run wrote them.
+
+        Parameters
+        ----------
+        names : iterable of str
+            Names of files.
+
+        Raises
+        ------
+        OutputError
+            If a file is missing or damaged, with its name.
+        """
         if wrong := self.wrong(names):
             raise OutputError(faults_of(self.folder, wrong))
 
     def strangers(self) -> list[str]:
-        """Return the files of others under names that the run's commands give; none in the folder of a run."""
+        """Return the files of others under names that the run's commands give; none in the folder of a run.
+
+        Returns
+        -------
+        list of str
+            Names.
+        """
         if self.facts:
             return []
         return [name for name in self._present() if is_own(name) or name == SUMS]
 
     def begin(self, fingerprint: str, facts: Mapping[str, Any]) -> None:
-        """Write which study the folder is of; raises OutputError for files of others, or when the disk refuses."""
+        """Write which study the folder is of.
+
+        Parameters
+        ----------
+        fingerprint : str
+            Fingerprint of the study.
+        facts : mapping
+            Further content of `run.json`.
+
+        Raises
+        ------
+        OutputError
+            If files of others are there, or the disk refuses.
+        """
         for name in self.strangers():
             raise OutputError(Fault("is not of this run; move it away", str(self.folder / name)))
         self.facts = {"fingerprint": fingerprint, **facts}
         self.write({RUN: json_of(self.facts).encode("utf-8")})
 
     def write(self, contents: Mapping[str, bytes]) -> None:
-        """Write files of the run and list them; raises OutputError when the disk refuses."""
+        """Write files of the run and list them.
+
+        Parameters
+        ----------
+        contents : mapping of str to bytes
+            Content by name.
+
+        Raises
+        ------
+        OutputError
+            If the disk refuses.
+        """
         for name, content in contents.items():
             if self._linked(name):
                 raise OutputError(Fault("is not of this run; move it away", str(self.folder / FIGURES)))
@@ -137,17 +195,52 @@ class Inventory:
         self._save()
 
     def write_table(self, name: str, table: pa.Table) -> None:
-        """Write a table of the run and list it; errors as for `write`."""
+        """Write a table of the run and list it.
+
+        Parameters
+        ----------
+        name : str
+            Name of the file.
+        table : pyarrow.Table
+            Table.
+
+        Raises
+        ------
+        OutputError
+            If the disk refuses.
+        """
         write_table(table, self.path(name))
         self.adopt(name)
 
     def adopt(self, name: str) -> None:
-        """List a file that was written; raises OutputError when the disk refuses."""
+        """List a file that was written.
+
+        Parameters
+        ----------
+        name : str
+            Name of the file.
+
+        Raises
+        ------
+        OutputError
+            If the disk refuses.
+        """
         self.files[name] = digest_of(self.path(name))
         self._save()
 
     def remove(self, names: Iterable[str]) -> None:
-        """Remove files with names of the run's and list them no longer; raises OutputError when the disk refuses."""
+        """Remove files of the run and their entries.
+
+        Parameters
+        ----------
+        names : iterable of str
+            Names of files.
+
+        Raises
+        ------
+        OutputError
+            If the disk refuses.
+        """
         gone = [name for name in names if name in self.files or os.path.lexists(self.path(name))]
         for name in gone:
             path = self.path(name)
@@ -161,11 +254,11 @@ class Inventory:
             self._save()
 
     def outdate(self) -> None:
-        """Remove what was made of tables that are no more: report and audit; errors as for `remove`."""
+        """Remove report and audit, which follow from tables that are gone."""
         self.remove([name for name in self.files if is_drawn(name) or name == AUDIT])
 
     def discard(self) -> None:
-        """Leave nothing of a run that has no file but its lists."""
+        """Remove the lists of a run without files."""
         if not self.files.keys() - {RUN}:
             for name in (SUMS, RUN):
                 with suppress(OSError):
@@ -177,17 +270,41 @@ class Inventory:
 
 
 def no_run(folder: Path) -> OutputError:
-    """Return the error for a folder that holds no run."""
+    """Return the error for a folder without a run.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder.
+
+    Returns
+    -------
+    OutputError
+        Error.
+    """
     return OutputError(Fault("no run here", str(folder), allowed="a folder that `sweep run` made"))
 
 
 def faults_of(folder: Path, wrong: Mapping[str, str]) -> list[Fault]:
-    """Return a line for each file that is not what the run wrote."""
+    """Return a line for each file that is not as the run wrote it.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder.
+    wrong : mapping of str to str
+        Problem by name.
+
+    Returns
+    -------
+    list of Fault
+        Lines.
+    """
     return [Fault(f"{what}; `sweep run` of its study makes it again", str(folder / n)) for n, what in wrong.items()]
 
 
 def _names(folder: Path) -> list[str]:
-    """Names in a folder; none where there is none, or a link in its place."""
+    """Return the names in a folder; none if there is no folder, or a link in its place."""
     try:
         return [] if is_link(folder) else [path.name for path in folder.iterdir()]
     except OSError:

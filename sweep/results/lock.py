@@ -1,4 +1,4 @@
-"""One command at a time writes into a run's folder."""
+"""Lock: one command at a time writes into a run's folder."""
 
 from __future__ import annotations
 
@@ -24,10 +24,24 @@ _WAIT_S = 0.2
 
 @contextmanager
 def locked(output: Path) -> Iterator[None]:
-    """Hold the output folder for one command; raises OutputError when it is in use or cannot be written.
+    """Hold the output folder for one command.
 
-    The system drops the lock with its process, so that a lock cannot go stale. Hidden files that a killed command or
-    worker left behind are removed.
+    The system releases the lock with its process. Hidden files of killed commands and workers are removed.
+
+    Parameters
+    ----------
+    output : Path
+        Output folder.
+
+    Yields
+    ------
+    None
+        The folder is locked.
+
+    Raises
+    ------
+    OutputError
+        If it is in use or cannot be written.
     """
     lock = FileLock(output / LOCK)
     try:
@@ -49,13 +63,24 @@ def locked(output: Path) -> Iterator[None]:
 
 
 def _is_lock(path: Path) -> bool:
-    """True for an empty file."""
+    """Return whether a file is empty."""
     status = path.lstat()
     return stat.S_ISREG(status.st_mode) and not status.st_size
 
 
 def in_use(output: Path) -> bool:
-    """Return whether a command holds the folder."""
+    """Return whether a command holds the folder.
+
+    Parameters
+    ----------
+    output : Path
+        Output folder.
+
+    Returns
+    -------
+    bool
+        True if it is in use.
+    """
     if not (output / LOCK).is_file():
         return False
     try:
@@ -66,7 +91,7 @@ def in_use(output: Path) -> bool:
 
 
 def _clear(output: Path) -> None:
-    """Remove what killed commands and workers left half written, but not through links."""
+    """Remove half-written files of killed commands and workers, but not through links."""
     inner = (output / PARTS, output / FIGURES)
     for folder in (output, *(one for one in inner if is_real_folder(one))):
         for path in folder.iterdir():

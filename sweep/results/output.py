@@ -1,4 +1,4 @@
-"""A finished output folder, read back."""
+"""Finished output folder, read back."""
 
 from __future__ import annotations
 
@@ -84,7 +84,20 @@ class Output:
     _made: dict[object, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def once(self, key: object, make: Callable[[], _Made]) -> _Made:
-        """Return a value that several parts of a report need of this run, made for the first of them."""
+        """Return a value that several parts of a report share, computed at its first use.
+
+        Parameters
+        ----------
+        key : object
+            Name.
+        make : callable
+            Computes the value.
+
+        Returns
+        -------
+        object
+            Value.
+        """
         if key not in self._made:
             self._made[key] = make()
         made: _Made = self._made[key]
@@ -102,16 +115,16 @@ class Output:
 
     @property
     def trade_off(self) -> tuple[Column, Column]:
-        """Axes of the Pareto front: separation, sensitivity.
+        """Axes of the Pareto front: separation and sensitivity.
 
-        `pareto` marks it among the designs that meet every constraint but those on these two.
+        `pareto` marks it among the designs that meet every constraint except those on these two.
         """
         separation, sensitivity = self.provenance.trade_off
         return self.columns[separation], self.columns[sensitivity]
 
     @cached_property
     def columns(self) -> dict[str, Column]:
-        """Quantities of the result table by their names."""
+        """Quantities of the result table by name."""
         return {column.name: column for column in self.provenance.quantities}
 
     @property
@@ -126,7 +139,7 @@ class Output:
 
     @property
     def further(self) -> list[str]:
-        """Columns that the study's objective and constraints name beside the CSDs and the sensitivities."""
+        """Columns of objective and constraints beside the CSDs and the sensitivities."""
         named = (*self.constraints, *self.objective.weights, self.objective.column)
         return [name for name in dict.fromkeys(named) if name not in (*self.distances, *self.light)]
 
@@ -137,7 +150,7 @@ class Output:
 
     @property
     def constraints(self) -> Mapping[str, Bound]:
-        """The study's constraints."""
+        """Constraints of the study."""
         return self.study.constraints
 
     @property
@@ -146,17 +159,28 @@ class Output:
         return list(self.study.scenarios)
 
     def words(self, column: str) -> str:
-        """Return a column's name as people write it."""
+        """Return a column's name in texts.
+
+        Parameters
+        ----------
+        column : str
+            Column name.
+
+        Returns
+        -------
+        str
+            Text.
+        """
         return self.columns[column].words if column in self.columns else column
 
     @property
     def order(self) -> tuple[str, str, str]:
-        """Columns that say which design is best, the first one first, all maximized."""
+        """Columns that rank designs, the first one first, all maximized."""
         return (self.objective.column, *self.provenance.trade_off)
 
     @property
     def scenario(self) -> str:
-        """Scenario that answers lead with: the search's, else the first one."""
+        """Leading scenario of answers: the search's, else the first one."""
         search = self.provenance.search
         return self.scenarios[0] if search is None else search.scenario
 
@@ -171,12 +195,34 @@ class Output:
         )
 
     def mosaic(self, cfa: str) -> Mosaic:
-        """Return the mosaic of a CFA of the study."""
+        """Return the mosaic of a CFA.
+
+        Parameters
+        ----------
+        cfa : str
+            Name of a CFA.
+
+        Returns
+        -------
+        Mosaic
+            Mosaic.
+        """
         tile = self.study.cfas[cfa].tile
         return Mosaic.from_name(cfa) if tile is None else Mosaic.from_rows(cfa, tile)
 
     def kind(self, *kinds: str) -> pd.DataFrame:
-        """Return the rows of some kinds: see `tables.PLAIN`."""
+        """Return the rows of some kinds.
+
+        Parameters
+        ----------
+        *kinds : str
+            Kinds, see `tables.PLAIN`.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Rows.
+        """
         return self.table[self.table["kind"].isin(kinds)]
 
     @cached_property
@@ -186,7 +232,7 @@ class Output:
 
     @cached_property
     def few(self) -> pd.DataFrame:
-        """The same and the search's answer."""
+        """Plain CFAs, named designs and the search's answer."""
         return self.kind(*FEW)
 
 
@@ -262,7 +308,7 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
 
 
 def _mapping(path: Path, parse: Callable[[str], Any]) -> dict[str, Any]:
-    """The mapping in a text file; raises OutputError."""
+    """Return the mapping in a text file; raises OutputError."""
     try:
         content = parse(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError, YAMLError) as error:
@@ -273,7 +319,7 @@ def _mapping(path: Path, parse: Callable[[str], Any]) -> dict[str, Any]:
 
 
 def _check_columns(path: Path, wanted: Sequence[str]) -> None:
-    """Raise OutputError for a table without the columns that are wanted."""
+    """Raise OutputError for a table without the requested columns."""
     try:
         names = pq.read_schema(path).names
     except (OSError, pa.ArrowException) as error:

@@ -1,7 +1,7 @@
-"""Finished work of a run that is not whole yet: part files.
+"""Finished work of a running or interrupted run: part files.
 
-A part is written under a hidden name, synced and renamed, by the worker that computed it where that is on this machine.
-Its name has the key of the work and the SHA-256 of its bytes: what is missing or damaged is computed again.
+A part is written under a hidden name, synced and renamed, by the worker that computed it if that is on this machine.
+Its name holds the key of the work and the SHA-256 of its bytes: missing or damaged parts are computed again.
 """
 
 from __future__ import annotations
@@ -49,7 +49,18 @@ def write_part(folder: Path, key: str, kind: str, content: bytes) -> str:
 
 
 class Parts:
-    """The part files in the folder of a run; raises OutputError where something else has its name."""
+    """Part files in the folder of a run.
+
+    Parameters
+    ----------
+    output : Path
+        Output folder.
+
+    Raises
+    ------
+    OutputError
+        If something else has the name of the folder of parts.
+    """
 
     def __init__(self, output: Path) -> None:
         self.folder = output / PARTS
@@ -63,20 +74,63 @@ class Parts:
         return key[:_DIGITS] in self._names
 
     def add(self, name: str) -> None:
-        """Register a part that was written; other names are left alone."""
+        """Register a part that was written; other names are ignored.
+
+        Parameters
+        ----------
+        name : str
+            Name of the file.
+        """
         if named := _NAME.fullmatch(name):
             self._names[named.group(1)] = name
 
     def save(self, key: str, kind: str, content: bytes) -> None:
-        """Write a part; raises OutputError when the disk refuses."""
+        """Write a part.
+
+        Parameters
+        ----------
+        key : str
+            SHA-256 of everything that the work depends on.
+        kind : {'parquet', 'json'}
+            Content.
+        content : bytes
+            File.
+
+        Raises
+        ------
+        OutputError
+            If the disk refuses.
+        """
         self.add(write_part(self.folder, key, kind, content))
 
     def paths(self, kind: str) -> list[Path]:
-        """Return the files of the parts of a kind."""
+        """Return the files of a kind.
+
+        Parameters
+        ----------
+        kind : {'parquet', 'json'}
+            Content.
+
+        Returns
+        -------
+        list of Path
+            Files.
+        """
         return [self.folder / name for name in self._names.values() if name.endswith(f".{kind}")]
 
     def read(self, key: str) -> bytes | None:
-        """Return the content of a part; None, and it is removed, where it is missing or not what was written."""
+        """Return the content of a part.
+
+        Parameters
+        ----------
+        key : str
+            SHA-256 of everything that the work depends on.
+
+        Returns
+        -------
+        bytes or None
+            None, and the part is removed, if it is missing or damaged.
+        """
         name = self._names.get(key[:_DIGITS])
         if name is None:
             return None
@@ -88,14 +142,20 @@ class Parts:
         return None
 
     def forget(self, key: str) -> None:
-        """Remove a part, so that its work is done again."""
+        """Remove a part, so that its work is done again.
+
+        Parameters
+        ----------
+        key : str
+            SHA-256 of everything that the work depends on.
+        """
         name = self._names.pop(key[:_DIGITS], None)
         if name is not None:
             with suppress(OSError):
                 (self.folder / name).unlink()
 
     def remove(self) -> None:
-        """Remove all parts, after the result table has their rows. Files of others stay."""
+        """Remove all parts, after the result table has their rows; files of others stay."""
         for key in list(self._names):
             self.forget(key)
         with suppress(OSError):

@@ -1,4 +1,4 @@
-"""Parameter profiles: the best objective that is left when one parameter is held at a value."""
+"""Parameter profiles: the best objective when one parameter is held at a value."""
 
 from __future__ import annotations
 
@@ -21,7 +21,15 @@ _MOST_VALUES, _MOST_PROFILES = 60, 9
 
 @dataclass(frozen=True)
 class ParameterProfile:
-    """The best objective of all feasible designs that have one parameter at a value: ndarray[n_values] each."""
+    """Best objective of all feasible designs with one parameter at a value.
+
+    Parameters
+    ----------
+    parameter : str
+        Name.
+    values, best : ndarray of shape (n_values,)
+        Values of the parameter, and best objective at each.
+    """
 
     parameter: str
     values: FloatArray
@@ -44,7 +52,7 @@ class ParameterProfile:
 
 @dataclass
 class Profiles:
-    """Profiles of swept designs in a scenario, by CFA, collected from tables of results."""
+    """Profiles of swept designs in a scenario by CFA, collected from result tables."""
 
     objective: str
     scenario: str
@@ -52,7 +60,13 @@ class Profiles:
     _best: dict[tuple[str, str], pd.Series] = field(default_factory=dict)
 
     def add(self, table: pa.Table) -> None:
-        """Take in some rows of the result table."""
+        """Add rows of the result table.
+
+        Parameters
+        ----------
+        table : pyarrow.Table
+            Table.
+        """
         import pandas as pd  # noqa: PLC0415  (slow to import: workers do without)
 
         wanted = holds(table, "kind", SWEPT) & holds(table, "scenario", self.scenario) & table["feasible"].to_numpy()
@@ -67,7 +81,7 @@ class Profiles:
 
     @property
     def found(self) -> dict[str, list[ParameterProfile]]:
-        """CFA -> profiles of the parameters that matter most, of those that have more than one value."""
+        """Profiles of the parameters with the largest effect, by CFA."""
         profiles: dict[str, list[ParameterProfile]] = {}
         for (cfa, name), best in self._best.items():
             if len(best) > 1:
@@ -77,7 +91,7 @@ class Profiles:
 
 
 def _binned(best: pd.Series) -> pd.Series:
-    """The same, of many values the best one in each of equal parts of their range."""
+    """Return the best value in each of equal parts of the range, if there are many values."""
     if len(best) <= _MOST_VALUES:
         return best
     values = best.index.to_numpy(dtype=float)
@@ -86,7 +100,18 @@ def _binned(best: pd.Series) -> pd.Series:
 
 
 def profile_table(profiles: Sequence[ParameterProfile]) -> pd.DataFrame:
-    """Return the profiles in figures, a row each."""
+    """Return the profiles in figures.
+
+    Parameters
+    ----------
+    profiles : sequence of ParameterProfile
+        Profiles.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row per parameter.
+    """
     import pandas as pd  # noqa: PLC0415  (slow to import: workers do without)
 
     return pd.DataFrame(

@@ -1,4 +1,4 @@
-"""Parquet and JSON on disk: explicit schemas, and how columns are stored."""
+"""Parquet and JSON on disk: explicit schemas and storage of columns."""
 
 from __future__ import annotations
 
@@ -85,17 +85,50 @@ _LEAST_GROUP = ROW_GROUP // 4
 
 
 def is_drawn(name: str) -> bool:
-    """Return whether it is the name of a file of the report."""
+    """Return whether a file belongs to the report.
+
+    Parameters
+    ----------
+    name : str
+        Name of a file.
+
+    Returns
+    -------
+    bool
+        True if it does.
+    """
     return _DRAWN.fullmatch(name) is not None
 
 
 def is_own(name: str) -> bool:
-    """Return whether it is a name that commands give to files of a run, beside its two lists."""
+    """Return whether a name is one that commands give to files of a run, beside its two lists.
+
+    Parameters
+    ----------
+    name : str
+        Name of a file.
+
+    Returns
+    -------
+    bool
+        True if it is.
+    """
     return name in MADE_BY_RUN or name == AUDIT or is_drawn(name)
 
 
 def result_schema(parameters: Sequence[str], quantities: Sequence[str]) -> pa.Schema:
-    """Return the columns of the result table: keys, a column per parameter (unit in its name), quantities, verdicts."""
+    """Return the columns of the result table.
+
+    Parameters
+    ----------
+    parameters, quantities : sequence of str
+        Column names.
+
+    Returns
+    -------
+    pyarrow.Schema
+        Keys, parameters, quantities, feasibility and status.
+    """
     number = pa.float64()
     fields = list(_KEYS) + [pa.field(name, number) for name in (*parameters, *quantities)] + list(_VERDICTS)
     return pa.schema(fields, metadata={"cfa_sweep_schema": SCHEMA_VERSION, _PARAMETERS: json.dumps(list(parameters))})
@@ -105,6 +138,16 @@ def search_schema(parameters: Sequence[str]) -> pa.Schema:
     """Return the columns of the search's log: one row per evaluation of the smooth response.
 
     `sensitivity_min` is the level of the front that the evaluation belongs to; null in the search itself.
+
+    Parameters
+    ----------
+    parameters : sequence of str
+        Column names.
+
+    Returns
+    -------
+    pyarrow.Schema
+        Schema.
     """
     text, number = pa.dictionary(pa.int32(), pa.string()), pa.float64()
     fields = [pa.field("scenario", text), pa.field("sensitivity_min", number)]
@@ -115,9 +158,19 @@ def search_schema(parameters: Sequence[str]) -> pa.Schema:
 
 
 def front_schema(parameters: Sequence[str]) -> pa.Schema:
-    """Return the columns of the trade-off that the search traces: one row per level of sensitivity.
+    """Return the columns of the trade-off of the search: one row per level of sensitivity.
 
-    `cfa_sensitivity_min`: the same level for the whole CFA; null where several channels are modified.
+    `cfa_sensitivity_min` is the same level for the whole CFA; null if several channels are modified.
+
+    Parameters
+    ----------
+    parameters : sequence of str
+        Column names.
+
+    Returns
+    -------
+    pyarrow.Schema
+        Schema.
     """
     number = pa.float64()
     names = ("sensitivity_min", "cfa_sensitivity_min", "objective", "sensitivity", "cfa_sensitivity", "limit", "gap")
@@ -126,14 +179,41 @@ def front_schema(parameters: Sequence[str]) -> pa.Schema:
 
 
 def write_table(table: pa.Table, path: Path) -> None:
-    """Write one Parquet file atomically, with a checksum of each page; errors as for `atomic`."""
+    """Write one Parquet file atomically, with a checksum of each page.
+
+    Parameters
+    ----------
+    table : pyarrow.Table
+        Table.
+    path : Path
+        File.
+
+    Raises
+    ------
+    OutputError
+        If the disk refuses.
+    """
     write_tables([table], table.schema, path)
 
 
 def write_tables(tables: Iterable[pa.Table], schema: pa.Schema, path: Path) -> None:
-    """Write tables of one schema, as they come, to one Parquet file; errors as for `atomic`.
+    """Write tables of one schema to one Parquet file as they come.
 
-    A row group has `ROW_GROUP` rows at most; short tables are put together. One row group and one table are in memory.
+    A row group has at most `ROW_GROUP` rows; short tables are joined. One row group and one table are in memory.
+
+    Parameters
+    ----------
+    tables : iterable of pyarrow.Table
+        Tables.
+    schema : pyarrow.Schema
+        Schema.
+    path : Path
+        File.
+
+    Raises
+    ------
+    OutputError
+        If the disk refuses.
     """
     waiting: list[pa.Table] = []
     with atomic(path) as hidden, pq.ParquetWriter(hidden, schema, **_how(schema)) as writer:
@@ -151,34 +231,91 @@ def write_tables(tables: Iterable[pa.Table], schema: pa.Schema, path: Path) -> N
 
 
 def write_csv(table: pd.DataFrame, path: Path) -> None:
-    """Write one CSV file with every digit, atomically; errors as for `atomic`."""
+    """Write one CSV file with every digit, atomically.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        Table.
+    path : Path
+        File.
+
+    Raises
+    ------
+    OutputError
+        If the disk refuses.
+    """
     write_text(csv_of(table), path)
 
 
 def csv_of(table: pd.DataFrame) -> str:
-    """Return a table as CSV with every digit.
+    """Return a table as CSV with every digit, whatever NumPy's print options are.
 
-    Pandas alone would print numbers as NumPy's print options say, which other libraries change.
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        Table.
+
+    Returns
+    -------
+    str
+        CSV.
     """
     return table.to_csv(index=False, float_format=lambda value: repr(float(value)))  # type: ignore[arg-type]
 
 
 def json_of(data: Mapping[str, Any]) -> str:
-    """Return a mapping as the text of a JSON file, its keys in order."""
+    """Return a mapping as JSON with sorted keys.
+
+    Parameters
+    ----------
+    data : mapping
+        Content.
+
+    Returns
+    -------
+    str
+        JSON.
+    """
     return json.dumps(data, indent=2, sort_keys=True, allow_nan=False) + "\n"
 
 
 def encoded(table: pa.Table) -> bytes:
-    """Return a table as the bytes of a Parquet file."""
+    """Return a table as the bytes of a Parquet file.
+
+    Parameters
+    ----------
+    table : pyarrow.Table
+        Table.
+
+    Returns
+    -------
+    bytes
+        File.
+    """
     sink = pa.BufferOutputStream()
     pq.write_table(table, sink, **_how(table.schema))
     return bytes(sink.getvalue().to_pybytes())
 
 
 def decoded(content: bytes, schema: pa.Schema, rows: int) -> pa.Table | None:
-    """Return the table of a Parquet file's bytes; None where they hold no such table of so many rows.
+    """Return the table of a Parquet file's bytes.
 
-    Nothing but its size and its schema is looked at before these fit, so that no more memory is taken than they need.
+    Size and schema are checked before rows are read, so that no more memory is taken than they need.
+
+    Parameters
+    ----------
+    content : bytes
+        File.
+    schema : pyarrow.Schema
+        Expected schema.
+    rows : int
+        Expected rows.
+
+    Returns
+    -------
+    pyarrow.Table or None
+        None if there is no such table.
     """
     try:
         file = pq.ParquetFile(pa.BufferReader(content), page_checksum_verification=True)
@@ -190,10 +327,9 @@ def decoded(content: bytes, schema: pa.Schema, rows: int) -> pa.Table | None:
 
 
 def _how(schema: pa.Schema) -> dict[str, Any]:
-    """Settings of the Parquet writer: pages carry checksums (CRC-32), which readers verify.
+    """Return the settings of the Parquet writer: pages carry checksums (CRC-32), which readers verify.
 
-    A result table may have many rows: words as numbers, ids as steps, values as is. Dictionaries of measured values,
-    which hardly repeat, take long to make.
+    In result tables words are dictionary-encoded, ids delta-encoded, and values plain, since they hardly repeat.
     """
     how: dict[str, Any] = {"write_page_checksum": True, "write_batch_size": _ROWS_AT_ONCE}
     if _PARAMETERS.encode() in (schema.metadata or {}):
@@ -203,7 +339,25 @@ def _how(schema: pa.Schema) -> dict[str, Any]:
 
 
 def batches(path: Path, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
-    """Yield a Parquet file, or some columns, a row group at a time; raises OutputError if missing or damaged."""
+    """Yield a Parquet file one row group at a time.
+
+    Parameters
+    ----------
+    path : Path
+        File.
+    columns : sequence of str, optional
+        Columns; left out, all of them.
+
+    Yields
+    ------
+    pyarrow.Table
+        Rows.
+
+    Raises
+    ------
+    OutputError
+        If the file is missing or damaged.
+    """
     try:
         # Buffered ahead, a whole file would be in memory.
         file = pq.ParquetFile(path, pre_buffer=False, page_checksum_verification=True)
@@ -214,7 +368,18 @@ def batches(path: Path, columns: Sequence[str] | None = None) -> Iterator[pa.Tab
 
 
 def rows_in(path: Path) -> int:
-    """Return the number of rows of a Parquet file; 0 where it is missing or damaged."""
+    """Return the number of rows of a Parquet file.
+
+    Parameters
+    ----------
+    path : Path
+        File.
+
+    Returns
+    -------
+    int
+        0 if the file is missing or damaged.
+    """
     try:
         return int(pq.read_metadata(path).num_rows)
     except (OSError, pa.ArrowException):
@@ -222,12 +387,43 @@ def rows_in(path: Path) -> int:
 
 
 def holds(table: pa.Table, column: str, *words: str) -> BoolArray:
-    """Return where a column of words (dictionary-encoded) holds one of `words`, ndarray[n_rows]."""
+    """Return where a dictionary-encoded column holds one of some words.
+
+    Parameters
+    ----------
+    table : pyarrow.Table
+        Table.
+    column : str
+        Column name.
+    *words : str
+        Words.
+
+    Returns
+    -------
+    ndarray of bool, shape (n_rows,)
+        True where it does.
+    """
     return np.asarray(pc.is_in(table[column].cast(pa.string()), pa.array(words)).to_numpy(), dtype=bool)
 
 
 def read_table(path: Path) -> pa.Table:
-    """Read a Parquet file; raises OutputError when it is missing or damaged."""
+    """Read a Parquet file.
+
+    Parameters
+    ----------
+    path : Path
+        File.
+
+    Returns
+    -------
+    pyarrow.Table
+        Table.
+
+    Raises
+    ------
+    OutputError
+        If it is missing or damaged.
+    """
     try:
         return pq.read_table(path, page_checksum_verification=True)
     except (OSError, pa.ArrowException) as error:

@@ -1,4 +1,4 @@
-"""A result table of any length, thinned to the rows that a report shows: the front exactly, the best, a sample."""
+"""Result table of any length, reduced to the rows that a report shows: the exact front, the best, and a sample."""
 
 from __future__ import annotations
 
@@ -35,29 +35,50 @@ _Group = tuple[str, str, str, str, bool, bool]
 
 @dataclass(frozen=True)
 class Counts:
-    """Number of rows of the whole table by kind, scenario, CFA, status, `feasible` and `pareto`.
-
-    Plain CFAs are no designs: they count among the rows alone.
-    """
+    """Number of rows by kind, scenario, CFA, status, `feasible` and `pareto`; plain CFAs are not counted as designs."""
 
     groups: Counter[_Group]
 
     @property
     def rows(self) -> int:
-        """All rows."""
+        """Number of rows."""
         return self.groups.total()
 
     @property
     def failed(self) -> int:
-        """Rows that could not be computed."""
+        """Number of rows that could not be computed."""
         return sum(n for (_, _, _, status, _, _), n in self.groups.items() if status != "ok")
 
     def feasible(self, scenario: str | None = None, cfa: str | None = None, *, met: bool = True) -> int:
-        """Return the number of designs that meet all constraints, or do not, in a scenario and a CFA, or in all."""
+        """Return the number of designs that meet all constraints.
+
+        Parameters
+        ----------
+        scenario, cfa : str, optional
+            Names; left out, all of them.
+        met : bool
+            False: those that do not.
+
+        Returns
+        -------
+        int
+            Number.
+        """
         return sum(n for _, n in self._designs(scenario, cfa, met))
 
     def front(self, scenario: str | None = None, cfa: str | None = None) -> int:
-        """Return the number of feasible designs on the Pareto front."""
+        """Return the number of feasible designs on the Pareto front.
+
+        Parameters
+        ----------
+        scenario, cfa : str, optional
+            Names; left out, all of them.
+
+        Returns
+        -------
+        int
+            Number.
+        """
         return sum(n for pareto, n in self._designs(scenario, cfa, met=True) if pareto)
 
     def _designs(self, scenario: str | None, cfa: str | None, met: bool) -> Iterator[tuple[bool, int]]:
@@ -68,12 +89,34 @@ class Counts:
 
 
 def per_exposure(separation: str) -> str:
-    """Return the name of a derived column: a separation for each millisecond of exposure."""
+    """Return the name of the column of separation per millisecond of exposure.
+
+    Parameters
+    ----------
+    separation : str
+        Column of a separation.
+
+    Returns
+    -------
+    str
+        Name.
+    """
     return f"{separation}_per_ms"
 
 
 def even(size: int, most: int) -> IndexArray:
-    """Return at most `most` of `size` indices, in order, spread evenly and not in step with a grid."""
+    """Return evenly spread indices that are not in step with a grid.
+
+    Parameters
+    ----------
+    size, most : int
+        Number of all indices, and of those returned at most.
+
+    Returns
+    -------
+    ndarray of int
+        Indices in order.
+    """
     if size <= most:
         return np.arange(size)
     golden = (np.arange(most) * ((5**0.5 - 1) / 2)) % 1
@@ -81,10 +124,20 @@ def even(size: int, most: int) -> IndexArray:
 
 
 def swept_points(path: Path) -> IndexArray:
-    """Return the ids of the swept designs of a result table that a report draws as points, in order.
+    """Return the swept designs of a result table that a report draws as points.
 
-    They are the feasible front of each CFA and scenario, and an even share of the others, feasible or not. A design's
-    id is the number of its row, so that a byte for each row is all that is held of a long table.
+    The feasible front of each CFA and scenario, and an even sample of the others. A design's id is its row number, so
+    that a long table takes one byte per row.
+
+    Parameters
+    ----------
+    path : Path
+        File.
+
+    Returns
+    -------
+    ndarray of int
+        Design ids in order.
     """
     parts = [np.zeros(0, dtype=np.uint8)]
     for table in batches(path, ["kind", "feasible", "pareto", "status"]):
@@ -159,7 +212,18 @@ def thinned(
 
 
 def row_groups(table: pa.Table) -> dict[tuple[str, str], IndexArray]:
-    """Return the indices of the rows of each CFA and scenario."""
+    """Return the rows of each CFA and scenario.
+
+    Parameters
+    ----------
+    table : pyarrow.Table
+        Table.
+
+    Returns
+    -------
+    dict of (str, str) to ndarray of int
+        Indices.
+    """
     cfas, scenarios = (
         {name: holds(table, column, name) for name in table[column].unique().to_pylist()}
         for column in ("cfa", "scenario")
@@ -191,7 +255,7 @@ def best_at(table: pa.Table, order: Sequence[str], most: int, among: BoolArray) 
 
 
 def leading_at(table: pa.Table, separation: str, among: BoolArray | None = None) -> IndexArray:
-    """Return, for each scenario, the indices of the rows with the largest separation, and the largest for its exposure.
+    """Return the rows with the largest separation, and the largest per exposure time, in each scenario.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Compiled inner loops of images: digital numbers that are drawn, and how likely they are."""
+"""Compiled inner loops of images: drawn digital numbers, and their likelihood."""
 
 from __future__ import annotations
 
@@ -20,9 +20,18 @@ def draw_numbers(
     uniform: NDArray[np.float64],
     out: NDArray[np.int16],
 ) -> None:
-    """The digital number up to which a share `uniform` of all lies, ndarray[n].
+    """Compute the digital number up to which a share `uniform` of all lies.
 
-    `node`, `share`: see `PixelTable.at`; `below`: see there.
+    Parameters
+    ----------
+    node, share : ndarray of shape (n,)
+        Result of `PixelTable.at`.
+    below : ndarray
+        As in `PixelTable`.
+    uniform : ndarray of shape (n,)
+        Random numbers, 0 to 1.
+    out : ndarray of shape (n,)
+        Digital numbers.
     """
     last = below.shape[1] - 1
     for i in range(node.size):
@@ -50,10 +59,24 @@ def cases_on_table(
     node: NDArray[np.int32],
     share: NDArray[np.float32],
 ) -> None:
-    """`PixelTable.at` of the expected electrons of all cases, ndarray[n_cases, n_pixels].
+    """Compute `PixelTable.at` of the expected electrons of all cases.
 
-    `unlit`, `phantoms`, `lamps`: see `HeadElectrons`, the first of one background, ndarray[n_places, n_pixels].
-    `cases`: ndarray[n_cases, 5]: type of the lit lens or -1, signal, order, phantom, place; `candelas`: of each case.
+    Parameters
+    ----------
+    unlit, phantoms, lamps : ndarray
+        As in `HeadElectrons`, the first for one background.
+    cases : ndarray of int, shape (n_cases, 5)
+        Type of the lit lens or -1, signal, order, phantom, place.
+    candelas : ndarray of shape (n_cases,)
+        Luminous intensity, cd.
+    orders : ndarray of int
+        Signal type of each lens in each order.
+    step : float
+        Step of the table.
+    last : int
+        Last node but one.
+    node, share : ndarray of shape (n_cases, n_pixels)
+        Results.
     """
     for case in range(len(cases)):
         kind, lamp, order, sunny, place = cases[case]
@@ -79,10 +102,18 @@ def log_likelihoods(
     table: NDArray[np.float32],
     out: NDArray[np.float64],
 ) -> None:
-    """Log-likelihood of each case for each image, up to a constant of the image, ndarray[n_images, n_cases].
+    """Compute the log-likelihood of each case for each image, up to a constant of the image.
 
-    `numbers`: ndarray[n_images, n_pixels]; `node`, `share`: ndarray[n_cases, n_pixels], see `PixelTable.at`, pixels
-    that tell most first; `table`: its `shares`, none above 0. -inf for cases that are impossible beside the best.
+    Parameters
+    ----------
+    numbers : ndarray of shape (n_images, n_pixels)
+        Digital numbers.
+    node, share : ndarray of shape (n_cases, n_pixels)
+        Result of `PixelTable.at`, pixels with most information first.
+    table : ndarray
+        `PixelTable.shares`, none above 0.
+    out : ndarray of shape (n_images, n_cases)
+        Results; -inf for cases that are impossible beside the best.
     """
     n_pixels = numbers.shape[1]
     for image in range(numbers.shape[0]):

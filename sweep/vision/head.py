@@ -1,4 +1,4 @@
-"""A signal head on the pixels: how much of each part every pixel sees, blurred, at each wavelength and place.
+"""Signal head on the pixels: light of each part on every pixel, blurred, at each wavelength and place.
 
 Round lenses stand one above the other in a housing before a backplate (all rectangles), as EN 12368's heads of 200 mm:
 lenses 1.5 diameters apart, the housing of three 1.6 x 4.6 diameters, the backplate 3 x 6.
@@ -36,9 +36,14 @@ _PERIOD_PX = 160
 class HeadMaps:
     """Light of each part relative to a uniform field of its radiance.
 
-    `lenses`: ndarray[n_places, n_lenses, side, side, n_knots], `housing` and `backplate` (what lies before them counts
-    as theirs): ndarray[n_places, side, side, n_knots]; the side has `MARGIN` at both ends. `knots_nm`:
-    ndarray[n_knots].
+    Parameters
+    ----------
+    knots_nm : ndarray of shape (n_knots,)
+        Wavelengths, nm.
+    lenses : ndarray of shape (n_places, n_lenses, side, side, n_knots)
+        Light of each lens; the side has `MARGIN` at both ends.
+    housing, backplate : ndarray of shape (n_places, side, side, n_knots)
+        Light of both, including the parts before them.
     """
 
     knots_nm: FloatArray
@@ -48,13 +53,37 @@ class HeadMaps:
 
 
 def heights(vision: Vision) -> FloatArray:
-    """Of the lenses' centers from the head's, downward from the top lens, in diameters, ndarray[n_lenses]."""
+    """Return the positions of the lenses' centers below the head's center.
+
+    Parameters
+    ----------
+    vision : Vision
+        Benchmark.
+
+    Returns
+    -------
+    ndarray of shape (n_lenses,)
+        Diameters.
+    """
     n = len(vision.lenses)
     return np.asarray(SPACING * (np.arange(n) - (n - 1) / 2), dtype=float)
 
 
 def head_places_px(vision: Vision, mosaic: Mosaic) -> FloatArray:
-    """Where the head's center may be, from the image's first pixel: ndarray[n_places, 2] as (column, row)."""
+    """Return the positions of the head's center from the image's first pixel.
+
+    Parameters
+    ----------
+    vision : Vision
+        Benchmark.
+    mosaic : Mosaic
+        Tile.
+
+    Returns
+    -------
+    ndarray of shape (n_places, 2)
+        (column, row), pixels.
+    """
     rows, columns = mosaic.indices.shape
     n = vision.places_per_pixel
     middle = [(vision.crop_px // 2 // size) * size - size / 2 for size in (columns, rows)]
@@ -66,7 +95,20 @@ _maps: Cache[tuple[object, ...], HeadMaps] = Cache(12)
 
 
 def head_maps(setup: Setup, vision: Vision) -> HeadMaps:
-    """The maps of the setup's target; they do not depend on filters, and the latest ones are kept."""
+    """Return the maps of the setup's target, which do not depend on filters; recent ones are cached.
+
+    Parameters
+    ----------
+    setup : Setup
+        Scene and camera.
+    vision : Vision
+        Benchmark.
+
+    Returns
+    -------
+    HeadMaps
+        Maps.
+    """
     target, pixel = setup.scene.target, setup.camera.pixel
     assert target is not None
     optics = vision.optics
@@ -97,13 +139,13 @@ def _made(setup: Setup, vision: Vision, target: Target) -> HeadMaps:
 
 
 def _apart(vision: Vision, centers: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Columns and rows of the pixels (with margin) from each center, ndarray[n_places, side] each."""
+    """Return columns and rows of the pixels (with margin) from each center, ndarray of shape (n_places, side) each."""
     at = np.arange(-MARGIN, vision.crop_px + MARGIN)
     return at - centers[:, :1], at - centers[:, 1:]
 
 
 def _disc(setup: Setup, vision: Vision, centers: FloatArray, knots_nm: FloatArray) -> FloatArray:
-    """A lens by the product's own image of a disc, ndarray[n_places, side, side, n_knots]."""
+    """Return a lens by `disc_image`, ndarray of shape (n_places, side, side, n_knots)."""
     target, pixel = setup.scene.target, setup.camera.pixel
     assert target is not None
     dx, dy = _apart(vision, centers)
@@ -123,10 +165,10 @@ def _disc(setup: Setup, vision: Vision, centers: FloatArray, knots_nm: FloatArra
 def _rectangle(
     setup: Setup, vision: Vision, centers: FloatArray, size_px: tuple[float, float], knots_nm: FloatArray
 ) -> FloatArray:
-    """A rectangle through the same lens onto the same pixels, ndarray[n_places, side, side, n_knots].
+    """Return a rectangle through the same lens onto the same pixels, ndarray of shape (n_places, side, side, n_knots).
 
-    The spectrum of rectangle and pixel times the product's transfer function, which ends at 1 / (lambda N): a cosine
-    series of a period that leaves its neighbors far away.
+    The spectrum of rectangle and pixel times the transfer function, which ends at 1 / (lambda N): a cosine series of a
+    period that leaves its neighbors far away.
     """
     pixel, pitch = setup.camera.pixel, setup.camera.pixel.pitch_um
     defocus = psf.defocus_um(setup.scene, pitch)

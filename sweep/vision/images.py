@@ -29,7 +29,24 @@ Numbers = NDArray[np.int16]
 
 
 def setup_at(setup: Setup, vision: Vision, distance_m: float, level: LightLevel) -> Setup:
-    """The setup's camera before a head at a distance: lamps of 1 cd, exposed as the level says."""
+    """Return the setup's camera before a head at a distance, with lamps of 1 cd.
+
+    Parameters
+    ----------
+    setup : Setup
+        Scene and camera.
+    vision : Vision
+        Benchmark.
+    distance_m : float
+        Distance, m.
+    level : LightLevel
+        Light and exposure.
+
+    Returns
+    -------
+    Setup
+        Setup.
+    """
     scenario = Scene(
         target=vision.target(distance_m),
         optics=vision.optics,
@@ -44,9 +61,16 @@ def setup_at(setup: Setup, vision: Vision, distance_m: float, level: LightLevel)
 class HeadElectrons:
     """Expected electrons of the parts of a head at one distance and level.
 
-    `unlit`: ndarray[n_places, n_backgrounds, n_pixels], all lenses off. What is added: `phantoms`, ndarray[n_places,
-    n_lenses, n_lenses, n_pixels] by position and type, and for each candela and second `lamps`, ndarray[n_places,
-    n_lenses, n_signals, n_pixels] by position.
+    Parameters
+    ----------
+    unlit : ndarray of shape (n_places, n_backgrounds, n_pixels)
+        All lenses off.
+    phantoms : ndarray of shape (n_places, n_lenses, n_lenses, n_pixels)
+        Added by sun on a lens, by position and type.
+    lamps : ndarray of shape (n_places, n_lenses, n_signals, n_pixels)
+        Added per candela and second, by position.
+    time_s : float
+        Exposure time, s.
     """
 
     unlit: FloatArray
@@ -62,9 +86,19 @@ class HeadElectrons:
         phantom_on: IndexArray,
         lit: tuple[IndexArray, IndexArray, FloatArray],
     ) -> FloatArray:
-        """Electrons of some heads, ndarray[n, n_pixels]; the other arguments are ndarray[n].
+        """Return electrons of some heads.
 
-        `lit`: the type of the lit lens (-1: none), its signal, its intensity in candelas.
+        Parameters
+        ----------
+        place, background, order, phantom_on : ndarray of int, shape (n,)
+            Choices of each head.
+        lit : tuple of ndarray of shape (n,)
+            Type of the lit lens (-1: none), its signal, its intensity, cd.
+
+        Returns
+        -------
+        ndarray of shape (n, n_pixels)
+            Expected electrons.
         """
         found = self.unlit[place, background]
         sunny = np.flatnonzero(phantom_on)
@@ -76,9 +110,16 @@ class HeadElectrons:
 
 
 class HeadCamera:
-    """A design before signal heads: what it expects of each part, at every distance and level of a benchmark.
+    """One design before signal heads, at every distance and level of a benchmark.
 
-    `curves`: QE of the modified channels, ndarray[n_modified, n_wavelengths].
+    Parameters
+    ----------
+    setup : Setup
+        Scene and camera.
+    curves : ndarray of shape (n_modified, n_wavelengths)
+        QE of the modified channels.
+    vision : Vision
+        Benchmark.
     """
 
     def __init__(self, setup: Setup, curves: FloatArray, vision: Vision) -> None:
@@ -100,7 +141,18 @@ class HeadCamera:
         self._heads: dict[tuple[int, int], HeadElectrons] = {}
 
     def electrons(self, distance: int, level: int) -> HeadElectrons:
-        """Of one distance and level, by their numbers; kept."""
+        """Return the electrons at one distance and level; cached.
+
+        Parameters
+        ----------
+        distance, level : int
+            Indices.
+
+        Returns
+        -------
+        HeadElectrons
+            Electrons.
+        """
         if (distance, level) not in self._heads:
             self._heads[distance, level] = self._made(distance, level)
         return self._heads[distance, level]
@@ -127,33 +179,33 @@ class HeadCamera:
         )
 
     def _phantoms(self, maps: HeadMaps, setup: Setup, level: LightLevel) -> FloatArray:
-        """Electrons/s of sun on each lens, as its color lets it back."""
+        """Return electrons/s of sun on each lens, reflected with its color."""
         spectra = np.stack([phantom(setup.camera.grid, kind) for kind in self.vision.lenses])
         per_cd = self._per_candela(setup) / luminance_per_photon_radiance(setup.camera.grid, spectra)
         return self._of_lenses(maps, spectra * (level.phantom_cd * per_cd)[:, None])
 
     def _per_candela(self, setup: Setup) -> float:
-        """Luminance of a lens of one candela, times the irradiance for each radiance."""
+        """Return the luminance of a lens of one candela, times irradiance over radiance."""
         luminance = setup.scene.luminance_cd_m2
         assert luminance is not None
         return luminance * irradiance_factor(self.vision.optics)
 
     def _lamp_rates(self, distance: int, maps: HeadMaps, setup: Setup) -> FloatArray:
-        """Electrons/s of each lamp of one candela at each position; the same at all levels."""
+        """Return electrons/s of each lamp of one candela at each position; equal at all levels."""
         if distance not in self._lamps:
             self._lamps[distance] = self._of_lenses(maps, signal_irradiance(setup))
         return self._lamps[distance]
 
     def _of_lenses(self, maps: HeadMaps, spectra: FloatArray) -> FloatArray:
-        """Spectra on each lens: ndarray[n_places, n_lenses, n_spectra, n_pixels]."""
+        """Return spectra on each lens, ndarray of shape (n_places, n_lenses, n_spectra, n_pixels)."""
         places, positions = maps.lenses.shape[:2]
         seen = self._seen(maps, maps.lenses.reshape(-1, *maps.lenses.shape[2:]), spectra)
         return np.maximum(seen.reshape(places, positions, *seen.shape[1:]), 0.0)
 
     def _seen(self, maps: HeadMaps, light: FloatArray, spectra: FloatArray) -> FloatArray:
-        """Electrons/s of images with spectra, through each pixel's filter, with crosstalk.
+        """Return electrons/s of images with spectra, through each pixel's filter, with crosstalk.
 
-        `light`: ndarray[n, side, side, n_knots] -> ndarray[n, n_spectra, n_pixels].
+        `light` has shape (n, side, side, n_knots), the result (n, n_spectra, n_pixels).
         """
         setup = self.setup
         on_knots = hats(setup.camera.grid.nodes_nm, maps.knots_nm)
@@ -170,11 +222,28 @@ class HeadCamera:
         return found[:, :, inner, inner].reshape(*found.shape[:2], -1)
 
     def n_places(self) -> int:
-        """Places of the head on the mosaic."""
+        """Return the number of positions of the head on the mosaic.
+
+        Returns
+        -------
+        int
+            Number.
+        """
         return int(self.setup.camera.mosaic.indices.size * self.vision.places_per_pixel**2)
 
     def expected(self, scenes: Scenes) -> FloatArray:
-        """Expected electrons of scenes, ndarray[n, n_pixels]."""
+        """Return expected electrons of scenes.
+
+        Parameters
+        ----------
+        scenes : Scenes
+            Scenes.
+
+        Returns
+        -------
+        ndarray of shape (n, n_pixels)
+            Electrons.
+        """
         n_pixels = self.vision.crop_px**2
         found = np.empty((len(scenes), n_pixels))
         candelas = np.array(self.vision.intensities_cd)
@@ -191,7 +260,18 @@ class HeadCamera:
         return found
 
     def images(self, scenes: Scenes) -> Numbers:
-        """Images of scenes as the camera reads them, each with its own photons."""
+        """Return images of scenes, each with its own photons.
+
+        Parameters
+        ----------
+        scenes : Scenes
+            Scenes.
+
+        Returns
+        -------
+        ndarray of shape (n, n_pixels)
+            Digital numbers.
+        """
         electrons = self.expected(scenes)
         node, share = self.table.at(electrons.ravel())
         found = np.empty(electrons.size, dtype=np.int16)

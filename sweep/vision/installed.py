@@ -1,4 +1,4 @@
-"""Whether the libraries are there that the network needs; nothing is imported to find out."""
+"""Check for the libraries of the network, without importing them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,13 @@ from ..base.errors import Fault, SweepError
 
 
 def require_network() -> None:
-    """Raises SweepError where JAX and Optax are not installed."""
+    """Raise SweepError if JAX and Optax are not installed.
+
+    Raises
+    ------
+    SweepError
+        If they are not.
+    """
     if any(find_spec(name) is None for name in ("jax", "optax")):
         allowed = "pip install 'cfa-sweep[vision]', or `network: false`"
         raise SweepError(

@@ -1,4 +1,4 @@
-"""Which lamps a reader may learn from: those of the test are never among them, by the digest of their spectra."""
+"""Split of the lamps into training, check and test, by the digest of their spectra."""
 
 from __future__ import annotations
 
@@ -18,24 +18,71 @@ _PARTS = (TRAIN, CHECK, TEST)
 
 @dataclass(frozen=True)
 class Lamps:
-    """Lamps of each lens that a part of the images shows: for each signal type the indices of signals."""
+    """Signals of each lens's type that a part of the images shows.
+
+    Parameters
+    ----------
+    of_lens : tuple of ndarray of int
+        Signals, one array per lens.
+    """
 
     of_lens: tuple[IndexArray, ...]
 
     def digests(self, lights: Lights) -> set[str]:
-        """Digests of their spectra."""
+        """Return the digests of the spectra.
+
+        Parameters
+        ----------
+        lights : Lights
+            Signals.
+
+        Returns
+        -------
+        set of str
+            Digests.
+        """
         return {spectrum_digest(lights.photons[i]) for own in self.of_lens for i in own}
 
 
 def spectrum_digest(spectrum: FloatArray) -> str:
-    """SHA-256 of a spectrum."""
+    """Return the SHA-256 of a spectrum.
+
+    Parameters
+    ----------
+    spectrum : ndarray of shape (n_wavelengths,)
+        Spectrum.
+
+    Returns
+    -------
+    str
+        Digest.
+    """
     return hashlib.sha256(np.ascontiguousarray(spectrum, dtype="<f8").tobytes()).hexdigest()
 
 
 def split_lamps(lights: Lights, vision: Vision, seed: tuple[int, int]) -> dict[str, Lamps]:
-    """Half of the lamps of each signal type to train, a quarter to check, a quarter to test; one at least.
+    """Split the lamps of each signal type: half to train, a quarter to check, a quarter to test; one at least.
 
-    Signals of one spectrum are one lamp. Raises SweepError where a lamp of the test has the spectrum of another part's.
+    Signals with equal spectra are one lamp.
+
+    Parameters
+    ----------
+    lights : Lights
+        Signals.
+    vision : Vision
+        Benchmark.
+    seed : tuple of int
+        Seed of the study, and number of this seed.
+
+    Returns
+    -------
+    dict of str to Lamps
+        Parts.
+
+    Raises
+    ------
+    SweepError
+        If a lamp of the test has the spectrum of another part's.
     """
     rng = np.random.default_rng((*seed, 1))
     parts: dict[str, list[IndexArray]] = {part: [] for part in _PARTS}

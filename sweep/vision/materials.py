@@ -1,8 +1,8 @@
-"""Spectra of surfaces and of what lights them: of CIE, of the ColorChecker (through colour-science), and measured ones.
+"""Spectra of surfaces and illuminants: of CIE, of the ColorChecker (through colour-science), and measured ones.
 
 Surfaces are patches of the ColorChecker (N. Ohta, 1997): `foliage`, `blue sky` and its neutral row; or the mean of a
-group that the package ships (`sweep list data`): measured soil, asphalt and concrete, modeled canopies. Street light is
-CIE's LED-B3 (a phosphor LED of 4100 K) or HP1 (high-pressure sodium), CIE 015:2018.
+group that the package ships (`sweep list data`): measured soil, asphalt and concrete, modeled canopies. Street light
+is CIE's LED-B3 (a phosphor LED of 4100 K) or HP1 (high-pressure sodium), CIE 015:2018.
 """
 
 from __future__ import annotations
@@ -40,7 +40,20 @@ _LENS_WIDTH_NM = 6.0
 
 @cache
 def ambient_light(grid: WavelengthGrid, name: Illuminant) -> FloatArray:
-    """Photons of a light, which integrate to 1 on the grid, ndarray[n_wavelengths]."""
+    """Return the photons of an illuminant, normalized to an integral of 1.
+
+    Parameters
+    ----------
+    grid : WavelengthGrid
+        Wavelengths, nm.
+    name : str
+        Illuminant.
+
+    Returns
+    -------
+    ndarray of shape (n_wavelengths,)
+        Photons per nm.
+    """
     from colour import SDS_ILLUMINANTS  # noqa: PLC0415  (more than a second to import)
 
     held = SDS_ILLUMINANTS[_ILLUMINANTS[name]]
@@ -50,9 +63,19 @@ def ambient_light(grid: WavelengthGrid, name: Illuminant) -> FloatArray:
 
 @cache
 def reflectance(grid: WavelengthGrid, name: Material) -> FloatArray:
-    """Share of the light that a surface sends back, ndarray[n_wavelengths]; beyond its range as at its end.
+    """Return the reflectance of a surface; constant beyond its range, 0 for those of a group.
 
-    Those of a group are 0 there.
+    Parameters
+    ----------
+    grid : WavelengthGrid
+        Wavelengths, nm.
+    name : str
+        Material.
+
+    Returns
+    -------
+    ndarray of shape (n_wavelengths,)
+        0 to 1.
     """
     if name not in _PATCHES:
         return np.asarray(group(grid, name).mean(axis=0), dtype=float)
@@ -63,10 +86,22 @@ def reflectance(grid: WavelengthGrid, name: Material) -> FloatArray:
 
 
 def phantom(grid: WavelengthGrid, kind: str) -> FloatArray:
-    """Photons of daylight that comes back through a colored lens, which integrate to 1, ndarray[n_wavelengths].
+    """Return the photons of daylight reflected by a colored lens, normalized to an integral of 1.
 
     The lens is modeled, not measured: a band with logistic edges, passed twice. A lens of another signal type than
     red, orange, yellow and green is clear.
+
+    Parameters
+    ----------
+    grid : WavelengthGrid
+        Wavelengths, nm.
+    kind : str
+        Signal type of the lens.
+
+    Returns
+    -------
+    ndarray of shape (n_wavelengths,)
+        Photons per nm.
     """
     nodes = grid.nodes_nm
     passed = np.ones(nodes.size)

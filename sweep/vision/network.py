@@ -1,7 +1,7 @@
-"""A small convolutional network on raw pixels, trained with JAX on the CPU; the same for every CFA.
+"""Small convolutional network on raw pixels, trained with JAX on the CPU; the same for every CFA.
 
-Planes by tile position come in, three layers of 3 x 3 filters (16, 24 and 32 of them, the last two with a step of two
-pixels) and a dense layer of 32 follow. The order of the sums is fixed: the same seed gives the same numbers on one
+Planes by tile position are the input; three layers of 3 x 3 filters (16, 24 and 32 of them, the last two with a stride
+of two pixels) and a dense layer of 32 follow. The order of the sums is fixed: one seed gives the same numbers on one
 machine.
 """
 
@@ -37,7 +37,7 @@ _OPTIMIZER = optax.adam(_RATE)
 
 
 def _start(key: Any, shape: tuple[int, ...], n_states: int) -> _Weights:
-    """He's initial weights for planes of a shape, (rows, columns, planes)."""
+    """Return He's initial weights for planes of a shape, (rows, columns, planes)."""
     high, wide, planes = shape
     weights: _Weights = {}
     keys = jax.random.split(key, len(_FILTERS) + 2)
@@ -54,7 +54,7 @@ def _start(key: Any, shape: tuple[int, ...], n_states: int) -> _Weights:
 
 
 def _filtered(x: Any, filters: Any, bias: Any, step: int) -> Any:
-    """3 x 3 filters as one matrix product, many times faster on a CPU than XLA's own convolution."""
+    """Apply 3 x 3 filters as one matrix product, many times faster on a CPU than XLA's own convolution."""
     high, wide = x.shape[1:3]
     padded = jnp.pad(x, ((0, 0), (1, 1), (1, 1), (0, 0)))
     shifts = [padded[:, i : i + high : step, j : j + wide : step] for i in range(3) for j in range(3)]
@@ -74,7 +74,7 @@ def _loss(weights: _Weights, x: Any, y: Any) -> Any:
 
 @jax.jit
 def _steps(weights: _Weights, state: Any, x: Any, y: Any) -> tuple[_Weights, Any]:
-    """One step for each of a few batches."""
+    """Take one step for each of a few batches."""
 
     def step(held: tuple[_Weights, Any], batch: tuple[Any, Any]) -> tuple[tuple[_Weights, Any], None]:
         gradient = jax.grad(_loss)(held[0], *batch)
@@ -90,7 +90,17 @@ _told: Callable[..., Any] = jax.jit(lambda weights, x: jax.nn.softmax(_logits(we
 
 @dataclass(frozen=True)
 class Network:
-    """A trained network. `mean`, `deviation`: of the values that it was trained on; `epochs`: passes that it took."""
+    """Trained network.
+
+    Parameters
+    ----------
+    weights : list
+        Weights.
+    mean, deviation : float
+        Moments of the training values.
+    epochs : int
+        Passes over the training images.
+    """
 
     weights: _Weights
     mean: float
@@ -98,7 +108,18 @@ class Network:
     epochs: int
 
     def probabilities(self, planes: FloatArray) -> FloatArray:
-        """Of each state, ndarray[n, n_states]; `planes`: ndarray[n, rows, columns, planes]."""
+        """Return the probability of each state.
+
+        Parameters
+        ----------
+        planes : ndarray of shape (n, rows, columns, planes)
+            Images.
+
+        Returns
+        -------
+        ndarray of shape (n, n_states)
+            Probabilities.
+        """
         told = _told(self.weights, _scaled(planes, self.mean, self.deviation))
         found = np.asarray(told, dtype=float)
         return np.asarray(found / found.sum(axis=1, keepdims=True), dtype=float)
@@ -116,9 +137,25 @@ def train(
     epochs: int,
     seed: tuple[int, ...],
 ) -> Network:
-    """A network trained on `planes` and their states; `check`: planes and states on which early stopping looks.
+    """Train a network; the weights with the smallest loss on the check images are kept.
 
-    Of all epochs the weights with the smallest loss on `check` are kept.
+    Parameters
+    ----------
+    planes : ndarray of shape (n, rows, columns, planes)
+        Training images.
+    states : ndarray of int, shape (n,)
+        Their states.
+    check : tuple of ndarray
+        Images and states for early stopping.
+    n_states, epochs : int
+        Number of states, and of passes at most.
+    seed : tuple of int
+        Seed.
+
+    Returns
+    -------
+    Network
+        Trained network.
     """
     rng = np.random.default_rng(seed)
     mean, deviation = float(planes.mean()), max(float(planes.std()), 1e-12)

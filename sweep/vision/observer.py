@@ -1,8 +1,8 @@
-"""The ideal observer: it knows how images come about, and sums the likelihood over everything that is random.
+"""Ideal observer: it knows how images arise, and sums the likelihood over everything that is random.
 
-It knows the lamps that the images show, and is told distance, light level and background, which the images themselves
-show. It sums over the state, the lamp, its intensity, the sun on the lenses, their order, and the place of the head.
-So no reader of these images is more often right on average.
+It knows the lamps that the images show, and is given distance, light level and background, which the images themselves
+show. It sums over the state, the lamp, its intensity, the sun on the lenses, their order, and the position of the
+head. On average no reader of these images is more often right.
 
 Between two nodes of the pixel's table images are drawn from a mixture, of which it takes the mean of the logarithms:
 less than 0.002 of a pixel's log-likelihood.
@@ -24,10 +24,14 @@ from .scenes import PHANTOM_SHARE, SHUFFLED, Scenes, orders_of_lenses, states_of
 
 @dataclass(frozen=True)
 class _Cases:
-    """All that a head can be, one by one.
+    """All states of a head, one by one.
 
-    `table`: ndarray[n_cases, 5]: type of the lit lens or -1, signal, order, phantom, place; `candelas` and `share`, how
-    frequent each is in its state, ndarray[n_cases].
+    Parameters
+    ----------
+    table : ndarray of int, shape (n_cases, 5)
+        Type of the lit lens or -1, signal, order, phantom, place.
+    candelas, share : ndarray of shape (n_cases,)
+        Intensity, cd, and probability within the state.
     """
 
     table: IndexArray
@@ -52,9 +56,25 @@ def _cases(camera: HeadCamera, lamps: Lamps, order: str, sunny: bool) -> _Cases:
 
 
 def posteriors(camera: HeadCamera, scenes: Scenes, images: Numbers, lamps: Lamps, order: str) -> FloatArray:
-    """Probability of each state given each image, ndarray[n_images, n_states]; all states are equally frequent.
+    """Return the probability of each state given each image; all states are equally frequent.
 
-    `lamps`, `order`: from which the scenes were drawn.
+    Parameters
+    ----------
+    camera : HeadCamera
+        Design.
+    scenes : Scenes
+        Scenes of the images.
+    images : ndarray
+        Digital numbers.
+    lamps : Lamps
+        Lamps of the scenes.
+    order : str
+        Order of the lenses.
+
+    Returns
+    -------
+    ndarray of shape (n_images, n_states)
+        Probabilities.
     """
     found = np.empty((len(scenes), len(states_of(camera.vision))))
     groups = np.stack([scenes.distance, scenes.level, scenes.background], axis=1)
@@ -68,7 +88,7 @@ def posteriors(camera: HeadCamera, scenes: Scenes, images: Numbers, lamps: Lamps
 
 
 def _of_states(camera: HeadCamera, images: Numbers, heads: HeadElectrons, background: int, cases: _Cases) -> FloatArray:
-    """Probability of each state before a background, ndarray[n_images, n_states]."""
+    """Return the probability of each state before a background, ndarray of shape (n_images, n_states)."""
     n_cases, unlit = len(cases.table), heads.unlit[:, background]
     telling = np.argsort(-_telling(heads, unlit), kind="stable")
     dark, sun, lamp = (np.ascontiguousarray(each[..., telling]) for each in (unlit, heads.phantoms, heads.lamps))
@@ -86,5 +106,5 @@ def _of_states(camera: HeadCamera, images: Numbers, heads: HeadElectrons, backgr
 
 
 def _telling(heads: HeadElectrons, unlit: FloatArray) -> FloatArray:
-    """About how much each pixel tells: how much a mean lamp changes it beside its noise, ndarray[n_pixels]."""
+    """Return the approximate information of each pixel: effect of a mean lamp over its noise."""
     return np.asarray(heads.lamps.mean(axis=(0, 1, 2)) / np.sqrt(unlit.mean(axis=0) + 1), dtype=float)

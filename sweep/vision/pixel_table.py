@@ -1,8 +1,8 @@
-"""How often a pixel reads each digital number: sums over Poisson electrons, tabulated over the expected electrons.
+"""Distribution of a pixel's digital number: sums over Poisson electrons, tabulated over the expected electrons.
 
-The order is the camera's: gain error, Poisson electrons, full well, read noise, gain and pedestal, ADC range, rounding.
-Between two nodes of the root of the electrons the distributions are mixed linearly: the mean is exact, and a mixture of
-two neighbors has up to 0.4 % more variance.
+The order is the camera's: gain error, Poisson electrons, full well, read noise, gain and pedestal, ADC range,
+rounding. Between two nodes of the root of the electrons the distributions are mixed linearly: the mean is exact, and a
+mixture of two neighbors has up to 0.4 % more variance.
 """
 
 from __future__ import annotations
@@ -27,8 +27,14 @@ _REACH = 9.5
 
 @dataclass(frozen=True)
 class PixelTable:
-    """`shares`: log of the share of each digital number, less that number's largest over all nodes,
-    ndarray[n_numbers, n_nodes]; `below`: share of the numbers up to each, ndarray[n_nodes, n_numbers].
+    """Distribution of a pixel at nodes of the expected electrons.
+
+    Parameters
+    ----------
+    shares : ndarray of shape (n_numbers, n_nodes)
+        Log of the probability of each number, less its largest over all nodes.
+    below : ndarray of shape (n_nodes, n_numbers)
+        Cumulative probability.
     """
 
     shares: NDArray[np.float32]
@@ -36,11 +42,22 @@ class PixelTable:
 
     @property
     def last(self) -> int:
-        """The last node but one."""
+        """Last node but one."""
         return len(self.below) - 2
 
     def at(self, electrons: FloatArray) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-        """The node below each expected number of electrons, and the share of the next one, of any shape."""
+        """Return the node below each expected number of electrons, and the share of the next one.
+
+        Parameters
+        ----------
+        electrons : ndarray
+            Expected electrons.
+
+        Returns
+        -------
+        node, share : ndarray of the same shape
+            Node and share.
+        """
         node = np.minimum(np.sqrt(electrons) / ROOT_STEP, self.last).astype(np.int32)
         # Linear in the electrons, not in their root, so that the mean is exact.
         share = (electrons / ROOT_STEP**2 - node.astype(float) ** 2) / (2.0 * node + 1)
@@ -49,7 +66,18 @@ class PixelTable:
 
 @lru_cache(maxsize=4)
 def pixel_table(pixel: Pixel) -> PixelTable:
-    """The table of a pixel with its noise."""
+    """Return the table of a pixel with its noise; cached.
+
+    Parameters
+    ----------
+    pixel : Pixel
+        Full well, gain, noise and ADC.
+
+    Returns
+    -------
+    PixelTable
+        Table.
+    """
     shares = _with_prnu(_without_prnu(pixel), pixel)
     logs = np.log(np.maximum(shares, _LEAST)).T
     logs -= logs.max(axis=1, keepdims=True)
@@ -59,13 +87,13 @@ def pixel_table(pixel: Pixel) -> PixelTable:
 
 
 def _nodes_e(pixel: Pixel) -> FloatArray:
-    """Expected electrons of the nodes, from none to where nothing changes any more."""
+    """Return the expected electrons of the nodes, from 0 to saturation."""
     last = math.sqrt(moments.Ends.of(moments.without_prnu(pixel)).last_e)
     return np.asarray((np.arange(math.ceil(last / ROOT_STEP) + 2) * ROOT_STEP) ** 2, dtype=float)
 
 
 def _without_prnu(pixel: Pixel) -> FloatArray:
-    """Shares of the digital numbers of each node without gain errors, ndarray[n_nodes, n_numbers]."""
+    """Return the distribution at each node without gain errors, ndarray of shape (n_nodes, n_numbers)."""
     from scipy.sparse import csr_matrix  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
     well = math.ceil(pixel.well_e)
@@ -94,7 +122,7 @@ def _without_prnu(pixel: Pixel) -> FloatArray:
 
 
 def _with_prnu(shares: FloatArray, pixel: Pixel) -> FloatArray:
-    """The mean over the pixels' Gaussian gains, by the trapezoidal rule between the nodes."""
+    """Return the mean over Gaussian gains of the pixels, by the trapezoidal rule between the nodes."""
     if not pixel.prnu:
         return shares
     from scipy.sparse import csr_matrix  # noqa: PLC0415  (slow to import: kept off the start-up path)

@@ -1,4 +1,4 @@
-"""A raw image as planes: one for each pixel of the tile, or one for each channel after demosaicking."""
+"""Raw image as planes: one per pixel of the tile, or one per channel after demosaicking."""
 
 from __future__ import annotations
 
@@ -10,7 +10,20 @@ from ..camera.mosaic import Mosaic
 
 
 def tile_planes(images: FloatArray, mosaic: Mosaic) -> FloatArray:
-    """Each position of the tile as a plane: [n, rows, columns] -> [n, rows / tile, columns / tile, positions]."""
+    """Return each position of the tile as a plane.
+
+    Parameters
+    ----------
+    images : ndarray of shape (n, rows, columns)
+        Raw images.
+    mosaic : Mosaic
+        Tile.
+
+    Returns
+    -------
+    ndarray of shape (n, rows / tile, columns / tile, positions)
+        Planes.
+    """
     rows, columns = mosaic.indices.shape
     n, high, wide = images.shape
     parts = images.reshape(n, high // rows, rows, wide // columns, columns)
@@ -18,9 +31,21 @@ def tile_planes(images: FloatArray, mosaic: Mosaic) -> FloatArray:
 
 
 def demosaicked(images: FloatArray, mosaic: Mosaic) -> FloatArray:
-    """Every channel at every pixel, of a tile of any size: [..., rows, columns] -> [..., rows, columns, n_channels].
+    """Return every channel at every pixel, for a tile of any size.
 
-    Normalized convolution with a tent as wide as the tile, the product's own rule (`camera/effects/demosaic.py`).
+    Normalized convolution with a tent as wide as the tile, as in `camera.sampling.center_weights`.
+
+    Parameters
+    ----------
+    images : ndarray of shape (..., rows, columns)
+        Raw images.
+    mosaic : Mosaic
+        Tile.
+
+    Returns
+    -------
+    ndarray of shape (..., rows, columns, n_channels)
+        Demosaicked images.
     """
     tile = mosaic.indices
     high, wide = images.shape[-2:]
@@ -35,7 +60,7 @@ def demosaicked(images: FloatArray, mosaic: Mosaic) -> FloatArray:
 
 
 def _convolved(images: FloatArray, tents: list[FloatArray]) -> FloatArray:
-    """With the product of a tent along the rows' axis and one along the columns'."""
+    """Convolve with the product of a tent along the rows' axis and one along the columns'."""
     found = images
     for axis, tent in zip((-2, -1), tents, strict=True):
         found = convolve1d(found, tent, axis=axis, mode="constant")
@@ -43,10 +68,26 @@ def _convolved(images: FloatArray, tents: list[FloatArray]) -> FloatArray:
 
 
 def false_colors(image: FloatArray, mosaic: Mosaic, mean_nm: FloatArray, offset_dn: float) -> FloatArray:
-    """A demosaicked image in false colors, 0 to 1, ndarray[rows, columns, 3].
+    """Return a demosaicked image in false colors.
 
-    Red shows the channel that sees the longest wavelengths on average, blue that of the shortest, green the one in the
-    middle; `mean_nm`: ndarray[n_channels]. The brightest value is 1, and the root brings out what is dark.
+    Red shows the channel with the longest mean wavelength, blue the shortest, green the one in the middle. The
+    brightest value is 1; the root shows dark parts.
+
+    Parameters
+    ----------
+    image : ndarray of shape (rows, columns)
+        Raw image, DN.
+    mosaic : Mosaic
+        Tile.
+    mean_nm : ndarray of shape (n_channels,)
+        Mean wavelength of each channel, nm.
+    offset_dn : float
+        Pedestal, DN.
+
+    Returns
+    -------
+    ndarray of shape (rows, columns, 3)
+        0 to 1.
     """
     planes = np.maximum(demosaicked(image, mosaic) - offset_dn, 0.0)
     order = np.argsort(-mean_nm)

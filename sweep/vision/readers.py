@@ -1,4 +1,4 @@
-"""A design before the benchmark: what the ideal observer and the network say of the same images, for one seed."""
+"""One design in the benchmark: answers of the ideal observer and the network to the same images, for one seed."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ _SHOWN = 12
 
 @dataclass(frozen=True)
 class Answers:
-    """Probability of each state, ndarray[n, n_states], as readers of the same images say it.
+    """Probability of each state from readers of the same images, ndarray of shape (n, n_states) each.
 
-    `half`: of a network that learned from half of the images. Without a network both are empty.
+    `half` is a network that learned from half of the images. Without a network both are empty.
     """
 
     scenes: Scenes
@@ -35,10 +35,10 @@ class Answers:
 
 @dataclass(frozen=True)
 class SeedReading:
-    """Answers of one seed, by the order of the lenses, on lamps that the network has not seen, and on those it has.
+    """Answers of one seed by order of the lenses, on lamps that the network has not seen, and on those it has.
 
-    `pictures`: images of unseen lamps that were read wrongly in false colors, ndarray[n, rows, columns, 3] of 0 to 1;
-    `pictured`: their numbers among the images with lenses in any order.
+    `pictures` are wrongly read images in false colors, [n, rows, columns, 3]; `pictured` their numbers among the
+    images with lenses in any order.
     """
 
     unseen: dict[str, Answers]
@@ -48,9 +48,23 @@ class SeedReading:
 
 
 def read_images(setup: Setup, curves: FloatArray, vision: Vision, seed: tuple[int, int]) -> SeedReading:
-    """One design and one seed; `curves`: of the modified channels, ndarray[n_modified, n_wavelengths].
+    """Read the images of one design and one seed.
 
-    `seed`: the study's and the number of this one, from which lamps, scenes, photons and training follow.
+    Parameters
+    ----------
+    setup : Setup
+        Scene and camera.
+    curves : ndarray of shape (n_modified, n_wavelengths)
+        QE of the modified channels.
+    vision : Vision
+        Benchmark.
+    seed : tuple of int
+        Seed of the study, and number of this seed.
+
+    Returns
+    -------
+    SeedReading
+        Answers.
     """
     camera = HeadCamera(setup, curves, vision)
     lamps = split_lamps(setup.lights, vision, seed)
@@ -71,9 +85,25 @@ def read_images(setup: Setup, curves: FloatArray, vision: Vision, seed: tuple[in
 
 
 def observer_error(setup: Setup, curves: FloatArray, vision: Vision, seed: tuple[int, int]) -> float:
-    """What the ideal observer leaves in doubt of one seed's test images, the lenses in any order; see `read_images`.
+    """Return the expected error of the ideal observer on one seed's test images, with the lenses in any order.
 
-    The mean of one less the probability of the most probable state: its expected error, with less scatter than a count.
+    The mean of one less the probability of the most probable state, with less scatter than a count.
+
+    Parameters
+    ----------
+    setup : Setup
+        Scene and camera.
+    curves : ndarray of shape (n_modified, n_wavelengths)
+        QE of the modified channels.
+    vision : Vision
+        Benchmark.
+    seed : tuple of int
+        Seed of the study, and number of this seed.
+
+    Returns
+    -------
+    float
+        Error probability.
     """
     camera, order = HeadCamera(setup, curves, vision), ORDERS[-1]
     lamps = split_lamps(setup.lights, vision, seed)[TEST]
@@ -82,7 +112,7 @@ def observer_error(setup: Setup, curves: FloatArray, vision: Vision, seed: tuple
 
 
 def _key(seed: tuple[int, int], order: str) -> tuple[int, ...]:
-    """Of the test's scenes."""
+    """Return the seed of the test's scenes."""
     return (*seed, 10 + ORDERS.index(order), 0)
 
 
@@ -92,10 +122,19 @@ def _drawn(camera: HeadCamera, lamps: Lamps, order: str, count: int, key: tuple[
 
 
 def planes_of(camera: HeadCamera, images: Numbers) -> FloatArray:
-    """What the network sees: roots of the digital numbers above the pedestal, whose noise is even.
+    """Return the input of the network: roots of the digital numbers above the pedestal, whose noise is uniform.
 
-    Raw pixels by tile position, ndarray[n, rows / tile, columns / tile, positions], or as a study asks for it every
-    channel at every pixel, ndarray[n, rows, columns, n_channels].
+    Parameters
+    ----------
+    camera : HeadCamera
+        Design.
+    images : ndarray
+        Digital numbers.
+
+    Returns
+    -------
+    ndarray
+        Raw pixels by tile position, or every channel at every pixel, as the study asks.
     """
     pixel, mosaic = camera.pixel, camera.setup.camera.mosaic
     whole = camera.vision.input == "demosaicked"
@@ -112,7 +151,7 @@ def _none() -> tuple[list[FloatArray], list[FloatArray], int]:
 def _of_networks(
     camera: HeadCamera, lamps: dict[str, Lamps], order: str, key: tuple[int, ...], tests: list[Numbers]
 ) -> tuple[list[FloatArray], list[FloatArray], int]:
-    """What a network that learned from all images, and one from half of them, say of tests; epochs of the first."""
+    """Return the answers of networks trained on all images and on half of them, and the epochs of the first."""
     from .network import train  # noqa: PLC0415  (JAX: only where a study asks for a network)
 
     vision = camera.vision
@@ -130,7 +169,7 @@ def _of_networks(
 
 
 def _pictures(camera: HeadCamera, answers: Answers, images: Numbers) -> tuple[FloatArray, list[int]]:
-    """Images that the network (without one, the observer) read wrongly, as many as are kept."""
+    """Return images that the network (without one, the observer) read wrongly, up to a number."""
     told = answers.network if answers.network.size else answers.observer
     wrong = np.flatnonzero(told.argmax(axis=1) != answers.scenes.state)[:_SHOWN]
     curves = camera.qe

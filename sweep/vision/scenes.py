@@ -1,4 +1,4 @@
-"""The scenes of a benchmark: one list for all CFAs, with the numbers from which their photons are drawn."""
+"""Scenes of a benchmark: one list for all CFAs, with the random numbers of their photons."""
 
 from __future__ import annotations
 
@@ -24,12 +24,34 @@ PHANTOM_SHARE = 0.5
 
 @cache
 def orders_of_lenses(n_lenses: int) -> IndexArray:
-    """Signal type of the lens at each position from the top, ndarray[n_orders, n_lenses]; the street's is first."""
+    """Return the signal type of the lens at each position from the top; the street's order is first.
+
+    Parameters
+    ----------
+    n_lenses : int
+        Number of lenses.
+
+    Returns
+    -------
+    ndarray of int, shape (n_orders, n_lenses)
+        Orders.
+    """
     return np.array(list(permutations(range(n_lenses))), dtype=np.intp)
 
 
 def states_of(vision: Vision) -> tuple[str, ...]:
-    """What a reader can answer: off, or the type of the lit lens."""
+    """Return the possible answers of a reader: off, or the type of the lit lens.
+
+    Parameters
+    ----------
+    vision : Vision
+        Benchmark.
+
+    Returns
+    -------
+    tuple of str
+        States.
+    """
     return (OFF, *vision.lenses)
 
 
@@ -57,14 +79,41 @@ class Scenes:
         return len(self.state)
 
     def some(self, which: IndexArray | NDArray[np.bool_] | slice) -> Scenes:
-        """Some of them."""
+        """Return some of the scenes.
+
+        Parameters
+        ----------
+        which : ndarray or slice
+            Selection.
+
+        Returns
+        -------
+        Scenes
+            Scenes.
+        """
         return Scenes(**{each.name: getattr(self, each.name)[which] for each in fields(self)})
 
 
 def draw_scenes(vision: Vision, lamps: Lamps, order: str, count: int, key: tuple[int, ...]) -> Scenes:
-    """`count` scenes, as many of each distance and level and of each state as can be, the rest at random.
+    """Draw scenes, evenly over distances, levels and states, the rest at random; equal for all CFAs.
 
-    They follow from `key` alone: all CFAs see the same ones.
+    Parameters
+    ----------
+    vision : Vision
+        Benchmark.
+    lamps : Lamps
+        Lamps.
+    order : str
+        Order of the lenses.
+    count : int
+        Number of scenes.
+    key : tuple of int
+        Seed.
+
+    Returns
+    -------
+    Scenes
+        Scenes.
     """
     rng = np.random.default_rng(key)
     levels, at, n_orders = list(vision.levels.values()), np.arange(count), len(orders_of_lenses(len(vision.lenses)))
@@ -91,8 +140,20 @@ def draw_scenes(vision: Vision, lamps: Lamps, order: str, count: int, key: tuple
 
 
 def uniforms(scenes: Scenes, n_pixels: int) -> FloatArray:
-    """A number between 0 and 1 for each pixel of each scene, ndarray[n, n_pixels], the same for all CFAs.
+    """Return a random number from 0 to 1 for each pixel of each scene, equal for all CFAs.
 
-    Each scene has a counter-based generator of its own (Philox), so that it does not matter what is drawn before.
+    Each scene has its own counter-based generator (Philox), so that earlier draws do not matter.
+
+    Parameters
+    ----------
+    scenes : Scenes
+        Scenes.
+    n_pixels : int
+        Pixels.
+
+    Returns
+    -------
+    ndarray of shape (n, n_pixels)
+        Numbers.
     """
     return np.stack([np.random.Generator(np.random.Philox(key=int(key))).random(n_pixels) for key in scenes.key])

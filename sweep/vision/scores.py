@@ -1,4 +1,4 @@
-"""How good answers are, with intervals: bootstrap over scenes nested in seeds, the same scenes for all designs."""
+"""Scores of answers with intervals: bootstrap over scenes nested in seeds, the same scenes for all designs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _CONFIDENCE = 0.95
 
 @dataclass(frozen=True)
 class Interval:
-    """A value with its 95 % interval."""
+    """Value with its 95 % interval."""
 
     value: float
     low: float
@@ -22,14 +22,26 @@ class Interval:
 
     @property
     def excludes_zero(self) -> bool:
-        """Whether the interval is on one side of 0."""
+        """True if the interval is on one side of 0."""
         return self.low > 0 or self.high < 0
 
 
 def nested_weights(groups: IndexArray, rng: np.random.Generator, draws: int = DRAWS) -> FloatArray:
-    """Weights of scenes in bootstrap samples, ndarray[draws, n], each row's sum is 1.
+    """Return weights of scenes in bootstrap samples: seeds drawn with replacement, then scenes within each.
 
-    `groups`: the seed of each scene, ndarray[n]. Seeds are drawn with replacement, and then the scenes within each.
+    Parameters
+    ----------
+    groups : ndarray of int, shape (n,)
+        Seed of each scene.
+    rng : numpy.random.Generator
+        Source of random numbers.
+    draws : int
+        Samples.
+
+    Returns
+    -------
+    ndarray of shape (draws, n)
+        Weights; each row sums to 1.
     """
     names, which = np.unique(groups, return_inverse=True)
     found = np.zeros((draws, groups.size))
@@ -44,7 +56,20 @@ def nested_weights(groups: IndexArray, rng: np.random.Generator, draws: int = DR
 
 
 def interval(value: float, samples: FloatArray) -> Interval:
-    """The percentile interval of bootstrap samples, ndarray[draws]; those that are not finite are left out."""
+    """Return the percentile interval of bootstrap samples.
+
+    Parameters
+    ----------
+    value : float
+        Value.
+    samples : ndarray of shape (draws,)
+        Samples; those that are not finite are left out.
+
+    Returns
+    -------
+    Interval
+        Interval.
+    """
     known = samples[np.isfinite(samples)]
     if not known.size:
         return Interval(value, np.nan, np.nan)
@@ -53,10 +78,22 @@ def interval(value: float, samples: FloatArray) -> Interval:
 
 
 def interval_around(value: float, samples: FloatArray) -> Interval:
-    """The value and 1.96 standard deviations of its bootstrap samples on either side.
+    """Return a value and 1.96 standard deviations of its bootstrap samples on either side.
 
     For rank correlations: scatter in the samples makes these smaller than the value itself, so that their percentiles
-    may lie below it. For the same reason endless images would give a value that is rather farther from 0.
+    may lie below it.
+
+    Parameters
+    ----------
+    value : float
+        Value.
+    samples : ndarray of shape (draws,)
+        Samples.
+
+    Returns
+    -------
+    Interval
+        Interval.
     """
     known = samples[np.isfinite(samples)]
     reach = 1.96 * float(known.std()) if known.size else np.nan
@@ -64,30 +101,80 @@ def interval_around(value: float, samples: FloatArray) -> Interval:
 
 
 def mean_of(values: FloatArray | BoolArray, weights: FloatArray) -> Interval:
-    """The mean of one value for each scene, ndarray[n]; `weights`: see `nested_weights`."""
+    """Return the mean of one value per scene.
+
+    Parameters
+    ----------
+    values : ndarray of shape (n,)
+        Values.
+    weights : ndarray of shape (draws, n)
+        Result of `nested_weights`.
+
+    Returns
+    -------
+    Interval
+        Mean.
+    """
     numbers = np.asarray(values, dtype=float)
     return interval(float(numbers.mean()), weights @ numbers)
 
 
 def confusion_matrix(truth: IndexArray, said: IndexArray, n_states: int) -> IndexArray:
-    """How often each state (row) was said to be each (column), ndarray[n_states, n_states]."""
+    """Return the number of answers by true state (row) and answer (column).
+
+    Parameters
+    ----------
+    truth, said : ndarray of int, shape (n,)
+        True states and answers.
+    n_states : int
+        Number of states.
+
+    Returns
+    -------
+    ndarray of int, shape (n_states, n_states)
+        Counts.
+    """
     found = np.zeros((n_states, n_states), dtype=np.intp)
     np.add.at(found, (truth, said), 1)
     return found
 
 
 def macro_f1(matrix: IndexArray) -> float:
-    """The mean over the states of the harmonic mean of precision and recall; 0 for a state that is never right."""
+    """Return the mean over the states of the harmonic mean of precision and recall; 0 for a state that is never right.
+
+    Parameters
+    ----------
+    matrix : ndarray of int, shape (n_states, n_states)
+        Confusion matrix.
+
+    Returns
+    -------
+    float
+        0 to 1.
+    """
     right = np.diag(matrix).astype(float)
     total = matrix.sum(axis=0) + matrix.sum(axis=1)
     return float(np.mean(np.divide(2 * right, total, out=np.zeros_like(right), where=total > 0)))
 
 
 def costs(wrong: BoolArray, probability: FloatArray, unknown_cost: float) -> tuple[FloatArray, BoolArray]:
-    """Cost of each answer and where it is "unknown", ndarray[n] each.
+    """Return the cost of each answer; a reader answers "unknown" if that is expected to cost less than 1 for an error.
 
-    `wrong`: where the most probable state is not the true one; `probability`: of that state, as the reader says it. It
-    answers "unknown" where that is expected to cost less; a wrong answer costs 1.
+    Parameters
+    ----------
+    wrong : ndarray of bool, shape (n,)
+        True if the most probable state is not the true one.
+    probability : ndarray of shape (n,)
+        Probability of that state, by the reader.
+    unknown_cost : float
+        Cost of "unknown".
+
+    Returns
+    -------
+    cost : ndarray of shape (n,)
+        Costs.
+    unknown : ndarray of bool, shape (n,)
+        True for "unknown".
     """
     unknown = np.asarray(1 - probability > unknown_cost, dtype=bool)
     return np.where(unknown, unknown_cost, wrong.astype(float)), unknown

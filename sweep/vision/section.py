@@ -78,12 +78,23 @@ class Vision(Section):
         return self
 
     def target(self, distance_m: float) -> Target:
-        """A lens of the head at a distance, as the target of a scene."""
+        """Return a lens of the head at a distance as the target of a scene.
+
+        Parameters
+        ----------
+        distance_m : float
+            Distance, m.
+
+        Returns
+        -------
+        Target
+            Target.
+        """
         return Target(distance_m=distance_m, fov_deg=self.fov_deg, diameter_m=self.diameter_m)
 
 
 class SeededVision(NamedTuple):
-    """A study's benchmark with the study's seed."""
+    """Benchmark of a study with its seed."""
 
     vision: Vision
     seed: int

@@ -15,7 +15,7 @@ from sweep.camera.forward import ForwardModel
 from sweep.designs.block import CurveBlock, EdgeBlock, edges_of
 from sweep.metrics import evaluate as route
 from sweep.metrics import registry
-from sweep.metrics.evaluate import Spent, evaluate, whole_readout_metrics
+from sweep.metrics.evaluate import evaluate
 from sweep.metrics.own import OwnMetric
 from sweep.metrics.quantity import Asked, Columns, Quantity, ReadoutMetric
 
@@ -91,9 +91,9 @@ def test_csds_are_those_without_other_metrics_and_these_are_of_the_whole_readout
     name: str, at_once: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(route, "_READ_AT_ONCE", at_once)
-    block, spent = edges_of(SPACE, 3, 9 if name == "refined" else 69), Spent()
+    block = edges_of(SPACE, 3, 9 if name == "refined" else 69)
     assert block is not None
-    columns = evaluate(ForwardModel(SCENES[name]), block, own=[BRIGHTEST], spent=spent)
+    columns = evaluate(ForwardModel(SCENES[name]), block, own=[BRIGHTEST])
     monkeypatch.setattr(route, "OTHERS", [])
     alone = evaluate(ForwardModel(SCENES[name]), block)
     assert {*columns} == {*alone, "darkest_dn", "brightest"}
@@ -101,7 +101,6 @@ def test_csds_are_those_without_other_metrics_and_these_are_of_the_whole_readout
         np.testing.assert_array_equal(columns[column], values, err_msg=column)
     for column, values in by_hand(name, block).items():
         np.testing.assert_allclose(columns[column], values, atol=1e-9, err_msg=column)
-    assert spent.seconds > 0
 
 
 @pytest.mark.usefixtures("darkest")
@@ -125,8 +124,3 @@ def test_a_cfa_that_lacks_an_own_metric_says_so_of_one_design() -> None:
         assert np.isnan(columns["absent"]).all()
         assert np.isfinite(columns["brightest"]).all()
     assert calls == [1, 1]
-
-
-@pytest.mark.usefixtures("darkest")
-def test_a_study_knows_which_of_its_columns_these_are() -> None:
-    assert whole_readout_metrics(Asked(("yellow", "red"), own=(BRIGHTEST,))) == ["darkest_dn", "brightest"]
