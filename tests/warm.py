@@ -31,13 +31,11 @@ def _command(
     os.environ.clear()
     os.environ.update(environment)
     sys.argv = ["sweep", *arguments]
-    from sweep.commands import runs
     from sweep.commands.start import start
     from sweep.report import page
 
     if not drawn:
         page._drawings = lambda _: iter(())
-        runs._DRAWING = ()
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         start()

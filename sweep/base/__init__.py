@@ -1,1 +1,1 @@
-"""What every room needs: faults, types, a cache, files that may be anything, code of others."""
+"""Errors, types, a cache, reading of files, lazy imports, code of users, and machine code."""

@@ -12,7 +12,7 @@ _Value = TypeVar("_Value")
 
 
 class Cache(Generic[_Key, _Value]):
-    """The values that were used last, at most `most` of them.
+    """The values that were used last, at most `most` of them, shared by threads.
 
     Threads wait for one another, so that each value is made once; what fails while it is made is not kept.
     """
@@ -20,22 +20,17 @@ class Cache(Generic[_Key, _Value]):
     def __init__(self, most: int) -> None:
         self._most = most
         self._values: OrderedDict[_Key, _Value] = OrderedDict()
-        self._one_at_a_time = threading.RLock()
+        self._lock = threading.RLock()
 
     def __len__(self) -> int:
         return len(self._values)
 
     def get(self, key: _Key, make: Callable[[], _Value]) -> _Value:
-        """The value of `key`, from `make` where it is not kept; raises what `make` raises."""
-        with self._one_at_a_time:
+        """Return the value of `key`, from `make` where it is not kept; raises what `make` raises."""
+        with self._lock:
             if key not in self._values:
                 self._values[key] = make()
                 while len(self._values) > self._most:
                     self._values.popitem(last=False)
             self._values.move_to_end(key)
             return self._values[key]
-
-    def clear(self) -> None:
-        """Forget all values."""
-        with self._one_at_a_time:
-            self._values.clear()

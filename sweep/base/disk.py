@@ -24,21 +24,13 @@ NO_UTF_16 = "UTF-8; UTF-16? save as UTF-8"
 """What to allow where a text seems to be UTF-16."""
 
 
-def is_link(path: Path) -> bool:
-    """Whether a symbolic link stands there."""
-    return stat.S_ISLNK(_mode(path))
+# These are False, not an error, for a path that no file system takes.
+is_file, is_folder, is_link = os.path.isfile, os.path.isdir, os.path.islink
 
 
 def is_real_folder(path: Path) -> bool:
-    """Whether a folder stands there, and no link to one."""
-    return stat.S_ISDIR(_mode(path))
-
-
-def _mode(path: Path) -> int:
-    try:
-        return path.lstat().st_mode
-    except OSError:  # nothing there, or nothing can be there
-        return 0
+    """Return True where a folder stands, and no link to one."""
+    return is_folder(path) and not is_link(path)
 
 
 def opened(path: Path, *, links: bool = False) -> BufferedReader:
@@ -54,7 +46,7 @@ def opened(path: Path, *, links: bool = False) -> BufferedReader:
 
 
 def read_plain(path: Path, most: int) -> bytes:
-    """A plain file of at most `most` bytes; raises OSError when it is none, longer, or cannot be read."""
+    """Read a plain file of at most `most` bytes; raises OSError when it is none, longer, or cannot be read."""
     with opened(path) as file:
         content = file.read(most + 1)
     if len(content) > most:
@@ -63,13 +55,13 @@ def read_plain(path: Path, most: int) -> bytes:
 
 
 def digest_of(path: Path) -> str:
-    """SHA-256 of a plain file in hexadecimal; raises OSError when it is none or cannot be read."""
+    """Return the SHA-256 of a plain file in hexadecimal; raises OSError when it is none or cannot be read."""
     with opened(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def read_facts(path: Path) -> dict[str, Any]:
-    """A JSON mapping; an empty one where there is no plain file with one."""
+    """Read a JSON mapping; an empty one where there is no plain file with one."""
     try:
         return parsed_facts(read_plain(path, MOST_FACTS))
     except OSError:
@@ -77,16 +69,16 @@ def read_facts(path: Path) -> dict[str, Any]:
 
 
 def parsed_facts(content: bytes) -> dict[str, Any]:
-    """A JSON mapping; an empty one where the text is something else."""
+    """Parse a JSON mapping; an empty one where the text is something else."""
     try:
-        found = json.loads(content)
+        facts = json.loads(content)
     except (ValueError, RecursionError):
         return {}
-    return found if isinstance(found, dict) else {}
+    return facts if isinstance(facts, dict) else {}
 
 
 def read_input(path: Path, most_bytes: int, refused: type[SweepError]) -> bytes:
-    """The content of a regular file of at most `most_bytes`.
+    """Read the content of a regular file of at most `most_bytes`.
 
     Raises `refused` for what is absent, larger or no file (a pipe, a device, a folder), before anything of it is read:
     such a thing may block forever, or never end.
@@ -107,22 +99,6 @@ def read_input(path: Path, most_bytes: int, refused: type[SweepError]) -> bytes:
 
 
 def not_utf8(content: bytes, error: UnicodeDecodeError) -> tuple[str, bool]:
-    """What is wrong with a text that is not UTF-8, and whether it begins as UTF-16 does."""
+    """Describe a text that is not UTF-8; True where it begins as UTF-16 does."""
     wide = content[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
     return f"not UTF-8 text ({error.reason} at byte {error.start})", wide
-
-
-def is_file(path: Path) -> bool:
-    """Whether there is such a file; False also for a path that no file system takes."""
-    try:
-        return path.is_file()
-    except (OSError, ValueError):
-        return False
-
-
-def is_folder(path: Path) -> bool:
-    """Whether there is such a folder; False also for a path that no file system takes."""
-    try:
-        return path.is_dir()
-    except (OSError, ValueError):
-        return False

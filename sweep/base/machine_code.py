@@ -19,7 +19,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numba
 from numba.core import caching
@@ -41,12 +41,8 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 
 
 def sources() -> list[Path]:
-    """Files with kernels, in order."""
-    found = []
-    for folder, folders, names in os.walk(_ROOT):
-        folders[:] = [name for name in folders if name != "__pycache__"]
-        found += [Path(folder) / name for name in names if name.startswith(_NAMES) and name.endswith(".py")]
-    return sorted(found)
+    """Return the files with kernels, in order."""
+    return sorted(path for path in _ROOT.rglob("*.py") if path.name.startswith(_NAMES))
 
 
 def njit(**options: Any) -> Callable[[_F], _F]:
@@ -57,12 +53,11 @@ def njit(**options: Any) -> Callable[[_F], _F]:
     kept = options.pop("cache", False)
 
     def decorated(function: _F) -> _F:
-        made: Any = numba.njit(**options)(function)
+        kernel: Any = numba.njit(**options)(function)
         if kept:
             with suppress(RuntimeError):  # numba's, where the folder cannot be written
-                made._cache = _Cache(function)
-        kernel: _F = made
-        return kernel
+                kernel._cache = _Cache(function)
+        return cast(_F, kernel)
 
     return decorated
 
@@ -71,7 +66,7 @@ class _Files(caching.IndexDataCacheFile):
     """The machine code of a kernel for each key: a file that lists them, and a file for each."""
 
     def load(self, key: Any) -> Any:
-        """The code; None where there is none, or that of another key: two processes may have chosen one name."""
+        """Load the code; None where there is none, or that of another key: two processes may have chosen one name."""
         found = super().load(key)
         return found[1] if found is not None and found[0] == key else None
 
@@ -133,7 +128,7 @@ class _Folder:
         return hashlib.sha256(self._file.read_bytes()).hexdigest()
 
     def get_disambiguator(self) -> str:
-        """Return what tells kernels of one name in a file apart."""
+        """Return the line, by which kernels of one name in a file differ."""
         return str(self._line)
 
     def ensure_cache_path(self) -> None:
@@ -158,7 +153,7 @@ class _Cache(caching.FunctionCache):
         self._cache_file = _Files(self._cache_path, self._impl.filename_base, stamp)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The code of a signature; None where there is none that can be used."""
+        """Load the code of a signature; None where there is none that can be used."""
         try:
             return super().load_overload(sig, target_context)
         except Exception:  # of pickle, of numba or of LLVM
@@ -172,7 +167,7 @@ class _Cache(caching.FunctionCache):
 
 @cache
 def _kept_in(asked: str) -> Path:
-    """The folder of the machine code: in the one that is asked for, beside the package, or the user's."""
+    """Return the folder of the machine code: in the one that is asked for, beside the package, or the user's."""
     digest = hashlib.sha256(f"{_FORM}\0{numba.__version__}\0".encode())
     for path in sources():
         digest.update(path.relative_to(_ROOT).as_posix().encode() + b"\0" + path.read_bytes())

@@ -28,33 +28,33 @@ _begun: dict[str, str] = {}
 
 
 def is_in_file(name: str) -> bool:
-    """Whether a name is that of a class or function in a Python file: `my_filters.py:Gauss`."""
+    """Return True for the name of a class or function in a Python file: `my_filters.py:Gauss`."""
     return _SEPARATOR in name
 
 
 def file_of(name: str) -> str:
-    """The file in such a name."""
+    """Return the file in such a name."""
     return f"{name.partition(_SEPARATOR)[0]}.py"
 
 
 def own_name(name: str) -> str:
-    """A name without its file."""
+    """Return a name without its file."""
     return name.partition(_SEPARATOR)[2] or name
 
 
 def kind_in_words(name: str) -> str:
-    """A family's name as sentences say it; of one in a Python file that of its class."""
+    """Return a family's name for a sentence; of one in a Python file that of its class."""
     return own_name(name) if is_in_file(name) else name.replace("_", " ")
 
 
 def is_code(digested: str) -> bool:
-    """Whether what a run kept the digest of is code."""
+    """Return True where a run kept the digest of code."""
     return digested.endswith(".py") or digested.startswith(CODE_OF)
 
 
 @dataclass(frozen=True)
 class OwnCode:
-    """What a study names, as a worker process gets it: `name`, and the text of its file, or the group that offers it.
+    """Code that a study names, as a worker process gets it: its name, and the text of its file or its group.
 
     `digest`: that of an installed package, which a worker must have, too. Nothing runs before `loaded` is asked for.
     """
@@ -70,7 +70,7 @@ class OwnCode:
         return _loaded(self)
 
     def called(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        """What a function of it returns; whatever it raises is one line."""
+        """Call a function of it; whatever it raises is one line."""
         try:
             return function(*arguments)
         except (Exception, SystemExit) as error:  # it may raise anything
@@ -99,7 +99,7 @@ def _loaded(code: OwnCode) -> Any:
 
 
 def _of_file(name: str, source: str) -> Any:
-    """Run the text of a file, and give what is named in it."""
+    """Run the text of a file, and return what is named in it."""
     file, own = file_of(name), own_name(name)
     module = ModuleType(f"sweep_own_{hashlib.sha256(source.encode()).hexdigest()[:16]}")
     sys.modules[module.__name__] = module  # a dataclass looks there for the types that its fields name
@@ -117,7 +117,7 @@ def _of_file(name: str, source: str) -> Any:
 
 
 def read_code(path: Path) -> tuple[str, str]:
-    """The text of a Python file, and its SHA-256; nothing of it runs yet. Raises SweepError."""
+    """Read the text of a Python file, and its SHA-256; nothing of it runs yet. Raises SweepError."""
     content = read_input(path, _MOST_BYTES, SweepError)
     try:
         return content.decode("utf-8-sig"), hashlib.sha256(content).hexdigest()
@@ -127,7 +127,7 @@ def read_code(path: Path) -> tuple[str, str]:
 
 @dataclass(frozen=True)
 class Installed:
-    """What an installed package offers under a name."""
+    """An offer of an installed package under a name."""
 
     entry: EntryPoint
 
@@ -144,35 +144,32 @@ class Installed:
 
     @property
     def folders(self) -> list[Path]:
-        """Where its files are; none where it is a single file. Nothing of it runs."""
+        """Folders of its files; none where it is a single file. Nothing of it runs."""
         spec = find_spec(self.package)
         return [] if spec is None else [Path(place) for place in spec.submodule_search_locations or ()]
 
     @property
     def digest(self) -> str:
-        """SHA-256 of every Python file of the package, or of the one that it is, by path; nothing of it runs.
-
-        Raises SweepError where there is none.
-        """
-        spec, folders = find_spec(self.package), self.folders
-        files = [(path.relative_to(folder), path) for folder in folders for path in sorted(folder.rglob("*.py"))]
-        if spec is not None and not folders and spec.origin is not None:
+        """SHA-256 of each Python file of the package, by path; nothing of it runs. Raises SweepError without any."""
+        spec = find_spec(self.package)
+        files = [(path.relative_to(folder), path) for folder in self.folders for path in sorted(folder.rglob("*.py"))]
+        if spec is not None and not self.folders and spec.origin is not None:
             files = [(Path(Path(spec.origin).name), Path(spec.origin))]
         if not files:
             raise SweepError(Fault("no such package, though it is installed", self.told, value=self.package))
         digest = hashlib.sha256(self.told.encode())
-        for shown, path in files:
-            digest.update(shown.as_posix().encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
+        for name, path in files:
+            digest.update(name.as_posix().encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
         return digest.hexdigest()
 
 
 def offers(group: Offered) -> list[str]:
-    """Names that installed packages offer; nothing of them is imported."""
+    """Return the names that installed packages offer; nothing of them is imported."""
     return sorted({entry.name for entry in entry_points(group=group)})
 
 
 def installed(group: Offered, name: str) -> Installed | None:
-    """What an installed package offers under a name; raises SweepError where several packages do."""
+    """Return the offer of an installed package under a name; raises SweepError where several packages do."""
     found = {entry.value: entry for entry in entry_points(group=group) if entry.name == name}
     if len(found) > 1:
         several = " and ".join(sorted(Installed(entry).told for entry in found.values()))

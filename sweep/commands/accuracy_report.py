@@ -1,4 +1,4 @@
-"""The page and the lines of what accuracy costs."""
+"""Page and summary lines of the cost of accuracy."""
 
 from __future__ import annotations
 
@@ -14,14 +14,12 @@ from ..report.pages import inlined, page, rows
 from ..results.atomic import write_text
 from ..study import Study
 
-HARD_CASES = "hard_cases.json"
-REPORT = "accuracy.html"
 _HARD_COLUMNS = ("case", "oracle", "error", "allowed", "why")
 
 
 def read_hard_cases(folder: Path) -> pd.DataFrame | None:
     """Read the table of hard cases that the tests left in a folder, or None; raises OutputError when it is damaged."""
-    path = folder / HARD_CASES
+    path = folder / "hard_cases.json"
     if not path.is_file():
         return None
     try:
@@ -31,8 +29,8 @@ def read_hard_cases(folder: Path) -> pd.DataFrame | None:
         raise OutputError(Fault(f"cannot be read: {error}", str(path), allowed="what `make accuracy` writes")) from None
 
 
-def told(table: pd.DataFrame, hard: pd.DataFrame | None) -> list[str]:
-    """A line for each scene: error of the presets, and their times for one design and for those of the study.
+def summary(table: pd.DataFrame, hard: pd.DataFrame | None) -> list[str]:
+    """Return a line for each scene: error of the presets, and their times for one design and for those of the study.
 
     `table`: columns scenario, setting, value, designs, error_dn, total_s, extrapolated.
     """
@@ -52,7 +50,7 @@ def told(table: pd.DataFrame, hard: pd.DataFrame | None) -> list[str]:
 
 
 def _seconds(seconds: float, extrapolated: bool) -> str:
-    """A time with two digits; one that is extrapolated is so many seconds or so."""
+    """Format a time with two digits."""
     text = f"{1e3 * seconds:.2g} ms" if seconds < 0.0995 else f"{float(f'{seconds:.2g}'):g} s"
     return f"about {text}" if extrapolated else text
 
@@ -75,11 +73,11 @@ def make_accuracy_report(
         table=rows(_wide(table)),
         hard_cases=[] if hard is None else rows(_rounded(hard)),
     )
-    write_text(content, folder / REPORT)
+    write_text(content, folder / "accuracy.html")
 
 
 def _wide(table: pd.DataFrame) -> pd.DataFrame:
-    """A row for each setting: error, time of the first and of each following design, and of all of each number."""
+    """Return a row for each setting: error, time of the first and of each following design, and of each number."""
     wide = []
     for (scenario, setting, value), counts in table.groupby(["scenario", "setting", "value"], sort=False):
         of_study = counts.iloc[min(1, len(counts) - 1)]
@@ -94,6 +92,6 @@ def _wide(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def _rounded(table: pd.DataFrame) -> pd.DataFrame:
-    """Numbers with three digits."""
+    """Return the table with numbers of three digits."""
     numbers = table.select_dtypes(float).columns
     return table.assign(**{name: table[name].map("{:.3g}".format) for name in numbers})

@@ -1,19 +1,21 @@
-"""The command line: every file in `verbs` is a command."""
+"""The command line: every public function of a file in `verbs` is a command."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
 from functools import cache
+from importlib.metadata import version
+from inspect import isfunction
 from typing import Annotated, Any
 
 import typer
 
 from ..base.errors import EXIT_CODES
-from ..base.found import files_in
+from ..base.modules import files_in
 from . import verbs
 from .endings import ends_in_lines
-from .panels import PANELS
+from .options import PANELS
 
 app = typer.Typer(
     name="sweep",
@@ -24,36 +26,30 @@ app = typer.Typer(
 )
 
 
-def _version(asked: bool) -> None:
-    if asked:
-        from importlib.metadata import version  # noqa: PLC0415  (seldom asked for)
-
+def _version(wanted: bool) -> None:
+    if wanted:
         typer.echo(f"sweep {version('cfa-sweep')}")
         raise typer.Exit
 
 
-_Version = Annotated[
-    bool, typer.Option("--version", callback=_version, is_eager=True, help="Say the version, and end.")
-]
-
-
 @app.callback()
-def _whole(context: typer.Context, _: _Version = False) -> None:
-    context.obj = time.monotonic()  # when the command began, for those that say what they took
+def _start(
+    context: typer.Context,
+    _: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Say the version, and end.")
+    ] = False,
+) -> None:
+    context.obj = time.monotonic()  # commands say how long they took
 
 
-def _add_verbs() -> None:
-    for module in sorted(files_in(verbs), key=lambda module: PANELS.index(module.PANEL)):
-        function = module.__name__.rpartition(".")[2]
-        app.command(function.rstrip("_"), rich_help_panel=module.PANEL)(getattr(module, function))
-
-
-_add_verbs()
+for _module in sorted(files_in(verbs), key=lambda module: PANELS.index(module.PANEL)):
+    for _name, _function in vars(_module).items():
+        if isfunction(_function) and _function.__module__ == _module.__name__ and not _name.startswith("_"):
+            app.command(_name.rstrip("_"), rich_help_panel=_module.PANEL)(_function)
 
 
 @cache
 def _parser() -> Callable[..., Any]:
-    """What reads the arguments, made once in a process that gives several commands."""
     return typer.main.get_command(app)
 
 

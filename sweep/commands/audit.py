@@ -20,14 +20,17 @@ from ..results.tables import AUDIT, RESULTS, batches
 from ..run.check import compared_rows
 from ..study import Study
 
-SHARE = 0.01
+_SHARE = 0.01
+"""Share of the rows that are audited beside the front, plain CFAs and named designs."""
 _COLUMNS = ("design_id", "filter_id", "scenario", "plan", "allowed_dn", "realized_dn", "quantity")
 
 
 @dataclass(frozen=True)
 class Audit:
-    """A row per audited design: its id, scenario and plan, the largest error of any CSD, the one that is allowed, DN,
-    and the column that has it.
+    """Result of an audit.
+
+    `rows`: a row per audited design with its id, scenario and plan, the largest error of any CSD, the error that is
+    allowed, DN, and the column that has the largest error. `n_designs`: of the whole run.
     """
 
     rows: pd.DataFrame
@@ -51,9 +54,9 @@ class Audit:
 
     @property
     def faults(self) -> list[Fault]:
-        """For each scenario with too large errors, the largest one."""
-        by = self.broken.assign(excess=self.broken["realized_dn"].fillna(np.inf) - self.broken["allowed_dn"])
-        worst = by.sort_values("excess", ascending=False).drop_duplicates("scenario")
+        """The largest error of each scenario with errors that are too large."""
+        excess = self.broken.assign(excess=self.broken["realized_dn"].fillna(np.inf) - self.broken["allowed_dn"])
+        worst = excess.sort_values("excess", ascending=False).drop_duplicates("scenario")
         return [
             Fault(
                 f"design {row['design_id']}: {row['quantity']} is off by more than allowed",
@@ -65,15 +68,11 @@ class Audit:
         ]
 
 
-def _hashed(design_id: np.ndarray) -> np.ndarray:
-    """A number from 0 to 1 for each id, the same for ever."""
-    digests = [hashlib.sha256(str(i).encode()).digest()[:4] for i in design_id]
-    return np.array([int.from_bytes(digest, "big") / 2**32 for digest in digests], dtype=float)
-
-
-def sampled(table: pd.DataFrame, share: float = SHARE) -> pd.DataFrame:
-    """The Pareto front, everything that is no sweep, and a share of the rest, chosen by the hash of the row's id."""
-    wanted = table["pareto"] | (table["kind"] != "sweep") | (_hashed(table["design_id"].to_numpy()) < share)
+def sampled(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the Pareto front, everything that is no sweep, and 1 % of the rest, chosen by the hash of the row's id."""
+    digests = [hashlib.sha256(str(i).encode()).digest()[:4] for i in table["design_id"]]
+    hashed = np.array([int.from_bytes(digest, "big") / 2**32 for digest in digests], dtype=float)
+    wanted = table["pareto"] | (table["kind"] != "sweep") | (hashed < _SHARE)
     return table[wanted & (table["status"] == "ok")]
 
 
@@ -99,13 +98,13 @@ def audit_output(
     """Audit a finished run and write its rows beside it; errors as for `study_of` and `Inventory.write`."""
     output = read_output(folder, audited=False)
     study = study_of(output, data, allow_code=allow_code)
-    found = audit_rows(study, (table.to_pandas() for table in batches(folder / RESULTS)), progress)
+    result = audit_rows(study, (table.to_pandas() for table in batches(folder / RESULTS)), progress)
     with locked(folder):
-        Inventory(folder).write_table(AUDIT, pa.Table.from_pandas(found.rows, preserve_index=False))
-    return found
+        Inventory(folder).write_table(AUDIT, pa.Table.from_pandas(result.rows, preserve_index=False))
+    return result
 
 
-def mend_audit(folder: Path, data: Path | None) -> None:
+def audit_again(folder: Path, data: Path | None) -> None:
     """Audit a run again whose audited rows are missing or damaged."""
     inventory = Inventory(folder)
     if AUDIT in inventory.files and inventory.wrong([AUDIT]):

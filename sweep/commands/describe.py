@@ -1,14 +1,13 @@
-"""Describe a file of curves: lines for a person, and a picture."""
+"""Description of a file of curves: lines for a person, and a picture."""
 
 from __future__ import annotations
 
 import os
 import shlex
-import struct
 import warnings
-import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from io import BytesIO
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -17,29 +16,18 @@ import numpy as np
 
 from ..base.disk import read_input
 from ..base.errors import DataError, Fault, OutputError
-from ..curves.facts import Facts, condensed, facts_of, notes
+from ..curves.facts import Curve, Facts, condensed, facts_of, notes
 from ..curves.files import scan_curves
 from ..curves.light_unit import LightUnit
 from ..curves.mending import mended
 from ..curves.signal_color import LightColor
-from ..report.figures import rendered
 from ..results.atomic import write_bytes, write_text
 from .describe_picture import draw
 
 _MOST_NAMES = 12
 _MOST_PICTURE = 100_000_000
-_HEADER_BYTES = 33
-"""Of a PNG: its signature and its first chunk."""
-
-
-def _text_chunk(key: str, text: str) -> bytes:
-    """A PNG chunk of text: length, type and data, CRC-32 of these two (PNG specification, 11.3.3.2)."""
-    body = b"tEXt" + key.encode("latin-1") + b"\0" + text.encode("latin-1")
-    return struct.pack(">I", len(body) - 4) + body + struct.pack(">I", zlib.crc32(body))
-
-
-_MARK = _text_chunk("Software", "sweep describe")
-"""By it a picture is known to be a description's."""
+_SOFTWARE = "sweep describe"
+"""Software that a picture names in its first bytes: by this it is known to be a description's."""
 
 
 @dataclass(frozen=True)
@@ -62,67 +50,68 @@ def described(path: Path, folder: Path, quantity: LightUnit | None = None) -> De
     faults = tuple(condensed(list(chain.from_iterable(scan.faults))))
     facts = facts_of(scan)
     names = [curve.name for curve in facts.curves]
-    lines = [f"{path}: {len(names)} curve{'' if len(names) == 1 else 's'}{': ' if names else ''}{_some(names)}."]
+    lines = [f"{path}: {len(names)} curve{'' if len(names) == 1 else 's'}{': ' if names else ''}{_shown(names)}."]
     if not any(curve.values.size for curve in facts.curves):
         return Description((*lines, "Nothing in it can be drawn."), faults, {"curves": []})
     lines += [f"Read: {note}." for note in scan.notes]
     as_qe = facts.looks_like_qe and quantity is None
-    lines += [_range(facts), _guess(facts, quantity)]
     colors = {} if as_qe else facts.colors(quantity or "energy")
-    lines += _table(facts, colors)
+    lines += [_range(facts), _guess(facts, quantity)]
+    width = min(max(map(len, names)), 40)
+    lines += [f"  {curve.name:<{width}}  {_curve(curve, colors)}" for curve in facts.curves]
     if quantity == "photons":
-        lines += _as_energy(facts)
+        energy = facts.colors("energy").items()
+        words = [f"{name} {color.xy[0]:.4f} {color.xy[1]:.4f}" for name, color in energy if color is not None]
+        lines += [f"  the same numbers as energy would be at xy: {'; '.join(words)}"] if words else []
     lines += [f"Note: {note}." for note in notes(facts, as_qe=as_qe)]
     if not faults:
         lines.append("Its samples are clean: a study can read it.")
     elif mended(scan).faults == ():
         lines.append(f"`sweep describe {shlex.quote(str(path))} --clean NEW.csv` writes a file that a study can read.")
     picture = folder / f"{path.stem}.png"
-    _refuse_other(picture)
+    if os.path.lexists(picture) and _SOFTWARE.encode() not in read_input(picture, _MOST_PICTURE, OutputError)[:200]:
+        raise OutputError(Fault("holds something else already", str(picture), allowed="another --output"))
+    write_bytes(_png(path.name, facts, colors), picture)
+    values = {
+        "kind": "qe" if as_qe else "lights",
+        "picture": str(picture),
+        "curves": [_curve_facts(curve, colors.get(curve.name)) for curve in facts.curves],
+    }
+    return Description((*lines, f"Picture: {picture}"), faults, values)
+
+
+def _png(title: str, facts: Facts, colors: Mapping[str, LightColor | None]) -> bytes:
+    buffer = BytesIO()
     with warnings.catch_warnings(), np.errstate(over="ignore"):
         warnings.filterwarnings("ignore", "Glyph")  # names in scripts that the font lacks
-        content = rendered(draw(path.name, facts, colors), "png")
-    write_bytes(content[:_HEADER_BYTES] + _MARK + content[_HEADER_BYTES:], picture)
-    known = {"kind": "qe" if as_qe else "lights", "picture": str(picture), "curves": _curves(facts, colors)}
-    return Description((*lines, f"Picture: {picture}"), faults, known)
+        draw(title, facts, colors).savefig(buffer, format="png", dpi=160, metadata={"Software": _SOFTWARE})
+    return buffer.getvalue()
 
 
-def _curves(facts: Facts, colors: Mapping[str, LightColor | None]) -> list[dict[str, Any]]:
-    """Largest value of each curve, where it is, and the color of a light."""
-    curves: list[dict[str, Any]] = []
-    for curve in facts.curves:
-        color = colors.get(curve.name)
-        peak = {"largest": curve.values.max(), "at_nm": curve.peak_nm} if curve.values.size else {}
-        hue = {} if color is None else {"xy": color.xy, "dominant_nm": color.dominant_nm, "region": color.region}
-        curves.append({"name": curve.name, **peak, **hue})
-    return curves
+def _curve_facts(curve: Curve, color: LightColor | None) -> dict[str, Any]:
+    """Largest value of a curve, where it is, and the color of a light."""
+    peak = {"largest": curve.values.max(), "at_nm": curve.peak_nm} if curve.values.size else {}
+    hue = {} if color is None else {"xy": color.xy, "dominant_nm": color.dominant_nm, "region": color.region}
+    return {"name": curve.name, **peak, **hue}
 
 
 def cleaned(path: Path, to: Path) -> list[str]:
-    """Write a clean CSV of a file's curves to `to`, and say what was changed.
+    """Write a clean CSV of a file's curves to `to`, and return lines that say what was changed.
 
     Raises DataError for what no rule mends, OutputError where there is a file already or it cannot be written.
     """
     scan = scan_curves(path)
-    found = mended(scan)
-    if found.faults:
-        raise DataError(condensed([replace(fault, file=str(path)) for fault in found.faults]))
+    clean = mended(scan)
+    if clean.faults:
+        raise DataError(condensed([replace(fault, file=str(path)) for fault in clean.faults]))
     if os.path.lexists(to):
         raise OutputError(Fault("is there already, and stays as it is", str(to), allowed="another --clean"))
-    write_text(found.text(path.name, scan.notes), to)
-    said = [*(f"Read: {note}." for note in scan.notes), *(f"Changed: {change}." for change in found.changes)]
-    return [*said, *([] if found.changes else ["Changed: nothing."]), f"Clean: {to}"]
+    write_text(clean.text(path.name, scan.notes), to)
+    changes = clean.changes or ("nothing",)
+    return [*(f"Read: {n}." for n in scan.notes), *(f"Changed: {change}." for change in changes), f"Clean: {to}"]
 
 
-def _refuse_other(picture: Path) -> None:
-    if not os.path.lexists(picture):
-        return
-    held = read_input(picture, _MOST_PICTURE, OutputError)
-    if not held[: _HEADER_BYTES + len(_MARK)].endswith(_MARK):
-        raise OutputError(Fault("holds something else already", str(picture), allowed="another --output"))
-
-
-def _some(names: Sequence[str]) -> str:
+def _shown(names: Sequence[str]) -> str:
     if len(names) <= _MOST_NAMES:
         return ", ".join(names)
     return f"{', '.join(names[: _MOST_NAMES - 1])}, ... {names[-1]}"
@@ -152,39 +141,23 @@ def _guess(facts: Facts, quantity: LightUnit | None) -> str:
     return f"A guess: light spectra, for {reason}. Read as energy; `--quantity photons` reads photons."
 
 
-def _table(facts: Facts, colors: Mapping[str, LightColor | None]) -> list[str]:
-    """A line for each curve: its largest value, and its color where it is a light."""
-    wide = min(max(len(curve.name) for curve in facts.curves), 40)
-    lines = []
-    for curve in facts.curves:
-        name = f"  {curve.name:<{wide}}"
-        if not curve.values.size:
-            lines.append(f"{name}  no sample can be used")
-            continue
-        text = f"{name}  largest {curve.values.max():<9.6g} at {curve.peak_nm:g} nm"
-        lines.append(f"{text}  {color_words(colors[curve.name])}" if colors else text)
-    return lines
+def _curve(curve: Curve, colors: Mapping[str, LightColor | None]) -> str:
+    """Largest value of a curve, and its color where it is a light."""
+    if not curve.values.size:
+        return "no sample can be used"
+    text = f"largest {curve.values.max():<9.6g} at {curve.peak_nm:g} nm"
+    return f"{text}  {_color_words(colors[curve.name])}" if colors else text
 
 
-def _as_energy(facts: Facts) -> list[str]:
-    """Chromaticities of the same numbers taken as energy, to see what the quantity matters."""
-    found = facts.colors("energy").items()
-    words = [f"{name} {color.xy[0]:.4f} {color.xy[1]:.4f}" for name, color in found if color is not None]
-    return [f"  the same numbers as energy would be at xy: {'; '.join(words)}"] if words else []
-
-
-def color_words(color: LightColor | None) -> str:
-    """Chromaticity, dominant wavelength and region of a light, in words."""
+def _color_words(color: LightColor | None) -> str:
+    """Chromaticity, dominant wavelength and region of EN 12368 of a light."""
     if color is None:
         return "no visible light"
     hue = "white" if color.purity < 1e-3 else "purple" if color.dominant_nm is None else f"{color.dominant_nm:g} nm"
-    return f"xy {color.xy[0]:.4f} {color.xy[1]:.4f}, dominant {hue}, {region_words(color)}"
-
-
-def region_words(color: LightColor) -> str:
-    """The region of EN 12368 that a light lies in, or how far it is outside the nearest."""
     if color.region == "orange":
-        return "orange, between EN 12368's red and yellow"
-    if color.region is not None:
-        return f"{color.region} of EN 12368"
-    return f"in no region of EN 12368, {color.distance:.3f} from {color.nearest}"
+        region = "orange, between EN 12368's red and yellow"
+    elif color.region is not None:
+        region = f"{color.region} of EN 12368"
+    else:
+        region = f"in no region of EN 12368, {color.distance:.3f} from {color.nearest}"
+    return f"xy {color.xy[0]:.4f} {color.xy[1]:.4f}, dominant {hue}, {region}"

@@ -1,9 +1,8 @@
-"""A filter out of a finished run: as CSV for who makes it, as other programs' files for who simulates with it."""
+"""A filter of a finished run: as CSV for who makes it, as other programs' files for who simulates with it."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,51 +10,18 @@ import numpy as np
 
 from ..base.errors import Fault, OutputError
 from ..base.types import FloatArray
-from ..camera.mosaic import Mosaic
-from ..curves.filter_files import color_hints, csv_text, filter_names, isetcam_mat, unique_names
+from ..curves.filter_files import color_hints, csv_text, filter_names, isetcam_mat, speos_text, unique_names
+from ..curves.rgb_weights import rgb_weights
 from ..report import Output, check_kept, read_output, study_of
 from ..results.atomic import write_bytes
 from ..results.designs import find_row, row_curves
 from ..study import Study, folder_name
-from .export_also import other_files
 from .options import Also
 
-EXPORT = "export"
-_SAME_TOTAL = 1e-9
+_ROUNDING = 1e-9
 _MOST_SHOWN = 10
-
-
-@dataclass(frozen=True)
-class Filters:
-    """The channels of a CFA with a design's filters in it.
-
-    `qe`: ndarray[n_channels, n_wavelengths], in the order of the mosaic's channels. `bases`: modified channel -> name
-    of the curve that it replaces; `base_qe`: those curves, ndarray[n_wavelengths] each.
-    """
-
-    mosaic: Mosaic
-    wavelength_nm: FloatArray
-    qe: FloatArray
-    bases: Mapping[str, str]
-    base_qe: Mapping[str, FloatArray]
-
-    @property
-    def curves(self) -> dict[str, FloatArray]:
-        """Channel -> QE."""
-        return dict(zip(self.mosaic.channels, self.qe, strict=True))
-
-    def transmissions(self) -> dict[str, FloatArray]:
-        """`<channel>_over_<base>` -> transmission of each modified channel relative to the curve that it replaces.
-
-        1 where neither has any light; infinite where the modified channel alone has some.
-        """
-        found = {}
-        for channel, base in self.bases.items():
-            made, base_qe = self.curves[channel], self.base_qe[channel]
-            nothing = np.where(made > 0, np.inf, 1.0)
-            with np.errstate(over="ignore"):
-                found[f"{channel}_over_{base}"] = np.divide(made, base_qe, out=nothing, where=base_qe > 0)
-        return found
+_RGB = ("R", "G", "B")
+Row = Mapping[Any, Any]
 
 
 def export_design(
@@ -67,62 +33,104 @@ def export_design(
     *,
     allow_code: bool = False,
 ) -> list[str]:
-    """Write `<key>.csv` and `<key>.mat` of a design of a finished run to `to` (FOLDER/export), and say what it is.
+    """Write `<key>.csv` and `<key>.mat` of a design of a finished run, and say what it is.
 
-    `key`: a name, a design_id, or `best`. The filter is computed again, from the study's files in `data`, or, without
-    it, from the sensor's curves that the run kept, and compared with what the run kept of it. `also`: files of other
-    programs beside them. Raises SweepError for an unknown key, for a design that failed, and for a sensor without what
-    `also` needs; OutputError for a folder without a finished run, for curves that are not those of the run, and where
-    a file of other content would be overwritten.
+    The filter is computed again and compared with what the run kept of it.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the run.
+    key : str
+        A name, a design_id, or `best`.
+    data : Path or None
+        Folder of the study's files; without it, the curves that the run kept are taken.
+    to : Path or None
+        Folder of the new files, FOLDER/export without it.
+    also : collection of Also
+        Files of other programs beside them.
+    allow_code : bool
+        True to run the code that the study names.
+
+    Returns
+    -------
+    list of str
+        Lines to print.
+
+    Raises
+    ------
+    SweepError
+        For an unknown key, a design that failed, and a sensor without what `also` needs.
+    OutputError
+        For a folder without a finished run, for curves that are not those of the run, and where a file of other
+        content would be overwritten.
     """
     output = read_output(folder)
     row = find_row(output, key)
     study = study_of(output, data, allow_code=allow_code)
-    filters = filters_of(study, row)
-    _verify(output, row, filters)
-    transmissions = filters.transmissions()
-    finite = {name: values for name, values in transmissions.items() if np.isfinite(values).all()}
-    hints = color_hints(filters.mosaic.channels, filters.bases)
-    comment = _comment(output, row, filters)
-    base = (folder / EXPORT if to is None else to) / folder_name(key)
-    tables = filters.curves | finite
-    tile = filters.mosaic.indices
-    contents = {
-        base.with_name(base.name + ".csv"): csv_text(filters.wavelength_nm, tables).encode("utf-8"),
-        base.with_name(base.name + ".mat"): isetcam_mat(filters.wavelength_nm, filters.curves, hints, tile, comment),
+    space, modified = row_curves(study, row)
+    camera = study.setup(space, row["scenario"]).camera
+    qe = camera.qe.copy()
+    qe[list(camera.modified)] = modified[0]
+    wavelength_nm, curves = study.grid.nodes_nm, dict(zip(camera.mosaic.channels, qe, strict=True))
+    bases = {} if space.filter is None else dict(space.filter.bases)
+    base_qe = {channel: study.sensor.curve(name) for channel, name in bases.items()}
+    _verify(output, row, {channel: curves[channel] for channel in bases}, base_qe)
+
+    transmissions = {
+        f"{channel}_over_{name}": relative_transmission(curves[channel], base_qe[channel])
+        for channel, name in bases.items()
     }
-    others, said = other_files(also, base, filters.wavelength_nm, filters.curves, study, _design(output, row))
-    for path, content in (contents | others).items():
-        _refuse_other(path, content)
-    for path, content in (contents | others).items():
-        write_bytes(content, path)
-    lines = [*_lines(output, row, filters), *_remarks(filters, transmissions)]
-    csv_path, mat_path = contents
-    names = ", ".join(filter_names(hints, filters.curves))
-    lines.append(f"Files: {csv_path} ({', '.join(unique_names(tables))}),")
-    lines.append(f"       {mat_path} ({names}: QE, so set the pixel's spectral QE to 1 in ISETCam).")
-    return lines + said
+    table = curves | {name: values for name, values in transmissions.items() if np.isfinite(values).all()}
+    hints = color_hints(camera.mosaic.channels, bases)
+    path = (folder / "export" if to is None else to) / folder_name(key)
+    csv_path, mat_path = (path.with_name(path.name + suffix) for suffix in (".csv", ".mat"))
+    comment = _comment(output, row, bases)
+    files = {
+        csv_path: csv_text(wavelength_nm, table).encode("utf-8"),
+        mat_path: isetcam_mat(wavelength_nm, curves, hints, camera.mosaic.indices, comment),
+    }
+    lines = [
+        *_lines(output, row, bases),
+        *_remarks(wavelength_nm, bases, transmissions),
+        f"Files: {csv_path} ({', '.join(unique_names(table))}),",
+        f"       {mat_path} ({', '.join(filter_names(hints, curves))}: QE, so set the pixel's spectral QE to 1 in "
+        "ISETCam).",
+    ]
+    if Also.SPEOS in also:
+        for name, (channel, values) in zip(unique_names(map(folder_name, curves)), curves.items(), strict=True):
+            spectrum = path.with_name(f"{path.name}_{name}.spectrum")
+            about = f"{channel} of {_design(output, row)}: QE in percent, electrons per photon"
+            files[spectrum] = speos_text(wavelength_nm, values, about).encode("ascii")
+            lines.append(f"       {spectrum} ({channel}: QE in percent, for Speos)")
+    if Also.RGB in also:
+        weights = path.with_name(path.name + "_rgb_weights.csv")
+        text, weight_lines = _rgb_weights(study, curves)
+        files[weights] = text.encode("utf-8")
+        lines += [f"       {weights} (each channel as a sum of the sensor's R, G and B):", *weight_lines]
+    for file, content in files.items():
+        _refuse_other(file, content)
+    for file, content in files.items():
+        write_bytes(content, file)
+    return lines
 
 
-def filters_of(study: Study, row: Mapping[Any, Any]) -> Filters:
-    """The channels of a row's CFA, with its filters computed from its parameters."""
-    space, made = row_curves(study, row)
-    setup = study.setup(space, row["scenario"])
-    qe = setup.camera.qe.copy()
-    qe[list(setup.camera.modified)] = made[0]
-    bases = {} if space.filter is None else space.filter.bases
-    replaced = {channel: study.sensor.curve(base) for channel, base in bases.items()}
-    return Filters(setup.camera.mosaic, study.grid.nodes_nm, qe, bases, replaced)
+def relative_transmission(modified: FloatArray, base: FloatArray) -> FloatArray:
+    """Return the transmission of a modified channel relative to the curve that it replaces, ndarray[n_wavelengths].
+
+    1 where neither has any light; infinite where the modified channel alone has some.
+    """
+    unlit = np.where(modified > 0, np.inf, 1.0)
+    with np.errstate(over="ignore"):
+        return np.divide(modified, base, out=unlit, where=base > 0)
 
 
-def _verify(output: Output, row: Mapping[Any, Any], filters: Filters) -> None:
-    """Compare the filter with what the run kept of it, and with the row's sensitivity."""
-    made = [filters.curves[channel] for channel in filters.bases]
-    kept = output.curves.designs.get(int(row["design_id"]), {})
-    check_kept(output, kept, {channel: filters.curves[channel] for channel in filters.bases})
-    if made:
-        ratio = sum(values.sum() for values in made) / sum(base.sum() for base in filters.base_qe.values())
-        if not abs(ratio - row["sensitivity"]) <= _SAME_TOTAL * max(1.0, ratio):
+def _verify(output: Output, row: Row, modified: Mapping[str, FloatArray], base_qe: Mapping[str, FloatArray]) -> None:
+    """Compare the modified channels with what the run kept of them, and with the row's sensitivity."""
+    check_kept(output, output.curves.designs.get(int(row["design_id"]), {}), modified)
+    if modified:
+        ratio = sum(values.sum() for values in modified.values()) / sum(base.sum() for base in base_qe.values())
+        if not abs(ratio - row["sensitivity"]) <= _ROUNDING * max(1.0, ratio):
             problem = "computed again, this is not what the run has: sensitivity"
             raise OutputError(Fault(problem, str(output.folder), allowed="the version of that run"))
 
@@ -136,23 +144,24 @@ def _refuse_other(path: Path, content: bytes) -> None:
         raise OutputError(Fault("holds something else already", str(path), allowed="another --to, or delete it"))
 
 
-def _parameters(output: Output, row: Mapping[Any, Any]) -> dict[str, float]:
+def _parameters(output: Output, row: Row) -> dict[str, float]:
     return {name: row[name] for name in output.parameters if row[name] is not None and row[name] == row[name]}
 
 
-def _design(output: Output, row: Mapping[Any, Any]) -> str:
+def _design(output: Output, row: Row) -> str:
     name = f"{row['name']}, " if isinstance(row["name"], str) else ""
     return " ".join(f"{name}design {row['design_id']} of {output.study.study}".split())
 
 
-def _comment(output: Output, row: Mapping[Any, Any], filters: Filters) -> str:
-    own = ", ".join(f"{name}={value:.12g}" for name, value in _parameters(output, row).items())
-    replaced = ", ".join(f"{channel} replaces {base}" for channel, base in filters.bases.items())
+def _comment(output: Output, row: Row, bases: Mapping[str, str]) -> str:
+    """Comment of the `.mat` file."""
+    parameters = ", ".join(f"{name}={value:.12g}" for name, value in _parameters(output, row).items())
+    replaced = ", ".join(f"{channel} replaces {base}" for channel, base in bases.items())
     origin = output.provenance.sensor
     kind = "surrogate: modeled, not measured" if origin.surrogate else f"from {origin.source}"
     parts = [
         f"{row['cfa']}: {_design(output, row)}",
-        *([f"{row['family']}: {replaced}; {own}"] if own else []),
+        *([f"{row['family']}: {replaced}; {parameters}"] if parameters else []),
         "data is QE, electrons per photon, filters and silicon together: set the pixel's spectral QE to 1",
         f"sensor {origin.name}, {kind}",
         "filterOrder is the tile",
@@ -160,21 +169,19 @@ def _comment(output: Output, row: Mapping[Any, Any], filters: Filters) -> str:
     return ". ".join(" ".join(part.split()) for part in parts) + "."
 
 
-def _lines(output: Output, row: Mapping[Any, Any], filters: Filters) -> list[str]:
-    own = _parameters(output, row)
-    replaced = ", ".join(f"{channel} replaces {base}" for channel, base in filters.bases.items())
+def _lines(output: Output, row: Row, bases: Mapping[str, str]) -> list[str]:
+    parameters = list(_parameters(output, row).items())
+    replaced = ", ".join(f"{channel} replaces {base}" for channel, base in bases.items())
     lines = [f"{_design(output, row)}: {row['cfa']}" + (f", {row['family']}, {replaced}." if replaced else ", plain.")]
-    if own:
-        shown = ", ".join(f"{name} {value:.2f}" for name, value in list(own.items())[:_MOST_SHOWN])
-        more = f" and {len(own) - _MOST_SHOWN} more" if len(own) > _MOST_SHOWN else ""
+    if parameters:
+        shown = ", ".join(f"{name} {value:.2f}" for name, value in parameters[:_MOST_SHOWN])
+        more = f" and {len(parameters) - _MOST_SHOWN} more" if len(parameters) > _MOST_SHOWN else ""
         lines.append(f"Parameters: {shown}{more}.")
-    distances = ", ".join(
-        f"{'/'.join(column.pair or ())} {column.amount(row[column.name])}"
-        for column in (output.columns[name] for name in output.distances)
-    )
+    columns = [output.columns[name] for name in output.distances]
+    distances = ", ".join(f"{'/'.join(c.pair or ())} {c.amount(row[c.name])}" for c in columns)
     where = f" in {row['scenario']}" if len(output.scenarios) > 1 else ""
-    modified = f"sensitivity {row['sensitivity']:.4f}, " if filters.bases else ""
-    lines.append(f"CSDs{where}: {distances}; {modified}CFA sensitivity {row['cfa_sensitivity']:.4f}.")
+    sensitivity = f"sensitivity {row['sensitivity']:.4f}, " if bases else ""
+    lines.append(f"CSDs{where}: {distances}; {sensitivity}CFA sensitivity {row['cfa_sensitivity']:.4f}.")
     if not row["feasible"]:
         lines.append("Note: the design does not meet the study's constraints.")
     if output.provenance.sensor.surrogate:
@@ -182,13 +189,13 @@ def _lines(output: Output, row: Mapping[Any, Any], filters: Filters) -> list[str
     return lines
 
 
-def _remarks(filters: Filters, transmissions: Mapping[str, FloatArray]) -> list[str]:
-    """What whoever makes the filter must know of the transmissions."""
+def _remarks(wavelength_nm: FloatArray, bases: Mapping[str, str], transmissions: Mapping[str, FloatArray]) -> list[str]:
+    """Notes on the transmissions, for whoever makes the filter."""
     lines = []
-    for (channel, base), (name, values) in zip(filters.bases.items(), transmissions.items(), strict=True):
-        beyond = filters.wavelength_nm[values > 1 + _SAME_TOTAL]
+    for (channel, base), (name, values) in zip(bases.items(), transmissions.items(), strict=True):
+        beyond = wavelength_nm[values > 1 + _ROUNDING]
         if not np.isfinite(values).all():
-            at = filters.wavelength_nm[~np.isfinite(values)][0]
+            at = wavelength_nm[~np.isfinite(values)][0]
             lines.append(f"Note: no {name} in the CSV: at {at:g} nm {channel} has light where {base} has none.")
         elif beyond.size:
             lines.append(
@@ -196,3 +203,17 @@ def _remarks(filters: Filters, transmissions: Mapping[str, FloatArray]) -> list[
                 f"the filter takes the place of that of {base}, it cannot be put before it."
             )
     return lines
+
+
+def _rgb_weights(study: Study, curves: Mapping[str, FloatArray]) -> tuple[str, list[str]]:
+    """CSV of each channel as a sum of R, G and B, and a line per channel; raises DataError without them."""
+    fit = rgb_weights(curves, np.stack([study.sensor.curve(name) for name in _RGB]), study.lights.photons)
+    lines = []
+    for channel, weights, residual, error in zip(fit.channels, fit.weights, fit.residual, fit.light_error, strict=True):
+        shown = [round(float(weight), 4) + 0.0 for weight in weights]  # no -0.0000
+        terms = " ".join(f"{weight:+.4f} {name}" for weight, name in zip(shown, _RGB, strict=True))
+        lines.append(
+            f"       {channel} = {terms}; the sum misses {residual:.2%} of the curve (root mean square), and "
+            f"of each of the study's lights at most {error:.2%} of the brightest one's electrons."
+        )
+    return fit.as_csv(), lines

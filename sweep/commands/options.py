@@ -1,15 +1,23 @@
-"""The arguments and options that several commands share."""
+"""Arguments and options that several commands share, what the shell completes, and the groups of the help."""
 
 from __future__ import annotations
 
+import os
 from enum import StrEnum
+from glob import escape
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from ..base.errors import Fault, StudyError
-from .completion import run_folders, study_files
+
+OF_STUDIES = "Studies"
+OF_RESULTS = "Results"
+OF_CURVES = "Files of curves"
+OF_TOOL = "The tool itself"
+PANELS = (OF_STUDIES, OF_RESULTS, OF_CURVES, OF_TOOL)
+"""Groups of commands in the help, in order."""
 
 
 class Also(StrEnum):
@@ -19,49 +27,65 @@ class Also(StrEnum):
     RGB = "rgb"
 
 
-def _found(path: Path) -> Path:
+def study_files(incomplete: str) -> list[str]:
+    """Complete the path of a study file, up to a folder below what was typed."""
+    return sorted(_paths(incomplete, ("*.yaml", "*.yml", "*/*.yaml", "*/*.yml")))
+
+
+def run_folders(incomplete: str) -> list[str]:
+    """Complete the path of a folder that holds a run, up to a folder below what was typed."""
+    patterns = ("*/run.json", "*/provenance.json", "*/*/run.json", "*/*/provenance.json")
+    return sorted({str(Path(path).parent) for path in _paths(incomplete, patterns)})
+
+
+def _paths(incomplete: str, patterns: tuple[str, ...]) -> set[str]:
+    """Globbing from the last whole folder keeps a path as its user writes it."""
+    folder, typed = os.path.split(incomplete)
+    return {str(path) for pattern in patterns for path in Path(folder).glob(escape(typed) + pattern)}
+
+
+def _study_path(path: Path) -> Path:
     from ..study.shipped import study_path  # noqa: PLC0415  (help needs no study)
 
     return study_path(path)
 
 
-def _all_found(paths: list[Path]) -> list[Path]:
-    return [_found(path) for path in paths]
+def changes_of(texts: list[str] | None) -> dict[str, str]:
+    """Return the dotted keys and values of `--set`; raises StudyError for what is no KEY=VALUE."""
+    changes = {}
+    for text in texts or ():
+        key, mark, value = text.partition("=")
+        if not mark or not all(key.split(".")):
+            raise StudyError(
+                Fault("not KEY=VALUE", key="--set", value=text, allowed="constraints.sensitivity.min=0.92")
+            )
+        changes[key] = value
+    return changes
 
 
 _STUDY = "A study file, YAML, or the name of a study as `sweep list` has it."
 StudyPath = Annotated[
-    Path, typer.Argument(help=_STUDY, show_default=False, autocompletion=study_files, callback=_found)
+    Path, typer.Argument(help=_STUDY, show_default=False, autocompletion=study_files, callback=_study_path)
 ]
 StudyPaths = Annotated[
-    list[Path], typer.Argument(help=_STUDY, show_default=False, autocompletion=study_files, callback=_all_found)
+    list[Path],
+    typer.Argument(
+        help=_STUDY,
+        show_default=False,
+        autocompletion=study_files,
+        callback=lambda paths: [_study_path(path) for path in paths],
+    ),
 ]
 Changes = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="A key of the study: constraints.sensitivity.min=0.92."),
 ]
-
 AllowCode = Annotated[
     bool,
     typer.Option(
         "--allow-code", help="Run the code that the study names: Python files and what installed packages offer."
     ),
 ]
-
-
-def changes_of(given: list[str] | None) -> dict[str, str]:
-    """Dotted keys and values of `--set`; raises StudyError for what is no KEY=VALUE."""
-    found = {}
-    for text in given or ():
-        key, mark, value = text.partition("=")
-        if not mark or not all(key.split(".")):
-            raise StudyError(
-                Fault("not KEY=VALUE", key="--set", value=text, allowed="constraints.sensitivity.min=0.92")
-            )
-        found[key] = value
-    return found
-
-
 RunFolder = Annotated[
     Path, typer.Argument(help="Output folder of a study.", show_default=False, autocompletion=run_folders)
 ]

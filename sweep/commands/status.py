@@ -1,4 +1,4 @@
-"""How far a run is, from another terminal: what its folder says, without touching it."""
+"""State of a run, from another terminal: what its folder says, without touching it."""
 
 from __future__ import annotations
 
@@ -15,8 +15,6 @@ from ..results.lock import in_use
 from ..results.parts import ANSWER, PARTS, ROWS, Parts
 from ..results.tables import PROVENANCE, RESULTS, rows_in
 
-_MOST = 2**53
-
 
 @dataclass(frozen=True)
 class Status:
@@ -27,7 +25,7 @@ class Status:
 
 
 def status_of(folder: Path, *, verify: bool = False) -> Status:
-    """State, progress and files of a run.
+    """Return state, progress and files of a run.
 
     Of a finished run missing files are named; with `verify` all digests are compared. Raises OutputError where there
     is no run, and, naming each file, where some are missing or damaged.
@@ -41,39 +39,33 @@ def status_of(folder: Path, *, verify: bool = False) -> Status:
         wrong = inventory.wrong(quick=not verify) | inventory.wrong([PROVENANCE] if finished else [])
         if wrong:
             raise OutputError(faults_of(folder, wrong))
-    verified = [f"ok: its {len(inventory.files)} files are what the run wrote."] if verify and not running else []
     if finished:
         facts = read_facts(folder / PROVENANCE)
+        state = "finished"
         failed = f", {_number(facts, 'failed'):,} failed" if _number(facts, "failed") else ""
-        said = f"finished: {_number(facts, 'designs'):,} designs{failed} in {_number(facts, 'duration_s'):.1f} s."
-        known = {key: facts.get(key) for key in ("designs", "failed", "duration_s")}
-        return Status([said, _files(folder), *verified], _facts(folder, "finished", verify=verify, **known))
-    parts = Parts(folder)
-    rows, answers = parts.paths(ROWS), parts.paths(ANSWER)
-    done, total = sum(map(rows_in, rows)), _number(inventory.facts, "designs")
-    state = "running" if running else "interrupted; the same command continues"
-    share = f" ({told_share(done / total)})" if total else ""
-    lines = [f"{state}: {done:,} of {total:,} designs{share}, {len(rows):,} parts finished."]
-    if answers:
-        lines.append(f"The search has {len(answers):,} answers.")
-    known = {"designs": total, "finished_designs": done, "parts": len(rows), "search_answers": len(answers)}
-    return Status(
-        [*lines, *([_files(folder)] if rows else []), *verified],
-        _facts(folder, "running" if running else "interrupted", verify=verify, **known),
-    )
-
-
-def _facts(folder: Path, state: str, *, verify: bool, **known: Any) -> dict[str, Any]:
-    return {"folder": str(folder), "state": state, "verified": verify, **known}
+        lines = [f"finished: {_number(facts, 'designs'):,} designs{failed} in {_number(facts, 'duration_s'):.1f} s."]
+        values = {key: facts.get(key) for key in ("designs", "failed", "duration_s")}
+    else:
+        parts = Parts(folder)
+        rows, answers = parts.paths(ROWS), parts.paths(ANSWER)
+        done, total = sum(map(rows_in, rows)), _number(inventory.facts, "designs")
+        state = "running" if running else "interrupted"
+        share = f" ({told_share(done / total)})" if total else ""
+        continues = "" if running else "; the same command continues"
+        lines = [f"{state}{continues}: {done:,} of {total:,} designs{share}, {len(rows):,} parts finished."]
+        if answers:
+            lines.append(f"The search has {len(answers):,} answers.")
+        values = {"designs": total, "finished_designs": done, "parts": len(rows), "search_answers": len(answers)}
+    if (folder / RESULTS).is_file() and (finished or rows):
+        lines.append(f"Files: {folder}/: {RESULTS}, report.html.")
+    elif finished or rows:
+        lines.append(f"Finished parts: {folder / PARTS}/*.parquet, which pandas.read_parquet reads.")
+    if verify and not running:
+        lines.append(f"ok: its {len(inventory.files)} files are what the run wrote.")
+    return Status(lines, {"folder": str(folder), "state": state, "verified": verify, **values})
 
 
 def _number(facts: Mapping[str, Any], key: str) -> float:
-    """A number of a file that anyone may have written; 0 where it says none of a likely size."""
-    found = facts.get(key)
-    return found if isinstance(found, int | float) and 0 <= found < _MOST else 0
-
-
-def _files(folder: Path) -> str:
-    if (folder / RESULTS).is_file():
-        return f"Files: {folder}/: {RESULTS}, report.html."
-    return f"Finished parts: {folder / PARTS}/*.parquet, which pandas.read_parquet reads."
+    """Return a number of a file that anyone may have written; 0 where it says none of a likely size."""
+    value = facts.get(key)
+    return value if isinstance(value, int | float) and 0 <= value < 2**53 else 0

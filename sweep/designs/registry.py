@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import create_model
 
 from ..base.errors import Fault, SweepError, nearest
-from ..base.found import files_in
+from ..base.modules import files_in
 from ..base.types import FloatArray, Section
 from . import families
 from .family import Family

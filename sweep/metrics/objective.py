@@ -11,7 +11,7 @@ from pydantic import Field, GetJsonSchemaHandler, create_model, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from ..base.found import made_in
+from ..base.modules import made_in
 from ..base.types import FloatArray, Section
 from . import rules
 from .quantity import DECADES, Asked, Quantity

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import lru_cache
 
-from ..base.found import made_in
+from ..base.modules import made_in
 from . import columns
 from .quantity import Asked, Metric, Quantity
 

@@ -5,7 +5,7 @@ Names are loaded when they are first used: a worker process begins here, and nee
 
 from typing import TYPE_CHECKING
 
-from ..base.later import loaded_later
+from ..base.modules import loaded_later
 
 if TYPE_CHECKING:
     from ..results.folder import output_folder

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sweep.base.cache import Cache
 from sweep.camera import angular, irradiance, pixel_response, psf, pwm, readout, sampling
 from sweep.camera.accuracy import STANDARD, Accuracy
 from sweep.camera.effects import EFFECTS, Box
@@ -169,8 +170,8 @@ def test_what_is_left_out_is_not_computed(name: str, monkeypatch: pytest.MonkeyP
         monkeypatch.setattr(owner, function, stage)
 
     def read(left_out: frozenset[str]) -> None:
-        pixel_response._RESPONSES.clear()
-        angular._MATRICES.clear()
+        monkeypatch.setattr(pixel_response, "_RESPONSES", Cache(1))
+        monkeypatch.setattr(angular, "_MATRICES", Cache(4))
         ForwardModel(replace(setup, left_out=left_out)).read(ALL_ON.curves)
 
     with pytest.raises(AssertionError, match="computed"):

@@ -9,8 +9,7 @@ import pandas as pd
 import pytest
 
 from sweep.base.errors import OutputError
-from sweep.commands.accuracy import measure_accuracy
-from sweep.commands.accuracy_timing import denser, spread
+from sweep.commands.accuracy import denser, measure_accuracy, spread
 from sweep.study import load_study
 
 from ..build import stopband_study

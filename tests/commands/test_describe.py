@@ -13,7 +13,7 @@ from scipy.io import savemat
 
 from sweep.base.errors import DataError, OutputError
 from sweep.commands.describe import described
-from sweep.commands.schema import write_schema
+from sweep.commands.new import write_schema
 from sweep.curves.facts import condensed, facts_of
 from sweep.curves.files import scan_curves
 from sweep.curves.signal_color import VISIBLE, dominant_ranges_nm, light_color, outline
@@ -255,7 +255,7 @@ def test_a_schema_replaces_only_a_schema(tmp_path: Path) -> None:
     assert path.read_text() == schema_text()
     path.unlink()
     path.symlink_to("/dev/zero")  # it never ends
-    with pytest.raises(OutputError, match="holds something else already"):
+    with pytest.raises(OutputError, match="not a file"):
         write_schema(path)
     path.unlink()
     for held in ("mine", '{"title": "mine"}', "[]"):

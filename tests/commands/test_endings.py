@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import os
-import resource
-import shlex
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -20,7 +16,6 @@ from sweep.commands.endings import ends_in_lines
 
 from ..build import BASE
 from ..commanded import UNDRAWN, commanded
-from ..conftest import STUDIES
 
 COMMAND = [sys.executable, "-m", "sweep"]
 SWEPT = BASE.split("constraints:", maxsplit=1)[0]
@@ -157,73 +152,3 @@ def test_an_output_without_room_is_one_line() -> None:
         done = subprocess.run([*COMMAND, "schema"], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert done.returncode == 2
     assert done.stderr == "sweep: No space left on device\n"
-
-
-def within(megabytes: int) -> Callable[[], None]:
-    def limit() -> None:
-        resource.setrlimit(resource.RLIMIT_AS, (megabytes * 2**20, megabytes * 2**20))
-
-    return limit
-
-
-def run_within(megabytes: int, output: Path) -> subprocess.CompletedProcess[str]:
-    arguments = ["run", str(STUDIES / "paper.yaml"), "--output", str(output), "--jobs", "1"]
-    limit = within(megabytes)
-    return subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, check=False, preexec_fn=limit)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("megabytes", [1100, 1300])
-def test_little_memory_is_enough_or_one_line(tmp_path: Path, megabytes: int) -> None:
-    done = run_within(megabytes, tmp_path)
-    told = [line for line in done.stderr.splitlines() if " left" not in line]  # but for progress
-    assert done.returncode in (0, 2), done.stderr
-    assert len(told) == (done.returncode == 2), done.stderr
-    assert all(line.startswith("sweep: ") for line in told)
-
-
-@pytest.mark.parametrize(
-    ("encoding", "verbs"),
-    [
-        ("ascii", ("check",)),
-        pytest.param(None, ("check", "list"), marks=pytest.mark.slow),
-    ],
-)
-def test_names_of_any_letters_in_an_ascii_locale(tmp_path: Path, encoding: str | None, verbs: tuple[str, ...]) -> None:
-    folder = tmp_path / "größe"
-    folder.mkdir()
-    study = folder / "größe.yaml"
-    study.write_text(SWEPT.replace("study: tiny", 'study: "größe ü"'), encoding="utf-8")
-    locale = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
-    locale |= {} if encoding is None else {"PYTHONIOENCODING": encoding}
-    out = str(folder / "out")
-    arguments = {
-        "check": [str(study)],
-        "list": [str(folder), "--output", out],
-        "run": [str(study), "--output", out, "--jobs", "1"],
-        "status": [os.fsdecode(Path(out) / "gr__e__")],
-    }
-    for verb in verbs:
-        done = subprocess.run(
-            [*COMMAND, verb, *arguments[verb]], capture_output=True, check=False, env={**os.environ, **locale}
-        )
-        assert done.returncode == 0, (verb, done.stderr)
-        assert b"Traceback" not in done.stderr
-
-
-@pytest.mark.skipif(
-    subprocess.run(["unshare", "-rm", "true"], capture_output=True, check=False).returncode != 0
-    if Path("/usr/bin/unshare").exists()
-    else True,
-    reason="this machine gives no mount namespace",
-)
-@pytest.mark.slow
-def test_without_shared_memory_threads_do_the_work(tmp_path: Path) -> None:
-    study = tmp_path / "tiny.yaml"
-    study.write_text(SWEPT)
-    run = shlex.join([sys.executable, "-c", UNDRAWN, "run", str(study), "--output", str(tmp_path), "--jobs", "2"])
-    script = f"mount -t tmpfs -o ro none /dev/shm && {run}"
-    done = subprocess.run(["unshare", "-rm", "sh", "-c", script], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert "joblib will operate in serial mode" in done.stderr
-    assert "Traceback" not in done.stderr

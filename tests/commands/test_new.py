@@ -10,9 +10,9 @@ import pytest
 
 from sweep.api.channels import channel_of, layout_of
 from sweep.base.errors import DataError, OutputError, StudyError
-from sweep.commands.list_studies import list_lines, studies_of
+from sweep.commands.listing import list_lines, studies_of
 from sweep.commands.new import new_study
-from sweep.commands.new.template import scalar
+from sweep.commands.study_text import scalar
 from sweep.study import load_study
 from sweep.study.document import Document
 
@@ -155,7 +155,7 @@ def test_a_study_that_cannot_be_made_leaves_nothing(tmp_path: Path, monkeypatch:
     def full(*_: object) -> None:
         raise OutputError("full")
 
-    monkeypatch.setattr("sweep.commands.new.make.write_text", full)
+    monkeypatch.setattr("sweep.commands.new.write_text", full)
     with pytest.raises(OutputError, match="full"):
         new_study("mine", tmp_path / "a" / "b", None, None, "energy")
     assert list(tmp_path.iterdir()) == []

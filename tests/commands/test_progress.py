@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import pytest
 
-from sweep.commands import progress
+from sweep.commands import output
 
 
 def test_no_time_left_is_told_before_something_is_known(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     clock = iter([0.0, 11.0, 22.0, 33.0])
-    monkeypatch.setattr(progress.time, "monotonic", lambda: next(clock))
-    display = progress.ProgressDisplay()
+    monkeypatch.setattr(output.time, "monotonic", lambda: next(clock))
+    display = output.ProgressDisplay()
     for done in (0, 5, 1_000, 10_000):
         display.update("designs", done, 20_000)
     assert capsys.readouterr().err.splitlines() == [
@@ -26,8 +26,8 @@ def test_after_a_minute_a_slow_phase_tells_its_pace(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     clock = iter([0.0, 70.0])
-    monkeypatch.setattr(progress.time, "monotonic", lambda: next(clock))
-    display = progress.ProgressDisplay()
+    monkeypatch.setattr(output.time, "monotonic", lambda: next(clock))
+    display = output.ProgressDisplay()
     for done in (0, 7):
         display.update("designs", done, 10_000)
     assert capsys.readouterr().err == "designs: 7 of 10,000, 0.1/s, 99930 s left\n"

@@ -107,7 +107,7 @@ HELLO = '''\
 
 import typer
 
-from sweep.commands.panels import OF_TOOL
+from sweep.commands.options import OF_TOOL
 
 PANEL = OF_TOOL
 

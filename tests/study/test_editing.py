@@ -13,8 +13,8 @@ from typing import Any
 import jsonschema
 import pytest
 
-from sweep.commands.completion import run_folders, study_files
-from sweep.commands.list_studies import list_lines, studies_of
+from sweep.commands.listing import list_lines, studies_of
+from sweep.commands.options import run_folders, study_files
 from sweep.study.document import Document
 from sweep.study.editors import SCHEMA_FILE, schema_text, study_schema
 

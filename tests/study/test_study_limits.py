@@ -14,7 +14,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from sweep.base.errors import MOST_FAULTS, Fault, StudyError, SweepError, nearest
-from sweep.commands.list_studies import list_lines, studies_of
+from sweep.commands.listing import list_lines, studies_of
 from sweep.curves.scan import MOST_BYTES, MOST_CURVES, MOST_SAMPLES, MOST_VALUES
 from sweep.results.tables import RESOLVED
 from sweep.study import load_study

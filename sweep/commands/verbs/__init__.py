@@ -1,1 +1,1 @@
-"""The verbs of the command line, each a file: its arguments, and what it says. Heavy imports wait until it runs."""
+"""Commands: each public function of a file is one, with its arguments and options. Heavy imports wait until it runs."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ...base.found import files_in
+from ...base.modules import files_in
 from ..lights import Lights
 from ..spectrum import WavelengthGrid
 from . import data_sets

@@ -1,4 +1,4 @@
-"""The studies of a folder in a line each, and what has been run of them. Nothing is computed."""
+"""The studies of a folder, with what has been run of them, and the spectra that the package ships. Nothing is run."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from typing import Any
 
 from ..base.disk import is_folder, read_facts
 from ..base.errors import Fault, StudyError, SweepError
+from ..curves.builtin.spectra import cards
+from ..curves.builtin.stand_ins import surrogate_cards
 from ..results.folder import held_by
 from ..results.lock import in_use
 from ..results.tables import PROVENANCE
@@ -26,14 +28,9 @@ class Listed:
     state: str
     question: str
 
-    @property
-    def counted(self) -> str:
-        """Number of designs, in words."""
-        return "" if self.designs is None else f"{self.designs:,} designs"
-
 
 def studies_of(folder: Path, outputs: Path, data: Path | None = None) -> list[Listed]:
-    """Studies of `folder` (*.yaml, *.yml), with the state of their runs in `outputs`.
+    """Return the studies of `folder` (*.yaml, *.yml), with the state of their runs in `outputs`.
 
     `data` as for `load_study`. Raises StudyError when there is no such folder.
     """
@@ -49,18 +46,23 @@ def studies_of(folder: Path, outputs: Path, data: Path | None = None) -> list[Li
 
 
 def list_lines(folder: Path, studies: list[Listed]) -> list[str]:
-    """A line for each study: name, designs, state, question."""
+    """Return a line for each study: name, designs, state, question."""
     if not studies:
         return [f"No studies in {folder}. `sweep new NAME --folder {folder}` writes one."]
-    wide, wider, widest = (max(len(getattr(study, key)) for study in studies) for key in ("name", "counted", "state"))
-    shown = [f"{x.name:<{wide}}  {x.counted:>{wider}}  {x.state:<{widest}}  {x.question}".rstrip() for x in studies]
-    finished = sum(study.state.startswith("finished") for study in studies)
+    counts = ["" if x.designs is None else f"{x.designs:,} designs" for x in studies]
+    name_width, count_width = max(len(x.name) for x in studies), max(map(len, counts))
+    state_width = max(len(x.state) for x in studies)
+    lines = [
+        f"{x.name:<{name_width}}  {count:>{count_width}}  {x.state:<{state_width}}  {x.question}".rstrip()
+        for x, count in zip(studies, counts, strict=True)
+    ]
+    finished = sum(x.state.startswith("finished") for x in studies)
     count = f"{len(studies)} {'study' if len(studies) == 1 else 'studies'}"
-    return [*shown, f"{count}, {finished} finished. Run one: sweep run {folder}/NAME.yaml"]
+    return [*lines, f"{count}, {finished} finished. Run one: sweep run {folder}/NAME.yaml"]
 
 
 def list_facts(studies: list[Listed]) -> dict[str, Any]:
-    """The same as plain values."""
+    """Return the same as plain values."""
     return {"studies": [asdict(study) for study in studies]}
 
 
@@ -72,7 +74,10 @@ def _listed(path: Path, outputs: Path, data: Path | None) -> Listed:
         more = f" (and {len(error.faults) - 1} more)" if error.faults[1:] else ""
         return Listed(path.stem, None, "cannot be loaded", f"{error.faults[0]}{more}")
     name = path.stem if study.name == path.stem else f"{path.stem} ({study.name})"
-    return Listed(" ".join(name.split()), study.n_designs, state, _short(study))
+    question = " ".join(study.section.question.split())
+    if len(question) > _QUESTION_LETTERS:
+        question = question[: _QUESTION_LETTERS - 3].rstrip() + "..."
+    return Listed(" ".join(name.split()), study.n_designs, state, question)
 
 
 def _state(study: Study, outputs: Path) -> str:
@@ -84,12 +89,29 @@ def _state(study: Study, outputs: Path) -> str:
         return "running"
     if not held.finished:
         return "interrupted"
-    found = read_facts(folder / PROVENANCE).get("search") or {}
-    best = found.get("best_smooth_objective")
+    best = (read_facts(folder / PROVENANCE).get("search") or {}).get("best_smooth_objective")
     goal = study.quantities[study.objective.column]
     return "finished" if best is None else f"finished, search found {goal.amount(best)}"
 
 
-def _short(study: Study) -> str:
-    text = " ".join(study.section.question.split())
-    return text if len(text) <= _QUESTION_LETTERS else text[: _QUESTION_LETTERS - 3].rstrip() + "..."
+def data_lines() -> list[str]:
+    """Return for each set of spectra its data card: kind, range, license, groups, source, credit and digest."""
+    lines, total = [], 0
+    sets = [*cards(), *surrogate_cards()]
+    for card in sets:
+        count = sum(card.groups.values())
+        total += count
+        origin = "surrogate: modeled, not measured" if card.surrogate else "as published"
+        lines += [
+            f"{card.name}: {count} {card.kind}s, {card.first_nm:g} to {card.last_nm:g} nm, {card.license}, {origin}",
+            f"  groups: {', '.join(f'{group} ({size})' for group, size in card.groups.items())}",
+            f"  source: {card.source}",
+            f"  credit: {card.credit}",
+            f"  sha256: {card.sha256}",
+        ]
+    return [*lines, f"{total} spectra in {len(sets)} sets. A study's tasks name their groups: tasks: {{own: ...}}."]
+
+
+def data_facts() -> dict[str, Any]:
+    """Return the same as plain values."""
+    return {"sets": [asdict(card) for card in (*cards(), *surrogate_cards())]}

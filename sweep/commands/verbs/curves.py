@@ -1,18 +1,53 @@
-"""Judge a filter of one's own."""
+"""Commands of files of curves."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
+from ...base.errors import DataError
 from ...curves.light_unit import LightUnit
-from ..options import AllowCode, DataFolder
-from ..panels import OF_CURVES
-from ..said import Json, Quiet, say
+from ..options import OF_CURVES, AllowCode, DataFolder
+from ..output import Json, Quiet, say
 
 PANEL = OF_CURVES
+
+
+def describe(
+    file: Annotated[Path, typer.Argument(help="A file of curves, or EMVA 1288 results (.xml).", show_default=False)],
+    output: Annotated[Path, typer.Option(help="Folder for the picture.")] = Path("outputs/describe"),
+    quantity: Annotated[
+        LightUnit | None,
+        typer.Option(help="Of light spectra; without it, lights or QE is guessed.", show_default=False),
+    ] = None,
+    clean: Annotated[
+        Path | None,
+        typer.Option(help="Write clean CSV here; it says what was changed.", show_default=False),
+    ] = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Plot and check a file of curves: what it holds, what is wrong with it, which colors its lights have."""
+    facts: dict[str, Any] = {"file": str(file)}
+    if file.suffix.casefold() == ".xml" and clean is None and quantity is None:
+        from ..emva1288 import pixel_lines
+
+        lines = pixel_lines(file)
+        say(lines, facts | {"lines": lines}, as_json=as_json, quiet=quiet)
+        return
+    from ..describe import cleaned, described
+
+    if clean is not None:
+        lines = cleaned(file, clean)
+        say(lines, facts | {"clean": str(clean), "lines": lines}, as_json=as_json, quiet=quiet)
+        return
+    description = described(file, output, quantity)
+    facts |= {**description.facts, "faults": [str(fault) for fault in description.faults]}
+    say(description.lines, facts, as_json=as_json, quiet=quiet)
+    if description.faults:
+        raise DataError(description.faults)
 
 
 def evaluate_(

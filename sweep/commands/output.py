@@ -1,0 +1,91 @@
+"""Output of commands: lines for people, one JSON object for programs, and progress on stderr."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+import time
+from collections.abc import Iterable, Mapping
+from contextlib import ExitStack
+from typing import Annotated, Any
+
+import typer
+
+Json = Annotated[bool, typer.Option("--json", help="Say one JSON object on stdout, and everything else on stderr.")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="Say nothing but faults, and with --json the object.")]
+_INTERVAL_S = 10.0
+_LEAST_SHARE, _LEAST_S = 0.01, 60.0
+"""The time left is printed from this share of a phase, or this time, on: the first jobs wait for the compiler."""
+
+
+def say(lines: Iterable[str], facts: Mapping[str, Any], *, as_json: bool = False, quiet: bool = False) -> None:
+    """Print the lines of a command, and with `as_json` its facts on stdout; NaN and infinity become null."""
+    say_lines(lines, as_json=as_json, quiet=quiet)
+    if as_json:
+        typer.echo(json.dumps(_plain(facts), allow_nan=False, ensure_ascii=False))
+
+
+def say_lines(lines: Iterable[str], *, as_json: bool, quiet: bool) -> None:
+    """Print lines on stdout, or on stderr where stdout is kept for an object."""
+    for line in () if quiet else lines:
+        typer.echo(line, err=as_json)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _plain(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(inner) for inner in value]
+    if isinstance(value, bool | int | str) or value is None:
+        return value
+    if hasattr(value, "tolist"):  # of NumPy
+        return _plain(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return str(value)
+
+
+class ProgressDisplay(ExitStack):
+    """Progress of a command on stderr: a live bar on a terminal, a line now and then elsewhere."""
+
+    def __init__(self, *, quiet: bool = False) -> None:
+        super().__init__()
+        self._quiet = quiet
+        self._bars: Any = None
+        self._phase = ""
+        self._started = self._last_line = 0.0
+        self._first = 0
+        if sys.stderr.isatty() and not quiet:
+            from rich import progress  # noqa: PLC0415  (only on a terminal)
+            from rich.console import Console  # noqa: PLC0415
+
+            columns = (
+                progress.TextColumn("{task.description}"),
+                progress.BarColumn(),
+                progress.MofNCompleteColumn(),
+                progress.TimeRemainingColumn(),
+            )
+            self._bars = self.enter_context(progress.Progress(*columns, console=Console(stderr=True)))
+
+    def update(self, phase: str, done: int, total: int) -> None:
+        """Show that `done` of `total` are done in a phase."""
+        now = time.monotonic()
+        new = phase != self._phase
+        if new:
+            self._phase, self._started, self._first, self._last_line = phase, now, done, now
+        if self._bars is not None:
+            if new:
+                self._task = self._bars.add_task(phase, total=total)
+            self._bars.update(self._task, completed=done)
+        elif not self._quiet and now - self._last_line >= _INTERVAL_S:
+            self._last_line = now
+            print(f"{phase}: {done:,} of {total:,}, {self._pace(now, done, total)}", file=sys.stderr, flush=True)
+
+    def _pace(self, now: float, done: int, total: int) -> str:
+        """Rate and time left, in words."""
+        elapsed, new = now - self._started, done - self._first
+        if new <= 0 or (new < _LEAST_SHARE * total and elapsed < _LEAST_S):
+            return "time left not known yet"
+        rate = new / max(elapsed, 1e-9)
+        return f"{rate:,.3g}/s, {(total - done) / rate:.0f} s left"

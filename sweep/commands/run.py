@@ -1,0 +1,134 @@
+"""Run one study as the command asks, or say what that would do; draw the report of a finished run."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+import webbrowser
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from .. import run as runner
+from ..base.errors import BrokenPromiseError, Fault, SweepError
+from ..base.types import in_turn
+from ..results.tables import REPORT
+from ..run.workers import workers
+from ..study import folder_name, load_study
+from .output import ProgressDisplay, say_lines
+
+if TYPE_CHECKING:
+    from ..base.types import Parallel
+
+_JSON_KEYS = ("filters", "designs", "failed", "duration_s", "search", "check", "warnings")
+"""Keys of provenance that `--json` repeats."""
+
+
+def run_one(
+    path: Path,
+    *,
+    data: Path | None,
+    output: Path,
+    jobs: int | None,
+    backend: str,
+    scheduler: str | None,
+    dry_run: bool,
+    options: runner.RunOptions,
+    changes: dict[str, str],
+    allow_code: bool,
+    opens: bool,
+    as_json: bool,
+    quiet: bool,
+    began_s: float,
+) -> dict[str, Any]:
+    """Run a study, or continue it, draw its report and say what it found.
+
+    Parameters
+    ----------
+    path : Path
+        Study file.
+    changes : dict
+        Dotted key -> value instead of the file's.
+    began_s : float
+        Time at which the user began to wait, by the monotonic clock, s.
+    data, output, jobs, backend, scheduler, dry_run, options, allow_code, opens, as_json, quiet
+        Options of `sweep run`.
+
+    Returns
+    -------
+    dict
+        The same as plain values, for `--json`.
+
+    Raises
+    ------
+    SweepError
+        For a backend that is unknown, and as `run_study` does.
+    """
+
+    def note(text: str) -> None:
+        if not quiet:
+            typer.echo(f"Note: {text}", err=True)
+
+    if backend not in runner.BACKENDS:
+        allowed = ", ".join(runner.BACKENDS)
+        raise SweepError(Fault("unknown backend", key="--backend", value=backend, allowed=allowed))
+    study = load_study(path, data, changes=changes, allow_code=allow_code)
+    folder, other = runner.output_folder(output / folder_name(study.name), study)
+    n_workers = jobs or os.cpu_count() or 1
+    if other is not None:
+        note(f"{other}.")
+    if dry_run:
+        left = runner.to_do(study, folder, n_workers)
+        say_lines(runner.to_do_lines(left, folder), as_json=as_json, quiet=quiet)
+        counts = {"designs": study.n_designs, "finished_designs": left.finished, "parts": left.chunks}
+        return {"folder": str(folder), **counts, "searches": left.searches}
+    with runner.stopped_by_signals():
+        with ProgressDisplay(quiet=quiet) as display:
+            computed = runner.run_study(
+                study,
+                folder,
+                n_workers,
+                display.update,
+                sys.argv,
+                backend=backend,
+                scheduler=scheduler,
+                options=options,
+            )
+        if not computed:
+            note(f"{folder} holds this very study, finished; nothing was computed.")
+        from .audit import audit_again  # noqa: PLC0415  (tables are loaded while workers compute)
+
+        audit_again(folder, data)
+        with workers(n_workers if computed and backend == "loky" else 1) as parallel:
+            facts = finish(folder, began_s, mend=True, parallel=parallel, as_json=as_json, quiet=quiet)
+    if opens and not webbrowser.open((folder / REPORT).absolute().as_uri()):
+        note(f"no browser was found for {folder / REPORT}.")
+    return {"computed": bool(computed), **facts}
+
+
+def finish(
+    folder: Path,
+    began_s: float,
+    *,
+    mend: bool = False,
+    parallel: Parallel = in_turn,
+    as_json: bool = False,
+    quiet: bool = False,
+) -> dict[str, Any]:
+    """Draw figures and report of a finished run, and say what it found; the same as plain values.
+
+    `mend`: draw only what is missing or damaged; `began_s` as for `run_one`; `parallel` makes the pictures. Raises
+    BrokenPromiseError where the run's check failed.
+    """
+    from ..report import make_report, read_output, summary_lines  # noqa: PLC0415  (loaded while workers compute)
+
+    result = read_output(folder)
+    make_report(result, mend=mend, parallel=parallel)
+    say_lines(summary_lines(result, time.monotonic() - began_s), as_json=as_json, quiet=quiet)
+    check = result.provenance.check
+    if check is not None and not check.passed:
+        raise BrokenPromiseError([Fault(check.sentence.removesuffix("."), key=check.scenario)])
+    facts = result.provenance.model_dump(mode="json")
+    return {"folder": str(folder), **{key: facts[key] for key in _JSON_KEYS}}

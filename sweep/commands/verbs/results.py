@@ -1,0 +1,96 @@
+"""Commands of the results of runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ...base.errors import BrokenPromiseError
+from ..options import OF_RESULTS, AllowCode, Also, DataFolder, RunFolder, run_folders
+from ..output import Json, ProgressDisplay, Quiet, say
+
+PANEL = OF_RESULTS
+
+
+def audit(
+    folder: RunFolder,
+    data: DataFolder = None,
+    allow_code: AllowCode = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Compute the front and 1 % of a run's rows again at the reference settings, and compare.
+
+    Exit code 5 says that an error is larger than the study's tolerance allows.
+    """
+    from ...results.tables import AUDIT
+    from ..audit import audit_output
+
+    with ProgressDisplay(quiet=quiet) as display:
+        result = audit_output(folder, data, display.update, allow_code=allow_code)
+    facts = {"folder": str(folder), "designs": result.n_designs, "rows": result.rows.to_dict("records")}
+    say([*result.lines, f"Files: {folder}/: {AUDIT}."], facts, as_json=as_json, quiet=quiet)
+    if result.faults:
+        raise BrokenPromiseError(result.faults)
+
+
+def compare(
+    folders: Annotated[
+        list[Path],
+        typer.Argument(help="Output folders of two or more studies.", show_default=False, autocompletion=run_folders),
+    ],
+    output: Annotated[
+        Path | None, typer.Option(help="Folder for the comparison.", show_default="outputs/compare-A-B")
+    ] = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Compare finished runs: what their studies ask, best designs, fronts, versions."""
+    from ...report.compare import compare_runs
+
+    compared = compare_runs(folders, output)
+    tables = {name: table.to_dict("records") for name, table in compared.tables.items()} if as_json else {}
+    facts = {"folder": str(compared.folder), **tables, "notes": compared.notes}
+    say(compared.lines, facts, as_json=as_json, quiet=quiet)
+
+
+def export(
+    folder: RunFolder,
+    design: Annotated[str, typer.Option(help="A design_id, a name (RYN_4Cy, RGGB), or best.", show_default=False)],
+    data: Annotated[
+        Path | None, typer.Option(help="Folder with the run's curve files, which are then read again and compared.")
+    ] = None,
+    also: Annotated[
+        list[Also] | None,
+        typer.Option(help="Another file, too: .spectrum of Speos, or weights of the sensor's R, G and B."),
+    ] = None,
+    to: Annotated[Path | None, typer.Option(help="Folder for the files.", show_default="FOLDER/export")] = None,
+    allow_code: AllowCode = False,
+) -> None:
+    """Write a filter of a finished run as CSV and as ISETCam color filters (.mat), and for other programs."""
+    from ..export import export_design
+
+    for line in export_design(folder, design, data, to, also or (), allow_code=allow_code):
+        typer.echo(line)
+
+
+def report(context: typer.Context, folder: RunFolder) -> None:
+    """Draw figures and report of a finished run again."""
+    from ..run import finish
+
+    finish(folder, context.find_root().obj)
+
+
+def status(
+    folder: RunFolder,
+    verify: Annotated[bool, typer.Option("--verify", help="Compare the digests of all its files.")] = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Say how far a run is, from another terminal; of a finished one, which of its files are missing or damaged."""
+    from ..status import status_of
+
+    status = status_of(folder, verify=verify)
+    say(status.lines, status.facts, as_json=as_json, quiet=quiet)
