@@ -12,9 +12,9 @@ from ..base.errors import DataError, Fault, nearest
 from ..base.types import FloatArray
 from ..camera.mosaic import Mosaic
 from ..camera.sensor import SensorCurves
+from ..curves import LightUnit
 from ..curves.facts import qe_scale
 from ..curves.files import read_curves
-from ..curves.light_unit import LightUnit
 from ..curves.lights import Lights
 from ..curves.spectrum import Curves
 from .channels import NEW, Layout, layout_of, sensor_file

@@ -13,8 +13,8 @@ from pydantic import BaseModel
 from .. import study as studies_of_files
 from ..base.disk import is_file
 from ..base.errors import DataError, Fault
+from ..curves import LightUnit
 from ..curves.light_files import lights_file
-from ..curves.light_unit import LightUnit
 from ..curves.spectrum import Curves
 from ..study.shipped import shipped_names, study_path
 from .channels import sensor_file

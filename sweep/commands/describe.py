@@ -16,10 +16,9 @@ import numpy as np
 
 from ..base.disk import read_input
 from ..base.errors import DataError, Fault, OutputError
-from ..curves.facts import Curve, Facts, condensed, facts_of, notes
+from ..curves import LightUnit
+from ..curves.facts import Curve, Facts, condensed, facts_of, mended, notes
 from ..curves.files import scan_curves
-from ..curves.light_unit import LightUnit
-from ..curves.mending import mended
 from ..curves.signal_color import LightColor
 from ..results.atomic import write_bytes, write_text
 from .describe_picture import draw

@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from ..base.disk import read_input
 from ..base.errors import DataError, Fault
 from ..camera.pixel import Pixel
-from ..curves.scan import MOST_BYTES
+from ..curves.text_tables import MOST_BYTES
 
 _RESULTS = {
     "u_e_sat": ("well_e", ("e-", "e"), 1.0),

@@ -10,8 +10,15 @@ import numpy as np
 
 from ..base.errors import Fault, OutputError
 from ..base.types import FloatArray
-from ..curves.filter_files import color_hints, csv_text, filter_names, isetcam_mat, speos_text, unique_names
-from ..curves.rgb_weights import rgb_weights
+from ..curves.filter_files import (
+    color_hints,
+    csv_text,
+    filter_names,
+    isetcam_mat,
+    rgb_weights,
+    speos_text,
+    unique_names,
+)
 from ..report import Output, check_kept, read_output, study_of
 from ..results.atomic import write_bytes
 from ..results.designs import find_row, row_curves

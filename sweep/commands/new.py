@@ -15,9 +15,9 @@ from ..api.channels import sensor_file
 from ..base.disk import read_input
 from ..base.errors import DataError, Fault, OutputError, StudyError, SweepError
 from ..base.own_code import is_code
+from ..curves import LightUnit
 from ..curves.light_files import lights_file
-from ..curves.light_unit import LightUnit
-from ..curves.scan import MOST_BYTES
+from ..curves.text_tables import MOST_BYTES
 from ..results.atomic import atomic, write_bytes, write_text
 from ..study import Study, folder_name, load_study
 from ..study.editors import SCHEMA_FILE, TITLE, schema_text

@@ -1,7 +1,8 @@
-"""CIE 1931 chromaticity of lights, and the color regions of traffic signals."""
+"""CIE 1931 chromaticity of lights, and the color regions of traffic signals, vehicle lamps and sign sheeting."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
@@ -42,7 +43,7 @@ green: y <= 0.726 - 0.726 x, x <= 0.625 y - 0.041, y >= 0.400."""
 
 @cache
 def _observer(grid: WavelengthGrid) -> FloatArray:
-    """The CIE 1931 2 degree observer's x, y and z, and V(lambda) of 1924, on the grid, ndarray[4, n_wavelengths].
+    """Return the CIE 1931 observer's x, y and z, and V(lambda) of 1924, on the grid, ndarray[4, n_wavelengths].
 
     The tables of colour-science, which takes a second to import. 0 outside 360 to 830 nm, where they are not defined:
     the eye sees next to nothing there.
@@ -53,7 +54,7 @@ def _observer(grid: WavelengthGrid) -> FloatArray:
 
 
 def color_matching(grid: WavelengthGrid) -> FloatArray:
-    """CIE 1931 2 degree color-matching functions on the grid, ndarray[3, n_wavelengths]; 0 outside 360 to 830 nm."""
+    """Return the CIE 1931 2 degree color-matching functions on the grid, ndarray[3, n_wavelengths]."""
     return _observer(grid)[:3]
 
 
@@ -68,7 +69,7 @@ _XYZ_TO_RGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [
 
 
 def luminance_per_photon_radiance(grid: WavelengthGrid, photons: FloatArray) -> FloatArray:
-    """cd/m^2 for each photon/s/sr/m^2 of spectra that integrate to one photon: [n, n_wavelengths] -> [n].
+    """Return cd/m^2 for each photon/s/sr/m^2 of spectra that integrate to one photon: [n, n_wavelengths] -> [n].
 
     L = 683 integral(V h c / lambda S) d lambda, S in photons per nm; 0 for spectra outside VISIBLE_NM.
     """
@@ -77,13 +78,13 @@ def luminance_per_photon_radiance(grid: WavelengthGrid, photons: FloatArray) -> 
 
 
 def chromaticity(grid: WavelengthGrid, photons: FloatArray) -> FloatArray:
-    """CIE 1931 x, y of photon spectra: ndarray[n, n_wavelengths] -> ndarray[n, 2]; NaN for what nobody sees."""
+    """Return CIE 1931 x, y of photon spectra: ndarray[n, n_wavelengths] -> ndarray[n, 2]; NaN for what nobody sees."""
     xyz = energy_from_photons(grid.nodes_nm, photons) @ color_matching(grid).T
     return np.asarray(xyz[:, :2] / xyz.sum(axis=1, keepdims=True), dtype=float)
 
 
 def display_colors(grid: WavelengthGrid, photons: FloatArray) -> FloatArray:
-    """sRGB colors in 0..1 to draw lights with, each as bright as its hue allows: ndarray[n, n_wavelengths] -> [n, 3].
+    """Return sRGB colors, 0..1, to draw lights with, as bright as their hues allow: [n, n_wavelengths] -> [n, 3].
 
     Saturated lights lie outside sRGB; negative primaries are cut off (the color shown is the nearest in hue, not the
     light's own). What nobody sees is gray.
@@ -95,3 +96,62 @@ def display_colors(grid: WavelengthGrid, photons: FloatArray) -> FloatArray:
     linear = linear / linear.max(axis=1, keepdims=True)
     colors[seen] = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
     return colors
+
+
+_R48 = "UN Regulation 48, 2.29, color of the light emitted from a device (red, amber, white)"
+_R65 = "UN Regulation 65, special warning lamps (blue)"
+LAMP_REGIONS = {
+    "red": ColorRegion(((0, 1, 0.335), (-1, -1, -0.980)), _R48),
+    "amber": ColorRegion(((-1, 1, -0.120), (0, -1, -0.390), (-0.670, -1, -0.790)), _R48),
+    "white": ColorRegion(
+        ((-0.640, 1, 0.150), (0, 1, 0.440), (1, 0, 0.500), (0.750, -1, -0.050), (-1, 0, -0.310)),
+        f"{_R48}; its convex part",
+    ),
+    "blue": ColorRegion(((-0.805, 1, 0.065), (1, 1, 0.400), (1, -0.600, 0.133)), _R65),
+}
+"""red: y <= 0.335, y >= 0.980 - x; amber: y <= x - 0.120, y >= 0.390, y >= 0.790 - 0.670 x; blue: y <= 0.065 + 0.805 x,
+y <= 0.400 - x, x <= 0.133 + 0.600 y; white: y <= 0.150 + 0.640 x, y <= 0.440, x <= 0.500, y >= 0.050 + 0.750 x,
+x >= 0.310 (right of x = 0.443 the regulation lets y down to 0.382)."""
+
+_ITE = "ITE, Vehicle Traffic Control Signal Heads, 1985, and its part 2 of 1998 for LED modules"
+SIGNAL_REGIONS: Mapping[str, Mapping[str, ColorRegion]] = {
+    "en_12368": {kind: REGIONS[kind] for kind in ("yellow", "red")},
+    "ite": {
+        "yellow": ColorRegion(((0, -1, -0.411), (0, 1, 0.452), (-1, -1, -0.995)), _ITE),
+        "red": ColorRegion(((0, 1, 0.308), (-1, -1, -0.998)), _ITE),
+    },
+    "un_r48": {"yellow": LAMP_REGIONS["amber"], "red": LAMP_REGIONS["red"]},
+}
+"""Yellow and red lights that a norm allows, between these bounds and the spectral locus, with corners (x, y).
+
+EN 12368: yellow (0.593, 0.387), (0.536, 0.444), red (0.660, 0.320), (0.690, 0.290). ITE: yellow 0.411 <= y <= 0.452,
+y >= 0.995 - x: (0.584, 0.411), (0.543, 0.452), red y <= 0.308, y >= 0.998 - x: (0.690, 0.308). ITE's supplement for
+LED circular signals of 2005, which replaced part 2, is not in it: its bounds could not be read. Bounds of both as
+compared by the Lighting Research Center, Rensselaer, "LED Traffic Signal Comparison". UN R48, which SAE J578 shares:
+yellow (0.545, 0.425), (0.597, 0.390), red (0.645, 0.335), (0.721, 0.259), of vehicles' lamps.
+"""
+NORM_NAMES: Mapping[str, str] = {"en_12368": "EN 12368", "ite": "ITE (1985, 1998)", "un_r48": "UN R48 and SAE J578"}
+
+
+def corners(*points: tuple[float, float], source: str) -> ColorRegion:
+    """Return the convex region with these corners (x, y), in either order of rotation."""
+    area = sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(points, (*points[1:], points[0]), strict=True))
+    ordered = points if area > 0 else points[::-1]
+    bounds = []
+    for (x0, y0), (x1, y1) in zip(ordered, (*ordered[1:], ordered[0]), strict=True):
+        normal = (y1 - y0, x0 - x1)  # outward of a polygon that runs counterclockwise
+        bounds.append((*normal, normal[0] * x0 + normal[1] * y0))
+    return ColorRegion(tuple(bounds), source)
+
+
+_FHWA = "23 CFR 655, subpart F, appendix, table 1: daytime color of retroreflective sign material (D65, 2 degrees)"
+SHEETING_REGIONS = {
+    "white": corners((0.303, 0.300), (0.368, 0.366), (0.340, 0.393), (0.274, 0.329), source=_FHWA),
+    "red": corners((0.648, 0.351), (0.735, 0.265), (0.629, 0.281), (0.565, 0.346), source=_FHWA),
+    "orange": corners((0.558, 0.352), (0.636, 0.364), (0.570, 0.429), (0.506, 0.404), source=_FHWA),
+    "yellow": corners((0.498, 0.412), (0.557, 0.442), (0.479, 0.520), (0.438, 0.472), source=_FHWA),
+    "green": corners((0.026, 0.399), (0.166, 0.364), (0.286, 0.446), (0.207, 0.771), source=_FHWA),
+    "blue": corners((0.140, 0.035), (0.244, 0.210), (0.190, 0.255), (0.065, 0.216), source=_FHWA),
+}
+"""Corners (x, y) of each color. White was compared with a published table of these limits (ASTM D4956), the others with
+none."""

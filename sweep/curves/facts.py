@@ -1,18 +1,20 @@
-"""Facts of a file of curves, also of one that is not clean: curves on sorted wavelengths, a guess of what they are."""
+"""Facts of a file of curves, also of one that is not clean: what its curves are, and what can be repaired."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
 from ..base.errors import Fault
 from ..base.types import FloatArray
-from .light_unit import LightUnit
-from .scan import Scan, distinct, unit_by_size
+from . import LightUnit
+from .filter_files import csv_text
 from .signal_color import VISIBLE, LightColor, light_color
-from .spectrum import WavelengthGrid, photons_from_energy, resample
+from .spectrum import WavelengthGrid, photons_from_energy, resample, sample_faults
+from .text_tables import Scan, distinct, unit_by_size
 
 _NEEDED = WavelengthGrid()
 _BROAD_NM = 70.0
@@ -22,6 +24,8 @@ _FEWEST_IN_PEAK = 4
 _PERCENT = 100.0
 _MOST_LETTERS = 100
 _NEARLY = 1e-6
+_SMALL = 0.02
+"""Negatives up to this share of a curve's largest value are noise around 0."""
 NORMALIZED = (
     "the curves have a maximum of 1: they look normalized, and are taken as QE; electrons, noise, SNR and what a "
     "stated exposure gives are then those of a pixel with that QE; `scale` brings them to the pixel's own"
@@ -98,7 +102,7 @@ class Facts:
 
 
 def facts_of(scan: Scan) -> Facts:
-    """The curves of a file with what can be used of them: finite samples, sorted, each wavelength once."""
+    """Return the curves of a file with what can be used of them: finite samples, sorted, each wavelength once."""
     factor = unit_by_size(scan.wavelength_nm)
     read_as = {1e9: "read as m", 1e3: "read as um"}.get(factor, "")
     usable = np.isfinite(scan.wavelength_nm)
@@ -114,7 +118,7 @@ def facts_of(scan: Scan) -> Facts:
 
 
 def notes(facts: Facts, *, as_qe: bool) -> list[str]:
-    """Notes on curves that can be read."""
+    """Return notes on curves that can be read."""
     lines = []
     wave = facts.samples_nm
     if wave.size and (wave[0] > _NEEDED.start_nm or wave[-1] < _NEEDED.stop_nm):
@@ -151,14 +155,14 @@ def looks_normalized(top: float) -> bool:
 
 
 def qe_scale(top: float) -> float:
-    """Factor that brings QE curves whose largest value is `top` into 0..1: 0.01 for percent."""
+    """Return the factor that brings QE curves whose largest value is `top` into 0..1: 0.01 for percent."""
     if top <= 1:
         return 1.0
     return 1 / _PERCENT if 2 < top <= _PERCENT else float(f"{1 / top * (1 - 5e-4):.4g}")
 
 
 def condensed(faults: Sequence[Fault]) -> list[Fault]:
-    """One fault for many that say the same of one column, or of several; their number, and the first one's place."""
+    """Return one fault, with their number and the first one's place, for many that say the same of columns."""
     alike: dict[tuple[str, str | None], list[Fault]] = {}
     for fault in faults:
         alike.setdefault((fault.problem, fault.key), []).append(fault)
@@ -173,3 +177,59 @@ def _joined(group: Sequence[Fault]) -> Fault:
     names = [fault.key or "" for fault in group]
     shown = ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
     return replace(group[0], key=shown or None)
+
+
+@dataclass(frozen=True)
+class Mended:
+    """Curves as `Scan` has them, in rising order; `changes`: what was changed; `faults`: what no rule here mends."""
+
+    wavelength_nm: FloatArray
+    names: tuple[str, ...]
+    values: FloatArray
+    changes: tuple[str, ...]
+    faults: tuple[Fault, ...]
+
+    def text(self, file: str, notes: tuple[str, ...]) -> str:
+        """A clean CSV that says what was changed in its first lines."""
+        lines = [f"from {file}", *(f"read: {note}" for note in notes), *(f"changed: {c}" for c in self.changes)]
+        head = "".join(f"# {' '.join(line.split())}\n" for line in lines)
+        return head + csv_text(self.wavelength_nm, dict(zip(self.names, self.values.T, strict=True)))
+
+
+def mended(scan: Scan) -> Mended:
+    """Return the curves of a scan with what can be repaired in one way only.
+
+    Negatives of up to 2 % of the peak become 0, single gaps between two samples are filled by the straight line, and
+    rows that say the same twice are left out. Everything else stays, and is a fault.
+    """
+    changes: list[str] = []
+    order = np.argsort(scan.wavelength_nm, kind="stable")  # puts NaN last
+    kept = order[np.isfinite(scan.wavelength_nm[order])]
+    if kept.size < order.size:
+        changes.append(f"{order.size - kept.size} rows without a wavelength were left out")
+    if (np.diff(kept) < 0).any():
+        changes.append("rows were sorted by wavelength")
+    wave, values = scan.wavelength_nm[kept], scan.values[kept]
+    again = np.zeros(wave.size, dtype=bool)
+    again[1:] = (wave[1:] == wave[:-1]) & (values[1:] == values[:-1]).all(axis=1)
+    if again.any():
+        changes.append(f"{np.count_nonzero(again)} rows that repeat another were left out")
+    wave, values = wave[~again], values[~again]
+    for name, column in zip(scan.names, values.T, strict=True):
+        changes += _mend(wave, column, name)
+    groups = sample_faults("", wave, scan.names, values) if wave.size > 1 else [[Fault("fewer than two samples")]]
+    return Mended(wave, scan.names, values, tuple(changes), tuple(chain.from_iterable(groups)))
+
+
+def _mend(wave: FloatArray, column: FloatArray, name: str) -> list[str]:
+    """Change a curve in place, and say how."""
+    changes = []
+    finite = np.isfinite(column)
+    low = finite & (column < 0) & (column >= -_SMALL * column[finite].max(initial=0.0))
+    if low.any():
+        changes.append(f"{name}: {np.count_nonzero(low)} negatives down to {column[low].min():.3g} were set to 0")
+        column[low] = 0.0
+    for at in np.flatnonzero(~finite[1:-1] & finite[:-2] & finite[2:]) + 1:
+        column[at] = np.interp(wave[at], wave[[at - 1, at + 1]], column[[at - 1, at + 1]])
+        changes.append(f"{name}: the missing value at {wave[at]:g} nm is {column[at]:.6g}, by a straight line")
+    return changes

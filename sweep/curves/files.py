@@ -13,9 +13,8 @@ import numpy as np
 
 from ..base.disk import read_input
 from ..base.errors import DataError, Fault, nearest
-from .scan import MOST_BYTES, MOST_VALUES, Scan, check_size
 from .spectrum import Curves, sample_faults
-from .text_tables import scan_text
+from .text_tables import MOST_BYTES, MOST_VALUES, Scan, check_size, scan_text
 
 _MAT_VARIABLES = ("wavelength", "data", "filterNames")
 _MAT_NUMBERS = ("double", "single", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)))

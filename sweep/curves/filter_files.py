@@ -1,15 +1,16 @@
-"""Write the filters of a CFA: CSV, ISETCam's `.mat` color filters, and Speos' `.spectrum`."""
+"""Write the filters of a CFA: CSV, ISETCam's `.mat` color filters, Speos' `.spectrum`, and as sums of RGB."""
 
 from __future__ import annotations
 
 import csv
 import io
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..base.types import FloatArray, IndexArray
-from .scan import WAVELENGTH
+from .text_tables import WAVELENGTH
 
 HINTS = "rgbcymwiuxzok"
 """First letters of filter names that ISETCam has a color for (its `sensorColorOrder`)."""
@@ -22,7 +23,7 @@ _SPEOS_TITLE = "OPTIS - Spectrum file v1.0"
 
 
 def unique_names(names: Iterable[str]) -> list[str]:
-    """The names on one line each, without blanks around them; one that occurs again gets a number."""
+    """Return the names on one line each, without blanks around them; one that occurs again gets a number."""
     unique: list[str] = []
     for name in names:
         plain = " ".join(name.split()) or "_"
@@ -35,7 +36,7 @@ def unique_names(names: Iterable[str]) -> list[str]:
 
 
 def csv_text(wavelength_nm: FloatArray, curves: Mapping[str, FloatArray]) -> str:
-    """Curves, ndarray[n_wavelengths] each, as `curve_files.read_curves` reads them: every float comes back as it is."""
+    """Return curves, ndarray[n_wavelengths] each, as `read_curves` reads them: every float comes back as it is."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([WAVELENGTH, *unique_names(curves)])
@@ -44,7 +45,7 @@ def csv_text(wavelength_nm: FloatArray, curves: Mapping[str, FloatArray]) -> str
 
 
 def color_hints(channels: Sequence[str], bases: Mapping[str, str]) -> list[str]:
-    """A letter of HINTS for each channel of a CFA, each used once, as ISETCam wants it (`k` when all are spent).
+    """Return a letter of HINTS for each channel of a CFA, each used once, as ISETCam wants it (`k` when all are spent).
 
     `bases`: modified channel -> curve that it replaces, whose color it takes where that is free. `C` is the clear
     pixel here, ISETCam's `w`; its `c` is cyan, `Cy` here.
@@ -65,14 +66,14 @@ def _own_hint(name: str) -> str:
 
 
 def filter_names(hints: Sequence[str], channels: Iterable[str]) -> list[str]:
-    """Names of ISETCam's filters: the hint, then the channel's own name."""
+    """Return the names of ISETCam's filters: the hint, then the channel's own name."""
     return [hint + name for hint, name in zip(hints, unique_names(channels), strict=True)]
 
 
 def isetcam_mat(
     wavelength_nm: FloatArray, curves: Mapping[str, FloatArray], hints: Sequence[str], tile: IndexArray, comment: str
 ) -> bytes:
-    """Filters as ISETCam's `ieReadColorFilter` and `sensorCreate('custom', ...)` take them, MATLAB version 5.
+    """Return filters as ISETCam's `ieReadColorFilter` and `sensorCreate('custom', ...)` take them, MATLAB version 5.
 
     `curves`: channel -> ndarray[n_wavelengths], 0..1 (above 1 ISETCam rescales all: what rounding put there is cut).
     `tile`: ndarray[rows, columns] of channel indices. Variables: `wavelength` (a column, nm), `data`
@@ -100,7 +101,7 @@ def isetcam_mat(
 
 
 def speos_text(wavelength_nm: FloatArray, values: FloatArray, about: str) -> str:
-    """A curve, ndarray[n_wavelengths], 0..1, as Speos reads it; `about` describes it in ASCII, on one line.
+    """Return a curve, ndarray[n_wavelengths], 0..1, as Speos reads it; `about` describes it in ASCII, on one line.
 
     The form: a title, the description, the number of samples, then a line of wavelength (nm) and percent each. Source:
     Ansys Optics, "Create spectrum file from graph".
@@ -109,3 +110,44 @@ def speos_text(wavelength_nm: FloatArray, values: FloatArray, about: str) -> str
     head = [_SPEOS_TITLE, plain, str(wavelength_nm.size)]
     rows = [f"{float(nm)!r}\t{float(share)!r}" for nm, share in zip(wavelength_nm, 100.0 * values, strict=True)]
     return "\n".join([*head, *rows, ""])
+
+
+@dataclass(frozen=True)
+class RgbWeights:
+    """The least-squares fit of channels by red, green and blue, every wavelength counted alike.
+
+    `weights`: ndarray[n_channels, 3], of any sign. `residual`: ndarray[n_channels], root mean square of what the fit
+    leaves over that of the channel's curve: 0 where the sum is the channel, 1 where it has nothing of it.
+    `light_error`: ndarray[n_channels], the largest error of a channel's electrons over the lights, as a share of those
+    of its brightest light; infinite where it sees none of them.
+    """
+
+    channels: tuple[str, ...]
+    weights: FloatArray
+    residual: FloatArray
+    light_error: FloatArray
+
+    def as_csv(self) -> str:
+        """A row per channel; every float comes back as it is."""
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(["channel", "red", "green", "blue", "residual", "largest_error_of_a_light"])
+        rows = zip(self.channels, self.weights, self.residual, self.light_error, strict=True)
+        for channel, weights, residual, error in rows:
+            writer.writerow([channel, *(repr(float(number)) for number in (*weights, residual, error))])
+        return text.getvalue()
+
+
+def rgb_weights(qe: Mapping[str, FloatArray], rgb: FloatArray, photons: FloatArray) -> RgbWeights:
+    """Fit channels, ndarray[n_wavelengths] each, by the curves `rgb`, ndarray[3, n_wavelengths].
+
+    `photons`: ndarray[n_lights, n_wavelengths]. A channel whose curve is 0 has weights and a residual of 0.
+    """
+    curves = np.stack(list(qe.values()))
+    weights = np.asarray(np.linalg.lstsq(rgb.T, curves.T, rcond=None)[0].T, dtype=float)
+    fit = weights @ rgb
+    left, whole = (np.asarray(np.sqrt((part**2).mean(axis=1)), dtype=float) for part in (curves - fit, curves))
+    brightest, off = (curves @ photons.T).max(axis=1), np.abs((fit - curves) @ photons.T).max(axis=1)
+    errors = np.divide(off, brightest, out=np.full_like(off, np.inf), where=brightest > 0)
+    residual = np.divide(left, whole, out=np.zeros_like(left), where=whole > 0)
+    return RgbWeights(tuple(qe), weights, residual, errors)

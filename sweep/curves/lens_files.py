@@ -59,7 +59,7 @@ def read_chief_rays(path: Path, corner_mm: float | None = None) -> ChiefRays:
 
 
 def _columns(table: TextTable) -> tuple[str, int]:
-    """The unit of the heights, and the index of the column of angles."""
+    """Return the unit of the heights, and the index of the column of angles."""
     file, line, header = table.file, table.line, table.header
     if table.unit == 0:
         raise DataError(Fault("there is no header", file, line, None, None, _ALLOWED))
@@ -78,7 +78,7 @@ def _columns(table: TextTable) -> tuple[str, int]:
 
 
 def _to_corner(table: TextTable, unit: str, values: FloatArray, names: list[str], corner_mm: float | None) -> ChiefRays:
-    """From the middle of the sensor to its corner."""
+    """Return the rays from the middle of the sensor to its corner."""
 
     def check(passes: bool, problem: str, row: int, column: int, allowed: str | None = None) -> None:
         if not passes:

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import DataError, Fault
+from . import LightUnit
 from .facts import Curve, Facts, condensed, facts_of
 from .files import scan_curves
-from .light_unit import LightUnit
 from .signal_color import LightColor
 from .spectrum import WavelengthGrid
 
@@ -48,7 +48,7 @@ class LightsFile:
 
 
 def clean_curves(path: Path) -> dict[str, Curve]:
-    """Clean curves by the names that the file has; raises DataError with all of its faults."""
+    """Return clean curves by the names that the file has; raises DataError with all of its faults."""
     scan = scan_curves(path)
     if scan.faults:
         raise DataError(condensed(list(chain.from_iterable(scan.faults))))
@@ -56,7 +56,7 @@ def clean_curves(path: Path) -> dict[str, Curve]:
 
 
 def lights_file(path: Path, quantity: LightUnit, start_nm: float = 400, stop_nm: float = 700) -> LightsFile:
-    """The lights of a file by their chromaticities; raises DataError where they are of fewer than two signal colors.
+    """Return the lights of a file by their colors; raises DataError where they are of fewer than two signal colors.
 
     `start_nm`, `stop_nm`: the wavelengths of the study.
     """

@@ -17,12 +17,12 @@ Pair = tuple[str, str]
 
 
 def class_pairs(classes: Sequence[str]) -> tuple[Pair, ...]:
-    """All unordered pairs of signal types, in the order of `classes`."""
+    """Return all unordered pairs of signal types, in the order of `classes`."""
     return tuple(combinations(classes, 2))
 
 
 def pair_name(what: str, pair: Pair) -> str:
-    """The name of something measured of a pair: `what_a_b`."""
+    """Return the name of something measured of a pair: `what_a_b`."""
     return f"{what}_{pair[0]}_{pair[1]}"
 
 
@@ -57,7 +57,7 @@ class Lights:
 
 
 def peak_normalized_ratio(grid: WavelengthGrid, photons: FloatArray) -> float:
-    """K for spectra normalized to their peaks, as the median over the signals.
+    """Return K for spectra normalized to their peaks, as the median over the signals.
 
     The photons of a spectrum with peak 1 over those of a flat white of height 1 on the same grid: equivalent
     bandwidth / grid span. `photons`: ndarray[n_signals, n_wavelengths], in any scale.

@@ -132,7 +132,7 @@ def _drift_and_own(lights: Lights, population: Population, signal: int) -> tuple
 
 
 def moved(photons: FloatArray, steps: int) -> FloatArray:
-    """A spectrum shifted by whole steps toward the red, ndarray[n_wavelengths]."""
+    """Return a spectrum shifted by whole steps toward the red, ndarray[n_wavelengths]."""
     shifted = np.zeros_like(photons)
     size = photons.size
     if abs(steps) < size:
@@ -141,7 +141,7 @@ def moved(photons: FloatArray, steps: int) -> FloatArray:
 
 
 def stretched(grid: WavelengthGrid, photons: FloatArray, factor: float) -> FloatArray:
-    """A spectrum stretched by a factor about its mean wavelength, with as many photons, ndarray[n_wavelengths]."""
+    """Return a spectrum stretched by a factor about its mean wavelength, with as many photons."""
     if factor == 1:
         return photons
     wave = grid.nodes_nm
@@ -153,7 +153,7 @@ def stretched(grid: WavelengthGrid, photons: FloatArray, factor: float) -> Float
 def _corners(
     population: Population, drifts: tuple[float, float], own: tuple[tuple[float, float], tuple[float, float]]
 ) -> list[_Point]:
-    """Points whose hull is the region of two lights, nm."""
+    """Return points whose hull is the region of two lights, nm."""
     (a, b), (x, y) = drifts, own
     warmings = [(warmer, warmer) for warmer in population.warmer_k]
     if population.temperatures == "independent":
@@ -162,7 +162,7 @@ def _corners(
 
 
 def _hull(points: list[_Point]) -> list[_Point]:
-    """The corners of the convex hull (Andrew, 1979); two points of a line, one of a single point."""
+    """Return the corners of the convex hull (Andrew, 1979); two points of a line, one of a single point."""
     points = sorted({(round(x, _DIGITS), round(y, _DIGITS)) for x, y in points})
     if len(points) < 3:
         return points
@@ -183,7 +183,7 @@ def _cross(o: _Point, p: _Point, q: _Point) -> float:
 
 
 def _clipped(polygon: list[_Point], axis: int, bound: float, sign: float) -> list[_Point]:
-    """The part of a polygon with sign x (coordinate - bound) >= 0 (Sutherland and Hodgman)."""
+    """Return the part of a polygon with sign x (coordinate - bound) >= 0 (Sutherland and Hodgman)."""
     kept: list[_Point] = []
     for here, there in zip(polygon, polygon[1:] + polygon[:1], strict=True):
         u, v = sign * (here[axis] - bound), sign * (there[axis] - bound)
@@ -198,7 +198,7 @@ def _clipped(polygon: list[_Point], axis: int, bound: float, sign: float) -> lis
 
 
 def _size(polygon: list[_Point]) -> tuple[float, float]:
-    """Area, and the longest way between two corners."""
+    """Return the area, and the longest way between two corners."""
     area = sum(_cross(polygon[0], p, q) for p, q in pairwise(polygon)) / 2
     longest = max((float(np.hypot(p[0] - q[0], p[1] - q[1])) for p in polygon for q in polygon), default=0.0)
     return abs(area), longest
@@ -227,7 +227,7 @@ def _region(points: list[_Point]) -> ShiftRegion:
 
 
 def _along(points: FloatArray) -> FloatArray:
-    """Where points lie along the direction in which they are spread most, 0 to 1."""
+    """Return where points lie along the direction in which they are spread most, 0 to 1."""
     off = points - points.mean(axis=0)
     at = off @ np.linalg.svd(off, full_matrices=False)[2][0]
     return np.asarray((at - at.min()) / max(float(np.ptp(at)), _TINY), dtype=float)

@@ -40,12 +40,12 @@ LEDs is less than that of the peak, because the eye's sensitivity falls there.)
 
 
 def _by_name(value: Any) -> Any:
-    """A number alone holds for every signal."""
+    """Take a number alone for that of for every signal."""
     return value if isinstance(value, dict) else {_ALL: value}
 
 
 def _spans_by_name(value: Any) -> Any:
-    """Two numbers alone hold for every signal."""
+    """Take two numbers alone for those of for every signal."""
     return {name: from_to(span) for name, span in _by_name(value).items()}
 
 
@@ -150,5 +150,5 @@ class Population(Section):
 
 
 def _of(values: Mapping[str, _Value], kind: str, name: str, default: _Value) -> _Value:
-    """That of the signal, else of its type, else of all."""
+    """Return that of the signal, else of its type, else of all."""
     return values.get(name, values.get(kind, values.get(_ALL, default)))

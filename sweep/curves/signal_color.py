@@ -47,12 +47,15 @@ class LightColor:
         """
         if self.region is not None or self.dominant_nm is None or self.purity < LEAST_PURITY:
             return self.region
-        gap, kind = min((_gap(self.dominant_nm, *span), kind) for kind, span in dominant_ranges_nm().items())
+        gap, kind = min(
+            (max(low - self.dominant_nm, self.dominant_nm - high, 0.0), kind)
+            for kind, (low, high) in dominant_ranges_nm().items()
+        )
         return kind if gap <= NEAR_NM else None
 
 
 def light_color(photons: FloatArray) -> LightColor | None:
-    """The color of a photon spectrum on VISIBLE, ndarray[471]; None where it has no visible light."""
+    """Return the color of a photon spectrum on VISIBLE, ndarray[471]; None where it has no visible light."""
     peak = float(photons.max())
     if not peak > 0:
         return None
@@ -74,7 +77,7 @@ def light_color(photons: FloatArray) -> LightColor | None:
 
 
 def _hue(xy: FloatArray) -> tuple[float, float | None]:
-    """Excitation purity and dominant wavelength, to a nm, of a chromaticity, ndarray[2] (CIE 15, 9).
+    """Return excitation purity and dominant wavelength, to a nm, of a chromaticity, ndarray[2] (CIE 15, 9).
 
     Both are of the point where the line from white through it leaves the spectral locus; there is no such wavelength
     where that is on the line of purples.
@@ -96,13 +99,13 @@ def _hue(xy: FloatArray) -> tuple[float, float | None]:
 
 @cache
 def spectral_locus() -> FloatArray:
-    """Chromaticities of monochromatic light on VISIBLE, ndarray[471, 2]."""
+    """Return chromaticities of monochromatic light on VISIBLE, ndarray[471, 2]."""
     return chromaticity(VISIBLE, np.eye(VISIBLE.size))
 
 
 @cache
 def outline(kind: str) -> FloatArray:
-    """The part of a color region that light can have, as a polygon, ndarray[n, 2].
+    """Return the part of a color region that light can have, as a polygon, ndarray[n, 2].
 
     The spectral locus is cut at each bound (Sutherland and Hodgman, "Reentrant polygon clipping").
     """
@@ -121,7 +124,7 @@ def outline(kind: str) -> FloatArray:
 
 @cache
 def dominant_ranges_nm() -> dict[str, tuple[float, float]]:
-    """Dominant wavelengths of each region: those of monochromatic light inside it. Red is open toward the red."""
+    """Return dominant wavelengths of each region: those of monochromatic light inside it; red is open."""
     spans = {}
     for kind, region in REGIONS.items():
         inside = VISIBLE.nodes_nm[region.violation(spectral_locus()) <= 0]
@@ -129,12 +132,8 @@ def dominant_ranges_nm() -> dict[str, tuple[float, float]]:
     return spans
 
 
-def _gap(value: float, low: float, high: float) -> float:
-    return max(low - value, value - high, 0.0)
-
-
 def _distance(xy: FloatArray, polygon: FloatArray) -> float:
-    """From a point to a polygon's outline, ndarray[2] and ndarray[n, 2]."""
+    """Return the distance from a point to a polygon's outline, ndarray[2] and ndarray[n, 2]."""
     along = np.roll(polygon, -1, axis=0) - polygon
     length = (along**2).sum(axis=1)
     share = np.divide(((xy - polygon) * along).sum(axis=1), length, out=np.zeros_like(length), where=length > 0)

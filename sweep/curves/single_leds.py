@@ -11,8 +11,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from ..base.types import FloatArray, Section, from_to
 from .builtin.led import led_photons
-from .color import chromaticity
-from .regulations import SIGNAL_REGIONS
+from .color import SIGNAL_REGIONS, chromaticity
 from .signal_color import VISIBLE
 from .spectrum import WavelengthGrid, equal_photons
 
@@ -97,7 +96,7 @@ class SingleLeds:
 
 
 def every_led(asked: RegionMap) -> SingleLeds:
-    """All peaks with all widths."""
+    """Return all peaks with all widths."""
     peaks, widths = np.meshgrid(asked.peaks_nm, asked.widths_nm, indexing="ij")
     return SingleLeds(peaks.ravel(), widths.ravel())
 

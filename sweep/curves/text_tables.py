@@ -16,9 +16,15 @@ import numpy as np
 from ..base.disk import read_input
 from ..base.errors import DataError, Fault
 from ..base.types import FloatArray
-from .scan import MOST_BYTES, WAVELENGTH, Scan, check_size, distinct, unit_by_size
 from .spectrum import LARGEST, sample_faults
 
+WAVELENGTH = "wavelength_nm"
+"""Name of the first column of the package's own files."""
+MOST_BYTES = 40_000_000
+MOST_CURVES = 2_000
+MOST_SAMPLES = 100_000
+MOST_VALUES = 2_000_000
+"""Limits of a file of curves: 2,000 curves of 1,000 samples are read in a second or two."""
 _COMMENTS = ("#", "%", "//")
 _BEGIN = re.compile(r">{3,}begin.*<{3,}|\[data\]", re.IGNORECASE)
 _END = re.compile(r">{3,}end.*<{3,}|\[endoffile\]|\[end.*\]", re.IGNORECASE)
@@ -46,6 +52,22 @@ _MOST_CELL_FAULTS = 10_000
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 _NAME_AND_UNIT = re.compile(r"(.*?)[\s_/,.\-]*[\[(]?\s*([^\W\d_]+)\s*[\])]?")
+
+
+@dataclass(frozen=True)
+class Scan:
+    """A file of curves, read as far as it can be.
+
+    `wavelength_nm`: ndarray[n_samples] as the file has it, in nm where it says its unit. `values`: ndarray[n_samples,
+    n_curves], a column per name. What is not a number is NaN in both. `faults`: what is wrong, in groups; `read_curves`
+    stops at the first group. `notes`: how it was read, where it is not written as `wavelength_nm,...`.
+    """
+
+    wavelength_nm: FloatArray
+    names: tuple[str, ...]
+    values: FloatArray
+    faults: tuple[tuple[Fault, ...], ...]
+    notes: tuple[str, ...] = ()
 
 
 @dataclass
@@ -81,7 +103,7 @@ def scan_text(path: Path) -> Scan:
 
 
 def text_table(path: Path, first: str = WAVELENGTH) -> TextTable:
-    """Head and rows of a file, as texts; `first`: name of its first column in messages.
+    """Return head and rows of a file, as texts; `first`: name of its first column in messages.
 
     Raises DataError where there is no table at all.
     """
@@ -94,14 +116,14 @@ def text_table(path: Path, first: str = WAVELENGTH) -> TextTable:
 
 
 def lens_table(path: Path, first: str) -> TextTable:
-    """Head and rows of a file of no wavelengths, with the mark of its decimals."""
+    """Return head and rows of a file of no wavelengths, with the mark of its decimals."""
     table = text_table(path, first)
     _find_decimal(table)
     return table
 
 
 def _decoded(path: Path) -> tuple[str, list[str]]:
-    """A file's text and how it was decoded. Raises DataError where it is no text."""
+    """Return a file's text and how it was decoded. Raises DataError where it is no text."""
     content = read_input(path, MOST_BYTES, DataError)
     wide = content[:2] in _UTF_16 and content[:4] != codecs.BOM_UTF32_LE
     beginning = content[:_BEGINNING_BYTES]
@@ -114,7 +136,7 @@ def _decoded(path: Path) -> tuple[str, list[str]]:
 
 
 def _laid_out(file: str, text: str, first: str, notes: list[str]) -> TextTable:
-    """Head and rows of a text: the head is the line above the first numbers, or the first that names wavelengths."""
+    """Return head and rows of a text: the head is above the first numbers, or the first line that names wavelengths."""
     lines = io.StringIO(text, newline=None).read().split("\n")
     kept = [(n, line) for n, line in enumerate(lines, 1) if line.strip() and not line.startswith(_COMMENTS)]
     begin = next((i for i, (_, line) in enumerate(kept) if _BEGIN.fullmatch(line.strip())), None)
@@ -147,7 +169,7 @@ def _laid_out(file: str, text: str, first: str, notes: list[str]) -> TextTable:
 
 
 def _mark(lines: Sequence[str]) -> str:
-    """The separator of the columns: the first of tabs, semicolons and commas that most lines have equally often.
+    """Return the separator of the columns: the first of tabs, semicolons and commas that most lines have equally often.
 
     In a text with semicolons or tabs, a comma is a decimal one.
     """
@@ -162,7 +184,7 @@ def _mark(lines: Sequence[str]) -> str:
 
 
 def _head(kept: Sequence[tuple[int, str]], mark: str) -> int | None:
-    """Index of the head among the lines; None where the first line has numbers alone, and there is none."""
+    """Return the index of the head among the lines; None where the first line has numbers alone, and there is none."""
     split = [line.split() if mark == " " else line.split(mark) for _, line in kept[:_RELEVANT]]
     named = next((i for i, cells in enumerate(split) if any(_wavelength_unit(c) is not None for c in cells)), None)
     if named is not None and len(split[named]) > 1:
@@ -178,7 +200,7 @@ def _numeric(cell: str) -> bool:
 
 
 def _rows(file: str, kept: Sequence[tuple[int, str]], mark: str) -> list[tuple[int, list[str]]]:
-    """The cells of each line; quotes may hold a separator, and no line."""
+    """Return the cells of each line; quotes may hold a separator, and no line."""
     if mark == " ":
         return [(n, line.split()) for n, line in kept]
     rows = []
@@ -193,7 +215,7 @@ def _rows(file: str, kept: Sequence[tuple[int, str]], mark: str) -> list[tuple[i
 
 
 def _wavelength_unit(cell: str) -> float | None:
-    """Factor that brings a column with this head to nm: 1 for `nm`, `Wavelength (nm)`; 0 where it has no unit.
+    """Return the factor that brings a column with this head to nm: 1 for `Wavelength (nm)`; 0 where it has no unit.
 
     None for a head that is none of wavelengths.
     """
@@ -281,7 +303,7 @@ def _find_decimal(table: TextTable) -> None:
 
 
 def _numbers(table: TextTable) -> Scan:
-    """The numbers of a table, in nm and in rising order."""
+    """Return the numbers of a table, in nm and in rising order."""
     layout = [*table.faults, *_header_faults(table)]
     waves = [number_of(row[0].replace(table.decimal, ".")) for _, row in table.rows if row]
     known = [wave for wave in waves if wave is not None]
@@ -363,6 +385,34 @@ def table_numbers(
 
 
 def number_of(cell: str) -> float | None:
-    """A finite number as tables have it; Python's own underscores and other scripts' digits are none."""
+    """Return a finite number as tables have it; Python's own underscores and other scripts' digits are none."""
     number = float(cell) if _NUMBER.fullmatch(cell.strip()) else math.nan
     return number + 0.0 if math.isfinite(number) else None
+
+
+def check_size(file: str, line: int | None, n_samples: int, n_curves: int) -> None:
+    """Refuse what would take minutes to read, before it is read. Raises DataError."""
+    for what, count, most in (
+        ("curves", n_curves, MOST_CURVES),
+        ("samples", n_samples, MOST_SAMPLES),
+        ("values", n_samples * n_curves, MOST_VALUES),
+    ):
+        if count > most:
+            raise DataError(Fault(f"too many {what} in one file", file, line, None, count, f"at most {most:,}"))
+
+
+def unit_by_size(wave: FloatArray) -> float:
+    """Return the factor that brings wavelengths to nm: light between 100 nm and 20 um in nm, um or m."""
+    largest = float(np.nanmax(wave)) if np.isfinite(wave).any() else 0.0
+    return 1e9 if 0 < largest < 1e-4 else 1e3 if 0 < largest < 20 else 1.0
+
+
+def distinct(names: Sequence[str]) -> tuple[str, ...]:
+    """Return column names, numbered where one is empty or occurs twice."""
+    unique: dict[str, None] = {}
+    for index, name in enumerate(names):
+        candidate = name or f"column ({index + 2})"
+        while candidate in unique:
+            candidate = f"{candidate} ({index + 2})"
+        unique[candidate] = None
+    return tuple(unique)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from ..curves.regulations import NORM_NAMES
+from ..curves.color import NORM_NAMES
 from ..metrics.quantity import DN, WORST, WORST_CASE
 from ..metrics.share import told_share
 from ..results.output import Output

@@ -40,7 +40,7 @@ from ..results.tables import (
 from ..results.thinning import swept_points
 from ..search.limit import Limit
 from ..study import Study
-from ..study.reach import out_of_reach
+from ..study.goals import out_of_reach
 from ..vision.installed import require_network
 from .answers import KeptAnswers
 from .check import check_run

@@ -43,9 +43,7 @@ class Axis(Section):
         """The values, in order."""
         if self.values is not None:
             return tuple(self.values)
-        assert self.min is not None
-        assert self.max is not None
-        assert self.count is not None
+        assert self.min is not None and self.max is not None and self.count is not None  # noqa: PT018
         step = (self.max - self.min) / max(1, self.count - 1)
         return tuple(self.max if i == self.count - 1 else self.min + i * step for i in range(self.count))
 
@@ -74,7 +72,7 @@ _MOST_KEYS = 500_000
 
 
 class ScenarioTemplate(Scene):
-    """What the file says of a scenario; with `each`, of one for every combination of its values.
+    """A scenario as the file has it; with `each`, of one for every combination of its values.
 
     `each`: dotted keys of the scenario (target.distance_m) -> values.
     """
@@ -83,35 +81,35 @@ class ScenarioTemplate(Scene):
 
 
 def expanded(value: Any) -> Any:
-    """Scenarios with `each: {key: values}` become one per combination, named after their values."""
+    """Replace scenarios with `each: {key: values}` by one per combination, named after its values."""
     if not isinstance(value, dict):
         return value
-    found: dict[str, Any] = {}
+    scenarios: dict[str, Any] = {}
     for name, entry in value.items():
         if not isinstance(entry, dict) or "each" not in entry:
-            found[name] = entry
+            scenarios[name] = entry
             continue
         each = entry["each"]
         if not isinstance(each, dict) or not each:
             raise ValueError(f"{name}: `each` maps keys such as target.distance_m to values")
         axes = [_numbers(f"{name}: each.{key}", axis) for key, axis in each.items()]
-        made_of = math.prod(map(len, axes))
-        if made_of + len(found) > _MOST_SCENARIOS:
+        count = math.prod(map(len, axes))
+        if count + len(scenarios) > _MOST_SCENARIOS:
             raise ValueError(f"{name}: more than {_MOST_SCENARIOS} scenarios")
-        if made_of * _size(entry) > _MOST_KEYS:
+        if count * _size(entry) > _MOST_KEYS:
             raise ValueError(f"{name}: more than {_MOST_KEYS:,} keys in all that `each` makes of it")
         for point in product(*axes):
             made = deepcopy({key: inner for key, inner in entry.items() if key != "each"})
-            for key, number in zip(each, point, strict=True):
-                _set(made, str(key).split("."), number)
-            labels = [f"{str(key).rsplit('.', 1)[-1]}={number:.12g}" for key, number in zip(each, point, strict=True)]
-            full = " ".join([str(name), *labels])
-            if full in found:
+            full = str(name)
+            for key, number in zip(map(str, each), point, strict=True):
+                _set(made, key.split("."), number)
+                full += f" {key.rsplit('.', 1)[-1]}={number:.12g}"
+            if full in scenarios:
                 raise ValueError(f"{name}: two scenarios are named {full!r}")
-            found[full] = made
-    if len(found) > _MOST_SCENARIOS:
+            scenarios[full] = made
+    if len(scenarios) > _MOST_SCENARIOS:
         raise ValueError(f"more than {_MOST_SCENARIOS} scenarios")
-    return found
+    return scenarios
 
 
 def _size(value: Any) -> int:
@@ -143,22 +141,16 @@ def _set(mapping: dict[str, Any], path: list[str], number: float) -> None:
 
 
 def series_of(scenarios: Iterable[str]) -> dict[tuple[str, str], dict[str, float]]:
-    """Sets of scenarios that differ in one number: (name, key) -> scenario -> number, in order of the numbers."""
+    """Return sets of scenarios that differ in one number: (name, key) -> scenario -> number, in rising order."""
     groups: dict[tuple[str, str], dict[str, float]] = {}
     for name in scenarios:
         base, _, last = str(name).rpartition(" ")
-        key, equals, number = last.partition("=")
-        value = _number(number)
-        if base and equals and "=" not in base and value is not None:
+        key, _, number = last.partition("=")
+        try:
+            value = float(number)
+        except ValueError:  # a scenario that a person named may have an `=` followed by anything
+            continue
+        if base and "=" not in base and math.isfinite(value):
             groups.setdefault((base, key), {})[name] = value
-    ordered = {group: dict(sorted(found.items(), key=lambda item: item[1])) for group, found in groups.items()}
-    return {group: found for group, found in ordered.items() if len(found) > 1}
-
-
-def _number(text: str) -> float | None:
-    """A finite number, or None: a scenario that a person named may have an `=` followed by anything."""
-    try:
-        value = float(text)
-    except ValueError:
-        return None
-    return value if math.isfinite(value) else None
+    ordered = {group: dict(sorted(values.items(), key=lambda item: item[1])) for group, values in groups.items()}
+    return {group: values for group, values in ordered.items() if len(values) > 1}

@@ -1,29 +1,186 @@
-"""YAML with line numbers, and pydantic's errors as one-line faults that name their line."""
+"""YAML as plain values that know their lines, and pydantic's errors as one-line faults that name their line.
+
+The tree is built from ruamel.yaml's nodes and only up to limits. The library's constructor builds everything first: a
+few hundred bytes of aliases become billions of values.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from io import StringIO
 from itertools import islice
 from pathlib import Path
-from types import UnionType
-from typing import Any, Union, get_args, get_origin
+from typing import Any
 
 from pydantic import BaseModel, ValidationError
+from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.nodes import Node, ScalarNode, SequenceNode
+from ruamel.yaml.reader import ReaderError
 
 from ..base.disk import NO_UTF_16, not_utf8, read_input
 from ..base.errors import MOST_FAULTS, Fault, StudyError, nearest
-from .yaml_tree import Key, Place, Tree, yaml_text
 
+MOST_DEPTH = 20
+"""Levels of nesting; a study needs seven."""
+_MOST_DIGITS = 100
+"""Letters of a number; a float has 17 digits and an exponent."""
 _MOST = (500_000, 50_000)
 """Bytes of a study file, and keys and values in it."""
-_RESOLVED = ".resolved.yaml"
 _MOST_RESOLVED = (8_000_000, 400_000)
-"""Limits of a file of that name, as a run writes it: with every default, and each of up to 2000 scenarios."""
-_MEANT = {"yes": "true", "on": "true", "y": "true", "no": "false", "off": "false", "n": "false"}
-"""Booleans of YAML 1.1, which are texts in YAML 1.2."""
+"""The same of a `*.resolved.yaml`, as a run writes it: with every default, and each of up to 2000 scenarios."""
 _MOST_LOOKED_AT = 2 * MOST_FAULTS
-"""Most faults of the schema that are looked at; of a value that may have several types there is one for each."""
+"""Errors of the schema that are read; of a value that may have several types there is one for each."""
+_PLAIN = {
+    **dict.fromkeys(("", "~", "null", "Null", "NULL")),
+    **dict.fromkeys(("true", "True", "TRUE"), True),
+    **dict.fromkeys(("false", "False", "FALSE"), False),
+}
+_INTEGER = re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")
+_FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
+_LOOKS_LIKE_A_NUMBER = re.compile(r"[-+.]*[0-9][-+.0-9xo_a-fA-F]*")
+_SURROGATE = re.compile("[\ud800-\udfff]")
+"""Half of a character: `\\ud800`. No file takes it."""
+_YAML_1_1_BOOLEANS = {"yes": "true", "on": "true", "y": "true", "no": "false", "off": "false", "n": "false"}
+
+Key = str | int
+KeyPath = tuple[Key, ...]
+"""Keys that lead to a place of the study."""
+Place = int | str
+"""A line from 1, or the option that a value came from."""
+
+
+class Tree:
+    """The value of a YAML document (YAML 1.2, core schema; `<<` merges mappings), and the line of each of its keys.
+
+    At most `most_values` keys and values, those of an alias counted each time that it stands for them. Raises
+    StudyError with file and line: not YAML, beyond the limits, a key twice, a tag, a second document.
+    """
+
+    def __init__(self, text: str, file: str | None, most_values: int) -> None:
+        self._file, self._most, self._count = file, most_values, 0
+        self._lines: dict[int, tuple[Any, dict[Key, Place]]] = {}  # with its value, so that no other one has the id
+        if version := re.match(r"%YAML\s+(?!1\.2\s)\S*", text):
+            raise self._error("another version of YAML", 1, (), version.group(), "%YAML 1.2, or no such line")
+        yaml = YAML(typ="safe", pure=True)
+        yaml.composer.warn_double_anchors = False
+        self._resolve = yaml.resolver.resolve
+        try:
+            root = yaml.compose(StringIO(text))
+        except MarkedYAMLError as error:
+            line = None if error.problem_mark is None else error.problem_mark.line + 1
+            problem = ", ".join(part for part in (error.context, error.problem) if part)
+            raise self._error(f"not valid YAML: {problem}", line) from None
+        except ReaderError as error:
+            line = text.count("\n", 0, int(error.position)) + 1
+            raise self._error(f"not valid YAML: the character {error.character!r}", line) from None
+        except RecursionError:
+            raise self._error("nested too deep", None, allowed=f"at most {MOST_DEPTH} levels") from None
+        except (YAMLError, ValueError) as error:
+            raise self._error(f"not valid YAML: {type(error).__name__} {error}", None) from None
+        self.root: Any = None if root is None else self._value(root, ())
+
+    def place(self, node: Any, key: Key) -> Place | None:
+        """Return the place of a key of a mapping or of an entry of a list; None where the file has none."""
+        return self._lines[id(node)][1].get(key) if id(node) in self._lines else None
+
+    def put(self, node: Any, key: Key, value: Any, place: Place) -> None:
+        """Set a key of a mapping or an entry of a list to a value that stands at another place."""
+        node[key] = value
+        self._lines.setdefault(id(node), (node, {}))[1][key] = place
+
+    def _value(self, node: Node, path: tuple[str, ...], depth: int = 0) -> Any:
+        """Return the plain value of a node; `path`: the keys that lead to it."""
+        line = self._counted(node, path)
+        implicit = (True, False) if getattr(node, "style", None) is None else (False, True)
+        if node.tag != str(self._resolve(type(node), node.value, implicit)):
+            raise self._error("a tag", line, path, node.tag, "the value without it; quotes make a text of it")
+        if isinstance(node, ScalarNode):
+            return self._plain(node.value, line, path) if node.style is None else node.value
+        if depth >= MOST_DEPTH:
+            raise self._error("nested too deep", line, path, allowed=f"at most {MOST_DEPTH} levels")
+        if not isinstance(node, SequenceNode):
+            return self._mapping(node, path, depth)
+        entries = [self._value(entry, path, depth + 1) for entry in node.value]
+        self._lines[id(entries)] = entries, {i: entry.start_mark.line + 1 for i, entry in enumerate(node.value)}
+        return entries
+
+    def _mapping(self, node: Node, path: tuple[str, ...], depth: int) -> dict[Key, Any]:
+        value: dict[Key, Any] = {}
+        lines: dict[Key, Place] = {}
+        merged: list[dict[Key, Any]] = []
+        for key_node, inner in node.value:
+            line = self._counted(key_node, path)
+            key = key_node.value
+            if not isinstance(key_node, ScalarNode):
+                raise self._error("a key that is no word", line, path, allowed="`key: value`")
+            if key in lines:
+                raise self._error(f"found duplicate key {key!r}", line, path)
+            lines[key] = line
+            made = self._value(inner, (*path, key), depth + 1)
+            if key == "<<" and key_node.style is None:
+                sources = made if isinstance(made, list) else [made]
+                if not all(isinstance(source, dict) for source in sources):
+                    raise self._error("`<<` merges mappings only", line, path)
+                merged += sources
+            else:
+                value[key] = made
+        for source in merged:
+            value |= {key: made for key, made in source.items() if key not in value}
+        self._lines[id(value)] = value, lines
+        return value
+
+    def _counted(self, node: Node, path: tuple[str, ...]) -> int:
+        """Count a key or a value, check its characters, and return its line."""
+        line: int = node.start_mark.line + 1
+        self._count += 1
+        if self._count > self._most:
+            allowed = f"at most {self._most:,} keys and values, those of an alias counted each time"
+            raise self._error("more keys and values than a study has", line, path, allowed=allowed)
+        if isinstance(node, ScalarNode) and (half := _SURROGATE.search(node.value)):
+            raise self._error("not a character of a text", line, path, half.group())
+        return line
+
+    def _plain(self, text: str, line: int, path: tuple[str, ...]) -> Any:
+        """Return a value without quotes: nothing, a boolean, a number or a text."""
+        if len(text) > _MOST_DIGITS:
+            if _LOOKS_LIKE_A_NUMBER.fullmatch(text):
+                allowed = f"at most {_MOST_DIGITS} letters"
+                raise self._error(f"a number of {len(text):,} letters", line, path, text, allowed)
+            return text
+        if text in _PLAIN:
+            return _PLAIN[text]
+        if _INTEGER.fullmatch(text):
+            return int(text, 0 if text[:2] in ("0o", "0x") else 10)
+        if _FLOAT.fullmatch(text):
+            # No -0.0: it is the same number, but would give the study another fingerprint.
+            return float(text.lower().replace(".inf", "inf").replace(".nan", "nan")) + 0.0
+        return text
+
+    def _error(
+        self,
+        problem: str,
+        line: int | None,
+        path: Sequence[str] = (),
+        value: object = None,
+        allowed: str | None = None,
+    ) -> StudyError:
+        return StudyError(Fault(problem, self._file, line, ".".join(path) or None, value, allowed))
+
+
+def yaml_text(data: Mapping[str, Any]) -> str:
+    """Return keys with plain values as a YAML document; raises StudyError for a value that no study file can hold."""
+    text = StringIO()
+    yaml = YAML(typ="safe", pure=True)
+    yaml.default_flow_style = False
+    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
+    try:
+        yaml.dump(data, text)
+    except YAMLError as error:
+        raise StudyError(Fault(f"not a value of a study: {' '.join(str(error).split())}")) from None
+    return text.getvalue()
 
 
 class Document:
@@ -34,56 +191,37 @@ class Document:
 
     def __init__(self, source: Path | Mapping[str, Any]) -> None:
         self.file = str(source) if isinstance(source, Path) else None
-        resolved = isinstance(source, Path) and source.name.endswith(_RESOLVED)
+        resolved = isinstance(source, Path) and source.name.endswith(".resolved.yaml")
         most_bytes, most_values = _MOST_RESOLVED if resolved else _MOST
         text = _text(source, most_bytes) if isinstance(source, Path) else yaml_text(source)
         self._tree = Tree(text, self.file, most_values)
-        if not isinstance(self._tree.root, dict):
+        self.data: dict[str, Any] = self._tree.root
+        if not isinstance(self.data, dict):
             allowed = "`study: name` and further keys"
             raise StudyError(Fault("a study file is a mapping of keys", self.file, 1, allowed=allowed))
-        self.data: dict[str, Any] = self._tree.root
 
     def change(self, key: str, text: str) -> None:
         """Set a dotted key to a value written as in a study file. Raises StudyError where it cannot stand there."""
-        said = f"--set {key}={text}"
+        option = f"--set {key}={text}"
         try:
             value = Tree(f"value: {text}", None, _MOST[1]).root["value"]
         except StudyError as error:
-            raise StudyError([replace(fault, file=said, line=None, key=None) for fault in error.faults]) from None
+            raise StudyError([replace(fault, file=option, line=None, key=None) for fault in error.faults]) from None
         *path, last = key.split(".")
         node: Any = self.data
         for at, part in enumerate(path):
-            if isinstance(node, list) and part.isdecimal() and int(part) < len(node):
-                node = node[int(part)]
-            elif isinstance(node, dict):
-                if part not in node:
-                    self._tree.put(node, part, {}, said)
-                node = node[part]
-            else:
-                node = None
+            if isinstance(node, dict) and part not in node:
+                self._tree.put(node, part, {}, option)
+            node = _child(node, int(part) if isinstance(node, list) and part.isdecimal() else part)
             if not isinstance(node, dict | list):
                 where = ".".join(path[: at + 1])
-                raise StudyError(Fault(f"`{where}` is no mapping in {self.file}", said, allowed="the whole of it"))
-        if isinstance(node, list):
-            if not last.isdecimal() or int(last) >= len(node):
-                raise StudyError(Fault("no such entry of the list", said, value=last, allowed=f"0 to {len(node) - 1}"))
-            self._tree.put(node, int(last), value, said)
-        else:
-            self._tree.put(node, last, value, said)
-
-    def rename(self, path: Sequence[Key], name: str | None) -> None:
-        """Give a key the name that was meant; without one, or where that is taken, drop the key."""
-        *parents, key = path
-        node: Any = self.data
-        for part in parents:
-            node = _child(node, part)
-        if _has(node, key):
-            value = node.pop(key)
-            if name is not None and name not in node:
-                self._tree.put(node, name, value, self._tree.place(node, key))
+                raise StudyError(Fault(f"`{where}` is no mapping in {self.file}", option, allowed="the whole of it"))
+        if isinstance(node, list) and not (last.isdecimal() and int(last) < len(node)):
+            raise StudyError(Fault("no such entry of the list", option, value=last, allowed=f"0 to {len(node) - 1}"))
+        self._tree.put(node, int(last) if isinstance(node, list) else last, value, option)
 
     def place(self, path: Sequence[Key]) -> Place:
-        """Place of the deepest key of `path` that there is; of a section, an option that changed a key of it."""
+        """Return the place of the deepest key of `path` that there is; of a section, an option that changed it."""
         node: Any = self.data
         place: Place = 1
         for part in path:
@@ -93,7 +231,7 @@ class Document:
             if not _has(node, key):
                 return place
             place = self._tree.place(node, key) or place
-            node = _child(node, key)
+            node = node[key]
         keys = node if isinstance(node, dict) else range(len(node)) if isinstance(node, list) else ()
         return next((inner for key in keys if isinstance(inner := self._tree.place(node, key), str)), place)
 
@@ -105,83 +243,91 @@ class Document:
         allowed: str | None = None,
         near: str | None = None,
     ) -> Fault:
-        """A fault at `path` of this file."""
+        """Return a fault at `path` of this file."""
         place = None if self.file is None else self.place(path)
         file, line = (place, None) if isinstance(place, str) else (self.file, place)
         return Fault(problem, file, line, dotted(path), value, allowed, near)
 
-    def faults(self, error: ValidationError, model: type[BaseModel]) -> list[tuple[tuple[Key, ...], Fault]]:
-        """Pydantic's errors as faults of this file, with their paths."""
-        made: dict[tuple[tuple[Key, ...], str], Fault] = {}
-        meant = set()
+    def faults(self, error: ValidationError, model: type[BaseModel]) -> list[Fault]:
+        """Return pydantic's errors as faults of this file, in the order of their lines."""
+        faults: dict[tuple[KeyPath, str], Fault] = {}
         items = error.errors(include_url=False)
+        schema = model.model_json_schema() if any(item["type"] == "extra_forbidden" for item in items) else {}
+        meant = set()
         for item in islice(items, _MOST_LOOKED_AT):
-            path = self._known_path(item["loc"])
-            fault = self._fault(path, item, model)
-            made.setdefault((path, fault.problem), fault)
+            path = self._path(item["loc"])
+            fault = self._fault(path, item, schema)
+            faults.setdefault((path, fault.problem), fault)
             if item["type"] == "extra_forbidden":
                 meant.add((*path[:-1], fault.nearest))
         # A misspelled key is one fault, not a second one because the right key is missing.
-        kept = [(path, fault) for (path, problem), fault in made.items() if problem != "missing" or path not in meant]
+        kept = [fault for (path, problem), fault in faults.items() if problem != "missing" or path not in meant]
         more = len(items) - _MOST_LOOKED_AT
-        return [*kept, ((), Fault(f"and about {more:,} more faults", self.file))] if more > 0 else kept
+        return by_line(kept) + ([Fault(f"and about {more:,} more faults", self.file)] if more > 0 else [])
 
-    def _known_path(self, loc: Sequence[Key]) -> tuple[Key, ...]:
-        """`loc` without the tags that pydantic adds for unions, and with a missing last key kept."""
+    def _path(self, loc: Sequence[Key]) -> KeyPath:
+        """Return `loc` without the tags that pydantic adds for unions, and with a missing last key kept."""
         node: Any = self.data
         path: list[Key] = []
         varied: set[Key] = set()
-        for position, made in enumerate(loc):
-            key = _written(node, made)
-            if key != made:
+        for position, part in enumerate(loc):
+            key = _written(node, part)
+            if key != part:
                 varied = {part for name in node[key]["each"] for part in str(name).split(".")}
             if _has(node, key):
                 path.append(key)
-                node = _child(node, key)
+                node = node[key]
             elif key in varied or (isinstance(node, dict) and position == len(loc) - 1):
                 path.append(key)
         return tuple(path)
 
-    def _fault(self, path: tuple[Key, ...], item: Any, model: type[BaseModel]) -> Fault:
-        kind, value = item["type"], item["input"]
+    def _fault(self, path: KeyPath, item: Any, schema: dict[str, Any]) -> Fault:
+        kind, value, context = item["type"], item["input"], item.get("ctx", {})
+        tag = str(context.get("discriminator")).strip("'")
         if kind == "extra_forbidden":
-            known = field_names(model, path[:-1], self.data)
+            known = _known_keys(schema, path[:-1], self.data)
             return self.fault(path, "unknown key", None, ", ".join(known), nearest(path[-1], known))
-        if kind == "missing":
-            return self.fault(path, "missing")
-        if kind == "value_error":
-            return self.fault(path, str(item["ctx"]["error"]))
-        if kind == "union_tag_not_found":
-            return self.fault((*path, str(item["ctx"]["discriminator"]).strip("'")), "missing")
+        if kind in ("missing", "value_error", "union_tag_not_found"):
+            place = (*path, tag) if kind == "union_tag_not_found" else path
+            return self.fault(place, str(context["error"]) if kind == "value_error" else "missing")
         if kind == "union_tag_invalid":
-            tag = str(item["ctx"]["discriminator"]).strip("'")
-            expected = item["ctx"].get("expected_tags", "")
             got = value.get(tag) if isinstance(value, dict) else value
-            return self.fault((*path, tag), "unknown kind", got, expected)
+            return self.fault((*path, tag), "unknown kind", got, context.get("expected_tags", ""))
         shown = value if not isinstance(value, dict | list) else type(value).__name__
-        meant = _MEANT.get(str(value).casefold()) if kind == "bool_type" else None
-        problem = "not allowed" if meant is None else f"true or false expected: write {meant}"
-        return self.fault(path, problem, shown, _readable(item["msg"]) if meant is None else None)
+        if kind == "bool_type" and (meant := _YAML_1_1_BOOLEANS.get(str(value).casefold())):
+            return self.fault(path, f"true or false expected: write {meant}", shown)
+        allowed = item["msg"].removeprefix("Input should be ").removeprefix("a valid ")
+        allowed = "mapping" if allowed.startswith("dictionary") else allowed
+        return self.fault(path, "not allowed", shown, "true or false" if allowed == "boolean" else allowed)
 
 
-def field_names(model: type[BaseModel], path: Sequence[Key], data: Any) -> list[str]:
-    """Keys that the section at `path` of a model knows; the section is found by its declared types."""
-    annotation: Any = model
-    node = data
+def _known_keys(schema: dict[str, Any], path: Sequence[Key], data: Any) -> list[str]:
+    """Return the keys that the section at `path` of a JSON Schema knows."""
+
+    def options(part: Any) -> list[dict[str, Any]]:
+        """Return a part without references and unions."""
+        if not isinstance(part, dict):
+            return []
+        if "$ref" in part:
+            return options(schema["$defs"][part["$ref"].rpartition("/")[2]])
+        union = [inner for word in ("anyOf", "oneOf", "allOf") for inner in part.get(word, ())]
+        return [option for inner in union for option in options(inner)] or [part]
+
+    parts, node = options(schema), data
     for key in path:
         node = _child(node, key)
-        choices = [option for option in _options(annotation) if _accepts(option, key)]
-        annotation = _inner(choices[0], key) if choices else None
-    alone = [
-        inner for option in _options(annotation) if get_origin(option) is list for inner in _options(_inner(option, 0))
-    ]
-    for option in (*_options(annotation), *(alone if isinstance(node, dict) else ())):
-        if isinstance(option, type) and issubclass(option, BaseModel):
-            kinds = option.model_fields.get("kind")
-            if kinds is None or not isinstance(node, dict) or node.get("kind", kinds.default) == kinds.default:
-                return [
-                    str(key) for key, name in _keys(option).items() if option.model_fields[name].exclude is not True
-                ]
+        inner = []
+        for part in parts:
+            general = [part.get("items")] if isinstance(key, int) else [part.get("additionalProperties")]
+            general += part.get("patternProperties", {}).values()
+            inner += [part["properties"][key]] if key in part.get("properties", {}) else general
+        parts = [option for part in inner for option in options(part)]
+    if isinstance(node, dict):  # an entry alone in the place of a list
+        parts += [option for part in parts for option in options(part.get("items"))]
+    for keys in (part["properties"] for part in parts if "properties" in part):
+        kind = keys.get("kind", {}).get("const")
+        if kind is None or not isinstance(node, dict) or node.get("kind", keys["kind"].get("default")) == kind:
+            return list(keys)
     return []
 
 
@@ -189,8 +335,12 @@ def _has(node: Any, key: Key) -> bool:
     return key in node if isinstance(node, dict) else isinstance(node, list) and key in range(len(node))
 
 
+def _child(node: Any, key: Key) -> Any:
+    return node[key] if _has(node, key) else None
+
+
 def _written(node: Any, key: Key) -> Key:
-    """The key as the file has it: a scenario made by `each` is named after the one that it was made from."""
+    """Return the key as the file has it: a scenario made by `each` is named after the one that it was made from."""
     if isinstance(node, dict) and isinstance(key, str) and key not in node:
         for name, entry in node.items():
             if isinstance(entry, dict) and isinstance(entry.get("each"), dict) and key.startswith(f"{name} "):
@@ -198,53 +348,14 @@ def _written(node: Any, key: Key) -> Key:
     return key
 
 
-def _child(node: Any, key: Key) -> Any:
-    return node[key] if _has(node, key) else None
-
-
-def _options(annotation: Any) -> list[Any]:
-    origin = get_origin(annotation)
-    if origin in (Union, UnionType):
-        return [inner for option in get_args(annotation) for inner in _options(option)]
-    return [] if annotation in (None, type(None)) else [_unannotated(annotation)]
-
-
-def _accepts(annotation: Any, key: Key) -> bool:
-    if get_origin(annotation) is dict:
-        return True
-    if get_origin(annotation) is list:
-        return isinstance(key, int)
-    return isinstance(annotation, type) and issubclass(annotation, BaseModel) and key in _keys(annotation)
-
-
-def _inner(annotation: Any, key: Key) -> Any:
-    if get_origin(annotation) is dict:
-        return _unannotated(get_args(annotation)[1])
-    if get_origin(annotation) is list:
-        return _unannotated(get_args(annotation)[0])
-    return annotation.model_fields[_keys(annotation)[str(key)]].annotation
-
-
-def _keys(section: type[BaseModel]) -> dict[Key, str]:
-    """Keys as files have them -> names of the section's fields."""
-    return {info.alias or name: name for name, info in section.model_fields.items()}
-
-
-def _unannotated(annotation: Any) -> Any:
-    return get_args(annotation)[0] if hasattr(annotation, "__metadata__") else annotation
+def by_line(faults: Iterable[Fault]) -> list[Fault]:
+    """Return faults in the order of their lines."""
+    return sorted(faults, key=lambda fault: (fault.line is None, fault.file or "", fault.line or 0))
 
 
 def dotted(path: Sequence[Key]) -> str:
-    """A path as people write it: `sweeps.main.grid`, `sensor.files[0].file`."""
-    text = ""
-    for key in path:
-        text += f"[{key}]" if isinstance(key, int) else f".{key}" if text else str(key)
-    return text
-
-
-def _readable(message: str) -> str:
-    plain = message.removeprefix("Input should be ").removeprefix("a valid ")
-    return "mapping" if plain.startswith("dictionary") else "true or false" if plain == "boolean" else plain
+    """Return a path as people write it: `sweeps.main.grid`, `sensor.files[0].file`."""
+    return "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path).removeprefix(".")
 
 
 def _text(path: Path, most_bytes: int) -> str:

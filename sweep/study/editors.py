@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from copy import deepcopy
 from typing import Any
 
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
@@ -16,27 +17,29 @@ SCHEMA_FILE = "study.schema.json"
 TITLE = "A study of sweep"
 """Title of the schema, its second key."""
 _REF = "#/$defs/"
-_TEMPLATE = "ScenarioTemplate"
 Json = dict[str, Any]
 
 
 class _Untitled(GenerateJsonSchema):
-    """Leaves out titles of keys, which only repeat the keys."""
+    """Generator that leaves out titles of keys, which only repeat the keys."""
 
     def field_title_should_be_set(self, schema: core_schema.CoreSchema | Any) -> bool:  # noqa: ARG002  (pydantic's)
-        """Never."""
+        """Return False."""
         return False
 
 
 def study_schema() -> Json:
-    """The schema of what the loader takes: sections as mappings or as their short forms, nothing unknown.
+    """Return the schema of what the loader takes: sections as mappings or as their short forms, nothing unknown.
 
     It is wider than the loader in what only a whole file tells: names that refer to others, what goes together.
     """
     schema = StudySection.model_json_schema(mode="validation", by_alias=True, schema_generator=_Untitled)
     sections: JsonSchemaValue = schema["$defs"]
     for section in [schema, *sections.values()]:
-        _describe_keys(section)
+        # A key that has no description of its own shows its section's, which speaks of it.
+        for prop in section.get("properties", {}).values():
+            if "description" in section and "$ref" not in prop:
+                prop.setdefault("description", section["description"])
     for part in _parts(schema):
         part.pop("discriminator", None)  # OpenAPI's; the constant `kind` says it
         if part.get("type") != "string":
@@ -50,15 +53,8 @@ def study_schema() -> Json:
 
 
 def schema_text() -> str:
-    """The schema as the text of a file."""
+    """Return the schema as the text of a file."""
     return json.dumps(study_schema(), indent=1, ensure_ascii=False) + "\n"
-
-
-def _describe_keys(section: Json) -> None:
-    """A key that has no description of its own shows its section's, which speaks of it."""
-    for prop in section.get("properties", {}).values():
-        if "description" in section and "$ref" not in prop:
-            prop.setdefault("description", section["description"])
 
 
 def _parts(node: Any) -> Iterator[Json]:
@@ -69,25 +65,15 @@ def _parts(node: Any) -> Iterator[Json]:
 
 
 def _loosen_each(sections: Json) -> None:
-    """With `each` a scenario may lack what `each` gives it: its sections require nothing but their kind.
-
-    Without `each` the sections as they are hold.
-    """
-    template = sections[_TEMPLATE]
-    strict = {}
+    """Let a scenario with `each` lack what that gives it: its sections require nothing but their kind."""
+    template, strict = sections["ScenarioTemplate"], {}
     for key, prop in template["properties"].items():
-        named = {part["$ref"] for part in _parts(prop) if "$ref" in part}
-        if any("required" in sections[ref.removeprefix(_REF)] for ref in named):
-            strict[key] = json.loads(json.dumps(prop))
-            for part in _parts(prop):
-                if "$ref" in part:
-                    part["$ref"] = _loose(sections, part["$ref"].removeprefix(_REF))
+        parts = [part for part in _parts(prop) if "$ref" in part]
+        names = [part["$ref"].removeprefix(_REF) for part in parts]
+        if any("required" in sections[name] for name in names):
+            strict[key] = deepcopy(prop)
+            for part, name in zip(parts, names, strict=True):
+                loose = sections[f"{name}WithEach"] = deepcopy(sections[name])
+                loose["required"] = [required for required in loose.get("required", []) if required == "kind"]
+                part["$ref"] = f"{_REF}{name}WithEach"
     template |= {"if": {"required": ["each"]}, "else": {"properties": strict}}
-
-
-def _loose(sections: Json, name: str) -> str:
-    """The reference to a copy of a section in which everything but `kind` may be missing."""
-    copied = json.loads(json.dumps(sections[name]))
-    copied["required"] = [key for key in copied.get("required", []) if key == "kind"]
-    sections[f"{name}WithEach"] = copied
-    return f"{_REF}{name}WithEach"

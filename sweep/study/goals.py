@@ -1,22 +1,27 @@
-"""Objective, constraints and search of a study, checked against the quantities and spaces that it has."""
+"""Objective, constraints and search of a study, checked against its quantities, its spaces and what can be reached."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
+from ..base.errors import Fault
 from ..camera.scene import WhitePatchExposure
 from ..designs.space import Space
-from ..metrics.bound import Bound
+from ..metrics.columns.sensitivity import CFA_SENSITIVITY, SENSITIVITY
 from ..metrics.quantity import DN, OF_A_SHARE, WORST_CASE, Asked, Quantity
 from ..metrics.registry import quantities_of
 from ..search.solver import ALGORITHMS, DIRECT, GRADIENT
 from .axes import Axis
-from .model import Search
+from .document import KeyPath
+from .model import Search, Study
 from .schema import StudySection
 from .sources import Sources
-from .yaml_tree import Key
 
+_SLACK = 1e-9
 _LEAST_ERROR = 1e-12
 """Smallest error that is stated where errors are no exact sums."""
 
@@ -26,56 +31,40 @@ def check_goals(section: StudySection, sources: Sources, asked: Asked) -> None:
 
     `asked`: what the study asks for, with its states.
     """
-    known = quantities_of(asked)
-    _check_objective(section, sources, asked, known)
-    for name, bound in section.constraints.items():
-        path: tuple[Key, ...] = ("constraints", name)
-        if not _is_known(path, "quantity", name, section, sources, asked):
-            continue
-        if known[name].smooth is None and section.search is not None:
-            sources.add(path, f"the search does not know {name}", None, "a study without `search`")
-        _check_slopes(path, known[name], section, sources)
-        _check_ends(path, known[name], bound, sources)
-
-
-def _check_objective(section: StudySection, sources: Sources, asked: Asked, known: Mapping[str, Quantity]) -> None:
-    given = sources.document.data.get("objective")
-    rule = section.objective.rule
+    known, rule = quantities_of(asked), section.objective.rule
+    stated = sources.document.data.get("objective")
     for name in section.objective.weights:
-        path: tuple[Key, ...] = ("objective", rule.name, name) if isinstance(given, dict) else ("objective",)
+        path: KeyPath = ("objective", rule.name, name) if isinstance(stated, dict) else ("objective",)
         if not _is_known(path, "objective", name, section, sources, asked):
             continue
         _check_slopes(path, known[name], section, sources)
         if known[name].wanted != rule.wanted:
             right = f"`{{least: {{{name}: 1}}}}`" if rule.wanted == "more" else "`minimum` or `sum`"
             sources.add(path, f"{known[name].wanted} of {name} is better", None, right)
+    for name, bound in section.constraints.items():
+        path = ("constraints", name)
+        if not _is_known(path, "quantity", name, section, sources, asked):
+            continue
+        if known[name].smooth is None and section.search is not None:
+            sources.add(path, f"the search does not know {name}", None, "a study without `search`")
+        _check_slopes(path, known[name], section, sources)
+        for end in ("min", "max"):
+            value, ends = getattr(bound, end), known[name].ends
+            if end not in ends and value is not None:
+                right = " or ".join(f"`{other}`" for other in ends)
+                sources.add((*path, end), f"{name} has no `{end}`", value, right)
+        if known[name].rows == "decades" and bound.max is not None and not _LEAST_ERROR <= bound.max <= 1:
+            sources.add((*path, "max"), "no such error is told", bound.max, f"{_LEAST_ERROR:g} to 1")
 
 
-def _check_slopes(path: tuple[Key, ...], quantity: Quantity, section: StudySection, sources: Sources) -> None:
-    """A search by gradients needs those of all that it looks at."""
+def _check_slopes(path: KeyPath, quantity: Quantity, section: StudySection, sources: Sources) -> None:
+    """Check that a search by gradients has those of all that it looks at."""
     if section.search is not None and section.search.algorithm in GRADIENT and not quantity.slopes:
         allowed = f"`search: {{algorithm: ...}}`: {', '.join(DIRECT)}"
         sources.add(path, f"{quantity.name} has no derivatives, which {section.search.algorithm} needs", None, allowed)
 
 
-def _check_ends(path: tuple[Key, ...], quantity: Quantity, bound: Bound, sources: Sources) -> None:
-    for end in ("min", "max"):
-        value = getattr(bound, end)
-        if end not in quantity.ends and value is not None:
-            right = " or ".join(f"`{each}`" for each in quantity.ends)
-            sources.add((*path, end), f"{quantity.name} has no `{end}`", value, right)
-    if quantity.rows == "decades" and bound.max is not None and not _LEAST_ERROR <= bound.max <= 1:
-        sources.add((*path, "max"), "no such error is told", bound.max, f"{_LEAST_ERROR:g} to 1")
-
-
-def _is_known(
-    path: tuple[Key, ...],
-    what: str,
-    name: str,
-    section: StudySection,
-    sources: Sources,
-    asked: Asked,
-) -> bool:
+def _is_known(path: KeyPath, what: str, name: str, section: StudySection, sources: Sources, asked: Asked) -> bool:
     """Return whether there is such a quantity; else add a fault, with what the study would need for it."""
     known = _names(what, asked)
     if name in known:
@@ -95,12 +84,12 @@ def _is_known(
 
 
 def _names(what: str, asked: Asked) -> list[str]:
-    """Quantities that an objective or a constraint can be of."""
+    """Return the quantities that an objective or a constraint can be of."""
     return [name for name, q in quantities_of(asked).items() if (q.goal if what == "objective" else q.ends)]
 
 
 def search_of(section: StudySection, spaces: Sequence[Space], sources: Sources) -> Search | None:
-    """The search, or None where there is none or after adding faults."""
+    """Return the search, or None where there is none or after adding faults."""
     asked = section.search
     if asked is None:
         return None
@@ -145,3 +134,50 @@ def check_searched(section: StudySection, space: Space, known: Mapping[str, Quan
     if section.search.front is not None and any(known[name].role == "light" for name in goals if name in known):
         problem = "the front is searched at levels of sensitivity, which is in the objective"
         sources.add(("search", "front"), problem, None, "an objective of CSDs")
+
+
+def likely_percents(study: Study) -> Iterator[str]:
+    """Yield bounds on ratios that look like percent."""
+    for name, bound in study.constraints.items():
+        quantity = study.quantities[name]
+        for end, value in (("min", bound.min), ("max", bound.max)):
+            if quantity.role == "light" and value is not None and 2 < value <= 100:
+                place = f"constraints.{name}.{end}"
+                yield f"{place}: {value:g} of a ratio; is it a percentage? {value:g} % are {value / 100:g}"
+
+
+def out_of_reach(study: Study, space: Space, scenario: str) -> list[Fault]:
+    """Return a fault for each constraint that no filter of a space can meet, whatever else it meets.
+
+    Of sensitivities by the largest curve that a filter of the box can be, of widths by the box, of CSDs by the longest
+    distance of digital numbers. What is not here may be out of reach all the same.
+    """
+    faults = []
+    most = dict(_most(study, space, scenario))
+    for name, bound in study.constraints.items():
+        plain = study.quantities[name].of or name
+        if bound.min is not None and plain in most and bound.min > most[plain] * (1 + _SLACK):
+            largest = math.ceil(most[plain] * 1e4) / 1e4
+            problem = f"out of reach: {name} {bound}; no filter of {space.name} has more than {largest:g}"
+            faults.append(Fault(problem, key=f"constraints.{name}"))
+    return faults
+
+
+def _most(study: Study, space: Space, scenario: str) -> Iterator[tuple[str, float]]:
+    """Yield quantities with the largest values that they can have in a space."""
+    setup = study.setup(space, scenario)
+    for name, quantity in study.quantities.items():
+        if quantity.apart == DN and not quantity.extreme:
+            yield name, setup.camera.longest_distance_dn
+    if space.filter is None:
+        return
+    low, high = (np.array([end(axis) for axis in space.axes], dtype=float) for end in (min, max))
+    made = [space.filter.family.produced(off) for off in study.tolerance.places]
+    top = np.max([family.hull(low, high)[1] for family in made], axis=0)
+    counts, modified = setup.camera.mosaic.counts, list(setup.camera.modified)
+    qe = setup.camera.qe.copy()
+    qe[modified] = top
+    yield SENSITIVITY, float(top.sum() / setup.camera.base_qe.sum())
+    yield CFA_SENSITIVITY, float((qe.sum(axis=1) * counts).sum() / (counts.sum() * setup.camera.clear_qe.sum()))
+    for name, rows in space.filter.family.dimensions.items():
+        yield name, float(np.maximum(rows * low, rows * high).sum(axis=1).min())

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+from pydantic import ValidationError
 
 from ..base.disk import is_folder
 from ..base.errors import Fault, StudyError
 from ..curves.spectrum import Curves, WavelengthGrid
-from .checked import schema_of
 from .document import Document
 from .model import Study
 from .resolve import resolve
-from .sources import KeptSources
-
-_ALLOWED = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.")
+from .schema import StudySection
+from .sources import KeptSources, Sources
 
 
 def load_study(
@@ -30,23 +30,38 @@ def load_study(
 ) -> Study:
     """Read and check a study file.
 
-    Files that it names are looked for in `data`, when given, and then beside the study. `step_nm` replaces the step of
-    its wavelength grid. `kept`: curves on that grid to take instead of those in files, `qe:<curve>` and
-    `light:<type>:<name>`, each ndarray[n_wavelengths]. `changes`: dotted key -> value to take instead, as a study file
-    would have it. `allow_code`: code that the study names may run, or of it what has these digests. Raises StudyError
-    with one fault per thing wrong: file:line, key, value, what is allowed, nearest name.
+    Parameters
+    ----------
+    path
+        The study file.
+    data
+        Folder in which the files that it names are looked for first; then beside the study.
+    step_nm
+        Step of the wavelength grid instead of the study's, nm.
+    kept
+        Curves on that grid to take instead of those in files.
+    changes
+        Dotted key -> value to take instead, as a study file would have it.
+    allow_code
+        Code that the study names may run, or of it what has these digests.
+
+    Raises
+    ------
+    StudyError
+        With a fault for each thing wrong: file:line, key, value, what is allowed, nearest name.
     """
     document = Document(path)
     for key, text in changes.items():
         document.change(key, text)
-    known = schema_of(document)
+    section = _checked(document)
     if step_nm is not None:
-        grid = known.section.wavelengths
+        grid = section.wavelengths
         finer = WavelengthGrid(start_nm=grid.start_nm, stop_nm=grid.stop_nm, step_nm=step_nm)
-        known = replace(known, section=known.section.model_copy(update={"wavelengths": finer}))
+        section = section.model_copy(update={"wavelengths": finer})
     if data is not None and not is_folder(data):
         raise StudyError(Fault("no such folder", None, None, "--data", str(data)))
-    return resolve(document, known, [*([data] if data is not None else []), path.parent], kept, allow_code=allow_code)
+    folders = [path.parent] if data is None else [data, path.parent]
+    return resolve(section, Sources(document, section.wavelengths, folders, kept, allow_code=allow_code))
 
 
 def study_of_keys(
@@ -58,10 +73,19 @@ def study_of_keys(
     names that the study gives these. Raises StudyError as `load_study` does, without file and line.
     """
     document = Document(keys)
-    return resolve(document, schema_of(document), [folder], None, given, allow_code=allow_code)
+    section = _checked(document)
+    return resolve(section, Sources(document, section.wavelengths, [folder], None, given, allow_code))
+
+
+def _checked(document: Document) -> StudySection:
+    """Return the study as its schema has it. Raises StudyError with the faults of the schema."""
+    try:
+        return StudySection.model_validate(document.data)
+    except ValidationError as error:
+        raise StudyError(document.faults(error, StudySection)) from None
 
 
 def folder_name(study_name: str) -> str:
-    """A folder name for a study's outputs: other characters than letters, digits, `-`, `_`, `.` become `_`."""
-    kept = "".join(c if c in _ALLOWED else "_" for c in study_name)
-    return kept if kept.strip(".") else "_"
+    """Return a folder name for a study's outputs: characters but letters, digits, `-`, `_` and `.` become `_`."""
+    name = re.sub(r"[^a-zA-Z0-9_.-]", "_", study_name)
+    return name if name.strip(".") else "_"

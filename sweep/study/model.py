@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -205,9 +204,12 @@ class Study:
         tolerance_dn = self.section.tolerance_dn if tolerance_dn is None else tolerance_dn
         searched = None if self.search is None or self.search.scenario != scenario else self.search.space
         spaces = [space for space in self.spaces if space.size or space is searched] or list(self.spaces)
-        with _holding(scenario):
+        try:
             boxes = [self.box(space, scenario) for space in spaces]
             return plan_scene(scenario, boxes, tolerance_dn, self.section.accuracy, for_noise=bool(self.states))
+        except ArithmeticError:
+            problem = "the numbers of this scene, or of the pixel, are too large or too small to compute with"
+            raise StudyError(Fault(problem, key=f"scenarios.{scenario}")) from None
 
     def with_plans(self, tolerance_dn: float | None = None) -> Study:
         """The study with a plan for each of its scenarios; `tolerance_dn` instead of the study's own.
@@ -260,13 +262,3 @@ def asked_of(section: StudySection, lights: Lights, tasks: StudyTasks | None, ow
 def _states(section: StudySection, lights: Lights) -> tuple[str, ...]:
     recognition = section.recognition
     return () if recognition is None else tuple(recognition.states or lights.classes)
-
-
-@contextmanager
-def _holding(scenario: str) -> Iterator[None]:
-    """Raise StudyError where numbers of a scene are larger or smaller than a float can hold."""
-    try:
-        yield
-    except ArithmeticError:
-        problem = "the numbers of this scene, or of the pixel, are too large or too small to compute with"
-        raise StudyError(Fault(problem, key=f"scenarios.{scenario}")) from None

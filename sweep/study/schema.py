@@ -21,8 +21,18 @@ from ..metrics.bound import Bound
 from ..metrics.objective import Objective
 from ..vision.section import Vision
 from .axes import ScenarioTemplate, Span, Values, expanded
-from .schema_curves import LIGHTS_NAME, Documented, LightsSection, Name, SensorSection, Validation, builtin, named
-from .schema_tasks import TasksAsked
+from .schema_curves import (
+    LIGHTS_NAME,
+    Documented,
+    LightsSection,
+    Name,
+    SensorSection,
+    TasksAsked,
+    Validation,
+    builtin,
+    listed,
+    named,
+)
 
 _FEWEST_PATCHES = 10
 _MOST_ROWS = 64
@@ -41,10 +51,6 @@ class CfaSection(Section):
     curves: dict[Name, Name] = {}
 
 
-def _listed(value: Any) -> Any:
-    return [value] if isinstance(value, str) else value
-
-
 class Modification(Documented):
     """A family of filters put into `channel` of a CFA: it starts from curve `base` and goes `to` a curve or a floor.
 
@@ -61,7 +67,7 @@ class Modification(Documented):
             "an installed package offers it.",
         ),
     ] = "stopband"
-    channel: Annotated[list[Name], BeforeValidator(_listed, json_schema_input_type=list[Name] | Name)] = []
+    channel: Annotated[list[Name], BeforeValidator(listed, json_schema_input_type=list[Name] | Name)] = []
     """The channel of the CFA that the filter replaces; `dual` takes a list of two."""
     base: Name | None = None
     """The curve that the filter starts from."""
@@ -272,7 +278,7 @@ class StudySection(Documented):
     vision: Vision | None = None
     """Images of signal heads, read by the ideal observer and by a network; lamps need luminous intensity."""
     metrics: Annotated[
-        list[Name], BeforeValidator(_listed, json_schema_input_type=list[Name] | Name), Field(max_length=_MOST_OWN)
+        list[Name], BeforeValidator(listed, json_schema_input_type=list[Name] | Name), Field(max_length=_MOST_OWN)
     ] = []
     """Own metrics: FILE.py:NAME, or names that installed packages offer; each is a column like any other."""
     effects: Annotated[list[Name], Field(max_length=_MOST_OWN)] = []

@@ -1,61 +1,46 @@
-"""Sections of a study that name curves: a sensor's and lights', built in or from files."""
+"""Sections of a study that name curves: a sensor's, lights' and tasks', built in or from files."""
 
 from __future__ import annotations
 
-import ast
-import inspect
-import textwrap
 from collections.abc import Iterable
-from itertools import pairwise
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, WithJsonSchema, model_validator
-from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema
+from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, Tag, WithJsonSchema, model_validator
 
-from ..base.types import Ratio, Section
+from ..base.types import Ratio, Seconds, Section
+from ..camera.pixel import ReadNoise
 from ..curves.builtin.registry import BUILT_IN_LIGHTS
-from ..curves.scan import MOST_CURVES
 from ..curves.spectrum import Outside, Resampling
+from ..curves.tasks import SHIPPED
+from ..curves.text_tables import MOST_CURVES
 from ..designs.technology import Stated
+
+_MOST_TASKS = 20
+_MOST_CLASSES = 40
 
 Name = Annotated[str, Field(min_length=1, max_length=100)]
 FileColumns = Annotated[list[Name], Field(min_length=1, max_length=MOST_CURVES)]
-FilePath = Annotated[str, Field(min_length=1, max_length=4096)]
+_Path = Annotated[str, Field(min_length=1, max_length=4096)]
+FilePath = Annotated[
+    _Path, Field(description="Path of a file of curves, relative to the study or to the folder of --data.")
+]
+ResamplingRule = Annotated[
+    Resampling,
+    Field(description="`mean` over each bin keeps the integral of lines that are finer than the grid."),
+]
+OutsideRule = Annotated[Outside, Field(description="`zero` takes 0 where the samples end inside the grid.")]
 
 
 class Documented(Section):
-    """A section whose keys are described by the text below them, for editors; the texts are read when these ask."""
+    """A section whose keys are described by the text below them, for editors."""
 
-    @classmethod
-    def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler, /) -> JsonSchemaValue:
-        made = handler(core_schema)
-        keys = handler.resolve_ref_schema(made)["properties"]
-        for part in cls.__mro__[: cls.__mro__.index(Documented)]:
-            for name, text in _texts_below(part).items():
-                keys[cls.model_fields[name].alias or name].setdefault("description", text)
-        return made
-
-
-def _texts_below(section: type) -> dict[str, str]:
-    """Key of a section -> the text below it in the source."""
-    (made,) = ast.parse(textwrap.dedent(inspect.getsource(section))).body
-    assert isinstance(made, ast.ClassDef)
-    return {
-        key.target.id: inspect.cleandoc(text.value.value)
-        for key, text in pairwise(made.body)
-        if isinstance(key, ast.AnnAssign)
-        and isinstance(key.target, ast.Name)
-        and isinstance(text, ast.Expr)
-        and isinstance(text.value, ast.Constant)
-        and isinstance(text.value.value, str)
-    }
+    model_config = ConfigDict(use_attribute_docstrings=True)
 
 
 class CurveFile(Documented):
     """QE curves from one file: `columns` maps the sensor's curve names to the file's column names."""
 
-    file: FilePath
+    file: _Path
     """Path of a file of curves, relative to the study or to the folder of --data.
 
     At most 40 MB, 2,000 curves, 100,000 samples of each and 2,000,000 values; values are 0 to 1e100."""
@@ -67,10 +52,8 @@ class CurveFile(Documented):
     """A curve of the sensor that the file's values are relative to: they are transmissions, and are multiplied by it.
 
     A built-in curve, or one of a file without `relative_to`."""
-    resampling: Resampling = "linear"
-    """`mean` over each bin keeps the integral of lines that are finer than the grid."""
-    outside: Outside = "refuse"
-    """`zero` takes 0 where the samples end inside the grid."""
+    resampling: ResamplingRule = "linear"
+    outside: OutsideRule = "refuse"
 
 
 class SensorSection(Documented):
@@ -102,29 +85,23 @@ class LightFile(Documented):
     """Lights from one file: `signals` maps a signal type to the file's columns."""
 
     file: FilePath
-    """Path of a file of curves, relative to the study or to the folder of --data."""
     quantity: Annotated[str, Field(pattern="^(energy|photons)$"), WithJsonSchema({"enum": ["energy", "photons"]})]
     """What the file's numbers are."""
     signals: Annotated[dict[Name, FileColumns], Field(min_length=1)]
-    resampling: Resampling = "linear"
-    """`mean` over each bin keeps the integral of lines that are finer than the grid."""
-    outside: Outside = "refuse"
-    """`zero` takes 0 where the samples end inside the grid."""
+    resampling: ResamplingRule = "linear"
+    outside: OutsideRule = "refuse"
 
 
 class TaskFile(Documented):
     """Spectra of a task's class from one file. Only their shape counts: all spectra of a task have the same photons."""
 
     file: FilePath
-    """Path of a file of curves, relative to the study or to the folder of --data."""
     quantity: Literal["energy", "photons", "reflectance"]
     """What the file's numbers are: of lamps `energy` or `photons`, of surfaces `reflectance`, in any unit."""
     columns: FileColumns | None = None
     """Columns of the file; left out, all of them."""
-    resampling: Resampling = "linear"
-    """`mean` over each bin keeps the integral of lines that are finer than the grid."""
-    outside: Outside = "refuse"
-    """`zero` takes 0 where the samples end inside the grid."""
+    resampling: ResamplingRule = "linear"
+    outside: OutsideRule = "refuse"
 
 
 class LightsSection(Documented):
@@ -147,12 +124,12 @@ class LightsSection(Documented):
 
 
 def named(names: Iterable[str]) -> Any:
-    """The type of built-in names, as editors complete them; installed packages may offer others."""
+    """Return the type of built-in names, as editors complete them; installed packages may offer others."""
     return Annotated[str, WithJsonSchema({"anyOf": [{"type": "string", "enum": list(names)}, {"type": "string"}]})]
 
 
 def builtin(value: Any) -> Any:
-    """A name alone is that of a built-in one."""
+    """Take a name alone for that of a built-in one."""
     return {"builtin": value} if isinstance(value, str) else value
 
 
@@ -177,3 +154,72 @@ class Validation(Documented):
         if self.lights is None and not self.leave_one_out:
             raise ValueError("`lights`, `leave_one_out: true`, or both")
         return self
+
+
+_TaskName = Annotated[str, Field(min_length=1, max_length=40, pattern="^[a-z][a-z0-9_]*$")]
+
+
+def listed(value: Any) -> Any:
+    """Take an entry alone for a list of one."""
+    return value if isinstance(value, list) else [value]
+
+
+_Spectra = Annotated[
+    Annotated[Name, Tag("<group>")] | Annotated[TaskFile, Tag("<file>")],
+    Discriminator(lambda value: "<group>" if isinstance(value, str) else "<file>"),
+]
+_ClassSpectra = Annotated[
+    list[_Spectra],
+    BeforeValidator(listed, json_schema_input_type=list[_Spectra] | _Spectra),
+    Field(min_length=1, max_length=_MOST_CLASSES),
+]
+
+
+class OwnTask(Documented):
+    """Classes of spectra to tell apart: from the groups that `sweep list data` shows, and from files."""
+
+    classes: Annotated[dict[Name, _ClassSpectra], Field(min_length=2, max_length=_MOST_CLASSES)]
+    """Class -> a group of spectra, {file: ..., quantity: ...}, or a list of these; all are lamps, or all surfaces."""
+    under: Annotated[list[Name], BeforeValidator(listed, json_schema_input_type=list[Name] | Name)] = []
+    """Lights of a task of surfaces: d65, d50, a (a filament), led, hps, lps (sodium of high and low pressure)."""
+
+
+class TasksSection(Documented):
+    """What designs gain and lose elsewhere: patches that fill the field, on axis, at one exposure for all CFAs.
+
+    The noise is that of photons and of read noise, in four pixels of the CFA.
+    """
+
+    shipped: Annotated[list[Name], Field(json_schema_extra={"items": {"enum": list(SHIPPED)}})] = list(SHIPPED)
+    """Tasks of the package: color, low_light, vehicle_lamps, emergency, road_marking, traffic_signs, vegetation,
+    unseen_lamps; all of them where it is left out."""
+    own: Annotated[dict[_TaskName, OwnTask], Field(max_length=_MOST_TASKS)] = {}
+    """Tasks of your own, by name."""
+    exposure_s: Seconds = 0.01
+    """Exposure, the same for every CFA."""
+    read_noise_e: ReadNoise = 2.0
+    """Read noise of a pixel, electrons."""
+    illuminance_lx: Annotated[float, Field(ge=1e-9, le=1e9)] = 1000.0
+    """Light on the charts of `color`; the color matrix of `low_light`, too, weighs the noise of that light."""
+
+    @model_validator(mode="after")
+    def _some(self) -> TasksSection:
+        if not self.shipped and not self.own:
+            raise ValueError("`shipped`, `own`, or both")
+        if len(set(self.shipped)) < len(self.shipped):
+            raise ValueError("a task is named twice")
+        return self
+
+
+def _tasks(value: Any) -> Any:
+    """Take `all` for every task of the package, and a list for those that it names."""
+    if value == "all":
+        return {}
+    return {"shipped": value} if isinstance(value, list) else value
+
+
+TasksAsked = Annotated[
+    TasksSection | None,
+    BeforeValidator(_tasks, json_schema_input_type=Literal["all"] | list[Name] | TasksSection | None),
+]
+"""`tasks` as a study states it."""

@@ -14,20 +14,22 @@ from ..camera.sensor import BUILT_IN_SENSORS, SensorCurves, make_sensor
 from ..camera.sensor_field import PLACES, SensorField
 from ..curves.facts import NORMALIZED, looks_normalized
 from ..designs.space import Space
+from .document import KeyPath
 from .schema import StudySection
 from .schema_curves import CurveFile, SensorSection
 from .sources import Sources
-from .yaml_tree import Key
+from .user_code import offered_curves
 
 _ROUNDING = 1e-9
 
 
-def sensor_of(sources: Sources, section: SensorSection) -> SensorCurves | None:
-    """The study's sensor, or None after adding faults to `sources`.
+def sensor_of(section: SensorSection, sources: Sources) -> SensorCurves | None:
+    """Return the study's sensor, or None after adding faults to `sources`. Raises StudyError.
 
     Curves of files that are relative to another one are multiplied by it; such a curve is built in, or from a file
-    whose values are QE themselves.
+    whose values are QE themselves. A channel with an own curve is not taken from another one of the built-in sensor.
     """
+    section = offered_curves(sources, ("sensor",), section, "sweep.sensors", BUILT_IN_SENSORS)
     built_in: SensorCurves | None = None
     if section.builtin is not None:
         built_in = sources.built_in(("sensor",), section.builtin, BUILT_IN_SENSORS)
@@ -36,56 +38,54 @@ def sensor_of(sources: Sources, section: SensorSection) -> SensorCurves | None:
     before = len(sources.faults)
     if not sources.fits(("sensor", "files"), "curves", sum(len(entry.columns) for entry in section.files)):
         return None
-    own = _curves_of_files(sources, section, {} if built_in is None else built_in.qe)
+    known = {} if built_in is None else built_in.qe
+    own = _curves_of_files(sources, section, known)
     if len(sources.faults) > before:
         return None
     source = ", ".join(entry.file for entry in section.files)
-    qe = own if built_in is None else {**built_in.qe, **own}
     clear = section.clear or (None if built_in is None else built_in.clear)
     try:
-        made = make_sensor(section.name or section.builtin or "sensor", qe, source, clear)
+        made = make_sensor(section.name or section.builtin or "sensor", {**known, **own}, source, clear)
     except DataError as error:
         for fault in error.faults:
-            path = ("sensor", "clear") if fault.key is None else _place(section, fault.key)
+            index = next((i for i, entry in enumerate(section.files) if fault.key in entry.columns), None)
+            place = ("sensor",) if index is None else ("sensor", "files", index, "columns", fault.key or "")
+            path = ("sensor", "clear") if fault.key is None else place
             sources.add(path, fault.problem, fault.value, fault.allowed, fault.nearest)
         return None
-    return made if built_in is None else _beside(made, built_in, own)
-
-
-def _beside(made: SensorCurves, built_in: SensorCurves, own: Mapping[str, FloatArray]) -> SensorCurves:
-    """The sensor with what else the built-in one says; a channel with an own curve is not taken from another one."""
+    if built_in is None:
+        return made
     variants = {
         cfa: {channel: curve for channel, curve in channels.items() if channel not in own}
         for cfa, channels in built_in.variants.items()
     }
-    return replace(made, source=f"{built_in.source}, {made.source}", surrogate=built_in.surrogate, variants=variants)
+    return replace(made, source=f"{built_in.source}, {source}", surrogate=built_in.surrogate, variants=variants)
 
 
 def _curves_of_files(
     sources: Sources, section: SensorSection, known: Mapping[str, FloatArray]
 ) -> dict[str, FloatArray]:
-    """QE of every curve of the files, those that are relative to others last; `known`: built-in curves."""
+    """Return the QE of every curve of the files, those that are relative to others last; `known`: built-in curves."""
     curves: dict[str, FloatArray] = {}
-    every = list(enumerate(section.files))
-    for entries in ([e for e in every if e[1].relative_to is None], [e for e in every if e[1].relative_to is not None]):
-        whole = {**known, **curves}
-        for index, entry in entries:
-            path: tuple[Key, ...] = ("sensor", "files", index)
-            if entry.relative_to is not None and entry.relative_to not in whole:
-                sources.unknown((*path, "relative_to"), "curve", entry.relative_to, list(whole))
-                continue
-            factor = entry.scale if entry.relative_to is None else entry.scale * whole[entry.relative_to]
-            for name, values in _columns(sources, path, entry, factor).items():
-                if name in curves:
-                    sources.add((*path, "columns", name), "the curve is defined twice", name)
-                curves[name] = values
+    files = sorted(enumerate(section.files), key=lambda item: item[1].relative_to is not None)
+    whole = dict(known)
+    for index, entry in files:
+        path: KeyPath = ("sensor", "files", index)
+        if entry.relative_to is not None and entry.relative_to not in whole:
+            sources.unknown((*path, "relative_to"), "curve", entry.relative_to, whole)
+            continue
+        factor = entry.scale if entry.relative_to is None else entry.scale * whole[entry.relative_to]
+        for name, values in _columns(sources, path, entry, factor).items():
+            if name in curves:
+                sources.add((*path, "columns", name), "the curve is defined twice", name)
+            curves[name] = values
+            if entry.relative_to is None:
+                whole[name] = values
     return curves
 
 
-def _columns(
-    sources: Sources, path: tuple[Key, ...], entry: CurveFile, factor: float | FloatArray
-) -> dict[str, FloatArray]:
-    """The curves of one file on the grid, times a factor; those that a finished run kept have it already."""
+def _columns(sources: Sources, path: KeyPath, entry: CurveFile, factor: float | FloatArray) -> dict[str, FloatArray]:
+    """Return the curves of one file on the grid, times a factor; those that a finished run kept have it already."""
     curves = sources.curves(path, entry)
     if curves is not None and entry.relative_to is None:
         top = max((float(curves.values[c].max()) for c in entry.columns.values() if c in curves.values), default=0.0)
@@ -104,14 +104,8 @@ def _columns(
     return scaled
 
 
-def _place(section: SensorSection, curve: str) -> tuple[Key, ...]:
-    """Where the study names a curve."""
-    index = next((i for i, entry in enumerate(section.files) if curve in entry.columns), None)
-    return ("sensor",) if index is None else ("sensor", "files", index, "columns", curve)
-
-
 def with_chief_rays(section: StudySection, sources: Sources) -> StudySection:
-    """The study with the rows of lenses' files in the place of their names; what does not fit adds a fault."""
+    """Return the study with the rows of lenses' files in the place of their names; what does not fit adds a fault."""
     scenarios = dict(section.scenarios)
     read: dict[tuple[str, float | None], SensorField] = {}
     for name, scenario in section.scenarios.items():
@@ -139,22 +133,22 @@ def _moves(sensor: SensorCurves, curve: str) -> bool:
 
 
 def with_technologies(sensor: SensorCurves, section: StudySection, sources: Sources) -> SensorCurves:
-    """The sensor with what is stated of its curves; what does not fit adds a fault."""
+    """Return the sensor with what is stated of its curves; what does not fit adds a fault."""
     clear = sensor.curve(sensor.clear)
     kind = "clear" if sensor.has_clear else "brightest"
     stated = replace(sensor, technologies=section.sensor.technology)
     for curve in section.sensor.technology:
-        path: tuple[Key, ...] = ("sensor", "technology", curve)
+        path: KeyPath = ("sensor", "technology", curve)
         if curve not in sensor.qe:
-            sources.unknown(path, "curve", curve, list(sensor.qe))
+            sources.unknown(path, "curve", curve, sensor.qe)
         elif _moves(stated, curve) and (sensor.qe[curve] > clear * (1 + _ROUNDING)).any():
             problem = f"an interference filter lets through a share of the {kind} curve, {sensor.clear}"
             sources.add(path, problem, f"{curve} is above it", "pigment")
     return stated
 
 
-def check_filter(space: Space, path: tuple[Key, ...], sensor: SensorCurves, sources: Sources) -> None:
-    """Check that a filter can be told from its base: that is no interference filter, nor exceeded by one."""
+def check_filter(space: Space, path: KeyPath, sensor: SensorCurves, sources: Sources) -> None:
+    """Check that a filter's base is no interference filter, and that none exceeds its base."""
     made = space.filter
     assert made is not None
     for base in dict.fromkeys(made.bases.values()):
@@ -172,7 +166,7 @@ def check_filter(space: Space, path: tuple[Key, ...], sensor: SensorCurves, sour
 
 
 def check_lenses(section: StudySection, sensor: SensorCurves, spaces: Sequence[Space], sources: Sources) -> None:
-    """Where filters move, no ray of any scene grazes them."""
+    """Check that no ray of any scene grazes filters that move with the angle of the light."""
     filters = [space.filter.technology for space in spaces if space.filter is not None]
     if all(t is None or t.interference is None for t in (*filters, *sensor.technologies.values())):
         return

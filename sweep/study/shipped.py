@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sysconfig
-from collections.abc import Iterator
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
@@ -12,35 +11,28 @@ from ..base.disk import is_file, is_folder
 from ..base.errors import Fault, StudyError, nearest
 
 _STUDIES, _SHARED = "studies", "share/cfa-sweep/studies"
+_INSTALLED = f"{_SHARED}/stopband.yaml"
 _KINDS = (".yaml", ".yml")
 _ONE_OF_THEM = "stopband.yaml"
 
 
 def shipped_folder() -> Path | None:
-    """The folder of the project's studies: beside the package in a checkout, else where the installer put it."""
-    for folder in _places():
-        if is_file(folder / _ONE_OF_THEM):
-            return folder
-    return None
-
-
-def _places() -> Iterator[Path]:
-    yield Path(__file__).resolve().parents[2] / _STUDIES
-    with suppress(PackageNotFoundError):
-        for file in distribution("cfa-sweep").files or ():
-            if file.as_posix().endswith(f"{_SHARED}/{_ONE_OF_THEM}"):
-                yield Path(str(file.locate())).resolve().parent
-    yield Path(sysconfig.get_path("data")) / _SHARED
+    """Return the folder of the project's studies: beside the package in a checkout, else where it was installed."""
+    folders = [Path(__file__).resolve().parents[2] / _STUDIES, Path(sysconfig.get_path("data")) / _SHARED]
+    with suppress(PackageNotFoundError):  # `pip install --user` or `--target` put it elsewhere
+        files = distribution("cfa-sweep").files or ()
+        folders += [Path(str(f.locate())).resolve().parent for f in files if f.as_posix().endswith(_INSTALLED)]
+    return next((folder for folder in folders if is_file(folder / _ONE_OF_THEM)), None)
 
 
 def shipped_names() -> list[str]:
-    """Names of the project's studies, in order; none where they were not installed."""
+    """Return the names of the project's studies, in order; none where they were not installed."""
     folder = shipped_folder()
     return [] if folder is None else sorted(path.stem for path in folder.iterdir() if path.suffix == ".yaml")
 
 
 def study_path(given: Path) -> Path:
-    """The file that is meant: the path itself, or, for a name alone, that study of `studies/` or of the project.
+    """Return the file that is meant: the path itself, or, for a name alone, that study of `studies/` or of the project.
 
     Raises StudyError, with the nearest name, for a name that is nowhere.
     """

@@ -1,40 +1,34 @@
-"""Curves that a study names: built in, or from files beside the study or in a data folder."""
+"""Files and built-in curves that a study names, and all faults that are found in it."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
 from ..base.disk import is_file
-from ..base.errors import MOST_FAULTS, DataError, Fault, SweepError, nearest
+from ..base.errors import MOST_FAULTS, DataError, Fault, StudyError, SweepError, nearest
 from ..base.types import FloatArray
 from ..camera.sensor import SensorCurves
-from ..curves.builtin.registry import BUILT_IN_LIGHTS
 from ..curves.builtin.surrogate import BUILT_IN_RANGE_NM
 from ..curves.files import digest, read_curves
 from ..curves.lens_files import ChiefRays, read_chief_rays
-from ..curves.lights import Lights, make_lights
+from ..curves.lights import Lights
 from ..curves.spectrum import Curves, WavelengthGrid, photons_from_energy
-from .document import Document
-from .schema import MOST_TYPES
-from .schema_curves import CurveFile, LightFile, LightsSection, TaskFile
-from .yaml_tree import Key
+from .document import Document, KeyPath, by_line
+from .schema_curves import CurveFile, LightFile, TaskFile
 
-_Made = TypeVar("_Made", SensorCurves, Lights)
-_Content = TypeVar("_Content", Curves, ChiefRays)
 _MOST_VALUES = 10_000_000
 """Most values of the curves of a sensor, or of lights, on the grid: 80 MB."""
 _CUT_OFF = 0.01
-"""Share of a light's photons outside the grid from which on the user is told."""
-
-
+"""Share of a light's photons outside the grid from which on the user gets a warning."""
+_Made = TypeVar("_Made", SensorCurves, Lights)
+_Content = TypeVar("_Content", Curves, ChiefRays)
 _Key = TypeVar("_Key")
 _Entry = CurveFile | LightFile | TaskFile
-"""A file of curves as a study names it."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +44,7 @@ class KeptSources:
 
 @dataclass
 class Sources:
-    """Reads the files of one study, each once; collects faults, warnings and digests.
+    """Reader of the files of one study, each once; collects faults, warnings and digests.
 
     `kept`: the curves of a finished run; no file is read then. `given`: files that are not on a disk, by their names.
     `allow_code`: code that the study names may run, or of it what has these digests.
@@ -67,100 +61,58 @@ class Sources:
     digests: dict[str, str] = field(default_factory=dict)
     _read: dict[str, Curves | None] = field(default_factory=dict)
 
-    def unknown(
-        self, path: tuple[Key, ...], what: str, value: str, known: list[str], others: Iterable[str] = ()
+    @property
+    def error(self) -> StudyError:
+        """All faults, in the order of their lines."""
+        return StudyError(by_line(self.faults))
+
+    def add(
+        self, path: KeyPath, problem: str, value: object = None, allowed: str | None = None, near: str | None = None
     ) -> None:
+        """Add a fault at `path` of the study file."""
+        self.faults.append(self.document.fault(path, problem, value, allowed, near))
+
+    def add_error(self, path: KeyPath, error: SweepError) -> None:
+        """Add the faults of an error at `path` of the study file."""
+        for fault in error.faults:
+            problem = f"{fault.file}: {fault.problem}" if fault.file else fault.problem
+            self.add(path, problem, fault.value, fault.allowed, fault.nearest)
+
+    def unknown(self, path: KeyPath, what: str, value: str, known: Iterable[str], others: Iterable[str] = ()) -> None:
         """Add the fault of a name that is not among the known ones, with the nearest of them and of `others`."""
-        if len(self.faults) < MOST_FAULTS:
-            self.add(path, f"unknown {what}", value, ", ".join(known), nearest(value, [*known, *others]))
-        else:  # nobody reads it
-            self.add(path, f"unknown {what}", value)
+        known = list(known)
+        near = nearest(value, [*known, *others]) if len(self.faults) < MOST_FAULTS else None  # of more nobody reads it
+        self.add(path, f"unknown {what}", value, ", ".join(known), near)
 
-    def held_out(self, section: LightsSection, own: Lights) -> Lights | None:
-        """Lights that the study does not optimize for, as bright as its own, or None after adding faults.
-
-        Those of a finished run are not kept: None, too.
-        """
-        if self.kept is not None:
-            return None
-        path = ("validate", "lights")
-        lights = self.lights(section, path)
-        if lights is None:
-            return None
-        for name in lights.classes:
-            if name not in own.classes:
-                self.unknown(path, "signal type", name, list(own.classes))
-        return replace(lights, photon_ratio=own.photon_ratio)
-
-    def lights(self, section: LightsSection, at: tuple[Key, ...] = ("lights",)) -> Lights | None:
-        """The lights of the section at a place of the study, or None after adding faults."""
-        if section.builtin is not None:
-            own = sorted(section.model_fields_set - {"builtin", "files"})
-            for key in own:
-                self.add(
-                    (*at, key), "a built-in data set has its own", getattr(section, key), "this key beside `files`"
-                )
-            return None if own else self.built_in(at, section.builtin, BUILT_IN_LIGHTS)
-        before = len(self.faults)
-        used = [len(columns) for entry in section.files for columns in entry.signals.values()]
-        if not self.fits((*at, "files"), "lights", sum(used)):
-            return None
-        by_type: dict[str, list[tuple[str, str, FloatArray]]] = {}
-        for index, entry in enumerate(section.files):
-            path = (*at, "files", index)
-            curves = self.curves(path, entry)
-            for signal_type, columns in entry.signals.items():
-                for position, column in enumerate(columns):
-                    place = (*path, "signals", signal_type, position)
-                    label = f"{Path(entry.file).stem}:{column}"
-                    if self.kept is not None:
-                        photons = self.kept_curve(place, self.kept.lights, (signal_type, label))
-                    else:
-                        photons = self.photons(place, curves, column, entry)
-                    if photons is not None:
-                        by_type.setdefault(signal_type, []).append((label, signal_type, photons))
-        if len(self.faults) > before:
-            return None
-        if len(by_type) < 2:
-            self.add((*at, "files"), "only one signal type", list(by_type), "two or more, to tell them apart")
-            return None
-        if len(by_type) > MOST_TYPES:
-            self.add((*at, "files"), "too many signal types", len(by_type), f"at most {MOST_TYPES}")
-            return None
-        signals = [signal for group in by_type.values() for signal in group]
-        source = ", ".join(entry.file for entry in section.files)
-        return make_lights(self.grid, section.name or "lights", signals, source, photon_ratio=section.photon_ratio)
-
-    def fits(self, path: tuple[Key, ...], what: str, count: int) -> bool:
-        """Return whether so many curves on the grid fit into memory; else adds a fault."""
+    def fits(self, path: KeyPath, what: str, count: int) -> bool:
+        """Return whether so many curves on the grid fit into memory; else add a fault."""
         most = _MOST_VALUES // self.grid.size
         if count > most:
             self.add(path, f"too many {what} for a grid of {self.grid.size:,} wavelengths", count, f"at most {most:,}")
         return count <= most
 
-    def built_in(
-        self, at: tuple[Key, ...], name: str, known: Mapping[str, Callable[[WavelengthGrid], _Made]]
-    ) -> _Made | None:
-        """A sensor or lights of the package on the grid, or None after adding faults."""
+    def built_in(self, at: KeyPath, name: str, known: Mapping[str, Callable[[WavelengthGrid], _Made]]) -> _Made | None:
+        """Return a sensor or lights of the package on the grid, or None after adding faults."""
         if name not in known:
             allowed = f"{', '.join(known)}, or a mapping with `files`"
             self.add(at, f"unknown built-in {at[-1]}", name, allowed, nearest(name, known))
             return None
+        return known[name](self.grid) if self.in_built_in_range("the built-in curves") else None
+
+    def in_built_in_range(self, what: str) -> bool:
+        """Return whether the grid is inside the range of the built-in curves; else add a fault, once."""
         low, high = BUILT_IN_RANGE_NM
-        if not low <= self.grid.start_nm < self.grid.stop_nm <= high:
-            asked = f"{self.grid.start_nm:g} to {self.grid.stop_nm:g} nm"
-            fault = self.document.fault(
-                ("wavelengths",), "the built-in curves end before the grid", asked, f"{low:g} to {high:g} nm"
-            )
-            if fault not in self.faults:
-                self.faults.append(fault)
-            return None
-        return known[name](self.grid)
+        inside = low <= self.grid.start_nm < self.grid.stop_nm <= high
+        grid = f"{self.grid.start_nm:g} to {self.grid.stop_nm:g} nm"
+        fault = self.document.fault(("wavelengths",), f"{what} end before the grid", grid, f"{low:g} to {high:g} nm")
+        if not inside and fault not in self.faults:
+            self.faults.append(fault)
+        return inside
 
     def photons(
-        self, path: tuple[Key, ...], curves: Curves | None, column: str, entry: LightFile | TaskFile
+        self, path: KeyPath, curves: Curves | None, column: str, entry: LightFile | TaskFile
     ) -> FloatArray | None:
-        """A light's photon spectrum on the grid; says so when photons are cut off."""
+        """Return a light's photon spectrum on the grid, or None after adding faults; warn where photons are cut off."""
         values = self.column(path, curves, column, entry)
         if values is None or curves is None:
             return None
@@ -179,12 +131,12 @@ class Sources:
             )
         return values
 
-    def column(self, path: tuple[Key, ...], curves: Curves | None, column: str, entry: _Entry) -> FloatArray | None:
-        """A column of a file on the grid, ndarray[n_wavelengths], or None after adding faults."""
+    def column(self, path: KeyPath, curves: Curves | None, column: str, entry: _Entry) -> FloatArray | None:
+        """Return a column of a file on the grid, ndarray[n_wavelengths], or None after adding faults."""
         if curves is None:
             return None
         if column not in curves.values:
-            self.unknown(path, f"column of {entry.file}", column, list(curves.values))
+            self.unknown(path, f"column of {entry.file}", column, curves.values)
             return None
         try:
             return curves.on(self.grid, column, entry.resampling, entry.outside)
@@ -193,34 +145,32 @@ class Sources:
                 self.add(path, f"{entry.file}, column {column}: {fault.problem}", fault.value, fault.allowed)
             return None
 
-    def kept_curve(self, path: tuple[Key, ...], curves: Mapping[_Key, FloatArray], name: _Key) -> FloatArray | None:
-        """A curve that a finished run kept, or None after adding a fault."""
+    def kept_curve(self, path: KeyPath, curves: Mapping[_Key, FloatArray], name: _Key) -> FloatArray | None:
+        """Return a curve that a finished run kept, or None after adding a fault."""
         if name not in curves:
             self.add(path, "the run kept no such curve", name)
         return curves.get(name)
 
-    def curves(self, path: tuple[Key, ...], entry: _Entry) -> Curves | None:
-        """All curves of a file, which is read once, or None after adding faults."""
+    def curves(self, path: KeyPath, entry: _Entry) -> Curves | None:
+        """Return all curves of a file, which is read once, or None after adding faults."""
         if self.kept is not None:
             return None
-        if entry.file in self._read:
-            return self._read[entry.file]
-        if entry.file in self.given:
+        if entry.file not in self._read and entry.file in self.given:
             curves = self._read[entry.file] = self.given[entry.file]
             content = hashlib.sha256(curves.wavelength_nm.tobytes())
             for name, values in curves.values.items():
                 content.update(name.encode() + values.tobytes())
             self.digests[entry.file] = content.hexdigest()
-            return curves
-        self._read[entry.file] = self._noted((*path, "file"), entry.file, read_curves)
+        elif entry.file not in self._read:
+            self._read[entry.file] = self._content((*path, "file"), entry.file, read_curves)
         return self._read[entry.file]
 
-    def chief_rays(self, path: tuple[Key, ...], file: str, corner_mm: float | None) -> ChiefRays | None:
-        """A lens's chief ray angles from a file that the study names at `path`, or None after adding faults."""
-        return self._noted(path, file, lambda place: read_chief_rays(place, corner_mm))
+    def chief_rays(self, path: KeyPath, file: str, corner_mm: float | None) -> ChiefRays | None:
+        """Return a lens's chief ray angles from a file, or None after adding faults."""
+        return self._content(path, file, lambda place: read_chief_rays(place, corner_mm))
 
-    def _noted(self, path: tuple[Key, ...], file: str, read: Callable[[Path], _Content]) -> _Content | None:
-        """Content of a file, with its notes and its digest kept; None after adding faults."""
+    def _content(self, path: KeyPath, file: str, read: Callable[[Path], _Content]) -> _Content | None:
+        """Return what is in a file, and keep its notes and its digest; None after adding faults."""
         place = self.file(path, file)
         if place is None:
             return None
@@ -233,31 +183,18 @@ class Sources:
         self.warnings += [f"{file}: {note}" for note in content.notes]
         return content
 
-    def file(self, path: tuple[Key, ...], file: str) -> Path | None:
-        """Where a file lies that the study names at `path`, or None after adding a fault."""
+    def file(self, path: KeyPath, file: str) -> Path | None:
+        """Return where a file lies that the study names at `path`, or None after adding a fault."""
         place = next((folder / file for folder in self.folders if is_file(folder / file)), None)
         if place is None:
-            searched = ", ".join(str(folder) for folder in self.folders)
             names: list[str] = []
             for folder in self.folders:
                 with suppress(OSError):
                     names += [item.name for item in folder.iterdir()]
-            self.add(path, "no such file", file, f"a path relative to {searched}", nearest(file, names))
+            self.add(path, "no such file", file, f"a path relative to {self.searched}", nearest(file, names))
         return place
 
-    def add(
-        self,
-        path: tuple[Key, ...],
-        problem: str,
-        value: object = None,
-        allowed: str | None = None,
-        near: str | None = None,
-    ) -> None:
-        """Add a fault at `path` of the study file."""
-        self.faults.append(self.document.fault(path, problem, value, allowed, near))
-
-    def told(self, path: tuple[Key, ...], error: SweepError) -> None:
-        """Add the faults of an error at `path` of the study file."""
-        for fault in error.faults:
-            problem = f"{fault.file}: {fault.problem}" if fault.file else fault.problem
-            self.add(path, problem, fault.value, fault.allowed, fault.nearest)
+    @property
+    def searched(self) -> str:
+        """Folders in which files are looked for."""
+        return ", ".join(str(folder) for folder in self.folders)

@@ -18,11 +18,11 @@ from ..designs.registry import FAMILIES, build_family
 from ..designs.space import Filter, Kind, Space
 from ..designs.technology import PIGMENT
 from ..designs.ungridded import Drawn, Method, Paired, Ungridded
-from .own_codes import allowed, code_of, is_from_outside
+from .document import KeyPath
 from .schema import DesignSection, Modification, StudySection, SweepSection
 from .sensors import check_filter
 from .sources import Sources
-from .yaml_tree import Key
+from .user_code import allowed, code_of, is_from_outside
 
 _MOST_POINTS = 2_000_000
 _MOST_DRAWN = 10_000_000
@@ -30,21 +30,16 @@ _FAMILIES: Offered = "sweep.families"
 
 
 def check_cfas(section: StudySection, sources: Sources) -> None:
-    """Check that filters are put into CFAs of the study, which is all that can be told without a sensor."""
+    """Check that filters are put into CFAs of the study, which needs no sensor."""
     for kind, entries in (("designs", section.designs), ("sweeps", section.sweeps), ("boxes", section.boxes)):
         for name, entry in entries.items():
-            check_cfa(section, sources, (kind, name), entry)
-
-
-def check_cfa(section: StudySection, sources: Sources, path: tuple[Key, ...], entry: Modification) -> None:
-    """Add a fault where a filter is put into a CFA that the study does not have."""
-    if entry.cfa not in section.cfas:
-        sources.unknown((*path, "cfa"), "CFA", entry.cfa, list(section.cfas))
+            if entry.cfa not in section.cfas:
+                sources.unknown((kind, name, "cfa"), "CFA", entry.cfa, section.cfas)
 
 
 @dataclass(frozen=True)
 class SpaceBuilder:
-    """Makes the spaces of a study; what is wrong goes to the faults of `sources`."""
+    """Maker of the spaces of a study; what is wrong goes to the faults of `sources`."""
 
     section: StudySection
     sources: Sources
@@ -52,7 +47,7 @@ class SpaceBuilder:
     mosaics: Mapping[str, Mosaic]
 
     def spaces(self) -> list[Space]:
-        """Plain CFAs (those whose every channel has a curve), then named designs, then sweeps."""
+        """Return plain CFAs (those whose every channel has a curve), then named designs, then sweeps."""
         section = self.section
         if not self._fits():
             return []
@@ -60,18 +55,15 @@ class SpaceBuilder:
         changed = {(entry.cfa, channel) for entry in entries for channel in entry.channel}
         spaces = []
         for name, mosaic in self.mosaics.items():
-            missing = False
-            for channel in mosaic.channels:
-                curve = section.cfas[name].curves.get(channel, self.sensor.curve_name(name, channel))
-                if curve not in self.sensor.qe:
-                    missing = True
-                    if (name, channel) not in changed:
-                        self.sources.unknown(
-                            ("cfas", name), f"curve of channel {channel!r}", curve, list(self.sensor.qe)
-                        )
-            for channel in section.cfas[name].curves:
+            stated = section.cfas[name].curves
+            curves = {c: stated.get(c, self.sensor.curve_name(name, c)) for c in mosaic.channels}
+            missing = {channel: curve for channel, curve in curves.items() if curve not in self.sensor.qe}
+            for channel, curve in missing.items():
+                if (name, channel) not in changed:
+                    self.sources.unknown(("cfas", name), f"curve of channel {channel!r}", curve, self.sensor.qe)
+            for channel in stated:
                 if channel not in mosaic.channels:
-                    self.sources.unknown(("cfas", name, "curves", channel), "channel", channel, list(mosaic.channels))
+                    self.sources.unknown(("cfas", name, "curves", channel), "channel", channel, mosaic.channels)
             if not missing:
                 spaces.append(Space("reference", name, name))
         for name, design in section.designs.items():
@@ -86,7 +78,7 @@ class SpaceBuilder:
         return spaces
 
     def _fits(self) -> bool:
-        """Return whether the axes of all grids and boxes can be written out; else adds a fault."""
+        """Return whether the axes of all grids and boxes can be written out; else add a fault."""
         sweeps, boxes = self.section.sweeps.values(), self.section.boxes.values()
         stated = [*(sweep.grid or sweep.box or sweep.paired or {} for sweep in sweeps), *(box.box for box in boxes)]
         total = sum(axis.size for axes in stated for axis in axes.values())
@@ -96,17 +88,17 @@ class SpaceBuilder:
         return total <= _MOST_POINTS
 
     def _built_in(self, name: str, design: DesignSection) -> Mapping[str, float]:
-        """A design's parameters, looked up when it names a built-in filter."""
+        """Return a design's parameters, looked up when it names a built-in filter."""
         if not isinstance(design.at, str):
             return design.at
         known = surrogate_parameters().stopbands
         if design.at not in known:
-            self.sources.unknown(("designs", name, "at"), "built-in filter", design.at, list(known))
+            self.sources.unknown(("designs", name, "at"), "built-in filter", design.at, known)
             return {}
         return known[design.at].model_dump()
 
-    def _check_channels(self, path: tuple[Key, ...], entry: Modification, mosaic: Mosaic | None) -> None:
-        """The channels that a family replaces: of the CFA, as many as the family wants, each once."""
+    def _check_channels(self, path: KeyPath, entry: Modification, mosaic: Mosaic | None) -> None:
+        """Check that a family replaces channels of the CFA, as many as it wants, each once."""
         for key, value in (("channel", entry.channel), ("base", entry.base)):
             if not value:
                 self.sources.add((*path, key), "missing")
@@ -116,8 +108,8 @@ class SpaceBuilder:
             self.sources.add((*path, "technology"), problem, PIGMENT, "interference, or nothing stated")
         for channel in entry.channel:
             if mosaic is not None and channel not in mosaic.channels:
-                self.sources.unknown((*path, "channel"), f"channel of {entry.cfa}", channel, list(mosaic.channels))
-        own = self._is_own(entry)
+                self.sources.unknown((*path, "channel"), f"channel of {entry.cfa}", channel, mosaic.channels)
+        own = is_from_outside(entry.family, _FAMILIES, FAMILIES)
         if own and not allowed(self.sources, (*path, "family"), entry.family):
             return
         if own and self.section.production.tolerance:
@@ -129,43 +121,35 @@ class SpaceBuilder:
         elif len(set(entry.channel)) < len(entry.channel):
             self.sources.add((*path, "channel"), "a channel is named twice", entry.channel)
 
-    @staticmethod
-    def _is_own(entry: Modification) -> bool:
-        """Return whether a family is not the package's."""
-        return is_from_outside(entry.family, _FAMILIES, FAMILIES)
-
     def _filtered(
         self,
         kind: Kind,
         name: str,
         entry: Modification,
         axes: Mapping[str, tuple[float, ...]],
-        axes_path: tuple[Key, ...],
+        axes_path: KeyPath,
         rows: Ungridded | None = None,
     ) -> list[Space]:
         before = len(self.sources.faults)
         path = axes_path[:-1]
-        curves = list(self.sensor.qe)
         mosaic = self.mosaics.get(entry.cfa)
-        check_cfa(self.section, self.sources, path, entry)
-        if entry.base is not None and entry.base not in curves:
-            self.sources.unknown((*path, "base"), "curve", entry.base, curves)
-        if isinstance(entry.to, str) and entry.to not in curves:
-            self.sources.unknown((*path, "to"), "curve", entry.to, curves)
+        for key, curve in (("base", entry.base), ("to", entry.to)):
+            if isinstance(curve, str) and curve not in self.sensor.qe:
+                self.sources.unknown((*path, key), "curve", curve, self.sensor.qe)
         self._check_channels(path, entry, mosaic)
         if len(self.sources.faults) > before or mosaic is None:  # a CFA without a mosaic has a fault of its own
             return []
         assert entry.base is not None  # else there is a fault
         base = self.sensor.curve(entry.base)
-        target = (
-            self.sensor.curve(entry.to) if isinstance(entry.to, str) else None if entry.to is None else base * entry.to
-        )
+        target = self.sensor.curve(entry.to) if isinstance(entry.to, str) else None
+        if isinstance(entry.to, float | int):
+            target = base * entry.to
         try:
             family = self._family(entry, base, target)
         except SweepError as error:
-            self.sources.told((*path, "family"), error)
+            self.sources.add_error((*path, "family"), error)
             return []
-        ordered = self._axes(axes, axes_path, family.parameters, open_ended=axes_path[-1] == "box")
+        ordered = self._axes(axes, axes_path, family.parameters)
         if rows is not None and rows.size * len(ordered) > _MOST_DRAWN:
             allowed = f"at most {_MOST_DRAWN // len(ordered):,} designs of {len(ordered)} parameters"
             self.sources.add(path, "too many designs that are no grid", f"{rows.size:,}", allowed)
@@ -178,9 +162,9 @@ class SpaceBuilder:
         return [space]
 
     def _family(self, entry: Modification, base: FloatArray, target: FloatArray | None) -> Family:
-        """The family over its curves; raises SweepError."""
+        """Return the family over its curves; raises SweepError."""
         nodes_nm = self.section.wavelengths.nodes_nm
-        if not self._is_own(entry):
+        if not is_from_outside(entry.family, _FAMILIES, FAMILIES):
             return build_family(entry.family, nodes_nm, base, target, entry.options)
         own = PluginFamily(code_of(self.sources, entry.family, _FAMILIES), nodes_nm, base, target)
         bounds = f"0 and {entry.base or 1}" if own.below_base else "0 and 1"
@@ -194,14 +178,9 @@ class SpaceBuilder:
         return cast(Family, own)
 
     def _axes(
-        self,
-        axes: Mapping[str, tuple[float, ...]],
-        path: tuple[Key, ...],
-        parameters: Sequence[Parameter],
-        *,
-        open_ended: bool,
+        self, axes: Mapping[str, tuple[float, ...]], path: KeyPath, parameters: Sequence[Parameter]
     ) -> list[tuple[float, ...]]:
-        """The values of each parameter, in order; one not named has its default, or its range if `open_ended`."""
+        """Return the values of each parameter, in order; one not named has its default, or in a box its range."""
         known = [parameter.name for parameter in parameters]
         misspelled = [name for name in axes if name not in known]
         for name in misspelled:
@@ -210,7 +189,7 @@ class SpaceBuilder:
         ordered = []
         for parameter in parameters:
             usual: tuple[float, ...] = () if parameter.default is None else (parameter.default,)
-            if open_ended and not usual:
+            if path[-1] == "box" and not usual:
                 usual = (parameter.low, parameter.high)
             values = axes.get(parameter.name, usual)
             if not values and parameter.name not in meant:
@@ -225,7 +204,7 @@ class SpaceBuilder:
 
 
 def _sweep_axes(sweep: SweepSection, seed: int) -> tuple[str, dict[str, tuple[float, ...]], Ungridded | None]:
-    """Key that the parameters of a sweep stand under, their values, and its designs where they are no grid."""
+    """Return the key of a sweep's parameters, their values, and its designs where they are no grid."""
     if sweep.grid is not None:
         return "grid", {name: axis.points() for name, axis in sweep.grid.items()}, None
     if sweep.box is not None:

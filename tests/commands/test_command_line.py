@@ -13,7 +13,7 @@ from ruamel.yaml import YAML
 import sweep
 from sweep.run import run_study
 from sweep.study import load_study
-from sweep.study.reach import out_of_reach
+from sweep.study.goals import out_of_reach
 from sweep.study.shipped import shipped_folder
 
 from ..build import BASE, load, stopband_study

@@ -15,8 +15,8 @@ from scipy.io import savemat
 from sweep.base.errors import DataError, SweepError
 from sweep.commands.describe import described
 from sweep.curves.files import read_curves, scan_curves
-from sweep.curves.scan import MOST_CURVES, MOST_SAMPLES
 from sweep.curves.spectrum import LARGEST, LEAST_PEAK, check_samples
+from sweep.curves.text_tables import MOST_CURVES, MOST_SAMPLES
 
 from ..watchdog import within
 

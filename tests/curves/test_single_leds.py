@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from colour import MSDS_CMFS
 
-from sweep.curves.regulations import SIGNAL_REGIONS
+from sweep.curves.color import SIGNAL_REGIONS
 from sweep.curves.single_leds import Norm, RegionMap, SingleLeds, every_led
 from sweep.curves.spectrum import WavelengthGrid
 

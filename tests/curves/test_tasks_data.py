@@ -11,8 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from sweep.curves.builtin import spectra, stand_ins, task_sets
-from sweep.curves.color import chromaticity
-from sweep.curves.regulations import corners
+from sweep.curves.color import chromaticity, corners
 from sweep.curves.spectrum import WavelengthGrid
 from sweep.curves.tasks import SHIPPED
 

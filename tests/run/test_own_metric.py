@@ -20,7 +20,7 @@ from sweep.report import make_report, read_output
 from sweep.results.dictionary import KEYS
 from sweep.run import run_study
 from sweep.study import Study, load_study
-from sweep.study.own_models import RESERVED
+from sweep.study.user_code import RESERVED
 
 from ..build import one_line, ran
 from ..cases import thinned

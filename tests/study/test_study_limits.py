@@ -15,12 +15,11 @@ from ruamel.yaml.error import YAMLError
 
 from sweep.base.errors import MOST_FAULTS, Fault, StudyError, SweepError, nearest
 from sweep.commands.listing import list_lines, studies_of
-from sweep.curves.scan import MOST_BYTES, MOST_CURVES, MOST_SAMPLES, MOST_VALUES
+from sweep.curves.text_tables import MOST_BYTES, MOST_CURVES, MOST_SAMPLES, MOST_VALUES
 from sweep.results.tables import RESOLVED
 from sweep.study import load_study
-from sweep.study.document import Document
+from sweep.study.document import MOST_DEPTH, Document, Tree
 from sweep.study.editors import study_schema
-from sweep.study.yaml_tree import MOST_DEPTH, Tree
 
 from ..commanded import commanded
 from ..watchdog import within

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from ...base.errors import DataError
-from ...curves.light_unit import LightUnit
+from ...curves import LightUnit
 from ..options import OF_CURVES, AllowCode, DataFolder
 from ..output import Json, Quiet, say
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from ...base.errors import Fault, InterruptedRunError, StudyError, SweepError
-from ...curves.light_unit import LightUnit
+from ...curves import LightUnit
 from ..endings import say_faults
 from ..options import OF_STUDIES, AllowCode, Changes, DataFolder, Outputs, StudyPath, StudyPaths, changes_of
 from ..output import Json, Quiet, say
@@ -22,7 +22,7 @@ PANEL = OF_STUDIES
 def check(study: StudyPath, data: DataFolder = None, changes: Changes = None, allow_code: AllowCode = False) -> None:
     """Check a study file and count its designs, without running it."""
     from ...study import load_study
-    from ...study.reach import likely_percents, out_of_reach
+    from ...study.goals import likely_percents, out_of_reach
 
     loaded = load_study(study, data, changes=changes_of(changes), allow_code=allow_code)
     typer.echo(f"{study}: {loaded.n_designs:,} designs on {', '.join(loaded.mosaics)}; nothing wrong found.")

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.types import FloatArray
-from ..color import REGIONS, ColorRegion
-from ..regulations import LAMP_REGIONS, SHEETING_REGIONS
+from ..color import LAMP_REGIONS, REGIONS, SHEETING_REGIONS, ColorRegion
 from ..spectrum import WavelengthGrid
 from .led import led_photons
 from .spectra import Card, gridded, spectrum_of

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -22,12 +22,12 @@ _MOST = 20
 
 
 def illuminant(grid: WavelengthGrid, name: str) -> FloatArray:
-    """Relative photons of a light, ndarray[n_wavelengths]."""
+    """Return the relative photons of a light, ndarray[n_wavelengths]."""
     return spectra.gridded(grid, spectra.spectrum_of(*ILLUMINANTS[name]))
 
 
 def task_groups() -> dict[str, int]:
-    """Every group that a task may name as a class, and how many spectra it has."""
+    """Return every group that a task may name as a class, and how many spectra it has."""
     shipped = {name: len(members) for name, members in spectra.shipped_groups().items()}
     return shipped | {name: len(shapes) for name, shapes in stand_ins.STAND_INS.items()}
 
@@ -40,7 +40,7 @@ def is_surface(group: str) -> bool:
 
 
 def group(grid: WavelengthGrid, name: str, most: int | None = None) -> FloatArray:
-    """The spectra of a group, ndarray[n, n_wavelengths]; `most`: so many of them, evenly spaced in their order."""
+    """Return the spectra of a group, ndarray[n, n_wavelengths]; `most`: so many of them, evenly spaced."""
     if name in stand_ins.STAND_INS:
         return np.stack([shape.on(grid) for shape in stand_ins.STAND_INS[name]])
     members = spectra.shipped_groups()[name]
@@ -50,7 +50,7 @@ def group(grid: WavelengthGrid, name: str, most: int | None = None) -> FloatArra
 
 
 def chart(grid: WavelengthGrid, reflectances: FloatArray, lights: Sequence[str]) -> Chart:
-    """Patches of these reflectances, ndarray[n_patches, n_wavelengths], under lights of 1 lx."""
+    """Return patches of these reflectances, ndarray[n_patches, n_wavelengths], under lights of 1 lx."""
     matching = color_matching(grid)
     photons, gray, xyz, white = [], [], [], []
     for name in lights:
@@ -68,7 +68,7 @@ def chart(grid: WavelengthGrid, reflectances: FloatArray, lights: Sequence[str])
 def separation_task(
     grid: WavelengthGrid, name: str, classes: Mapping[str, FloatArray], lights: Sequence[str] = ()
 ) -> GriddedTask:
-    """A task of classes of spectra, ndarray[n, n_wavelengths] each: lamps, or reflectances under each of `lights`."""
+    """Return a task of classes of spectra, ndarray[n, n_wavelengths] each: lamps, or reflectances under `lights`."""
     stacked = np.concatenate(list(classes.values()))
     lit = [stacked * illuminant(grid, light) for light in lights] or [stacked]
     types = tuple(kind for kind, spectra_of_class in classes.items() for _ in spectra_of_class)
@@ -76,51 +76,39 @@ def separation_task(
     return GriddedTask(TaskName(name, "separation", tuple(lights) or ("",)), types, photons)
 
 
-def _color(grid: WavelengthGrid, name: str) -> GriddedTask:
-    lights = _STREET
-    index = chart(grid, group(grid, "iso_17321")[:18], ["d50"])
-    return GriddedTask(
-        TaskName(name, "color", lights), chart=chart(grid, group(grid, "colorchecker"), lights), index=index
-    )
+def shipped(grid: WavelengthGrid, name: str) -> GriddedTask:
+    """Return a task that the package ships, on the grid."""
 
+    def groups(*names: str) -> dict[str, FloatArray]:
+        return {name: group(grid, name, _MOST) for name in names}
 
-def _low_light(grid: WavelengthGrid, name: str) -> GriddedTask:
-    lights = ("a", "led", "hps")
-    return GriddedTask(TaskName(name, "low_light", lights), chart=chart(grid, group(grid, "colorchecker"), lights))
+    def white(*names: str) -> list[FloatArray]:
+        return [spectra.gridded(grid, spectra.spectrum_of("cie_illuminants", name)) for name in names]
 
-
-def _vehicle_lamps(grid: WavelengthGrid, name: str) -> GriddedTask:
-    white = np.stack([illuminant(grid, "a"), *_named(grid, _WHITE_LED)])
-    return separation_task(grid, name, {**_groups(grid, "brake red", "turn amber"), "reversing white": white})
-
-
-def _emergency(grid: WavelengthGrid, name: str) -> GriddedTask:
-    white = np.stack(_named(grid, [*_WHITE_LED, *_HID]))
-    return separation_task(grid, name, {**_groups(grid, "emergency blue"), "white": white})
-
-
-def _road_marking(grid: WavelengthGrid, name: str) -> GriddedTask:
-    return separation_task(grid, name, _groups(grid, "white marking", "yellow marking"), (*_STREET, "lps"))
-
-
-def _traffic_signs(grid: WavelengthGrid, name: str) -> GriddedTask:
-    return separation_task(
-        grid, name, _groups(grid, *(g for g in stand_ins.STAND_INS if stand_ins.is_sheeting(g))), _STREET
-    )
-
-
-def _vegetation(grid: WavelengthGrid, name: str) -> GriddedTask:
-    signals = lights(grid)
-    leaves = group(grid, "canopy", _MOST) * illuminant(grid, "d65")
-    return separation_task(grid, name, {"vegetation": leaves, "green": signals.photons[signals.members["green"]]})
-
-
-def _unseen_lamps(grid: WavelengthGrid, name: str) -> GriddedTask:
-    return separation_task(grid, name, _groups(grid, "unseen green", "unseen yellow", "unseen red"))
-
-
-def _groups(grid: WavelengthGrid, *names: str) -> dict[str, FloatArray]:
-    return {name: group(grid, name, _MOST) for name in names}
+    classes: dict[str, FloatArray] = {}
+    cases: tuple[str, ...] = ()
+    match name:
+        case "color" | "low_light":
+            cases = _STREET if name == "color" else ("a", "led", "hps")
+            index = chart(grid, group(grid, "iso_17321")[:18], ["d50"]) if name == "color" else None
+            patches = chart(grid, group(grid, "colorchecker"), cases)
+            return GriddedTask(TaskName(name, name, cases), chart=patches, index=index)
+        case "vehicle_lamps":
+            reversing = np.stack([illuminant(grid, "a"), *white(*_WHITE_LED)])
+            classes = {**groups("brake red", "turn amber"), "reversing white": reversing}
+        case "emergency":
+            classes = {**groups("emergency blue"), "white": np.stack(white(*_WHITE_LED, *_HID))}
+        case "road_marking":
+            classes, cases = groups("white marking", "yellow marking"), (*_STREET, "lps")
+        case "traffic_signs":
+            classes, cases = groups(*filter(stand_ins.is_sheeting, stand_ins.STAND_INS)), _STREET
+        case "vegetation":
+            signals = lights(grid)
+            leaves = group(grid, "canopy", _MOST) * illuminant(grid, "d65")
+            classes = {"vegetation": leaves, "green": signals.photons[signals.members["green"]]}
+        case "unseen_lamps":
+            classes = groups("unseen green", "unseen yellow", "unseen red")
+    return separation_task(grid, name, classes, cases)
 
 
 NIGHT_LX = 50.0
@@ -146,7 +134,7 @@ _NIGHT_LAMPS = {
 
 
 def night_scene(grid: WavelengthGrid) -> dict[str, FloatArray]:
-    """Area of a street at night -> its photon radiance, photons/s/sr/m^2/nm, ndarray[n_wavelengths].
+    """Return area of a street at night -> its photon radiance, photons/s/sr/m^2/nm, ndarray[n_wavelengths].
 
     Surfaces under white LEDs, and lamps that have as much of X, Y or Z as white paper there, so that none is
     overexposed.
@@ -160,24 +148,3 @@ def night_scene(grid: WavelengthGrid) -> dict[str, FloatArray]:
         lamp = group(grid, name)[0]
         radiance[area] = lamp / (energy_from_photons(grid.nodes_nm, lamp) @ color_matching(grid).T / of_white).max()
     return radiance
-
-
-def _named(grid: WavelengthGrid, names: Sequence[str]) -> list[FloatArray]:
-    return [spectra.gridded(grid, spectra.spectrum_of("cie_illuminants", name)) for name in names]
-
-
-_MADE: dict[str, Callable[[WavelengthGrid, str], GriddedTask]] = {
-    "color": _color,
-    "low_light": _low_light,
-    "vehicle_lamps": _vehicle_lamps,
-    "emergency": _emergency,
-    "road_marking": _road_marking,
-    "traffic_signs": _traffic_signs,
-    "vegetation": _vegetation,
-    "unseen_lamps": _unseen_lamps,
-}
-
-
-def shipped(grid: WavelengthGrid, name: str) -> GriddedTask:
-    """A task that the package ships, on the grid."""
-    return _MADE[name](grid, name)

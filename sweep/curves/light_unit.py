@@ -1,5 +1,0 @@
-"""Quantities of a light's spectrum."""
-
-from typing import Literal
-
-LightUnit = Literal["energy", "photons"]

@@ -1,0 +1,209 @@
+"""Checks of a study across its sections: vision, recognition, LEDs of a norm, published figures, memory."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+from ..camera import psf
+from ..camera.memory import MOST_BYTES, too_large
+from ..camera.mosaic import Mosaic
+from ..camera.scene import OBJECT_RESOLUTION, FixedExposure, Scene
+from ..curves.color import luminance_per_photon_radiance
+from ..curves.lights import Lights
+from ..metrics.quantity import Asked, Quantity
+from ..metrics.registry import listed, quantities_of
+from ..vision.section import FEWEST_LAMPS, MOST_BITS, MOST_READ_NOISE_DN, MOST_WELL_E, Vision
+from .model import Study
+from .schema import StudySection
+from .sources import Sources
+
+_HELD_TIMES = 3
+"""Times that a network's training images are held in double precision: as they are, and while they are scaled."""
+_LEAST_LUMINANCE = 1e-20
+"""cd/m^2 for each photon/s/sr/m^2 of a lamp that the eye sees; at 555 nm it is 2.4e-16."""
+_MOST_DESIGNS = 10**9
+
+
+def check_scenes(section: StudySection, sources: Sources) -> None:
+    """Check that LEDs of a norm fit the study, and that every target makes an image that can be computed."""
+    _check_regions(section, sources)
+    for name, scene in section.scenarios.items():
+        if (refused := psf.too_much(scene, section.pixel)) is not None:
+            key, problem, value, allowed = refused
+            sources.add(("scenarios", name, *key), problem, value, allowed)
+
+
+def check_lights(
+    section: StudySection, lights: Lights, mosaics: Mapping[str, Mosaic], asked: Asked, sources: Sources
+) -> None:
+    """Check all that names signal types or columns, or needs lamps. `asked`: quantities that the study has."""
+    _check_columns(asked, sources)
+    _check_recognition(section, lights, sources)
+    _check_vision(section, lights, mosaics, sources)
+    _check_published(section, lights, mosaics, sources)
+
+
+def _check_columns(asked: Asked, sources: Sources) -> None:
+    """Check that every pair of signal types has columns of its own."""
+    seen: dict[str, Quantity] = {}
+    for quantity in listed(replace(asked, edge_shift=False)):
+        other = seen.setdefault(quantity.name, quantity)
+        if other.pair != quantity.pair and other.pair is not None and quantity.pair is not None:
+            pairs = f"{'/'.join(other.pair)} and {'/'.join(quantity.pair)}"
+            problem = f"the pairs {pairs} share the column {quantity.name}"
+            sources.add(("lights",), problem, None, "other names of signal types")
+
+
+def _check_recognition(section: StudySection, lights: Lights, sources: Sources) -> None:
+    """Check that its states are signal types, each once, and that every scene has noise."""
+    recognition = section.recognition
+    if recognition is None:
+        return
+    states = recognition.states or []
+    for name in states:
+        if name not in lights.classes:
+            sources.unknown(("recognition", "states"), "signal type", name, lights.classes)
+    if len(set(states)) < len(states):
+        sources.add(("recognition", "states"), "a signal type is named twice", states)
+    if len(lights.classes) < 2:
+        sources.add(("recognition",), "there is one signal type only", lights.classes[0], "two or more")
+    for name, scene in section.scenarios.items():
+        if scene.noise is None:
+            problem = "`recognition` needs noise in every scenario"
+            sources.add(("scenarios", name, "noise"), problem, None, "noise: true")
+
+
+def _check_published(section: StudySection, lights: Lights, mosaics: Mapping[str, Mosaic], sources: Sources) -> None:
+    """Check the names of published figures."""
+    nominal = quantities_of(Asked(lights.classes)).values()
+    columns = [q.name for q in nominal if q.ends and q.needs != "family"]
+    known = dict.fromkeys([*mosaics, *section.designs, *section.geometry])
+    for table, rows in section.published.items():
+        for row, values in rows.items():
+            path = ("published", table, row)
+            if row not in known:
+                sources.unknown(path, "CFA, design or geometry", row, known)
+                continue
+            names = [OBJECT_RESOLUTION] if row in section.geometry else columns
+            for quantity in values:
+                if quantity not in names:
+                    sources.unknown((*path, quantity), "quantity", quantity, names)
+
+
+def _check_regions(section: StudySection, sources: Sources) -> None:
+    """Check that LEDs lie on the study's wavelengths and at a named phase, and that each norm allows some."""
+    regions = section.regions
+    if regions is None:
+        return
+    grid, (low, high) = section.wavelengths, regions.peak_nm
+    if not grid.start_nm <= low <= high <= grid.stop_nm:
+        allowed = f"{grid.start_nm:g} to {grid.stop_nm:g} nm"
+        sources.add(("regions", "peak_nm"), "peaks outside the study's wavelengths", [low, high], allowed)
+    if grid.step_nm > regions.fwhm_nm[0]:
+        problem = "an LED is narrower than a step of the study's wavelengths"
+        sources.add(("regions", "fwhm_nm"), problem, list(regions.fwhm_nm), f"{grid.step_nm:g} nm or more")
+    for name, scene in section.scenarios.items():
+        if scene.target is not None and scene.target.phase_px == "any":
+            problem = "`regions` needs a light at a named place of the mosaic"
+            sources.add(("scenarios", name, "target", "phase_px"), problem, "any", "[column, row]")
+    if sources.faults:
+        return
+    from ..curves.single_leds import every_led  # noqa: PLC0415  (few studies ask for it)
+
+    leds = every_led(regions)
+    for norm in regions.norms:
+        for kind in ("yellow", "red"):
+            if not leds.allowed(norm, kind).peak_nm.size:
+                problem = f"none of the {leds.peak_nm.size:,} LEDs is {kind} as {norm} allows it"
+                sources.add(("regions",), problem, None, "other ends or smaller steps of `peak_nm` and `fwhm_nm`")
+
+
+def check_size(study: Study, sources: Sources) -> None:
+    """Check that the kernels of every scene and CFA fit into memory. Raises StudyError."""
+    for name in study.scenarios:
+        for space in study.spaces:
+            if (refused := too_large(study.setup(space, name))) is not None:
+                problem, value, allowed = refused
+                sources.add(("scenarios", name, "target"), f"{problem} (CFA {space.cfa})", value, allowed)
+                raise sources.error
+
+
+def check_count(study: Study, sources: Sources) -> None:
+    """Check that there are designs, and not too many. Raises StudyError."""
+    if not study.n_designs and study.search is None:
+        sources.add(("cfas",), "no designs", None, "a CFA with a curve for each channel, a design, a sweep or a search")
+    if study.n_designs > _MOST_DESIGNS:
+        sources.add(("sweeps",), "too many designs", f"{study.n_designs:,}", f"at most {_MOST_DESIGNS:,}")
+    if sources.faults:
+        raise sources.error
+
+
+def _check_vision(section: StudySection, lights: Lights, mosaics: Mapping[str, Mosaic], sources: Sources) -> None:
+    """Check that lenses are signal types with lamps enough, tiles divide the images, and tables and images fit."""
+    vision = section.vision
+    if vision is None:
+        return
+    for lens in vision.lenses:
+        if lens not in lights.classes:
+            sources.unknown(("vision", "lenses"), "signal type", lens, lights.classes)
+            continue
+        different = len({lights.photons[i].tobytes() for i in lights.members[lens]})
+        if different < FEWEST_LAMPS:
+            allowed = f"at least {FEWEST_LAMPS} different lamps: one to train, one to check, one to test"
+            sources.add(("vision", "lenses"), f"too few lamps of type {lens}", different, allowed)
+        seen = luminance_per_photon_radiance(section.wavelengths, lights.photons[lights.members[lens]])
+        if not seen.min() > _LEAST_LUMINANCE:
+            problem = f"a lamp of type {lens} is not visible, and has no luminous intensity"
+            sources.add(("vision", "lenses"), problem, lens, "lamps that the eye sees")
+    for name, mosaic in mosaics.items():
+        if any(vision.crop_px % size for size in mosaic.indices.shape):
+            rows, columns = mosaic.indices.shape
+            problem = f"the tile of {name} ({rows} x {columns}) does not divide the images"
+            sources.add(("vision", "crop_px"), problem, vision.crop_px, "a multiple of every tile")
+    for distance_m in vision.distances_m:
+        scene = Scene(target=vision.target(distance_m), optics=vision.optics, exposure=FixedExposure(exposure_s=1.0))
+        if (refused := psf.too_much(scene, section.pixel)) is not None:
+            _, problem, value, allowed = refused
+            sources.add(("vision", "distances_m"), f"{problem} at {distance_m:g} m", value, allowed)
+    _check_pixel(section, sources)
+    _check_memory(vision, lights, mosaics, sources)
+
+
+def _check_pixel(section: StudySection, sources: Sources) -> None:
+    """Check that the table of a pixel's digital numbers can be held, and that there is one pixel."""
+    pixel = section.pixel
+    read_dn = pixel.read_noise_e * pixel.dn_per_e
+    for key, value, most in (("bits", pixel.bits, MOST_BITS), ("well_e", pixel.well_e, MOST_WELL_E)):
+        if value > most:
+            sources.add(("pixel", key), "too large for `vision`", value, f"at most {most:g}")
+    if read_dn > MOST_READ_NOISE_DN:
+        problem = f"too large for `vision`: {read_dn:.4g} DN"
+        sources.add(("pixel", "read_noise_e"), problem, pixel.read_noise_e, f"at most {MOST_READ_NOISE_DN:g} DN")
+    for name, scene in section.scenarios.items():
+        if scene.noise is not None and scene.noise.of(pixel) != pixel:
+            allowed = "noise: true, and the figures in `pixel`"
+            sources.add(("scenarios", name, "noise"), "`vision` has one pixel for all scenarios", None, allowed)
+
+
+def _check_memory(vision: Vision, lights: Lights, mosaics: Mapping[str, Mosaic], sources: Sources) -> None:
+    """Check that lamps at all phases, the observer's cases at one distance and level, and training images fit."""
+    pixels = vision.crop_px**2
+    n_lenses = len(vision.lenses)
+    test_lamps = sum(max(1, len(lights.members.get(lens, ())) // 4) for lens in vision.lenses)
+    for name, mosaic in mosaics.items():
+        places = mosaic.indices.size * vision.places_per_pixel**2
+        lamps = 8 * places * n_lenses * len(lights.names) * pixels * len(vision.distances_m)
+        cases = 8 * places * 2 * math.factorial(n_lenses) * (1 + test_lamps * len(vision.intensities_cd)) * pixels
+        if (every := max(lamps, cases)) > MOST_BYTES:
+            problem = f"{places} places of the head take too much memory (CFA {name})"
+            allowed = f"at most {MOST_BYTES / 2**30:g} GiB: smaller images, fewer places, lamps or distances"
+            sources.add(("vision",), problem, f"{every / 2**30:.1f} GiB", allowed)
+            return
+        planes = len(mosaic.channels) if vision.input == "demosaicked" else 1
+        trained = 8 * _HELD_TIMES * planes * pixels * max(vision.train_images, vision.check_images, vision.test_images)
+        if vision.network and trained > MOST_BYTES:
+            allowed = f"at most {MOST_BYTES / 2**30:g} GiB: smaller images, or fewer of them"
+            sources.add(("vision",), f"images take too much memory (CFA {name})", f"{trained / 2**30:.1f} GiB", allowed)
+            return

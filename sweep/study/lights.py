@@ -1,0 +1,191 @@
+"""The lights of a study: from files or built in, with their population; and checks of what scenes ask of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ..base.errors import DataError
+from ..base.types import FloatArray
+from ..camera.pixel import unquantized
+from ..curves.builtin.registry import BUILT_IN_LIGHTS
+from ..curves.color import VISIBLE_NM
+from ..curves.files import is_curve_file
+from ..curves.light_files import lights_file
+from ..curves.lights import Lights, make_lights
+from ..curves.population import DRIFT_NM_PER_K
+from .document import KeyPath
+from .model import Study
+from .schema import MOST_TYPES, StudySection
+from .schema_curves import LightsSection
+from .sources import Sources
+from .user_code import offered_curves
+
+_MOST_SPECTRA = 20_000
+_LEAST_VISIBLE = 1e-6
+"""Share of a light's photons that the eye must see where its luminous intensity is given."""
+
+
+def with_light_files(section: StudySection, sources: Sources) -> StudySection:
+    """Return the study with what is in files in the place of their names: the colors of columns tell their types.
+
+    Raises StudyError for files that do not do.
+    """
+
+    def read(lights: LightsSection, path: KeyPath) -> LightsSection:
+        name = lights.builtin
+        if name is None or name in BUILT_IN_LIGHTS or not is_curve_file(name):
+            return lights
+        place = sources.file(path, name)
+        if place is None:
+            return lights
+        try:
+            taken = lights_file(place, "energy", section.wavelengths.start_nm, section.wavelengths.stop_nm)
+        except DataError as error:
+            sources.faults.extend(error.faults)
+            return lights
+        kinds = [f"{kind}: {', '.join(columns)}" for kind, columns in taken.types.items()]
+        left_out = [f"{column} is left out ({reason})" for column, reason in taken.left_out.items()]
+        sources.warnings.append(f"{name}: read as energy; {'; '.join([*kinds, *left_out])}")
+        stated = lights.model_dump(exclude_unset=True, exclude={"builtin", "files"})
+        return LightsSection.model_validate(taken.keys(name) | stated)
+
+    before = len(sources.faults)
+    changed: dict[str, object] = {"lights": read(section.lights, ("lights",))}
+    validation = section.validation
+    if validation is not None and validation.lights is not None:
+        lights = read(validation.lights, ("validate", "lights"))
+        changed["validation"] = validation.model_copy(update={"lights": lights})
+    if len(sources.faults) > before:
+        raise sources.error
+    return section.model_copy(update=changed)
+
+
+def lights_of(section: LightsSection, sources: Sources, at: KeyPath = ("lights",)) -> Lights | None:
+    """Return the lights of the section at a place of the study, or None after adding faults. Raises StudyError."""
+    section = offered_curves(sources, at, section, "sweep.lights", BUILT_IN_LIGHTS)
+    if section.builtin is not None:
+        own = sorted(section.model_fields_set - {"builtin", "files"})
+        for key in own:
+            value = getattr(section, key)
+            sources.add((*at, key), "a built-in data set has its own", value, "this key beside `files`")
+        return None if own else sources.built_in(at, section.builtin, BUILT_IN_LIGHTS)
+    before = len(sources.faults)
+    files = (*at, "files")
+    count = sum(len(columns) for entry in section.files for columns in entry.signals.values())
+    if not sources.fits(files, "lights", count):
+        return None
+    by_type: dict[str, list[tuple[str, str, FloatArray]]] = {}
+    for index, entry in enumerate(section.files):
+        curves = sources.curves((*files, index), entry)
+        for signal_type, columns in entry.signals.items():
+            for position, column in enumerate(columns):
+                place = (*files, index, "signals", signal_type, position)
+                label = f"{Path(entry.file).stem}:{column}"
+                if sources.kept is not None:
+                    photons = sources.kept_curve(place, sources.kept.lights, (signal_type, label))
+                else:
+                    photons = sources.photons(place, curves, column, entry)
+                if photons is not None:
+                    by_type.setdefault(signal_type, []).append((label, signal_type, photons))
+    if len(sources.faults) > before:
+        return None
+    if len(by_type) < 2:
+        sources.add(files, "only one signal type", list(by_type), "two or more, to tell them apart")
+        return None
+    if len(by_type) > MOST_TYPES:
+        sources.add(files, "too many signal types", len(by_type), f"at most {MOST_TYPES}")
+        return None
+    signals = [signal for group in by_type.values() for signal in group]
+    source = ", ".join(entry.file for entry in section.files)
+    return make_lights(sources.grid, section.name or "lights", signals, source, photon_ratio=section.photon_ratio)
+
+
+def held_out_lights(section: StudySection, lights: Lights | None, sources: Sources) -> Lights | None:
+    """Return lights to validate on, as bright as the study's own, or None; those of a finished run are not kept."""
+    validation, path = section.validation, ("validate", "lights")
+    if validation is not None and validation.leave_one_out and section.search is None:
+        sources.add(("validate", "leave_one_out"), "nothing is searched", None, "a study with `search`")
+    if validation is None or validation.lights is None or lights is None or sources.kept is not None:
+        return None
+    held_out = lights_of(validation.lights, sources, path)
+    if held_out is None:
+        return None
+    for name in held_out.classes:
+        if name not in lights.classes:
+            sources.unknown(path, "signal type", name, lights.classes)
+    return replace(held_out, photon_ratio=lights.photon_ratio)
+
+
+def with_population(lights: Lights, section: StudySection, sources: Sources) -> Lights:
+    """Return the lights with the population that the study asks for; what does not fit adds a fault."""
+    population, at = section.population, ("population",)
+    if population is None:
+        return lights
+    from ..curves.members import spans_nm  # noqa: PLC0415  (only where lights have a population)
+
+    known = [*lights.classes, *lights.names]
+    for key, names in population.names.items():
+        for name in sorted(names - set(known)):
+            sources.unknown((*at, key, name), "signal type or signal", name, known)
+    for kind, name in zip(lights.types, lights.names, strict=True):
+        if population.drift(kind, name) is None:
+            allowed = f"nm/K of {kind}; known are {', '.join(DRIFT_NM_PER_K)}"
+            sources.add((*at, "drift_nm_per_k"), f"no drift is known for signals of type {kind}", None, allowed)
+            return lights
+    for name, scene in section.scenarios.items():
+        if scene.intensity_cd is not None:
+            problem = "lights of a population have their photons, not their luminous intensity, in common"
+            sources.add(("scenarios", name, "intensity_cd"), problem, scene.intensity_cd, "photon_radiance")
+        if scene.target is not None and scene.target.phase_px == "any":
+            problem = "worst cases over a population need a light at a named place of the mosaic"
+            sources.add(("scenarios", name, "target", "phase_px"), problem, "any", "[column, row]")
+        if scene.field is not None and scene.field.everywhere:
+            problem = "worst cases over a population need places of the sensor that are counted"
+            sources.add(("scenarios", name, "field", "places"), problem, "any", "a number, 2 to 100")
+    ends = [end for span in spans_nm(lights, population) for end in span]
+    steps = (max(ends) - min(ends)) / section.wavelengths.step_nm
+    spectra = len(lights.names) * len(population.width) * (steps + 2)
+    if spectra > _MOST_SPECTRA:
+        value = f"{spectra:,.0f} spectra, {len(lights.names)} signals at every step of the grid"
+        sources.add(at, "the population has too many members", value, f"at most {_MOST_SPECTRA:,}")
+    return replace(lights, population=population)
+
+
+def check_range(study: Study, sources: Sources) -> None:
+    """Check that no member of the population is cut off when it is read out. Raises StudyError.
+
+    Worst cases over the population are those of a response that is not cut off.
+    """
+    if study.lights.population is None:
+        return
+    from ..curves.members import Members  # noqa: PLC0415  (only where lights have a population)
+
+    lights = Members(study.lights, study.grid).lights
+    for name in study.scenarios:
+        for space in study.spaces:
+            box = study.box(space, name)
+            brightest_dn = replace(box, setup=replace(box.setup, lights=lights)).brightest_pixel_dn
+            top_dn = float(unquantized(np.array(box.setup.camera.pixel.saturation_e), box.setup.camera.pixel))
+            if brightest_dn > top_dn:
+                problem = f"lights of the population exceed the full well or the range of the ADC (CFA {space.cfa})"
+                sources.add(("scenarios", name), problem, f"{brightest_dn:,.0f} DN", f"up to {top_dn:,.0f} DN")
+                raise sources.error
+
+
+def check_luminances(section: StudySection, lights: Lights, sources: Sources) -> None:
+    """Check that candelas are given of lights, and of a background, that the eye sees."""
+    nodes = section.wavelengths.nodes_nm
+    visible = (nodes >= VISIBLE_NM[0]) & (nodes <= VISIBLE_NM[1])
+    share = section.wavelengths.integrate(lights.photons * visible)
+    dark = [name for name, part in zip(lights.names, share, strict=True) if not part >= _LEAST_VISIBLE]
+    allowed = f"photons between {VISIBLE_NM[0]:g} and {VISIBLE_NM[1]:g} nm"
+    for name, scene in section.scenarios.items():
+        if scene.intensity_cd is not None and dark:
+            problem = f"a light that the eye does not see has no luminous intensity: {dark[0]}"
+            sources.add(("scenarios", name, "intensity_cd"), problem, scene.intensity_cd, allowed)
+        if scene.background_cd_m2 and not visible.any():
+            problem = "a background on wavelengths that the eye does not see has no luminance"
+            sources.add(("scenarios", name, "background_cd_m2"), problem, scene.background_cd_m2, allowed)

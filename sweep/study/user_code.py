@@ -1,0 +1,215 @@
+"""Code of a user's own that a study names: allowed or refused, read, digested, and tried before any work."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+from pydantic import ValidationError
+
+from ..base.disk import is_file
+from ..base.errors import Fault, SweepError
+from ..base.own_code import CODE_OF, Installed, Offered, OwnCode, file_of, installed, is_in_file, offers, read_code
+from ..camera.irradiance import scene_irradiance
+from ..camera.own_effects import OwnEffect
+from ..camera.scene import Scene
+from ..camera.setup import Setup
+from ..designs.space import Space
+from ..metrics.own import OwnMetric, Readings
+from ..metrics.quantity import WORST, Asked
+from ..metrics.registry import quantities_of
+from ..metrics.smooth import smooth_response
+from .document import KeyPath
+from .model import Study
+from .schema import StudySection
+from .schema_curves import LightsSection, SensorSection
+from .sources import Sources
+
+_Curves = TypeVar("_Curves", SensorSection, LightsSection)
+_Made = TypeVar("_Made")
+RESERVED = (
+    *("design_id", "filter_id", "kind", "name", "space", "cfa", "family", "scenario", "objective"),
+    *("limit", "gap", "feasible", "violation", "pareto", "plan", "promised_dn", "status"),
+)
+"""Columns that are no quantities."""
+_SAME = 1e-9
+
+
+def is_from_outside(name: str, group: Offered, known: Iterable[str]) -> bool:
+    """Return whether a name is that of code that is not the package's, whose own names come first."""
+    return is_in_file(name) or (name not in known and name in offers(group))
+
+
+def allowed(sources: Sources, path: KeyPath, name: str) -> bool:
+    """Return whether code may run; else add a fault."""
+    if not sources.allow_code:
+        whose = "a Python file" if is_in_file(name) else "what an installed package offers"
+        problem = f"the study names {whose}, whose code would run"
+        sources.add(path, problem, name, "--allow-code, if you trust it")
+    return bool(sources.allow_code)
+
+
+def code_of(sources: Sources, name: str, group: Offered) -> OwnCode:
+    """Return code that is allowed, and keep its digest. Raises SweepError where there is none."""
+    if not is_in_file(name):
+        offer = installed(group, name)
+        if offer is None:
+            raise SweepError(Fault("no installed package offers it", value=name))
+        _digested(sources, f"{CODE_OF}{offer.told} ({group}: {name})", offer.digest)
+        return OwnCode(name, None, group, offer.digest)
+    file = file_of(name)
+    place = next((folder / file for folder in sources.folders if is_file(folder / file)), None)
+    if place is None:
+        raise SweepError(Fault("no such file", value=file, allowed=f"a path relative to {sources.searched}"))
+    source, digest = read_code(place)
+    _digested(sources, file, digest)
+    return OwnCode(name, source)
+
+
+def _digested(sources: Sources, name: str, digest: str) -> None:
+    """Note the digest; raises SweepError where only other code may run."""
+    if not isinstance(sources.allow_code, bool) and sources.allow_code.get(name) != digest:
+        raise SweepError(Fault("not the code that the run had", value=name))
+    sources.digests[name] = digest
+
+
+def offered_curves(sources: Sources, at: KeyPath, section: _Curves, group: Offered, known: Iterable[str]) -> _Curves:
+    """Return the section as a package states it, with what the study adds; itself where it names none of a package.
+
+    A package offers what a study would say: a mapping with `files`, which lie in the package, or a function that
+    returns one. Raises StudyError where that cannot be had.
+    """
+    name = section.builtin
+    if name is None or not is_from_outside(name, group, known):
+        return section
+    if not allowed(sources, at, name):
+        raise sources.error
+    try:
+        code = code_of(sources, name, group)
+        stated = code.called(code.loaded) if callable(code.loaded) else code.loaded
+        if not isinstance(stated, Mapping) or stated.get("builtin") == name:
+            raise SweepError(Fault(f"{name} says nothing of curves", value=stated, allowed="a mapping with `files`"))
+        made: _Curves = type(section).model_validate(dict(stated))
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        sources.add(at, f"what a package offers is no such section: {where}: {first['msg']}", name)
+        raise sources.error from None
+    except SweepError as error:
+        sources.add_error(at, error)
+        raise sources.error from None
+    package: Installed | None = installed(group, name)
+    sources.folders = [*([] if package is None else package.folders), *sources.folders]
+    own = {key: getattr(section, key) for key in section.model_fields_set - {"builtin", "files"}}
+    return made.model_copy(update={"name": made.name or name, "files": [*made.files, *section.files], **own})
+
+
+def own_metrics(section: StudySection, sources: Sources) -> tuple[OwnMetric, ...]:
+    """Return the study's own metrics. Raises StudyError where one cannot be had."""
+
+    def make(code: OwnCode) -> OwnMetric:
+        metric = OwnMetric(code)
+        for stated in ("name", "unit", "label", "wanted", "digits"):
+            getattr(metric, stated)
+        return metric
+
+    metrics = _read_own("metrics", section.metrics, "sweep.metrics", make, sources)
+    for name in section.metrics:
+        whose = "that file" if is_in_file(name) else "an installed package"
+        sources.warnings.append(
+            f"{name} runs code of {whose}: the tolerance of {section.tolerance_dn:g} DN is of CSDs, and nothing is "
+            "promised or proven of this metric; a search takes its gradient by differences"
+        )
+    return metrics
+
+
+def own_effects(section: StudySection, sources: Sources) -> tuple[OwnEffect, ...]:
+    """Return the study's own effects. Raises StudyError where one cannot be had."""
+    return _read_own("effects", section.effects, "sweep.effects", OwnEffect, sources)
+
+
+def _read_own(
+    key: str, names: Sequence[str], group: Offered, make: Callable[[OwnCode], _Made], sources: Sources
+) -> tuple[_Made, ...]:
+    is_list = isinstance(sources.document.data.get(key), list)
+    made, failed = [], set[str]()
+    for index, name in enumerate(names):
+        path: KeyPath = (key, index) if is_list else (key,)
+        if not is_from_outside(name, group, ()):
+            sources.unknown(path, key.removesuffix("s"), name, offers(group) or ["FILE.py:NAME"])
+        elif allowed(sources, path, name):
+            try:
+                made.append(make(code_of(sources, name, group)))
+            except SweepError as error:
+                if str(error) not in failed:  # several names may be of one file
+                    sources.add_error(path, error)
+                failed.add(str(error))
+    if len(made) < len(names):
+        raise sources.error
+    return tuple(made)
+
+
+def try_effects(study: Study, sources: Sources) -> None:
+    """Apply the study's own effects in each scenario. Raises StudyError where one fails."""
+    for name in study.scenarios if study.own_effects else ():
+        try:
+            scene_irradiance(study.setup(study.spaces[0], name))
+        except SweepError as error:
+            sources.add_error(("effects",), error)
+            raise sources.error from None
+
+
+def check_names(own: Sequence[OwnMetric], asked: Asked, spaces: Sequence[Space], sources: Sources) -> bool:
+    """Return whether each column has one meaning; else add a fault. `asked`: what the study asks for."""
+    if not own:
+        return True
+    every = replace(asked, own=(), states=asked.classes, any_place=True, edge_shift=True, population=True)
+    taken = {*quantities_of(replace(every, probabilities=True, vision=True)), *RESERVED}
+    taken |= {name for space in spaces for name in space.parameters}
+    for metric in own:
+        if metric.name in taken:
+            problem = "another column has this name; the metric can say `name`"
+            sources.add(("metrics",), problem, metric.name, "another name")
+            return False
+        taken.add(metric.name)
+    return True
+
+
+def try_metrics(study: Study, sources: Sources) -> None:
+    """Compute own metrics of every CFA, of a light that fills the field. Raises StudyError where one fails."""
+    setups = {space.cfa: study.setup(space, next(iter(study.scenarios))) for space in study.spaces} if study.own else {}
+    searched = None if study.search is None else study.search.space.cfa
+    wanted = {*study.objective.weights, *study.constraints}
+    lacking: dict[str, list[str]] = {metric.name: [] for metric in study.own}
+    for metric in study.own:
+        for cfa, setup in setups.items():
+            try:
+                lacking[metric.name] += [] if _tried(metric, setup) else [cfa]
+            except SweepError as error:
+                sources.add_error(("metrics",), error)
+                break  # it fails on the others, too
+        if searched in lacking[metric.name] and {metric.name, WORST + metric.name} & wanted:
+            sources.add(("metrics",), f"{metric.code.name} gives None for {searched}, which is searched", metric.name)
+    if sources.faults:
+        raise sources.error
+
+
+def _tried(metric: OwnMetric, setup: Setup) -> bool:
+    """Return whether a CFA has it; it gives the same alone and beside others. Raises SweepError where it does not.
+
+    Its filters are the curves that they replace, and darker ones.
+    """
+    plain = replace(setup, scene=Scene(), left_out=frozenset()).with_camera(technologies=())
+    base = plain.camera.base_qe[None]
+    response = smooth_response(plain, np.concatenate([base, 0.9 * base, 0.8 * base]))[:, 0]
+    every = metric.parts(Readings.of_setup(setup, response))
+    alone = [metric.parts(Readings.of_setup(setup, response[[at]])) for at in range(len(response))]
+    some = [values for values in alone if values is not None]
+    if every is None:
+        return False
+    joined = np.concatenate(some) if len(some) == len(every) else np.empty(0)
+    if joined.shape != every.shape or not np.allclose(joined, every, rtol=_SAME, atol=_SAME * np.abs(every).max()):
+        raise SweepError(Fault(f"{metric.code.name}: a design's number depends on the designs beside it"))
+    return True
