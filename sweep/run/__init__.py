@@ -1,6 +1,6 @@
-"""Run a study over the cores or a cluster and keep what it found.
+"""Run a study on the cores or a cluster.
 
-Names are loaded when they are first used: a worker process begins here, and needs few of them.
+Names are loaded at their first use: a worker process begins here, and needs few of them.
 """
 
 from typing import TYPE_CHECKING

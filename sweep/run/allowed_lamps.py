@@ -1,4 +1,4 @@
-"""Separations of each design over the yellow and red LEDs that a norm allows."""
+"""Separations of designs over the yellow and red LEDs that a norm allows."""
 
 from __future__ import annotations
 
@@ -36,10 +36,26 @@ _SCHEMA = pa.schema(
 
 
 def regions_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: Progress) -> pa.Table:
-    """Return a row per plain CFA, named design or answer, norm, peak of the yellow and peak of the red LED.
+    """Compute the separations of modeled LEDs with all effects.
 
-    `pairs`: allowed pairs of widths, `separated`: those of them with at least the wanted CSD, as read out with all
-    effects; `least_dn`: the smallest CSD, DN, and the widths of these two LEDs.
+    One row per design, norm, peak of the yellow and peak of the red LED. `pairs` counts allowed pairs of widths,
+    `separated` those with at least the wanted CSD; `least_dn` is the smallest CSD, with the widths of both LEDs.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    rows : pandas.DataFrame
+        Rows of plain CFAs, named designs and the answer.
+    parallel : callable
+        Runs calls on the cores.
+    progress : callable
+        Called with a phase, work done and work in total.
+
+    Returns
+    -------
+    pyarrow.Table
+        Table.
     """
     regions = study.section.regions
     assert regions is not None
@@ -58,7 +74,7 @@ def regions_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
 def _cells(
     setup: Setup, curves: FloatArray, allowed: Mapping[Norm, tuple[SingleLeds, SingleLeds]], wanted_dn: float
 ) -> list[dict[str, Any]]:
-    """Rows of a design; `allowed`: the yellow and the red LEDs of each norm."""
+    """Return the rows of one design."""
     cells = []
     for norm, (yellow, red) in allowed.items():
         yellow_dn, red_dn = (_read(setup, curves, leds) for leds in (yellow, red))
@@ -82,7 +98,7 @@ def _cells(
 
 
 def _read(setup: Setup, curves: FloatArray, leds: SingleLeds) -> FloatArray:
-    """DN of LEDs with the photons of the study's lights, ndarray[n_phases, n_leds, n_channels]."""
+    """Return DN of LEDs with the photons of the study's lights, ndarray of shape (n_phases, n_leds, n_channels)."""
     photons, parts = leds.photons(setup.camera.grid), []
     for start in range(0, len(photons), _TOGETHER):
         part = photons[start : start + _TOGETHER]

@@ -1,4 +1,4 @@
-"""Answers of a search that survive a kill: each is a part, as JSON, as soon as it is finished."""
+"""Answers of a search that survive a kill: each is a part file (JSON) as soon as it is finished."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from .workers import Workers
 
 @dataclass
 class KeptAnswers:
-    """Calls as the workers run them, each answer kept: no finished part of a killed search is searched again.
+    """Calls on the workers, each answer kept, so that a killed search repeats no finished call.
 
-    The type of an answer is the annotation of its function; a kept answer that is not of this type is not used.
+    The type of an answer is the annotation of its function.
     """
 
     crew: Workers
@@ -29,7 +29,18 @@ class KeptAnswers:
     _limits: list[str] = field(default_factory=list)
 
     def __call__(self, calls: Iterable[Call]) -> Iterator[Any]:
-        """Yield the answers of calls in their order; errors as for `Workers` and `Parts.save`."""
+        """Yield the answers of calls in order.
+
+        Parameters
+        ----------
+        calls : iterable of Call
+            Calls.
+
+        Yields
+        ------
+        object
+            Answers.
+        """
         self._round += 1
         waiting = list(calls)
         keys = [
@@ -50,12 +61,12 @@ class KeptAnswers:
             yield kept.pop(at)
 
     def drop_limits(self) -> None:
-        """Forget limits that cannot be right, so that the same command looks for them again."""
+        """Forget upper bounds that cannot be right, so that the same command computes them again."""
         while self._limits:
             self.parts.forget(self._limits.pop())
 
     def _answer(self, key: str, call: Call) -> Any:
-        """The answer of an earlier, interrupted run to this call, or None."""
+        """Return the answer of an earlier, interrupted run, or None."""
         content = self.parts.read(key)
         with suppress(ValueError):
             return None if content is None else from_json(get_type_hints(call[0])["return"], content)

@@ -1,4 +1,4 @@
-"""Rows of a run against the reference settings: all effects, and the finest accuracy."""
+"""Check of a run's rows against the reference settings: all effects, and the finest accuracy."""
 
 from __future__ import annotations
 
@@ -35,13 +35,20 @@ Row = Mapping[str, Any]
 
 
 def compared_rows(study: Study, rows: Sequence[Row]) -> Iterator[list[dict[str, Any]]]:
-    """Compare rows of the result table with the reference, a block of designs of one space and scene at a time.
+    """Compare rows of the result table with the reference, one block of designs of a space and scene at a time.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    rows : sequence of mapping
+        Rows.
 
     Yields
     ------
     list of dict
-        `design_id`, `filter_id`, `scenario`, `plan`, `allowed_dn`, `realized_dn`: the largest difference of any CSD,
-        infinite where only one of both is a number, and the `quantity` that has it.
+        `design_id`, `filter_id`, `scenario`, `plan`, `allowed_dn`, `realized_dn` (largest difference of any
+        CSD, infinite if only one is a number), and its `quantity`.
     """
     groups: dict[tuple[int, str], tuple[Space, list[Row]]] = {}
     for row in rows:
@@ -78,10 +85,10 @@ def _compared(study: Study, space: Space, scenario: str, rows: Sequence[Row]) ->
 
 
 def _allowed_dn(setup: Setup, tolerance_dn: float) -> float:
-    """Difference of a CSD from the reference that is no fault, DN.
+    """Return the difference of a CSD from the reference that is no fault, DN.
 
-    That is the tolerance. A readout in whole numbers without noise steps by up to sqrt(channels) DN between neighboring
-    values of what is sampled: where images of a light, moments of a pulse or all field positions count, that is added.
+    That is the tolerance. A readout in whole numbers without noise steps by up to sqrt(channels) DN between
+    neighboring samples: with images of a light, moments of a pulse or all field positions, that is added.
     """
     scene, steps = setup.scene, setup.scene.noise is None and setup.computes("quantization")
     sampled = scene.target is not None or scene.drive is not None or setup.all_heights
@@ -89,14 +96,23 @@ def _allowed_dn(setup: Setup, tolerance_dn: float) -> float:
 
 
 def check_run(study: Study, results: Path, seconds: float, crew: Workers) -> tuple[CheckFacts | None, list[str]]:
-    """Compare a seeded sample of a run's rows with the reference, as many as fit into some seconds, at least one.
+    """Compare a seeded sample of a run's rows with the reference within a time, at least one row.
 
-    Each worker, which knows the scenes, takes a part of them and of the time.
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    results : Path
+        Result table.
+    seconds : float
+        Time, s; each worker takes a part of it.
+    crew : Workers
+        Workers.
 
     Returns
     -------
     check : CheckFacts or None
-        None where no row could be compared.
+        None if no row could be compared.
     warnings : list of str
         One for each row that could not.
     """
@@ -116,7 +132,7 @@ def check_run(study: Study, results: Path, seconds: float, crew: Workers) -> tup
 
 
 def _checked(study: Study, rows: Sequence[Row], seconds: float) -> tuple[list[dict[str, Any]], list[str]]:
-    """`compared_rows` of some rows, until the time is over, and a warning for each that could not be compared."""
+    """Compare some rows until the time is over; return results and warnings."""
     ended = time.monotonic() + seconds
     result: list[dict[str, Any]] = []
     warnings: list[str] = []
@@ -132,7 +148,7 @@ def _checked(study: Study, rows: Sequence[Row], seconds: float) -> tuple[list[di
 
 
 def _sampled(study: Study, results: Path) -> list[Row]:
-    """Rows of a result table in a random order that the study's seed gives; those that failed are left out."""
+    """Return rows in a random order by the study's seed, without those that failed."""
     rng = np.random.default_rng([study.section.seed, 5])
     with pq.ParquetFile(results) as table:
         groups = rng.permutation(table.num_row_groups)

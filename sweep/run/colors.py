@@ -1,4 +1,4 @@
-"""Colors of a study with the task of color: error against noise, and areas of two pictures, of each named design."""
+"""Colors of a study with the task `color`: error against noise, and areas of two pictures, for each named design."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _RENDERED = pa.schema(
 
 
 def _shown(study: Study, highlights: pd.DataFrame) -> Iterator[tuple[dict[str, Any], Any]]:
-    """Keys of the rows of plain CFAs, named designs and the answer, and their colors."""
+    """Yield keys and colors of plain CFAs, named designs and the answer."""
     from ..metrics.tasks.color import Looks  # noqa: PLC0415  (few studies have tasks)
 
     for row in few_rows(highlights):
@@ -45,7 +45,20 @@ def _chart_of(tasks: StudyTasks) -> tuple[tuple[str, ...], Chart]:
 
 
 def traded_table(study: Study, highlights: pd.DataFrame) -> pa.Table:
-    """Return a row per design, light and regularization of the color matrix."""
+    """Compute color error against noise.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    highlights : pandas.DataFrame
+        Rows of plain CFAs, named designs and the answer.
+
+    Returns
+    -------
+    pyarrow.Table
+        One row per design, light and regularization of the color matrix.
+    """
     from ..metrics.tasks.judge import REGULARIZATIONS, traded  # noqa: PLC0415  (few studies have tasks)
 
     assert study.tasks is not None
@@ -61,9 +74,19 @@ def traded_table(study: Study, highlights: pd.DataFrame) -> pa.Table:
 
 
 def rendered_table(study: Study, highlights: pd.DataFrame) -> pa.Table:
-    """Return a row per design, picture and area; those of the eye itself have no design.
+    """Compute the areas of two pictures: the chart in daylight, and a night scene under white LEDs.
 
-    The chart stands in daylight of the study's illuminance; the night scene under white LEDs has its own.
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    highlights : pandas.DataFrame
+        Rows of plain CFAs, named designs and the answer.
+
+    Returns
+    -------
+    pyarrow.Table
+        One row per design, picture and area; those of the eye itself have no design.
     """
     from ..curves.builtin.task_sets import NIGHT_LIGHT, NIGHT_LX, night_scene  # noqa: PLC0415  (few studies have tasks)
     from ..curves.color import color_matching  # noqa: PLC0415
@@ -93,7 +116,7 @@ def rendered_table(study: Study, highlights: pd.DataFrame) -> pa.Table:
 def _areas(
     design: dict[str, Any], picture: str, names: Any, xyz: FloatArray, covariance: FloatArray | None = None
 ) -> list[dict[str, Any]]:
-    """Rows of a picture; without a covariance there is no noise."""
+    """Return the rows of a picture; without a covariance there is no noise."""
     spread = np.zeros((len(xyz), 3, 3)) if covariance is None else covariance
     return [
         design | {"picture": picture, "area": area, "xyz": color.tolist(), "covariance": noise.ravel().tolist()}

@@ -1,4 +1,4 @@
-"""Range in which designs are usable: the number between two scenarios at which the state error is the allowed one."""
+"""Usable range of designs: the number between two scenarios at which the state error is the allowed one."""
 
 from __future__ import annotations
 
@@ -38,10 +38,27 @@ _Path = tuple[str, ...]
 
 
 def crossings_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: Progress) -> pa.Table:
-    """Return a row per series of scenarios and plain CFA, named design or answer whose error passes the limit once.
+    """Find where the error of designs passes the allowed one, with all effects.
 
-    `series`, `key`: of scenarios that differ in one number; `low`, `high`: the numbers of the two between which it
-    passes, `at`: where, with all effects, and the `error` there. `design_id`: of the row at `low`.
+    One row per series of scenarios (`series`, `key`) and design whose error passes the limit once: `low` and `high`
+    are the numbers of the two scenarios, `at` is the crossing, `error` the error there; `design_id` is that of the row
+    at `low`.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    rows : pandas.DataFrame
+        Rows of plain CFAs, named designs and the answer.
+    parallel : callable
+        Runs calls on the cores.
+    progress : callable
+        Called with a phase, work done and work in total.
+
+    Returns
+    -------
+    pyarrow.Table
+        Table.
     """
     recognition = study.section.recognition
     assert recognition is not None
@@ -65,7 +82,7 @@ def crossings_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progre
 def _passing(
     few: Sequence[Mapping[Any, Any]], scenarios: Mapping[str, float], allowed: float
 ) -> Iterator[tuple[Mapping[Any, Any], tuple[str, str], tuple[float, float]]]:
-    """Designs whose error passes the allowed one once: the row before, both scenarios, and the errors in them."""
+    """Yield designs whose error passes the allowed one once: the row before, both scenarios, and their errors."""
     designs: dict[str, dict[str, Mapping[Any, Any]]] = {}
     for row in few:
         if row["scenario"] in scenarios:
@@ -81,7 +98,7 @@ def _passing(
 
 
 def _differing(study: Study, ends: tuple[str, str], numbers: tuple[float, float]) -> _Path | None:
-    """The only number in which two scenarios differ, where it is the one in their names; else None."""
+    """Return the only number in which two scenarios differ, if it is the one in their names, else None."""
     one, other = (dict(_leaves(_section(study, name))) for name in ends)
     paths = [path for path in {**one, **other} if one.get(path) != other.get(path)]
     values = [leaves.get(path) for path in paths for leaves in (one, other)]
@@ -107,12 +124,30 @@ def _leaves(section: Any, path: _Path = ()) -> Iterator[tuple[_Path, Any]]:
 
 
 def setup_between(study: Study, setup: Setup, scenario: str, path: _Path, number: float) -> Setup:
-    """Return the setup of a scenario with another number in it and all effects.
+    """Return the setup of a scenario with another number and all effects.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    setup : Setup
+        Scene and camera.
+    scenario : str
+        Scenario.
+    path : tuple
+        Key of the number.
+    number : float
+        Its value.
+
+    Returns
+    -------
+    Setup
+        Setup.
 
     Raises
     ------
     ValidationError
-        No study may have such a scene.
+        If no study may have such a scene.
     """
     section = _section(study, scenario)
     reduce(lambda inner, key: inner[key], path[:-1], section)[path[-1]] = number
@@ -121,7 +156,22 @@ def setup_between(study: Study, setup: Setup, scenario: str, path: _Path, number
 
 
 def state_error_of(setup: Setup, curves: FloatArray, states: tuple[str, ...]) -> float:
-    """Return how often noise confuses the worst two states; `curves`: ndarray[1, n_modified, n_wavelengths]."""
+    """Return the error of the worst pair of states.
+
+    Parameters
+    ----------
+    setup : Setup
+        Scene and camera.
+    curves : ndarray of shape (1, n_modified, n_wavelengths)
+        QE of the modified channels.
+    states : tuple of str
+        Signal types.
+
+    Returns
+    -------
+    float
+        Error probability.
+    """
     return float(state_errors(ForwardModel(setup, once=True), curves, states)[0])
 
 
@@ -133,9 +183,9 @@ def _crossing(
     errors: tuple[float, float],
     allowed: float,
 ) -> dict[str, float]:
-    """Number with the allowed error, and the error there; empty where no scene between the two can be had.
+    """Return the number with the allowed error, and the error there; empty if no scene in between exists.
 
-    The logarithms of both numbers are nearly on a line; `errors`: at the ends, as the run has them.
+    The logarithms of both numbers are nearly on a line.
     """
     from scipy.optimize import brentq  # noqa: PLC0415  (few studies ask for it)
 

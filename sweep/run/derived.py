@@ -1,4 +1,4 @@
-"""Tables derived from the rows that a report shows: those of a study, and their content."""
+"""Tables derived from the rows that a report shows."""
 
 from __future__ import annotations
 
@@ -48,10 +48,26 @@ _POINTS = pa.schema(
 
 @dataclass(frozen=True)
 class Shown:
-    """Rows that a report shows, and those `on_front` of them; `limit`: of a search.
+    """Input of the derived tables.
 
-    `details`: by the ids of the rows; `points`: ids of the swept designs that figures show as points,
-    ndarray[n_points]; `kept`: calls whose results are kept as parts under a name.
+    Parameters
+    ----------
+    study : Study
+        Study.
+    rows, on_front : pandas.DataFrame
+        Rows to draw, and rows on the front.
+    details : mapping of int to Details
+        Details by row id.
+    points : ndarray of int
+        Swept designs that figures show as points.
+    limit : callable
+        Upper bound of the search.
+    parallel : callable
+        Runs calls on the cores.
+    kept : callable
+        Calls whose results are kept as parts under a name.
+    progress : callable
+        Progress.
     """
 
     study: Study
@@ -66,7 +82,7 @@ class Shown:
 
     @property
     def drawn(self) -> list[dict[Any, Any]]:
-        """Rows of the first scenario and the search's answer; not those that failed."""
+        """Rows of the first scenario and the search's answer, without those that failed."""
         first = self.rows["scenario"] == next(iter(self.study.scenarios))
         return computed_rows(self.rows[first | (self.rows["kind"] == FOUND)])
 
@@ -78,7 +94,18 @@ class Shown:
 
 
 def row_tables(study: Study) -> dict[str, Callable[[Shown], pa.Table]]:
-    """Return the derived tables of a study by the names of their files, in the order in which they are made."""
+    """Return the derived tables of a study.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+
+    Returns
+    -------
+    dict of str to callable
+        Function of each table, by file name, in the order of their computation.
+    """
     recognition, tasks = study.section.recognition, study.tasks
     tables: dict[str, Callable[[Shown], pa.Table]] = {
         CURVES: _curves_table,
@@ -104,7 +131,7 @@ def row_tables(study: Study) -> dict[str, Callable[[Shown], pa.Table]]:
 
 
 def _curves_table(shown: Shown) -> pa.Table:
-    """Curves of the sensor, the lights, own tasks' files, the designs that are drawn or on the front, the limit."""
+    """Return the curves of sensor, lights, files of user tasks, drawn designs, front and upper bound."""
     study, limit = shown.study, shown.limit()
     lights = zip(study.lights.types, study.lights.names, study.lights.photons, strict=True)
     limits = {}
@@ -122,7 +149,7 @@ def _curves_table(shown: Shown) -> pa.Table:
 
 
 def _filters(study: Study, rows: list[dict[Any, Any]]) -> dict[int, FilterCurves]:
-    """QE of the modified channels of designs."""
+    """Return the QE of the modified channels of designs."""
     filters = {}
     for row in rows:
         space, curves = row_curves(study, row)
@@ -132,7 +159,7 @@ def _filters(study: Study, rows: list[dict[Any, Any]]) -> dict[int, FilterCurves
 
 
 def _points_table(shown: Shown) -> pa.Table:
-    """Digital numbers of each signal in each channel of the designs that are drawn or on the front."""
+    """Return the digital numbers of each signal in each channel of drawn designs and the front."""
     lights, parts = shown.study.lights, [_POINTS.empty_table()]
     for row in [*shown.drawn, *shown.other_front]:
         dn = shown.details[int(row["design_id"])].dn

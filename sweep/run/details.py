@@ -39,10 +39,16 @@ _Design = tuple[int, FloatArray, frozenset[str]]
 
 @dataclass(frozen=True)
 class Details:
-    """Readout of a design, as far as a table needs it.
+    """Details of one design.
 
-    `limited_by`: of each pair of types the two lights that limit its separation; `dn`: digital numbers at the first
-    sampling phase, ndarray[n_signals, n_channels]; `recognized`: see `recognize`.
+    Parameters
+    ----------
+    limited_by : mapping of pair to str
+        Two lights that limit each separation.
+    dn : ndarray of shape (n_signals, n_channels)
+        Digital numbers at the first sampling phase.
+    recognized : mapping of str to float
+        Result of `recognize`.
     """
 
     limited_by: Mapping[Pair, str | None] | None = None
@@ -58,7 +64,28 @@ def design_details(
     parallel: Parallel,
     progress: Progress,
 ) -> dict[int, Details]:
-    """Return the details of the rows to draw and those on the front, by their ids, for the tables to be made."""
+    """Compute the details of drawn rows and of the front.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    tables : collection of str
+        Tables that are made from them.
+    rows : pandas.DataFrame
+        Rows of plain CFAs, named designs and the answer.
+    on_front : pandas.DataFrame
+        Rows on the front.
+    parallel : callable
+        Runs calls on the cores.
+    progress : callable
+        Called with a phase, work done and work in total.
+
+    Returns
+    -------
+    dict of int to Details
+        Details by row id.
+    """
     first, front = next(iter(study.scenarios)), {*on_front["design_id"]}
     groups: dict[tuple[str, ...], tuple[Setup, list[_Design]]] = {}
     for row in computed_rows(rows, on_front):
@@ -92,7 +119,7 @@ def _patches(study: Study) -> int:
 def _details(
     setup: Setup, designs: Sequence[_Design], states: tuple[str, ...], patches: int, seed: int
 ) -> dict[int, Details]:
-    """Details by ids; the random numbers of a design's patches follow from the study's seed and its id."""
+    """Return details by row id; random patches follow from the study's seed and the id."""
     result = {}
     for design_id, curves, wanted in designs:
         model = forward_model(setup, AllPhases if RECOGNITION in wanted else ForwardModel)
@@ -109,7 +136,22 @@ def _details(
 
 
 def recognition_table(study: Study, rows: pd.DataFrame, details: Mapping[int, Details]) -> pa.Table:
-    """A row per plain CFA, named design and answer: its keys, `patches` and `recognition.columns`."""
+    """Return one row per plain CFA, named design and answer: keys, `patches` and `recognition.columns`.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    rows : pandas.DataFrame
+        Rows of plain CFAs, named designs and the answer.
+    details : mapping of int to Details
+        Details by row id.
+
+    Returns
+    -------
+    pyarrow.Table
+        Table.
+    """
     keys = ["design_id", "kind", "name", "cfa", "scenario"]
     made = []
     for row in few_rows(rows):
@@ -164,7 +206,7 @@ def limited_by_table(
 
 
 def _limits(setup: Setup, space: Space, numbers: IndexArray) -> LimitingLights:
-    """Lights that limit some designs of a space, by their numbers in it."""
+    """Return the limiting lights of some designs of a space."""
     model, camera = forward_model(setup), setup.camera
     step = max(1, _MOST_VALUES // (model.n_cases * len(setup.lights.names) * len(camera.mosaic.channels)))
     parts = []
@@ -177,10 +219,25 @@ def _limits(setup: Setup, space: Space, numbers: IndexArray) -> LimitingLights:
 
 
 def sensor_map_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: Progress) -> pa.Table:
-    """Return a row per image height of each plain CFA, named design and answer in a scene with a field.
+    """Compute CSDs over the image height before clipping and rounding, with all other effects.
 
-    CSDs are those of the response before clipping and rounding, with all other effects; of a pulsed light the
-    smallest over its moments.
+    For a pulsed light, the smallest over its moments.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    rows : pandas.DataFrame
+        Rows of plain CFAs, named designs and the answer.
+    parallel : callable
+        Runs calls on the cores.
+    progress : callable
+        Called with a phase, work done and work in total.
+
+    Returns
+    -------
+    pyarrow.Table
+        One row per image height and design, in a scene with a field.
     """
     calls = []
     for row in few_rows(rows):
@@ -195,7 +252,7 @@ def sensor_map_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progr
 
 
 def _over_heights(setup: Setup, design_id: int, curves: FloatArray) -> list[dict[str, float]]:
-    """Rows of one design, the center of the image first."""
+    """Return the rows of one design, the center of the image first."""
     field, rows = setup.scene.field, list[dict[str, float]]()
     assert field is not None
     same = len(over_field(setup)) == 1

@@ -1,4 +1,4 @@
-"""Dry run: filters, scenarios, rows finished and to compute, evaluations at most, and the effects that are computed."""
+"""Dry run: filters, scenarios, finished and remaining rows, evaluations at most, and computed effects."""
 
 from __future__ import annotations
 
@@ -20,9 +20,18 @@ from .workers import Workers
 
 @dataclass(frozen=True)
 class ToDo:
-    """A study with its plans, and the work that is left.
+    """Remaining work of a study.
 
-    `finished`: rows that are kept; `chunks`: number of those that hold the others; `searches`: its search is to do.
+    Parameters
+    ----------
+    study : Study
+        Study with its plans.
+    finished : int
+        Rows that are kept.
+    chunks : int
+        Jobs that hold the others.
+    searches : bool
+        The search remains.
     """
 
     study: Study
@@ -32,7 +41,22 @@ class ToDo:
 
 
 def to_do(study: Study, output: Path, n_jobs: int) -> ToDo:
-    """Plan, and read which parts are kept; neither compute designs nor write anything."""
+    """Plan a study and read which parts are kept, without computing or writing.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    output : Path
+        Output folder.
+    n_jobs : int
+        Workers.
+
+    Returns
+    -------
+    ToDo
+        Remaining work.
+    """
     held = held_by(output)
     whole = held is not None and held.fingerprint == fingerprint(study) and not held.wrong([RESULTS], quick=True)
     study = study.with_plans()
@@ -44,7 +68,20 @@ def to_do(study: Study, output: Path, n_jobs: int) -> ToDo:
 
 
 def to_do_lines(todo: ToDo, output: Path) -> Iterator[str]:
-    """Describe the work that is left, a line each; of a search the most evaluations, where it finds a design."""
+    """Yield lines that describe the remaining work.
+
+    Parameters
+    ----------
+    todo : ToDo
+        Remaining work.
+    output : Path
+        Output folder.
+
+    Yields
+    ------
+    str
+        Lines.
+    """
     study, search = todo.study, todo.study.search
     plain = sum(space.size for space in study.spaces if space.kind == PLAIN)
     yield (

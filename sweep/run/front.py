@@ -1,4 +1,4 @@
-"""Report rows and Pareto front of a run, reduced from its tables as they come."""
+"""Rows of the report and Pareto front of a run, reduced from its tables as they come."""
 
 from __future__ import annotations
 
@@ -27,10 +27,22 @@ _Group = tuple[str, str]
 
 
 def few_of(table: pa.Table, rules: Rules) -> pa.Table:
-    """Return the rows that a report may need of a table, of each CFA and scenario: its front, the best, the leading.
+    """Return the rows of a table that a report may need: front, best and leading rows of each CFA and scenario.
 
-    All rows that are no sweep are among them. `pareto` marks the front of any part of a run's rows, so that the
-    function may be applied again to its results put together.
+    Plain CFAs, named designs and answers are all kept. `pareto` marks the front of any part of a run's rows, so that
+    the function may be applied again to concatenated results.
+
+    Parameters
+    ----------
+    table : pyarrow.Table
+        Rows.
+    rules : Rules
+        Rules of the study.
+
+    Returns
+    -------
+    pyarrow.Table
+        Table.
     """
     few, on_front = holds(table, "kind", *FEW), table["pareto"].to_numpy()
     feasible = table["feasible"].to_numpy()
@@ -67,7 +79,13 @@ class Gathered:
         self._front: dict[_Group, set[tuple[float, ...]]] = {}
 
     def add(self, few: pa.Table) -> None:
-        """Add the result of `few_of` for a part of the rows."""
+        """Add the result of `few_of` for a part of the rows.
+
+        Parameters
+        ----------
+        few : pyarrow.Table
+            Rows.
+        """
         self._waiting.append(few)
         if sum(table.num_rows for table in self._waiting) > _AT_ONCE:
             self._waiting = [few_of(self._all(), self.rules)]
@@ -81,7 +99,7 @@ class Gathered:
         )
 
     def finish(self) -> None:
-        """Find the front of the whole run, after all rows were added."""
+        """Compute the front of the whole run, after all rows were added."""
         self._rows, self._waiting = self._all(), []
         marked = self._rows.filter(self._rows["pareto"])
         for group, at in row_groups(marked).items():
@@ -89,14 +107,36 @@ class Gathered:
             self._front[group] = set(map(tuple, values[non_dominated(values)].tolist()))
 
     def swept_front(self, cfa: str, scenario: str) -> FloatArray:
-        """Return the two quantities of the front of the swept rows alone, ndarray[n, 2], each pair once."""
+        """Return the front of the swept rows alone.
+
+        Parameters
+        ----------
+        cfa, scenario : str
+            CFA and scenario.
+
+        Returns
+        -------
+        ndarray of shape (n, 2)
+            Both quantities, each pair once.
+        """
         wanted = holds(self._rows, "kind", SWEPT) & holds(self._rows, "cfa", cfa)
         wanted &= holds(self._rows, "scenario", scenario) & self._rows["pareto"].to_numpy()
         values = _values(self._rows.filter(pa.array(wanted)), self.rules.front)
         return np.unique(values[non_dominated(values)], axis=0)
 
     def marked(self, table: pa.Table) -> pa.Table:
-        """Return a table of the run with `pareto` only where a row is on the front of the whole run."""
+        """Return a table of the run with `pareto` only where a row is on the front of the whole run.
+
+        Parameters
+        ----------
+        table : pyarrow.Table
+            Rows.
+
+        Returns
+        -------
+        pyarrow.Table
+            Table.
+        """
         front: BoolArray = np.zeros(table.num_rows, dtype=bool)
         local = np.flatnonzero(table["pareto"].to_numpy())
         few = table.take(local)
@@ -107,7 +147,13 @@ class Gathered:
         return table.set_column(at, table.schema.field(at), pa.array(front))
 
     def frame(self) -> pd.DataFrame:
-        """Return the rows to draw: all that are no sweep, and of the first scenario the best of each CFA's sweeps."""
+        """Return the rows to draw: all that are not swept, and of the first scenario the best swept rows of each CFA.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Rows.
+        """
         few, drawn = holds(self._rows, "kind", *FEW), self._drawn()
         best = [
             best_at(self._rows, self.rules.order, BEST_PER_CFA, drawn & holds(self._rows, "cfa", cfa))
@@ -116,7 +162,13 @@ class Gathered:
         return self._frame([np.flatnonzero(few), *best])
 
     def front_frame(self) -> pd.DataFrame:
-        """Return swept rows: an even share of the first scenario's feasible front, and those that lead a scenario."""
+        """Return swept rows: an even sample of the first scenario's feasible front, and those that lead a scenario.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Rows.
+        """
         leaders = leading_at(self._rows, self.rules.front[0])
         at = [leaders[holds(self._rows, "kind", SWEPT)[leaders]]]
         front = self._drawn() & self.marked(self._rows)["pareto"].to_numpy()
@@ -128,7 +180,7 @@ class Gathered:
         return self._frame(at)
 
     def _drawn(self) -> BoolArray:
-        """Feasible swept rows of the first scenario."""
+        """Return the feasible swept rows of the first scenario."""
         swept = holds(self._rows, "kind", SWEPT) & holds(self._rows, "scenario", self.scenario)
         return np.asarray(swept & self._rows["feasible"].to_numpy())
 
@@ -136,6 +188,6 @@ class Gathered:
         return list(self._rows["cfa"].unique().to_pylist())
 
     def _frame(self, at: list[IndexArray]) -> pd.DataFrame:
-        """Rows at these indices, each once, in the order of their ids."""
+        """Return the rows at some indices, each once, in the order of their ids."""
         frame: pd.DataFrame = self.marked(self._rows.take(np.unique(np.concatenate(at)))).to_pandas()
         return frame

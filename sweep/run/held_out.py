@@ -35,9 +35,25 @@ _FIGURES = ("seen", "with_it", "fall")
 def held_out_table(
     study: Study, rows: pd.DataFrame, on_front: pd.DataFrame, parallel: Parallel, progress: Progress
 ) -> pa.Table:
-    """Return `design_id` and `held_out_csd_<a>_<b>`, DN, of the rows to draw and of the front.
+    """Compute the CSDs of other lights in the study's scenes, with the effects of their plans.
 
-    The scenes are those of the study, with the effects of their plans, with the other lights in place of its own.
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    rows : pandas.DataFrame
+        Rows of plain CFAs, named designs and the answer.
+    on_front : pandas.DataFrame
+        Rows on the front.
+    parallel : callable
+        Runs calls on the cores.
+    progress : callable
+        Called with a phase, work done and work in total.
+
+    Returns
+    -------
+    pyarrow.Table
+        `design_id` and `held_out_csd_<a>_<b>`, DN.
     """
     lights = study.held_out
     assert lights is not None
@@ -59,16 +75,29 @@ def _on_lights(setup: Setup, curves: FloatArray) -> dict[str, float]:
 
 
 def left_out_table(study: Study, search: Search, best: Evaluation, parallel: Parallel, progress: Progress) -> pa.Table:
-    """Search without each light of the objective in turn, and return what each optimum falls to with it.
+    """Search without each light of the objective in turn.
 
-    Each search starts from the study's answer and a few other points. Of an objective that is a worst case the nominal
-    quantity is searched, too. A light that is alone in its type cannot be left out.
+    Each search starts from the study's answer and a few other points. For a worst case the nominal quantity is
+    searched, too. A light that is alone in its type cannot be left out.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    search : Search
+        Search.
+    best : Evaluation
+        Answer of the study.
+    parallel : callable
+        Runs calls on the cores.
+    progress : callable
+        Called with a phase, work done and work in total.
 
     Returns
     -------
     pyarrow.Table
-        `objective`, `signal_type`, `signal`; `seen`: the objective of the optimum without the light, `with_it`: that of
-        the same design with all lights, `fall`: the difference; before quantization.
+        `objective`, `signal_type`, `signal`; `seen`: optimum without the light, `with_it`: the same design
+        with all lights, `fall`: the difference; before quantization.
     """
     problem, seed, lights = study.problem(search), study.section.seed, study.lights
     points = starting_points(problem, _LEFT_OUT_STARTS - 1, seed)
@@ -94,7 +123,20 @@ def left_out_table(study: Study, search: Search, best: Evaluation, parallel: Par
 
 
 def most_evaluations_left_out(study: Study, search: Search) -> int:
-    """Return the number of evaluations of `left_out_table` at most."""
+    """Return the largest number of evaluations of `left_out_table`.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    search : Search
+        Search.
+
+    Returns
+    -------
+    int
+        Evaluations.
+    """
     problem = study.problem(search)
     optima = 2 if _has_nominal(problem) else 1
     searches = optima * len(_left_out_signals(problem)) + optima - 1
@@ -106,13 +148,13 @@ def _evaluations_of_start(search: Search) -> int:
 
 
 def _has_nominal(problem: Problem) -> bool:
-    """True where the objective is a single worst case."""
+    """Return whether the objective is a single worst case."""
     quantity = problem.quantities.get(problem.objective.column)
     return quantity is not None and quantity.extreme == WORST_CASE
 
 
 def _left_out_signals(problem: Problem) -> list[int]:
-    """Lights of the objective's types that are not alone in theirs."""
+    """Return the lights of the objective's types that are not alone in their type."""
     lights, kinds = problem.setup.lights, set[str]()
     for column in problem.objective.weights:
         quantity = problem.quantities[column]
@@ -126,7 +168,7 @@ def _left_out_signals(problem: Problem) -> list[int]:
 def _without(
     problem: Problem, light: int, starts: Sequence[FloatArray], algorithm: str, evaluations: int, seed: int
 ) -> tuple[float, float, float] | None:
-    """The optimum without a light: its objective without and with it, and the difference; None without a design."""
+    """Return the objective of the optimum without a light: without it, with it, and their difference."""
     lights = problem.setup.lights
     kept = [i for i in range(len(lights.names)) if i != light]
     fewer_lights = replace(

@@ -18,7 +18,18 @@ _PACKAGES = ("cfa-sweep", "numpy", "scipy", "numba", "pandas", "pyarrow", "jobli
 
 
 def resolved_yaml(study: Study) -> str:
-    """Return the study with all defaults written out; a study file itself."""
+    """Return the study with all defaults written out; a study file itself.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+
+    Returns
+    -------
+    str
+        YAML.
+    """
     section = study.section.model_dump(mode="json", by_alias=True, exclude_none=True)
     for key in ("sensor", "lights"):
         named = not section[key]["files"] and not section[key].get("technology")
@@ -29,7 +40,18 @@ def resolved_yaml(study: Study) -> str:
 
 
 def plan_facts(study: Study) -> dict[str, Any]:
-    """Return how each scene was simulated."""
+    """Return the plan of each scene for the provenance.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+
+    Returns
+    -------
+    dict
+        Plans.
+    """
     return {
         name: {
             "key": plan.key,
@@ -43,9 +65,19 @@ def plan_facts(study: Study) -> dict[str, Any]:
 
 
 def provenance(study: Study, how: Mapping[str, Any]) -> dict[str, Any]:
-    """Return all that is needed to run the study again, and the machine.
+    """Return versions, digests, seed and machine.
 
-    `how`: `command`, `duration_s`, `backend`, `scheduler` and `workers` of the run.
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    how : mapping
+        `command`, `duration_s`, `backend`, `scheduler` and `workers` of the run.
+
+    Returns
+    -------
+    dict
+        Facts.
     """
     vision = study.section.vision
     packages = (*_PACKAGES, "jax", "optax") if vision is not None and vision.network else _PACKAGES

@@ -39,7 +39,7 @@ _FIELDS = [
 
 @dataclass(frozen=True)
 class Candidate:
-    """A design in a scene; `point`: its parameters, ndarray[1, n_parameters]."""
+    """Design in a scene, with parameters of shape (1, n_parameters) and the tolerance of production."""
 
     setup: Setup
     space: Space
@@ -47,7 +47,18 @@ class Candidate:
     tolerance: Tolerance
 
     def imager(self, scale: float) -> PopulationImager:
-        """Return the model of the scene with the population of its lights so many times as large."""
+        """Return the scene with a scaled population of its lights.
+
+        Parameters
+        ----------
+        scale : float
+            Factor of the stated ranges.
+
+        Returns
+        -------
+        PopulationImager
+            Scene with all members.
+        """
         population = self.setup.lights.population
         assert population is not None
         return population_imager(
@@ -55,11 +66,37 @@ class Candidate:
         )
 
     def curves(self, off: Off) -> FloatArray:
-        """Return its filters as production makes them."""
+        """Return the filters as production makes them.
+
+        Parameters
+        ----------
+        off : Off
+            Production error.
+
+        Returns
+        -------
+        ndarray of shape (1, n_modified, n_wavelengths)
+            QE.
+        """
         return np.asarray(self.space.curves(self.point, self.setup.camera.grid.size, off), dtype=float)
 
     def worst(self, pair: Pair, scale: float) -> tuple[float, Off]:
-        """Return the smallest CSD over population and tolerances scaled so, DN, and its production error."""
+        """Return the smallest CSD over a scaled population and scaled tolerances.
+
+        Parameters
+        ----------
+        pair : tuple of str
+            Signal types.
+        scale : float
+            Factor of the stated ranges.
+
+        Returns
+        -------
+        csd_dn : float
+            CSD, DN.
+        off : Off
+            Its production error.
+        """
         imager, made = self.imager(scale), self.space.filter is not None
         places = self.tolerance.scaled(scale).places if made else (AS_DESIGNED,)
         csds = imager.worst(np.concatenate([self.curves(off) for off in places]), [pair])[csd_name(pair)]
@@ -68,12 +105,27 @@ class Candidate:
 
 
 def robustness_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: Progress) -> pa.Table:
-    """Return a row per plain CFA, named design and answer of the search.
+    """Compute robustness and yield of designs.
 
-    `breaks_at`: how many times as large the population, and the tolerances, must be for the worst CSD to fall
-    below that of the plain CFA that has most at 1 (null where it does not up to 3 times, in steps of 0.25); `breaks_dn`
-    and what stands beside it: the worst CSD there, and the lights, shifts and temperature that it comes from. `yield`:
-    the share of lamps and cameras with the wanted CSD, with its 95 % interval (Wilson, 1927).
+    `breaks_at` is the factor of the population and the tolerances at which the worst CSD falls below that of the plain
+    CFA that has most at 1 (null if it does not up to 3, in steps of 0.25), with CSD, lights, shifts and temperature
+    there; `yield` is the share of lamps and cameras with the wanted CSD, with its 95 % interval (Wilson, 1927).
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    rows : pandas.DataFrame
+        Rows of plain CFAs, named designs and the answer.
+    parallel : callable
+        Runs calls on the cores.
+    progress : callable
+        Called with a phase, work done and work in total.
+
+    Returns
+    -------
+    pyarrow.Table
+        One row per design.
     """
     pair = study.pair_over_population
     assert pair is not None
@@ -97,7 +149,7 @@ def _design(study: Study, row: dict[Any, Any]) -> Candidate:
 def _robustness(
     design: Candidate, rival: Candidate | None, pair: Pair, seed: int
 ) -> tuple[dict[str, float], dict[str, str]]:
-    """Numbers, and names of lights, of a design by their columns, in a form that a run can keep."""
+    """Return numbers, and names of lights, of a design by column."""
     numbers, lights = ({}, {}) if rival is None else _breaks(design, rival, pair)
     population = design.setup.lights.population
     assert population is not None
@@ -109,7 +161,7 @@ def _robustness(
 
 
 def _breaks(design: Candidate, rival: Candidate, pair: Pair) -> tuple[dict[str, float], dict[str, str]]:
-    """Scale at which a design falls below a rival first, and its causes: numbers, and names of lights."""
+    """Return the scale at which a design first falls below a rival, and its causes."""
 
     def below(scale: float) -> bool:
         return design.worst(pair, scale)[0] < rival.worst(pair, scale)[0]
@@ -139,7 +191,7 @@ def _breaks(design: Candidate, rival: Candidate, pair: Pair) -> tuple[dict[str, 
 
 
 def _first(below: Callable[[float], bool]) -> float | None:
-    """The smallest scale, in steps of `_STEP`, at which something holds; then to 2^-_HALVINGS of a step."""
+    """Return the smallest scale, in steps of `_STEP`, at which a condition holds, refined to 2^-_HALVINGS of a step."""
     for step in range(round(_LARGEST / _STEP) + 1):
         high = step * _STEP
         if below(high):
@@ -154,9 +206,21 @@ def _first(below: Callable[[float], bool]) -> float | None:
 
 
 def drawn_dn(design: Candidate, pair: Pair, seed: int) -> FloatArray:
-    """Return the CSD of two random members per draw, before clipping and rounding, DN, ndarray[n_draws].
+    """Return the CSD of two random members per draw, before clipping and rounding; equal draws for all designs.
 
-    Every number is drawn whatever the design, so that all designs see the same lamps and cameras.
+    Parameters
+    ----------
+    design : Candidate
+        Design.
+    pair : tuple of str
+        Signal types.
+    seed : int
+        Seed.
+
+    Returns
+    -------
+    ndarray of shape (n_draws,)
+        CSD, DN.
     """
     imager = population_imager(design.setup)
     tolerance = design.tolerance if design.space.filter is not None else Tolerance()

@@ -1,4 +1,4 @@
-"""Quantities of designs, a block at a time; a block that fails is halved down to the design that does."""
+"""Quantities of designs, one block at a time; a block that fails is halved down to the design that fails."""
 
 from __future__ import annotations
 
@@ -34,8 +34,28 @@ _CHUNKS_BY_EDGES = 4
 class Rules:
     """Rules by which designs become rows.
 
-    `front`: the two quantities of the Pareto front, whose constraints the designs on it need not meet. `vision`,
-    `seed`: of images; `drawn`: raw patches are drawn of plain CFAs and named designs, from the same readout.
+    Parameters
+    ----------
+    schema : pyarrow.Schema
+        Schema of the result table.
+    asked : Asked
+        Requested quantities.
+    objective : Objective
+        Objective.
+    constraints : mapping of str to Bound
+        Constraints.
+    front : tuple of str
+        Quantities of the Pareto front, whose constraints designs on it need not meet.
+    tolerance : Tolerance
+        Production tolerance.
+    plans : mapping of str to Plan
+        Plan of each scenario.
+    vision : Vision, optional
+        Benchmark of vision.
+    seed : int
+        Seed of the study.
+    drawn : bool
+        Raw patches are drawn of plain CFAs and named designs.
     """
 
     schema: pa.Schema
@@ -56,7 +76,7 @@ class Rules:
 
     @cached_property
     def quantities(self) -> Mapping[str, Quantity]:
-        """Quantities by the names of their columns."""
+        """Quantities by column name."""
         return columns_of(self.asked, self.objective)
 
     @property
@@ -110,12 +130,23 @@ def found_of(
 
 
 def text_of(error: Exception) -> str:
-    """Return an error on one line, cut where it is long."""
+    """Return an error on one line, cut if it is long.
+
+    Parameters
+    ----------
+    error : Exception
+        Error.
+
+    Returns
+    -------
+    str
+        Text.
+    """
     return " ".join(f"{type(error).__name__}: {error}".split())[:_MOST_LETTERS]
 
 
 def _columns(space: Space, start: int, setup: Setup, points: FloatArray, rules: Rules) -> Columns:
-    """Quantities of a block of designs, ndarray[n_designs] each."""
+    """Return the quantities of a block of designs, ndarray of shape (n_designs,) each."""
     size, asked = setup.camera.grid.size, rules.asked
     model = forward_model(setup, AllPhases if rules.drawn and space.kind in FEW else ForwardModel)
     edges = edges_of(space, start, start + len(points))
@@ -171,7 +202,7 @@ def worst_cases(
 
 
 def _of_a_share(space: Space, setup: Setup, points: FloatArray, rules: Rules) -> Columns:
-    """CSD that the wanted share of random lamps and cameras has, see `LampsAndCameras`."""
+    """Return the CSD that the wanted share of random lamps and cameras has."""
     from ..metrics.drawn import LampsAndCameras  # noqa: PLC0415  (only where a share of lamps and cameras counts)
     from ..metrics.members import population_imager  # noqa: PLC0415
 
@@ -183,9 +214,9 @@ def _of_a_share(space: Space, setup: Setup, points: FloatArray, rules: Rules) ->
 
 
 def _not_finite(columns: Columns, setup: Setup, rules: Rules) -> dict[int, str]:
-    """Designs with a quantity that is no finite number, where it is none that a design may lack.
+    """Return designs with a quantity that is not finite but must be.
 
-    Those are quantities of a family and own metrics; of a plain CFA, all that a modified channel has.
+    Quantities of a family and metrics of user code may be missing; for a plain CFA, those of a modified channel.
     """
     needs = ("family", "own") if setup.camera.modified else ("family", "own", "modified")
     lacking = {name for name, quantity in rules.quantities.items() if quantity.needs in needs}

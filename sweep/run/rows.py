@@ -1,4 +1,4 @@
-"""Jobs: chunks of designs, and the rows that they give."""
+"""Jobs (chunks of designs) and their rows."""
 
 from __future__ import annotations
 
@@ -31,9 +31,18 @@ _DRAWN_DESIGNS = 32
 
 @dataclass(frozen=True)
 class Job:
-    """A run of consecutive designs of one space in one scenario.
+    """Consecutive designs of one space in one scenario.
 
-    `first_id`: the row id of its first design; `first_filter`: the number of its filter, the same in every scenario.
+    Parameters
+    ----------
+    space : Space
+        Designs.
+    scenario : str
+        Scenario.
+    start, stop : int
+        Range of the designs.
+    first_id, first_filter : int
+        Row id, and filter number, of the first design.
     """
 
     space: Space
@@ -50,7 +59,18 @@ class Job:
 
 
 def jobs_of(study: Study) -> Iterator[Job]:
-    """Yield all jobs in the order of their rows."""
+    """Yield all jobs in the order of their rows.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+
+    Yields
+    ------
+    Job
+        Jobs.
+    """
     first_id = 0
     for scenario in study.scenarios:
         first_filter = 0
@@ -64,10 +84,7 @@ def jobs_of(study: Study) -> Iterator[Job]:
 
 
 def _job_size(study: Study, space: Space) -> int:
-    """Designs of a job: several chunks where many designs cost next to nothing, so that a job is not mostly overhead.
-
-    It does not depend on the workers, and so neither do the rows.
-    """
+    """Return the number of designs of a job, independent of the workers; several chunks for fast designs."""
     if study.asked.wanted_yield:
         return _DRAWN_DESIGNS
     if study.states or not by_edges(space):
@@ -76,13 +93,39 @@ def _job_size(study: Study, space: Space) -> int:
 
 
 def job_key(job: Job, fingerprint: str, plan: Plan | None) -> str:
-    """Return the SHA-256 of everything that a job's rows depend on; `fingerprint`: of study, data and model."""
+    """Return the SHA-256 of everything that a job's rows depend on.
+
+    Parameters
+    ----------
+    job : Job
+        Job.
+    fingerprint : str
+        Fingerprint of study, data and model.
+    plan : Plan or None
+        Plan of the scene.
+
+    Returns
+    -------
+    str
+        Hexadecimal digest.
+    """
     parts = [fingerprint, "" if plan is None else plan.key, job.scenario, job.space.kind, job.space.name]
     return hashlib.sha256(json.dumps([*parts, job.start, job.stop]).encode()).hexdigest()
 
 
 def rules_of(study: Study) -> Rules:
-    """Return the rules of a study."""
+    """Return the rules of a study.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+
+    Returns
+    -------
+    Rules
+        Rules.
+    """
     section, recognition = study.section, study.section.recognition
     return Rules(
         schema=described(result_schema(study.parameters, list(study.quantities)), study.quantities),
@@ -99,7 +142,7 @@ def rules_of(study: Study) -> Rules:
 
 
 def run_job(job: Job, setup: Setup, rules: Rules) -> pa.Table:
-    """Evaluate a job; a design that fails is a row with its status, and the others are kept.
+    """Evaluate a job; a design that fails becomes a row with its status.
 
     `pareto` marks the non-dominated designs of this job alone, among those that meet every constraint but those on the
     front's axes; `front.Gathered` finds those of the whole table.
@@ -137,13 +180,28 @@ def run_job(job: Job, setup: Setup, rules: Rules) -> pa.Table:
 
 
 def failed_rows(job: Job, rules: Rules, status: str) -> pa.Table:
-    """Return the rows of a job that could not be computed."""
+    """Return the rows of a job that could not be computed.
+
+    Parameters
+    ----------
+    job : Job
+        Job.
+    rules : Rules
+        Rules of the study.
+    status : str
+        Status of the rows.
+
+    Returns
+    -------
+    pyarrow.Table
+        Table.
+    """
     no = np.zeros(job.size, dtype=bool)
     return _table(job, rules, {"feasible": no, "pareto": no, "status": _word(status, job.size)})
 
 
 def _table(job: Job, rules: Rules, values: Mapping[str, Any]) -> pa.Table:
-    """Rows of a job: its keys, parameters and plan beside the values; a column that it lacks is null, as is NaN."""
+    """Return the rows of a job: keys, parameters, plan and values; a missing column, and NaN, is null."""
     n, space, plan = job.size, job.space, rules.plans.get(job.scenario)
     points = space.points(job.start, job.stop)
     known: dict[str, Any] = {
@@ -172,10 +230,10 @@ def _table(job: Job, rules: Rules, values: Mapping[str, Any]) -> pa.Table:
 
 
 def _word(text: str, n: int) -> pa.Array:
-    """The same word in n rows."""
+    """Return the same word in n rows."""
     return _words([text], np.zeros(n, dtype=np.intp))
 
 
 def _words(texts: list[str], numbers: IndexArray) -> pa.Array:
-    """Words by their places in a list, dictionary-encoded."""
+    """Return dictionary-encoded words from their indices in a list."""
     return pa.DictionaryArray.from_arrays(pa.array(numbers, pa.int32()), pa.array(texts, pa.string()))

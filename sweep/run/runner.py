@@ -1,4 +1,4 @@
-"""A whole run: search, sweep, the tables that a report draws from, and provenance."""
+"""Run of a study: search, sweep, derived tables, and provenance."""
 
 from __future__ import annotations
 
@@ -59,13 +59,24 @@ _CHECK_S, _CHECK_SHARE = 1.0, 0.1
 
 
 def files_of(study: Study) -> set[str]:
-    """Return the names of the files that a run of the study makes."""
+    """Return the names of the files that a run makes.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+
+    Returns
+    -------
+    set of str
+        Names.
+    """
     vision = () if study.section.vision is None else VISION_TABLES
     return {RESOLVED, *_whole(study), *row_tables(study), *vision}
 
 
 def _whole(study: Study) -> set[str]:
-    """Files for which the whole run is made again."""
+    """Return the files for which the whole run is made again."""
     names = {RESULTS, PROVENANCE}
     if study.search is not None:
         names |= {SEARCH_LOG} | ({FRONT} if study.search.levels else set())
@@ -84,9 +95,10 @@ def run_study(
     scheduler: str | None = None,
     options: RunOptions = RunOptions(),  # noqa: B008  (a frozen value)
 ) -> tuple[str, ...]:
-    """Run a study into a folder, or continue a run that was stopped; a finished one is only made whole.
+    """Run a study into a folder, or continue a stopped run; a finished one is only repaired.
 
-    A table of the report that is missing or damaged is made again from the rows. Where the rows, the search's tables or
+    A table of the report that is missing or damaged is made again from the rows. Where the rows, the search's tables
+    or
     provenance are, the whole run is.
 
     Parameters
@@ -148,9 +160,9 @@ def run_study(
 
 @dataclass
 class _Run:
-    """One run of a study whose scenes are planned, in a folder that it holds.
+    """One run of a planned study in a locked folder.
 
-    `started`: by the monotonic clock, seconds; `how`: command, workers, backend and scheduler, for provenance.
+    `started` is a time of the monotonic clock, s; `how` has command, workers, backend and scheduler.
     """
 
     study: Study
@@ -167,7 +179,18 @@ class _Run:
         self.gathered = Gathered(self.rules, next(iter(self.study.scenarios)))
 
     def make(self, wrong: set[str]) -> tuple[str, ...]:
-        """Make these files, and what depends on them; provenance comes last: without it a run is not finished."""
+        """Make files and those that depend on them; provenance comes last, and marks a finished run.
+
+        Parameters
+        ----------
+        wrong : set of str
+            Names of missing or damaged files.
+
+        Returns
+        -------
+        tuple of str
+            Names of the files that were made.
+        """
         study = self.study
         if wrong & _whole(study):
             wrong = files_of(study)
@@ -191,7 +214,7 @@ class _Run:
 
     @cached_property
     def answer(self) -> SearchAnswer | None:
-        """Answer of the search; None of a study that does not search."""
+        """Answer of the search; None for a study without a search."""
         if self.study.search is None:
             return None
         kept = self._kept("search")
@@ -202,11 +225,11 @@ class _Run:
             raise
 
     def _kept(self, what: str) -> KeptAnswers:
-        """Calls whose answers are parts."""
+        """Return calls whose answers are part files."""
         return KeptAnswers(self.crew, self.parts, f"{self.sweep.fingerprint} {what}")
 
     def _search_and_sweep(self) -> None:
-        """Search, which ends a study that no design meets; sweep; write the result table and those of the search."""
+        """Search, sweep, and write the tables of both; an infeasible search ends the run before the sweep."""
         answer, sweep, gathered = self.answer, self.sweep, self.gathered
         sweep.run(gathered, self.progress, self.options)
         answered = [] if answer is None else [answer_row(self.study, answer, self.rules, self.crew)]
@@ -241,7 +264,7 @@ class _Run:
             self._write(name, table)
 
     def _write(self, name: str, table: pa.Table) -> None:
-        """Write a table with the filter's number beside each design's, and with units and meanings."""
+        """Write a table with `filter_id` beside `design_id`, and with units and meanings."""
         if "design_id" in table.column_names and "filter_id" not in table.column_names:
             ids = table["design_id"].to_numpy(zero_copy_only=False)
             filters = np.where(ids == self.study.n_designs, self.study.n_filters, ids % max(1, self.study.n_filters))
@@ -250,7 +273,7 @@ class _Run:
         self.inventory.write_table(name, table.cast(described(table.schema, self.study.quantities)))
 
     def _limit(self) -> Limit | None:
-        """The search's upper bound, found alone where the search itself need not be repeated."""
+        """Return the search's upper bound, computed alone if the search need not be repeated."""
         if "answer" in self.__dict__ or self.study.search is None:
             return None if self.answer is None else self.answer.limit
         return limit_alone(self.study, self.study.search)
@@ -282,7 +305,7 @@ class _Run:
 
 
 def _hypervolumes(answer: SearchAnswer, gathered: Gathered) -> dict[str, float]:
-    """Area that the designs of sweep and search dominate above no separation and the lowest level of sensitivity."""
+    """Return the area that sweep and search dominate above no separation and the lowest level of sensitivity."""
     reference = np.array([0.0, answer.search.levels[0] - 1e-6])
     runs = (*answer.runs, *(run for point in answer.front for run in point.runs))
     points = [[e.objective, e.sensitivity] for run in runs for e in run.log if e.violation <= FEASIBLE]
@@ -293,7 +316,7 @@ def _hypervolumes(answer: SearchAnswer, gathered: Gathered) -> dict[str, float]:
 
 
 def _discard(inventory: Inventory) -> None:
-    """Leave nothing of a run that has no result; what others have in the folder stays."""
+    """Remove everything of a run without a result; files of others stay."""
     Parts(inventory.folder).remove()
     inventory.discard()
     with suppress(OSError):

@@ -1,4 +1,4 @@
-"""The search of a study over the cores: its best design, its upper bound, and the trade-off that it traces."""
+"""Search of a study on the cores: best design, upper bound, and trade-off."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _REACH_STARTS = 8
 
 @dataclass(frozen=True)
 class SearchAnswer:
-    """All starts of a search, the best feasible evaluation among them, its limit and the front."""
+    """All starts of a search, the best feasible evaluation, its upper bound and the front."""
 
     search: Search
     runs: tuple[SearchRun, ...]
@@ -48,8 +48,28 @@ class SearchAnswer:
 def run_search(study: Study, search: Search, parallel: Parallel, progress: Progress) -> SearchAnswer:
     """Search from Sobol points; the evaluations are shared evenly among the starts.
 
-    Raises InfeasibleError, naming each constraint with the best value that is reachable, when no start found a feasible
-    design; BrokenProofError when the search, anywhere, found more than is proven to be out of reach.
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    search : Search
+        Search.
+    parallel : callable
+        Runs calls on the cores.
+    progress : callable
+        Called with a phase, work done and work in total.
+
+    Returns
+    -------
+    SearchAnswer
+        Answer.
+
+    Raises
+    ------
+    InfeasibleError
+        If no start finds a feasible design, with the best reachable value of each constraint.
+    BrokenProofError
+        If a design exceeds its upper bound.
     """
     problem = study.problem(search)
     n_starts = min(search.starts, search.max_evaluations)
@@ -78,7 +98,20 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
 
 
 def limit_alone(study: Study, search: Search) -> Limit | None:
-    """Return the upper bound of `run_search`, without a search."""
+    """Compute the upper bound of `run_search` without a search.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    search : Search
+        Search.
+
+    Returns
+    -------
+    Limit or None
+        None if there is no upper bound.
+    """
     problem = study.problem(search)
     return limit_of(problem) if why_not(problem) is None else None
 
@@ -94,7 +127,24 @@ def _infeasible(study: Study, problem: Problem, starts: FloatArray, per_start: i
 
 
 def answer_row(study: Study, answer: SearchAnswer, rules: Rules, parallel: Parallel) -> pa.Table:
-    """Return the search's answer as the camera reads it out, behind all other rows, with its upper bound and gap."""
+    """Return the search's answer as the camera reads it out, with its upper bound and gap.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    answer : SearchAnswer
+        Answer.
+    rules : Rules
+        Rules of the study.
+    parallel : callable
+        Runs calls on the cores.
+
+    Returns
+    -------
+    pyarrow.Table
+        One row.
+    """
     space = answer.search.space
     assert space.filter is not None
     name = f"best {kind_in_words(space.filter.family.kind)}"
@@ -110,7 +160,20 @@ def answer_row(study: Study, answer: SearchAnswer, rules: Rules, parallel: Paral
 
 
 def search_facts(study: Study, answer: SearchAnswer) -> dict[str, Any]:
-    """Return the search in figures, for provenance and summary."""
+    """Return the search in figures, for provenance and summary.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    answer : SearchAnswer
+        Answer.
+
+    Returns
+    -------
+    dict
+        Facts.
+    """
     search, space, limit = answer.search, answer.search.space, answer.limit
     return {
         "algorithm": search.algorithm,
@@ -138,10 +201,22 @@ def search_facts(study: Study, answer: SearchAnswer) -> dict[str, Any]:
 
 
 def bounded_spaces(study: Study, search: Search) -> list[str]:
-    """Return kinds and names of the spaces whose feasible filters the search's upper bound holds for, in its scenario.
+    """Return the design spaces whose feasible filters the upper bound holds for, in the search's scenario.
 
-    They are in the same channel of the same CFA, replace the same curve, which they nowhere exceed, and are of the same
+    They are in the same channel of the same CFA, replace the same curve, nowhere exceed it, and have the same
     technology.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    search : Search
+        Search.
+
+    Returns
+    -------
+    list of str
+        Kinds and names.
     """
     searched = search.space.filter
     assert searched is not None
@@ -158,7 +233,18 @@ def bounded_spaces(study: Study, search: Search) -> list[str]:
 
 
 def search_log(answer: SearchAnswer) -> pa.Table:
-    """Return every evaluation of every start, of the search and then of each level of the front."""
+    """Return every evaluation of every start, of the search and then of each level of the front.
+
+    Parameters
+    ----------
+    answer : SearchAnswer
+        Answer.
+
+    Returns
+    -------
+    pyarrow.Table
+        Table.
+    """
     names = answer.search.space.parameters
     rows = [
         {
@@ -181,7 +267,20 @@ def search_log(answer: SearchAnswer) -> pa.Table:
 
 
 def front_table(study: Study, answer: SearchAnswer) -> pa.Table:
-    """Return a row per level of sensitivity, and rows between with the upper bound alone."""
+    """Return one row per level of sensitivity, and rows in between with the upper bound alone.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    answer : SearchAnswer
+        Answer.
+
+    Returns
+    -------
+    pyarrow.Table
+        Table.
+    """
     names, setup = answer.search.space.parameters, study.setup(answer.search.space, answer.search.scenario)
     rows = []
     for point in answer.front:

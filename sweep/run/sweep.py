@@ -1,4 +1,4 @@
-"""The sweep of a study: jobs over the workers, each kept as a part as soon as it is finished."""
+"""Sweep of a study: jobs on the workers, each kept as a part file as soon as it is finished."""
 
 from __future__ import annotations
 
@@ -32,10 +32,16 @@ _KeyedJob = tuple[Job, str, Setup]
 
 @dataclass(frozen=True)
 class Finished:
-    """A finished job: its part, and what a run keeps of its rows in memory.
+    """Finished job.
 
-    `part`: the name of its file, or its content where the worker could not write it; `few`: see `few_of`; `failed`:
-    number of designs that failed.
+    Parameters
+    ----------
+    part : str or bytes
+        Name of its part file, or its content if the worker could not write it.
+    few : pyarrow.Table
+        Result of `few_of`.
+    failed : int
+        Designs that failed.
     """
 
     part: str | bytes
@@ -45,9 +51,14 @@ class Finished:
 
 @dataclass(frozen=True)
 class RunOptions:
-    """Settings for designs that fail.
+    """Failure policy.
 
-    `fail_fast`: stop at the first one; `retry_failed`: compute a finished run again in which some failed.
+    Parameters
+    ----------
+    fail_fast : bool
+        Stop at the first design that fails.
+    retry_failed : bool
+        Compute a finished run again in which some failed.
     """
 
     fail_fast: bool = False
@@ -56,7 +67,7 @@ class RunOptions:
 
 @dataclass
 class Sweep:
-    """All jobs of a study, those that are kept and those that are still to compute; `failed`: number of designs."""
+    """All jobs of a study, finished and remaining."""
 
     study: Study
     rules: Rules
@@ -67,17 +78,17 @@ class Sweep:
 
     @cached_property
     def fingerprint(self) -> str:
-        """Fingerprint of the study, which all keys depend on."""
+        """Fingerprint of the study, part of all keys."""
         return fingerprint(self.study)
 
     @cached_property
     def jobs(self) -> list[Job]:
-        """All jobs, in the order of their rows."""
+        """All jobs in the order of their rows."""
         return list(jobs_of(self.study))
 
     @cached_property
     def keys(self) -> list[str]:
-        """The key of each job."""
+        """Key of each job."""
         return [job_key(job, self.fingerprint, self.study.plans.get(job.scenario)) for job in self.jobs]
 
     @property
@@ -94,9 +105,21 @@ class Sweep:
         return self._setups[id(job.space), job.scenario]
 
     def run(self, gathered: Gathered, progress: Progress, options: RunOptions) -> None:
-        """Compute what is not kept yet; `gathered` takes in all rows.
+        """Compute the remaining jobs.
 
-        Raises FailedDesignError, after its part is kept, where the options ask for it.
+        Parameters
+        ----------
+        gathered : Gathered
+            Receives all rows.
+        progress : callable
+            Called with a phase, work done and work in total.
+        options : RunOptions
+            Failure policy.
+
+        Raises
+        ------
+        FailedDesignError
+            If a design failed, with `fail_fast`; its part is kept.
         """
         done = 0
         for index, key in enumerate(self.keys):
@@ -127,17 +150,34 @@ class Sweep:
             progress("designs", done, self.study.n_designs)
 
     def tables(self) -> Iterator[pa.Table]:
-        """Yield the rows of all jobs, in their order."""
+        """Yield the rows of all jobs in order.
+
+        Yields
+        ------
+        pyarrow.Table
+            Rows.
+        """
         for index in range(len(self.jobs)):
             yield self.table(index)
 
     def table(self, index: int) -> pa.Table:
-        """Return the rows of a finished job; one whose part was damaged since is computed again."""
+        """Return the rows of a finished job; a damaged part is computed again.
+
+        Parameters
+        ----------
+        index : int
+            Number of the job.
+
+        Returns
+        -------
+        pyarrow.Table
+            Table.
+        """
         job, table = self.jobs[index], self._kept(index)
         return run_job(job, self._setup(job), self.rules) if table is None else table
 
     def _kept(self, index: int) -> pa.Table | None:
-        """The rows of a part; None, and a warning, where it is damaged."""
+        """Return the rows of a part; None, and a warning, if it is damaged."""
         content = self.parts.read(self.keys[index])
         table = None if content is None else decoded(content, self.rules.schema, self.jobs[index].size)
         if table is None:
@@ -146,11 +186,10 @@ class Sweep:
         return table
 
     def _batches(self, todo: list[int]) -> list[list[int]]:
-        """Jobs by the calls that they are computed in.
+        """Return jobs by the call that computes them.
 
-        Jobs of few designs of one scene go to one worker, since they share its pixel responses, where there are so many
-        scenes that no worker waits long for the last one. Scenes with the largest lights, which take longest, come
-        first.
+        Jobs of few designs of one scene share its pixel response in one worker, if there are enough scenes. Scenes
+        with the largest lights, which take longest, come first.
         """
 
         def light_px(scenario: str) -> float:
@@ -168,7 +207,7 @@ class Sweep:
 
 
 def _compute(jobs: Sequence[_KeyedJob], rules: Rules, folder: Path | None) -> list[Finished]:
-    """Compute jobs, and write their parts where a folder is given."""
+    """Compute jobs, and write their parts if a folder is given."""
     return [_finished(key, folder, rules, run_job(job, setup, rules)) for job, key, setup in jobs]
 
 
@@ -184,13 +223,13 @@ def _failed(table: pa.Table) -> int:
 
 
 def _quarantined(call: Call) -> list[Finished]:
-    """Compute jobs whose worker died twice one by one; one that kills again by halves, down to the design that does."""
+    """Compute jobs whose worker died twice one by one; one that kills again by halves, down to the design."""
     jobs, rules, folder = call[1]
     return [_finished(key, folder, rules, _alone(job, setup, rules)) for job, key, setup in jobs]
 
 
 def _alone(job: Job, setup: Setup, rules: Rules) -> pa.Table:
-    """Rows of a job, with no other under way; by halves where its worker dies, down to a row with its status."""
+    """Return the rows of a job, computed with no other; by halves if its worker dies, down to a row with its status."""
     try:
         table: pa.Table = Workers(2).alone((run_job, (job, setup, rules), {}))
         return table

@@ -1,4 +1,4 @@
-"""The benchmark of vision: every plain CFA, named design and answer of the search before the same images."""
+"""Benchmark of vision: every plain CFA, named design and answer before the same images."""
 
 from __future__ import annotations
 
@@ -51,9 +51,25 @@ _MISREAD = pa.schema(
 
 
 def vision_tables(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: Progress) -> dict[str, pa.Table]:
-    """Return the tables of `VISION_TABLES`; of designs in several scenarios the first one's rows count.
+    """Compute the tables of `VISION_TABLES`; a design in several scenarios counts once.
 
-    Random numbers follow from the study's seed: all designs see the same scenes and the same photons.
+    Random numbers follow from the study's seed: all designs see the same scenes and photons.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    rows : pandas.DataFrame
+        Rows of plain CFAs, named designs and the answer.
+    parallel : callable
+        Runs calls on the cores.
+    progress : callable
+        Called with a phase, work done and work in total.
+
+    Returns
+    -------
+    dict of str to pyarrow.Table
+        Tables by file name.
     """
     vision = study.section.vision
     assert vision is not None
@@ -87,7 +103,7 @@ def vision_tables(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
 
 
 def _image_rows(study: Study, vision: Vision, key: dict[str, Any], reading: SeedReading) -> Iterator[dict[str, Any]]:
-    """A row for each image of a design and seed."""
+    """Yield one row per image of a design and seed."""
     for lamps, by_order in ((UNSEEN, reading.unseen), (SEEN, reading.seen)):
         for order in ORDERS:
             yield from _rows_of(study, vision, key | {"order": order, "lamps": lamps}, by_order[order])

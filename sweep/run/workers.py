@@ -1,4 +1,4 @@
-"""Calls over worker processes, threads or a cluster, by joblib; deaths of workers; stopping a run."""
+"""Calls on worker processes, threads or a cluster, by joblib; deaths of workers; stopping a run."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _STOPPED = "interrupted; finished parts are kept, the same command continues"
 
 
 class WorkerKilledError(SweepError):
-    """A call whose worker died twice."""
+    """Error of a call whose worker died twice."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,20 @@ class Workers:
         return max(1, min(self.n_jobs, os.cpu_count() or 1))
 
     def __call__(self, calls: Iterable[Call], killed: Callable[[Call], Any] | None = None) -> Iterator[Any]:
-        """Yield the results of calls in their order; see `unordered`."""
+        """Yield the results of calls in order; see `unordered`.
+
+        Parameters
+        ----------
+        calls : iterable of Call
+            Calls.
+        killed : callable, optional
+            Result of a call that kills its worker twice.
+
+        Yields
+        ------
+        object
+            Results.
+        """
         early: dict[int, Any] = {}
         turn = 0
         for at, result in self.unordered(calls, killed):
@@ -63,10 +76,27 @@ class Workers:
     def unordered(
         self, calls: Iterable[Call], killed: Callable[[Call], Any] | None = None
     ) -> Iterator[tuple[int, Any]]:
-        """Yield the numbers and results of calls, as they come.
+        """Yield the numbers and results of calls as they come.
 
-        Where a worker dies, the calls that were under way run again, one at a time. One that kills again goes to
-        `killed`, whose answer counts as its result; raises WorkerKilledError without it.
+        If a worker dies, the calls under way run again, one at a time. One that kills its worker again goes to
+        `killed`.
+
+        Parameters
+        ----------
+        calls : iterable of Call
+            Calls.
+        killed : callable, optional
+            Result of a call that kills its worker twice.
+
+        Yields
+        ------
+        number, result : int, object
+            Number and result.
+
+        Raises
+        ------
+        WorkerKilledError
+            Without `killed`.
         """
         waiting = dict(enumerate(calls))
         n_jobs = -1 if self.backend == "dask" else self.count
@@ -98,7 +128,23 @@ class Workers:
                     yield at, result
 
     def alone(self, call: Call) -> Any:
-        """Return the result of a call with no other under way; raises WorkerKilledError where its worker dies."""
+        """Return the result of a call with no other under way.
+
+        Parameters
+        ----------
+        call : Call
+            Call.
+
+        Returns
+        -------
+        object
+            Result.
+
+        Raises
+        ------
+        WorkerKilledError
+            If its worker dies.
+        """
         try:
             ((_, result),) = joblib.Parallel(max(2, self.count))([(_numbered, (0, call), {})])
         except Exception as error:
@@ -110,9 +156,26 @@ class Workers:
 
 @contextmanager
 def workers(n_jobs: int, backend: str = "loky", scheduler: str | None = None) -> Iterator[Workers]:
-    """Start the backend and give its workers for as long as the block stands.
+    """Start a backend and give its workers within a `with` block.
 
-    Raises SweepError where Dask is not installed or its scheduler does not answer.
+    Parameters
+    ----------
+    n_jobs : int
+        Workers.
+    backend : {'loky', 'threading', 'dask'}
+        Backend.
+    scheduler : str, optional
+        Address of a Dask scheduler.
+
+    Yields
+    ------
+    Workers
+        Workers.
+
+    Raises
+    ------
+    SweepError
+        If Dask is not installed, or its scheduler does not answer.
     """
     settings: dict[str, Any] = {}
     with ExitStack() as stack:
@@ -129,7 +192,24 @@ def workers(n_jobs: int, backend: str = "loky", scheduler: str | None = None) ->
 
 
 def tracked(parallel: Parallel, calls: Sequence[Call], phase: str, progress: Progress) -> Iterator[Any]:
-    """Yield the answers of calls in their order, with the progress of a phase."""
+    """Yield the answers of calls in order, with the progress of a phase.
+
+    Parameters
+    ----------
+    parallel : callable
+        Runs calls on the cores.
+    calls : sequence of Call
+        Calls.
+    phase : str
+        Name of the phase.
+    progress : callable
+        Called with a phase, work done and work in total.
+
+    Yields
+    ------
+    object
+        Answers.
+    """
     for done, answer in enumerate(parallel(calls), 1):
         progress(phase, done, len(calls))
         yield answer
@@ -137,10 +217,20 @@ def tracked(parallel: Parallel, calls: Sequence[Call], phase: str, progress: Pro
 
 @contextmanager
 def stopped_by_signals() -> Iterator[None]:
-    """SIGTERM stops a run as Ctrl-C does; raises InterruptedRunError then.
+    """Let SIGTERM stop a run as Ctrl-C does, within a `with` block.
 
-    joblib ends its workers when the exception reaches it. Parts are on the disk as soon as they are finished. Python
-    takes signals in the main thread alone; elsewhere nothing is changed.
+    joblib ends its workers when the exception reaches it; finished parts are on the disk. Python handles signals in
+    the main thread alone; elsewhere nothing changes.
+
+    Yields
+    ------
+    None
+        Signals are handled.
+
+    Raises
+    ------
+    InterruptedRunError
+        After SIGINT or SIGTERM.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -160,7 +250,7 @@ def stopped_by_signals() -> Iterator[None]:
 
 
 def heed_stop() -> None:
-    """Raise KeyboardInterrupt where a stop was asked for, before a result that it may have spoiled is kept."""
+    """Raise KeyboardInterrupt if a stop was requested, before a result is kept that it may have spoiled."""
     if _stop.is_set():
         raise KeyboardInterrupt
 
@@ -171,32 +261,32 @@ def _ask_to_stop(*_: object) -> None:
 
 
 def _begin_worker(parent: int) -> None:
-    """In a worker: leave Ctrl-C, which reaches all processes of a terminal, to the parent, and end with it."""
+    """Ignore Ctrl-C in a worker, and end the worker with its parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
 
 
 def _end_with(parent: int) -> None:
-    """End this process with its parent: loky's workers would wait for work from one that was killed for ever."""
+    """End this process with its parent; loky's workers would wait for work forever."""
     with suppress(psutil.NoSuchProcess):
         psutil.Process(parent).wait()
     signal.raise_signal(signal.SIGTERM)
 
 
 def _numbered(at: int, call: Call) -> tuple[int, Any]:
-    """The number and the result of a call whose libraries use one thread: the same sums with any number of workers."""
+    """Return number and result of a call whose libraries use one thread, so that sums do not depend on the workers."""
     function, arguments, named = call
     with threadpool_limits(limits=1):
         return at, function(*arguments, **named)
 
 
 def _is_death(error: Exception) -> bool:
-    """True where a worker died: loky's broken pool, or Dask's KilledWorker, whose package is an extra."""
+    """Return whether a worker died: loky's broken pool, or Dask's KilledWorker."""
     return isinstance(error, BrokenProcessPool) or type(error).__name__ == "KilledWorker"
 
 
 def _client(scheduler: str | None) -> Any:
-    """A client of a Dask scheduler."""
+    """Return a client of a Dask scheduler."""
     if scheduler is None:
         raise SweepError("--backend dask needs --scheduler tcp://HOST:PORT")
     try:
