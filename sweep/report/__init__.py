@@ -1,6 +1,6 @@
-"""Results of a finished run for a person: summary lines, figures, the HTML reports.
+"""Summary, figures and HTML reports of a finished run.
 
-Names are loaded when they are first used: a worker that draws needs few of them.
+Names are loaded at their first use: a worker that draws needs few of them.
 """
 
 from typing import TYPE_CHECKING

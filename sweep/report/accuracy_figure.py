@@ -1,4 +1,4 @@
-"""Error against time of accuracy settings, a panel for each scene."""
+"""Error against time of accuracy settings, one panel per scene."""
 
 from __future__ import annotations
 
@@ -32,8 +32,20 @@ _TOGETHER = (0.8, 0.7)
 def draw_accuracy(table: pd.DataFrame, name: str) -> Figure:
     """Draw the error of presets and single settings against the time of the study's designs.
 
-    Presets are stars with their names; the values of a single setting are joined by a line. `table`: columns scenario,
-    setting, value, designs, error_dn (DN), total_s (s); errors below 1e-6 DN are drawn there. `name`: of the study.
+    Presets are stars with their names; the values of a single setting are joined by a line.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        Columns scenario, setting, value, designs, error_dn (DN), total_s (s); errors below 1e-6 DN are
+        drawn there.
+    name : str
+        Name of the study.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Figure.
     """
     counts = sorted(table["designs"].unique())
     designs = counts[min(1, len(counts) - 1)]
@@ -69,13 +81,13 @@ def draw_accuracy(table: pd.DataFrame, name: str) -> Figure:
 
 
 def _style(number: int) -> dict[str, Any]:
-    """Line and marker of a single setting by its number."""
+    """Return line and marker of a single setting."""
     color, marker = _COLORS[number % len(_COLORS)], _MARKERS[number % len(_MARKERS)]
     return {"color": color, "marker": marker, "linestyle": "-", "linewidth": 0.8, "markersize": 4.5}
 
 
 def _mark_presets(axes: Axes, presets: pd.DataFrame) -> None:
-    """Presets as stars with their names; those that lie together share a label."""
+    """Draw presets as stars with their names; those that coincide share a label."""
     labels: list[tuple[float, float, list[str]]] = []
     for row in presets.to_dict("records"):
         seconds, error_dn = row["total_s"], max(row["error_dn"], _LEAST_DN)

@@ -1,4 +1,4 @@
-"""The answer to a study's question: sentences that can be said in a meeting, the first one before all others."""
+"""Answer to a study's question in sentences, the first one before all others."""
 
 from __future__ import annotations
 
@@ -28,7 +28,18 @@ _BY_NOISE = (D_PRIME, CNR)
 
 
 def answer_sentences(output: Output) -> list[str]:
-    """Return results on images first; then over scenarios that differ in one number the leaders, else the best."""
+    """Return results on images first; then the leaders over scenarios that differ in one number, else the best design.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    list of str
+        Lines.
+    """
     images: list[str] = []
     if output.study.vision is not None:
         from .vision_report import vision_sentences  # noqa: PLC0415  (only where a study asks for images)
@@ -58,7 +69,7 @@ def _of_designs(output: Output) -> list[str]:
 
 
 def _said_separation(output: Output, row: Row) -> str:
-    """The separation of a row for the pair of signal types of the trade-off, and its light."""
+    """Return the separation of a row and its light in words."""
     separation = output.trade_off[0]
     amount = separation.told(row[separation.name])
     light = f"at {row[CFA_SENSITIVITY]:.3f} {of_reference(output)}"
@@ -74,12 +85,12 @@ def _said_separation(output: Output, row: Row) -> str:
 
 
 def _in(output: Output, scenario: str) -> str:
-    """A scenario behind a sentence, where there are several."""
+    """Return a scenario for the end of a sentence, if there are several."""
     return f" in {scenario}" if len(output.scenarios) > 1 else ""
 
 
 def _best(output: Output, leaders: Leaders) -> Iterator[str]:
-    """The best design under the constraints, beside the plain CFA that separates most; its limits, and others."""
+    """Yield the best design beside the plain CFA with the largest separation, its limits, and others."""
     best, plain, separation = leaders.chosen, leaders.plain, output.trade_off[0]
     if best is None:
         if len(output.scenarios) > 1:
@@ -117,7 +128,7 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
 
 
 def _limits(output: Output, best: Row) -> str:
-    """Edges of the best filter, the lights that limit it, and the upper bound for any filter."""
+    """Return edges of the best filter, limiting lights, and the upper bound for any filter."""
     parts = []
     left_nm, right_nm = (best.get(name, np.nan) for name in ("left_nm", "right_nm"))
     if best["kind"] in (SWEPT, FOUND) and np.isfinite([left_nm, right_nm]).all():
@@ -137,7 +148,7 @@ def _limits(output: Output, best: Row) -> str:
 
 
 def _best_of_other_scenarios(output: Output) -> Iterator[str]:
-    """Best design of each scenario but the leading one, up to a few; those of a series by its two ends."""
+    """Yield the best design of each scenario but the leading one, up to a few; a series by its two ends."""
     inner = {name for members in series_of(output.scenarios).values() for name in list(members)[1:-1]}
     others = [name for name in output.scenarios if name not in inner and name != output.scenario]
     for scenario in others[:_MOST_SCENARIOS]:
@@ -153,7 +164,7 @@ def _best_of_other_scenarios(output: Output) -> Iterator[str]:
 
 
 def _limited(output: Output, row: Row) -> str:
-    """The two lights that limit the separation of a row, where it is that of two lights of the study."""
+    """Return the two lights that limit a row's separation, if they are lights of the study."""
     separation = output.trade_off[0]
     lights = row.get(limited_by_name(separation.pair)) if separation.pair else None
     of_two = separation.extreme != OF_A_SHARE and not over_population(output)
@@ -166,7 +177,7 @@ def _limited_told(output: Output, row: Row) -> str:
 
 
 def _times(output: Output, best: Row, plain: Row | None) -> str:
-    """The separation and the light of a row as multiples of those of a plain CFA."""
+    """Return separation and light of a row as multiples of those of a plain CFA."""
     if plain is None:
         return ""
     separation = output.trade_off[0]
@@ -182,7 +193,18 @@ def _times(output: Output, best: Row, plain: Row | None) -> str:
 
 
 def who_else(output: Output) -> list[str]:
-    """Return who separates most, where that is not the best under the constraints, and what it does not meet."""
+    """Return the design with the largest separation, if it is not the best one, and the constraints that it violates.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    list of str
+        Lines.
+    """
     leaders, separation = leaders_of(output), output.trade_off[0]
     best, most, where = leaders.chosen, leaders.separates, _in(output, leaders.scenario)
     verb, more = "separates most", "separates more"
@@ -203,7 +225,18 @@ _RESAMPLES = 10_000
 
 
 def unseen_lines(output: Output) -> Iterator[str]:
-    """Yield the loss of the search on lights that are left out of it."""
+    """Yield the loss of the search on lights that are left out of it.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Yields
+    ------
+    str
+        Sentences.
+    """
     if output.left_out is None:
         return
     several = output.left_out["objective"].nunique() > 1
@@ -222,8 +255,20 @@ def unseen_lines(output: Output) -> Iterator[str]:
 def generalization_gap(falls: FloatArray, seed: int) -> tuple[float, float, float]:
     """Return the mean fall of an optimum on a light that was left out, with its 95 % interval by a bootstrap.
 
-    `falls`: DN, ndarray[n_lights]. The interval is of lights like these, drawn at random (Efron and Tibshirani, An
-    Introduction to the Bootstrap, 1993, chapter 13).
+    The interval is of lights like these, drawn at random (Efron and Tibshirani, An Introduction to the Bootstrap,
+    1993, chapter 13).
+
+    Parameters
+    ----------
+    falls : ndarray of shape (n_lights,)
+        Falls, DN.
+    seed : int
+        Seed.
+
+    Returns
+    -------
+    mean, low, high : float
+        Mean and interval, DN.
     """
     rng = np.random.default_rng([seed, 2])
     means = falls[rng.integers(falls.size, size=(_RESAMPLES, falls.size))].mean(axis=1)
@@ -232,9 +277,19 @@ def generalization_gap(falls: FloatArray, seed: int) -> tuple[float, float, floa
 
 
 def large_numbers(output: Output) -> list[tuple[str, str, str]]:
-    """Return (value, name, comparison) of separation, light and distance to the upper bound of the best design.
+    """Return separation, light and distance to the upper bound of the best design, with a comparison.
 
     Without a bound, its separation per exposure. Without a best design there are none.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    list of (value, name, comparison)
+        Texts.
     """
     leaders = leaders_of(output)
     best, plain, separation = leaders.chosen, leaders.plain, output.trade_off[0]
@@ -266,5 +321,5 @@ def large_numbers(output: Output) -> list[tuple[str, str, str]]:
 
 
 def _rate(rate: float) -> str:
-    """A separation per millisecond of exposure."""
+    """Format a separation per millisecond of exposure."""
     return f"{rate:.{0 if rate >= 100 else 1}f}"

@@ -1,4 +1,4 @@
-"""Colors of a study with the task of color: error against noise per CFA, and two pictures as each CFA renders them."""
+"""Colors of a study with the task `color`: error against noise per CFA, and two rendered pictures."""
 
 from __future__ import annotations
 
@@ -27,7 +27,18 @@ _WHITE = np.array([0.9505, 1.0, 1.089])
 
 
 def error_curves(output: Output) -> dict[str, pd.DataFrame]:
-    """Light -> mean color error over luminance SNR of every design of the first scenario."""
+    """Return mean color error over luminance SNR of every design of the first scenario.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    dict of str to pandas.DataFrame
+        Curves by light.
+    """
     if output.traded is None:
         return {}
     rows = output.traded[output.traded["scenario"] == output.scenarios[0]]
@@ -35,7 +46,18 @@ def error_curves(output: Output) -> dict[str, pd.DataFrame]:
 
 
 def noise_optimal(curve: pd.DataFrame) -> tuple[float, float]:
-    """SNR and error of a design's noise-optimal matrix."""
+    """Return SNR and error of a design's noise-optimal matrix.
+
+    Parameters
+    ----------
+    curve : pandas.DataFrame
+        Curve of the design.
+
+    Returns
+    -------
+    snr, delta_e : float
+        Luminance SNR and mean color error.
+    """
     row = curve.iloc[(curve["regularization"] - 1).abs().argmin()]
     return float(row["snr"]), float(row["delta_e_mean"])
 
@@ -54,9 +76,17 @@ def _draw_error_curves(light: str, curves: pd.DataFrame) -> Figure:
 
 
 def renderings(output: Output) -> dict[str, dict[str, FloatArray]]:
-    """Picture -> it as the eye and each design of the first scenario see it, with noise drawn from the study's seed.
+    """Return pictures as the eye and each design of the first scenario see them, with noise by the study's seed.
 
-    In linear sRGB, ndarray[rows, columns, 3].
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    dict of str to dict of str to ndarray of shape (rows, columns, 3)
+        Linear sRGB by picture and design.
     """
     if output.rendered is None:
         return {}
@@ -72,7 +102,7 @@ def renderings(output: Output) -> dict[str, dict[str, FloatArray]]:
 
 
 def _image(picture: str, areas: pd.DataFrame, rng: np.random.Generator) -> FloatArray:
-    """Every pixel of an area with its own noise."""
+    """Return the pixels of a picture, each with its own noise."""
     names = list(areas["area"])
     if picture == CHART:
         patches = np.arange(len(names)).reshape(-1, _COLUMNS)
@@ -88,7 +118,7 @@ def _image(picture: str, areas: pd.DataFrame, rng: np.random.Generator) -> Float
 
 
 def _street(areas: Mapping[str, int]) -> IndexArray:
-    """A street at night: a road that narrows toward the horizon, its lines, signals, signs, a car and leaves."""
+    """Return the area of each pixel of a street at night: road, lines, signals, signs, a car and leaves."""
     height, width = 72, 108
     y, x = np.mgrid[0:height, 0:width]
     street = np.full((height, width), areas["sky"], dtype=np.intp)
@@ -121,7 +151,7 @@ def _street(areas: Mapping[str, int]) -> IndexArray:
 
 
 def _draw_renderings(pictures: Mapping[str, FloatArray], title: str) -> Figure:
-    """Draw the pictures side by side, in sRGB; colors outside it are cut off."""
+    """Draw the pictures side by side, in sRGB; colors outside it are clipped."""
     figure, panels = panel_grid(len(pictures), 4, (2.6, 2.1), (0, 0.4))
     for axes, (name, image) in zip(panels, pictures.items(), strict=True):
         linear = np.clip(image, 0.0, 1.0)
@@ -134,7 +164,18 @@ def _draw_renderings(pictures: Mapping[str, FloatArray], title: str) -> Figure:
 
 
 def color_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
-    """(file name, caption, drawing) of everything that is drawn of colors."""
+    """Yield the drawings of colors.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Yields
+    ------
+    name, caption, drawing : str, str, Drawing
+        File name, caption and drawing.
+    """
     for number, (light, curves) in enumerate(error_curves(output).items(), 1):
         caption = f"Color error against noise under {light.upper()}, over how much the color matrix weighs noise"
         drawn = curves[["name", "snr", "delta_e_mean", "regularization"]]

@@ -1,4 +1,4 @@
-"""Read finished runs, compare them, write page, picture and table."""
+"""Compare finished runs: page, picture and table."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ _MOST_SCENARIOS = 4
 
 @dataclass(frozen=True)
 class Comparison:
-    """Result of a comparison: folder of its files, lines for people, the same as tables, and notes."""
+    """Result of a comparison: folder of its files, lines, tables, and notes."""
 
     folder: Path
     lines: Sequence[str]
@@ -56,10 +56,26 @@ class Comparison:
 
 
 def compare_runs(folders: Sequence[Path], to: Path | None) -> Comparison:
-    """Compare finished runs, write `compare.html`, `compare.csv`, `fronts.png`, `fronts.svg`, and say what was found.
+    """Compare finished runs, and write `compare.html`, `compare.csv`, `fronts.png` and `fronts.svg`.
 
-    `to`: default outputs/compare-<a>-<b>. Raises SweepError unless there are 2 to 26; OutputError for a folder without
-    a finished run, where a file would be replaced that no comparison wrote, and as `atomic.atomic` does.
+    Parameters
+    ----------
+    folders : sequence of Path
+        Output folders of 2 to 26 studies.
+    to : Path or None
+        Folder of the comparison; None: outputs/compare-<a>-<b>.
+
+    Returns
+    -------
+    Comparison
+        Result.
+
+    Raises
+    ------
+    SweepError
+        If there are fewer or more runs.
+    OutputError
+        If a folder holds no finished run, a file of others would be replaced, or the disk refuses.
     """
     if not 2 <= len(folders) <= len(_LETTERS):
         allowed = f"2 to {len(_LETTERS)} folders"
@@ -115,7 +131,22 @@ def compare_runs(folders: Sequence[Path], to: Path | None) -> Comparison:
 
 
 def compare_fronts(runs: Mapping[str, Output]) -> tuple[dict[str, Areas], Drawing | None, list[str]]:
-    """Hypervolumes by scenario of the runs with the same axes, the plot of the first scenario, and notes."""
+    """Compare the fronts of runs with the same axes.
+
+    Parameters
+    ----------
+    runs : mapping of str to Output
+        Runs by name.
+
+    Returns
+    -------
+    areas : dict of str
+        Hypervolumes by scenario.
+    drawing : Drawing or None
+        Plot of the first scenario.
+    notes : list of str
+        Notes.
+    """
     group, notes = on_the_same_axes(runs)
     every = {name for output in group.values() for name in output.scenarios}
     scenarios = [n for n in next(iter(runs.values())).scenarios if all(n in o.scenarios for o in group.values())]
@@ -141,7 +172,7 @@ def compare_fronts(runs: Mapping[str, Output]) -> tuple[dict[str, Areas], Drawin
 
 
 def _largest(areas: Mapping[str, Areas]) -> list[str]:
-    """The front that dominates most, where there are several to compare."""
+    """Return the front with the largest hypervolume, if there are several to compare."""
     for scenario, (_, table) in list(areas.items())[:1]:
         if table["run"].nunique() > 1:
             most = table.nlargest(1, "hypervolume").iloc[0]
@@ -168,7 +199,7 @@ def _constraint_note(runs: Mapping[str, Output]) -> list[str]:
 
 
 def _folder_of(folders: Sequence[Path]) -> str:
-    """A name from those of the runs, short enough for every file system."""
+    """Return a folder name from those of the runs, short enough for every file system."""
     name = "-".join(["compare", *(folder_name(folder.resolve().name) for folder in folders)])
     if len(name) <= _MOST_LETTERS:
         return name
@@ -177,7 +208,7 @@ def _folder_of(folders: Sequence[Path]) -> str:
 
 
 def _refuse_other(target: Path) -> None:
-    """Raises OutputError where one of the files is there without a page that says a comparison wrote it."""
+    """Raise OutputError if a file is there without the page of a comparison."""
     try:
         with (target / PAGE).open("rb") as handle:
             if _MARK in handle.read(_MARK_WITHIN):
@@ -190,7 +221,7 @@ def _refuse_other(target: Path) -> None:
 
 
 def _write_or_remove(content: bytes | None, path: Path) -> None:
-    """A file of this comparison, or its absence: an older picture would be of something else."""
+    """Write a file of this comparison, or remove an older one."""
     if content is not None:
         write_bytes(content, path)
         return

@@ -32,10 +32,16 @@ _MARKS_PER_LINE = 12
 
 @dataclass(frozen=True)
 class ComparedFront:
-    """The trade-off of a CFA in a run.
+    """Front of a CFA in a run.
 
-    `traced`: by the search, before quantization; else designs of the result table. `points`: ndarray[n, 2],
-    separation and sensitivity, by rising sensitivity.
+    Parameters
+    ----------
+    run, cfa : str
+        Names.
+    traced : bool
+        By the search, before quantization; else designs of the result table.
+    points : ndarray of shape (n, 2)
+        Separation and sensitivity, by rising sensitivity.
     """
 
     run: str
@@ -45,7 +51,20 @@ class ComparedFront:
 
 
 def on_the_same_axes(runs: Mapping[str, Output]) -> tuple[dict[str, Output], list[str]]:
-    """The largest group of runs whose fronts have the same meaning, and a sentence where that is not all of them."""
+    """Return the largest group of runs whose fronts have the same meaning.
+
+    Parameters
+    ----------
+    runs : mapping of str to Output
+        Runs by name.
+
+    Returns
+    -------
+    group : dict of str to Output
+        Runs.
+    notes : list of str
+        Sentence on the other runs.
+    """
     groups: dict[tuple[str, ...], dict[str, Output]] = {}
     for label, output in runs.items():
         groups.setdefault(_meaning(output), {})[label] = output
@@ -59,13 +78,24 @@ def on_the_same_axes(runs: Mapping[str, Output]) -> tuple[dict[str, Output], lis
 
 
 def dn_of(output: Output) -> str:
-    """Full scale and pedestal of a run, without which its DN cannot be compared."""
+    """Return full scale and pedestal of a run, without which its DN cannot be compared.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    str
+        Text.
+    """
     pixel = output.study.pixel
     return f"DN of {pixel.bits} bits" + (f", pedestal {pixel.offset_dn:g} DN" if pixel.offset_dn else "")
 
 
 def _meaning(output: Output) -> tuple[str, ...]:
-    """Both axes in words, with all that a combined objective, a worst case and DN depend on."""
+    """Return both axes in words, with everything that a combined objective, a worst case and DN depend on."""
     production, population = output.study.production, output.study.population
     over = [f"edges {production.edge_shift_nm:g} nm off"] if production.edge_shift_nm else []
     over += [f"films {production.thickness:.2%} off"] if production.thickness else []
@@ -82,7 +112,20 @@ def _meaning(output: Output) -> tuple[str, ...]:
 
 
 def fronts_in(runs: Mapping[str, Output], scenario: str) -> list[ComparedFront]:
-    """All fronts of a scenario: of designs, which meet every constraint but those on the axes, and of the search."""
+    """Return all fronts of a scenario: of designs that meet every constraint but those on the axes, and of the search.
+
+    Parameters
+    ----------
+    runs : mapping of str to Output
+        Runs by name.
+    scenario : str
+        Scenario.
+
+    Returns
+    -------
+    list of ComparedFront
+        Fronts.
+    """
     fronts = []
     for label, output in runs.items():
         rows = output.table[output.table["pareto"] & (output.table["scenario"] == scenario)]
@@ -103,14 +146,38 @@ def _sorted(values: pd.DataFrame) -> FloatArray:
 
 
 def box_of(fronts: Sequence[ComparedFront]) -> tuple[FloatArray, FloatArray]:
-    """Corners of the box of all fronts: no separation and the hundredth below the lowest sensitivity, and the top."""
+    """Return the corners of the box of all fronts: no separation and 0.01 below the lowest sensitivity, and the top.
+
+    Parameters
+    ----------
+    fronts : sequence of ComparedFront
+        Fronts.
+
+    Returns
+    -------
+    low, high : ndarray of shape (2,)
+        Corners.
+    """
     points = np.concatenate([front.points for front in fronts])
     lowest = math.floor((points[:, 1].min() - _BELOW) / _STEP) * _STEP
     return np.array([min(0.0, points[:, 0].min()), round(lowest, 2)]), points.max(axis=0)
 
 
 def hypervolumes(fronts: Sequence[ComparedFront]) -> tuple[str, pd.DataFrame]:
-    """The box in words; a row per front: its ends, the area that it dominates in the box, and its share of the box."""
+    """Return the box in words, and one row per front with its ends, its hypervolume and its share of the box.
+
+    Parameters
+    ----------
+    fronts : sequence of ComparedFront
+        Fronts.
+
+    Returns
+    -------
+    box : str
+        Text.
+    table : pandas.DataFrame
+        Table.
+    """
     reference, top = box_of(fronts)
     whole = float(np.prod(top - reference))
     rows = []
@@ -144,10 +211,28 @@ def draw_fronts(
     fronts: Sequence[ComparedFront],
     best: Sequence[tuple[str, float, float]],
 ) -> Figure:
-    """Draw the fronts: a color and a dash per run, a mark per front, so that they differ in gray, too.
+    """Draw the fronts: a color and a dash per run, a marker per front, so that they differ in gray, too.
 
-    `labels`: of the axes; `order`: all runs; `best`: run and place of best designs. A front of designs is a staircase:
-    between two of them there is none. Between the levels of the search, nothing is known.
+    A front of designs is a staircase: between two designs there is none. Between the levels of the search, nothing is
+    known.
+
+    Parameters
+    ----------
+    title : str
+        Title.
+    labels : tuple of str
+        Axes.
+    order : sequence of str
+        All runs.
+    fronts : sequence of ComparedFront
+        Fronts.
+    best : sequence of (run, x, y)
+        Best designs.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Figure.
     """
     drawn, axes = canvas(9.0, 5.0)
     for front, marker in zip(fronts, itertools.cycle(_MARKERS)):

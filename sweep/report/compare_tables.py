@@ -1,4 +1,4 @@
-"""Tables of a comparison: best designs, plain CFAs, and the differences between studies and how they were computed."""
+"""Tables of a comparison: best designs, plain CFAs, and differences between studies."""
 
 from __future__ import annotations
 
@@ -26,7 +26,18 @@ _BEFORE = 20
 
 
 def best_of_runs(runs: Mapping[str, Output]) -> pd.DataFrame:
-    """A row per run: its best feasible design with parameters, CSDs and sensitivities; without one, the run alone."""
+    """Return one row per run: its best feasible design with parameters, CSDs and sensitivities, if it has one.
+
+    Parameters
+    ----------
+    runs : mapping of str to Output
+        Runs by name.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Table.
+    """
     rows = []
     for name, output in runs.items():
         row: dict[str, Any] = {
@@ -45,7 +56,22 @@ def best_of_runs(runs: Mapping[str, Output]) -> pd.DataFrame:
 
 
 def side_by_side(best: pd.DataFrame, runs: Mapping[str, Output]) -> tuple[pd.DataFrame, int]:
-    """The best designs as a column each, in words; and how many of their parameters were left out."""
+    """Return the best designs as one column each, in words.
+
+    Parameters
+    ----------
+    best : pandas.DataFrame
+        Result of `best_of_runs`.
+    runs : mapping of str to Output
+        Runs by name.
+
+    Returns
+    -------
+    table : pandas.DataFrame
+        Table.
+    n : int
+        Parameters that were left out.
+    """
     columns = {name: column for output in runs.values() for name, column in output.columns.items()}
     parameters = dict.fromkeys(name for output in runs.values() for name in output.parameters)
     left_out = [n for n in parameters if n in best and best[n].notna().any()][_MOST_PARAMETERS:]
@@ -71,7 +97,20 @@ def _cell(name: str, row: Mapping[Any, Any], columns: Mapping[str, Column]) -> s
 
 
 def plain_differences(runs: Mapping[str, Output]) -> tuple[pd.DataFrame, str]:
-    """CSDs of plain CFAs and named designs that differ between runs that have them; and the rest in a sentence."""
+    """Return CSDs of plain CFAs and named designs that differ between runs, and a sentence on the others.
+
+    Parameters
+    ----------
+    runs : mapping of str to Output
+        Runs by name.
+
+    Returns
+    -------
+    table : pandas.DataFrame
+        Table.
+    note : str
+        Sentence.
+    """
     parts = []
     for run, output in runs.items():
         named = output.named[["name", "scenario", *output.distances]].astype({"name": str, "scenario": str})
@@ -91,7 +130,18 @@ def plain_differences(runs: Mapping[str, Output]) -> tuple[pd.DataFrame, str]:
 
 
 def ranking(runs: Mapping[str, Output]) -> list[str]:
-    """The best run and its lead, among runs that maximize the same in the same DN; and runs without a best design."""
+    """Return the best run and its lead, among runs with equal objectives in equal DN, and runs without a best design.
+
+    Parameters
+    ----------
+    runs : mapping of str to Output
+        Runs by name.
+
+    Returns
+    -------
+    list of str
+        Lines.
+    """
     lines, groups = [], dict[tuple[str, str], dict[str, float]]()
     for run, output in runs.items():
         if output.best.empty:
@@ -123,18 +173,40 @@ def ranking(runs: Mapping[str, Output]) -> list[str]:
 
 
 def _maximized(output: Output) -> tuple[str, str]:
-    """The objective in words, and the meaning of its DN, where it has any."""
+    """Return the objective in words, and the meaning of its DN, if it has any."""
     text = str(output.objective) if output.goal.name == COMBINED else output.goal.words
     return text, dn_of(output) if any(output.columns[name].unit == DN for name in output.objective.weights) else ""
 
 
 def study_differences(runs: Mapping[str, Output]) -> pd.DataFrame:
-    """Columns `key` and a run each, a row for every key of the resolved studies that is not the same in all."""
+    """Return one row for every key of the resolved studies that differs; columns `key` and one per run.
+
+    Parameters
+    ----------
+    runs : mapping of str to Output
+        Runs by name.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Table.
+    """
     return _differences({run: output.resolved for run, output in runs.items()})
 
 
 def origin_differences(runs: Mapping[str, Output]) -> pd.DataFrame:
-    """The same of what made the results: sensor, lights, files, versions, and how each scene was simulated."""
+    """Return the differences of sensor, lights, files, versions, and plans; columns as in `study_differences`.
+
+    Parameters
+    ----------
+    runs : mapping of str to Output
+        Runs by name.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Table.
+    """
     trees = {}
     for run, output in runs.items():
         kept = {"sensor", "lights", "model_version", "data_sha256", "versions", "designs"}
@@ -158,7 +230,7 @@ def _differences(trees: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
 
 
 def _leaves(path: str, tree: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """Dotted keys and values in words."""
+    """Yield dotted keys and values in words."""
     for key, value in tree.items():
         where = f"{path}.{key}" if path else str(key)
         if isinstance(value, Mapping):
@@ -169,7 +241,7 @@ def _leaves(path: str, tree: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def _cut(texts: list[str]) -> list[str]:
-    """Differing values; of long ones the part where they begin to differ."""
+    """Return differing values; of long ones the part from the first difference on."""
     there = [text for text in texts if text != "-"]
     if max(map(len, there)) <= _SHOWN:
         return texts
@@ -183,7 +255,18 @@ def _cut(texts: list[str]) -> list[str]:
 
 
 def curve_notes(runs: Mapping[str, Output]) -> list[str]:
-    """A sentence for each run that used other curves than the first, which makes its CSDs another scale."""
+    """Return a sentence for each run with other curves than the first, whose CSDs have another scale.
+
+    Parameters
+    ----------
+    runs : mapping of str to Output
+        Runs by name.
+
+    Returns
+    -------
+    list of str
+        Lines.
+    """
     (first, reference), *others = runs.items()
     notes = []
     for name, output in others:

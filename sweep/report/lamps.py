@@ -27,15 +27,36 @@ _MODELED = "single LEDs, modeled as hyperbolic secants"
 
 
 def over_population(output: Output) -> bool:
-    """Return whether the separation of the trade-off is a worst case over a population of lights."""
+    """Return whether the separation of the trade-off is a worst case over a population of lights.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    bool
+        True if it is.
+    """
     separation = output.trade_off[0]
     return output.study.population is not None and separation.extreme == WORST_CASE and separation.pair is not None
 
 
 def robustness_lines(output: Output, best: Row | None) -> Iterator[str]:
-    """Yield the cost of the worst case, what breaks designs, and yields; nothing without a population of lights.
+    """Yield cost of the worst case, causes of failure, and yields; nothing without a population of lights.
 
-    In the scenario of the best design, else in the first one.
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+    best : mapping or None
+        Best design, whose scenario is used, else the first one.
+
+    Yields
+    ------
+    str
+        Sentences.
     """
     if output.study.population is None:
         return
@@ -62,7 +83,7 @@ def robustness_lines(output: Output, best: Row | None) -> Iterator[str]:
 
 
 def _price(output: Output, best: Row, named: list[Row]) -> Iterator[str]:
-    """The best one beside the named design that separates most in the nominal case."""
+    """Yield the best design beside the named design with the largest nominal separation."""
     worst = output.trade_off[0]
     nominal = output.columns[worst.of]
     rivals = [row for row in named if row[nominal.name] > best[nominal.name] and row[worst.name] > 0]
@@ -77,7 +98,7 @@ def _price(output: Output, best: Row, named: list[Row]) -> Iterator[str]:
 
 
 def _breaks(output: Output, row: Row, plain: list[Row]) -> str:
-    """Where a design falls below the best plain CFA, by which lights, at which temperature."""
+    """Return where a design falls below the best plain CFA, by which lights, at which temperature."""
     separation, who = output.trade_off[0], capital(full_name(row))
     worst = WORST + (separation.of or separation.name)
     rival = max(plain, key=lambda other: float(other[worst]))
@@ -101,9 +122,18 @@ def _breaks(output: Output, row: Row, plain: list[Row]) -> str:
 class LampMap:
     """Distances of the lamps of a norm with a design.
 
-    `share`: of all pairs, with at least the wanted distance; `nearest`: the two LEDs that are nearest to each other.
-    `least_dn`: the smallest distance over widths, a row per yellow and a column per red peak, nm; NaN where none is
-    allowed.
+    Parameters
+    ----------
+    row : mapping
+        Row of the design.
+    pairs : int
+        Pairs of LEDs.
+    share : float
+        Share of pairs with at least the wanted CSD.
+    nearest : mapping of str to float
+        Two nearest LEDs.
+    least_dn : pandas.DataFrame
+        Smallest CSD over widths, a row per yellow and a column per red peak, nm; NaN where none is allowed.
     """
 
     row: Row
@@ -114,17 +144,39 @@ class LampMap:
 
     @property
     def distance(self) -> str:
-        """Distance of the nearest two with its unit."""
+        """CSD of the nearest two with its unit."""
         value = self.nearest["least_dn"]
         return f"{value:.{0 if value >= 10 else 1}f} {DN}"
 
     def led(self, color: str) -> str:
-        """Describe one of the nearest two."""
+        """Describe one of the nearest two.
+
+        Parameters
+        ----------
+        color : str
+            `yellow` or `red`.
+
+        Returns
+        -------
+        str
+            Text.
+        """
         return f"{self.nearest[f'{color}_nm']:g} nm ({self.nearest[f'{color}_fwhm_nm']:g} nm wide)"
 
 
 def lamp_maps(output: Output) -> dict[str, list[LampMap]]:
-    """Return norm -> maps of every design, in the scenario of the best design or in the first one; empty by default."""
+    """Return the maps of every design, in the scenario of the best design or in the first one.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    dict of str to list of LampMap
+        Maps by norm.
+    """
     if output.regions is None:
         return {}
     rows = output.few[output.few["scenario"] == leaders_of(output).scenario]
@@ -142,7 +194,18 @@ def lamp_maps(output: Output) -> dict[str, list[LampMap]]:
 
 
 def lamp_lines(output: Output) -> Iterator[str]:
-    """Yield for each norm the share of the best design, else the largest one, beside that of the best plain CFA."""
+    """Yield for each norm the share of the best design, else the largest one, beside that of the best plain CFA.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Yields
+    ------
+    str
+        Sentences.
+    """
     best, regions = leaders_of(output).chosen, output.study.regions
     maps = lamp_maps(output)
     if not maps or regions is None:
@@ -166,7 +229,18 @@ def lamp_lines(output: Output) -> Iterator[str]:
 
 
 def lamp_table(output: Output) -> pd.DataFrame:
-    """Return a row per norm and design; empty where none are asked for."""
+    """Return one row per norm and design; empty if none are requested.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Table.
+    """
     rows = [
         {
             "norm": norm,
@@ -184,7 +258,18 @@ def lamp_table(output: Output) -> pd.DataFrame:
 
 
 def lamp_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
-    """Yield (file name, caption, drawing) of the map of each norm."""
+    """Yield the map of each norm.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Yields
+    ------
+    name, caption, drawing : str, str, Drawing
+        File name, caption and drawing.
+    """
     regions = output.study.regions
     for number, (norm, designs) in enumerate(lamp_maps(output).items(), 1):
         assert regions is not None
@@ -195,7 +280,7 @@ def lamp_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
 
 
 def _draw(maps: Sequence[LampMap], title: str, wanted_dn: float) -> Figure:
-    """A panel per design; a line where the wanted distance is reached, a cross at the nearest pair."""
+    """Draw one panel per design; a line at the wanted CSD, a cross at the nearest pair."""
     figure, panels = panel_grid(len(maps), _COLUMNS, (3.4, 2.6), (1.0, 0.6))
     most = max(float(np.nanmax(one.least_dn)) for one in maps)
     for axes, one in zip(panels, maps, strict=True):

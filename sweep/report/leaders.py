@@ -22,12 +22,21 @@ Row = Mapping[Any, Any]
 
 @dataclass(frozen=True)
 class Leaders:
-    """Rows of a scenario.
+    """Leading rows of a scenario.
 
-    `chosen`: the best design that the study swept or searched and that meets all constraints; without such designs the
-    CFA or named design that does and separates most; None where none does. `separates`: the largest separation of all
-    rows, whatever the constraints. `plain`: the other plain CFA that separates most, with which the chosen one is
-    compared. `others`: the best design of each other CFA whose designs the study swept or searched.
+    Parameters
+    ----------
+    scenario : str
+        Scenario.
+    chosen : mapping or None
+        Best swept or searched design that meets all constraints; without such designs, the CFA or named
+        design that does and separates most.
+    separates : mapping or None
+        Largest separation of all rows.
+    plain : mapping or None
+        Other plain CFA with the largest separation.
+    others : tuple of mapping
+        Best design of each other CFA.
     """
 
     scenario: str
@@ -38,7 +47,20 @@ class Leaders:
 
 
 def leaders_of(output: Output, scenario: str | None = None) -> Leaders:
-    """Return the leaders of a scenario, by default of that of the search, or of the first one."""
+    """Return the leaders of a scenario.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+    scenario : str, optional
+        Scenario; left out, that of the search, or the first one.
+
+    Returns
+    -------
+    Leaders
+        Leaders.
+    """
     scenario = output.scenario if scenario is None else scenario
     return output.once(("leaders", scenario), partial(_leaders, output, scenario))
 
@@ -62,41 +84,94 @@ def _first(rows: pd.DataFrame) -> Row | None:
 
 
 def _most(rows: pd.DataFrame, column: str) -> Row | None:
-    """The row with the largest value; of equal ones a CFA or design with a name, then the first one."""
+    """Return the row with the largest value; of equal ones a named one, then the first."""
     most = rows[rows[column] == rows[column].max()]
     named = most[most["name"].notna()]
     return _first(most if named.empty else named)
 
 
 def of_reference(output: Output) -> str:
-    """Name the unit of a CFA's light: a clear sensor's, or that of the brightest curve in every pixel."""
+    """Return the unit of a CFA's light: a clear sensor's, or that of the brightest curve in every pixel.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    str
+        Text.
+    """
     sensor = output.provenance.sensor
     return "of a clear sensor's light" if sensor.has_clear else f"of the light of {sensor.reference} pixels alone"
 
 
 def label(row: Row) -> str:
-    """Return a design's name, or its number."""
+    """Return a design's name, or its number.
+
+    Parameters
+    ----------
+    row : mapping
+        Row of the result table.
+
+    Returns
+    -------
+    str
+        Text.
+    """
     return str(row["name"]) if isinstance(row["name"], str) else f"filter {row['filter_id']}"
 
 
 def full_name(row: Row) -> str:
-    """Name a design in a sentence: a CFA or named design by its name, others with the CFA that they are made in."""
+    """Return a design's name for a sentence, with its CFA if it has no name.
+
+    Parameters
+    ----------
+    row : mapping
+        Row of the result table.
+
+    Returns
+    -------
+    str
+        Text.
+    """
     if row["kind"] in (PLAIN, NAMED):
         return label(row)
     return f"the {label(row)} of {row['cfa']}" if row["kind"] == FOUND else f"{label(row)} of {row['cfa']}"
 
 
 def capital(text: str) -> str:
-    """Begin a sentence with an upper-case letter."""
+    """Return a sentence that begins with an upper-case letter.
+
+    Parameters
+    ----------
+    text : str
+        Sentence.
+
+    Returns
+    -------
+    str
+        Text.
+    """
     return text[:1].upper() + text[1:]
 
 
 def upper_bound(output: Output) -> SearchFacts | None:
-    """Return the search that proved an upper bound on the separation of the trade-off; None without one.
+    """Return the search that proved an upper bound on the separation of the trade-off.
 
-    `limit_proven` is the bound of any filter in one channel of a CFA, in one scenario, before quantization. It holds
-    under the study's constraints, for filters between the least transmission and the curve that they replace, of the
-    kinds and spaces in `bounded`.
+    `limit_proven` bounds any filter in one channel of a CFA, in one scenario, before quantization, under the study's
+    constraints, between the least transmission and the replaced curve, of the kinds and spaces in `bounded`.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    SearchFacts or None
+        None without one.
     """
     search = output.provenance.search
     if search is None or search.limit_proven is None or output.goal.name != output.trade_off[0].name:
@@ -107,8 +182,25 @@ def upper_bound(output: Output) -> SearchFacts | None:
 def upper_bound_beside(output: Output, row: Row) -> float | None:
     """Return the upper bound that holds for a row's filter and is not below the row's value.
 
-    A value that is read out may be above a bound before quantization by its rounding, sqrt(channels) DN at most; no
-    bound stands beside such a value. Raises BrokenProofError where a value is farther above its bound.
+    A value that is read out may exceed a bound before quantization by its rounding, at most sqrt(channels) DN; no
+    bound stands beside such a value.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+    row : mapping
+        Row of the result table.
+
+    Returns
+    -------
+    float or None
+        Upper bound.
+
+    Raises
+    ------
+    BrokenProofError
+        If a value exceeds its bound by more.
     """
     search = upper_bound(output)
     if search is None or not row["feasible"] or row["scenario"] != search.scenario or row["kind"] == PLAIN:
@@ -125,7 +217,22 @@ def upper_bound_beside(output: Output, row: Row) -> float | None:
 
 
 def bounds_figure(output: Output, scenario: str, cfa: str) -> bool:
-    """Return whether the search's upper bound holds for all filters that are drawn of a CFA in a scenario."""
+    """Return whether the upper bound holds for all filters that are drawn of a CFA in a scenario.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+    scenario : str
+        Scenario.
+    cfa : str
+        CFA.
+
+    Returns
+    -------
+    bool
+        True if it does.
+    """
     search = upper_bound(output)
     if search is None or (scenario, cfa) != (search.scenario, search.cfa):
         return False

@@ -1,4 +1,4 @@
-"""Effects of noise on the states of a study: figures, the level up to which each design is usable, recognition."""
+"""Effects of noise on the states of a study: figures, usable ranges, recognition."""
 
 from __future__ import annotations
 
@@ -32,12 +32,23 @@ _RULE_NAMES = {MOST_LIKELY: "most likely signal", "nearest_centroid": "nearest c
 
 
 def all_series(output: Output) -> list[SeriesFigure]:
-    """Return every figure of a quantity over scenarios: errors and accuracies, if asked for, then separations."""
+    """Return every figure of a quantity over scenarios: errors and accuracies, if requested, then separations.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    list of SeriesFigure
+        Figures.
+    """
     return [*_noise_figures(output), *series_figures(output)]
 
 
 def _noise_figures(output: Output) -> Iterator[SeriesFigure]:
-    """For each series of scenarios the error of the worst pair of states, and accuracies of classifiers on patches."""
+    """Yield for each series of scenarios the error of the worst pair of states, and accuracies of classifiers."""
     if output.study.recognition is None:
         return
     for (base, key), scenarios in series_of(output.scenarios).items():
@@ -60,7 +71,18 @@ def _noise_figures(output: Output) -> Iterator[SeriesFigure]:
 
 
 def usable_lines(output: Output) -> Iterator[str]:
-    """Yield for each series of scenarios the numbers at which designs are usable; those with the same ones together."""
+    """Yield for each series of scenarios the usable ranges of designs; equal ones together.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Yields
+    ------
+    str
+        Sentences.
+    """
     if output.study.recognition is None:
         return
     allowed = output.study.recognition.error_max
@@ -77,11 +99,7 @@ def usable_lines(output: Output) -> Iterator[str]:
 
 
 def _range(x: FloatArray, usable: BoolArray, unit: str, passes: tuple[float, float] | None) -> str:
-    """Where among the numbers `x` (ascending) a design is usable, in words.
-
-    Where that ends once, by the computed end, rounded to the side where it is usable; without one, by the two numbers
-    between which it ends.
-    """
+    """Return the usable range of a design in words, by the computed crossing if there is one."""
     if usable.all():
         return "everywhere"
     if not usable.any():
@@ -98,7 +116,7 @@ def _range(x: FloatArray, usable: BoolArray, unit: str, passes: tuple[float, flo
 
 
 def _rounded(value: float, *, up: bool) -> str:
-    """Three digits of a number, rounded to one side; also where the last ones are 0."""
+    """Return a number with three digits, rounded to one side."""
     unit = 10.0 ** (math.floor(math.log10(abs(value))) - 2) if value else 1.0
     rounded = (math.ceil if up else math.floor)(value / unit * (1 - 1e-12)) * unit
     text = f"{rounded:#.3g}".removesuffix(".")
@@ -106,7 +124,7 @@ def _rounded(value: float, *, up: bool) -> str:
 
 
 def _crossings(output: Output, series: str, key: str) -> dict[str, tuple[float, float]]:
-    """Design -> the number at which its error is what is allowed, and that error, as the run has computed them."""
+    """Return the number at which each design has the allowed error, and that error."""
     if output.crossings is None:
         return {}
     known = output.crossings.dropna(subset=["at", "error"])
@@ -115,7 +133,18 @@ def _crossings(output: Output, series: str, key: str) -> dict[str, tuple[float, 
 
 
 def recognition_table(output: Output) -> pd.DataFrame:
-    """Return errors in closed form and accuracies on drawn patches, a row per design and scenario."""
+    """Return errors in closed form and accuracies on drawn patches, one row per design and scenario.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Table.
+    """
     if output.study.recognition is None:
         return pd.DataFrame()
     rows = output.few

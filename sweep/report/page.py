@@ -52,8 +52,19 @@ _SHOWN = {
 def make_report(output: Output, *, mend: bool = False, parallel: Parallel = in_turn) -> None:
     """Write `pareto.png`/`.svg`, `figures/*`, the comparison with published figures and `report.html`.
 
-    `mend`: those alone that are missing, damaged or out of date. `parallel` makes the pictures. Raises OutputError
-    where a file of others has the name of one of them or the disk refuses.
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+    mend : bool
+        Only files that are missing, damaged or out of date.
+    parallel : callable
+        Runs calls on the cores.
+
+    Raises
+    ------
+    OutputError
+        If a file of others has one of the names, or the disk refuses.
     """
     with locked(output.folder):
         inventory = Inventory(output.folder)
@@ -68,7 +79,7 @@ def make_report(output: Output, *, mend: bool = False, parallel: Parallel = in_t
 
 
 def _contents(output: Output, some: Iterable[str] | None, parallel: Parallel) -> dict[str, bytes]:
-    """The files of the report -> what they hold; `some` of them, or all, since the page has every picture in it."""
+    """Return the files of the report with their content: some of them, or all, since the page holds every picture."""
     contents, wanted = dict[str, bytes](), []
     images: dict[str, list[tuple[str, str]]] = {place: [] for place in _SHOWN}
     for name, caption, figure in (*_drawings(output), *_vision_drawings(output)):
@@ -93,7 +104,7 @@ def _contents(output: Output, some: Iterable[str] | None, parallel: Parallel) ->
 
 
 def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
-    """Contents of the page, but for its pictures."""
+    """Return the content of the page without its pictures."""
     drawn, groups = payload(output), scene_groups(output)
     series_first = bool(drawn["series"]) and output.best.empty
     return {
@@ -130,7 +141,7 @@ def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
 
 
 def _vision(output: Output) -> dict[str, list[list[str]]]:
-    """Tables of the benchmark of vision; none where the study asks for none."""
+    """Return tables of the benchmark of vision; none if the study has none."""
     if output.study.vision is None:
         return {}
     from .vision_report import vision_parts  # noqa: PLC0415  (only where a study asks for images)
@@ -139,7 +150,7 @@ def _vision(output: Output) -> dict[str, list[list[str]]]:
 
 
 def _vision_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
-    """The figures of the benchmark of vision; none where the study asks for none."""
+    """Yield drawings of the benchmark of vision; none if the study has none."""
     if output.study.vision is not None:
         from .vision_report import vision_drawings  # noqa: PLC0415  (only where a study asks for images)
 
@@ -147,14 +158,14 @@ def _vision_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
 
 
 def _objective(output: Output) -> str:
-    """The objective in words, and where it is one column, its name in the files."""
+    """Return the objective in words, and its column if it is one."""
     name = output.goal.name
     words = str(output.objective) if output.goal.words == name else f"the {output.goal.words}"
     return words if name in (words, COMBINED) else f"{words} ({name} in the files)"
 
 
 def _drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
-    """(file name, caption, drawing) of everything that is drawn, the slowest first, so that no core waits for it."""
+    """Yield all drawings, the slowest first, so that no core waits for it."""
     for name, caption, kinds in (
         ("clouds-cfas", "Signals in the channels of the plain CFAs", (PLAIN,)),
         ("clouds-designs", "Signals in the channels of the named and the found designs", (NAMED, FOUND)),

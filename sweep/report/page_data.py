@@ -32,7 +32,18 @@ _PUBLISHED_LABEL = "our counterpart of the paper's N_4"
 
 
 def payload(output: Output) -> dict[str, Any]:
-    """Return everything that the page's script needs, ready for JSON; no NaN but inside packed numbers."""
+    """Return the data of the page's script, ready for JSON.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    dict
+        Data; NaN only inside packed numbers.
+    """
     rows = content.drawn_rows(output)
     columns, named = _columns(output, rows), rows[rows["name"].notna()]
     return {
@@ -71,12 +82,12 @@ def payload(output: Output) -> dict[str, Any]:
 
 
 def _packed(values: Any, kind: str) -> dict[str, str]:
-    """Numbers as base64 of little-endian bytes, which cost a third of their digits."""
+    """Return numbers as base64 of little-endian bytes."""
     return {"dtype": kind, "bdata": base64.b64encode(np.asarray(values).astype(f"<{kind}").tobytes()).decode("ascii")}
 
 
 def _numbers(values: np.ndarray) -> dict[str, Any]:
-    """Numbers, or where they are few, these and the place of each among them."""
+    """Return numbers, or if there are few, these and their indices."""
     few, codes = np.unique(values, return_inverse=True)
     if len(few) > 256:
         return {"values": _packed(values, "f4")}
@@ -84,20 +95,20 @@ def _numbers(values: np.ndarray) -> dict[str, Any]:
 
 
 def _words(values: pd.Series) -> dict[str, Any]:
-    """A column of words: the words, and the number of each row's word."""
+    """Return the words of a column, and the index of each row's word."""
     codes, words = pd.factorize(values.astype(str))
     return {"words": [str(word) for word in words], "codes": _packed(codes, "u1" if len(words) <= 256 else "u2")}
 
 
 def _groups(rows: pd.DataFrame) -> np.ndarray:
-    """Index into GROUPS of each row."""
+    """Return the index into GROUPS of each row."""
     front = rows["feasible"] & rows["pareto"]
     kinds = [rows["kind"] == kind for kind in (PLAIN, FOUND, NAMED)]
     return np.select([*kinds, front, rows["feasible"]], [5, 4, 3, 2, 1], default=0)
 
 
 def _names(output: Output, row: Mapping[Any, Any]) -> dict[str, str]:
-    """A design's name, to write beside its point and in full; the published one says so."""
+    """Return a design's name, short and in full; the published one is marked."""
     name = str(row["name"])
     entry = output.study.designs.get(name)
     published = f" ({_PUBLISHED_LABEL})" if entry is not None and entry.at == _PUBLISHED else ""
@@ -105,7 +116,7 @@ def _names(output: Output, row: Mapping[Any, Any]) -> dict[str, str]:
 
 
 def _columns(output: Output, rows: pd.DataFrame) -> dict[str, dict[str, Any]]:
-    """Column -> label, digits and values of everything that says something about a design."""
+    """Return label, digits and values of every column with information on designs."""
     axes = [axis.name for axis in output.trade_off]
     wanted = (*axes, *output.parameters, *output.distances, *output.light, *output.further, "violation")
     columns = {}
@@ -119,7 +130,7 @@ def _columns(output: Output, rows: pd.DataFrame) -> dict[str, dict[str, Any]]:
 
 
 def _views(output: Output, rows: pd.DataFrame) -> Iterator[dict[str, Any]]:
-    """Lines, levels of plain CFAs, bound and knee around the points of each scenario and CFA."""
+    """Yield lines, levels of plain CFAs, bound and knee of each scenario and CFA."""
     for scenario in output.scenarios:
         for cfa in traded_cfas(output):
             figure = pareto_figure(output, scenario, cfa)
@@ -136,7 +147,7 @@ def _views(output: Output, rows: pd.DataFrame) -> Iterator[dict[str, Any]]:
 
 
 def _around(figure: TradeOff) -> dict[str, Any]:
-    """Words of a trade-off, and optima of the search and limit as lists of x and y."""
+    """Return words of a trade-off, and optima and upper bound of the search as lists of x and y."""
     lines = {"traced": figure.traced, "limit": figure.limit}
     return {
         **{name: getattr(figure, name) for name in ("title", "x_label", "y_label", "limit_name")},
@@ -145,7 +156,7 @@ def _around(figure: TradeOff) -> dict[str, Any]:
 
 
 def _limited(output: Output, rows: pd.DataFrame) -> dict[str, Any]:
-    """Column of a CSD -> a label, and the two lights that limit it in each row; no word where it is not known."""
+    """Return label and limiting lights of each CSD column; no word where they are unknown."""
     columns = [column for column in map(output.columns.get, output.distances) if column and column.metric == CSD]
     return {
         column.name: {"label": f"{column.words} limited by", **_words(rows[limited_by_name(column.pair)].fillna(""))}
@@ -155,14 +166,14 @@ def _limited(output: Output, rows: pd.DataFrame) -> dict[str, Any]:
 
 
 def _nearest(output: Output, rows: pd.DataFrame) -> dict[str, Any]:
-    """design_id -> the two lights that limit the trade-off's CSD, of the designs whose signals are drawn."""
+    """Return the two lights that limit the trade-off's CSD, by design_id."""
     drawn = rows[rows["design_id"].isin(output.points["design_id"])]
     nearest = {str(row["design_id"]): nearest_lights(output, row) for row in drawn.to_dict("records")}
     return {design: lights for design, lights in nearest.items() if lights is not None}
 
 
 def _knee(figure: TradeOff, output: Output, rows: pd.DataFrame) -> int | None:
-    """Row of the front's knee."""
+    """Return the row of the front's knee."""
     front = figure.groups["front"]
     order = np.argsort(front.x, kind="stable")
     at = knee(np.stack([front.x[order], front.y[order]], axis=1))
@@ -173,7 +184,7 @@ def _knee(figure: TradeOff, output: Output, rows: pd.DataFrame) -> int | None:
 
 
 def _curves(output: Output) -> dict[str, Any]:
-    """QE of the sensor's and the kept designs' channels over the wavelength, and the limits'."""
+    """Return QE of sensor and kept designs, and those of upper bounds, over the wavelength."""
     curves = output.curves
     return {
         "wavelength_nm": _packed(curves.wavelength_nm, "f4"),
@@ -189,7 +200,7 @@ def _curves(output: Output) -> dict[str, Any]:
 
 
 def _clouds(output: Output, rows: pd.DataFrame) -> dict[str, Any]:
-    """Signals' digital numbers of the kept designs: [n_channels x n_signals] each, channel by channel."""
+    """Return digital numbers of the signals of kept designs, channel by channel."""
     kept: dict[str, Any] = {"designs": {}, "channels": {}, "types": [], "names": []}
     cfas = dict(zip(rows["design_id"], rows["cfa"].astype(str), strict=True))
     for design in output.points["design_id"].unique():
@@ -202,10 +213,19 @@ def _clouds(output: Output, rows: pd.DataFrame) -> dict[str, Any]:
 
 
 def history_of(output: Output) -> dict[str, Any] | None:
-    """Return the best feasible objective of each start of a search and of all, and hypervolume, over the evaluations.
+    """Return the best feasible objective of each start and of all, and the hypervolume, over the evaluations.
 
-    The best one is over the designs that meet the study's own constraints; the hypervolume is above an objective of 0
-    and `least_sensitivity`, and there is none for an objective that is no CSD.
+    The hypervolume is above an objective of 0 and `least_sensitivity`; there is none for an objective that is no CSD.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    dict or None
+        None without a search.
     """
     log = output.searched
     if log is None or log.empty:
@@ -257,7 +277,7 @@ def _series(series: SeriesFigure) -> dict[str, Any]:
 
 
 def _front(output: Output, rows: pd.DataFrame) -> dict[str, Any]:
-    """The feasible front, every digit of it, for its file."""
+    """Return the feasible front with every digit, for its file."""
     front = rows[rows["feasible"] & rows["pareto"] & (rows["kind"] == SWEPT)]
     used = [name for name in output.parameters if front[name].notna().any()]
     names = ["design_id", "filter_id", "scenario", "cfa", *used, *output.distances]

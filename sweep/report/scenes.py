@@ -1,4 +1,4 @@
-"""Simulation of each scene: effects computed and left out, the bound on what that changes, and measured errors."""
+"""Simulation of each scene: effects computed and left out, their bound, and measured errors."""
 
 from __future__ import annotations
 
@@ -18,10 +18,7 @@ from .pages import aligned
 
 @dataclass(frozen=True)
 class SceneGroup:
-    """Scenes of which the same effects were computed.
-
-    `realized_dn`: the largest error that an audit found, NaN without one.
-    """
+    """Scenes with the same computed effects; `realized_dn` is the largest error of an audit, NaN without one."""
 
     scenarios: tuple[str, ...]
     effects: tuple[EffectFacts, ...]
@@ -31,7 +28,7 @@ class SceneGroup:
 
     @property
     def title(self) -> str:
-        """The scenes in a few words."""
+        """Scenes in a few words."""
         return scenes_told(self.scenarios)
 
     @property
@@ -41,12 +38,34 @@ class SceneGroup:
 
 
 def scenes_told(names: Sequence[str]) -> str:
-    """Scenes in a few words."""
+    """Return scenes in a few words.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names.
+
+    Returns
+    -------
+    str
+        Text.
+    """
     return names[0] if len(names) == 1 else f"{names[0]} ... {names[-1]} ({len(names)} scenes)"
 
 
 def scene_groups(output: Output) -> list[SceneGroup]:
-    """All scenes, those with the same effects together, each effect with its largest bound among them."""
+    """Return all scenes, grouped by computed effects, each effect with its largest bound.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    list of SceneGroup
+        Groups.
+    """
     groups: dict[tuple[str, ...], list[str]] = {}
     for name, plan in output.provenance.plans.items():
         groups.setdefault(tuple(plan.computed), []).append(name)
@@ -65,7 +84,18 @@ def scene_groups(output: Output) -> list[SceneGroup]:
 
 
 def scene_table(groups: Sequence[SceneGroup]) -> pd.DataFrame:
-    """Effects of each group of scenes, the bound on the others, and the error that an audit found."""
+    """Return the effects of each group, the bound on the others, and the error of an audit.
+
+    Parameters
+    ----------
+    groups : sequence of SceneGroup
+        Groups.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Table.
+    """
     rows = [
         {
             "scenes": group.title,
@@ -80,7 +110,18 @@ def scene_table(groups: Sequence[SceneGroup]) -> pd.DataFrame:
 
 
 def effect_table(effects: Sequence[EffectFacts | Choice]) -> pd.DataFrame:
-    """Every effect, whether it is computed, its bound and reason."""
+    """Return every effect with its bound and reason.
+
+    Parameters
+    ----------
+    effects : sequence of EffectFacts or Choice
+        Effects.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Table.
+    """
     rows = [
         {
             "effect": effect.effect,
@@ -94,7 +135,18 @@ def effect_table(effects: Sequence[EffectFacts | Choice]) -> pd.DataFrame:
 
 
 def plan_lines(study: Study) -> Iterator[str]:
-    """Effects of every scene: computed or left out, bound and reason; scenes of one plan together."""
+    """Yield the effects of every scene with bound and reason; scenes of one plan together.
+
+    Parameters
+    ----------
+    study : Study
+        Planned study.
+
+    Yields
+    ------
+    str
+        Lines.
+    """
     groups: dict[str, list[Plan]] = {}
     for plan in study.plans.values():
         groups.setdefault(plan.key, []).append(plan)
@@ -113,7 +165,18 @@ def plan_lines(study: Study) -> Iterator[str]:
 
 
 def plan_facts(study: Study) -> dict[str, Any]:
-    """The same as plain values: accuracy, and for each scene tolerance, error bound (DN) and effects."""
+    """Return accuracy, and tolerance, error bound (DN) and effects of each scene.
+
+    Parameters
+    ----------
+    study : Study
+        Planned study.
+
+    Returns
+    -------
+    dict
+        Facts.
+    """
     scenes = {
         name: {
             "tolerance_dn": plan.tolerance_dn,

@@ -1,4 +1,4 @@
-"""Gains and losses of designs elsewhere: the tasks of a study in one table, and as factors in one plot."""
+"""Gains and losses of designs in the tasks of a study: one table, and factors in one plot."""
 
 from __future__ import annotations
 
@@ -26,9 +26,16 @@ _SAME = 1e-9
 
 @dataclass(frozen=True)
 class ScoreRow:
-    """A figure of a task over the designs: `values`, ndarray[n_designs], NaN where a design has none.
+    """Figure of a task over the designs.
 
-    `best`, `worst`: which designs have the best and the worst value; none where all are the same.
+    Parameters
+    ----------
+    column : Column
+        Column.
+    values : ndarray of shape (n_designs,)
+        Values; NaN where a design has none.
+    best, worst : frozenset of int
+        Designs with the best and the worst value; empty if all are equal.
     """
 
     column: Column
@@ -38,7 +45,7 @@ class ScoreRow:
 
     @property
     def cells(self) -> list[tuple[str, str]]:
-        """(text, mark) of each design: `best`, `worst` or nothing."""
+        """Text and mark of each design: `best`, `worst` or nothing."""
         return [
             (
                 "-" if np.isnan(value) else f"{value:.{self.column.digits}f}",
@@ -48,7 +55,18 @@ class ScoreRow:
         ]
 
     def factors(self, reference: int) -> FloatArray:
-        """Factors by which designs are better than one of them, ndarray[n_designs]; NaN where that means nothing."""
+        """Return factors by which designs are better than one of them.
+
+        Parameters
+        ----------
+        reference : int
+            Index of that design.
+
+        Returns
+        -------
+        ndarray of shape (n_designs,)
+            Factors; NaN where they are undefined.
+        """
         of = self.values[reference]
         ratio = np.full(self.values.shape, np.nan)
         some = (self.values > 0) & (of > 0) & bool(self.best)
@@ -58,7 +76,7 @@ class ScoreRow:
 
 @dataclass(frozen=True)
 class Scorecard:
-    """All rows of a scorecard. `names`: of the designs; `reference`: the plain CFA that factors are relative to."""
+    """All rows of a scorecard, names of the designs, and the plain CFA that factors are relative to."""
 
     names: tuple[str, ...]
     rows: tuple[ScoreRow, ...]
@@ -66,7 +84,18 @@ class Scorecard:
 
 
 def scorecard(output: Output) -> Scorecard | None:
-    """Scores of the plain CFAs, named designs and the search's answer in the first scenario; None without tasks."""
+    """Return the scores of plain CFAs, named designs and the answer in the first scenario.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    Scorecard or None
+        None without tasks.
+    """
     columns = [c for c in output.columns.values() if c.metric.startswith(PREFIX) and not c.extreme]
     if columns:
         from ..metrics.tasks.figures import FIGURES  # noqa: PLC0415  (few studies have tasks)
@@ -92,7 +121,18 @@ def _row(column: Column, values: FloatArray) -> ScoreRow:
 
 
 def score_lines(card: Scorecard | None) -> list[str]:
-    """Counts of best and worst figures of each design, in one line."""
+    """Return the numbers of best and worst figures of each design, in one line.
+
+    Parameters
+    ----------
+    card : Scorecard or None
+        Scorecard.
+
+    Returns
+    -------
+    list of str
+        Lines.
+    """
     if card is None:
         return []
     marked = [row for row in card.rows if row.best]
@@ -104,7 +144,18 @@ def score_lines(card: Scorecard | None) -> list[str]:
 
 
 def draw_scorecard(card: Scorecard) -> Figure:
-    """Draw how many times better each design is than the reference, a line per figure; better is to the right."""
+    """Draw factors relative to the reference, one line per figure; better is to the right.
+
+    Parameters
+    ----------
+    card : Scorecard
+        Scorecard.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Figure.
+    """
     drawn = [(row.column.words, row.factors(card.reference)) for row in card.rows]
     drawn = [(words, factors) for words, factors in drawn if np.isfinite(factors).sum() > 1]
     figure, axes = canvas(9.0, 1.4 + 0.27 * len(drawn))

@@ -1,4 +1,4 @@
-"""Maps of the separation over the sensor, designs side by side, where a scene has a field."""
+"""Maps of the separation over the sensor, designs side by side, for a scene with a field."""
 
 from __future__ import annotations
 
@@ -28,7 +28,15 @@ BEST_FOUND = "best of the search"
 
 @dataclass(frozen=True)
 class SensorMap:
-    """A separation over image height: `dn` at the `heights`, ndarray[n] each."""
+    """Separation over image height.
+
+    Parameters
+    ----------
+    name : str
+        Design.
+    heights, dn : ndarray of shape (n,)
+        Relative image heights, and CSD, DN.
+    """
 
     name: str
     heights: FloatArray
@@ -36,7 +44,7 @@ class SensorMap:
 
     @property
     def worst(self) -> str:
-        """The smallest one that was computed, and where."""
+        """Smallest computed CSD, and its position."""
         at = int(self.dn.argmin())
         height = float(self.heights[at])
         where = {0.0: "in the middle", 1.0: "in the corner"}.get(height, f"at {height:.0%} of the corner's height")
@@ -45,7 +53,7 @@ class SensorMap:
 
 @dataclass(frozen=True)
 class SensorFigure:
-    """Maps of one scene. `level`: name and DN of the plain CFA that keeps most everywhere; None without one."""
+    """Maps of one scene; `level` is name and DN of the plain CFA with the largest worst CSD, if any."""
 
     scenario: str
     words: str
@@ -56,7 +64,18 @@ class SensorFigure:
 
 
 def sensor_figures(output: Output) -> Iterator[SensorFigure]:
-    """Data of a figure for each scene with a field: named designs and the search's answer, the last nine."""
+    """Yield the data of one figure per scene with a field: named designs and the answer, the last nine.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Yields
+    ------
+    SensorFigure
+        Figures.
+    """
     separation = output.trade_off[0]
     name = separation.of or separation.name
     if output.places is None or separation.pair is None or name not in output.places:
@@ -79,7 +98,18 @@ def sensor_figures(output: Output) -> Iterator[SensorFigure]:
 
 
 def told_map(figure: SensorFigure) -> str:
-    """The caption of a map: its contents, and how it was computed."""
+    """Return the caption of a map.
+
+    Parameters
+    ----------
+    figure : SensorFigure
+        Figure.
+
+    Returns
+    -------
+    str
+        Text.
+    """
     text = (
         f"The {figure.words} over the sensor, in {figure.scenario}, before clipping and rounding; the chief ray "
         f"falls in at {figure.corner_deg:g} degrees in the corner. Computed at {figure.maps[0].heights.size} image "
@@ -93,7 +123,7 @@ def told_map(figure: SensorFigure) -> str:
 
 
 def _draw(figure: SensorFigure) -> Figure:
-    """Draw the maps with one scale of colors."""
+    """Draw the maps with one color scale."""
     columns = min(_ACROSS, len(figure.maps)) if len(figure.maps) != 4 else 2
     panel_in = _WIDTH_IN / columns
     drawn, panels = panel_grid(len(figure.maps), columns, (panel_in, 0.3 + 0.87 * panel_in * _HIGH / _WIDE), (0, 0.6))
@@ -114,6 +144,17 @@ def _draw(figure: SensorFigure) -> Figure:
 
 
 def map_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
-    """(file name, caption, drawing) of every map."""
+    """Yield the maps.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Yields
+    ------
+    name, caption, drawing : str, str, Drawing
+        File name, caption and drawing.
+    """
     for number, figure in enumerate(sensor_figures(output), 1):
         yield f"places-{number}", told_map(figure), partial(_draw, figure)

@@ -1,4 +1,4 @@
-"""A quantity over the scenarios that differ in one number: against distance, exposure or visibility."""
+"""Quantities over scenarios that differ in one number: distance, exposure or visibility."""
 
 from __future__ import annotations
 
@@ -37,9 +37,16 @@ _LABELS = {
 
 @dataclass(frozen=True)
 class Line:
-    """A design: values over the numbers, ndarray[n], and, where it has one, the upper end of its band.
+    """Line of a design.
 
-    `passes`: where it passes the level of the figure, between two of the numbers, and its value there.
+    Parameters
+    ----------
+    y : ndarray of shape (n,)
+        Values.
+    upper : ndarray of shape (n,) or None
+        Upper end of its band.
+    passes : tuple of float, optional
+        Number at which it passes the level of the figure, and its value there.
     """
 
     y: FloatArray
@@ -47,7 +54,18 @@ class Line:
     passes: tuple[float, float] | None = None
 
     def over(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Numbers and values as drawn, with the point where it passes the level among them; `x`: ascending."""
+        """Return numbers and values as drawn, with the crossing among them.
+
+        Parameters
+        ----------
+        x : ndarray of shape (n,)
+            Numbers, ascending.
+
+        Returns
+        -------
+        x, y : ndarray
+            Points of the line.
+        """
         if self.passes is None:
             return x, self.y
         at = np.searchsorted(x, self.passes[0])
@@ -56,10 +74,7 @@ class Line:
 
 @dataclass(frozen=True)
 class SeriesFigure:
-    """A line per design over `x` (ndarray[n]), the number `key` of the scenarios; `level` is marked.
-
-    `among`: the scenarios, where there are others over the same number. `note`: the meaning of the values.
-    """
+    """One line per design over the number `key` of the scenarios, with a marked level."""
 
     title: str
     key: str
@@ -75,32 +90,69 @@ class SeriesFigure:
 
     @property
     def x_label(self) -> str:
-        """The scenarios' number with its unit."""
+        """Number of the scenarios with its unit."""
         return _LABELS.get(self.key, self.key)
 
     @property
     def log_x(self) -> bool:
-        """Whether the numbers span more than a decade."""
+        """True if the numbers span more than a decade."""
         return bool(self.x.min() > 0 and self.x.max() / self.x.min() > _WIDE)
 
     def at(self, place: int) -> str:
-        """A number of the scenarios with its unit."""
+        """Return a number of the scenarios with its unit.
+
+        Parameters
+        ----------
+        place : int
+            Index.
+
+        Returns
+        -------
+        str
+            Text.
+        """
         return f"{self.x[place]:g} {quantity_of(self.key)[1]}".rstrip()
 
     @property
     def values(self) -> dict[str, FloatArray]:
-        """Values of each design; unknown ones are the least."""
+        """Values of each design, with unknown ones as the least."""
         return {design: np.nan_to_num(line.y, nan=-np.inf) for design, line in self.lines.items()}
 
 
 def quantity_of(key: str) -> tuple[str, str]:
-    """Return name and unit of the number that scenarios differ in by its key; the unit may be empty."""
+    """Return name and unit of the number that scenarios differ in.
+
+    Parameters
+    ----------
+    key : str
+        Key of the study.
+
+    Returns
+    -------
+    name, unit : str
+        Texts; the unit may be empty.
+    """
     name, _, unit = _LABELS.get(key, key).partition(" / ")
     return name, unit.strip("()")
 
 
 def over_series(rows: pd.DataFrame, scenarios: Mapping[str, float], column: str) -> dict[str, np.ndarray]:
-    """Return a column over a series' numbers for every design that has them all, ndarray[n_scenarios] each."""
+    """Return a column over a series' numbers for every design with all of them.
+
+    Parameters
+    ----------
+    rows : pandas.DataFrame
+        Rows.
+    scenarios : mapping of str to float
+        Number of each scenario.
+    column : str
+        Column name.
+
+    Returns
+    -------
+    dict of str to ndarray of shape (n_scenarios,)
+        Values by design.
+    """
     names = list(scenarios)
     rows = rows[rows["scenario"].isin(names)].dropna(subset=["name"]).astype({"name": str, "scenario": str})
     designs = {str(name): part.set_index("scenario")[column] for name, part in rows.groupby("name", sort=False)}
@@ -108,7 +160,18 @@ def over_series(rows: pd.DataFrame, scenarios: Mapping[str, float], column: str)
 
 
 def series_figures(output: Output) -> list[SeriesFigure]:
-    """Return for each set of scenarios that differ in one number the separation of every named design over it."""
+    """Return the separation of every named design over each set of scenarios that differ in one number.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    list of SeriesFigure
+        Figures.
+    """
     rows, separation, columns = output.few, output.trade_off[0], output.columns.values()
     best_place = [c.name for c in columns if (c.extreme, c.of) == ("best place", separation.name) and c.name in rows]
     figures, series = [], series_of(output.scenarios)
@@ -127,7 +190,18 @@ def series_figures(output: Output) -> list[SeriesFigure]:
 
 
 def lead_sentence(series: SeriesFigure) -> str:
-    """Return the leading design of each range, with its value and its rival's where that ends."""
+    """Return the leading design of each range, with its value and its rival's at the end.
+
+    Parameters
+    ----------
+    series : SeriesFigure
+        Series.
+
+    Returns
+    -------
+    str
+        Text.
+    """
     what, _, unit = series.y_label.partition(" / ")
     values, leads = series.values, leads_of(series)
 
@@ -157,9 +231,19 @@ def lead_sentence(series: SeriesFigure) -> str:
 
 
 def leads_of(series: SeriesFigure) -> list[tuple[str | None, int, int]]:
-    """Return (leader, its first place, its last place) in order; None where no CFA reaches 1 DN.
+    """Return the leader of each range in order; None where no CFA reaches 1 DN.
 
-    A leader stays one as long as nobody has more.
+    A leader stays one as long as no other design has more.
+
+    Parameters
+    ----------
+    series : SeriesFigure
+        Series.
+
+    Returns
+    -------
+    list of (leader, first, last)
+        Names and indices.
     """
     values = series.values
     least = _LEAST_LEAD if series.y_label.endswith(f" / {DN}") else 0.0
@@ -179,7 +263,18 @@ def leads_of(series: SeriesFigure) -> list[tuple[str | None, int, int]]:
 
 
 def draw_series(series: SeriesFigure) -> Figure:
-    """Draw a line with its band per design; numbers over more than a decade are drawn on a logarithmic axis."""
+    """Draw one line with its band per design; numbers over more than a decade are on a logarithmic axis.
+
+    Parameters
+    ----------
+    series : SeriesFigure
+        Series.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Figure.
+    """
     figure, axes = canvas(8.0, 4.8)
     for (name, line), color in zip(series.lines.items(), CURVE_CYCLE * 4, strict=False):
         axes.plot(*line.over(series.x), "-", color=color, linewidth=1.5)

@@ -1,4 +1,4 @@
-"""Figures of signals and pixels: point clouds in the channels of a CFA, the color checker chart, and CFA tiles."""
+"""Figures of signals and pixels: point clouds in the channels of a CFA, the color chart, and CFA tiles."""
 
 from __future__ import annotations
 
@@ -29,7 +29,20 @@ _MOST_TILES, _WIDE = 24, 8
 
 
 def signals_of(output: Output, design_id: object) -> tuple[list[str], list[tuple[str, str]], FloatArray]:
-    """Channels, (type, name) of the signals, and their DN, ndarray[n_channels, n_signals], of a design."""
+    """Return channels, (type, name) of the signals, and their digital numbers with a design.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+    design_id : int
+        Row id.
+
+    Returns
+    -------
+    channels, signals, dn : list, list, ndarray of shape (n_channels, n_signals)
+        Signals.
+    """
     points = output.points[output.points["design_id"] == design_id]
     channels = list(dict.fromkeys(points["channel"]))
     first = points.iloc[:: max(1, len(channels))]
@@ -38,7 +51,20 @@ def signals_of(output: Output, design_id: object) -> tuple[list[str], list[tuple
 
 
 def clouds(output: Output, *kinds: str) -> list[Cloud]:
-    """Signals of the designs of some kinds in the first scenario; a CFA of one channel has none."""
+    """Return signals of designs in the first scenario; a CFA of one channel has none.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+    *kinds : str
+        Kinds of rows.
+
+    Returns
+    -------
+    list of Cloud
+        Clouds.
+    """
     rows = output.kind(*kinds)
     rows = rows[(rows["scenario"] == output.scenarios[0]) & (rows["status"] == "ok")]
     designs = []
@@ -50,7 +76,20 @@ def clouds(output: Output, *kinds: str) -> list[Cloud]:
 
 
 def nearest_lights(output: Output, row: Mapping[Any, Any]) -> Nearest | None:
-    """(type, name) of the two lights that limit a row's separation, and their distance in words."""
+    """Return (type, name) of the two lights that limit a row's separation, and their distance in words.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+    row : mapping
+        Row of the result table.
+
+    Returns
+    -------
+    tuple or None
+        None if they are unknown.
+    """
     separation = output.trade_off[0]
     if separation.pair is None:
         return None
@@ -65,7 +104,22 @@ def nearest_lights(output: Output, row: Mapping[Any, Any]) -> Nearest | None:
 
 
 def draw_clouds(designs: Sequence[Cloud], title: str, top_dn: float) -> Figure:
-    """A row of panels per design, its first channel against the others, all up to `top_dn` to compare distances."""
+    """Draw a row of panels per design, its first channel against the others, with equal axes.
+
+    Parameters
+    ----------
+    designs : sequence of Cloud
+        Clouds.
+    title : str
+        Title.
+    top_dn : float
+        End of all axes, DN.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Figure.
+    """
     most = max(len(channels) for _, channels, *_ in designs) - 1
     figure = empty_figure(3.1 * most + 1.0, 2.9 * len(designs) + 0.6)
     panels = figure.subplots(len(designs), most, squeeze=False)
@@ -93,13 +147,35 @@ def draw_clouds(designs: Sequence[Cloud], title: str, top_dn: float) -> Figure:
 
 
 def chart_patches(output: Output) -> dict[str, FloatArray]:
-    """The color checker chart that the signals make: signal type -> sRGB colors, ndarray[n, 3]."""
+    """Return the color chart of the signals.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    dict of str to ndarray of shape (n, 3)
+        sRGB by signal type.
+    """
     grid = output.study.wavelengths
     return {kind: display_colors(grid, photons) for kind, photons in output.curves.bundles.items()}
 
 
 def draw_chart(patches: Mapping[str, FloatArray]) -> Figure:
-    """Draw the patches, a row per signal type, and the gray reference steps."""
+    """Draw the patches, one row per signal type, and gray steps.
+
+    Parameters
+    ----------
+    patches : mapping of str to ndarray
+        Result of `chart_patches`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Figure.
+    """
     from matplotlib.patches import Rectangle  # noqa: PLC0415  (slow to import)
 
     figure = empty_figure(8.0, 0.55 * (len(patches) + 1) + 0.8)
@@ -116,7 +192,18 @@ def draw_chart(patches: Mapping[str, FloatArray]) -> Figure:
 
 
 def replaced_channels(output: Output) -> dict[str, dict[str, str]]:
-    """CFA -> its channels that a filter of the study replaces -> their base."""
+    """Return the channels of each CFA that a filter of the study replaces, with their base.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    dict of str to dict of str to str
+        Bases by CFA and channel.
+    """
     replaced: dict[str, dict[str, str]] = {}
     for entry in modifications(output):
         if entry.base is not None:
@@ -125,12 +212,36 @@ def replaced_channels(output: Output) -> dict[str, dict[str, str]]:
 
 
 def first_mosaics(output: Output) -> dict[str, Mosaic]:
-    """The tiles of the first CFAs of a study."""
+    """Return the tiles of the first CFAs of a study.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    dict of str to Mosaic
+        Tiles.
+    """
     return {name: output.mosaic(name) for name in list(output.study.cfas)[:_MOST_TILES]}
 
 
 def draw_tiles(mosaics: Mapping[str, Mosaic], replaced: Mapping[str, Mapping[str, str]]) -> Figure:
-    """Draw the tiles side by side, the channel's name in each pixel; a replaced one is hatched in its base's color."""
+    """Draw the tiles side by side; a replaced channel is hatched in its base's color.
+
+    Parameters
+    ----------
+    mosaics : mapping of str to Mosaic
+        Tiles.
+    replaced : mapping
+        Result of `replaced_channels`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Figure.
+    """
     from matplotlib.patches import Rectangle  # noqa: PLC0415  (slow to import)
 
     wide = min(_WIDE, len(mosaics))

@@ -1,4 +1,4 @@
-"""A run in about ten lines."""
+"""Summary of a run in about ten lines."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _MOST_SCENARIOS = 8
 
 
 def _scene_lines(output: Output) -> list[str]:
-    """CFAs and named designs in each scenario; of those that differ in one number the two ends, of many others few."""
+    """Return CFAs and named designs in each scenario; a series by its two ends, of many others few."""
     shown, single = output.trade_off[0], len(output.scenarios) == 1
     title = f"{capital(shown.words)} of the named CFAs and designs"
     title += f", and their share {of_reference(output)}:" if single else ":"
@@ -42,7 +42,20 @@ def _scene_lines(output: Output) -> list[str]:
 
 
 def summary_lines(output: Output, took_s: float | None = None) -> list[str]:
-    """Results of a run and the place of its files; `took_s`: time of the whole command, s."""
+    """Return the summary of a run and the place of its files.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+    took_s : float, optional
+        Time of the whole command, s.
+
+    Returns
+    -------
+    list of str
+        Lines.
+    """
     facts = output.provenance
     lines = [*answer_sentences(output), *_scene_lines(output)]
     if not output.best.empty:
@@ -81,7 +94,7 @@ def summary_lines(output: Output, took_s: float | None = None) -> list[str]:
 
 
 def _plan_line(output: Output) -> str:
-    """Effects that were computed, over all scenarios, a bound on those left out, and the check of the run."""
+    """Return the computed effects over all scenarios, the bound on the others, and the check of the run."""
     plans, check = output.provenance.plans, output.provenance.check
     computed = dict.fromkeys(effect for plan in plans.values() for effect in plan.computed)
     bound_dn = max(plan.error_bound_dn for plan in plans.values())
@@ -91,7 +104,18 @@ def _plan_line(output: Output) -> str:
 
 
 def counts_line(output: Output) -> str:
-    """Number of designs, and of those that the report leaves out."""
+    """Return the number of designs, and of those that the report draws.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    str
+        Text.
+    """
     counts = output.counts
     text = _count(output.provenance.filters, "filter")
     plain = output.kind(PLAIN)["filter_id"].nunique()
@@ -115,7 +139,7 @@ def _count(number: int, what: str) -> str:
 
 
 def _limit_line(output: Output, search: SearchFacts) -> str:
-    """The bracket of the limit: the proven bound, its filters and its response."""
+    """Return the upper bound with its filters and response."""
     if search.no_limit is not None or search.limit_proven is None:
         return f"Upper bound: none computed ({search.no_limit})."
     proven = output.goal.told_bound(search.limit_proven)

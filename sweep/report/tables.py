@@ -1,4 +1,4 @@
-"""The tables of the report, as plain values."""
+"""Tables of the report, as plain values."""
 
 from __future__ import annotations
 
@@ -17,13 +17,37 @@ _DIGITS = 4
 
 
 def comparison_table(output: Output) -> pd.DataFrame:
-    """Plain CFAs, named designs and the search's answer with all CSDs, sensitivities and the lights that limit them."""
+    """Return plain CFAs, named designs and the answer with CSDs, sensitivities and limiting lights.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Table.
+    """
     rest = [*output.light, *output.further, *output.distances]
     return _shown(output, output.few, ["name", "scenario"], [*rest, "feasible"])
 
 
 def best_table(output: Output, most: int = 12) -> pd.DataFrame:
-    """Best feasible designs with their parameters: the first ones, or over several scenarios the best of each CFA."""
+    """Return the best feasible designs with their parameters; over several scenarios the best of each CFA.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+    most : int
+        Rows at most.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Table.
+    """
     ranked = output.best.head(most)
     if len(output.scenarios) > 1:
         ranked = output.best.groupby(["scenario", "cfa"], sort=False, observed=True).head(1)
@@ -33,7 +57,7 @@ def best_table(output: Output, most: int = 12) -> pd.DataFrame:
 
 
 def _shown(output: Output, rows: pd.DataFrame, keys: list[str], rest: list[str]) -> pd.DataFrame:
-    """Keys, separation and light of the trade-off, CSDs of other lights, the rest, and the limiting lights."""
+    """Return keys, separation and light of the trade-off, other CSDs, further columns, and limiting lights."""
     separation = output.trade_off[0]
     first = [separation.name, CFA_SENSITIVITY]
     held_out = [name for distance in output.distances if (name := HELD_OUT + distance) in output.table]
@@ -52,7 +76,20 @@ def _shown(output: Output, rows: pd.DataFrame, keys: list[str], rest: list[str])
 
 
 def worst_left_out(output: Output, most: int = 10) -> pd.DataFrame:
-    """The lights whose absence from the search costs most."""
+    """Return the lights whose absence from the search costs most.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+    most : int
+        Rows at most.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Table.
+    """
     if output.left_out is None:
         return pd.DataFrame()
     worst = output.left_out.nlargest(most, "fall").round(1)
@@ -60,7 +97,18 @@ def worst_left_out(output: Output, most: int = 10) -> pd.DataFrame:
 
 
 def geometry_table(output: Output) -> pd.DataFrame:
-    """Object resolution of each distance scenario (the paper's Table 1)."""
+    """Return the object resolution of each distance scenario (paper, Table 1).
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Table.
+    """
     rows = [
         {
             "scenario": name,
@@ -77,10 +125,22 @@ PUBLISHED_CSV, PUBLISHED_PARQUET = "paper_comparison.csv", "paper_comparison.par
 
 
 def comparison_with_published(output: Output) -> pd.DataFrame:
-    """One row per published figure: table, cfa (or geometry), quantity, paper, ours, error, relative_error, ours_exact.
+    """Return one row per published figure, with ours and the error.
 
-    `ours` is rounded to the digits that are printed, and `error` is its difference; `ours_exact` is not rounded. Ours
-    is of the study's first scenario. Empty when the study publishes nothing.
+    Columns: table, cfa (or geometry), quantity, paper, ours, error, relative_error, ours_exact.
+
+    `ours` is rounded to the printed digits, and `error` is its difference; `ours_exact` is not rounded. Values are of
+    the first scenario.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Table.
     """
     named = output.named[output.named["scenario"] == output.scenarios[0]].set_index("name")
     rows = []
@@ -100,7 +160,18 @@ def comparison_with_published(output: Output) -> pd.DataFrame:
 
 
 def comparison_lines(comparison: pd.DataFrame) -> list[str]:
-    """The comparison as tables of text: ours, and in brackets the printed figure."""
+    """Return the comparison as text: our figures, with the printed ones in brackets.
+
+    Parameters
+    ----------
+    comparison : pandas.DataFrame
+        Result of `comparison_with_published`.
+
+    Returns
+    -------
+    list of str
+        Lines.
+    """
     lines = []
     for name, rows in comparison.groupby("table", sort=False):
         cells = rows["ours"].map("{:g}".format) + rows["paper"].map(" ({:g})".format)

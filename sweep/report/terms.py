@@ -1,4 +1,4 @@
-"""Constraints as people say them, and the meaning of the terms of the first screen."""
+"""Constraints in words, and the terms of the first screen."""
 
 from __future__ import annotations
 
@@ -16,7 +16,22 @@ from .values import modifications
 
 
 def constraint_told(output: Output, name: str, bound: Bound) -> str:
-    """A constraint in words: `slope at most 0.06 per nm`."""
+    """Return a constraint in words: `slope at most 0.06 per nm`.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+    name : str
+        Column name.
+    bound : Bound
+        Constraint.
+
+    Returns
+    -------
+    str
+        Text.
+    """
     words, column = output.words(name), output.columns.get(name)
     if bound.max is None:
         return f"{words} at least {_amount(column, bound.min)}"
@@ -28,12 +43,36 @@ def constraint_told(output: Output, name: str, bound: Bound) -> str:
 
 
 def constraints_told(output: Output) -> str:
-    """All constraints in words; empty where there are none."""
+    """Return all constraints in words; empty if there are none.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    str
+        Text.
+    """
     return " and ".join(constraint_told(output, name, bound) for name, bound in output.constraints.items())
 
 
 def missed_told(output: Output, row: Row) -> str:
-    """Constraints that a row does not meet: `its sensitivity is below 0.9`; empty where it meets all."""
+    """Return the violated constraints of a row: `its sensitivity is below 0.9`.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+    row : mapping
+        Row of the result table.
+
+    Returns
+    -------
+    str
+        Text; empty if it meets all.
+    """
     parts = list[str]()
     for name, bound in output.constraints.items():
         value = float(row[name])
@@ -47,7 +86,18 @@ def missed_told(output: Output, row: Row) -> str:
 
 
 def unknown_lines(output: Output) -> Iterator[str]:
-    """Say which constrained quantities designs lack; unknown is not feasible."""
+    """Yield constrained quantities that designs lack; unknown is not feasible.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Yields
+    ------
+    str
+        Sentences.
+    """
     rows = output.kind(NAMED, SWEPT, FOUND)
     rows = rows[rows["status"] == "ok"]
     for name in output.constraints:
@@ -58,13 +108,24 @@ def unknown_lines(output: Output) -> Iterator[str]:
 
 
 def _amount(column: Column | None, value: float | None) -> str:
-    """A bound with the unit of its column."""
+    """Return a bound with the unit of its column."""
     unit = "" if column is None else column.unit
     return f"{value:g} {unit.replace('1/', 'per ', 1)}".rstrip()
 
 
 def terms_of(output: Output) -> list[str]:
-    """Meaning of the separation and of the bounded quantities, and the pixels that have a filter of the study."""
+    """Return the meaning of the separation and of the bounded quantities, and the modified pixels.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    list of str
+        Lines.
+    """
     asked = (output.trade_off[0].name, *output.constraints)
     columns = [output.columns[name] for name in asked if name in output.columns]
     lines = []
@@ -85,7 +146,7 @@ _NOT_STATED = "No technology is stated of the filters: they are taken as on axis
 
 
 def _technologies(output: Output, row: Row) -> list[Technology | None]:
-    """Technology that the study states of the filter of a row: one, or of a sweep's design each that it may be of."""
+    """Return the technologies that a row's filter may have."""
     study, search = output.study, output.provenance.search
     if row["kind"] == PLAIN:
         return []
@@ -97,13 +158,39 @@ def _technologies(output: Output, row: Row) -> list[Technology | None]:
 
 
 def technology_of(output: Output, row: Row) -> Technology | None:
-    """Technology of a row's filter; None if not stated, or not the same for all that it may be."""
+    """Return the technology of a row's filter.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+    row : mapping
+        Row of the result table.
+
+    Returns
+    -------
+    Technology or None
+        None if it is not stated or not unique.
+    """
     stated = _technologies(output, row)
     return stated[0] if len(stated) == 1 else None
 
 
 def assumed(output: Output, row: Row) -> str:
-    """Whether a row's filter moves with the angle of the light, and in which light it then is; empty if not stated."""
+    """Return a note on the angle of the light for a row's filter; empty if no technology is stated.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+    row : mapping
+        Row of the result table.
+
+    Returns
+    -------
+    str
+        Text.
+    """
     stated = technology_of(output, row)
     if stated is None:
         return ""
@@ -114,12 +201,25 @@ def assumed(output: Output, row: Row) -> str:
 
 
 def moves_with_light(output: Output, row: Row) -> bool:
-    """Whether a row's filter is said to move with the angle of the light."""
+    """Return whether a row's filter moves with the angle of the light.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+    row : mapping
+        Row of the result table.
+
+    Returns
+    -------
+    bool
+        True if it does.
+    """
     return any(t is not None and t.interference is not None for t in _technologies(output, row))
 
 
 def _told_light(scene: Scene) -> str:
-    """The rays of a scene in words."""
+    """Return the rays of a scene in words."""
     lens = f"behind f/{scene.optics.f_number:g}"
     if scene.field is None:
         return f"{lens} at a chief ray angle of {scene.optics.cra_deg:g} degrees"
@@ -130,7 +230,18 @@ def _told_light(scene: Scene) -> str:
 
 
 def assumed_line(output: Output) -> str:
-    """A note of what is not as measured or stated: surrogate curves, filters without a technology; else empty."""
+    """Return a note on surrogate curves and on filters without a technology; else empty.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    str
+        Text.
+    """
     notes = []
     if output.provenance.sensor.surrogate or output.provenance.lights.surrogate:
         notes.append("Built-in curves are surrogates, modeled from stated parameters, not measured.")

@@ -49,7 +49,15 @@ _STYLES: dict[str, dict[str, Any]] = {
 
 @dataclass(frozen=True)
 class Points:
-    """A named group of designs: x and y, each ndarray[n], and labels of single points (empty: none)."""
+    """Named group of designs.
+
+    Parameters
+    ----------
+    x, y : ndarray of shape (n,)
+        Coordinates.
+    labels : tuple of str
+        Labels of single points (empty: none).
+    """
 
     x: FloatArray
     y: FloatArray
@@ -60,9 +68,24 @@ class Points:
 class TradeOff:
     """Separation against a sensitivity.
 
-    `traced`: optima of the search at levels of sensitivity; `limit`: the upper bound there, `limit_name`: the filters
-    that it bounds. `levels`: CFAs without a modified channel, name -> separation. `counts`: of the groups, in the whole
-    table. `x_range`: a range that is always shown.
+    Parameters
+    ----------
+    title, x_label, y_label : str
+        Texts.
+    groups : mapping of str to Points
+        Designs.
+    traced : Points or None
+        Optima of the search at levels of sensitivity.
+    limit, limit_name : Points or None, str
+        Upper bound there, and the filters that it bounds.
+    levels : mapping of str to float
+        Separation of CFAs without a modified channel.
+    bound, bound_text : float or None, str
+        Constraint on the sensitivity.
+    counts : mapping of str to int
+        Size of the groups in the whole table.
+    x_range : tuple of float
+        Range that is always shown.
     """
 
     title: str
@@ -80,7 +103,22 @@ class TradeOff:
 
 
 def pareto_figure(output: Output, scenario: str, cfa: str) -> TradeOff:
-    """Separation against the sensitivity of the modified channel in a scenario, for the designs of one CFA."""
+    """Return separation against the sensitivity of the modified channel of one CFA.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+    scenario : str
+        Scenario.
+    cfa : str
+        CFA.
+
+    Returns
+    -------
+    TradeOff
+        Data.
+    """
     table = output.table[(output.table["scenario"] == scenario) & (output.table["status"] == "ok")]
     designs = table[table["cfa"] == cfa]
     swept, named, best = (designs[designs["kind"] == kind] for kind in (SWEPT, NAMED, FOUND))
@@ -118,9 +156,21 @@ def pareto_figure(output: Output, scenario: str, cfa: str) -> TradeOff:
 
 
 def overview_figure(output: Output, scenario: str) -> TradeOff:
-    """Separation against the light of the whole CFA, for all CFAs of a scenario.
+    """Return separation against the light of the whole CFA, for all CFAs of a scenario.
 
-    Designs of the swept front meet every constraint but, in the group `outside`, those on its two axes.
+    Designs of the swept front meet every constraint except, in the group `outside`, those on the two axes.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+    scenario : str
+        Scenario.
+
+    Returns
+    -------
+    TradeOff
+        Data.
     """
     separation = output.trade_off[0]
     table = output.table[(output.table["scenario"] == scenario) & (output.table["status"] == "ok")]
@@ -137,7 +187,20 @@ def overview_figure(output: Output, scenario: str) -> TradeOff:
 
 
 def around_designs(output: Output, scenario: str) -> TradeOff:
-    """The same without the designs."""
+    """Return `overview_figure` without the designs.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+    scenario : str
+        Scenario.
+
+    Returns
+    -------
+    TradeOff
+        Data.
+    """
     separation, sensor = output.trade_off[0], output.provenance.sensor
     traced, limit = _trade_offs(output, scenario)
     reference = "clear sensor" if sensor.has_clear else f"{sensor.reference} pixels alone"
@@ -154,7 +217,7 @@ def around_designs(output: Output, scenario: str) -> TradeOff:
 
 
 def _limit_name(output: Output) -> str:
-    """The filters of the search's upper bound, for a legend; empty without a search."""
+    """Return the filters of the upper bound, for a legend; empty without a search."""
     search = output.provenance.search
     return "" if search is None else f"upper bound for {search.channel} of {search.cfa}, unquantized"
 
@@ -165,7 +228,7 @@ def _points(output: Output, rows: pd.DataFrame, x: str, labels: Sequence[str] = 
 
 
 def _trade_offs(output: Output, scenario: str, cfa: str | None = None) -> tuple[Points | None, Points | None]:
-    """Optima and limit of a search in this scenario, over the light of the whole CFA or of the modified channel."""
+    """Return optima and upper bound of a search over the light of the whole CFA or of the modified channel."""
     search, front = output.provenance.search, output.front
     if front is None or search is None or search.scenario != scenario or cfa not in (None, search.cfa):
         return None, None
@@ -179,7 +242,18 @@ def _trade_offs(output: Output, scenario: str, cfa: str | None = None) -> tuple[
 
 
 def traded_cfas(output: Output) -> list[str]:
-    """CFAs with designs, swept or traced by the search, that trade sensitivity for separation."""
+    """Return CFAs with designs, swept or searched, that trade sensitivity for separation.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    list of str
+        Lines.
+    """
     rows, traded = output.kind(SWEPT), []
     for cfa in dict.fromkeys(m.cfa for m in modifications(output)):
         swept = rows[(rows["cfa"] == cfa) & (rows["status"] == "ok")]["sensitivity"].to_numpy(dtype=float)
@@ -192,7 +266,18 @@ def traded_cfas(output: Output) -> list[str]:
 
 
 def draw_trade_off(figure: TradeOff) -> Figure:
-    """Draw the trade-off; each group has its marker, and named designs their name."""
+    """Draw the trade-off; each group has its marker, and named designs their name.
+
+    Parameters
+    ----------
+    figure : TradeOff
+        Data.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Figure.
+    """
     drawn, axes = canvas(8.3, 5.0)
     for group, points in figure.groups.items():
         if points.x.size:
@@ -225,7 +310,7 @@ def draw_trade_off(figure: TradeOff) -> Figure:
 
 
 def _level_labels(heights: Sequence[tuple[str, float]], limits: tuple[float, float]) -> list[tuple[str, float]]:
-    """One label for levels that lie too close for two."""
+    """Return one label for levels that are too close for two."""
     merged: list[tuple[list[str], float]] = []
     for name, level in heights:
         if merged and level - merged[-1][1] < 0.03 * (limits[1] - limits[0]):
@@ -236,7 +321,7 @@ def _level_labels(heights: Sequence[tuple[str, float]], limits: tuple[float, flo
 
 
 def _annotate(axes: Axes, groups: Iterable[Points]) -> None:
-    """Names beside points; one that would lie on another goes above it."""
+    """Draw names beside points; one that would overlap another goes above it."""
     labeled = sorted(item for points in groups for item in zip(points.x, points.y, points.labels, strict=False))
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     for number, (x, y, text) in enumerate(labeled):

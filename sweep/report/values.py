@@ -23,13 +23,35 @@ _MOST_POINTS = 2500
 
 
 def sensor_figure(output: Output) -> CurvesFigure:
-    """The sensor's QE curves."""
+    """Return the sensor's QE curves.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    CurvesFigure
+        Data.
+    """
     title = f"Quantum efficiency, {_name(output.provenance.sensor)}"
     return CurvesFigure(title, "QE", output.curves.wavelength_nm, output.curves.sensor, shades=light_shades(output))
 
 
 def lights_figure(output: Output) -> CurvesFigure:
-    """The photon spectra of all signals."""
+    """Return the photon spectra of all signals.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    CurvesFigure
+        Data.
+    """
     bundles = {f"{kind} ({len(photons)})": photons for kind, photons in output.curves.bundles.items()}
     colors = {name: TYPE_COLORS[kind] for kind in TYPE_COLORS for name in bundles if name.startswith(f"{kind} (")}
     title = f"Signals, {_name(output.provenance.lights)}"
@@ -39,7 +61,18 @@ def lights_figure(output: Output) -> CurvesFigure:
 
 
 def light_shades(output: Output) -> dict[str, np.ndarray]:
-    """Signal type -> the largest of its spectra at each wavelength, each with a peak of 1, ndarray[n_wavelengths]."""
+    """Return the largest spectrum of each signal type at each wavelength, with peaks of 1.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    dict of str to ndarray of shape (n_wavelengths,)
+        Spectra.
+    """
     return {
         kind: np.max(photons / photons.max(axis=1, keepdims=True), axis=0)
         for kind, photons in output.curves.bundles.items()
@@ -47,21 +80,54 @@ def light_shades(output: Output) -> dict[str, np.ndarray]:
 
 
 def channel_curves(output: Output, cfa: str) -> list[str]:
-    """Names of the sensor's curves that a CFA's channels have; a modified channel has none."""
+    """Return the names of the sensor's curves of a CFA's channels; a modified channel has none.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+    cfa : str
+        CFA.
+
+    Returns
+    -------
+    list of str
+        Lines.
+    """
     renamed = output.study.cfas[cfa].curves
     names = (renamed.get(channel, channel) for channel in output.mosaic(cfa).channels)
     return [name for name in dict.fromkeys(names) if name in output.curves.sensor]
 
 
 def modifications(output: Output) -> list[Modification]:
-    """The study's named designs, sweeps and boxes."""
+    """Return the study's named designs, sweeps and boxes.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    list of Modification
+        Modifications.
+    """
     study = output.study
     return [*study.designs.values(), *study.sweeps.values(), *study.boxes.values()]
 
 
 def drawn_rows(output: Output) -> pd.DataFrame:
-    """Rows that figures show as points: all CFAs, named and found designs, an even share of the swept ones, and those
-    whose signals were kept.
+    """Return the rows that figures show as points: CFAs, named designs and answers, and an even sample of swept ones.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Table.
     """
     table = output.table[output.table["status"] == "ok"]
     kept = (table["kind"] != SWEPT) | (table["feasible"] & table["pareto"])
@@ -74,8 +140,19 @@ def drawn_rows(output: Output) -> pd.DataFrame:
 
 
 def filters_figure(output: Output, cfa: str) -> CurvesFigure:
-    """Modified channels of the named designs and the best ones of a CFA, beside the green and yellow pixels' curves and
-    the ends that they go between.
+    """Return the modified channels of named and best designs of a CFA, beside the curves that they lie between.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+    cfa : str
+        CFA.
+
+    Returns
+    -------
+    CurvesFigure
+        Data.
     """
     rows = output.table[output.table["design_id"].isin(output.curves.drawn) & (output.table["cfa"] == cfa)]
     ends = end_curves(output, cfa)
@@ -97,7 +174,20 @@ def filters_figure(output: Output, cfa: str) -> CurvesFigure:
 
 
 def end_curves(output: Output, cfa: str) -> list[str]:
-    """Names of the sensor's curves that a CFA's filters go between, and those of the green and the yellow pixel."""
+    """Return the names of the curves that a CFA's filters lie between, and those of the green and yellow pixel.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+    cfa : str
+        CFA.
+
+    Returns
+    -------
+    list of str
+        Lines.
+    """
     entries = [entry for entry in modifications(output) if entry.cfa == cfa]
     ends = {end for entry in entries for end in (entry.base, entry.to) if isinstance(end, str)} | {"G", "Y"}
     return [name for name in output.curves.sensor if name in ends]

@@ -1,4 +1,4 @@
-"""Benchmark of vision as a run left it: errors of each design and reader, and what predicts them, with intervals."""
+"""Benchmark of vision of a run: errors of each design and reader, and their predictors, with intervals."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _FALLS = ("csd", "dprime")
 
 @dataclass(frozen=True, eq=False)
 class Benchmark:
-    """The images of a run and what was said of them. `images`, `conditions`: the tables as the run wrote them."""
+    """Images of a run and the answers to them."""
 
     vision: Vision
     seed: int
@@ -46,7 +46,7 @@ class Benchmark:
 
     @property
     def reference(self) -> str:
-        """The design with which the others are compared."""
+        """Design that the others are compared with."""
         return _REFERENCE if _REFERENCE in self.designs else self.designs[0]
 
     @cached_property
@@ -56,7 +56,7 @@ class Benchmark:
 
     @property
     def judge(self) -> str:
-        """By whom designs are compared: the network, or without one the observer."""
+        """Reader by which designs are compared: the network, or without one the observer."""
         return NETWORK if NETWORK in self.readers else OBSERVER
 
     def _answers(self, order: str, lamps: str = UNSEEN) -> pd.DataFrame:
@@ -64,46 +64,134 @@ class Benchmark:
 
     @lru_cache  # noqa: B019  (a benchmark lives as long as its report)
     def wrong(self, reader: str, order: str, lamps: str = UNSEEN) -> pd.DataFrame:
-        """1 where an image was read wrongly, a row for each scene (seed, image), a column for each design."""
+        """Return 1 where an image was read wrongly.
+
+        Parameters
+        ----------
+        reader, order, lamps : str
+            Reader, order of the lenses, and lamps.
+
+        Returns
+        -------
+        pandas.DataFrame
+            One row per scene (seed, image), one column per design.
+        """
         rows = self._answers(order, lamps)
         rows = rows.assign(wrong=(rows[reader] != rows["state"]).astype(float))
         return rows.pivot(index=["seed", "image"], columns="name", values="wrong")[self.designs]
 
     @lru_cache  # noqa: B019
     def weights(self, order: str, lamps: str = UNSEEN) -> FloatArray:
-        """Bootstrap weights of the scenes of `wrong`, the same for all designs and readers."""
+        """Return the bootstrap weights of the scenes of `wrong`, equal for all designs and readers.
+
+        Parameters
+        ----------
+        order, lamps : str
+            Order of the lenses, and lamps.
+
+        Returns
+        -------
+        ndarray of shape (draws, n_scenes)
+            Weights.
+        """
         seeds = self.scenes(order, lamps)["seed"].to_numpy()
         return nested_weights(seeds, np.random.default_rng((self.seed, 99)))
 
     def error(self, design: str, reader: str, order: str, lamps: str = UNSEEN) -> Interval:
-        """Share of images that were read wrongly."""
+        """Return the share of images that were read wrongly.
+
+        Parameters
+        ----------
+        design, reader, order, lamps : str
+            Design, reader, order of the lenses, and lamps.
+
+        Returns
+        -------
+        Interval
+            Share.
+        """
         return mean_of(self.wrong(reader, order, lamps)[design].to_numpy(), self.weights(order, lamps))
 
     def difference(self, design: str, order: str) -> Interval:
-        """Error of a design less that of the reference, on the same scenes."""
+        """Return the error of a design less that of the reference, on the same scenes.
+
+        Parameters
+        ----------
+        design, order : str
+            Design and order of the lenses.
+
+        Returns
+        -------
+        Interval
+            Difference.
+        """
         wrong = self.wrong(self.judge, order)
         return mean_of((wrong[design] - wrong[self.reference]).to_numpy(), self.weights(order))
 
     def scenes(self, order: str, lamps: str = UNSEEN) -> pd.DataFrame:
-        """Contents of the scenes of `wrong`, in the same order."""
+        """Return the scenes of `wrong` in the same order.
+
+        Parameters
+        ----------
+        order, lamps : str
+            Order of the lenses, and lamps.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Table.
+        """
         rows = self._answers(order, lamps)
         return rows[rows["name"] == self.designs[0]].sort_values(["seed", "image"])
 
     def said(self, design: str, reader: str, order: str) -> pd.DataFrame:
-        """Answers on unseen lamps: columns state, said, p."""
+        """Return the answers on unseen lamps: columns state, said, p.
+
+        Parameters
+        ----------
+        design, reader, order : str
+            Design, reader and order of the lenses.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Table.
+        """
         rows = self._answers(order)
         rows = rows[rows["name"] == design]
         return rows[["state", reader, f"{reader}_p"]].set_axis(["state", "said", "p"], axis=1)
 
     def confusion(self, design: str, reader: str, order: str) -> pd.DataFrame:
-        """Counts of each state (row) said to be each (column)."""
+        """Return the number of answers by true state (row) and answer (column).
+
+        Parameters
+        ----------
+        design, reader, order : str
+            Design, reader and order of the lenses.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Table.
+        """
         states, rows = list(states_of(self.vision)), self.said(design, reader, order)
         truth, said = (np.array([states.index(value) for value in rows[column]]) for column in ("state", "said"))
         return pd.DataFrame(confusion_matrix(truth, said, len(states)), states, states)
 
 
 def benchmark_of(output: Output) -> Benchmark:
-    """Return the benchmark of a run whose study asks for one."""
+    """Return the benchmark of a run whose study has one.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    Benchmark
+        Benchmark.
+    """
     vision = output.study.vision
     assert vision is not None
     tables = output.vision[VISION], output.vision[VISION_CONDITIONS]
@@ -111,22 +199,44 @@ def benchmark_of(output: Output) -> Benchmark:
 
 
 def said_interval(interval: Interval) -> str:
-    """Format a value with its interval."""
+    """Format a value with its interval.
+
+    Parameters
+    ----------
+    interval : Interval
+        Value.
+
+    Returns
+    -------
+    str
+        Text.
+    """
     return f"{interval.value:.2f} ({interval.low:.2f} to {interval.high:.2f})"
 
 
 def said_percent(interval: Interval) -> str:
-    """Format a share with its interval, in percent, without the sign."""
+    """Format a share with its interval, in percent, without the sign.
+
+    Parameters
+    ----------
+    interval : Interval
+        Share.
+
+    Returns
+    -------
+    str
+        Text.
+    """
     value, low, high = (told_share(share).removesuffix("%") for share in (interval.value, interval.low, interval.high))
     return f"{value} ({low} to {high})"
 
 
 @dataclass(frozen=True)
 class Ranks:
-    """Rank correlations with how rarely the network errs, of each of `PREDICTORS`: 1 predicts every order.
+    """Rank correlations of each of `PREDICTORS` with the rarity of the network's errors: 1 predicts every order.
 
-    `everywhere`: over all designs, distances and levels; `between`: between designs at one distance and level, the
-    mean over these. `conditions`: a row per design, distance and level, with all predictors and the measured `error`.
+    `everywhere` is over all designs, distances and levels; `between` is the mean over distances and levels of the
+    correlation between designs. `conditions` has one row per design, distance and level, with predictors and `error`.
     """
 
     everywhere: dict[str, Interval]
@@ -136,7 +246,18 @@ class Ranks:
 
 @lru_cache(maxsize=4)
 def ranks_of(benchmark: Benchmark) -> Ranks:
-    """Return predictors of the network's errors, lenses in any order; intervals by a bootstrap of scenes in seeds."""
+    """Return the rank correlations, lenses in any order; intervals by a bootstrap of scenes in seeds.
+
+    Parameters
+    ----------
+    benchmark : Benchmark
+        Benchmark.
+
+    Returns
+    -------
+    Ranks
+        Correlations.
+    """
     scenes, weights = benchmark.scenes(SHUFFLED), benchmark.weights(SHUFFLED)
     weights = np.vstack([np.full(weights.shape[1], 1 / weights.shape[1]), weights])
     where = list(dict.fromkeys(zip(benchmark.conditions["distance_m"], benchmark.conditions["level"], strict=True)))
@@ -168,7 +289,7 @@ def ranks_of(benchmark: Benchmark) -> Ranks:
 
 
 def _by_condition(wrong: pd.DataFrame, here: BoolArray, weights: FloatArray) -> FloatArray:
-    """Errors, ndarray[draws, designs, conditions]; NaN where a draw has no scene of a condition."""
+    """Return errors, ndarray of shape (draws, designs, conditions); NaN where a draw has no scene of a condition."""
     values = wrong.to_numpy(dtype=float)
     errors = np.full((len(weights), values.shape[1], len(here)), np.nan)
     for at, scenes in enumerate(here):
@@ -179,7 +300,7 @@ def _by_condition(wrong: pd.DataFrame, here: BoolArray, weights: FloatArray) -> 
 
 
 def _spearman(x: FloatArray, y: FloatArray) -> FloatArray:
-    """Rank correlation along the last axis, ndarray[draws]; NaN where one side is the same everywhere."""
+    """Return the rank correlation along the last axis, ndarray of shape (draws,); NaN if one side is constant."""
     a, b = (rankdata(values, axis=1) for values in (x, y))
     a, b = (ranks - ranks.mean(axis=1, keepdims=True) for ranks in (a, b))
     scale = np.sqrt((a**2).sum(axis=1) * (b**2).sum(axis=1))

@@ -42,7 +42,18 @@ _WELL = 0.5
 
 
 def vision_sentences(output: Output) -> Iterator[str]:
-    """Predictors of the errors, who errs less than the reference, and how far the network is from the best reader."""
+    """Yield predictors of the errors, designs with fewer errors than the reference, and the network's excess error.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Yields
+    ------
+    str
+        Sentences.
+    """
     benchmark = benchmark_of(output)
     ranks = ranks_of(benchmark)
     csd = ranks.between.get("csd")
@@ -83,7 +94,7 @@ def _against_reference(benchmark: Benchmark) -> Iterator[str]:
 
 
 def _vision_table(benchmark: Benchmark) -> pd.DataFrame:
-    """A row per design: errors by reader, order of lenses and lamps, differences, F1, and what "unknown" saves."""
+    """Return one row per design: errors by reader, lenses and lamps, differences, F1, and the gain by "unknown"."""
     rows = []
     for design in benchmark.designs:
         row: dict[str, str] = {"design": design}
@@ -108,7 +119,7 @@ def _vision_table(benchmark: Benchmark) -> pd.DataFrame:
 
 
 def _unknown(benchmark: Benchmark, design: str, reader: str) -> str:
-    """Mean cost of an answer where "unknown" is allowed, and how often it is given."""
+    """Return the mean cost of an answer with "unknown", and its frequency."""
     rows, cost = benchmark.said(design, reader, SHUFFLED), benchmark.vision.unknown_cost
     wrong = (rows["said"] != rows["state"]).to_numpy(dtype=bool)
     cost_of, unknown = costs(wrong, rows["p"].to_numpy(dtype=float), cost)
@@ -116,7 +127,7 @@ def _unknown(benchmark: Benchmark, design: str, reader: str) -> str:
 
 
 def _vision_conditions_table(benchmark: Benchmark, ranks: Ranks) -> pd.DataFrame:
-    """A row per level and distance: percent read wrongly with each design, and in brackets by the ideal observer."""
+    """Return one row per level and distance: percent read wrongly with each design, in brackets by the observer."""
     rows = ranks.conditions
     levels = {name: f"{name} ({level.illuminance_lx:g} lx)" for name, level in benchmark.vision.levels.items()}
     text = (100 * rows["error"]).map("{:.1f}".format)
@@ -129,14 +140,14 @@ def _vision_conditions_table(benchmark: Benchmark, ranks: Ranks) -> pd.DataFrame
 
 
 def _confusion_table(benchmark: Benchmark) -> pd.DataFrame:
-    """Counts of states as the judge takes them, a row per design and state, lenses in any order."""
+    """Return counts of answers, one row per design and state, lenses in any order."""
     parts = {design: benchmark.confusion(design, benchmark.judge, SHUFFLED) for design in benchmark.designs}
     table = pd.concat(parts, names=["design", "state"])
     return table.rename(columns=lambda name: f"said {name}").reset_index()
 
 
 def _ranks_table(ranks: Ranks) -> pd.DataFrame:
-    """A row per predictor: its rank correlations with their intervals."""
+    """Return one row per predictor: rank correlations with their intervals."""
     rows = [
         {
             "predictor": PREDICTORS[name],
@@ -149,7 +160,18 @@ def _ranks_table(ranks: Ranks) -> pd.DataFrame:
 
 
 def vision_parts(output: Output) -> dict[str, pd.DataFrame]:
-    """Return every table of the report, by its title."""
+    """Return every table of the benchmark.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    dict of str to pandas.DataFrame
+        Tables by title.
+    """
     benchmark = benchmark_of(output)
     ranks = ranks_of(benchmark)
     who = READER_NAMES[benchmark.judge]
@@ -165,7 +187,18 @@ def vision_parts(output: Output) -> dict[str, pd.DataFrame]:
 
 
 def vision_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
-    """Yield (file name, caption, drawing) of a benchmark."""
+    """Yield the drawings of the benchmark.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Yields
+    ------
+    name, caption, drawing : str, str, Drawing
+        File name, caption and drawing.
+    """
     benchmark = benchmark_of(output)
     ranks = ranks_of(benchmark)
     levels = {name: level.illuminance_lx for name, level in benchmark.vision.levels.items()}
@@ -181,7 +214,7 @@ def vision_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
 
 
 def _misread(benchmark: Benchmark, pictures: pd.DataFrame) -> list[tuple[str, NDArray[np.uint8]]]:
-    """Title and false colors, ndarray[rows, columns, 3], of a few images of every design."""
+    """Return title and false colors, ndarray of shape (rows, columns, 3), of a few images of every design."""
     per_design = max(1, _COLUMNS * _ROWS // pictures["name"].nunique())
     shown = pictures.groupby("name", sort=False).head(per_design).head(_COLUMNS * _ROWS)
     answers = benchmark.images
@@ -199,7 +232,7 @@ def _misread(benchmark: Benchmark, pictures: pd.DataFrame) -> list[tuple[str, ND
 
 
 def _draw_errors(conditions: pd.DataFrame, levels: Mapping[str, float], judge: str) -> Figure:
-    """A panel per level: the judge's error with each design; dashed the ideal observer's."""
+    """Draw one panel per level: the error with each design; dashed the ideal observer's."""
     figure, panels = canvas_grid(1, len(levels), 4.2 * len(levels), 4.2)
     for axes, (level, lux) in zip(panels, levels.items(), strict=True):
         rows = conditions[conditions["level"] == level].sort_values("distance_m")
@@ -217,7 +250,7 @@ def _draw_errors(conditions: pd.DataFrame, levels: Mapping[str, float], judge: s
 
 
 def _draw_ranks(ranks: Ranks, levels: Sequence[str], who: str) -> Figure:
-    """A panel per predictor: a point per design, distance and level; the color is the design, the marker the level."""
+    """Draw one panel per predictor: one point per design, distance and level."""
     names, designs = list(ranks.everywhere), ranks.conditions["design"].unique()
     figure, panels = canvas_grid(1, len(names), 3.7 * len(names), 4.4)
     for axes, name in zip(panels, names, strict=True):
