@@ -21,7 +21,7 @@ class ColorRegion:
     source: str
 
     def violation(self, xy: FloatArray) -> FloatArray:
-        """How far each point of ndarray[n, 2] is outside, ndarray[n]; inside where <= 0."""
+        """Return the distance of points, ndarray[n, 2], beyond the bounds, ndarray[n]; inside where <= 0."""
         a, b, c = np.array(self.bounds).T
         return np.asarray((xy[:, :1] * a + xy[:, 1:] * b - c).max(axis=1), dtype=float)
 

@@ -52,7 +52,7 @@ class Curve:
         return float(self.wavelength_nm[np.argmax(self.values)])
 
     def on(self, grid: WavelengthGrid) -> FloatArray:
-        """The curve over its largest value, ndarray[grid.size]; 0 where it is negative or has no samples."""
+        """Return the curve over its largest value, ndarray[grid.size]; 0 where it is negative or has no samples."""
         if self.values.size < 2 or not self.peak > 0:
             return np.zeros(grid.size)
         return resample(self.wavelength_nm, np.clip(self.values / self.peak, 0, None), grid, "mean", "zero")
@@ -92,7 +92,7 @@ class Facts:
         return bool(lit) and 2 * broad >= len(lit) and max(curve.peak for curve in lit) <= _PERCENT
 
     def colors(self, quantity: LightUnit) -> Mapping[str, LightColor | None]:
-        """The color of each curve read as a light."""
+        """Return the color of each curve read as a light."""
         colors = {}
         for curve in self.curves:
             values = curve.on(VISIBLE)
@@ -190,7 +190,7 @@ class Mended:
     faults: tuple[Fault, ...]
 
     def text(self, file: str, notes: tuple[str, ...]) -> str:
-        """A clean CSV that says what was changed in its first lines."""
+        """Return a clean CSV that says what was changed in its first lines."""
         lines = [f"from {file}", *(f"read: {note}" for note in notes), *(f"changed: {c}" for c in self.changes)]
         head = "".join(f"# {' '.join(line.split())}\n" for line in lines)
         return head + csv_text(self.wavelength_nm, dict(zip(self.names, self.values.T, strict=True)))

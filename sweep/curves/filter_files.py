@@ -128,7 +128,7 @@ class RgbWeights:
     light_error: FloatArray
 
     def as_csv(self) -> str:
-        """A row per channel; every float comes back as it is."""
+        """Return a row per channel; every float comes back as it is."""
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(["channel", "red", "green", "blue", "residual", "largest_error_of_a_light"])

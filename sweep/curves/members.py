@@ -71,15 +71,15 @@ class Members:
         return {name: np.asarray(rows, dtype=np.intp) for name, rows in starts.items()}
 
     def signal(self, row: int) -> int:
-        """The signal whose spectra begin at a row."""
+        """Return the signal whose spectra begin at a row."""
         return row // (len(self.population.width) * self.n_steps)
 
     def steps_of(self, shift_nm: FloatArray) -> FloatArray:
-        """How many steps after the first shift a shift is, 0 or more."""
+        """Return the steps of a shift after the first one, 0 or more."""
         return np.asarray(np.clip(shift_nm / self._step_nm - self._first, 0.0, self.n_steps - 1), dtype=float)
 
     def shift_nm(self, cell: int, share: float) -> float:
-        """By how much a spectrum is shifted so many steps after the first shift."""
+        """Return the shift so many steps after the first one, nm."""
         return (self._first + cell + share) * self._step_nm
 
     def drift_and_own(self, signal: int) -> tuple[float, tuple[float, float]]:
@@ -91,18 +91,18 @@ class Members:
         first, second = (self.rows[name] for name in pair)
         known: dict[int, int] = {}
         regions: list[ShiftRegion] = []
-        which = np.empty((first.size, second.size), dtype=np.intp)
+        indices = np.empty((first.size, second.size), dtype=np.intp)
         for one, row in enumerate(first):
             for other, column in enumerate(second):
                 region = self.region(self.signal(int(row)), self.signal(int(column)))
                 if id(region) not in known:
                     known[id(region)] = len(regions)
                     regions.append(region)
-                which[one, other] = known[id(region)]
-        return regions, which
+                indices[one, other] = known[id(region)]
+        return regions, indices
 
     def region(self, one: int, other: int) -> ShiftRegion:
-        """The shifts of two signals that occur together."""
+        """Return the shifts of two signals that occur together."""
         (a, own_a), (b, own_b) = self.drift_and_own(one), self.drift_and_own(other)
         key = (a, *own_a, b, *own_b)
         if key not in self._regions:
@@ -114,7 +114,7 @@ class Members:
 
 
 def spans_nm(lights: Lights, population: Population) -> list[tuple[float, float]]:
-    """From and to where each signal is shifted."""
+    """Return the range of shifts of each signal, nm."""
     spans = []
     for signal in range(len(lights.names)):
         drift, (low, high) = _drift_and_own(lights, population, signal)

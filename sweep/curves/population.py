@@ -114,12 +114,12 @@ class Population(Section):
 
     @property
     def warmer_k(self) -> tuple[float, float]:
-        """By how much a junction is warmer than the reference, at least and at most."""
+        """Least and largest excess of a junction's temperature over the reference, K."""
         low, high = self.temperature_c
         return low - self.reference_c, high + self.self_heating_k - self.reference_c
 
     def scaled(self, factor: float) -> Population:
-        """The population with every shift so many times as large."""
+        """Return the population with every shift so many times as large."""
         low, high = (self.reference_c + factor * warmer for warmer in self.warmer_k)
         update = {
             "temperature_c": (low, high),
@@ -134,8 +134,8 @@ class Population(Section):
         drift, (low, high) = self.drift(kind, name), self.own_nm(kind, name)
         ends = self.warmer_k
         if drift:
-            own = sorted((shift_nm - off) / drift for off in (low, high))
-            ends = max(ends[0], own[0]), min(ends[1], own[1])
+            ends_k = sorted((shift_nm - off) / drift for off in (low, high))
+            ends = max(ends[0], ends_k[0]), min(ends[1], ends_k[1])
         return self.reference_c + ends[0], self.reference_c + ends[1]
 
     def drift(self, kind: str, name: str) -> float | None:
@@ -143,7 +143,7 @@ class Population(Section):
         return _of(self.drift_nm_per_k, kind, name, DRIFT_NM_PER_K.get(kind))
 
     def own_nm(self, kind: str, name: str) -> tuple[float, float]:
-        """From and to where binning and ageing alone shift a signal."""
+        """Return the range of shifts by binning and ageing alone, nm."""
         binning = _of(self.binning_nm, kind, name, 0.0)
         low, high = _of(self.ageing_nm, kind, name, (0.0, 0.0))
         return low - binning, high + binning

@@ -83,7 +83,7 @@ class SingleLeds:
         return equal_photons(grid, self._shapes(grid))
 
     def allowed(self, norm: Norm, kind: str) -> SingleLeds:
-        """The LEDs whose color is inside a norm's region of a signal type."""
+        """Return the LEDs whose color is inside a norm's region of a signal type."""
         inside = SIGNAL_REGIONS[norm][kind].violation(chromaticity(VISIBLE, self._shapes(VISIBLE))) <= 0
         return SingleLeds(self.peak_nm[inside], self.fwhm_nm[inside])
 

@@ -175,8 +175,10 @@ def _mark(lines: Sequence[str]) -> str:
     """
     for mark in ("\t", ";", ","):
         counts = [line.count(mark) for line in lines]
-        some = [count for count in counts if count]
-        if 2 * len(some) > len(lines) and some.count(max(set(some), key=some.count)) * 2 > len(some):
+        positive = [count for count in counts if count]
+        if 2 * len(positive) > len(lines) and positive.count(max(set(positive), key=positive.count)) * 2 > len(
+            positive
+        ):
             return mark
     first = next((mark for mark in (",", ";", "\t") if mark in lines[0]), "")
     last = lines[-1].split()

@@ -40,7 +40,7 @@ class Axis(Section):
         return self.count or len(self.values or ())
 
     def points(self) -> tuple[float, ...]:
-        """The values, in order."""
+        """Return the values, in order."""
         if self.values is not None:
             return tuple(self.values)
         assert self.min is not None and self.max is not None and self.count is not None  # noqa: PT018
@@ -49,14 +49,14 @@ class Axis(Section):
 
 
 def _span(value: Any) -> Any:
-    """An axis of a box: `min` and `max` are enough."""
+    """Return an axis of a box: `min` and `max` are enough."""
     if isinstance(value, dict) and set(value) == {"min", "max"}:
         return {**value, "count": 1 if value["min"] == value["max"] else 2}
     return _axis(value)
 
 
 def _axis(value: Any) -> Any:
-    """A number or a list of numbers as an axis."""
+    """Return a number or a list of numbers as an axis."""
     if isinstance(value, list):
         return {"values": value}
     return {"values": [value]} if isinstance(value, int | float) and not isinstance(value, bool) else value

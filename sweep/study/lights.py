@@ -67,11 +67,11 @@ def lights_of(section: LightsSection, sources: Sources, at: KeyPath = ("lights",
     """Return the lights of the section at a place of the study, or None after adding faults. Raises StudyError."""
     section = offered_curves(sources, at, section, "sweep.lights", BUILT_IN_LIGHTS)
     if section.builtin is not None:
-        own = sorted(section.model_fields_set - {"builtin", "files"})
-        for key in own:
+        excess = sorted(section.model_fields_set - {"builtin", "files"})
+        for key in excess:
             value = getattr(section, key)
             sources.add((*at, key), "a built-in data set has its own", value, "this key beside `files`")
-        return None if own else sources.built_in(at, section.builtin, BUILT_IN_LIGHTS)
+        return None if excess else sources.built_in(at, section.builtin, BUILT_IN_LIGHTS)
     before = len(sources.faults)
     files = (*at, "files")
     count = sum(len(columns) for entry in section.files for columns in entry.signals.values())

@@ -88,7 +88,7 @@ class Study:
 
     @property
     def tolerance(self) -> Tolerance:
-        """How far off filters may come out."""
+        """Production tolerance of filters."""
         return self.section.production.tolerance
 
     @property
@@ -181,11 +181,11 @@ class Study:
         )
 
     def pixel_in(self, scene: Scene) -> Pixel:
-        """The study's pixel, with a scene's noise where it states one."""
+        """Return the study's pixel, with a scene's noise where it states one."""
         return self.pixel if scene.noise is None else scene.noise.of(self.pixel)
 
     def box(self, space: Space, scenario: str) -> Box:
-        """The range of the designs of `space`, for a plan of the scenario."""
+        """Return the range of the designs of `space`, for a plan of the scenario."""
         setup = self.setup(space, scenario).with_all_effects
         low, high = setup.camera.qe.copy(), setup.camera.qe.copy()
         if space.filter is not None:
@@ -197,7 +197,7 @@ class Study:
         return Box(setup, low, high)
 
     def plan(self, scenario: str, tolerance_dn: float | None = None) -> Plan:
-        """The plan of a scene, for all designs of the study; `tolerance_dn` instead of the study's own.
+        """Return the plan of a scene, for all designs of the study; `tolerance_dn` instead of the study's own.
 
         Raises StudyError for numbers that are allowed one by one, but that no float can hold together.
         """
@@ -212,14 +212,14 @@ class Study:
             raise StudyError(Fault(problem, key=f"scenarios.{scenario}")) from None
 
     def with_plans(self, tolerance_dn: float | None = None) -> Study:
-        """The study with a plan for each of its scenarios; `tolerance_dn` instead of the study's own.
+        """Return the study with a plan for each of its scenarios; `tolerance_dn` instead of the study's own.
 
         Raises StudyError as `plan` does.
         """
         return replace(self, plans={name: self.plan(name, tolerance_dn) for name in self.scenarios})
 
     def problem(self, search: Search) -> Problem:
-        """The search as a mathematical problem."""
+        """Return the search as a mathematical problem."""
         assert search.space.filter is not None
         return Problem(
             setup=self.setup(search.space, search.scenario),

@@ -114,8 +114,8 @@ class SweepSection(Modification):
             raise ValueError("`box` goes with `sobol` and `lhs`, which draw from it")
         sizes = {name: axis.size for name, axis in (self.paired or {}).items()}
         if len(set(sizes.values()) - {1}) > 1:
-            told = ", ".join(f"{name} {size}" for name, size in sizes.items())
-            raise ValueError(f"zip: as many values of each parameter, or a single one; there are: {told}")
+            counts = ", ".join(f"{name} {size}" for name, size in sizes.items())
+            raise ValueError(f"zip: as many values of each parameter, or a single one; there are: {counts}")
         if self.listed is not None and not self.listed:
             raise ValueError("list: one design or more")
         for number, design in enumerate(self.listed or (), 1):
@@ -146,7 +146,7 @@ class Production(Section):
 
     @property
     def tolerance(self) -> Tolerance:
-        """How far off a filter may come out."""
+        """Production tolerance of a filter."""
         return Tolerance(self.edge_shift_nm, self.thickness)
 
 

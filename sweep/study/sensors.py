@@ -39,13 +39,13 @@ def sensor_of(section: SensorSection, sources: Sources) -> SensorCurves | None:
     if not sources.fits(("sensor", "files"), "curves", sum(len(entry.columns) for entry in section.files)):
         return None
     known = {} if built_in is None else built_in.qe
-    own = _curves_of_files(sources, section, known)
+    added = _curves_of_files(sources, section, known)
     if len(sources.faults) > before:
         return None
     source = ", ".join(entry.file for entry in section.files)
     clear = section.clear or (None if built_in is None else built_in.clear)
     try:
-        made = make_sensor(section.name or section.builtin or "sensor", {**known, **own}, source, clear)
+        made = make_sensor(section.name or section.builtin or "sensor", {**known, **added}, source, clear)
     except DataError as error:
         for fault in error.faults:
             index = next((i for i, entry in enumerate(section.files) if fault.key in entry.columns), None)
@@ -56,7 +56,7 @@ def sensor_of(section: SensorSection, sources: Sources) -> SensorCurves | None:
     if built_in is None:
         return made
     variants = {
-        cfa: {channel: curve for channel, curve in channels.items() if channel not in own}
+        cfa: {channel: curve for channel, curve in channels.items() if channel not in added}
         for cfa, channels in built_in.variants.items()
     }
     return replace(made, source=f"{built_in.source}, {source}", surrogate=built_in.surrogate, variants=variants)

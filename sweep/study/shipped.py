@@ -44,7 +44,7 @@ def study_path(given: Path) -> Path:
     for path in (folder / f"{name}{kind}" for folder in folders for kind in _KINDS):
         if is_file(path):
             return path
-    own = sorted(path.stem for path in folders[0].glob("*") if path.suffix in _KINDS)
-    known = list(dict.fromkeys([*own, *shipped_names()]))
+    local = sorted(path.stem for path in folders[0].glob("*") if path.suffix in _KINDS)
+    known = list(dict.fromkeys([*local, *shipped_names()]))
     problem = "no such file, and no study of that name"
     raise StudyError(Fault(problem, value=name, allowed=", ".join(known), nearest=nearest(name, known)))

@@ -109,14 +109,16 @@ class SpaceBuilder:
         for channel in entry.channel:
             if mosaic is not None and channel not in mosaic.channels:
                 self.sources.unknown((*path, "channel"), f"channel of {entry.cfa}", channel, mosaic.channels)
-        own = is_from_outside(entry.family, _FAMILIES, FAMILIES)
-        if own and not allowed(self.sources, (*path, "family"), entry.family):
+        external = is_from_outside(entry.family, _FAMILIES, FAMILIES)
+        if external and not allowed(self.sources, (*path, "family"), entry.family):
             return
-        if own and self.section.production.tolerance:
+        if external and self.section.production.tolerance:
             self.sources.add((*path, "family"), "a family of one's own has no edges that production could shift")
-        elif not own and entry.family not in FAMILIES:
+        elif not external and entry.family not in FAMILIES:
             self.sources.unknown((*path, "family"), "family", entry.family, [*FAMILIES, *offers(_FAMILIES)])
-        elif entry.channel and len(entry.channel) != (n_modified := 1 if own else FAMILIES[entry.family].n_modified):
+        elif entry.channel and len(entry.channel) != (
+            n_modified := 1 if external else FAMILIES[entry.family].n_modified
+        ):
             self.sources.add((*path, "channel"), f"{entry.family} replaces {n_modified} channel(s)", entry.channel)
         elif len(set(entry.channel)) < len(entry.channel):
             self.sources.add((*path, "channel"), "a channel is named twice", entry.channel)
@@ -166,8 +168,8 @@ class SpaceBuilder:
         nodes_nm = self.section.wavelengths.nodes_nm
         if not is_from_outside(entry.family, _FAMILIES, FAMILIES):
             return build_family(entry.family, nodes_nm, base, target, entry.options)
-        own = PluginFamily(code_of(self.sources, entry.family, _FAMILIES), nodes_nm, base, target)
-        bounds = f"0 and {entry.base or 1}" if own.below_base else "0 and 1"
+        plugin = PluginFamily(code_of(self.sources, entry.family, _FAMILIES), nodes_nm, base, target)
+        bounds = f"0 and {entry.base or 1}" if plugin.below_base else "0 and 1"
         whose = "code of that file" if is_in_file(entry.family) else "code of an installed package"
         note = (
             f"{entry.family} runs {whose}: its gradients are differences, and its filters are taken for any "
@@ -175,7 +177,7 @@ class SpaceBuilder:
         )
         if note not in self.sources.warnings:
             self.sources.warnings.append(note)
-        return cast(Family, own)
+        return cast(Family, plugin)
 
     def _axes(
         self, axes: Mapping[str, tuple[float, ...]], path: KeyPath, parameters: Sequence[Parameter]

@@ -26,9 +26,9 @@ _MOST_PAIRS = 200_000
 def tasks_of(section: TasksSection, sources: Sources) -> StudyTasks | None:
     """Return the tasks of a study, or None after adding faults."""
     before = len(sources.faults)
-    own = section.own.values()
-    named = [entry for task in own for spectra in task.classes.values() for entry in spectra]
-    if section.shipped or any(task.under for task in own) or any(isinstance(entry, str) for entry in named):
+    user_tasks = section.own.values()
+    named = [entry for task in user_tasks for spectra in task.classes.values() for entry in spectra]
+    if section.shipped or any(task.under for task in user_tasks) or any(isinstance(entry, str) for entry in named):
         sources.in_built_in_range("the spectra of the tasks")
     for name in section.shipped:
         if name not in SHIPPED:

@@ -102,8 +102,8 @@ def offered_curves(sources: Sources, at: KeyPath, section: _Curves, group: Offer
         raise sources.error from None
     package: Installed | None = installed(group, name)
     sources.folders = [*([] if package is None else package.folders), *sources.folders]
-    own = {key: getattr(section, key) for key in section.model_fields_set - {"builtin", "files"}}
-    return made.model_copy(update={"name": made.name or name, "files": [*made.files, *section.files], **own})
+    added = {key: getattr(section, key) for key in section.model_fields_set - {"builtin", "files"}}
+    return made.model_copy(update={"name": made.name or name, "files": [*made.files, *section.files], **added})
 
 
 def own_metrics(section: StudySection, sources: Sources) -> tuple[OwnMetric, ...]:
@@ -165,8 +165,8 @@ def check_names(own: Sequence[OwnMetric], asked: Asked, spaces: Sequence[Space],
     """Return whether each column has one meaning; else add a fault. `asked`: what the study asks for."""
     if not own:
         return True
-    every = replace(asked, own=(), states=asked.classes, any_place=True, edge_shift=True, population=True)
-    taken = {*quantities_of(replace(every, probabilities=True, vision=True)), *RESERVED}
+    widest = replace(asked, own=(), states=asked.classes, any_place=True, edge_shift=True, population=True)
+    taken = {*quantities_of(replace(widest, probabilities=True, vision=True)), *RESERVED}
     taken |= {name for space in spaces for name in space.parameters}
     for metric in own:
         if metric.name in taken:
@@ -204,12 +204,14 @@ def _tried(metric: OwnMetric, setup: Setup) -> bool:
     plain = replace(setup, scene=Scene(), left_out=frozenset()).with_camera(technologies=())
     base = plain.camera.base_qe[None]
     response = smooth_response(plain, np.concatenate([base, 0.9 * base, 0.8 * base]))[:, 0]
-    every = metric.parts(Readings.of_setup(setup, response))
+    together = metric.parts(Readings.of_setup(setup, response))
     alone = [metric.parts(Readings.of_setup(setup, response[[at]])) for at in range(len(response))]
-    some = [values for values in alone if values is not None]
-    if every is None:
+    parts = [values for values in alone if values is not None]
+    if together is None:
         return False
-    joined = np.concatenate(some) if len(some) == len(every) else np.empty(0)
-    if joined.shape != every.shape or not np.allclose(joined, every, rtol=_SAME, atol=_SAME * np.abs(every).max()):
+    joined = np.concatenate(parts) if len(parts) == len(together) else np.empty(0)
+    if joined.shape != together.shape or not np.allclose(
+        joined, together, rtol=_SAME, atol=_SAME * np.abs(together).max()
+    ):
         raise SweepError(Fault(f"{metric.code.name}: a design's number depends on the designs beside it"))
     return True

@@ -91,11 +91,7 @@ def test_the_measured_study_loads() -> None:
             "tiny.yaml:4: cfas.RGXB: unknown curve of channel 'X' (got 'X'); allowed: C, R, G, B, Y, Cy, Rx; "
             "did you mean 'Rx'?",
         ),
-        (
-            "[RGGB, RYNCy]",
-            "[RGB, RYNCy]",
-            "tiny.yaml:4: cfas.RGB: not the name of a 2x2 CFA (got 'RGB')",
-        ),
+        ("[RGGB, RYNCy]", "[RGB, RYNCy]", "tiny.yaml:4: cfas.RGB: not the name of a 2x2 CFA (got 'RGB')"),
         (
             "sensor: ar0820",
             "sensor: ar0280",
@@ -137,11 +133,7 @@ def test_the_measured_study_loads() -> None:
         ),
         ("study: tiny\n", "", "tiny.yaml:1: study: missing"),
         ("sensor: ar0820", "sensr: ar0820", "tiny.yaml:2: sensr: unknown key"),
-        (
-            "      right_nm: 650\n",
-            "",
-            "tiny.yaml:13: sweeps.edges.grid.right_nm: missing",
-        ),
+        ("      right_nm: 650\n", "", "tiny.yaml:13: sweeps.edges.grid.right_nm: missing"),
         ("study: tiny\n", "study: tiny\nstudy: again\n", "tiny.yaml:2: found duplicate key"),
         ("[RGGB, RYNCy]", "[RGGB, RYNCy", "not valid YAML"),
         (

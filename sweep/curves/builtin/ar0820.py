@@ -66,12 +66,12 @@ def transmission(wavelength_nm: FloatArray, parameters: FilterParameters) -> Flo
 
 
 def _logistic(offset_widths: FloatArray) -> FloatArray:
-    """A logistic edge over the offset from its center in units of its 10-90 % width."""
+    """Return a logistic edge over the offset from its center in units of its 10-90 % width."""
     return np.asarray(1 / (1 + np.exp(-_LOGISTIC_PER_WIDTH * offset_widths)), dtype=float)
 
 
 def ar0820(grid: WavelengthGrid, parameters: SurrogateParameters) -> Curves:
-    """The surrogate sensor on a grid inside 400-700 nm: C and every filter of the parameter file."""
+    """Return the surrogate sensor on a grid inside 400-700 nm: C and every filter of the parameter file."""
     wave = grid.nodes_nm
     clear = clear_qe(wave, parameters.clear_pixel) * _logistic(
         (parameters.ir_cut.center_nm - wave) / parameters.ir_cut.width_nm

@@ -80,26 +80,28 @@ def numbers_digest(spectra: tuple[Spectrum, ...]) -> str:
 
 
 def cards() -> list[Card]:
-    """The card of each set of the file; its range and digest are those of the numbers that are there."""
+    """Return the card of each set of the file; its range and digest are those of the numbers that are there."""
     about, parts = _read()
     made = []
     for name, groups_of_set in parts.items():
-        every = tuple(spectrum for group in groups_of_set.values() for spectrum in group)
-        sizes = {group: len(spectra) for group, spectra in groups_of_set.items()}
-        first, last = min(s.wavelength_nm[0] for s in every), max(s.wavelength_nm[-1] for s in every)
+        spectra = tuple(spectrum for group in groups_of_set.values() for spectrum in group)
+        sizes = {group: len(members) for group, members in groups_of_set.items()}
+        first, last = min(s.wavelength_nm[0] for s in spectra), max(s.wavelength_nm[-1] for s in spectra)
         source, license_, credit = (about[name][key] for key in ("source", "license", "credit"))
-        kind = every[0].kind
-        made.append(Card(name, source, license_, credit, kind, sizes, float(first), float(last), numbers_digest(every)))
+        kind = spectra[0].kind
+        made.append(
+            Card(name, source, license_, credit, kind, sizes, float(first), float(last), numbers_digest(spectra))
+        )
     return made
 
 
 def spectrum_of(group: str, name: str) -> Spectrum:
-    """A spectrum of a group by its name."""
+    """Return a spectrum of a group by its name."""
     return next(spectrum for spectrum in shipped_groups()[group] if spectrum.name == name)
 
 
 def gridded(grid: WavelengthGrid, spectrum: Spectrum) -> FloatArray:
-    """A reflectance, or a relative photon spectrum, on the grid, ndarray[n_wavelengths].
+    """Return a reflectance, or a relative photon spectrum, on the grid, ndarray[n_wavelengths].
 
     On a grid that is coarser than its samples it is the mean over each bin, so that narrow lines keep their photons.
     """

@@ -50,7 +50,7 @@ class EdgeShape:
     lit: bool = False
 
     def on(self, grid: WavelengthGrid) -> FloatArray:
-        """The reflectance, or the lens's relative photons, ndarray[n_wavelengths]."""
+        """Return the reflectance, or the lens's relative photons, ndarray[n_wavelengths]."""
         edge = 1 / (1 + np.exp(-(grid.nodes_nm - self.middle_nm) * _RISE / self.width_nm))
         return _behind(grid, self.low + (self.high - self.low) * edge, lit=self.lit)
 
@@ -66,7 +66,7 @@ class BandShape:
     lit: bool = False
 
     def on(self, grid: WavelengthGrid) -> FloatArray:
-        """The reflectance, or the lens's relative photons, ndarray[n_wavelengths]."""
+        """Return the reflectance, or the lens's relative photons, ndarray[n_wavelengths]."""
         shape = np.exp(-4 * np.log(2) * ((grid.nodes_nm - self.middle_nm) / self.width_nm) ** 2)
         return _behind(grid, self.low + (self.high - self.low) * shape, lit=self.lit)
 
@@ -104,7 +104,7 @@ STAND_INS: Mapping[str, tuple[StandIn, ...]] = {
 
 
 def region(group: str) -> ColorRegion:
-    """The color region of a group, from its regulation."""
+    """Return the color region of a group, from its regulation."""
     first, _, second = group.partition(" ")
     if second == "sheeting":
         return SHEETING_REGIONS[first]
@@ -117,7 +117,7 @@ def is_sheeting(group: str) -> bool:
 
 
 def surrogate_cards() -> list[Card]:
-    """The cards of lamps and sheeting; their digest is of the stated numbers."""
+    """Return the cards of lamps and sheeting; their digest is of the stated numbers."""
     cards = []
     for name, kind, source in (
         (

@@ -86,7 +86,7 @@ def surrogate_parameters(name: str = "surrogate") -> SurrogateParameters:
 
 
 def parameter_tree(name: str) -> dict[str, Any]:
-    """The file as plain mappings and lists."""
+    """Return the file as plain mappings and lists."""
     text = files(__package__).joinpath(f"{name}.yaml").read_text(encoding="utf-8")
     tree: dict[str, Any] = YAML(typ="safe").load(text)
     return tree

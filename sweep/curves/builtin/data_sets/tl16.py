@@ -19,7 +19,7 @@ SIGNAL_TYPES = ("green", "yellow", "orange", "red")
 
 
 def tl16(grid: WavelengthGrid, parameters: SurrogateParameters) -> Lights:
-    """The 51 signals on the grid; the lamps of a region spread evenly over peak +- spread of each color."""
+    """Return the 51 signals on the grid; the lamps of a region spread evenly over peak +- spread of each color."""
     wave = grid.nodes_nm
     signals = []
     for color in SIGNAL_TYPES:
@@ -34,5 +34,5 @@ def tl16(grid: WavelengthGrid, parameters: SurrogateParameters) -> Lights:
 
 
 def lights(grid: WavelengthGrid) -> Lights:
-    """The signals of `tl16` with the parameters that the package ships."""
+    """Return the signals of `tl16` with the parameters that the package ships."""
     return tl16(grid, surrogate_parameters())
