@@ -1,4 +1,4 @@
-"""Curves over wavelength: sampled, read from any file, written, colored, built in."""
+"""Spectra and curves over wavelength: sampled, read from files, written, colored, built in."""
 
 from typing import Literal
 

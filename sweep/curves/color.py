@@ -1,4 +1,4 @@
-"""CIE 1931 chromaticity of lights, and the color regions of traffic signals, vehicle lamps and sign sheeting."""
+"""CIE 1931 chromaticity of lights, and color regions of traffic signals, vehicle lamps and sign sheeting."""
 
 from __future__ import annotations
 
@@ -15,13 +15,24 @@ from .spectrum import WavelengthGrid, energy_from_photons
 
 @dataclass(frozen=True)
 class ColorRegion:
-    """A convex region of the chromaticity diagram: a x + b y <= c for every (a, b, c) of `bounds`."""
+    """Convex region of the chromaticity diagram: a x + b y <= c for every (a, b, c) of `bounds`."""
 
     bounds: tuple[tuple[float, float, float], ...]
     source: str
 
     def violation(self, xy: FloatArray) -> FloatArray:
-        """Return the distance of points, ndarray[n, 2], beyond the bounds, ndarray[n]; inside where <= 0."""
+        """Return the distance of points beyond the bounds.
+
+        Parameters
+        ----------
+        xy : ndarray of shape (n, 2)
+            Chromaticities.
+
+        Returns
+        -------
+        ndarray of shape (n,)
+            Distance in x, y; inside where <= 0.
+        """
         a, b, c = np.array(self.bounds).T
         return np.asarray((xy[:, :1] * a + xy[:, 1:] * b - c).max(axis=1), dtype=float)
 
@@ -43,10 +54,9 @@ green: y <= 0.726 - 0.726 x, x <= 0.625 y - 0.041, y >= 0.400."""
 
 @cache
 def _observer(grid: WavelengthGrid) -> FloatArray:
-    """Return the CIE 1931 observer's x, y and z, and V(lambda) of 1924, on the grid, ndarray[4, n_wavelengths].
+    """Return the CIE 1931 observer's x, y and z, and V(lambda) of 1924, on the grid, [4, n_wavelengths].
 
-    The tables of colour-science, which takes a second to import. 0 outside 360 to 830 nm, where they are not defined:
-    the eye sees next to nothing there.
+    Tables of colour-science; 0 outside 360 to 830 nm, where they are not defined.
     """
     with resources.files("sweep.curves.builtin").joinpath(_OBSERVER).open(encoding="utf-8") as file:
         wave, *columns = np.loadtxt(file, delimiter=",", skiprows=1).T
@@ -54,7 +64,18 @@ def _observer(grid: WavelengthGrid) -> FloatArray:
 
 
 def color_matching(grid: WavelengthGrid) -> FloatArray:
-    """Return the CIE 1931 2 degree color-matching functions on the grid, ndarray[3, n_wavelengths]."""
+    """Return the CIE 1931 2 degree color-matching functions.
+
+    Parameters
+    ----------
+    grid : WavelengthGrid
+        Wavelengths, nm.
+
+    Returns
+    -------
+    ndarray of shape (3, n_wavelengths)
+        x, y and z.
+    """
     return _observer(grid)[:3]
 
 
@@ -69,25 +90,59 @@ _XYZ_TO_RGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [
 
 
 def luminance_per_photon_radiance(grid: WavelengthGrid, photons: FloatArray) -> FloatArray:
-    """Return cd/m^2 for each photon/s/sr/m^2 of spectra that integrate to one photon: [n, n_wavelengths] -> [n].
+    """Return the luminance per photon radiance: L = 683 integral(V h c / lambda S) d lambda, S in photons per nm.
 
-    L = 683 integral(V h c / lambda S) d lambda, S in photons per nm; 0 for spectra outside VISIBLE_NM.
+    Parameters
+    ----------
+    grid : WavelengthGrid
+        Wavelengths, nm.
+    photons : ndarray of shape (n, n_wavelengths)
+        Spectra that integrate to one photon.
+
+    Returns
+    -------
+    ndarray of shape (n,)
+        cd/m2 per photon/s/sr/m2; 0 for spectra outside VISIBLE_NM.
     """
     power = energy_from_photons(grid.nodes_nm, photons)
     return np.asarray(LUMINOUS_EFFICACY_LM_W * grid.integrate(power * _observer(grid)[3]), dtype=float)
 
 
 def chromaticity(grid: WavelengthGrid, photons: FloatArray) -> FloatArray:
-    """Return CIE 1931 x, y of photon spectra: ndarray[n, n_wavelengths] -> ndarray[n, 2]; NaN for what nobody sees."""
+    """Return CIE 1931 x, y of photon spectra.
+
+    Parameters
+    ----------
+    grid : WavelengthGrid
+        Wavelengths, nm.
+    photons : ndarray of shape (n, n_wavelengths)
+        Photon spectra, photons per nm.
+
+    Returns
+    -------
+    ndarray of shape (n, 2)
+        Chromaticities; NaN for invisible spectra.
+    """
     xyz = energy_from_photons(grid.nodes_nm, photons) @ color_matching(grid).T
     return np.asarray(xyz[:, :2] / xyz.sum(axis=1, keepdims=True), dtype=float)
 
 
 def display_colors(grid: WavelengthGrid, photons: FloatArray) -> FloatArray:
-    """Return sRGB colors, 0..1, to draw lights with, as bright as their hues allow: [n, n_wavelengths] -> [n, 3].
+    """Return sRGB colors to draw lights with, as bright as their hues allow.
 
-    Saturated lights lie outside sRGB; negative primaries are cut off (the color shown is the nearest in hue, not the
-    light's own). What nobody sees is gray.
+    Saturated lights are outside sRGB; negative primaries are clipped. Invisible spectra are gray.
+
+    Parameters
+    ----------
+    grid : WavelengthGrid
+        Wavelengths, nm.
+    photons : ndarray of shape (n, n_wavelengths)
+        Photon spectra, photons per nm.
+
+    Returns
+    -------
+    ndarray of shape (n, 3)
+        sRGB, 0 to 1.
     """
     xyz = energy_from_photons(grid.nodes_nm, photons) @ color_matching(grid).T
     seen = xyz.max(axis=1) > 0
@@ -134,7 +189,20 @@ NORM_NAMES: Mapping[str, str] = {"en_12368": "EN 12368", "ite": "ITE (1985, 1998
 
 
 def corners(*points: tuple[float, float], source: str) -> ColorRegion:
-    """Return the convex region with these corners (x, y), in either order of rotation."""
+    """Return the convex region with some corners.
+
+    Parameters
+    ----------
+    *points : tuple of float
+        Corners (x, y), in either order of rotation.
+    source : str
+        Source.
+
+    Returns
+    -------
+    ColorRegion
+        Region.
+    """
     area = sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(points, (*points[1:], points[0]), strict=True))
     ordered = points if area > 0 else points[::-1]
     bounds = []

@@ -1,4 +1,4 @@
-"""Facts of a file of curves, also of one that is not clean: what its curves are, and what can be repaired."""
+"""Facts of a file of curves, clean or not: kind of its curves, and possible repairs."""
 
 from __future__ import annotations
 
@@ -35,7 +35,15 @@ NORMALIZED = (
 
 @dataclass(frozen=True)
 class Curve:
-    """One curve with its finite samples: wavelengths and values, ndarray[n] each, n >= 0, wavelengths increasing."""
+    """Curve with its finite samples.
+
+    Parameters
+    ----------
+    name : str
+        Name.
+    wavelength_nm, values : ndarray of shape (n,)
+        Samples, wavelengths increasing; n >= 0.
+    """
 
     name: str
     wavelength_nm: FloatArray
@@ -43,16 +51,27 @@ class Curve:
 
     @property
     def peak(self) -> float:
-        """The largest value; 0 without samples."""
+        """Largest value; 0 without samples."""
         return float(self.values.max(initial=0.0))
 
     @property
     def peak_nm(self) -> float:
-        """Where the largest value lies."""
+        """Wavelength of the largest value, nm."""
         return float(self.wavelength_nm[np.argmax(self.values)])
 
     def on(self, grid: WavelengthGrid) -> FloatArray:
-        """Return the curve over its largest value, ndarray[grid.size]; 0 where it is negative or has no samples."""
+        """Return the curve over its largest value.
+
+        Parameters
+        ----------
+        grid : WavelengthGrid
+            Wavelengths, nm.
+
+        Returns
+        -------
+        ndarray of shape (n_wavelengths,)
+            Relative values; 0 where the curve is negative or has no samples.
+        """
         if self.values.size < 2 or not self.peak > 0:
             return np.zeros(grid.size)
         return resample(self.wavelength_nm, np.clip(self.values / self.peak, 0, None), grid, "mean", "zero")
@@ -65,7 +84,7 @@ class Curve:
 
     @property
     def samples_in_peak(self) -> int:
-        """Samples in a row around the largest value that are at least half of it."""
+        """Consecutive samples around the largest value that are at least half of it."""
         low = np.flatnonzero(self.values < self.peak / 2)
         at = int(np.argmax(self.values))
         left, right = low[low < at], low[low > at]
@@ -74,25 +93,36 @@ class Curve:
 
 @dataclass(frozen=True)
 class Facts:
-    """A file's curves; `read_as` says how its wavelengths were taken, where they are not in nm."""
+    """Curves of a file, and a note on the unit of wavelengths that are not in nm."""
 
     curves: tuple[Curve, ...]
     read_as: str
 
     @property
     def samples_nm(self) -> FloatArray:
-        """Wavelengths at which any curve has a sample."""
+        """Wavelengths at which any curve has a sample, nm."""
         return np.unique(np.concatenate([curve.wavelength_nm for curve in self.curves]))
 
     @property
     def looks_like_qe(self) -> bool:
-        """The guess: half of the curves or more are as broad as a pixel's, and none is beyond percent."""
+        """True if at least half of the curves are as broad as a pixel's, and none exceeds 100 %."""
         lit = [curve for curve in self.curves if curve.peak > 0]
         broad = sum(curve.width_nm >= _BROAD_NM for curve in lit)
         return bool(lit) and 2 * broad >= len(lit) and max(curve.peak for curve in lit) <= _PERCENT
 
     def colors(self, quantity: LightUnit) -> Mapping[str, LightColor | None]:
-        """Return the color of each curve read as a light."""
+        """Return the color of each curve read as a light.
+
+        Parameters
+        ----------
+        quantity : {'energy', 'photons'}
+            Unit of the values.
+
+        Returns
+        -------
+        dict of str to LightColor or None
+            Colors.
+        """
         colors = {}
         for curve in self.curves:
             values = curve.on(VISIBLE)
@@ -102,7 +132,18 @@ class Facts:
 
 
 def facts_of(scan: Scan) -> Facts:
-    """Return the curves of a file with what can be used of them: finite samples, sorted, each wavelength once."""
+    """Return the curves of a file with their usable samples: finite, sorted, each wavelength once.
+
+    Parameters
+    ----------
+    scan : Scan
+        File.
+
+    Returns
+    -------
+    Facts
+        Facts.
+    """
     factor = unit_by_size(scan.wavelength_nm)
     read_as = {1e9: "read as m", 1e3: "read as um"}.get(factor, "")
     usable = np.isfinite(scan.wavelength_nm)
@@ -118,7 +159,20 @@ def facts_of(scan: Scan) -> Facts:
 
 
 def notes(facts: Facts, *, as_qe: bool) -> list[str]:
-    """Return notes on curves that can be read."""
+    """Return notes on readable curves.
+
+    Parameters
+    ----------
+    facts : Facts
+        Facts of the file.
+    as_qe : bool
+        Curves are QE.
+
+    Returns
+    -------
+    list of str
+        Notes.
+    """
     lines = []
     wave = facts.samples_nm
     if wave.size and (wave[0] > _NEEDED.start_nm or wave[-1] < _NEEDED.stop_nm):
@@ -150,19 +204,52 @@ def notes(facts: Facts, *, as_qe: bool) -> list[str]:
 
 
 def looks_normalized(top: float) -> bool:
-    """Return whether QE curves with the largest value `top` are relative responses: no pixel has a QE of just 1."""
+    """Return whether QE curves are relative responses: no pixel has a QE of just 1.
+
+    Parameters
+    ----------
+    top : float
+        Largest value.
+
+    Returns
+    -------
+    bool
+        True if they are.
+    """
     return abs(top - 1) <= _NEARLY
 
 
 def qe_scale(top: float) -> float:
-    """Return the factor that brings QE curves whose largest value is `top` into 0..1: 0.01 for percent."""
+    """Return the factor that brings QE curves to 0..1: 0.01 for percent.
+
+    Parameters
+    ----------
+    top : float
+        Largest value.
+
+    Returns
+    -------
+    float
+        Factor.
+    """
     if top <= 1:
         return 1.0
     return 1 / _PERCENT if 2 < top <= _PERCENT else float(f"{1 / top * (1 - 5e-4):.4g}")
 
 
 def condensed(faults: Sequence[Fault]) -> list[Fault]:
-    """Return one fault, with their number and the first one's place, for many that say the same of columns."""
+    """Combine equal faults of many columns to one, with their number and the first place.
+
+    Parameters
+    ----------
+    faults : sequence of Fault
+        Faults.
+
+    Returns
+    -------
+    list of Fault
+        Faults.
+    """
     alike: dict[tuple[str, str | None], list[Fault]] = {}
     for fault in faults:
         alike.setdefault((fault.problem, fault.key), []).append(fault)
@@ -181,7 +268,7 @@ def _joined(group: Sequence[Fault]) -> Fault:
 
 @dataclass(frozen=True)
 class Mended:
-    """Curves as `Scan` has them, in rising order; `changes`: what was changed; `faults`: what no rule here mends."""
+    """Repaired curves in rising order, with the changes and the remaining faults."""
 
     wavelength_nm: FloatArray
     names: tuple[str, ...]
@@ -190,17 +277,40 @@ class Mended:
     faults: tuple[Fault, ...]
 
     def text(self, file: str, notes: tuple[str, ...]) -> str:
-        """Return a clean CSV that says what was changed in its first lines."""
+        """Return a clean CSV with the changes in its first lines.
+
+        Parameters
+        ----------
+        file : str
+            Name of the original file.
+        notes : tuple of str
+            Further notes.
+
+        Returns
+        -------
+        str
+            Text.
+        """
         lines = [f"from {file}", *(f"read: {note}" for note in notes), *(f"changed: {c}" for c in self.changes)]
         head = "".join(f"# {' '.join(line.split())}\n" for line in lines)
         return head + csv_text(self.wavelength_nm, dict(zip(self.names, self.values.T, strict=True)))
 
 
 def mended(scan: Scan) -> Mended:
-    """Return the curves of a scan with what can be repaired in one way only.
+    """Repair the curves of a scan where that is possible in one way only.
 
-    Negatives of up to 2 % of the peak become 0, single gaps between two samples are filled by the straight line, and
-    rows that say the same twice are left out. Everything else stays, and is a fault.
+    Negatives of up to 2 % of the peak become 0, single gaps between two samples are interpolated linearly, and
+    duplicate rows are removed. Everything else stays, and is a fault.
+
+    Parameters
+    ----------
+    scan : Scan
+        File.
+
+    Returns
+    -------
+    Mended
+        Repaired curves.
     """
     changes: list[str] = []
     order = np.argsort(scan.wavelength_nm, kind="stable")  # puts NaN last
@@ -222,7 +332,7 @@ def mended(scan: Scan) -> Mended:
 
 
 def _mend(wave: FloatArray, column: FloatArray, name: str) -> list[str]:
-    """Change a curve in place, and say how."""
+    """Change a curve in place, and return the changes."""
     changes = []
     finite = np.isfinite(column)
     low = finite & (column < 0) & (column >= -_SMALL * column[finite].max(initial=0.0))

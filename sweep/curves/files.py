@@ -21,19 +21,59 @@ _MAT_NUMBERS = ("double", "single", *(f"{sign}int{bits}" for sign in ("", "u") f
 
 
 def is_curve_file(name: str) -> bool:
-    """Return whether a name ends like one of a file of curves."""
+    """Return whether a name has the extension of a file of curves.
+
+    Parameters
+    ----------
+    name : str
+        File name.
+
+    Returns
+    -------
+    bool
+        True if it has.
+    """
     return Path(name).suffix.casefold() in _KINDS
 
 
 def digest(path: Path) -> str:
-    """SHA-256 of a file's bytes, hexadecimal; raises DataError when it cannot be read."""
+    """Return the SHA-256 of a file's bytes.
+
+    Parameters
+    ----------
+    path : Path
+        File.
+
+    Returns
+    -------
+    str
+        Hexadecimal digest.
+
+    Raises
+    ------
+    DataError
+        If the file cannot be read.
+    """
     return hashlib.sha256(read_input(path, MOST_BYTES, DataError)).hexdigest()
 
 
 def read_curves(path: Path) -> Curves:
     """Read every curve of a file, unscaled and in the file's own quantity.
 
-    Raises DataError (file, line, column, value) on anything that is not clean: see `spectrum.check_samples`.
+    Parameters
+    ----------
+    path : Path
+        File.
+
+    Returns
+    -------
+    Curves
+        Curves.
+
+    Raises
+    ------
+    DataError
+        If the file cannot be read or is not clean, with file, line, column and value.
     """
     scan = scan_curves(path)
     if scan.faults:
@@ -42,9 +82,22 @@ def read_curves(path: Path) -> Curves:
 
 
 def scan_curves(path: Path) -> Scan:
-    """Read a file as far as possible, say everything that is wrong with it, and how it was read.
+    """Read a file as far as possible, with everything that is wrong with it.
 
-    Raises DataError where nothing can be read at all: no file, an unknown kind, no numbers.
+    Parameters
+    ----------
+    path : Path
+        File.
+
+    Returns
+    -------
+    Scan
+        Curves and faults.
+
+    Raises
+    ------
+    DataError
+        If nothing can be read: no file, an unknown kind, no numbers.
     """
     kind = _KINDS.get(path.suffix.casefold())
     if kind is None:
@@ -53,7 +106,7 @@ def scan_curves(path: Path) -> Scan:
 
 
 def _scan_mat(path: Path) -> Scan:
-    """ISETCam color filters and spectra: `wavelength`, `data` (a column per curve), `filterNames` if there.
+    """Read ISETCam color filters and spectra: `wavelength`, `data` (a column per curve), optionally `filterNames`.
 
     SciPy reads plain arrays; nothing in them is executed.
     """
@@ -87,7 +140,7 @@ def _scan_mat(path: Path) -> Scan:
 
 
 def _check_mat(file: str, variables: list[tuple[str, tuple[int, ...], str]]) -> None:
-    """Refuse a .mat file by the names, shapes and kinds of its variables, before their values are read."""
+    """Refuse a .mat file by names, shapes and kinds of its variables, before their values are read."""
     kinds = {name: kind for name, _, kind in variables}
     for needed in ("wavelength", "data"):
         if needed not in kinds:

@@ -1,4 +1,4 @@
-"""Write the filters of a CFA: CSV, ISETCam's `.mat` color filters, Speos' `.spectrum`, and as sums of RGB."""
+"""Write the filters of a CFA: CSV, ISETCam's `.mat` color filters, Speos' `.spectrum`, and sums of RGB."""
 
 from __future__ import annotations
 
@@ -23,7 +23,18 @@ _SPEOS_TITLE = "OPTIS - Spectrum file v1.0"
 
 
 def unique_names(names: Iterable[str]) -> list[str]:
-    """Return the names on one line each, without blanks around them; one that occurs again gets a number."""
+    """Return stripped one-line names; a repeated one gets a number.
+
+    Parameters
+    ----------
+    names : iterable of str
+        Names.
+
+    Returns
+    -------
+    list of str
+        Names.
+    """
     unique: list[str] = []
     for name in names:
         plain = " ".join(name.split()) or "_"
@@ -36,7 +47,20 @@ def unique_names(names: Iterable[str]) -> list[str]:
 
 
 def csv_text(wavelength_nm: FloatArray, curves: Mapping[str, FloatArray]) -> str:
-    """Return curves, ndarray[n_wavelengths] each, as `read_curves` reads them: every float comes back as it is."""
+    """Return curves as CSV that `read_curves` reads back exactly.
+
+    Parameters
+    ----------
+    wavelength_nm : ndarray of shape (n_wavelengths,)
+        Wavelengths, nm.
+    curves : mapping of str to ndarray of shape (n_wavelengths,)
+        Curves.
+
+    Returns
+    -------
+    str
+        Text.
+    """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([WAVELENGTH, *unique_names(curves)])
@@ -45,10 +69,19 @@ def csv_text(wavelength_nm: FloatArray, curves: Mapping[str, FloatArray]) -> str
 
 
 def color_hints(channels: Sequence[str], bases: Mapping[str, str]) -> list[str]:
-    """Return a letter of HINTS for each channel of a CFA, each used once, as ISETCam wants it (`k` when all are spent).
+    """Return ISETCam's hint letter for each channel of a CFA, each used once (`k` when all are used).
 
-    `bases`: modified channel -> curve that it replaces, whose color it takes where that is free. `C` is the clear
-    pixel here, ISETCam's `w`; its `c` is cyan, `Cy` here.
+    Parameters
+    ----------
+    channels : sequence of str
+        Channels; `C` is the clear pixel, ISETCam's `w`; `Cy` is its `c`.
+    bases : mapping of str to str
+        Modified channel to the replaced curve, whose color it takes if that is free.
+
+    Returns
+    -------
+    list of str
+        Letters.
     """
     hints: dict[str, str] = {}
     for channel in sorted(channels, key=lambda channel: channel in bases):  # a plain channel keeps its own letter
@@ -66,19 +99,48 @@ def _own_hint(name: str) -> str:
 
 
 def filter_names(hints: Sequence[str], channels: Iterable[str]) -> list[str]:
-    """Return the names of ISETCam's filters: the hint, then the channel's own name."""
+    """Return the names of ISETCam's filters: hint letter and channel.
+
+    Parameters
+    ----------
+    hints : sequence of str
+        Letters.
+    channels : iterable of str
+        Channels.
+
+    Returns
+    -------
+    list of str
+        Names.
+    """
     return [hint + name for hint, name in zip(hints, unique_names(channels), strict=True)]
 
 
 def isetcam_mat(
     wavelength_nm: FloatArray, curves: Mapping[str, FloatArray], hints: Sequence[str], tile: IndexArray, comment: str
 ) -> bytes:
-    """Return filters as ISETCam's `ieReadColorFilter` and `sensorCreate('custom', ...)` take them, MATLAB version 5.
+    """Return filters for ISETCam's `ieReadColorFilter` and `sensorCreate('custom', ...)`, MATLAB version 5.
 
-    `curves`: channel -> ndarray[n_wavelengths], 0..1 (above 1 ISETCam rescales all: what rounding put there is cut).
-    `tile`: ndarray[rows, columns] of channel indices. Variables: `wavelength` (a column, nm), `data`
-    (n_wavelengths x n_filters), `filterNames` (a cell array: hint and name), `filterOrder` (the tile, from 1 on),
-    `comment`. The same filters give the same bytes.
+    Variables: `wavelength` (a column, nm), `data` (n_wavelengths x n_filters), `filterNames` (a cell array: hint and
+    name), `filterOrder` (the tile, from 1 on), `comment`. Equal filters give equal bytes.
+
+    Parameters
+    ----------
+    wavelength_nm : ndarray of shape (n_wavelengths,)
+        Wavelengths, nm.
+    curves : mapping of str to ndarray of shape (n_wavelengths,)
+        QE of each channel, clipped to 1, since ISETCam rescales larger values.
+    hints : sequence of str
+        Hint letters.
+    tile : ndarray of int, shape (rows, columns)
+        Channel indices.
+    comment : str
+        Comment.
+
+    Returns
+    -------
+    bytes
+        File.
     """
     from scipy.io import savemat  # noqa: PLC0415  (slow to import, seldom needed)
 
@@ -101,10 +163,24 @@ def isetcam_mat(
 
 
 def speos_text(wavelength_nm: FloatArray, values: FloatArray, about: str) -> str:
-    """Return a curve, ndarray[n_wavelengths], 0..1, as Speos reads it; `about` describes it in ASCII, on one line.
+    """Return a curve as Speos reads it.
 
-    The form: a title, the description, the number of samples, then a line of wavelength (nm) and percent each. Source:
-    Ansys Optics, "Create spectrum file from graph".
+    A title, the description, the number of samples, then a line of wavelength (nm) and percent each. Source: Ansys
+    Optics, "Create spectrum file from graph".
+
+    Parameters
+    ----------
+    wavelength_nm : ndarray of shape (n_wavelengths,)
+        Wavelengths, nm.
+    values : ndarray of shape (n_wavelengths,)
+        Curve, 0 to 1.
+    about : str
+        Description in ASCII, one line.
+
+    Returns
+    -------
+    str
+        Text.
     """
     plain = " ".join(about.split()).encode("ascii", "replace").decode("ascii")
     head = [_SPEOS_TITLE, plain, str(wavelength_nm.size)]
@@ -114,12 +190,18 @@ def speos_text(wavelength_nm: FloatArray, values: FloatArray, about: str) -> str
 
 @dataclass(frozen=True)
 class RgbWeights:
-    """The least-squares fit of channels by red, green and blue, every wavelength counted alike.
+    """Least-squares fit of channels by red, green and blue, with equal weight of all wavelengths.
 
-    `weights`: ndarray[n_channels, 3], of any sign. `residual`: ndarray[n_channels], root mean square of what the fit
-    leaves over that of the channel's curve: 0 where the sum is the channel, 1 where it has nothing of it.
-    `light_error`: ndarray[n_channels], the largest error of a channel's electrons over the lights, as a share of those
-    of its brightest light; infinite where it sees none of them.
+    Parameters
+    ----------
+    channels : tuple of str
+        Channels.
+    weights : ndarray of shape (n_channels, 3)
+        Weights of any sign.
+    residual : ndarray of shape (n_channels,)
+        RMS of the residual over that of the curve, 0 to 1.
+    light_error : ndarray of shape (n_channels,)
+        Largest error of a channel's electrons over the lights, relative to its brightest light.
     """
 
     channels: tuple[str, ...]
@@ -128,7 +210,13 @@ class RgbWeights:
     light_error: FloatArray
 
     def as_csv(self) -> str:
-        """Return a row per channel; every float comes back as it is."""
+        """Return one row per channel with every digit.
+
+        Returns
+        -------
+        str
+            Text.
+        """
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(["channel", "red", "green", "blue", "residual", "largest_error_of_a_light"])
@@ -139,9 +227,21 @@ class RgbWeights:
 
 
 def rgb_weights(qe: Mapping[str, FloatArray], rgb: FloatArray, photons: FloatArray) -> RgbWeights:
-    """Fit channels, ndarray[n_wavelengths] each, by the curves `rgb`, ndarray[3, n_wavelengths].
+    """Fit channels by three curves.
 
-    `photons`: ndarray[n_lights, n_wavelengths]. A channel whose curve is 0 has weights and a residual of 0.
+    Parameters
+    ----------
+    qe : mapping of str to ndarray of shape (n_wavelengths,)
+        Channels; one whose curve is 0 has weights and a residual of 0.
+    rgb : ndarray of shape (3, n_wavelengths)
+        Curves of the fit.
+    photons : ndarray of shape (n_lights, n_wavelengths)
+        Lights.
+
+    Returns
+    -------
+    RgbWeights
+        Fit.
     """
     curves = np.stack(list(qe.values()))
     weights = np.asarray(np.linalg.lstsq(rgb.T, curves.T, rcond=None)[0].T, dtype=float)

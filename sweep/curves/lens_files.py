@@ -1,4 +1,4 @@
-"""A lens's chief ray angle over image height, as data sheets have it: a table of two columns."""
+"""Chief ray angle over image height of a lens, as a table of two columns."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _MOST_ROWS = 1000
 
 @dataclass(frozen=True)
 class ChiefRays:
-    """Chief ray angles, degrees, at rising image heights relative to the corner, 0 to 1; and how the file was read."""
+    """Chief ray angles, degrees, at rising image heights relative to the corner, and notes on the file."""
 
     heights: FloatArray
     cra_deg: FloatArray
@@ -36,10 +36,25 @@ class ChiefRays:
 
 
 def read_chief_rays(path: Path, corner_mm: float | None = None) -> ChiefRays:
-    """Read a table of image height and chief ray angle, from the middle of the sensor to its corner or beyond.
+    """Read a table of image height and chief ray angle, from the center of the sensor to its corner or beyond.
 
-    Heights are in mm, percent or relative, as the head of their column says; the corner is the last row, or at
-    `corner_mm`. Raises DataError (file, line, column, value) on anything that is not clean.
+    Parameters
+    ----------
+    path : Path
+        File.
+    corner_mm : float, optional
+        Image height of the corner, mm; left out, the last row. Heights are in mm, percent or relative, by
+        the head of their column.
+
+    Returns
+    -------
+    ChiefRays
+        Angles.
+
+    Raises
+    ------
+    DataError
+        If the file cannot be read or is not clean, with file, line, column and value.
     """
     table = lens_table(path, _FIRST)
     if table.faults:
@@ -78,7 +93,7 @@ def _columns(table: TextTable) -> tuple[str, int]:
 
 
 def _to_corner(table: TextTable, unit: str, values: FloatArray, names: list[str], corner_mm: float | None) -> ChiefRays:
-    """Return the rays from the middle of the sensor to its corner."""
+    """Return the rays from the center of the sensor to its corner."""
 
     def check(passes: bool, problem: str, row: int, column: int, allowed: str | None = None) -> None:
         if not passes:

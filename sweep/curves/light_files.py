@@ -1,4 +1,4 @@
-"""Which columns of a user's file are lights of which signal type, by their colors."""
+"""Assign columns of a file of lights to signal types by their colors."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _USUAL = WavelengthGrid()
 
 @dataclass(frozen=True)
 class LightsFile:
-    """`types`: signal type -> column -> color; `left_out`: column -> reason.
+    """Lights of a file: columns of each signal type with their colors, other columns with the reason.
 
     `ends_early`: the file ends inside the wavelengths of the study; `fine`: it is finer than 1 nm.
     """
@@ -39,7 +39,18 @@ class LightsFile:
     fine: bool
 
     def keys(self, file: str) -> dict[str, Any]:
-        """Keys of a study for them."""
+        """Return the keys of a study for these lights.
+
+        Parameters
+        ----------
+        file : str
+            Path as the study names it.
+
+        Returns
+        -------
+        dict
+            Keys.
+        """
         entry: dict[str, Any] = {"file": file, "quantity": self.quantity}
         entry["signals"] = {kind: list(columns) for kind, columns in self.types.items()}
         entry |= {"outside": "zero"} if self.ends_early else {}
@@ -48,7 +59,23 @@ class LightsFile:
 
 
 def clean_curves(path: Path) -> dict[str, Curve]:
-    """Return clean curves by the names that the file has; raises DataError with all of its faults."""
+    """Return clean curves by column name.
+
+    Parameters
+    ----------
+    path : Path
+        File.
+
+    Returns
+    -------
+    dict of str to Curve
+        Curves.
+
+    Raises
+    ------
+    DataError
+        If curves are not clean, with all faults.
+    """
     scan = scan_curves(path)
     if scan.faults:
         raise DataError(condensed(list(chain.from_iterable(scan.faults))))
@@ -56,9 +83,26 @@ def clean_curves(path: Path) -> dict[str, Curve]:
 
 
 def lights_file(path: Path, quantity: LightUnit, start_nm: float = 400, stop_nm: float = 700) -> LightsFile:
-    """Return the lights of a file by their colors; raises DataError where they are of fewer than two signal colors.
+    """Return the lights of a file by their colors.
 
-    `start_nm`, `stop_nm`: the wavelengths of the study.
+    Parameters
+    ----------
+    path : Path
+        File.
+    quantity : {'energy', 'photons'}
+        Unit of the values.
+    start_nm, stop_nm : float
+        Wavelengths of the study, nm.
+
+    Returns
+    -------
+    LightsFile
+        Lights.
+
+    Raises
+    ------
+    DataError
+        If there are fewer than two signal colors.
     """
     curves = clean_curves(path)
     colors = dict(zip(curves, Facts(tuple(curves.values()), "").colors(quantity).values(), strict=True))

@@ -17,12 +17,36 @@ Pair = tuple[str, str]
 
 
 def class_pairs(classes: Sequence[str]) -> tuple[Pair, ...]:
-    """Return all unordered pairs of signal types, in the order of `classes`."""
+    """Return all unordered pairs of signal types.
+
+    Parameters
+    ----------
+    classes : sequence of str
+        Signal types.
+
+    Returns
+    -------
+    tuple of pair
+        Pairs in the order of the types.
+    """
     return tuple(combinations(classes, 2))
 
 
 def pair_name(what: str, pair: Pair) -> str:
-    """Return the name of something measured of a pair: `what_a_b`."""
+    """Return the column name of a pair: `what_a_b`.
+
+    Parameters
+    ----------
+    what : str
+        Metric.
+    pair : tuple of str
+        Signal types.
+
+    Returns
+    -------
+    str
+        Text.
+    """
     return f"{what}_{pair[0]}_{pair[1]}"
 
 
@@ -30,9 +54,22 @@ def pair_name(what: str, pair: Pair) -> str:
 class Lights:
     """Signals with equal photon counts.
 
-    `photons`: ndarray[n_signals, n_wavelengths], each integrates to 1. `types`: signal type of each, grouped in the
-    order of `classes`. `photon_ratio`: K, the photons of a signal patch over those of the white patch. `population`:
-    the lamps that they stand for, where a study asks for worst cases over these.
+    Parameters
+    ----------
+    name : str
+        Data set.
+    names, types : tuple of str
+        Name and signal type of each signal, grouped by type.
+    photons : ndarray of shape (n_signals, n_wavelengths)
+        Spectra that integrate to 1.
+    photon_ratio : float
+        Photons of a signal patch over those of the white patch (K).
+    source : str
+        Source.
+    surrogate : bool
+        True for modeled spectra.
+    population : Population, optional
+        Lamps that they stand for.
     """
 
     name: str
@@ -46,21 +83,33 @@ class Lights:
 
     @property
     def classes(self) -> tuple[str, ...]:
-        """The distinct signal types, in order."""
+        """Distinct signal types, in order."""
         return tuple(dict.fromkeys(self.types))
 
     @property
     def members(self) -> dict[str, IndexArray]:
-        """Signal type -> indices of its signals."""
+        """Indices of the signals of each type."""
         types = np.asarray(self.types)
         return {name: np.flatnonzero(types == name) for name in self.classes}
 
 
 def peak_normalized_ratio(grid: WavelengthGrid, photons: FloatArray) -> float:
-    """Return K for spectra normalized to their peaks, as the median over the signals.
+    """Return K for peak-normalized spectra, the median over the signals.
 
-    The photons of a spectrum with peak 1 over those of a flat white of height 1 on the same grid: equivalent
-    bandwidth / grid span. `photons`: ndarray[n_signals, n_wavelengths], in any scale.
+    Photons of a spectrum with peak 1 over those of a flat white of height 1 on the same grid: equivalent bandwidth
+    over the span of the grid.
+
+    Parameters
+    ----------
+    grid : WavelengthGrid
+        Wavelengths, nm.
+    photons : ndarray of shape (n_signals, n_wavelengths)
+        Spectra in any scale.
+
+    Returns
+    -------
+    float
+        K.
     """
     peak_one = photons / photons.max(axis=1, keepdims=True)
     return float(np.median(grid.integrate(peak_one))) / (grid.size * grid.step_nm)
@@ -75,9 +124,32 @@ def make_lights(
     photon_ratio: float | None = None,
     surrogate: bool = False,
 ) -> Lights:
-    """Group (name, type, photon spectrum on the grid) into a data set with equal photon counts.
+    """Group photon spectra into a data set with equal photon counts.
 
-    Raises DataError when a light has no photons on the grid.
+    Parameters
+    ----------
+    grid : WavelengthGrid
+        Wavelengths, nm.
+    name : str
+        Data set.
+    signals : list of (name, type, ndarray of shape (n_wavelengths,))
+        Spectra.
+    source : str
+        Source.
+    photon_ratio : float, optional
+        K; left out, that of peak-normalized spectra.
+    surrogate : bool
+        True for modeled spectra.
+
+    Returns
+    -------
+    Lights
+        Lights.
+
+    Raises
+    ------
+    DataError
+        If a light has no photons on the grid.
     """
     photons = equal_photons(grid, np.stack([spectrum for _, _, spectrum in signals]))
     ratio = peak_normalized_ratio(grid, photons) if photon_ratio is None else photon_ratio

@@ -1,13 +1,12 @@
-"""The members of a population of lights: shifted spectra, and which shifts of two lights occur together.
+"""Members of a population of lights: shifted spectra, and the shifts of two lights that occur together.
 
-A spectrum is linear between the nodes of the wavelength grid, and what lies at the nodes is what counts. So a spectrum
-that is shifted by part of a step is a mean of the two that are shifted by whole steps, and every response that is
-linear in light is linear in the shift between whole steps: nothing between them has to be sampled. Photons that are
-shifted out of the grid are lost, as behind an IR cut filter.
+A spectrum is linear between the nodes of the wavelength grid. A spectrum shifted by part of a step is therefore a mean
+of the two that are shifted by whole steps, and every response that is linear in light is linear in the shift between
+whole steps. Photons that are shifted out of the grid are lost, as behind an IR cut filter.
 
-The shifts (x, y) of two lights that occur together fill a convex polygon: a line of temperatures, widened by what each
-light has of its own. Cut along whole steps of x and y it falls into pieces, each of triangles, on which the difference
-of two responses is linear.
+The shifts (x, y) of two lights that occur together fill a convex polygon: a line of temperatures, widened by the
+independent shifts of each light. Cut along whole steps of x and y it falls into pieces, each of triangles, on which
+the difference of two responses is linear.
 """
 
 from __future__ import annotations
@@ -30,10 +29,16 @@ _Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class ShiftRegion:
-    """The triangles of the shifts of two lights that occur together, in steps of the grid from the first shift.
+    """Triangles of the shifts of two lights that occur together, in steps of the grid from the first shift.
 
-    `cells`: ndarray[n, 2], the whole step below each triangle's x and y; `shares`: ndarray[n, 3, 2], what its corners
-    are above that, 0 to 1; `along`: ndarray[n], where a triangle lies along the region's length, 0 to 1.
+    Parameters
+    ----------
+    cells : ndarray of int, shape (n, 2)
+        Whole steps below each triangle.
+    shares : ndarray of shape (n, 3, 2)
+        Corners above these, 0 to 1.
+    along : ndarray of shape (n,)
+        Position along the region's length, 0 to 1.
     """
 
     cells: IndexArray
@@ -42,9 +47,9 @@ class ShiftRegion:
 
 
 class Members:
-    """The spectra of the lights of a population on a wavelength grid.
+    """Spectra of the lights of a population on a wavelength grid.
 
-    `lights`: one after the other, each width of each signal, shifted by every whole step: `n_steps` spectra for each.
+    `lights` holds each width of each signal, shifted by every whole step: `n_steps` spectra each.
     """
 
     def __init__(self, lights: Lights, grid: WavelengthGrid) -> None:
@@ -66,28 +71,87 @@ class Members:
 
     @cached_property
     def rows(self) -> dict[str, IndexArray]:
-        """Signal type -> where the spectra of each of its signals and widths begin in `lights`."""
+        """First spectrum of each signal and width in `lights`, by signal type."""
         starts = {name: rows[:: self.n_steps] for name, rows in self.lights.members.items()}
         return {name: np.asarray(rows, dtype=np.intp) for name, rows in starts.items()}
 
     def signal(self, row: int) -> int:
-        """Return the signal whose spectra begin at a row."""
+        """Return the signal of a spectrum.
+
+        Parameters
+        ----------
+        row : int
+            Index of its first spectrum.
+
+        Returns
+        -------
+        int
+            Signal.
+        """
         return row // (len(self.population.width) * self.n_steps)
 
     def steps_of(self, shift_nm: FloatArray) -> FloatArray:
-        """Return the steps of a shift after the first one, 0 or more."""
+        """Return the steps of a shift after the first one.
+
+        Parameters
+        ----------
+        shift_nm : ndarray
+            Shifts, nm.
+
+        Returns
+        -------
+        ndarray of the same shape
+            Steps, 0 or more.
+        """
         return np.asarray(np.clip(shift_nm / self._step_nm - self._first, 0.0, self.n_steps - 1), dtype=float)
 
     def shift_nm(self, cell: int, share: float) -> float:
-        """Return the shift so many steps after the first one, nm."""
+        """Return a shift.
+
+        Parameters
+        ----------
+        cell : int
+            Whole steps after the first one.
+        share : float
+            Share of the next step.
+
+        Returns
+        -------
+        float
+            Shift, nm.
+        """
         return (self._first + cell + share) * self._step_nm
 
     def drift_and_own(self, signal: int) -> tuple[float, tuple[float, float]]:
-        """nm/K of a signal, and from and to where binning and ageing shift it."""
+        """Return drift and independent shifts of a signal.
+
+        Parameters
+        ----------
+        signal : int
+            Signal.
+
+        Returns
+        -------
+        drift, shifts : float, tuple of float
+            nm/K, and range of shifts by binning and ageing, nm.
+        """
         return _drift_and_own(self._lights, self.population, signal)
 
     def regions(self, pair: Pair) -> tuple[list[ShiftRegion], IndexArray]:
-        """The different regions of two types, and that of each two signals and widths, ndarray[n_first, n_second]."""
+        """Return the distinct regions of two types, and the region of each two signals and widths.
+
+        Parameters
+        ----------
+        pair : tuple of str
+            Signal types.
+
+        Returns
+        -------
+        regions : list of ShiftRegion
+            Regions.
+        which : ndarray of int, shape (n_first, n_second)
+            Index of the region.
+        """
         first, second = (self.rows[name] for name in pair)
         known: dict[int, int] = {}
         regions: list[ShiftRegion] = []
@@ -102,7 +166,18 @@ class Members:
         return regions, indices
 
     def region(self, one: int, other: int) -> ShiftRegion:
-        """Return the shifts of two signals that occur together."""
+        """Return the shifts of two signals that occur together.
+
+        Parameters
+        ----------
+        one, other : int
+            Signals.
+
+        Returns
+        -------
+        ShiftRegion
+            Shifts.
+        """
         (a, own_a), (b, own_b) = self.drift_and_own(one), self.drift_and_own(other)
         key = (a, *own_a, b, *own_b)
         if key not in self._regions:
@@ -114,7 +189,20 @@ class Members:
 
 
 def spans_nm(lights: Lights, population: Population) -> list[tuple[float, float]]:
-    """Return the range of shifts of each signal, nm."""
+    """Return the range of shifts of each signal.
+
+    Parameters
+    ----------
+    lights : Lights
+        Signals.
+    population : Population
+        Population.
+
+    Returns
+    -------
+    list of tuple of float
+        Ranges, nm.
+    """
     spans = []
     for signal in range(len(lights.names)):
         drift, (low, high) = _drift_and_own(lights, population, signal)
@@ -124,7 +212,7 @@ def spans_nm(lights: Lights, population: Population) -> list[tuple[float, float]
 
 
 def _drift_and_own(lights: Lights, population: Population, signal: int) -> tuple[float, tuple[float, float]]:
-    """nm/K of a signal, and the shifts that are its own."""
+    """Return drift, nm/K, and range of independent shifts of a signal."""
     kind, name = lights.types[signal], lights.names[signal]
     drift = population.drift(kind, name)
     assert drift is not None
@@ -132,7 +220,20 @@ def _drift_and_own(lights: Lights, population: Population, signal: int) -> tuple
 
 
 def moved(photons: FloatArray, steps: int) -> FloatArray:
-    """Return a spectrum shifted by whole steps toward the red, ndarray[n_wavelengths]."""
+    """Return a spectrum shifted by whole steps toward the red.
+
+    Parameters
+    ----------
+    photons : ndarray of shape (n_wavelengths,)
+        Spectrum.
+    steps : int
+        Steps of the grid.
+
+    Returns
+    -------
+    ndarray of shape (n_wavelengths,)
+        Values.
+    """
     shifted = np.zeros_like(photons)
     size = photons.size
     if abs(steps) < size:
@@ -141,7 +242,22 @@ def moved(photons: FloatArray, steps: int) -> FloatArray:
 
 
 def stretched(grid: WavelengthGrid, photons: FloatArray, factor: float) -> FloatArray:
-    """Return a spectrum stretched by a factor about its mean wavelength, with as many photons."""
+    """Return a spectrum stretched about its mean wavelength, with equal photons.
+
+    Parameters
+    ----------
+    grid : WavelengthGrid
+        Wavelengths, nm.
+    photons : ndarray of shape (n_wavelengths,)
+        Spectrum.
+    factor : float
+        Factor.
+
+    Returns
+    -------
+    ndarray of shape (n_wavelengths,)
+        Values.
+    """
     if factor == 1:
         return photons
     wave = grid.nodes_nm

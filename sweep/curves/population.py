@@ -1,7 +1,7 @@
-"""How lamps differ from the spectra of a study: temperature, binning, ageing, width.
+"""Variation of lamps around the spectra of a study: temperature, binning, ageing, width.
 
-A warm LED emits at longer wavelengths. Each signal of a study becomes a set of spectra: its own, shifted by
-drift x (temperature of the junction - reference) + binning + ageing, and stretched by each of the width factors.
+A warm LED emits at longer wavelengths. Each signal of a study becomes a set of spectra: its own, shifted by drift
+times (temperature of the junction - reference) + binning + ageing, and stretched by each width factor.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ LEDs is less than that of the peak, because the eye's sensitivity falls there.)
 
 
 def _by_name(value: Any) -> Any:
-    """Take a number alone for that of for every signal."""
+    """Convert a single number to one for every signal."""
     return value if isinstance(value, dict) else {_ALL: value}
 
 
 def _spans_by_name(value: Any) -> Any:
-    """Take two numbers alone for those of for every signal."""
+    """Convert a single range to one for every signal."""
     return {name: from_to(span) for name, span in _by_name(value).items()}
 
 
@@ -103,7 +103,7 @@ class Population(Section):
 
     @property
     def names(self) -> dict[str, set[str]]:
-        """Key of the section -> the signal types and signals that it names."""
+        """Signal types and signals that each key of the section names."""
         return {key: set(getattr(self, key)) - {_ALL} for key in ("drift_nm_per_k", "binning_nm", "ageing_nm")}
 
     @property
@@ -119,7 +119,18 @@ class Population(Section):
         return low - self.reference_c, high + self.self_heating_k - self.reference_c
 
     def scaled(self, factor: float) -> Population:
-        """Return the population with every shift so many times as large."""
+        """Return a population with scaled shifts.
+
+        Parameters
+        ----------
+        factor : float
+            Factor.
+
+        Returns
+        -------
+        Population
+            Population.
+        """
         low, high = (self.reference_c + factor * warmer for warmer in self.warmer_k)
         update = {
             "temperature_c": (low, high),
@@ -130,7 +141,20 @@ class Population(Section):
         return self.model_copy(update=update)
 
     def temperature_of(self, kind: str, name: str, shift_nm: float) -> tuple[float, float]:
-        """Between which temperatures of its junction a signal may be shifted so far, degrees Celsius."""
+        """Return the range of junction temperatures at which a signal may be shifted by an amount.
+
+        Parameters
+        ----------
+        kind, name : str
+            Signal type and name of the signal.
+        shift_nm : float
+            Shift, nm.
+
+        Returns
+        -------
+        low_c, high_c : float
+            Temperatures, degrees Celsius.
+        """
         drift, (low, high) = self.drift(kind, name), self.own_nm(kind, name)
         ends = self.warmer_k
         if drift:
@@ -139,16 +163,38 @@ class Population(Section):
         return self.reference_c + ends[0], self.reference_c + ends[1]
 
     def drift(self, kind: str, name: str) -> float | None:
-        """nm/K of a signal of a type; None where neither the study nor a default says it."""
+        """Return the drift of a signal.
+
+        Parameters
+        ----------
+        kind, name : str
+            Signal type and name of the signal.
+
+        Returns
+        -------
+        float or None
+            nm/K; None if neither the study nor a default states it.
+        """
         return _of(self.drift_nm_per_k, kind, name, DRIFT_NM_PER_K.get(kind))
 
     def own_nm(self, kind: str, name: str) -> tuple[float, float]:
-        """Return the range of shifts by binning and ageing alone, nm."""
+        """Return the range of shifts by binning and ageing alone.
+
+        Parameters
+        ----------
+        kind, name : str
+            Signal type and name of the signal.
+
+        Returns
+        -------
+        low_nm, high_nm : float
+            Range, nm.
+        """
         binning = _of(self.binning_nm, kind, name, 0.0)
         low, high = _of(self.ageing_nm, kind, name, (0.0, 0.0))
         return low - binning, high + binning
 
 
 def _of(values: Mapping[str, _Value], kind: str, name: str, default: _Value) -> _Value:
-    """Return that of the signal, else of its type, else of all."""
+    """Return the value of the signal, else of its type, else of all."""
     return values.get(name, values.get(kind, values.get(_ALL, default)))

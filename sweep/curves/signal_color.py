@@ -1,4 +1,4 @@
-"""The color of a light, and the traffic signal that it is: chromaticity, dominant wavelength, EN 12368's regions."""
+"""Color of a light, and its traffic signal: chromaticity, dominant wavelength, regions of EN 12368."""
 
 from __future__ import annotations
 
@@ -25,11 +25,22 @@ LEAST_PURITY = 0.5
 
 @dataclass(frozen=True)
 class LightColor:
-    """The color of one light.
+    """Color of one light.
 
-    `xy`: CIE 1931, 2 degree observer. `dominant_nm` is None for a white and for a purple (beyond the ends of the
-    spectrum); `purity` is the excitation purity, 1 on the spectral locus. `region` is the one that the light lies in,
-    None outside all; `nearest` the nearest of them, `distance` away in x, y (0 inside).
+    Parameters
+    ----------
+    xy : tuple of float
+        CIE 1931, 2 degree observer.
+    dominant_nm : float or None
+        Dominant wavelength, nm; None for white and purple.
+    purity : float
+        Excitation purity, 1 on the spectral locus.
+    region : str or None
+        Region of the light.
+    nearest : str
+        Nearest region.
+    distance : float
+        Distance to it in x, y (0 inside).
     """
 
     xy: tuple[float, float]
@@ -41,10 +52,7 @@ class LightColor:
 
     @property
     def signal(self) -> str | None:
-        """The signal type that the light is taken for: its region, else the nearest one by dominant wavelength.
-
-        None where that is more than NEAR_NM off, or the light is whitish or purple.
-        """
+        """Signal type of the light: its region, else the nearest by dominant wavelength within NEAR_NM."""
         if self.region is not None or self.dominant_nm is None or self.purity < LEAST_PURITY:
             return self.region
         gap, kind = min(
@@ -55,7 +63,18 @@ class LightColor:
 
 
 def light_color(photons: FloatArray) -> LightColor | None:
-    """Return the color of a photon spectrum on VISIBLE, ndarray[471]; None where it has no visible light."""
+    """Return the color of a photon spectrum.
+
+    Parameters
+    ----------
+    photons : ndarray of shape (471,)
+        Spectrum on VISIBLE.
+
+    Returns
+    -------
+    LightColor or None
+        None without visible light.
+    """
     peak = float(photons.max())
     if not peak > 0:
         return None
@@ -77,10 +96,10 @@ def light_color(photons: FloatArray) -> LightColor | None:
 
 
 def _hue(xy: FloatArray) -> tuple[float, float | None]:
-    """Return excitation purity and dominant wavelength, to a nm, of a chromaticity, ndarray[2] (CIE 15, 9).
+    """Return excitation purity and dominant wavelength, to a nm, of a chromaticity (CIE 15, 9).
 
-    Both are of the point where the line from white through it leaves the spectral locus; there is no such wavelength
-    where that is on the line of purples.
+    Both are of the point where the line from white through it leaves the spectral locus; on the line of purples there
+    is no such wavelength.
     """
     white, locus = np.array(EQUAL_ENERGY), spectral_locus()
     (dx, dy), (ax, ay) = xy - white, (locus - white).T
@@ -99,15 +118,31 @@ def _hue(xy: FloatArray) -> tuple[float, float | None]:
 
 @cache
 def spectral_locus() -> FloatArray:
-    """Return chromaticities of monochromatic light on VISIBLE, ndarray[471, 2]."""
+    """Return the chromaticities of monochromatic light on VISIBLE.
+
+    Returns
+    -------
+    ndarray of shape (471, 2)
+        x, y.
+    """
     return chromaticity(VISIBLE, np.eye(VISIBLE.size))
 
 
 @cache
 def outline(kind: str) -> FloatArray:
-    """Return the part of a color region that light can have, as a polygon, ndarray[n, 2].
+    """Return the part of a color region that light can have, as a polygon.
 
     The spectral locus is cut at each bound (Sutherland and Hodgman, "Reentrant polygon clipping").
+
+    Parameters
+    ----------
+    kind : str
+        Signal type.
+
+    Returns
+    -------
+    ndarray of shape (n, 2)
+        Corners.
     """
     polygon = spectral_locus()
     for a, b, c in REGIONS[kind].bounds:
@@ -124,7 +159,13 @@ def outline(kind: str) -> FloatArray:
 
 @cache
 def dominant_ranges_nm() -> dict[str, tuple[float, float]]:
-    """Return dominant wavelengths of each region: those of monochromatic light inside it; red is open."""
+    """Return the dominant wavelengths of each region; red is open.
+
+    Returns
+    -------
+    dict of str to tuple of float
+        Ranges of monochromatic light inside it, nm.
+    """
     spans = {}
     for kind, region in REGIONS.items():
         inside = VISIBLE.nodes_nm[region.violation(spectral_locus()) <= 0]

@@ -1,4 +1,4 @@
-"""Single LEDs that a norm allows: all peaks and widths whose color lies in its region of yellow or of red."""
+"""Single LEDs that a norm allows: all peaks and widths with a color in its region of yellow or red."""
 
 from __future__ import annotations
 
@@ -62,33 +62,57 @@ class RegionMap(Section):
 
     @property
     def peaks_nm(self) -> FloatArray:
-        """Every peak, ndarray[n_peaks]."""
+        """Peaks, nm, ndarray of shape (n_peaks,)."""
         return _steps(*self.peak_nm, self.peak_step_nm)
 
     @property
     def widths_nm(self) -> FloatArray:
-        """Every full width at half maximum, ndarray[n_widths]."""
+        """Full widths at half maximum, nm, ndarray of shape (n_widths,)."""
         return _steps(*self.fwhm_nm, self.fwhm_step_nm)
 
 
 @dataclass(frozen=True)
 class SingleLeds:
-    """LEDs by their peaks and full widths at half maximum, nm, ndarray[n] each."""
+    """LEDs by peak and full width at half maximum, nm, ndarray of shape (n,) each."""
 
     peak_nm: FloatArray
     fwhm_nm: FloatArray
 
     def photons(self, grid: WavelengthGrid) -> FloatArray:
-        """Photon spectra that integrate to 1 on the grid, ndarray[n, n_wavelengths]."""
+        """Return photon spectra that integrate to 1 on the grid.
+
+        Parameters
+        ----------
+        grid : WavelengthGrid
+            Wavelengths, nm.
+
+        Returns
+        -------
+        ndarray of shape (n, n_wavelengths)
+            Photons per nm.
+        """
         return equal_photons(grid, self._shapes(grid))
 
     def allowed(self, norm: Norm, kind: str) -> SingleLeds:
-        """Return the LEDs whose color is inside a norm's region of a signal type."""
+        """Return the LEDs whose color is inside a norm's region.
+
+        Parameters
+        ----------
+        norm : str
+            Norm.
+        kind : str
+            Signal type.
+
+        Returns
+        -------
+        SingleLeds
+            LEDs.
+        """
         inside = SIGNAL_REGIONS[norm][kind].violation(chromaticity(VISIBLE, self._shapes(VISIBLE))) <= 0
         return SingleLeds(self.peak_nm[inside], self.fwhm_nm[inside])
 
     def _shapes(self, grid: WavelengthGrid) -> FloatArray:
-        """Photon spectra with a peak of 1, ndarray[n, n_wavelengths]."""
+        """Return photon spectra with a peak of 1, ndarray of shape (n, n_wavelengths)."""
         decays = self.fwhm_nm / _FWHM
         nodes = grid.nodes_nm
         shapes = [led_photons(nodes, peak, a, a) for peak, a in zip(self.peak_nm, decays, strict=True)]
@@ -96,7 +120,18 @@ class SingleLeds:
 
 
 def every_led(asked: RegionMap) -> SingleLeds:
-    """Return all peaks with all widths."""
+    """Return all peaks with all widths.
+
+    Parameters
+    ----------
+    asked : RegionMap
+        Ranges.
+
+    Returns
+    -------
+    SingleLeds
+        LEDs.
+    """
     peaks, widths = np.meshgrid(asked.peaks_nm, asked.widths_nm, indexing="ij")
     return SingleLeds(peaks.ravel(), widths.ravel())
 

@@ -1,6 +1,6 @@
 """Spectra on one wavelength grid: checks, resampling rules, photons and energy.
 
-A curve that is not clean (NaN, negative, unsorted, duplicated or truncated data) is refused, never mended.
+A curve that is not clean (NaN, negative, unsorted, duplicated or truncated data) is refused, never repaired.
 """
 
 from __future__ import annotations
@@ -63,11 +63,22 @@ class WavelengthGrid(Section):
 
     @property
     def nodes_nm(self) -> FloatArray:
-        """The wavelengths, ndarray[size], nm."""
+        """Wavelengths, nm, ndarray of shape (size,)."""
         return self.start_nm + self.step_nm * np.arange(self.size, dtype=float)
 
     def integrate(self, values: FloatArray) -> FloatArray:
-        """Sum of value times bin width over the last axis: ndarray[..., size] -> ndarray[...]."""
+        """Sum value times bin width over the last axis.
+
+        Parameters
+        ----------
+        values : ndarray of shape (..., size)
+            Values.
+
+        Returns
+        -------
+        ndarray of shape (...)
+            Integrals.
+        """
         return np.asarray(values.sum(axis=-1) * self.step_nm, dtype=float)
 
 
@@ -75,9 +86,18 @@ class WavelengthGrid(Section):
 class Curves:
     """Named curves on common wavelengths, as they came from their source.
 
-    `wavelength_nm`: ndarray[n], strictly increasing. `values`: name -> ndarray[n], finite and >= 0.
-    `source` names the file or the maker; `surrogate` says that the curves are modeled, not measured. `notes`: how
-    a file was read.
+    Parameters
+    ----------
+    wavelength_nm : ndarray of shape (n,)
+        Wavelengths, strictly increasing, nm.
+    values : mapping of str to ndarray of shape (n,)
+        Finite values >= 0.
+    source : str
+        File or maker.
+    surrogate : bool
+        True for modeled curves.
+    notes : tuple of str
+        Notes on the way a file was read.
     """
 
     wavelength_nm: FloatArray
@@ -89,7 +109,24 @@ class Curves:
     def on(
         self, grid: WavelengthGrid, name: str, method: Resampling = "linear", outside: Outside = "refuse"
     ) -> FloatArray:
-        """Return curve `name` on `grid`, ndarray[grid.size]; errors as for `resample`."""
+        """Resample a curve to a grid; see `resample`.
+
+        Parameters
+        ----------
+        grid : WavelengthGrid
+            Wavelengths, nm.
+        name : str
+            Name of the curve.
+        method : {'linear', 'mean'}
+            Resampling.
+        outside : {'refuse', 'zero'}
+            Values beyond the samples.
+
+        Returns
+        -------
+        ndarray of shape (n_wavelengths,)
+            Values.
+        """
         try:
             return resample(self.wavelength_nm, self.values[name], grid, method, outside)
         except DataError as error:
@@ -131,7 +168,23 @@ def _value_faults(wave: FloatArray, data: FloatArray) -> Iterator[Fault]:
 
 
 def check_samples(wavelength_nm: ArrayLike, values: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Return both as float arrays of equal length, or raise DataError with one fault per thing wrong."""
+    """Check samples of a curve.
+
+    Parameters
+    ----------
+    wavelength_nm, values : array-like of shape (n,)
+        Samples.
+
+    Returns
+    -------
+    wavelength_nm, values : ndarray of shape (n,)
+        Samples as floats.
+
+    Raises
+    ------
+    DataError
+        With one fault for everything that is wrong.
+    """
     wave = np.asarray(wavelength_nm, dtype=float)
     data = np.asarray(values, dtype=float)
     if wave.ndim != 1 or data.shape != wave.shape or wave.size < 2:
@@ -145,7 +198,24 @@ def check_samples(wavelength_nm: ArrayLike, values: ArrayLike) -> tuple[FloatArr
 
 
 def sample_faults(file: str, wave: FloatArray, names: Sequence[str], data: FloatArray) -> list[list[Fault]]:
-    """Faults by `check_samples` of the curves of a file, ndarray[n_samples, n_curves], a group for each curve."""
+    """Return the faults of the curves of a file by `check_samples`.
+
+    Parameters
+    ----------
+    file : str
+        File, for the messages.
+    wave : ndarray of shape (n_samples,)
+        Wavelengths, nm.
+    names : sequence of str
+        Names of the curves.
+    data : ndarray of shape (n_samples, n_curves)
+        Values.
+
+    Returns
+    -------
+    list of list of Fault
+        Faults of each curve.
+    """
     groups = []
     for index, name in enumerate(names):
         try:
@@ -162,12 +232,32 @@ def resample(
     method: Resampling = "linear",
     outside: Outside = "refuse",
 ) -> FloatArray:
-    """Bring a sampled curve onto `grid`: ndarray[grid.size].
+    """Bring a sampled curve to a grid.
 
-    `linear`: the value of the piecewise linear interpolant at each node. `mean`: its exact mean over each bin, which
-    keeps the integral (of bins inside the samples) when the source is finer than the grid; bins are cut at the ends of
-    the samples. Splines are not offered: they ring below zero at LED peaks.
-    `outside`: `refuse` raises DataError when the samples end inside the grid, `zero` takes 0 there.
+    `linear` is the value of the piecewise linear interpolant at each node. `mean` is its exact mean over each bin,
+    which keeps the integral (of bins inside the samples) if the source is finer than the grid. Splines are not
+    offered: they ring below zero at LED peaks.
+
+    Parameters
+    ----------
+    wavelength_nm, values : array-like of shape (n,)
+        Samples.
+    grid : WavelengthGrid
+        Wavelengths, nm.
+    method : {'linear', 'mean'}
+        Resampling.
+    outside : {'refuse', 'zero'}
+        If the samples end inside the grid: an error, or 0.
+
+    Returns
+    -------
+    ndarray of shape (n_wavelengths,)
+        Values.
+
+    Raises
+    ------
+    DataError
+        If samples are not clean, or end inside the grid with `refuse`.
     """
     wave, data = check_samples(wavelength_nm, values)
     nodes = grid.nodes_nm
@@ -194,7 +284,7 @@ def resample(
 
 
 def _integral_to(wave: FloatArray, data: FloatArray, at: FloatArray) -> FloatArray:
-    """Integral of the piecewise linear interpolant from the first sample to `at`."""
+    """Return the integral of the piecewise linear interpolant from the first sample to `at`."""
     whole = np.concatenate([[0.0], np.cumsum(np.diff(wave) * (data[1:] + data[:-1]) / 2)])
     index = np.clip(np.searchsorted(wave, at, side="right") - 1, 0, wave.size - 2)
     part = at - wave[index]
@@ -203,19 +293,60 @@ def _integral_to(wave: FloatArray, data: FloatArray, at: FloatArray) -> FloatArr
 
 
 def photons_from_energy(wavelength_nm: FloatArray, energy: FloatArray) -> FloatArray:
-    """Spectral photon quantity from spectral radiant energy: Q lambda / (h c), per the same nm (Planck)."""
+    """Convert spectral radiant energy to photons: Q lambda / (h c) (Planck).
+
+    Parameters
+    ----------
+    wavelength_nm : ndarray of shape (n_wavelengths,)
+        Wavelengths, nm.
+    energy : ndarray of shape (..., n_wavelengths)
+        Energy per nm.
+
+    Returns
+    -------
+    ndarray of the same shape
+        Photons per nm.
+    """
     return energy * (wavelength_nm * 1e-9) / (PLANCK_J_S * LIGHT_M_S)
 
 
 def energy_from_photons(wavelength_nm: FloatArray, photons: FloatArray) -> FloatArray:
-    """Spectral radiant energy from a spectral photon quantity: Q h c / lambda, per the same nm (Planck)."""
+    """Convert photons to spectral radiant energy: Q h c / lambda (Planck).
+
+    Parameters
+    ----------
+    wavelength_nm : ndarray of shape (n_wavelengths,)
+        Wavelengths, nm.
+    photons : ndarray of shape (..., n_wavelengths)
+        Photons per nm.
+
+    Returns
+    -------
+    ndarray of the same shape
+        Energy per nm.
+    """
     return photons * (PLANCK_J_S * LIGHT_M_S) / (wavelength_nm * 1e-9)
 
 
 def equal_photons(grid: WavelengthGrid, photons: FloatArray) -> FloatArray:
-    """Scale each spectrum of ndarray[..., grid.size] so that it integrates to 1 photon over the grid.
+    """Scale spectra to an integral of one photon.
 
-    Raises DataError when a spectrum has no photons on the grid.
+    Parameters
+    ----------
+    grid : WavelengthGrid
+        Wavelengths, nm.
+    photons : ndarray of shape (..., n_wavelengths)
+        Spectra.
+
+    Returns
+    -------
+    ndarray of the same shape
+        Scaled spectra.
+
+    Raises
+    ------
+    DataError
+        If a spectrum has no photons on the grid.
     """
     total = grid.integrate(photons)
     if not (total >= LEAST_PEAK).all():
@@ -229,9 +360,19 @@ def equal_photons(grid: WavelengthGrid, photons: FloatArray) -> FloatArray:
 
 
 def hats(at: FloatArray, knots: FloatArray) -> FloatArray:
-    """Weights of values at ascending `knots` in the lines between them, ndarray[n_knots, n_at]; flat beyond the ends.
+    """Return the linear basis of interpolation between knots; constant beyond the ends.
 
-    Any f, ndarray[..., n_knots], is f @ hats at the points `at`.
+    Parameters
+    ----------
+    at : ndarray of shape (n_at,)
+        Points.
+    knots : ndarray of shape (n_knots,)
+        Knots, ascending.
+
+    Returns
+    -------
+    ndarray of shape (n_knots, n_at)
+        Weights: any f of shape (..., n_knots) is f @ weights at the points.
     """
     if knots.size == 1:
         return np.ones((1, at.size))

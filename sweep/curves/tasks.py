@@ -1,4 +1,4 @@
-"""Tasks beside traffic lights, as spectra on the wavelength grid, and the names of their columns."""
+"""Tasks beside traffic lights: spectra on the wavelength grid, and names of their columns."""
 
 from __future__ import annotations
 
@@ -39,14 +39,27 @@ high and low pressure."""
 
 @dataclass(frozen=True)
 class TaskName:
-    """Names of a task's columns: its metric, and its lights."""
+    """Name, metric and lights of a task's columns."""
 
     name: str
     metric: Measure
     cases: tuple[Case, ...]
 
     def column(self, what: str, case: Case = "") -> str:
-        """`<task>_<what>`, and the light's name where the task has several."""
+        """Return a column name: `<task>_<what>`, and the light if there are several.
+
+        Parameters
+        ----------
+        what : str
+            Figure.
+        case : str
+            Light.
+
+        Returns
+        -------
+        str
+            Text.
+        """
         return "_".join(part for part in (self.name, what, case) if part)
 
 
@@ -54,9 +67,16 @@ class TaskName:
 class Chart:
     """Patches of a chart under several lights.
 
-    `photons`: ndarray[n_cases, n_patches, n_wavelengths], photon radiance of each at 1 lx, per nm; `gray`: the same of
-    18 % gray, ndarray[n_cases, n_wavelengths]. `xyz`: CIE 1931 of the patches, ndarray[n_cases, n_patches, 3], and
-    `white` of a perfect reflector, ndarray[n_cases, 3], which has Y = 1.
+    Parameters
+    ----------
+    photons : ndarray of shape (n_cases, n_patches, n_wavelengths)
+        Photon radiance at 1 lx, per nm.
+    gray : ndarray of shape (n_cases, n_wavelengths)
+        The same of 18 % gray.
+    xyz : ndarray of shape (n_cases, n_patches, 3)
+        CIE 1931.
+    white : ndarray of shape (n_cases, 3)
+        CIE 1931 of a perfect reflector, Y = 1.
     """
 
     photons: FloatArray
@@ -67,11 +87,18 @@ class Chart:
 
 @dataclass(frozen=True)
 class GriddedTask:
-    """A task on the wavelength grid.
+    """Task on the wavelength grid.
 
-    A separation has classes of spectra: `photons`, ndarray[n_cases, n_spectra, n_wavelengths], each integrates to one
-    photon, so that brightness tells nothing; `types`: the class of each. A task of color has a chart, and `index`: the
-    one of the metamerism index.
+    Parameters
+    ----------
+    key : TaskName
+        Names.
+    types : tuple of str
+        Class of each spectrum of a separation.
+    photons : ndarray of shape (n_cases, n_spectra, n_wavelengths), optional
+        Spectra that integrate to one photon.
+    chart, index : Chart, optional
+        Charts of a task of color, and of its metamerism index.
     """
 
     key: TaskName
@@ -91,7 +118,7 @@ class GriddedTask:
 
 @dataclass(frozen=True)
 class Conditions:
-    """Under which all tasks are judged: exposure, read noise, and the illuminance of charts."""
+    """Conditions of all tasks: exposure, read noise, and illuminance of charts."""
 
     exposure_s: float
     read_noise_e: float
@@ -100,10 +127,7 @@ class Conditions:
 
 @dataclass(frozen=True)
 class StudyTasks:
-    """The tasks of a study, each once, and their conditions.
-
-    `from_files`: (task and class, file and column) -> a spectrum of the study's own files, ndarray[n_wavelengths].
-    """
+    """Tasks of a study, their conditions, and spectra from its files."""
 
     conditions: Conditions
     tasks: tuple[GriddedTask, ...]
@@ -116,5 +140,5 @@ class StudyTasks:
 
     @property
     def by_name(self) -> Mapping[str, GriddedTask]:
-        """Each by its name."""
+        """Tasks by name."""
         return {task.key.name: task for task in self.tasks}

@@ -1,4 +1,4 @@
-"""Tables of text as instruments and spreadsheets write them: what can be meant in one way only is read, and noted."""
+"""Tables of text as instruments and spreadsheets write them; ambiguous ones are refused."""
 
 from __future__ import annotations
 
@@ -56,11 +56,20 @@ _NAME_AND_UNIT = re.compile(r"(.*?)[\s_/,.\-]*[\[(]?\s*([^\W\d_]+)\s*[\])]?")
 
 @dataclass(frozen=True)
 class Scan:
-    """A file of curves, read as far as it can be.
+    """File of curves, read as far as possible.
 
-    `wavelength_nm`: ndarray[n_samples] as the file has it, in nm where it says its unit. `values`: ndarray[n_samples,
-    n_curves], a column per name. What is not a number is NaN in both. `faults`: what is wrong, in groups; `read_curves`
-    stops at the first group. `notes`: how it was read, where it is not written as `wavelength_nm,...`.
+    Parameters
+    ----------
+    wavelength_nm : ndarray of shape (n_samples,)
+        As in the file, in nm if its unit is known; NaN for anything else.
+    names : tuple of str
+        Columns.
+    values : ndarray of shape (n_samples, n_curves)
+        Values; NaN for anything else.
+    faults : tuple of tuple of Fault
+        Faults in groups; `read_curves` stops at the first group.
+    notes : tuple of str
+        Notes on the way it was read.
     """
 
     wavelength_nm: FloatArray
@@ -72,9 +81,9 @@ class Scan:
 
 @dataclass
 class TextTable:
-    """A table of texts: its head, its rows with their line numbers, and how it was read.
+    """Table of texts: head, rows with line numbers, and notes.
 
-    `unit` brings its wavelengths to nm (0: its head says none), `factor` its values to plain numbers.
+    `unit` brings its wavelengths to nm (0: unknown), `factor` its values to plain numbers.
     """
 
     file: str
@@ -89,10 +98,22 @@ class TextTable:
 
 
 def scan_text(path: Path) -> Scan:
-    """Read a table of curves as far as possible; its delimiter, decimal mark, head, unit and order are recognized.
+    """Read a table of curves as far as possible; delimiter, decimal mark, head, unit and order are recognized.
 
-    What is not as `wavelength_nm,...` with points is in `notes`. What two readers could read in two ways is a fault.
-    Raises DataError where there is no table at all.
+    Parameters
+    ----------
+    path : Path
+        File.
+
+    Returns
+    -------
+    Scan
+        Curves; an ambiguous table has faults.
+
+    Raises
+    ------
+    DataError
+        If there is no table.
     """
     table = text_table(path)
     _read_unit_row(table)
@@ -103,9 +124,24 @@ def scan_text(path: Path) -> Scan:
 
 
 def text_table(path: Path, first: str = WAVELENGTH) -> TextTable:
-    """Return head and rows of a file, as texts; `first`: name of its first column in messages.
+    """Return head and rows of a file, as texts.
 
-    Raises DataError where there is no table at all.
+    Parameters
+    ----------
+    path : Path
+        File.
+    first : str
+        Name of the first column in messages.
+
+    Returns
+    -------
+    TextTable
+        Table.
+
+    Raises
+    ------
+    DataError
+        If there is no table.
     """
     text, notes = _decoded(path)
     table = _laid_out(str(path), text.replace("\0", ""), first, notes)
@@ -116,7 +152,20 @@ def text_table(path: Path, first: str = WAVELENGTH) -> TextTable:
 
 
 def lens_table(path: Path, first: str) -> TextTable:
-    """Return head and rows of a file of no wavelengths, with the mark of its decimals."""
+    """Return head and rows of a file without wavelengths, with its decimal mark.
+
+    Parameters
+    ----------
+    path : Path
+        File.
+    first : str
+        Name of the first column in messages.
+
+    Returns
+    -------
+    TextTable
+        Table.
+    """
     table = text_table(path, first)
     _find_decimal(table)
     return table
@@ -352,9 +401,29 @@ def table_numbers(
     falling: bool = False,
     noun: str = "wavelength",
 ) -> tuple[FloatArray, list[Fault]]:
-    """ndarray[n_samples, n_columns], NaN where a cell is no number; and the faults, row by row.
+    """Return the numbers of a table and the faults, row by row.
 
-    `falling`: the first column falls from row to row; `noun`: what it holds.
+    Parameters
+    ----------
+    file : str
+        File, for the messages.
+    header : list of str
+        Columns.
+    rows : list of (line, cells)
+        Rows.
+    decimal : str
+        Decimal mark.
+    falling : bool
+        The first column falls from row to row.
+    noun : str
+        Content of the first column.
+
+    Returns
+    -------
+    numbers : ndarray of shape (n_samples, n_columns)
+        Numbers; NaN where a cell is none.
+    faults : list of Fault
+        Faults.
     """
     values = np.full((len(rows), len(header)), np.nan)
     faults: list[Fault] = []
@@ -387,13 +456,39 @@ def table_numbers(
 
 
 def number_of(cell: str) -> float | None:
-    """Return a finite number as tables have it; Python's own underscores and other scripts' digits are none."""
+    """Return a finite number as tables have it, without Python's underscores and other scripts' digits.
+
+    Parameters
+    ----------
+    cell : str
+        Cell.
+
+    Returns
+    -------
+    float or None
+        None if it is none.
+    """
     number = float(cell) if _NUMBER.fullmatch(cell.strip()) else math.nan
     return number + 0.0 if math.isfinite(number) else None
 
 
 def check_size(file: str, line: int | None, n_samples: int, n_curves: int) -> None:
-    """Refuse what would take minutes to read, before it is read. Raises DataError."""
+    """Refuse a table that would take minutes to read.
+
+    Parameters
+    ----------
+    file : str
+        File, for the message.
+    line : int or None
+        Line.
+    n_samples, n_curves : int
+        Size.
+
+    Raises
+    ------
+    DataError
+        If it is too large.
+    """
     for what, count, most in (
         ("curves", n_curves, MOST_CURVES),
         ("samples", n_samples, MOST_SAMPLES),
@@ -404,13 +499,35 @@ def check_size(file: str, line: int | None, n_samples: int, n_curves: int) -> No
 
 
 def unit_by_size(wave: FloatArray) -> float:
-    """Return the factor that brings wavelengths to nm: light between 100 nm and 20 um in nm, um or m."""
+    """Return the factor from wavelengths to nm by their size: light between 100 nm and 20 um in nm, um or m.
+
+    Parameters
+    ----------
+    wave : ndarray of shape (n_samples,)
+        Wavelengths.
+
+    Returns
+    -------
+    float
+        Factor.
+    """
     largest = float(np.nanmax(wave)) if np.isfinite(wave).any() else 0.0
     return 1e9 if 0 < largest < 1e-4 else 1e3 if 0 < largest < 20 else 1.0
 
 
 def distinct(names: Sequence[str]) -> tuple[str, ...]:
-    """Return column names, numbered where one is empty or occurs twice."""
+    """Return column names, numbered if empty or repeated.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names.
+
+    Returns
+    -------
+    tuple of str
+        Names.
+    """
     unique: dict[str, None] = {}
     for index, name in enumerate(names):
         candidate = name or f"column ({index + 2})"

@@ -1,1 +1,1 @@
-"""Curves that a study can name: traffic light data sets, and parts of sensors."""
+"""Built-in curves: traffic light data sets, and parts of sensors."""

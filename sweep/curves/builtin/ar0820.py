@@ -1,7 +1,7 @@
-"""A surrogate of the AR0820's quantum efficiencies, made from stated parameters; not measured.
+"""Surrogate of the AR0820's QE from stated parameters; not measured.
 
-QE = clear pixel x filter transmission. The clear pixel is a monotone cubic through a few nodes; a filter is a product
-of logistic edges (the shape of a dye filter's edge) between its leakage, which is such a cubic, too, and its peak.
+QE = clear pixel times filter transmission. The clear pixel is a monotone cubic through a few nodes; a filter is a
+product of logistic edges (the shape of a dye filter's edge) between its leakage, another such cubic, and its peak.
 """
 
 from __future__ import annotations
@@ -20,9 +20,21 @@ _LOGISTIC_PER_WIDTH = 2 * math.log(9)
 
 
 def monotone(nodes_nm: ArrayLike, values: ArrayLike, wavelength_nm: FloatArray) -> FloatArray:
-    """The monotone cubic through three nodes or more: Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5, 300 (1984).
+    """Return the monotone cubic through nodes: Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5, 300 (1984).
 
-    That of `scipy.interpolate.PchipInterpolator`, whose import would take longer than all that is read from a file.
+    That of `scipy.interpolate.PchipInterpolator`, whose import takes longer than reading the file.
+
+    Parameters
+    ----------
+    nodes_nm, values : array-like of shape (n,)
+        Three nodes or more.
+    wavelength_nm : ndarray of shape (n_wavelengths,)
+        Wavelengths, nm.
+
+    Returns
+    -------
+    ndarray of shape (n_wavelengths,)
+        Values.
     """
     x, y = np.asarray(nodes_nm, dtype=float), np.asarray(values, dtype=float)
     step = np.diff(x)
@@ -42,7 +54,7 @@ def monotone(nodes_nm: ArrayLike, values: ArrayLike, wavelength_nm: FloatArray) 
 
 
 def _end_slope(step: float, next_step: float, rise: float, next_rise: float) -> float:
-    """Slope at an end: that of the parabola through three nodes, but of the first rise's sign and no steeper than 3."""
+    """Return the slope at an end: that of the parabola through three nodes, limited for monotonicity."""
     slope = ((2 * step + next_step) * rise - step * next_rise) / (step + next_step)
     if slope * rise <= 0:
         return 0.0
@@ -50,12 +62,38 @@ def _end_slope(step: float, next_step: float, rise: float, next_rise: float) -> 
 
 
 def clear_qe(wavelength_nm: FloatArray, clear: ClearPixel) -> FloatArray:
-    """QE of the unfiltered pixel, ndarray[n_wavelengths]."""
+    """Return the QE of the clear pixel.
+
+    Parameters
+    ----------
+    wavelength_nm : ndarray of shape (n_wavelengths,)
+        Wavelengths, nm.
+    clear : ClearPixel
+        Parameters.
+
+    Returns
+    -------
+    ndarray of shape (n_wavelengths,)
+        Values.
+    """
     return monotone(clear.wavelength_nm, clear.qe, wavelength_nm)
 
 
 def transmission(wavelength_nm: FloatArray, parameters: FilterParameters) -> FloatArray:
-    """Transmission of a color filter, ndarray[n_wavelengths], between its leak and its peak."""
+    """Return the transmission of a color filter, between its leak and its peak.
+
+    Parameters
+    ----------
+    wavelength_nm : ndarray of shape (n_wavelengths,)
+        Wavelengths, nm.
+    parameters : FilterParameters
+        Parameters.
+
+    Returns
+    -------
+    ndarray of shape (n_wavelengths,)
+        Values.
+    """
     opened = np.ones_like(wavelength_nm)
     for edge in parameters.edges:
         sign = 1 if edge.passes == "above" else -1
@@ -71,7 +109,20 @@ def _logistic(offset_widths: FloatArray) -> FloatArray:
 
 
 def ar0820(grid: WavelengthGrid, parameters: SurrogateParameters) -> Curves:
-    """Return the surrogate sensor on a grid inside 400-700 nm: C and every filter of the parameter file."""
+    """Return the surrogate sensor: C and every filter of the parameter file.
+
+    Parameters
+    ----------
+    grid : WavelengthGrid
+        Wavelengths inside 400 to 700 nm.
+    parameters : SurrogateParameters
+        Parameters.
+
+    Returns
+    -------
+    Curves
+        QE.
+    """
     wave = grid.nodes_nm
     clear = clear_qe(wave, parameters.clear_pixel) * _logistic(
         (parameters.ir_cut.center_nm - wave) / parameters.ir_cut.width_nm

@@ -1,4 +1,4 @@
-"""The shape of an LED's spectrum."""
+"""Spectrum of an LED."""
 
 from __future__ import annotations
 
@@ -8,10 +8,22 @@ from ...base.types import FloatArray
 
 
 def led_photons(wavelength_nm: FloatArray, peak_nm: float, blue_nm: float, red_nm: float) -> FloatArray:
-    """Photon spectrum of an LED, 1 at its peak: (a + b) / (a exp(-u/a) + b exp(u/b)), u = l - peak, a blue, b red.
+    """Return the photon spectrum of an LED, 1 at its peak.
 
-    An asymmetric hyperbolic secant: it decays as exp(u/a) toward the blue and exp(-u/b) toward the red, as the
-    band-edge emission of LEDs does. `wavelength_nm`: ndarray[n]. Returns ndarray[n].
+    (a + b) / (a exp(-u/a) + b exp(u/b)), u = l - peak, a blue, b red: an asymmetric hyperbolic secant, which decays as
+    exp(u/a) toward the blue and exp(-u/b) toward the red, as the band-edge emission of LEDs does.
+
+    Parameters
+    ----------
+    wavelength_nm : ndarray of shape (n_wavelengths,)
+        Wavelengths, nm.
+    peak_nm, blue_nm, red_nm : float
+        Peak, and decay lengths, nm.
+
+    Returns
+    -------
+    ndarray of shape (n_wavelengths,)
+        Values.
     """
     u = wavelength_nm - peak_nm
     # exp(-|u|/scale) never overflows; the two sides are the same formula divided by its larger exponential.

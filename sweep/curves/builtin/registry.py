@@ -1,4 +1,4 @@
-"""Every traffic light data set that a study can name, found in `data_sets`."""
+"""Traffic light data sets that a study can name, collected from `data_sets`."""
 
 from __future__ import annotations
 

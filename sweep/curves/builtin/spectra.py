@@ -1,4 +1,4 @@
-"""Measured and standard spectra that the package ships, with a data card for each set (`tests/make_spectra.py`)."""
+"""Measured and standard spectra of the package, with a data card for each set (`tests/make_spectra.py`)."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _FILE = "spectra.parquet"
 
 @dataclass(frozen=True)
 class Spectrum:
-    """A spectrum as it came: `value` at `wavelength_nm`, ndarray[n] each; of an emission relative radiant power."""
+    """Spectrum as published: `value` at `wavelength_nm`, ndarray of shape (n,) each; emissions in relative power."""
 
     name: str
     kind: SpectrumKind
@@ -31,10 +31,10 @@ class Spectrum:
 
 @dataclass(frozen=True)
 class Card:
-    """Facts of a set of spectra: where it comes from, who may use it, whom to thank, its range and digest.
+    """Facts of a set of spectra: source, license, credit, range and digest.
 
-    `groups`: the parts of the set that a task may name, with the number of spectra of each. `surrogate`: modeled by
-    us from stated numbers, not measured.
+    `groups` are the parts of the set that a task may name, with the number of their spectra. `surrogate` spectra are
+    modeled from stated numbers, not measured.
     """
 
     name: str
@@ -51,7 +51,7 @@ class Card:
 
 @cache
 def _read() -> tuple[dict[str, dict[str, str]], dict[str, dict[str, tuple[Spectrum, ...]]]]:
-    """Set -> what the file says of it, and set -> group -> spectra, in the file's order."""
+    """Return the metadata of each set, and its spectra by group, in the file's order."""
     from pyarrow import parquet  # noqa: PLC0415  (few studies need it)
 
     table = parquet.read_table(str(files(__package__).joinpath(_FILE)))
@@ -66,12 +66,29 @@ def _read() -> tuple[dict[str, dict[str, str]], dict[str, dict[str, tuple[Spectr
 
 
 def shipped_groups() -> dict[str, tuple[Spectrum, ...]]:
-    """Group -> its spectra, over all sets."""
+    """Return the spectra of every group, over all sets.
+
+    Returns
+    -------
+    dict of str to tuple of Spectrum
+        Spectra by group.
+    """
     return {group: members for parts in _read()[1].values() for group, members in parts.items()}
 
 
 def numbers_digest(spectra: tuple[Spectrum, ...]) -> str:
-    """SHA-256 of names and numbers (32-bit floats, wavelengths first), hexadecimal."""
+    """Return the SHA-256 of names and numbers (32-bit floats, wavelengths first).
+
+    Parameters
+    ----------
+    spectra : tuple of Spectrum
+        Spectra.
+
+    Returns
+    -------
+    str
+        Hexadecimal digest.
+    """
     content = hashlib.sha256()
     for spectrum in spectra:
         wave, value = spectrum.wavelength_nm.astype(np.float32), spectrum.value.astype(np.float32)
@@ -80,7 +97,13 @@ def numbers_digest(spectra: tuple[Spectrum, ...]) -> str:
 
 
 def cards() -> list[Card]:
-    """Return the card of each set of the file; its range and digest are those of the numbers that are there."""
+    """Return the card of each set of the file, with range and digest of its numbers.
+
+    Returns
+    -------
+    list of Card
+        Cards.
+    """
     about, parts = _read()
     made = []
     for name, groups_of_set in parts.items():
@@ -96,14 +119,37 @@ def cards() -> list[Card]:
 
 
 def spectrum_of(group: str, name: str) -> Spectrum:
-    """Return a spectrum of a group by its name."""
+    """Return a spectrum of a group.
+
+    Parameters
+    ----------
+    group, name : str
+        Group and name.
+
+    Returns
+    -------
+    Spectrum
+        Spectrum.
+    """
     return next(spectrum for spectrum in shipped_groups()[group] if spectrum.name == name)
 
 
 def gridded(grid: WavelengthGrid, spectrum: Spectrum) -> FloatArray:
-    """Return a reflectance, or a relative photon spectrum, on the grid, ndarray[n_wavelengths].
+    """Return a reflectance, or a relative photon spectrum, on the grid.
 
     On a grid that is coarser than its samples it is the mean over each bin, so that narrow lines keep their photons.
+
+    Parameters
+    ----------
+    grid : WavelengthGrid
+        Wavelengths, nm.
+    spectrum : Spectrum
+        Spectrum.
+
+    Returns
+    -------
+    ndarray of shape (n_wavelengths,)
+        Values.
     """
     finest = float(np.diff(spectrum.wavelength_nm).min())
     method: Resampling = "mean" if grid.step_nm > finest else "linear"

@@ -1,4 +1,4 @@
-"""Surrogates of vehicle lamps, of lamps that no search has seen and of sign sheeting: modeled, not measured.
+"""Surrogate spectra of vehicle lamps, of lamps that no search has seen and of sign sheeting: modeled, not measured.
 
 No open spectra of them exist. Each lies inside its regulation's color region, which `tests/curves/test_tasks_data.py`
 tests: lamps by their own light, sheeting under D65.
@@ -25,20 +25,31 @@ _RISE = 4.394
 
 @dataclass(frozen=True)
 class LedShape:
-    """An LED by its peak and its decay toward blue and red, see `led_photons`."""
+    """LED by its peak and its decay toward blue and red, see `led_photons`."""
 
     peak_nm: float
     blue_nm: float
     red_nm: float
 
     def on(self, grid: WavelengthGrid) -> FloatArray:
-        """Relative photons, ndarray[n_wavelengths]."""
+        """Return relative photons.
+
+        Parameters
+        ----------
+        grid : WavelengthGrid
+            Wavelengths, nm.
+
+        Returns
+        -------
+        ndarray of shape (n_wavelengths,)
+            Values.
+        """
         return led_photons(grid.nodes_nm, self.peak_nm, self.blue_nm, self.red_nm)
 
 
 @dataclass(frozen=True)
 class EdgeShape:
-    """A curve that rises from `low` to `high` at a wavelength, by a logistic edge with a 10 to 90 % width.
+    """Curve that rises from `low` to `high` by a logistic edge with a 10 to 90 % width.
 
     It is a reflectance, or, `lit`, the light of a filament (illuminant A) behind a lens of that transmission.
     """
@@ -50,14 +61,25 @@ class EdgeShape:
     lit: bool = False
 
     def on(self, grid: WavelengthGrid) -> FloatArray:
-        """Return the reflectance, or the lens's relative photons, ndarray[n_wavelengths]."""
+        """Return the reflectance, or the lens's relative photons.
+
+        Parameters
+        ----------
+        grid : WavelengthGrid
+            Wavelengths, nm.
+
+        Returns
+        -------
+        ndarray of shape (n_wavelengths,)
+            Values.
+        """
         edge = 1 / (1 + np.exp(-(grid.nodes_nm - self.middle_nm) * _RISE / self.width_nm))
         return _behind(grid, self.low + (self.high - self.low) * edge, lit=self.lit)
 
 
 @dataclass(frozen=True)
 class BandShape:
-    """The same with a Gaussian band, `width_nm` wide at half its height."""
+    """Curve with a Gaussian band, `width_nm` wide at half its height; see `EdgeShape`."""
 
     low: float
     high: float
@@ -66,7 +88,18 @@ class BandShape:
     lit: bool = False
 
     def on(self, grid: WavelengthGrid) -> FloatArray:
-        """Return the reflectance, or the lens's relative photons, ndarray[n_wavelengths]."""
+        """Return the reflectance, or the lens's relative photons.
+
+        Parameters
+        ----------
+        grid : WavelengthGrid
+            Wavelengths, nm.
+
+        Returns
+        -------
+        ndarray of shape (n_wavelengths,)
+            Values.
+        """
         shape = np.exp(-4 * np.log(2) * ((grid.nodes_nm - self.middle_nm) / self.width_nm) ** 2)
         return _behind(grid, self.low + (self.high - self.low) * shape, lit=self.lit)
 
@@ -104,7 +137,18 @@ STAND_INS: Mapping[str, tuple[StandIn, ...]] = {
 
 
 def region(group: str) -> ColorRegion:
-    """Return the color region of a group, from its regulation."""
+    """Return the color region of a group by its regulation.
+
+    Parameters
+    ----------
+    group : str
+        Group.
+
+    Returns
+    -------
+    ColorRegion
+        Region.
+    """
     first, _, second = group.partition(" ")
     if second == "sheeting":
         return SHEETING_REGIONS[first]
@@ -112,12 +156,29 @@ def region(group: str) -> ColorRegion:
 
 
 def is_sheeting(group: str) -> bool:
-    """Return whether a group is of surfaces, not of lamps."""
+    """Return whether a group has surfaces.
+
+    Parameters
+    ----------
+    group : str
+        Group.
+
+    Returns
+    -------
+    bool
+        False for lamps.
+    """
     return group.endswith("sheeting")
 
 
 def surrogate_cards() -> list[Card]:
-    """Return the cards of lamps and sheeting; their digest is of the stated numbers."""
+    """Return the cards of lamps and sheeting, with digests of the stated numbers.
+
+    Returns
+    -------
+    list of Card
+        Cards.
+    """
     cards = []
     for name, kind, source in (
         (

@@ -81,12 +81,34 @@ class SurrogateParameters(Section):
 
 @cache
 def surrogate_parameters(name: str = "surrogate") -> SurrogateParameters:
-    """Read a parameter file that ships with the package."""
+    """Read a parameter file of the package.
+
+    Parameters
+    ----------
+    name : str
+        `surrogate` or `prior`.
+
+    Returns
+    -------
+    SurrogateParameters
+        Parameters.
+    """
     return SurrogateParameters.model_validate(parameter_tree(name))
 
 
 def parameter_tree(name: str) -> dict[str, Any]:
-    """Return the file as plain mappings and lists."""
+    """Return a parameter file as mappings and lists.
+
+    Parameters
+    ----------
+    name : str
+        `surrogate` or `prior`.
+
+    Returns
+    -------
+    dict
+        Content.
+    """
     text = files(__package__).joinpath(f"{name}.yaml").read_text(encoding="utf-8")
     tree: dict[str, Any] = YAML(typ="safe").load(text)
     return tree

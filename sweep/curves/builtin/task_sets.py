@@ -1,4 +1,4 @@
-"""The eight tasks that the package ships, and tasks of a study's own from the groups of spectra that it ships."""
+"""The eight tasks of the package, and tasks of a study from its groups of spectra."""
 
 from __future__ import annotations
 
@@ -22,25 +22,70 @@ _MOST = 20
 
 
 def illuminant(grid: WavelengthGrid, name: str) -> FloatArray:
-    """Return the relative photons of a light, ndarray[n_wavelengths]."""
+    """Return the relative photons of an illuminant.
+
+    Parameters
+    ----------
+    grid : WavelengthGrid
+        Wavelengths, nm.
+    name : str
+        Illuminant.
+
+    Returns
+    -------
+    ndarray of shape (n_wavelengths,)
+        Values.
+    """
     return spectra.gridded(grid, spectra.spectrum_of(*ILLUMINANTS[name]))
 
 
 def task_groups() -> dict[str, int]:
-    """Return every group that a task may name as a class, and how many spectra it has."""
+    """Return the groups that a task may name as a class.
+
+    Returns
+    -------
+    dict of str to int
+        Number of spectra by group.
+    """
     shipped = {name: len(members) for name, members in spectra.shipped_groups().items()}
     return shipped | {name: len(shapes) for name, shapes in stand_ins.STAND_INS.items()}
 
 
 def is_surface(group: str) -> bool:
-    """Return whether a group is of surfaces, not of lamps."""
+    """Return whether a group has surfaces.
+
+    Parameters
+    ----------
+    group : str
+        Group.
+
+    Returns
+    -------
+    bool
+        False for lamps.
+    """
     if group in stand_ins.STAND_INS:
         return stand_ins.is_sheeting(group)
     return spectra.shipped_groups()[group][0].kind == "reflectance"
 
 
 def group(grid: WavelengthGrid, name: str, most: int | None = None) -> FloatArray:
-    """Return the spectra of a group, ndarray[n, n_wavelengths]; `most`: so many of them, evenly spaced."""
+    """Return the spectra of a group.
+
+    Parameters
+    ----------
+    grid : WavelengthGrid
+        Wavelengths, nm.
+    name : str
+        Group.
+    most : int, optional
+        Number at most, evenly spaced.
+
+    Returns
+    -------
+    ndarray of shape (n, n_wavelengths)
+        Spectra.
+    """
     if name in stand_ins.STAND_INS:
         return np.stack([shape.on(grid) for shape in stand_ins.STAND_INS[name]])
     members = spectra.shipped_groups()[name]
@@ -50,7 +95,22 @@ def group(grid: WavelengthGrid, name: str, most: int | None = None) -> FloatArra
 
 
 def chart(grid: WavelengthGrid, reflectances: FloatArray, lights: Sequence[str]) -> Chart:
-    """Return patches of these reflectances, ndarray[n_patches, n_wavelengths], under lights of 1 lx."""
+    """Return patches under lights of 1 lx.
+
+    Parameters
+    ----------
+    grid : WavelengthGrid
+        Wavelengths, nm.
+    reflectances : ndarray of shape (n_patches, n_wavelengths)
+        Reflectances.
+    lights : sequence of str
+        Illuminants.
+
+    Returns
+    -------
+    Chart
+        Chart.
+    """
     matching = color_matching(grid)
     photons, gray, xyz, white = [], [], [], []
     for name in lights:
@@ -68,7 +128,24 @@ def chart(grid: WavelengthGrid, reflectances: FloatArray, lights: Sequence[str])
 def separation_task(
     grid: WavelengthGrid, name: str, classes: Mapping[str, FloatArray], lights: Sequence[str] = ()
 ) -> GriddedTask:
-    """Return a task of classes of spectra, ndarray[n, n_wavelengths] each: lamps, or reflectances under `lights`."""
+    """Return a task of classes of spectra.
+
+    Parameters
+    ----------
+    grid : WavelengthGrid
+        Wavelengths, nm.
+    name : str
+        Task.
+    classes : mapping of str to ndarray of shape (n, n_wavelengths)
+        Lamps, or reflectances under `lights`.
+    lights : sequence of str
+        Illuminants.
+
+    Returns
+    -------
+    GriddedTask
+        Task.
+    """
     stacked = np.concatenate(list(classes.values()))
     lit = [stacked * illuminant(grid, light) for light in lights] or [stacked]
     types = tuple(kind for kind, spectra_of_class in classes.items() for _ in spectra_of_class)
@@ -77,7 +154,20 @@ def separation_task(
 
 
 def shipped(grid: WavelengthGrid, name: str) -> GriddedTask:
-    """Return a task that the package ships, on the grid."""
+    """Return a task of the package.
+
+    Parameters
+    ----------
+    grid : WavelengthGrid
+        Wavelengths, nm.
+    name : str
+        Task.
+
+    Returns
+    -------
+    GriddedTask
+        Task.
+    """
 
     def groups(*names: str) -> dict[str, FloatArray]:
         return {name: group(grid, name, _MOST) for name in names}
@@ -134,10 +224,19 @@ _NIGHT_LAMPS = {
 
 
 def night_scene(grid: WavelengthGrid) -> dict[str, FloatArray]:
-    """Return area of a street at night -> its photon radiance, photons/s/sr/m^2/nm, ndarray[n_wavelengths].
+    """Return the photon radiance of the areas of a street at night.
 
-    Surfaces under white LEDs, and lamps that have as much of X, Y or Z as white paper there, so that none is
-    overexposed.
+    Surfaces under white LEDs, and lamps with as much of X, Y or Z as white paper there, so that none is overexposed.
+
+    Parameters
+    ----------
+    grid : WavelengthGrid
+        Wavelengths, nm.
+
+    Returns
+    -------
+    dict of str to ndarray of shape (n_wavelengths,)
+        Radiance, photons/s/sr/m2/nm.
     """
     light = equal_photons(grid, illuminant(grid, NIGHT_LIGHT)[None])[0]
     white = light * (NIGHT_LX / np.pi / luminance_per_photon_radiance(grid, light[None])[0])

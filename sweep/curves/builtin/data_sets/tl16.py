@@ -1,4 +1,4 @@
-"""A surrogate of the paper's 16 traffic lights, made from stated parameters; not measured.
+"""Surrogate of the paper's 16 traffic lights from stated parameters; not measured.
 
 11 lamps in California and 5 in Munich, each green, yellow and red; 3 of the US ones show an orange "don't walk", too:
 16 + 16 + 16 + 3 = 51 signals.
@@ -19,7 +19,20 @@ SIGNAL_TYPES = ("green", "yellow", "orange", "red")
 
 
 def tl16(grid: WavelengthGrid, parameters: SurrogateParameters) -> Lights:
-    """Return the 51 signals on the grid; the lamps of a region spread evenly over peak +- spread of each color."""
+    """Return the 51 signals; the lamps of a region spread evenly over peak +- spread of each color.
+
+    Parameters
+    ----------
+    grid : WavelengthGrid
+        Wavelengths, nm.
+    parameters : SurrogateParameters
+        Parameters.
+
+    Returns
+    -------
+    Lights
+        Signals.
+    """
     wave = grid.nodes_nm
     signals = []
     for color in SIGNAL_TYPES:
@@ -34,5 +47,16 @@ def tl16(grid: WavelengthGrid, parameters: SurrogateParameters) -> Lights:
 
 
 def lights(grid: WavelengthGrid) -> Lights:
-    """Return the signals of `tl16` with the parameters that the package ships."""
+    """Return the signals of `tl16` with the package's parameters.
+
+    Parameters
+    ----------
+    grid : WavelengthGrid
+        Wavelengths, nm.
+
+    Returns
+    -------
+    Lights
+        Signals.
+    """
     return tl16(grid, surrogate_parameters())
