@@ -40,8 +40,8 @@ from sweep.camera.scene import Scene
 from sweep.camera.sensor import ar0820_sensor
 from sweep.camera.setup import Setup
 from sweep.curves import builtin
-from sweep.curves.builtin.surrogate import SurrogateParameters, parameter_tree
 from sweep.curves.builtin.data_sets.tl16 import SIGNAL_TYPES, tl16
+from sweep.curves.builtin.surrogate import SurrogateParameters, parameter_tree
 from sweep.curves.color import REGIONS, chromaticity
 from sweep.curves.lights import class_pairs
 from sweep.curves.spectrum import WavelengthGrid

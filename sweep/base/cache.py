@@ -26,7 +26,20 @@ class Cache(Generic[_Key, _Value]):
         return len(self._values)
 
     def get(self, key: _Key, make: Callable[[], _Value]) -> _Value:
-        """Return the value of `key`, from `make` where it is not kept; raises what `make` raises."""
+        """Return the value of `key`, computed by `make` when it is not cached.
+
+        Parameters
+        ----------
+        key : hashable
+            Key of the value.
+        make : callable
+            Computes the value; its exceptions pass through.
+
+        Returns
+        -------
+        value
+            The cached or new value.
+        """
         with self._lock:
             if key not in self._values:
                 self._values[key] = make()

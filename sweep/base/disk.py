@@ -29,12 +29,41 @@ is_file, is_folder, is_link = os.path.isfile, os.path.isdir, os.path.islink
 
 
 def is_real_folder(path: Path) -> bool:
-    """Return True where a folder stands, and no link to one."""
+    """Return True if a folder, and no link to one, exists.
+
+    Parameters
+    ----------
+    path : Path
+        The folder.
+
+    Returns
+    -------
+    bool
+        False for links, files and paths that do not exist.
+    """
     return is_folder(path) and not is_link(path)
 
 
 def opened(path: Path, *, links: bool = False) -> BufferedReader:
-    """Open a plain file; raises OSError for folders, pipes, devices and, but for `links`, links: none is read."""
+    """Open a regular file; pipes, devices and folders are never read.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    links : bool
+        Follow symbolic links.
+
+    Returns
+    -------
+    BufferedReader
+        The open file.
+
+    Raises
+    ------
+    OSError
+        If the path is no regular file, or a link and `links` is False.
+    """
     # Without O_NONBLOCK, opening a pipe would wait for who writes into it. Windows has other flags, and no such files.
     flags = os.O_RDONLY | (0 if links else getattr(os, "O_NOFOLLOW", 0))
     flags |= getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
@@ -46,7 +75,25 @@ def opened(path: Path, *, links: bool = False) -> BufferedReader:
 
 
 def read_plain(path: Path, most: int) -> bytes:
-    """Read a plain file of at most `most` bytes; raises OSError when it is none, longer, or cannot be read."""
+    """Read a regular file of at most `most` bytes.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    most : int
+        Largest size, in bytes.
+
+    Returns
+    -------
+    bytes
+        The content.
+
+    Raises
+    ------
+    OSError
+        If the path is no regular file, is larger or cannot be read.
+    """
     with opened(path) as file:
         content = file.read(most + 1)
     if len(content) > most:
@@ -55,13 +102,40 @@ def read_plain(path: Path, most: int) -> bytes:
 
 
 def digest_of(path: Path) -> str:
-    """Return the SHA-256 of a plain file in hexadecimal; raises OSError when it is none or cannot be read."""
+    """Return the SHA-256 digest of a regular file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    str
+        The digest, in hexadecimal.
+
+    Raises
+    ------
+    OSError
+        If the path is no regular file or cannot be read.
+    """
     with opened(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def read_facts(path: Path) -> dict[str, Any]:
-    """Read a JSON mapping; an empty one where there is no plain file with one."""
+    """Read a JSON mapping.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    dict
+        The mapping; empty if there is no regular file with one.
+    """
     try:
         return parsed_facts(read_plain(path, MOST_FACTS))
     except OSError:
@@ -69,7 +143,18 @@ def read_facts(path: Path) -> dict[str, Any]:
 
 
 def parsed_facts(content: bytes) -> dict[str, Any]:
-    """Parse a JSON mapping; an empty one where the text is something else."""
+    """Parse a JSON mapping.
+
+    Parameters
+    ----------
+    content : bytes
+        The text.
+
+    Returns
+    -------
+    dict
+        The mapping; empty if the text holds anything else.
+    """
     try:
         facts = json.loads(content)
     except (ValueError, RecursionError):
@@ -78,10 +163,28 @@ def parsed_facts(content: bytes) -> dict[str, Any]:
 
 
 def read_input(path: Path, most_bytes: int, refused: type[SweepError]) -> bytes:
-    """Read the content of a regular file of at most `most_bytes`.
+    """Read a user's file of at most `most_bytes`.
 
-    Raises `refused` for what is absent, larger or no file (a pipe, a device, a folder), before anything of it is read:
-    such a thing may block forever, or never end.
+    Pipes, devices and folders are refused before they are opened, as reading them may never end.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    most_bytes : int
+        Largest size, in bytes.
+    refused : type
+        Class of the error to raise.
+
+    Returns
+    -------
+    bytes
+        The content.
+
+    Raises
+    ------
+    SweepError
+        Of class `refused`, if the file is missing, too large or no regular file.
     """
     try:
         if not stat.S_ISREG(path.stat().st_mode):
@@ -99,6 +202,19 @@ def read_input(path: Path, most_bytes: int, refused: type[SweepError]) -> bytes:
 
 
 def not_utf8(content: bytes, error: UnicodeDecodeError) -> tuple[str, bool]:
-    """Describe a text that is not UTF-8; True where it begins as UTF-16 does."""
+    """Describe a text that is not UTF-8.
+
+    Parameters
+    ----------
+    content : bytes
+        The text.
+    error : UnicodeDecodeError
+        Error of its decoding.
+
+    Returns
+    -------
+    tuple
+        Problem with the position, and True if the text starts like UTF-16.
+    """
     wide = content[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
     return f"not UTF-8 text ({error.reason} at byte {error.start})", wide

@@ -15,10 +15,23 @@ _MOST_OF_A_PART = 2000
 
 
 def nearest(name: object, known: Iterable[str]) -> str | None:
-    """Return the known name that is most like `name`, or None when none is alike.
+    """Return the known name that is most similar to `name`.
 
-    A name of the same words in another order, or with a letter wrong, is more like it than one of other words.
-    Looks at the first 1000 names, and nowhere for the like of a name beyond 100 letters, so that it never takes long.
+    Compares letters (difflib) and, for names of several words, words in any order. Only the first 1000 names and names
+    of
+    up to 100 letters are compared, which bounds the time.
+
+    Parameters
+    ----------
+    name : object
+        The unknown name.
+    known : iterable of str
+        Valid names.
+
+    Returns
+    -------
+    str or None
+        None if no name is similar.
     """
     if len(str(name)) > _MOST_LETTERS:
         return None

@@ -13,12 +13,36 @@ T = TypeVar("T")
 
 
 def files_in(folder: ModuleType) -> list[ModuleType]:
-    """Import the modules of a folder, in the order of their names."""
+    """Import the modules of a package, in alphabetical order.
+
+    Parameters
+    ----------
+    folder : module
+        The package.
+
+    Returns
+    -------
+    list of modules
+        Its modules.
+    """
     return [import_module(f"{folder.__name__}.{file.name}") for file in iter_modules(folder.__path__)]
 
 
 def made_in(folder: ModuleType, base: Callable[[], T]) -> list[T]:
-    """Make one of each class derived from `base` that the files of a folder define, in the order of the files."""
+    """Instantiate each class derived from `base` that the modules of a package define.
+
+    Parameters
+    ----------
+    folder : module
+        The package.
+    base : callable
+        Base class.
+
+    Returns
+    -------
+    list
+        One instance per class, in the order of the modules.
+    """
     kind_of: Any = base
     return [
         kind()
@@ -32,9 +56,19 @@ def made_in(folder: ModuleType, base: Callable[[], T]) -> list[T]:
 
 
 def loaded_later(names: dict[str, Any], homes: Mapping[str, str]) -> Callable[[str], Any]:
-    """Return the `__getattr__` of a package (PEP 562): its names are loaded when they are first used.
+    """Return the `__getattr__` of a package that imports its names on first use (PEP 562).
 
-    `names`: its `globals()`; `homes`: name -> module that defines it.
+    Parameters
+    ----------
+    names : dict
+        `globals()` of the package.
+    homes : mapping
+        Name -> module that defines it.
+
+    Returns
+    -------
+    callable
+        The `__getattr__`.
     """
 
     def loaded(name: str) -> Any:

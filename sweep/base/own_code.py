@@ -28,27 +28,82 @@ _begun: dict[str, str] = {}
 
 
 def is_in_file(name: str) -> bool:
-    """Return True for the name of a class or function in a Python file: `my_filters.py:Gauss`."""
+    """Return True if a name refers to a Python file, as `my_filters.py:Gauss` does.
+
+    Parameters
+    ----------
+    name : str
+        Name of a class or function.
+
+    Returns
+    -------
+    bool
+        True for `FILE.py:NAME`.
+    """
     return _SEPARATOR in name
 
 
 def file_of(name: str) -> str:
-    """Return the file in such a name."""
+    """Return the file part of `FILE.py:NAME`.
+
+    Parameters
+    ----------
+    name : str
+        Name of a class or function.
+
+    Returns
+    -------
+    str
+        The file, as the study writes it.
+    """
     return f"{name.partition(_SEPARATOR)[0]}.py"
 
 
 def own_name(name: str) -> str:
-    """Return a name without its file."""
+    """Return the name part of `FILE.py:NAME`.
+
+    Parameters
+    ----------
+    name : str
+        Name of a class or function.
+
+    Returns
+    -------
+    str
+        The name; unchanged if it has no file.
+    """
     return name.partition(_SEPARATOR)[2] or name
 
 
 def kind_in_words(name: str) -> str:
-    """Return a family's name for a sentence; of one in a Python file that of its class."""
+    """Return the name of a family for messages.
+
+    Parameters
+    ----------
+    name : str
+        Name of a family.
+
+    Returns
+    -------
+    str
+        Name with spaces; for a class in a Python file, the class.
+    """
     return own_name(name) if is_in_file(name) else name.replace("_", " ")
 
 
 def is_code(digested: str) -> bool:
-    """Return True where a run kept the digest of code."""
+    """Return True if an input digest of a run belongs to code.
+
+    Parameters
+    ----------
+    digested : str
+        Name of the input.
+
+    Returns
+    -------
+    bool
+        True for Python files and installed packages.
+    """
     return digested.endswith(".py") or digested.startswith(CODE_OF)
 
 
@@ -70,7 +125,23 @@ class OwnCode:
         return _loaded(self)
 
     def called(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        """Call a function of it; whatever it raises is one line."""
+        """Call a function of the user's code.
+
+        Parameters
+        ----------
+        function : callable
+            The function, without arguments.
+
+        Returns
+        -------
+        value
+            Its result.
+
+        Raises
+        ------
+        SweepError
+            One line, for any exception that the function raises.
+        """
         try:
             return function(*arguments)
         except (Exception, SystemExit) as error:  # it may raise anything
@@ -117,7 +188,23 @@ def _of_file(name: str, source: str) -> Any:
 
 
 def read_code(path: Path) -> tuple[str, str]:
-    """Read the text of a Python file, and its SHA-256; nothing of it runs yet. Raises SweepError."""
+    """Read a Python file without running it.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    tuple of str
+        Source and SHA-256 digest.
+
+    Raises
+    ------
+    SweepError
+        If the file is missing, too large or not UTF-8.
+    """
     content = read_input(path, _MOST_BYTES, SweepError)
     try:
         return content.decode("utf-8-sig"), hashlib.sha256(content).hexdigest()
@@ -164,12 +251,41 @@ class Installed:
 
 
 def offers(group: Offered) -> list[str]:
-    """Return the names that installed packages offer; nothing of them is imported."""
+    """Return the entry points that installed packages provide, without importing them.
+
+    Parameters
+    ----------
+    group : Offered
+        Entry point group.
+
+    Returns
+    -------
+    list of str
+        Sorted names.
+    """
     return sorted({entry.name for entry in entry_points(group=group)})
 
 
 def installed(group: Offered, name: str) -> Installed | None:
-    """Return the offer of an installed package under a name; raises SweepError where several packages do."""
+    """Return the entry point of a name.
+
+    Parameters
+    ----------
+    group : Offered
+        Entry point group.
+    name : str
+        Name of the entry point.
+
+    Returns
+    -------
+    Installed or None
+        None if no package provides it.
+
+    Raises
+    ------
+    SweepError
+        If several packages provide it.
+    """
     found = {entry.value: entry for entry in entry_points(group=group) if entry.name == name}
     if len(found) > 1:
         several = " and ".join(sorted(Installed(entry).told for entry in found.values()))

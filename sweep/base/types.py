@@ -22,12 +22,34 @@ Parallel = Callable[[Iterable[Call]], Iterator[Any]]
 
 
 def delayed(function: Callable[..., Any], *arguments: Any) -> Call:
-    """The call of a function, put off."""
+    """Record a call without making it.
+
+    Parameters
+    ----------
+    function : callable
+        The function.
+
+    Returns
+    -------
+    callable
+        Takes the arguments and returns the recorded call.
+    """
     return function, arguments, {}
 
 
 def in_turn(calls: Iterable[Call]) -> Iterator[Any]:
-    """Answers of calls, one after the other in this process."""
+    """Make recorded calls one after the other in this process.
+
+    Parameters
+    ----------
+    calls : iterable of Call
+        The calls.
+
+    Yields
+    ------
+    value
+        Result of each call.
+    """
     for function, arguments, named in calls:
         yield function(*arguments, **named)
 
@@ -50,7 +72,23 @@ class Section(BaseModel):
 
 
 def from_to(value: Any) -> Any:
-    """A list of two numbers as a tuple, for sections; raises ValueError for anything else."""
+    """Convert a list of two numbers to a tuple.
+
+    Parameters
+    ----------
+    value : list or tuple
+        Lower and upper end.
+
+    Returns
+    -------
+    tuple
+        The ends.
+
+    Raises
+    ------
+    ValueError
+        If the value is no pair.
+    """
     if not isinstance(value, list | tuple) or len(value) != 2:
         raise ValueError("two numbers, from and to")
     return tuple(value)

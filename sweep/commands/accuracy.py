@@ -224,13 +224,35 @@ def _rows(
 
 
 def spread(n: int) -> IndexArray:
-    """Return 0 to n - 1 in an order of which each beginning is spread over the whole range, ndarray[n]; 0 first."""
+    """Return 0 to n - 1 in an order whose every prefix covers the whole range evenly.
+
+    Parameters
+    ----------
+    n : int
+        Number of indices.
+
+    Returns
+    -------
+    ndarray of shape (n,)
+        The indices; 0 first.
+    """
     golden = (math.sqrt(5) - 1) / 2
     return np.argsort(np.arange(n) * golden % 1.0, kind="stable")
 
 
 def denser(space: Space) -> Space | None:
-    """Return a grid of at least 10,000 designs between the ends of a space's first axes; None where nothing varies."""
+    """Refine the grid of a design space to at least 10,000 designs.
+
+    Parameters
+    ----------
+    space : Space
+        Design space.
+
+    Returns
+    -------
+    Space or None
+        Grid between the ends of the first axes; None if nothing varies.
+    """
     varied = [at for at, axis in enumerate(space.axes) if max(axis) > min(axis)][:4]
     if not varied:
         return None

@@ -18,7 +18,23 @@ _HARD_COLUMNS = ("case", "oracle", "error", "allowed", "why")
 
 
 def read_hard_cases(folder: Path) -> pd.DataFrame | None:
-    """Read the table of hard cases that the tests left in a folder, or None; raises OutputError when it is damaged."""
+    """Read the table of hard cases that the tests wrote.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the table.
+
+    Returns
+    -------
+    DataFrame or None
+        None if there is no table.
+
+    Raises
+    ------
+    OutputError
+        If the table is damaged.
+    """
     path = folder / "hard_cases.json"
     if not path.is_file():
         return None
@@ -30,9 +46,19 @@ def read_hard_cases(folder: Path) -> pd.DataFrame | None:
 
 
 def summary(table: pd.DataFrame, hard: pd.DataFrame | None) -> list[str]:
-    """Return a line for each scene: error of the presets, and their times for one design and for those of the study.
+    """Summarize error and time of the presets, for one design and for all of the study.
 
-    `table`: columns scenario, setting, value, designs, error_dn, total_s, extrapolated.
+    Parameters
+    ----------
+    table : DataFrame
+        Columns scenario, setting, value, designs, error_dn, total_s, extrapolated.
+    hard : DataFrame or None
+        Table of hard cases.
+
+    Returns
+    -------
+    list of str
+        One line per scene.
     """
     lines = []
     for scenario, presets in table[table["setting"] == PRESET].groupby("scenario", sort=False):
@@ -63,7 +89,28 @@ def make_accuracy_report(
     table: pd.DataFrame,
     hard: pd.DataFrame | None,
 ) -> None:
-    """Write `accuracy.html` into the folder; errors as for `atomic.atomic`."""
+    """Write `accuracy.html`.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the report.
+    study : Study
+        The measured study.
+    lines : sequence of str
+        Summary.
+    png : bytes
+        Plot of error over time.
+    table : DataFrame
+        Measurements, as in `summary`.
+    hard : DataFrame or None
+        Table of hard cases.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
     content = page(
         "accuracy.html.j2",
         title=study.name,

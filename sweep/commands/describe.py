@@ -39,11 +39,28 @@ class Description:
 
 
 def described(path: Path, folder: Path, quantity: LightUnit | None = None) -> Description:
-    """Describe a CSV or `.mat` file of curves and draw it to `folder`/<stem>.png.
+    """Describe a CSV or `.mat` file of curves and plot it as `<folder>/<stem>.png`.
 
-    `quantity`: the curves are lights, in energy or photons; None guesses whether they are lights (then in energy) or
-    QE. Raises DataError where nothing can be read, OutputError where the picture cannot be written or would replace
-    a file that no description wrote.
+    Parameters
+    ----------
+    path : Path
+        The file.
+    folder : Path
+        Folder of the picture.
+    quantity : LightUnit, optional
+        Lights in energy or photons; by default lights (in energy) or QE are guessed.
+
+    Returns
+    -------
+    Description
+        Text and JSON object.
+
+    Raises
+    ------
+    DataError
+        If nothing can be read.
+    OutputError
+        If the picture cannot be written, or a file of that name is no picture of a description.
     """
     scan = scan_curves(path)
     faults = tuple(condensed(list(chain.from_iterable(scan.faults))))
@@ -95,9 +112,26 @@ def _curve_facts(curve: Curve, color: LightColor | None) -> dict[str, Any]:
 
 
 def cleaned(path: Path, to: Path) -> list[str]:
-    """Write a clean CSV of a file's curves to `to`, and return lines that say what was changed.
+    """Write the curves of a file as clean CSV.
 
-    Raises DataError for what no rule mends, OutputError where there is a file already or it cannot be written.
+    Parameters
+    ----------
+    path : Path
+        The file.
+    to : Path
+        The file to write.
+
+    Returns
+    -------
+    list of str
+        What was changed.
+
+    Raises
+    ------
+    DataError
+        If the file has a problem that no rule solves.
+    OutputError
+        If `to` exists or cannot be written.
     """
     scan = scan_curves(path)
     clean = mended(scan)

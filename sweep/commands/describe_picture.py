@@ -32,7 +32,22 @@ Paint = tuple[float, ...] | str
 
 
 def draw(title: str, facts: Facts, colors: Mapping[str, LightColor | None]) -> Figure:
-    """Draw the curves, an even share of very many; `colors` are those of lights, empty for QE."""
+    """Plot curves; of very many an even sample.
+
+    Parameters
+    ----------
+    title : str
+        Title of the plot.
+    facts : Facts
+        The curves.
+    colors : mapping of str to LightColor or None
+        Colors of lights; empty for QE.
+
+    Returns
+    -------
+    Figure
+        The plot.
+    """
     lights = bool(colors)
     step = -(-len(facts.curves) // _MOST_DRAWN)
     if step > 1:

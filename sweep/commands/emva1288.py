@@ -28,7 +28,23 @@ _RESULTS = {
 
 
 def pixel_lines(path: Path) -> list[str]:
-    """Return `pixel:` of a study with what the file says, and what it does not say; errors as for `pixel_figures`."""
+    """Convert EMVA 1288 results to the section `pixel:` of a study.
+
+    Parameters
+    ----------
+    path : Path
+        XML file of the results.
+
+    Returns
+    -------
+    list of str
+        The section, and the keys that the file does not state.
+
+    Raises
+    ------
+    DataError
+        As `pixel_figures`.
+    """
     figures, missing = pixel_figures(path)
     text = ", ".join(f"{key}: {value:.12g}" for key, value in figures.items())
     return [
@@ -39,9 +55,22 @@ def pixel_lines(path: Path) -> list[str]:
 
 
 def pixel_figures(path: Path) -> tuple[dict[str, float], list[str]]:
-    """Read the keys of `pixel:` with their values, and the keys that the file says nothing of.
+    """Read the keys of `pixel:` from EMVA 1288 results.
 
-    Raises DataError for a file without such results, a result of another unit, and a figure that no pixel has.
+    Parameters
+    ----------
+    path : Path
+        XML file of the results.
+
+    Returns
+    -------
+    tuple
+        Values by key, and keys that the file does not state.
+
+    Raises
+    ------
+    DataError
+        If the file has no such results, or an unknown unit or an impossible value.
     """
     root, figures, missing = read_xml(path), {}, []
     for name, (key, units, factor) in _RESULTS.items():
@@ -77,7 +106,23 @@ def _value(path: Path, element: ElementTree.Element, units: tuple[str, ...]) -> 
 
 
 def read_xml(path: Path) -> ElementTree.Element:
-    """Return the root of an XML file; raises DataError for no XML, or XML with entities of its own."""
+    """Parse an XML file without entities.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    Element
+        The root element.
+
+    Raises
+    ------
+    DataError
+        If the file is not XML or defines entities.
+    """
     file, content = str(path), read_input(path, MOST_BYTES, DataError)
 
     def refuse(*_: object) -> None:

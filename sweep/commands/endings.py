@@ -20,9 +20,19 @@ _UsageError: Any = typer.BadParameter.__bases__[0]
 
 
 def ends_in_lines(command: Callable[[], object]) -> NoReturn:
-    """Run a command and leave with its exit code: 0, what it returns or its error has, or 2.
+    """Run a command and exit with its code.
 
-    A fault of the program itself is raised on, with its traceback. SIGTERM ends a command as SIGINT does.
+    SIGTERM ends a command as SIGINT does. Errors of the program itself keep their traceback.
+
+    Parameters
+    ----------
+    command : callable
+        The command.
+
+    Raises
+    ------
+    SystemExit
+        With the result of the command, the code of its error, or 2.
     """
     try:
         for stream in (sys.stdout, sys.stderr):
@@ -60,7 +70,13 @@ def _flush() -> None:
 
 
 def say_faults(faults: Iterable[object]) -> None:
-    """Print a line on stderr for each."""
+    """Print faults on stderr, one per line.
+
+    Parameters
+    ----------
+    faults : iterable
+        The faults.
+    """
     with suppress(OSError, ValueError):
         for fault in faults:
             typer.echo(f"sweep: {' '.join(str(fault).split())}", err=True)

@@ -123,9 +123,19 @@ def export_design(
 
 
 def relative_transmission(modified: FloatArray, base: FloatArray) -> FloatArray:
-    """Return the transmission of a modified channel relative to the curve that it replaces, ndarray[n_wavelengths].
+    """Return the transmission of a modified channel relative to the curve that it replaces.
 
-    1 where neither has any light; infinite where the modified channel alone has some.
+    Parameters
+    ----------
+    modified : ndarray of shape (n_wavelengths,)
+        QE of the modified channel.
+    base : ndarray of shape (n_wavelengths,)
+        QE of the replaced channel.
+
+    Returns
+    -------
+    ndarray of shape (n_wavelengths,)
+        1 where both are zero, infinite where only `base` is.
     """
     unlit = np.where(modified > 0, np.inf, 1.0)
     with np.errstate(over="ignore"):

@@ -30,9 +30,26 @@ class Listed:
 
 
 def studies_of(folder: Path, outputs: Path, data: Path | None = None) -> list[Listed]:
-    """Return the studies of `folder` (*.yaml, *.yml), with the state of their runs in `outputs`.
+    """List the studies of a folder and the states of their runs.
 
-    `data` as for `load_study`. Raises StudyError when there is no such folder.
+    Parameters
+    ----------
+    folder : Path
+        Folder of `*.yaml` and `*.yml` files.
+    outputs : Path
+        Folder of the runs.
+    data : Path, optional
+        Folder of the curve files; that of the study by default.
+
+    Returns
+    -------
+    list of Listed
+        The studies.
+
+    Raises
+    ------
+    StudyError
+        If the folder does not exist.
     """
     if not is_folder(folder):
         raise StudyError(Fault("no such folder", str(folder), allowed="a folder of study files"))
@@ -46,7 +63,20 @@ def studies_of(folder: Path, outputs: Path, data: Path | None = None) -> list[Li
 
 
 def list_lines(folder: Path, studies: list[Listed]) -> list[str]:
-    """Return a line for each study: name, designs, state, question."""
+    """Format studies as a table: name, designs, state, question.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the studies.
+    studies : list of Listed
+        The studies.
+
+    Returns
+    -------
+    list of str
+        Lines of text.
+    """
     if not studies:
         return [f"No studies in {folder}. `sweep new NAME --folder {folder}` writes one."]
     counts = ["" if x.designs is None else f"{x.designs:,} designs" for x in studies]
@@ -62,7 +92,18 @@ def list_lines(folder: Path, studies: list[Listed]) -> list[str]:
 
 
 def list_facts(studies: list[Listed]) -> dict[str, Any]:
-    """Return the same as plain values."""
+    """Format studies as a JSON object.
+
+    Parameters
+    ----------
+    studies : list of Listed
+        The studies.
+
+    Returns
+    -------
+    dict
+        The object.
+    """
     return {"studies": [asdict(study) for study in studies]}
 
 

@@ -102,9 +102,28 @@ def _write(path: Path, name: str, sources: Sources) -> Study:
 
 
 def study_from(name: str, folder: Path, source: Path) -> list[str]:
-    """Write `folder`/<name>.yaml as a copy of a study under another name, comments and all; lines to print.
+    """Copy a study under another name, with its comments.
 
-    Raises StudyError for a bad name and where the copy would not load, OutputError where the file exists.
+    Parameters
+    ----------
+    name : str
+        Name of the new study.
+    folder : Path
+        Folder of the new study.
+    source : Path
+        Study to copy.
+
+    Returns
+    -------
+    list of str
+        Lines to print.
+
+    Raises
+    ------
+    StudyError
+        If the name is invalid or the copy cannot be loaded.
+    OutputError
+        If the file exists.
     """
     path = _new_path(name, folder)
     text = read_input(source, _MOST_STUDY, StudyError).decode("utf-8")
@@ -163,9 +182,22 @@ def _source_lines(sources: Sources) -> list[str]:
 
 
 def curve_files_of(source: Path) -> list[str]:
-    """Return the files of curves that a study names by paths below it; absolute paths hold from everywhere.
+    """Return the curve files that a study names by relative paths.
 
-    Raises StudyError where the study does not load, or names a file by a path that leads out of its folder.
+    Parameters
+    ----------
+    source : Path
+        The study file.
+
+    Returns
+    -------
+    list of str
+        The files; absolute paths are left out, as they stay valid.
+
+    Raises
+    ------
+    StudyError
+        If the study cannot be loaded or a path leads out of its folder.
     """
     names = [name for name in load_study(source).digests if not is_code(name) and not Path(name).is_absolute()]
     for name in names:
@@ -178,9 +210,21 @@ def curve_files_of(source: Path) -> list[str]:
 
 @contextmanager
 def copied(pairs: Iterable[tuple[Path, Path]]) -> Iterator[None]:
-    """Copy files, from and to; where the block fails, the copies that were made are removed.
+    """Copy files, and remove the copies if the block fails.
 
-    Raises OutputError where another file of that name is there.
+    Parameters
+    ----------
+    pairs : iterable of tuple of Path
+        Source and destination.
+
+    Yields
+    ------
+    None
+
+    Raises
+    ------
+    OutputError
+        If a different file exists at a destination.
     """
     copies: list[Path] = []
     try:
@@ -199,7 +243,18 @@ def copied(pairs: Iterable[tuple[Path, Path]]) -> Iterator[None]:
 
 
 def write_schema(path: Path) -> None:
-    """Write the JSON Schema of studies; raises OutputError, also where the file holds anything but such a schema."""
+    """Write the JSON Schema of study files.
+
+    Parameters
+    ----------
+    path : Path
+        The file to write.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written, or holds anything except such a schema.
+    """
     if os.path.lexists(path):
         # The title is the second key of a schema; in earlier versions it was the section's name.
         titles = [f'"title": {json.dumps(title)}'.encode() for title in (TITLE, StudySection.__name__)]

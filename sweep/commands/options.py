@@ -28,12 +28,34 @@ class Also(StrEnum):
 
 
 def study_files(incomplete: str) -> list[str]:
-    """Complete the path of a study file, up to a folder below what was typed."""
+    """Complete the path of a study file.
+
+    Parameters
+    ----------
+    incomplete : str
+        Text typed so far.
+
+    Returns
+    -------
+    list of str
+        Completions, down to one folder below.
+    """
     return sorted(_paths(incomplete, ("*.yaml", "*.yml", "*/*.yaml", "*/*.yml")))
 
 
 def run_folders(incomplete: str) -> list[str]:
-    """Complete the path of a folder that holds a run, up to a folder below what was typed."""
+    """Complete the path of a run's folder.
+
+    Parameters
+    ----------
+    incomplete : str
+        Text typed so far.
+
+    Returns
+    -------
+    list of str
+        Completions, down to one folder below.
+    """
     patterns = ("*/run.json", "*/provenance.json", "*/*/run.json", "*/*/provenance.json")
     return sorted({str(Path(path).parent) for path in _paths(incomplete, patterns)})
 
@@ -51,7 +73,23 @@ def _study_path(path: Path) -> Path:
 
 
 def changes_of(texts: list[str] | None) -> dict[str, str]:
-    """Return the dotted keys and values of `--set`; raises StudyError for what is no KEY=VALUE."""
+    """Parse the values of `--set`.
+
+    Parameters
+    ----------
+    texts : list of str, optional
+        `KEY=VALUE` texts.
+
+    Returns
+    -------
+    dict
+        Values by dotted key.
+
+    Raises
+    ------
+    StudyError
+        If a text is not KEY=VALUE.
+    """
     changes = {}
     for text in texts or ():
         key, mark, value = text.partition("=")

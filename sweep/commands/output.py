@@ -20,14 +20,36 @@ _LEAST_SHARE, _LEAST_S = 0.01, 60.0
 
 
 def say(lines: Iterable[str], facts: Mapping[str, Any], *, as_json: bool = False, quiet: bool = False) -> None:
-    """Print the lines of a command, and with `as_json` its facts on stdout; NaN and infinity become null."""
+    """Print the result of a command.
+
+    Parameters
+    ----------
+    lines : iterable of str
+        Text for people.
+    facts : mapping
+        JSON object; NaN and infinity become null.
+    as_json : bool
+        Print one JSON object on stdout; everything else goes to stderr.
+    quiet : bool
+        Print no progress and no summary.
+    """
     say_lines(lines, as_json=as_json, quiet=quiet)
     if as_json:
         typer.echo(json.dumps(_plain(facts), allow_nan=False, ensure_ascii=False))
 
 
 def say_lines(lines: Iterable[str], *, as_json: bool, quiet: bool) -> None:
-    """Print lines on stdout, or on stderr where stdout is kept for an object."""
+    """Print lines on stdout, or on stderr with `--json`.
+
+    Parameters
+    ----------
+    lines : iterable of str
+        Text for people.
+    as_json : bool
+        Print one JSON object on stdout; everything else goes to stderr.
+    quiet : bool
+        Print no progress and no summary.
+    """
     for line in () if quiet else lines:
         typer.echo(line, err=as_json)
 
@@ -69,7 +91,17 @@ class ProgressDisplay(ExitStack):
             self._bars = self.enter_context(progress.Progress(*columns, console=Console(stderr=True)))
 
     def update(self, phase: str, done: int, total: int) -> None:
-        """Show that `done` of `total` are done in a phase."""
+        """Show the progress of a phase.
+
+        Parameters
+        ----------
+        phase : str
+            Name of the phase.
+        done : int
+            Finished steps.
+        total : int
+            All steps.
+        """
         now = time.monotonic()
         new = phase != self._phase
         if new:

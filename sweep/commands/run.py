@@ -117,10 +117,32 @@ def finish(
     as_json: bool = False,
     quiet: bool = False,
 ) -> dict[str, Any]:
-    """Draw figures and report of a finished run, and say what it found; the same as plain values.
+    """Draw figures and report of a finished run, and print its summary.
 
-    `mend`: draw only what is missing or damaged; `began_s` as for `run_one`; `parallel` makes the pictures. Raises
-    BrokenPromiseError where the run's check failed.
+    Parameters
+    ----------
+    folder : Path
+        Folder of the run.
+    began_s : float
+        Start of the run, as in `run_one`.
+    mend : bool
+        Draw only missing or damaged files.
+    parallel : Parallel
+        Draws figures in parallel.
+    as_json : bool
+        Print one JSON object on stdout; everything else goes to stderr.
+    quiet : bool
+        Print no progress and no summary.
+
+    Returns
+    -------
+    dict
+        The summary as a JSON object.
+
+    Raises
+    ------
+    BrokenPromiseError
+        If the run's own check failed.
     """
     from ..report import make_report, read_output, summary_lines  # noqa: PLC0415  (loaded while workers compute)
 

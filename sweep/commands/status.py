@@ -27,8 +27,22 @@ class Status:
 def status_of(folder: Path, *, verify: bool = False) -> Status:
     """Return state, progress and files of a run.
 
-    Of a finished run missing files are named; with `verify` all digests are compared. Raises OutputError where there
-    is no run, and, naming each file, where some are missing or damaged.
+    Parameters
+    ----------
+    folder : Path
+        Folder of the run.
+    verify : bool
+        Compare the digests of all files, not only their existence.
+
+    Returns
+    -------
+    Status
+        State of the run.
+
+    Raises
+    ------
+    OutputError
+        If there is no run, or files of a finished run are missing or damaged.
     """
     inventory = Inventory(folder)
     if not inventory.fingerprint:

@@ -81,7 +81,18 @@ class ScenarioTemplate(Scene):
 
 
 def expanded(value: Any) -> Any:
-    """Replace scenarios with `each: {key: values}` by one per combination, named after its values."""
+    """Replace scenarios that have `each: {key: values}` by one scenario per combination of values.
+
+    Parameters
+    ----------
+    value : mapping or any
+        Scenarios of a study, before validation.
+
+    Returns
+    -------
+    mapping or any
+        Scenarios named after their values; other values unchanged.
+    """
     if not isinstance(value, dict):
         return value
     scenarios: dict[str, Any] = {}
@@ -141,7 +152,18 @@ def _set(mapping: dict[str, Any], path: list[str], number: float) -> None:
 
 
 def series_of(scenarios: Iterable[str]) -> dict[tuple[str, str], dict[str, float]]:
-    """Return sets of scenarios that differ in one number: (name, key) -> scenario -> number, in rising order."""
+    """Group scenarios that differ in a single number.
+
+    Parameters
+    ----------
+    scenarios : iterable of str
+        Names of scenarios.
+
+    Returns
+    -------
+    dict
+        (name, key) -> scenario -> number, in ascending order.
+    """
     groups: dict[tuple[str, str], dict[str, float]] = {}
     for name in scenarios:
         base, _, last = str(name).rpartition(" ")

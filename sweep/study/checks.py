@@ -27,7 +27,15 @@ _MOST_DESIGNS = 10**9
 
 
 def check_scenes(section: StudySection, sources: Sources) -> None:
-    """Check that LEDs of a norm fit the study, and that every target makes an image that can be computed."""
+    """Check LED norms and that every target forms an image that can be computed.
+
+    Parameters
+    ----------
+    section : StudySection
+        The keys of the study, checked against the schema.
+    sources : Sources
+        Files, curves and the faults so far.
+    """
     _check_regions(section, sources)
     for name, scene in section.scenarios.items():
         if (refused := psf.too_much(scene, section.pixel)) is not None:
@@ -38,7 +46,21 @@ def check_scenes(section: StudySection, sources: Sources) -> None:
 def check_lights(
     section: StudySection, lights: Lights, mosaics: Mapping[str, Mosaic], asked: Asked, sources: Sources
 ) -> None:
-    """Check all that names signal types or columns, or needs lamps. `asked`: quantities that the study has."""
+    """Check keys that name signal types or columns, or that need lamps.
+
+    Parameters
+    ----------
+    section : StudySection
+        The keys of the study, checked against the schema.
+    lights : Lights
+        The lights of the study.
+    mosaics : mapping of str to Mosaic
+        CFAs by name.
+    asked : Asked
+        Quantities of the study.
+    sources : Sources
+        Files, curves and the faults so far.
+    """
     _check_columns(asked, sources)
     _check_recognition(section, lights, sources)
     _check_vision(section, lights, mosaics, sources)
@@ -121,7 +143,20 @@ def _check_regions(section: StudySection, sources: Sources) -> None:
 
 
 def check_size(study: Study, sources: Sources) -> None:
-    """Check that the kernels of every scene and CFA fit into memory. Raises StudyError."""
+    """Check that the kernels of every scene and CFA fit into memory.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    sources : Sources
+        Files, curves and the faults so far.
+
+    Raises
+    ------
+    StudyError
+        If they do not fit.
+    """
     for name in study.scenarios:
         for space in study.spaces:
             if (refused := too_large(study.setup(space, name))) is not None:
@@ -131,7 +166,20 @@ def check_size(study: Study, sources: Sources) -> None:
 
 
 def check_count(study: Study, sources: Sources) -> None:
-    """Check that there are designs, and not too many. Raises StudyError."""
+    """Check that the study has designs, and not too many.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    sources : Sources
+        Files, curves and the faults so far.
+
+    Raises
+    ------
+    StudyError
+        If it has none or too many.
+    """
     if not study.n_designs and study.search is None:
         sources.add(("cfas",), "no designs", None, "a CFA with a curve for each channel, a design, a sweep or a search")
     if study.n_designs > _MOST_DESIGNS:

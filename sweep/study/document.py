@@ -83,11 +83,36 @@ class Tree:
         self.root: Any = None if root is None else self._value(root, ())
 
     def place(self, node: Any, key: Key) -> Place | None:
-        """Return the place of a key of a mapping or of an entry of a list; None where the file has none."""
+        """Return the position of a mapping's key or of a list's entry in the file.
+
+        Parameters
+        ----------
+        node : mapping or list
+            Node of the document.
+        key : str or int
+            Key or index.
+
+        Returns
+        -------
+        Place or None
+            None if the file does not contain it.
+        """
         return self._lines[id(node)][1].get(key) if id(node) in self._lines else None
 
     def put(self, node: Any, key: Key, value: Any, place: Place) -> None:
-        """Set a key of a mapping or an entry of a list to a value that stands at another place."""
+        """Set a mapping's key or a list's entry to a value from another position.
+
+        Parameters
+        ----------
+        node : mapping or list
+            Node of the document.
+        key : str or int
+            Key or index.
+        value : any
+            The value.
+        place : Place
+            Position of the value.
+        """
         node[key] = value
         self._lines.setdefault(id(node), (node, {}))[1][key] = place
 
@@ -171,7 +196,23 @@ class Tree:
 
 
 def yaml_text(data: Mapping[str, Any]) -> str:
-    """Return keys with plain values as a YAML document; raises StudyError for a value that no study file can hold."""
+    """Format keys with plain values as a YAML document.
+
+    Parameters
+    ----------
+    data : mapping
+        Keys of a study.
+
+    Returns
+    -------
+    str
+        The document.
+
+    Raises
+    ------
+    StudyError
+        If a value has no YAML form.
+    """
     text = StringIO()
     yaml = YAML(typ="safe", pure=True)
     yaml.default_flow_style = False
@@ -201,7 +242,20 @@ class Document:
             raise StudyError(Fault("a study file is a mapping of keys", self.file, 1, allowed=allowed))
 
     def change(self, key: str, text: str) -> None:
-        """Set a dotted key to a value written as in a study file. Raises StudyError where it cannot stand there."""
+        """Set a key, as the option `--set` does.
+
+        Parameters
+        ----------
+        key : str
+            Dotted key, `scenarios.near.distance_m`.
+        text : str
+            Value in YAML.
+
+        Raises
+        ------
+        StudyError
+            If the value cannot be set there.
+        """
         option = f"--set {key}={text}"
         try:
             value = Tree(f"value: {text}", None, _MOST[1]).root["value"]
@@ -221,7 +275,18 @@ class Document:
         self._tree.put(node, int(last) if isinstance(node, list) else last, value, option)
 
     def place(self, path: Sequence[Key]) -> Place:
-        """Return the place of the deepest key of `path` that there is; of a section, an option that changed it."""
+        """Return the position of the deepest existing key of a path.
+
+        Parameters
+        ----------
+        path : sequence of str and int
+            Keys that lead to the value.
+
+        Returns
+        -------
+        Place
+            Position in the file, or the option that changed the key.
+        """
         node: Any = self.data
         place: Place = 1
         for part in path:
@@ -243,13 +308,45 @@ class Document:
         allowed: str | None = None,
         near: str | None = None,
     ) -> Fault:
-        """Return a fault at `path` of this file."""
+        """Create a fault with the position of a key.
+
+        Parameters
+        ----------
+        path : sequence of str and int
+            Keys that lead to the value.
+        problem : str
+            Description of the problem.
+        value : object
+            The value that was given.
+        allowed : str, optional
+            Allowed values.
+        near : str, optional
+            Nearest valid name.
+
+        Returns
+        -------
+        Fault
+            The fault.
+        """
         place = None if self.file is None else self.place(path)
         file, line = (place, None) if isinstance(place, str) else (self.file, place)
         return Fault(problem, file, line, dotted(path), value, allowed, near)
 
     def faults(self, error: ValidationError, model: type[BaseModel]) -> list[Fault]:
-        """Return pydantic's errors as faults of this file, in the order of their lines."""
+        """Convert pydantic's errors to faults of this file.
+
+        Parameters
+        ----------
+        error : pydantic.ValidationError
+            Errors of the validation.
+        model : type
+            Model that was validated, for the names of its keys.
+
+        Returns
+        -------
+        list of Fault
+            Sorted by line.
+        """
         faults: dict[tuple[KeyPath, str], Fault] = {}
         items = error.errors(include_url=False)
         schema = model.model_json_schema() if any(item["type"] == "extra_forbidden" for item in items) else {}
@@ -349,12 +446,34 @@ def _written(node: Any, key: Key) -> Key:
 
 
 def by_line(faults: Iterable[Fault]) -> list[Fault]:
-    """Return faults in the order of their lines."""
+    """Sort faults by line.
+
+    Parameters
+    ----------
+    faults : iterable of Fault
+        The faults.
+
+    Returns
+    -------
+    list of Fault
+        Sorted; faults without a line last.
+    """
     return sorted(faults, key=lambda fault: (fault.line is None, fault.file or "", fault.line or 0))
 
 
 def dotted(path: Sequence[Key]) -> str:
-    """Return a path as people write it: `sweeps.main.grid`, `sensor.files[0].file`."""
+    """Format a path of keys: `sweeps.main.grid`, `sensor.files[0].file`.
+
+    Parameters
+    ----------
+    path : sequence of str and int
+        Keys that lead to the value.
+
+    Returns
+    -------
+    str
+        The dotted key.
+    """
     return "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path).removeprefix(".")
 
 

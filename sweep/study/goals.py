@@ -27,9 +27,16 @@ _LEAST_ERROR = 1e-12
 
 
 def check_goals(section: StudySection, sources: Sources, asked: Asked) -> None:
-    """Add a fault for each quantity of objective and constraints that does not exist or cannot be asked for so.
+    """Check that objective and constraints name quantities the study has.
 
-    `asked`: what the study asks for, with its states.
+    Parameters
+    ----------
+    section : StudySection
+        The keys of the study, checked against the schema.
+    sources : Sources
+        Files, curves and the faults so far.
+    asked : Asked
+        Quantities of the study, and the states they are computed for.
     """
     known, rule = quantities_of(asked), section.objective.rule
     stated = sources.document.data.get("objective")
@@ -89,7 +96,22 @@ def _names(what: str, asked: Asked) -> list[str]:
 
 
 def search_of(section: StudySection, spaces: Sequence[Space], sources: Sources) -> Search | None:
-    """Return the search, or None where there is none or after adding faults."""
+    """Construct the search of a study.
+
+    Parameters
+    ----------
+    section : StudySection
+        The keys of the study, checked against the schema.
+    spaces : sequence of Space
+        Design spaces of the study.
+    sources : Sources
+        Files, curves and the faults so far.
+
+    Returns
+    -------
+    Search or None
+        None if the study has no search, or after adding faults.
+    """
     asked = section.search
     if asked is None:
         return None
@@ -123,7 +145,19 @@ def search_of(section: StudySection, spaces: Sequence[Space], sources: Sources) 
 
 
 def check_searched(section: StudySection, space: Space, known: Mapping[str, Quantity], sources: Sources) -> None:
-    """Check that the searched family has what is constrained, and that levels of the search go with the objective."""
+    """Check that the searched family has the constrained quantities and suits the objective.
+
+    Parameters
+    ----------
+    section : StudySection
+        The keys of the study, checked against the schema.
+    space : Space
+        Design space of the search.
+    known : mapping of str to Quantity
+        Quantities by name.
+    sources : Sources
+        Files, curves and the faults so far.
+    """
     assert space.filter is not None
     assert section.search is not None
     dimensions, goals = space.filter.family.dimensions, section.objective.weights
@@ -137,7 +171,18 @@ def check_searched(section: StudySection, space: Space, known: Mapping[str, Quan
 
 
 def likely_percents(study: Study) -> Iterator[str]:
-    """Yield bounds on ratios that look like percent."""
+    """Find bounds on ratios that look like percentages.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+
+    Yields
+    ------
+    str
+        A warning per bound.
+    """
     for name, bound in study.constraints.items():
         quantity = study.quantities[name]
         for end, value in (("min", bound.min), ("max", bound.max)):
@@ -147,10 +192,25 @@ def likely_percents(study: Study) -> Iterator[str]:
 
 
 def out_of_reach(study: Study, space: Space, scenario: str) -> list[Fault]:
-    """Return a fault for each constraint that no filter of a space can meet, whatever else it meets.
+    """Find constraints that no filter of a design space can meet.
 
-    Of sensitivities by the largest curve that a filter of the box can be, of widths by the box, of CSDs by the longest
-    distance of digital numbers. What is not here may be out of reach all the same.
+    Bounds sensitivities by the largest curve within the parameter box, widths by the box, and CSDs by the largest
+    distance
+    between digital numbers. A constraint that is not listed may still be infeasible.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    space : Space
+        Design space.
+    scenario : str
+        Name of the scenario.
+
+    Returns
+    -------
+    list of Fault
+        One per constraint.
     """
     faults = []
     most = dict(_most(study, space, scenario))

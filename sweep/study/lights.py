@@ -29,9 +29,24 @@ _LEAST_VISIBLE = 1e-6
 
 
 def with_light_files(section: StudySection, sources: Sources) -> StudySection:
-    """Return the study with what is in files in the place of their names: the colors of columns tell their types.
+    """Read the files of lights; the colors of their columns define signal types.
 
-    Raises StudyError for files that do not do.
+    Parameters
+    ----------
+    section : StudySection
+        The keys of the study, checked against the schema.
+    sources : Sources
+        Files, curves and the faults so far.
+
+    Returns
+    -------
+    StudySection
+        The study with spectra instead of file names.
+
+    Raises
+    ------
+    StudyError
+        If a file cannot be used.
     """
 
     def read(lights: LightsSection, path: KeyPath) -> LightsSection:
@@ -64,7 +79,27 @@ def with_light_files(section: StudySection, sources: Sources) -> StudySection:
 
 
 def lights_of(section: LightsSection, sources: Sources, at: KeyPath = ("lights",)) -> Lights | None:
-    """Return the lights of the section at a place of the study, or None after adding faults. Raises StudyError."""
+    """Construct the lights of a section.
+
+    Parameters
+    ----------
+    section : LightsSection
+        Keys of the lights.
+    sources : Sources
+        Files, curves and the faults so far.
+    at : sequence of str and int
+        Keys that lead to the section.
+
+    Returns
+    -------
+    Lights or None
+        None after adding faults.
+
+    Raises
+    ------
+    StudyError
+        With every fault so far, if the study cannot be used.
+    """
     section = offered_curves(sources, at, section, "sweep.lights", BUILT_IN_LIGHTS)
     if section.builtin is not None:
         excess = sorted(section.model_fields_set - {"builtin", "files"})
@@ -104,7 +139,22 @@ def lights_of(section: LightsSection, sources: Sources, at: KeyPath = ("lights",
 
 
 def held_out_lights(section: StudySection, lights: Lights | None, sources: Sources) -> Lights | None:
-    """Return lights to validate on, as bright as the study's own, or None; those of a finished run are not kept."""
+    """Construct the lights for validation, as bright as those of the study.
+
+    Parameters
+    ----------
+    section : StudySection
+        The keys of the study, checked against the schema.
+    lights : Lights or None
+        Lights of the study.
+    sources : Sources
+        Files, curves and the faults so far.
+
+    Returns
+    -------
+    Lights or None
+        None if the study has no validation or the run is finished, which does not keep them.
+    """
     validation, path = section.validation, ("validate", "lights")
     if validation is not None and validation.leave_one_out and section.search is None:
         sources.add(("validate", "leave_one_out"), "nothing is searched", None, "a study with `search`")
@@ -120,7 +170,22 @@ def held_out_lights(section: StudySection, lights: Lights | None, sources: Sourc
 
 
 def with_population(lights: Lights, section: StudySection, sources: Sources) -> Lights:
-    """Return the lights with the population that the study asks for; what does not fit adds a fault."""
+    """Add the lamp population that the study defines.
+
+    Parameters
+    ----------
+    lights : Lights
+        Lights of the study.
+    section : StudySection
+        The keys of the study, checked against the schema.
+    sources : Sources
+        Files, curves and the faults so far.
+
+    Returns
+    -------
+    Lights
+        Lights with their population; faults are added to `sources`.
+    """
     population, at = section.population, ("population",)
     if population is None:
         return lights
@@ -155,9 +220,21 @@ def with_population(lights: Lights, section: StudySection, sources: Sources) -> 
 
 
 def check_range(study: Study, sources: Sources) -> None:
-    """Check that no member of the population is cut off when it is read out. Raises StudyError.
+    """Check that no lamp of the population saturates at readout.
 
-    Worst cases over the population are those of a response that is not cut off.
+    Worst cases over a population are computed for a response without saturation.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    sources : Sources
+        Files, curves and the faults so far.
+
+    Raises
+    ------
+    StudyError
+        If a lamp saturates.
     """
     if study.lights.population is None:
         return
@@ -176,7 +253,17 @@ def check_range(study: Study, sources: Sources) -> None:
 
 
 def check_luminances(section: StudySection, lights: Lights, sources: Sources) -> None:
-    """Check that candelas are given of lights, and of a background, that the eye sees."""
+    """Check that luminances are given only for visible lights and backgrounds.
+
+    Parameters
+    ----------
+    section : StudySection
+        The keys of the study, checked against the schema.
+    lights : Lights
+        Lights of the study.
+    sources : Sources
+        Files, curves and the faults so far.
+    """
     nodes = section.wavelengths.nodes_nm
     visible = (nodes >= VISIBLE_NM[0]) & (nodes <= VISIBLE_NM[1])
     share = section.wavelengths.integrate(lights.photons * visible)

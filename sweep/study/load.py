@@ -67,10 +67,28 @@ def load_study(
 def study_of_keys(
     keys: Mapping[str, Any], folder: Path, given: Mapping[str, Curves] = {}, *, allow_code: bool = False
 ) -> Study:
-    """Check a study that stands in no file: its keys with plain values.
+    """Construct a study from keys instead of a file.
 
-    Files that it names are looked for in `folder`; `given`: curves to take for files that are not on a disk, by the
-    names that the study gives these. Raises StudyError as `load_study` does, without file and line.
+    Parameters
+    ----------
+    keys : mapping
+        The keys of a study, with plain values.
+    folder : Path
+        Folder of relative file names.
+    given : mapping of str to Curves
+        Curves for file names that are not on disk.
+    allow_code : bool
+        Run Python files that the study names.
+
+    Returns
+    -------
+    Study
+        The study.
+
+    Raises
+    ------
+    StudyError
+        As `load_study`, without file and line.
     """
     document = Document(keys)
     section = _checked(document)
@@ -86,6 +104,17 @@ def _checked(document: Document) -> StudySection:
 
 
 def folder_name(study_name: str) -> str:
-    """Return a folder name for a study's outputs: characters but letters, digits, `-`, `_` and `.` become `_`."""
+    """Return a valid folder name for the results of a study.
+
+    Parameters
+    ----------
+    study_name : str
+        Name of the study.
+
+    Returns
+    -------
+    str
+        The name, with `_` for everything except letters, digits, `-`, `_` and `.`.
+    """
     name = re.sub(r"[^a-zA-Z0-9_.-]", "_", study_name)
     return name if name.strip(".") else "_"

@@ -143,7 +143,20 @@ class Study:
         return self.n_filters * len(self.scenarios)
 
     def setup(self, space: Space, scenario: str) -> Setup:
-        """Setup that the designs of `space` share in a scenario."""
+        """Return the setup shared by the designs of a space.
+
+        Parameters
+        ----------
+        space : Space
+            Design space.
+        scenario : str
+            Name of the scenario.
+
+        Returns
+        -------
+        Setup
+            Camera, scene and plan.
+        """
         bases = {} if space.filter is None else space.filter.bases
         technology = None if space.filter is None else space.filter.technology
         return self.setup_of(space.cfa, scenario, bases, technology)
@@ -151,9 +164,23 @@ class Study:
     def setup_of(
         self, cfa: str, scenario: str, bases: Mapping[str, str], technology: Technology | None = None
     ) -> Setup:
-        """Setup that designs of a CFA share in a scenario; `bases`: modified channel -> the curve that it replaces.
+        """Return the setup of a CFA.
 
-        `technology`: that of the modified channels' filters.
+        Parameters
+        ----------
+        cfa : str
+            Name of the CFA.
+        scenario : str
+            Name of the scenario.
+        bases : mapping of str to str
+            Modified channel -> curve that it replaces.
+        technology : Technology, optional
+            Filter technology of the modified channels.
+
+        Returns
+        -------
+        Setup
+            Camera, scene and plan.
         """
         mosaic, scene = self.mosaics[cfa], self.scenarios[scenario]
         replaced = {**self.section.cfas[cfa].curves, **bases}
@@ -181,11 +208,35 @@ class Study:
         )
 
     def pixel_in(self, scene: Scene) -> Pixel:
-        """Return the study's pixel, with a scene's noise where it states one."""
+        """Return the study's pixel with the noise of a scene.
+
+        Parameters
+        ----------
+        scene : Scene
+            The scene.
+
+        Returns
+        -------
+        Pixel
+            The pixel.
+        """
         return self.pixel if scene.noise is None else scene.noise.of(self.pixel)
 
     def box(self, space: Space, scenario: str) -> Box:
-        """Return the range of the designs of `space`, for a plan of the scenario."""
+        """Return the parameter range of a space, for a plan of the scenario.
+
+        Parameters
+        ----------
+        space : Space
+            Design space.
+        scenario : str
+            Name of the scenario.
+
+        Returns
+        -------
+        Box
+            Largest and smallest curves of the designs.
+        """
         setup = self.setup(space, scenario).with_all_effects
         low, high = setup.camera.qe.copy(), setup.camera.qe.copy()
         if space.filter is not None:
@@ -197,9 +248,24 @@ class Study:
         return Box(setup, low, high)
 
     def plan(self, scenario: str, tolerance_dn: float | None = None) -> Plan:
-        """Return the plan of a scene, for all designs of the study; `tolerance_dn` instead of the study's own.
+        """Plan which effects a scene is simulated with.
 
-        Raises StudyError for numbers that are allowed one by one, but that no float can hold together.
+        Parameters
+        ----------
+        scenario : str
+            Name of the scenario.
+        tolerance_dn : float, optional
+            Tolerance in DN; that of the study by default.
+
+        Returns
+        -------
+        Plan
+            The plan, for all designs of the study.
+
+        Raises
+        ------
+        StudyError
+            If numbers that are valid one by one overflow together.
         """
         tolerance_dn = self.section.tolerance_dn if tolerance_dn is None else tolerance_dn
         searched = None if self.search is None or self.search.scenario != scenario else self.search.space
@@ -212,14 +278,38 @@ class Study:
             raise StudyError(Fault(problem, key=f"scenarios.{scenario}")) from None
 
     def with_plans(self, tolerance_dn: float | None = None) -> Study:
-        """Return the study with a plan for each of its scenarios; `tolerance_dn` instead of the study's own.
+        """Plan all scenarios.
 
-        Raises StudyError as `plan` does.
+        Parameters
+        ----------
+        tolerance_dn : float, optional
+            Tolerance in DN; that of the study by default.
+
+        Returns
+        -------
+        Study
+            The study with its plans.
+
+        Raises
+        ------
+        StudyError
+            As `plan`.
         """
         return replace(self, plans={name: self.plan(name, tolerance_dn) for name in self.scenarios})
 
     def problem(self, search: Search) -> Problem:
-        """Return the search as a mathematical problem."""
+        """Formulate the search as an optimization problem.
+
+        Parameters
+        ----------
+        search : Search
+            The search.
+
+        Returns
+        -------
+        Problem
+            Objective, constraints and box.
+        """
         assert search.space.filter is not None
         return Problem(
             setup=self.setup(search.space, search.scenario),
@@ -244,7 +334,24 @@ class Study:
 
 
 def asked_of(section: StudySection, lights: Lights, tasks: StudyTasks | None, own: tuple[OwnMetric, ...]) -> Asked:
-    """Quantities that a study asks for, as far as it is known without its scenes and its sensor."""
+    """Return the quantities that a study computes, as far as its lights and tasks determine them.
+
+    Parameters
+    ----------
+    section : StudySection
+        The keys of the study, checked against the schema.
+    lights : Lights
+        Lights of the study.
+    tasks : StudyTasks or None
+        Tasks of the study.
+    own : tuple of OwnMetric
+        Metrics of the user.
+
+    Returns
+    -------
+    Asked
+        The quantities.
+    """
     recognition = section.recognition
     return Asked(
         lights.classes,

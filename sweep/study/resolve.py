@@ -22,9 +22,24 @@ _Made = TypeVar("_Made")
 
 
 def resolve(section: StudySection, sources: Sources) -> Study:
-    """Return the study that a checked schema describes, with the files and curves of `sources`.
+    """Construct the study that validated keys describe.
 
-    Raises StudyError with every fault that can be found without what is wrong.
+    Parameters
+    ----------
+    section : StudySection
+        The keys of the study, checked against the schema.
+    sources : Sources
+        Files, curves and the faults so far.
+
+    Returns
+    -------
+    Study
+        The study.
+
+    Raises
+    ------
+    StudyError
+        With every fault so far, if the study cannot be used.
     """
 
     def attempt(make: Callable[[], _Made]) -> _Made | None:

@@ -124,12 +124,34 @@ class LightsSection(Documented):
 
 
 def named(names: Iterable[str]) -> Any:
-    """Return the type of built-in names, as editors complete them; installed packages may offer others."""
+    """Return the type of a built-in name, with the choices that editors complete.
+
+    Parameters
+    ----------
+    names : iterable of str
+        Built-in names.
+
+    Returns
+    -------
+    type
+        String type; installed packages may provide more names.
+    """
     return Annotated[str, WithJsonSchema({"anyOf": [{"type": "string", "enum": list(names)}, {"type": "string"}]})]
 
 
 def builtin(value: Any) -> Any:
-    """Take a name alone for that of a built-in one."""
+    """Read a plain name as `{builtin: NAME}`.
+
+    Parameters
+    ----------
+    value : any
+        Value of the key.
+
+    Returns
+    -------
+    any
+        The mapping; other values unchanged.
+    """
     return {"builtin": value} if isinstance(value, str) else value
 
 
@@ -160,7 +182,18 @@ _TaskName = Annotated[str, Field(min_length=1, max_length=40, pattern="^[a-z][a-
 
 
 def listed(value: Any) -> Any:
-    """Take an entry alone for a list of one."""
+    """Read a single entry as a list of one.
+
+    Parameters
+    ----------
+    value : any
+        Value of the key.
+
+    Returns
+    -------
+    any
+        The list.
+    """
     return value if isinstance(value, list) else [value]
 
 

@@ -24,10 +24,28 @@ _ROUNDING = 1e-9
 
 
 def sensor_of(section: SensorSection, sources: Sources) -> SensorCurves | None:
-    """Return the study's sensor, or None after adding faults to `sources`. Raises StudyError.
+    """Construct the sensor of a study.
 
-    Curves of files that are relative to another one are multiplied by it; such a curve is built in, or from a file
-    whose values are QE themselves. A channel with an own curve is not taken from another one of the built-in sensor.
+    Relative curves of files are multiplied by their reference, which is built in or QE from a file. A channel with a
+    file
+    replaces that of the built-in sensor.
+
+    Parameters
+    ----------
+    section : SensorSection
+        Keys of the sensor.
+    sources : Sources
+        Files, curves and the faults so far.
+
+    Returns
+    -------
+    SensorCurves or None
+        None after adding faults.
+
+    Raises
+    ------
+    StudyError
+        With every fault so far, if the study cannot be used.
     """
     section = offered_curves(sources, ("sensor",), section, "sweep.sensors", BUILT_IN_SENSORS)
     built_in: SensorCurves | None = None
@@ -105,7 +123,20 @@ def _columns(sources: Sources, path: KeyPath, entry: CurveFile, factor: float | 
 
 
 def with_chief_rays(section: StudySection, sources: Sources) -> StudySection:
-    """Return the study with the rows of lenses' files in the place of their names; what does not fit adds a fault."""
+    """Read the files of lenses.
+
+    Parameters
+    ----------
+    section : StudySection
+        The keys of the study, checked against the schema.
+    sources : Sources
+        Files, curves and the faults so far.
+
+    Returns
+    -------
+    StudySection
+        The study with chief ray angles instead of file names; faults are added to `sources`.
+    """
     scenarios = dict(section.scenarios)
     read: dict[tuple[str, float | None], SensorField] = {}
     for name, scenario in section.scenarios.items():
@@ -133,7 +164,22 @@ def _moves(sensor: SensorCurves, curve: str) -> bool:
 
 
 def with_technologies(sensor: SensorCurves, section: StudySection, sources: Sources) -> SensorCurves:
-    """Return the sensor with what is stated of its curves; what does not fit adds a fault."""
+    """Add the filter technologies that the study states.
+
+    Parameters
+    ----------
+    sensor : SensorCurves
+        Sensor of the study.
+    section : StudySection
+        The keys of the study, checked against the schema.
+    sources : Sources
+        Files, curves and the faults so far.
+
+    Returns
+    -------
+    SensorCurves
+        The sensor with them; faults are added to `sources`.
+    """
     clear = sensor.curve(sensor.clear)
     kind = "clear" if sensor.has_clear else "brightest"
     stated = replace(sensor, technologies=section.sensor.technology)
@@ -148,7 +194,19 @@ def with_technologies(sensor: SensorCurves, section: StudySection, sources: Sour
 
 
 def check_filter(space: Space, path: KeyPath, sensor: SensorCurves, sources: Sources) -> None:
-    """Check that a filter's base is no interference filter, and that none exceeds its base."""
+    """Check that the base of a filter is no interference filter and that no filter exceeds its base.
+
+    Parameters
+    ----------
+    space : Space
+        Design space of the filter.
+    path : sequence of str and int
+        Keys that lead to the value.
+    sensor : SensorCurves
+        Sensor of the study.
+    sources : Sources
+        Files, curves and the faults so far.
+    """
     made = space.filter
     assert made is not None
     for base in dict.fromkeys(made.bases.values()):
@@ -166,7 +224,19 @@ def check_filter(space: Space, path: KeyPath, sensor: SensorCurves, sources: Sou
 
 
 def check_lenses(section: StudySection, sensor: SensorCurves, spaces: Sequence[Space], sources: Sources) -> None:
-    """Check that no ray of any scene grazes filters that move with the angle of the light."""
+    """Check that no ray reaches interference filters at grazing angles.
+
+    Parameters
+    ----------
+    section : StudySection
+        The keys of the study, checked against the schema.
+    sensor : SensorCurves
+        Sensor of the study.
+    spaces : sequence of Space
+        Design spaces.
+    sources : Sources
+        Files, curves and the faults so far.
+    """
     filters = [space.filter.technology for space in spaces if space.filter is not None]
     if all(t is None or t.interference is None for t in (*filters, *sensor.technologies.values())):
         return

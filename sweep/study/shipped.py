@@ -32,9 +32,22 @@ def shipped_names() -> list[str]:
 
 
 def study_path(given: Path) -> Path:
-    """Return the file that is meant: the path itself, or, for a name alone, that study of `studies/` or of the project.
+    """Find a study file by its path, or by its name in `studies/` and the package.
 
-    Raises StudyError, with the nearest name, for a name that is nowhere.
+    Parameters
+    ----------
+    given : Path
+        Path or name.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    StudyError
+        If there is none; names the nearest.
     """
     name = given.name
     if is_file(given) or is_folder(given) or name != str(given) or given.suffix in _KINDS:

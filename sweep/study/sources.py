@@ -69,30 +69,96 @@ class Sources:
     def add(
         self, path: KeyPath, problem: str, value: object = None, allowed: str | None = None, near: str | None = None
     ) -> None:
-        """Add a fault at `path` of the study file."""
+        """Add a fault.
+
+        Parameters
+        ----------
+        path : sequence of str and int
+            Keys that lead to the value.
+        problem : str
+            Description of the problem.
+        value : object
+            The value that was given.
+        allowed : str, optional
+            Allowed values.
+        near : str, optional
+            Nearest valid name.
+        """
         self.faults.append(self.document.fault(path, problem, value, allowed, near))
 
     def add_error(self, path: KeyPath, error: SweepError) -> None:
-        """Add the faults of an error at `path` of the study file."""
+        """Add the faults of an error.
+
+        Parameters
+        ----------
+        path : sequence of str and int
+            Keys that lead to the value.
+        error : SweepError
+            The error.
+        """
         for fault in error.faults:
             problem = f"{fault.file}: {fault.problem}" if fault.file else fault.problem
             self.add(path, problem, fault.value, fault.allowed, fault.nearest)
 
     def unknown(self, path: KeyPath, what: str, value: str, known: Iterable[str], others: Iterable[str] = ()) -> None:
-        """Add the fault of a name that is not among the known ones, with the nearest of them and of `others`."""
+        """Add a fault for an unknown name.
+
+        Parameters
+        ----------
+        path : sequence of str and int
+            Keys that lead to the value.
+        what : str
+            Kind of the name, for the message.
+        value : str
+            The name.
+        known : iterable of str
+            Valid names.
+        others : iterable of str
+            Further names to suggest.
+        """
         known = list(known)
         near = nearest(value, [*known, *others]) if len(self.faults) < MOST_FAULTS else None  # of more nobody reads it
         self.add(path, f"unknown {what}", value, ", ".join(known), near)
 
     def fits(self, path: KeyPath, what: str, count: int) -> bool:
-        """Return whether so many curves on the grid fit into memory; else add a fault."""
+        """Return True if curves on the wavelength grid fit into memory; add a fault otherwise.
+
+        Parameters
+        ----------
+        path : sequence of str and int
+            Keys that lead to the value.
+        what : str
+            Kind of the curves, for the message.
+        count : int
+            Number of curves.
+
+        Returns
+        -------
+        bool
+            True if they fit.
+        """
         most = _MOST_VALUES // self.grid.size
         if count > most:
             self.add(path, f"too many {what} for a grid of {self.grid.size:,} wavelengths", count, f"at most {most:,}")
         return count <= most
 
     def built_in(self, at: KeyPath, name: str, known: Mapping[str, Callable[[WavelengthGrid], _Made]]) -> _Made | None:
-        """Return a sensor or lights of the package on the grid, or None after adding faults."""
+        """Return a built-in sensor or built-in lights on the study's wavelength grid.
+
+        Parameters
+        ----------
+        at : sequence of str and int
+            Keys that lead to the value.
+        name : str
+            Name of the curves.
+        known : mapping of str to callable
+            Built-in curves.
+
+        Returns
+        -------
+        SensorCurves, Lights or None
+            None after adding faults.
+        """
         if name not in known:
             allowed = f"{', '.join(known)}, or a mapping with `files`"
             self.add(at, f"unknown built-in {at[-1]}", name, allowed, nearest(name, known))
@@ -100,7 +166,18 @@ class Sources:
         return known[name](self.grid) if self.in_built_in_range("the built-in curves") else None
 
     def in_built_in_range(self, what: str) -> bool:
-        """Return whether the grid is inside the range of the built-in curves; else add a fault, once."""
+        """Return True if the wavelength grid lies inside that of the built-in curves; add one fault otherwise.
+
+        Parameters
+        ----------
+        what : str
+            Kind of the curves, for the message.
+
+        Returns
+        -------
+        bool
+            True if it does.
+        """
         low, high = BUILT_IN_RANGE_NM
         inside = low <= self.grid.start_nm < self.grid.stop_nm <= high
         grid = f"{self.grid.start_nm:g} to {self.grid.stop_nm:g} nm"
@@ -112,7 +189,24 @@ class Sources:
     def photons(
         self, path: KeyPath, curves: Curves | None, column: str, entry: LightFile | TaskFile
     ) -> FloatArray | None:
-        """Return a light's photon spectrum on the grid, or None after adding faults; warn where photons are cut off."""
+        """Return the photon spectrum of a light, and warn about photons outside the wavelength grid.
+
+        Parameters
+        ----------
+        path : sequence of str and int
+            Keys that lead to the value.
+        curves : Curves or None
+            Curves of the file.
+        column : str
+            Column of the light.
+        entry : LightFile or TaskFile
+            Keys of the file.
+
+        Returns
+        -------
+        ndarray of shape (n_wavelengths,) or None
+            Relative photons per nm; None after adding faults.
+        """
         values = self.column(path, curves, column, entry)
         if values is None or curves is None:
             return None
@@ -132,7 +226,24 @@ class Sources:
         return values
 
     def column(self, path: KeyPath, curves: Curves | None, column: str, entry: _Entry) -> FloatArray | None:
-        """Return a column of a file on the grid, ndarray[n_wavelengths], or None after adding faults."""
+        """Interpolate a column of a file on the study's wavelength grid.
+
+        Parameters
+        ----------
+        path : sequence of str and int
+            Keys that lead to the value.
+        curves : Curves or None
+            Curves of the file.
+        column : str
+            Name of the column.
+        entry : section
+            Keys of the file.
+
+        Returns
+        -------
+        ndarray of shape (n_wavelengths,) or None
+            None after adding faults.
+        """
         if curves is None:
             return None
         if column not in curves.values:
@@ -146,13 +257,41 @@ class Sources:
             return None
 
     def kept_curve(self, path: KeyPath, curves: Mapping[_Key, FloatArray], name: _Key) -> FloatArray | None:
-        """Return a curve that a finished run kept, or None after adding a fault."""
+        """Return a curve stored with a finished run.
+
+        Parameters
+        ----------
+        path : sequence of str and int
+            Keys that lead to the value.
+        curves : mapping
+            Stored curves.
+        name : hashable
+            Key of the curve.
+
+        Returns
+        -------
+        ndarray of shape (n_wavelengths,) or None
+            None after adding a fault.
+        """
         if name not in curves:
             self.add(path, "the run kept no such curve", name)
         return curves.get(name)
 
     def curves(self, path: KeyPath, entry: _Entry) -> Curves | None:
-        """Return all curves of a file, which is read once, or None after adding faults."""
+        """Read all curves of a file, once per study.
+
+        Parameters
+        ----------
+        path : sequence of str and int
+            Keys that lead to the value.
+        entry : section
+            Keys of the file.
+
+        Returns
+        -------
+        Curves or None
+            None after adding faults.
+        """
         if self.kept is not None:
             return None
         if entry.file not in self._read and entry.file in self.given:
@@ -166,7 +305,22 @@ class Sources:
         return self._read[entry.file]
 
     def chief_rays(self, path: KeyPath, file: str, corner_mm: float | None) -> ChiefRays | None:
-        """Return a lens's chief ray angles from a file, or None after adding faults."""
+        """Read the chief ray angles of a lens.
+
+        Parameters
+        ----------
+        path : sequence of str and int
+            Keys that lead to the value.
+        file : str
+            Name of the file.
+        corner_mm : float or None
+            Image height of the corner in mm.
+
+        Returns
+        -------
+        ChiefRays or None
+            None after adding faults.
+        """
         return self._content(path, file, lambda place: read_chief_rays(place, corner_mm))
 
     def _content(self, path: KeyPath, file: str, read: Callable[[Path], _Content]) -> _Content | None:
@@ -184,7 +338,20 @@ class Sources:
         return content
 
     def file(self, path: KeyPath, file: str) -> Path | None:
-        """Return where a file lies that the study names at `path`, or None after adding a fault."""
+        """Return the path of a file that the study names.
+
+        Parameters
+        ----------
+        path : sequence of str and int
+            Keys that lead to the value.
+        file : str
+            Name in the study.
+
+        Returns
+        -------
+        Path or None
+            None after adding a fault.
+        """
         place = next((folder / file for folder in self.folders if is_file(folder / file)), None)
         if place is None:
             names: list[str] = []

@@ -24,7 +24,20 @@ _MOST_PAIRS = 200_000
 
 
 def tasks_of(section: TasksSection, sources: Sources) -> StudyTasks | None:
-    """Return the tasks of a study, or None after adding faults."""
+    """Construct the tasks of a study.
+
+    Parameters
+    ----------
+    section : TasksSection
+        Keys of the tasks.
+    sources : Sources
+        Files, curves and the faults so far.
+
+    Returns
+    -------
+    StudyTasks or None
+        None after adding faults.
+    """
     before = len(sources.faults)
     user_tasks = section.own.values()
     named = [entry for task in user_tasks for spectra in task.classes.values() for entry in spectra]
@@ -147,7 +160,21 @@ def _read(path: KeyPath, entry: TaskFile, sources: Sources) -> dict[str, FloatAr
 def check_seen(
     tasks: StudyTasks, section: StudySection, sensor: SensorCurves, spaces: Sequence[Space], sources: Sources
 ) -> None:
-    """Check that no filter moves with the angle, as tasks are on axis, and that no patch fills a pixel's well."""
+    """Check that no filter of a task depends on the angle and that no patch saturates a pixel.
+
+    Parameters
+    ----------
+    tasks : StudyTasks
+        Tasks of the study.
+    section : StudySection
+        The keys of the study, checked against the schema.
+    sensor : SensorCurves
+        Sensor of the study.
+    spaces : sequence of Space
+        Design spaces.
+    sources : Sources
+        Files, curves and the faults so far.
+    """
     filters = [space.filter.technology for space in spaces if space.filter is not None]
     if any(t is not None and t.interference is not None for t in (*filters, *sensor.technologies.values())):
         sources.add(

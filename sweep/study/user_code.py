@@ -38,12 +38,42 @@ _SAME = 1e-9
 
 
 def is_from_outside(name: str, group: Offered, known: Iterable[str]) -> bool:
-    """Return whether a name is that of code that is not the package's, whose own names come first."""
+    """Return True if a name refers to code of a file or an installed package.
+
+    Parameters
+    ----------
+    name : str
+        Name of a class or function.
+    group : Offered
+        Entry point group.
+    known : iterable of str
+        Built-in names, which take precedence.
+
+    Returns
+    -------
+    bool
+        False for built-in and unknown names.
+    """
     return is_in_file(name) or (name not in known and name in offers(group))
 
 
 def allowed(sources: Sources, path: KeyPath, name: str) -> bool:
-    """Return whether code may run; else add a fault."""
+    """Return True if code may run; add a fault otherwise.
+
+    Parameters
+    ----------
+    sources : Sources
+        Files, curves and the faults so far.
+    path : sequence of str and int
+        Keys that lead to the value.
+    name : str
+        Name of the class or function.
+
+    Returns
+    -------
+    bool
+        True if `--allow-code` or `allow_code` was given.
+    """
     if not sources.allow_code:
         whose = "a Python file" if is_in_file(name) else "what an installed package offers"
         problem = f"the study names {whose}, whose code would run"
@@ -52,7 +82,27 @@ def allowed(sources: Sources, path: KeyPath, name: str) -> bool:
 
 
 def code_of(sources: Sources, name: str, group: Offered) -> OwnCode:
-    """Return code that is allowed, and keep its digest. Raises SweepError where there is none."""
+    """Read code of a file or an installed package, and record its digest.
+
+    Parameters
+    ----------
+    sources : Sources
+        Files, curves and the faults so far.
+    name : str
+        Name of the class or function.
+    group : Offered
+        Entry point group.
+
+    Returns
+    -------
+    OwnCode
+        The code, not run yet.
+
+    Raises
+    ------
+    SweepError
+        If it does not exist.
+    """
     if not is_in_file(name):
         offer = installed(group, name)
         if offer is None:
@@ -76,10 +126,34 @@ def _digested(sources: Sources, name: str, digest: str) -> None:
 
 
 def offered_curves(sources: Sources, at: KeyPath, section: _Curves, group: Offered, known: Iterable[str]) -> _Curves:
-    """Return the section as a package states it, with what the study adds; itself where it names none of a package.
+    """Return a section with the keys that an installed package provides.
 
-    A package offers what a study would say: a mapping with `files`, which lie in the package, or a function that
-    returns one. Raises StudyError where that cannot be had.
+    A package provides a mapping with `files`, which it contains, or a function that returns one. Keys of the study
+    take
+    precedence.
+
+    Parameters
+    ----------
+    sources : Sources
+        Files, curves and the faults so far.
+    at : sequence of str and int
+        Keys that lead to the section.
+    section : section
+        Sensor or lights.
+    group : Offered
+        Entry point group.
+    known : iterable of str
+        Built-in names.
+
+    Returns
+    -------
+    section
+        Unchanged if it names no package.
+
+    Raises
+    ------
+    StudyError
+        If the package cannot be used.
     """
     name = section.builtin
     if name is None or not is_from_outside(name, group, known):
@@ -107,7 +181,25 @@ def offered_curves(sources: Sources, at: KeyPath, section: _Curves, group: Offer
 
 
 def own_metrics(section: StudySection, sources: Sources) -> tuple[OwnMetric, ...]:
-    """Return the study's own metrics. Raises StudyError where one cannot be had."""
+    """Load the user's metrics.
+
+    Parameters
+    ----------
+    section : StudySection
+        The keys of the study, checked against the schema.
+    sources : Sources
+        Files, curves and the faults so far.
+
+    Returns
+    -------
+    tuple of OwnMetric
+        The metrics.
+
+    Raises
+    ------
+    StudyError
+        If one cannot be loaded.
+    """
 
     def make(code: OwnCode) -> OwnMetric:
         metric = OwnMetric(code)
@@ -126,7 +218,25 @@ def own_metrics(section: StudySection, sources: Sources) -> tuple[OwnMetric, ...
 
 
 def own_effects(section: StudySection, sources: Sources) -> tuple[OwnEffect, ...]:
-    """Return the study's own effects. Raises StudyError where one cannot be had."""
+    """Load the user's effects.
+
+    Parameters
+    ----------
+    section : StudySection
+        The keys of the study, checked against the schema.
+    sources : Sources
+        Files, curves and the faults so far.
+
+    Returns
+    -------
+    tuple of OwnEffect
+        The effects.
+
+    Raises
+    ------
+    StudyError
+        If one cannot be loaded.
+    """
     return _read_own("effects", section.effects, "sweep.effects", OwnEffect, sources)
 
 
@@ -152,7 +262,20 @@ def _read_own(
 
 
 def try_effects(study: Study, sources: Sources) -> None:
-    """Apply the study's own effects in each scenario. Raises StudyError where one fails."""
+    """Apply the user's effects in every scenario.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    sources : Sources
+        Files, curves and the faults so far.
+
+    Raises
+    ------
+    StudyError
+        If one fails.
+    """
     for name in study.scenarios if study.own_effects else ():
         try:
             scene_irradiance(study.setup(study.spaces[0], name))
@@ -162,7 +285,24 @@ def try_effects(study: Study, sources: Sources) -> None:
 
 
 def check_names(own: Sequence[OwnMetric], asked: Asked, spaces: Sequence[Space], sources: Sources) -> bool:
-    """Return whether each column has one meaning; else add a fault. `asked`: what the study asks for."""
+    """Return True if every column has a single meaning; add a fault otherwise.
+
+    Parameters
+    ----------
+    own : sequence of OwnMetric
+        Metrics of the user.
+    asked : Asked
+        Quantities of the study.
+    spaces : sequence of Space
+        Design spaces.
+    sources : Sources
+        Files, curves and the faults so far.
+
+    Returns
+    -------
+    bool
+        True if no name clashes.
+    """
     if not own:
         return True
     widest = replace(asked, own=(), states=asked.classes, any_place=True, edge_shift=True, population=True)
@@ -178,7 +318,20 @@ def check_names(own: Sequence[OwnMetric], asked: Asked, spaces: Sequence[Space],
 
 
 def try_metrics(study: Study, sources: Sources) -> None:
-    """Compute own metrics of every CFA, of a light that fills the field. Raises StudyError where one fails."""
+    """Compute the user's metrics of every CFA, for a light that fills the field.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    sources : Sources
+        Files, curves and the faults so far.
+
+    Raises
+    ------
+    StudyError
+        If one fails.
+    """
     setups = {space.cfa: study.setup(space, next(iter(study.scenarios))) for space in study.spaces} if study.own else {}
     searched = None if study.search is None else study.search.space.cfa
     wanted = {*study.objective.weights, *study.constraints}
