@@ -44,7 +44,7 @@ def nearest(name: object, known: Iterable[str]) -> str | None:
 
 
 def _in_order(name: str) -> str:
-    """The words of a name in the order of the alphabet."""
+    """Sort the words of a name alphabetically."""
     return "_".join(sorted(name.split("_")))
 
 

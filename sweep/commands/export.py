@@ -207,7 +207,7 @@ def _lines(output: Output, row: Row, bases: Mapping[str, str]) -> list[str]:
 
 
 def _remarks(wavelength_nm: FloatArray, bases: Mapping[str, str], transmissions: Mapping[str, FloatArray]) -> list[str]:
-    """Notes on the transmissions, for whoever makes the filter."""
+    """Describe the transmissions for the manufacturer of the filter."""
     lines = []
     for (channel, base), (name, values) in zip(bases.items(), transmissions.items(), strict=True):
         beyond = wavelength_nm[values > 1 + _ROUNDING]

@@ -14,10 +14,10 @@ from numba.extending import intrinsic
 if TYPE_CHECKING:
 
     def smaller(one: float, other: float) -> float:
-        """The smaller of two floats, neither of which is NaN; for compiled functions."""
+        """Return the smaller of two floats, neither NaN, in compiled functions."""
 
     def larger(one: float, other: float) -> float:
-        """The larger of two floats, neither of which is NaN; for compiled functions."""
+        """Return the larger of two floats, neither NaN, in compiled functions."""
 
 else:
 

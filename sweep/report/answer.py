@@ -297,7 +297,7 @@ def large_numbers(output: Output) -> list[tuple[str, str, str]]:
         return []
 
     def beside(column: str, told: Callable[[float], str]) -> str:
-        """A value as a multiple of that of a plain CFA."""
+        """Return a value as a multiple of that of a plain CFA."""
         if plain is None or not float(plain[column]) > 0:
             return ""
         if column == separation.name and separation.unit == DECADES:  # a ratio of logarithms says nothing

@@ -40,7 +40,7 @@ def _plain(value: Any) -> Any:
 
 
 def _made(kind: Any, data: Any) -> Any:
-    """`data` as a value of the type `kind`."""
+    """Convert `data` to a value of the type `kind`."""
     origin, kinds = get_origin(kind), get_args(kind)
     if hasattr(origin, "__value__"):  # NumPy's NDArray is a type alias with some versions of Python and NumPy
         return _made(origin.__value__[kinds], data)
@@ -65,7 +65,7 @@ def _made(kind: Any, data: Any) -> Any:
 
 
 def _value(kind: Any, data: Any) -> Any:
-    """A mapping or a plain value of its type."""
+    """Convert a mapping or a plain value to its type."""
     origin, kinds = get_origin(kind), get_args(kind)
     if isinstance(origin, type) and issubclass(origin, Mapping):
         return {key: _made(kinds[1], inner) for key, inner in data.items()}

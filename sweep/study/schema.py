@@ -136,13 +136,12 @@ class BoxSection(Modification):
 
 
 class Production(Section):
-    """What production does to a filter: every edge may come out up to `edge_shift_nm` too far to either side, and all
-    films of an interference filter up to the share `thickness` too thick or too thin, which moves what is at l nm to
-    l (1 + thickness). Both are independent.
-    """
+    """Production tolerances of a filter: shifts of single edges, and of the film thickness; both are independent."""
 
     edge_shift_nm: float = Field(default=0.0, ge=0, le=1000)
+    """Largest shift of an edge, to either side, in nm."""
     thickness: float = Field(default=0.0, ge=0, le=0.2)
+    """Largest relative error of the films of an interference filter; moves l nm to l (1 + thickness)."""
 
     @property
     def tolerance(self) -> Tolerance:

@@ -108,7 +108,8 @@ class LightsSection(Documented):
     """A built-in data set by its name, or lights from files.
 
     A file alone in the place of the mapping is taken as energy; the colors of its columns tell their signal types, and
-    the resolved study holds what was understood."""
+    the resolved study holds what was understood.
+    """
 
     builtin: str | None = None
     name: Name | None = None

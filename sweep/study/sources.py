@@ -33,8 +33,9 @@ _Entry = CurveFile | LightFile | TaskFile
 
 @dataclass(frozen=True)
 class KeptSources:
-    """Curves to take instead of those in files, on the study's grid: QE by name, photons by type and name, spectra of
-    own tasks by class and name.
+    """Curves of a finished run, on its wavelength grid, which replace those of files.
+
+    QE by name, photon spectra by signal type and name, spectra of tasks by class and name.
     """
 
     sensor: Mapping[str, FloatArray]

@@ -127,9 +127,10 @@ def run(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Run studies one after the other: results, figures and report go to OUTPUT/<study>. The same command continues an
-    interrupted run, and makes again what is missing or damaged. Files that are not its own stay (SHA256SUMS lists those
-    that are). Of several studies, one that cannot be run does not stop the others.
+    """Run studies one after the other: results, figures and report go to OUTPUT/<study>.
+
+    The same command continues an interrupted run, and replaces missing or damaged files. Other files in the folder are
+    kept (SHA256SUMS lists those of the run). If one study cannot be run, the others are.
     """
     from ...run import RunOptions
     from ..run import run_one
