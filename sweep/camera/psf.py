@@ -47,6 +47,11 @@ _MOST_AT_ONCE = 2_000_000
 def gauss_legendre(order: int) -> tuple[FloatArray, FloatArray]:
     """Return nodes and weights of a Gauss-Legendre rule; cached, since long rules take milliseconds.
 
+    Parameters
+    ----------
+    order : int
+        Number of nodes.
+
     Returns
     -------
     nodes, weights : ndarray[order]

@@ -13,12 +13,46 @@ import numpy as np
 
 
 def to_json(value: object) -> bytes:
-    """Return the JSON of dataclasses, arrays, sequences, mappings and plain values; raises TypeError for others."""
+    """Convert dataclasses, arrays, sequences, mappings and plain values to JSON.
+
+    Parameters
+    ----------
+    value : object
+        The value.
+
+    Returns
+    -------
+    bytes
+        JSON text.
+
+    Raises
+    ------
+    TypeError
+        If the value, or a part of it, has no JSON form.
+    """
     return json.dumps(value, default=_plain).encode("utf-8")
 
 
 def from_json(kind: Any, content: bytes) -> Any:
-    """Return the value of the type `kind` that `to_json` wrote; raises ValueError when the text holds none."""
+    """Convert JSON back to the value that `to_json` was given.
+
+    Parameters
+    ----------
+    kind : type
+        Type of the value.
+    content : bytes
+        JSON text.
+
+    Returns
+    -------
+    value
+        Of the type `kind`.
+
+    Raises
+    ------
+    ValueError
+        If the text is no such value.
+    """
     try:
         return _made(kind, json.loads(content))
     except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError) as error:

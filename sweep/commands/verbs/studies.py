@@ -129,8 +129,9 @@ def run(
 ) -> int:
     """Run studies one after the other: results, figures and report go to OUTPUT/<study>.
 
-    The same command continues an interrupted run, and replaces missing or damaged files. Other files in the folder are
-    kept (SHA256SUMS lists those of the run). If one study cannot be run, the others are.
+    The same command continues an interrupted run, and replaces missing or damaged files.
+    Other files in the folder are kept; SHA256SUMS lists those of the run.
+    If one study cannot be run, the others are.
     """
     from ...run import RunOptions
     from ..run import run_one
