@@ -26,7 +26,7 @@ _LOCATIONS = {
     "Optics": "camera.pixel:Optics",
     "Scene": "camera.scene:Scene",
     "Target": "camera.scene:Target",
-    "WavelengthGrid": "curves.spectrum:WavelengthGrid",
+    "WavelengthGrid": "spectra.spectrum:WavelengthGrid",
     "Stopband": "designs.families.stopband:Stopband",
     "MultiStopband": "designs.families.stopband:MultiStopband",
     "Dual": "designs.families.dual:Dual",

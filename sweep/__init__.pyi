@@ -5,11 +5,11 @@ from .api.objects import FinishedRun, LoadedStudy
 from .base.errors import SweepError
 from .camera.pixel import Optics, Pixel
 from .camera.scene import Scene, Target
-from .curves.spectrum import WavelengthGrid
 from .designs.families.dual import Dual
 from .designs.families.free_form import FreeForm
 from .designs.families.stopband import MultiStopband, Stopband
 from .metrics.quantity import Quantity
+from .spectra.spectrum import WavelengthGrid
 
 __version__: str
 __all__ = [

@@ -1,6 +1,6 @@
 """`python -m sweep` is the command `sweep`."""
 
-from .commands.start import start
+from .cli.start import start
 
 if __name__ == "__main__":
     start()

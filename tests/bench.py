@@ -33,14 +33,14 @@ from sweep.camera.forward import ForwardModel
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.scene import Scene
 from sweep.camera.setup import Setup
-from sweep.curves.lights import Lights
-from sweep.curves.spectrum import WavelengthGrid
 from sweep.designs.block import CurveBlock, edges_of
 from sweep.designs.edge import SPAN_PER_WIDTH
 from sweep.designs.space import Space
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.separation import class_pairs, csd_name, separation, separations_along
 from sweep.run import run_study
+from sweep.spectra.lights import Lights
+from sweep.spectra.spectrum import WavelengthGrid
 from sweep.study import Study, load_study
 
 ROOT = Path(__file__).parent.parent

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from sweep.base.errors import StudyError, SweepError
-from sweep.commands.new import new_study
+from sweep.cli.new import new_study
 from sweep.run import run_study
 from sweep.study import Study, load_study
 

@@ -8,13 +8,13 @@ import sys
 from contextlib import redirect_stderr, redirect_stdout
 from unittest import mock
 
-from sweep.commands.app import main
+from sweep.cli.app import main
 
 UNDRAWN = """\
 import signal
 signal.signal(signal.SIGINT, signal.SIG_DFL)  # while it is loaded, a stop ends it without a word, as `start` has it
 import sweep.report.page
-from sweep.commands.app import main
+from sweep.cli.app import main
 sweep.report.page._drawings = lambda _: ()
 signal.signal(signal.SIGINT, signal.default_int_handler)
 try:

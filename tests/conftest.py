@@ -152,7 +152,7 @@ def draw_nothing(patch: pytest.MonkeyPatch) -> None:
     patch.setattr("sweep.report.page._drawings", lambda _: ((name, name, None) for name in names))
     patch.setattr("sweep.report.page.pictures_of", lambda _, kinds: {kind: kind.encode() for kind in kinds})
     patch.setattr("sweep.report.page.inlined", lambda _: "data:image/png;base64,cG5n")
-    patch.setattr("sweep.commands.describe._png", lambda *_: b"sweep describe")
+    patch.setattr("sweep.cli.describe._png", lambda *_: b"sweep describe")
 
 
 @pytest.fixture

@@ -1,9 +1,9 @@
-"""Makes sweep/curves/builtin/spectra.parquet: measured and standard spectra, with a data card for each set.
+"""Makes sweep/spectra/builtin/spectra.parquet: measured and standard spectra, with a data card for each set.
 
     python -m tests.make_spectra EARTHLIB
 
 EARTHLIB: the wheel of earthlib 1.1.0, or its folder where it is installed; it is read, not imported. The script stands
-among the tests because no user of the package needs that library, and because `tests/curves/test_tasks_data.py` makes
+among the tests because no user of the package needs that library, and because `tests/spectra/test_tasks_data.py` makes
 the file again where it is at hand.
 """
 

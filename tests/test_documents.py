@@ -10,7 +10,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from sweep.commands.accuracy import measure_accuracy
+from sweep.cli.accuracy import measure_accuracy
 from sweep.metrics.share import told_share
 from sweep.study import load_study
 

@@ -16,7 +16,7 @@ from sweep.run.provenance import _PACKAGES
 PACKAGE = Path(__file__).parent.parent / "sweep"
 LEVELS = [
     "base",
-    "curves",
+    "spectra",
     "designs",
     "camera",
     "vision",
@@ -27,7 +27,7 @@ LEVELS = [
     "run",
     "report",
     "api",
-    "commands",
+    "cli",
     "__main__",
 ]
 """Subpackages from the lowest to the highest, and the file that starts the program."""
@@ -36,7 +36,7 @@ ONLY_USER = {
     "joblib": ["run/"],
     "moocore": ["metrics/pareto"],
     "jinja2": ["report/"],
-    "typer": ["commands/"],
+    "typer": ["cli/"],
     "jax": ["vision/network"],
     "optax": ["vision/network"],
     "numba": ["base/machine_code", "designs/vectorized"],
@@ -133,19 +133,19 @@ def test_no_test_module_imports_another() -> None:
     ("file", "text"),
     [
         ("metrics/separation.py", "from ..study import load_study"),
-        ("camera/pixel.py", "def late():\n    from ..commands.app import main"),
-        ("curves/builtin/led.py", "from ...designs import family"),
+        ("camera/pixel.py", "def late():\n    from ..cli.app import main"),
+        ("spectra/builtin/led.py", "from ...designs import family"),
         ("camera/effects/blur.py", "from ... import metrics"),
         ("study/load.py", "from .. import base, run"),
-        ("study/load.py", "from . import model\nfrom .. import commands as verbs"),
-        ("base/errors.py", "import sweep.commands.app"),
-        ("base/errors.py", "from sweep import commands"),
+        ("study/load.py", "from . import model\nfrom .. import cli as verbs"),
+        ("base/errors.py", "import sweep.cli.app"),
+        ("base/errors.py", "from sweep import cli"),
         ("metrics/evaluate.py", "import nlopt"),
         ("search/limit.py", "import nlopt"),
         ("stray.py", ""),
         ("stray/inner.py", "x = 1"),
-        ("commands/app.py", "from .. import stray"),
-        ("__init__.py", "from .commands.app import main"),
+        ("cli/app.py", "from .. import stray"),
+        ("__init__.py", "from .cli.app import main"),
         ("__init__.py", "from . import base"),
     ],
 )

@@ -31,7 +31,7 @@ def _command(
     os.environ.clear()
     os.environ.update(environment)
     sys.argv = ["sweep", *arguments]
-    from sweep.commands.start import start
+    from sweep.cli.start import start
     from sweep.report import page
 
     if not drawn:

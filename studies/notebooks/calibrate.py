@@ -13,7 +13,7 @@
 # %%
 """Fit the built-in surrogate curves to the printed figures, and compare with the shipped ones.
 
-The shipped parameters (sweep/curves/builtin/surrogate.yaml) are those of an earlier fit of the same model. A fit from
+The shipped parameters (sweep/spectra/builtin/surrogate.yaml) are those of an earlier fit of the same model. A fit from
 the prior's mean does not reach them: its cost is 162, theirs 135; QE differs by up to 0.24, a red spectrum by 70 % of
 its peak. The best of four starts costs 132 (0.06, 8 %). All three meet all 49 figures, which leave much of it open.
 """
@@ -39,16 +39,16 @@ from sweep.camera.pixel import Pixel
 from sweep.camera.scene import Scene
 from sweep.camera.sensor import ar0820_sensor
 from sweep.camera.setup import Setup
-from sweep.curves import builtin
-from sweep.curves.builtin.data_sets.tl16 import SIGNAL_TYPES, tl16
-from sweep.curves.builtin.surrogate import SurrogateParameters, parameter_tree
-from sweep.curves.color import REGIONS, chromaticity
-from sweep.curves.lights import class_pairs
-from sweep.curves.spectrum import WavelengthGrid
 from sweep.designs.families.stopband import Stopband
 from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.separation import csd_name, separations
 from sweep.metrics.smooth import smooth_response
+from sweep.spectra import builtin
+from sweep.spectra.builtin.data_sets.tl16 import SIGNAL_TYPES, tl16
+from sweep.spectra.builtin.surrogate import SurrogateParameters, parameter_tree
+from sweep.spectra.color import REGIONS, chromaticity
+from sweep.spectra.lights import class_pairs
+from sweep.spectra.spectrum import WavelengthGrid
 
 GRID = WavelengthGrid()
 PRIOR, SHIPPED = parameter_tree("prior"), parameter_tree("surrogate")
@@ -58,7 +58,7 @@ CSDS = [csd_name(pair) for pair in class_pairs(SIGNAL_TYPES)]
 
 # %% [markdown]
 # ## What may move, and how far
-# The prior's mean is `sweep/curves/builtin/prior.yaml`, which says where it comes from. Here, by the last key of a
+# The prior's mean is `sweep/spectra/builtin/prior.yaml`, which says where it comes from. Here, by the last key of a
 # parameter: the prior's standard deviation, and half the width of the bounds, which keep curves physical. Widths and
 # decay lengths follow the spread of measured LEDs and of published dye filters.
 

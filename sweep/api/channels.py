@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import DataError, Fault
-from ..curves.facts import Curve, qe_scale
-from ..curves.filter_files import HINTS
-from ..curves.light_files import MOST_LETTERS, clean_curves
+from ..spectra.facts import Curve, qe_scale
+from ..spectra.filter_files import HINTS
+from ..spectra.light_files import MOST_LETTERS, clean_curves
 
 _WORDS = {
     "red": "R",

@@ -12,11 +12,11 @@ from ..base.errors import DataError, Fault, nearest
 from ..base.types import FloatArray
 from ..camera.mosaic import Mosaic
 from ..camera.sensor import SensorCurves
-from ..curves import LightUnit
-from ..curves.facts import qe_scale
-from ..curves.files import read_curves
-from ..curves.lights import Lights
-from ..curves.spectrum import Curves
+from ..spectra import LightUnit
+from ..spectra.facts import qe_scale
+from ..spectra.files import read_curves
+from ..spectra.lights import Lights
+from ..spectra.spectrum import Curves
 from .channels import NEW, Layout, layout_of, sensor_file
 from .filter_evaluation import (
     PLAIN_TILE,

@@ -13,13 +13,13 @@ from ..base.errors import DataError, Fault
 from ..base.types import FloatArray
 from ..camera.exposure import may_set_exposure
 from ..camera.mosaic import Mosaic
-from ..curves.lights import Pair, class_pairs
 from ..designs.technology import Technology
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY, reference_of
 from ..metrics.quantity import Column, Columns
 from ..metrics.separation import csd_name
 from ..metrics.smooth import smooth_csd
 from ..search.limit import gap_between
+from ..spectra.lights import Pair, class_pairs
 from ..study import Study
 from .loading import CurveSource, make_study
 from .user_filters import (

@@ -10,8 +10,8 @@ import numpy as np
 
 from ..base.errors import DataError, Fault
 from ..base.types import FloatArray
-from ..curves import files
-from ..curves.spectrum import Curves, WavelengthGrid, check_samples, resample
+from ..spectra import files
+from ..spectra.spectrum import Curves, WavelengthGrid, check_samples, resample
 
 if TYPE_CHECKING:
     import pandas as pd

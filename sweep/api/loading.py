@@ -13,9 +13,9 @@ from pydantic import BaseModel
 from .. import study as studies_of_files
 from ..base.disk import is_file
 from ..base.errors import DataError, Fault
-from ..curves import LightUnit
-from ..curves.light_files import lights_file
-from ..curves.spectrum import Curves
+from ..spectra import LightUnit
+from ..spectra.light_files import lights_file
+from ..spectra.spectrum import Curves
 from ..study.shipped import shipped_names, study_path
 from .channels import sensor_file
 from .inline_curves import CurveLike, table_to_curves, to_curves

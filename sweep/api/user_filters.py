@@ -13,7 +13,6 @@ from ..base.types import FloatArray
 from ..camera.exposure import leaves_exposure
 from ..camera.forward import forward_model
 from ..camera.setup import Setup
-from ..curves.lights import class_pairs
 from ..designs.families.stopband import Stopband
 from ..designs.family import Family
 from ..metrics.bound import FEASIBLE, Bound, total_violation
@@ -23,6 +22,7 @@ from ..metrics.objective import COMBINED
 from ..metrics.quantity import WORST, YIELD, Column, Columns
 from ..search.limit import Limit, limit_of, why_not
 from ..search.problem import Problem
+from ..spectra.lights import class_pairs
 from ..study import Study
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..base.types import FloatArray
-from ..curves.spectrum import WavelengthGrid
 from ..designs.technology import Technology, index_of
+from ..spectra.spectrum import WavelengthGrid
 from .mosaic import Mosaic
 from .pixel import Pixel
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.types import FloatArray
-from ..curves.color import luminance_per_photon_radiance
+from ..spectra.color import luminance_per_photon_radiance
 from .own_effects import Irradiance
 from .pixel import irradiance_factor
 from .scene import Scene

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..base.cache import Cache
 from ..base.types import FloatArray, IndexArray
-from ..curves.spectrum import hats
+from ..spectra.spectrum import hats
 from . import disc_image, psf, sampling
 from .field import field_heights, over_field
 from .irradiance import way_of_light

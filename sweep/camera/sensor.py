@@ -9,10 +9,10 @@ import numpy as np
 
 from ..base.errors import DataError, Fault, nearest
 from ..base.types import FloatArray
-from ..curves.builtin.ar0820 import ar0820
-from ..curves.builtin.surrogate import SurrogateParameters, surrogate_parameters
-from ..curves.spectrum import WavelengthGrid
 from ..designs.technology import Technology
+from ..spectra.builtin.ar0820 import ar0820
+from ..spectra.builtin.surrogate import SurrogateParameters, surrogate_parameters
+from ..spectra.spectrum import WavelengthGrid
 from .mosaic import Mosaic
 
 _LEAST_QE = 1e-9

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ..base.types import IndexArray
-from ..curves.lights import Lights
-from ..curves.tasks import StudyTasks
+from ..spectra.lights import Lights
+from ..spectra.tasks import StudyTasks
 from .accuracy import STANDARD, Accuracy
 from .camera import Camera
 from .own_effects import OwnEffect

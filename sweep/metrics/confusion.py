@@ -14,7 +14,7 @@ import numpy as np
 
 from ..base.types import FloatArray, IndexArray
 from ..camera.pixel import Pixel
-from ..curves.lights import class_pairs
+from ..spectra.lights import class_pairs
 
 FLOOR = 1e-18
 """What tails that are left out may add to an error or to its bound."""

@@ -18,7 +18,7 @@ import numpy as np
 from ..base.types import BoolArray, FloatArray, IndexArray
 from ..camera.noise.gaussian import share_below
 from ..camera.readout import NoisyReadout
-from ..curves.lights import Pair, class_pairs
+from ..spectra.lights import Pair, class_pairs
 from .separation import pair_blocks
 
 _Both = tuple[IndexArray, IndexArray]

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.types import FloatArray, IndexArray
-from ..curves.lights import Pair
-from ..curves.members import Members
 from ..designs.tolerance import Off, Tolerance
+from ..spectra.lights import Pair
+from ..spectra.members import Members
 from .members import PopulationImager
 from .separation import csd_name
 

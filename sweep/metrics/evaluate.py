@@ -13,9 +13,9 @@ from ..camera.field import field_heights, refined_heights, setup_at
 from ..camera.forward import ForwardModel, forward_model
 from ..camera.phases import Phases, fine_lattice, refined_minima
 from ..camera.setup import Setup
-from ..curves.lights import class_pairs
 from ..designs.block import Block, CurveBlock
 from ..designs.family import Family
+from ..spectra.lights import class_pairs
 from ..vision.section import Vision
 from .columns.color_separation import ColorSeparation
 from .columns.exposure import EXPOSURE

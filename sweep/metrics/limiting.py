@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from ..base.types import FloatArray, IndexArray
 from ..camera.forward import ForwardModel
 from ..camera.setup import Setup
-from ..curves.lights import Pair, class_pairs, pair_name
 from ..designs.block import Block
+from ..spectra.lights import Pair, class_pairs, pair_name
 
 BETWEEN = " / "
 LimitingLights = Mapping[Pair, NDArray[np.object_]]

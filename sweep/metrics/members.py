@@ -20,8 +20,8 @@ from ..base.cache import Cache
 from ..base.types import FloatArray, IndexArray
 from ..camera.linear import LinearModel, linear_model
 from ..camera.setup import Setup
-from ..curves.lights import Pair, class_pairs
-from ..curves.members import Members
+from ..spectra.lights import Pair, class_pairs
+from ..spectra.members import Members
 from .separation import csd_name
 
 _HELD = 4_000_000

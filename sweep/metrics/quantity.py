@@ -14,10 +14,10 @@ from ..base.types import FloatArray, IndexArray
 from ..camera.forward import ForwardModel
 from ..camera.readout import NoisyReadout
 from ..camera.setup import Setup
-from ..curves.lights import Pair
-from ..curves.tasks import TaskName
 from ..designs.block import Block
 from ..designs.family import Family
+from ..spectra.lights import Pair
+from ..spectra.tasks import TaskName
 from ..vision.section import Vision
 from .own import OwnMetric
 from .smooth import Rows, SmoothDesign

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.cache import Cache
 from ..base.types import BoolArray, FloatArray, IndexArray
-from ..curves.lights import Pair, class_pairs, pair_name
+from ..spectra.lights import Pair, class_pairs, pair_name
 
 _BLOCK_PAIRS = 262_144
 """Pair distances held at once per channel: 2 MiB, so that a block stays in cache."""

@@ -12,8 +12,8 @@ import numpy as np
 from ..base.types import FloatArray, IndexArray
 from ..camera.linear import LinearModel, linear_model
 from ..camera.setup import Setup
-from ..curves.lights import Pair
 from ..designs.family import Family
+from ..spectra.lights import Pair
 from ..vision.section import SeededVision
 from .separation import separation
 

@@ -14,7 +14,7 @@ import numpy as np
 from ..base.types import FloatArray
 from ..camera.linear import linear_model
 from ..camera.setup import Setup
-from ..curves.lights import Pair, class_pairs
+from ..spectra.lights import Pair, class_pairs
 from .discrimination import detectability
 from .smooth import Rows, SmoothDesign
 from .tasks.colorimetry import COMPLEX_STEP, Smooth, root

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from ..curves.color import NORM_NAMES
 from ..metrics.quantity import DN, WORST, WORST_CASE
 from ..metrics.share import told_share
 from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN
+from ..spectra.color import NORM_NAMES
 from .figures import Drawing, panel_grid
 from .leaders import Row, capital, full_name, label, leaders_of
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from ..base.types import FloatArray
 from ..camera.mosaic import Mosaic
-from ..curves.color import display_colors
 from ..metrics.limiting import BETWEEN, limited_by_name
 from ..results.output import Output
+from ..spectra.color import display_colors
 from .figures import CURVE_COLORS, TYPE_COLORS, decorate, empty_figure
 from .leaders import label
 from .values import modifications

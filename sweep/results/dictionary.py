@@ -8,10 +8,10 @@ from typing import get_args
 
 import pyarrow as pa
 
-from ..curves.tasks import Measure, TaskName
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY, reference_of
 from ..metrics.quantity import DN, Asked, Column
 from ..metrics.registry import listed
+from ..spectra.tasks import Measure, TaskName
 from . import tables as files
 from .curves import SCHEMA
 from .thinning import MOST_POINTS

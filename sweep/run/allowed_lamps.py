@@ -13,9 +13,9 @@ import pyarrow as pa
 from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..camera.forward import ForwardModel
 from ..camera.setup import Setup
-from ..curves.lights import Lights
-from ..curves.single_leds import Norm, SingleLeds, every_led
 from ..results.designs import few_rows, row_curves
+from ..spectra.lights import Lights
+from ..spectra.single_leds import Norm, SingleLeds, every_led
 from ..study import Study
 from .workers import tracked
 

@@ -10,9 +10,9 @@ import numpy as np
 import pyarrow as pa
 
 from ..base.types import FloatArray
-from ..curves.tasks import Chart, StudyTasks
 from ..results.designs import few_rows, row_curves
 from ..results.tables import CHART, NIGHT
+from ..spectra.tasks import Chart, StudyTasks
 from ..study import Study
 
 if TYPE_CHECKING:
@@ -88,10 +88,10 @@ def rendered_table(study: Study, highlights: pd.DataFrame) -> pa.Table:
     pyarrow.Table
         One row per design, picture and area; those of the eye itself have no design.
     """
-    from ..curves.builtin.task_sets import NIGHT_LIGHT, NIGHT_LX, night_scene  # noqa: PLC0415  (few studies have tasks)
-    from ..curves.color import color_matching  # noqa: PLC0415
-    from ..curves.spectrum import energy_from_photons  # noqa: PLC0415
     from ..metrics.tasks.judge import rendered_areas  # noqa: PLC0415
+    from ..spectra.builtin.task_sets import NIGHT_LIGHT, NIGHT_LX, night_scene  # noqa: PLC0415  (few studies have tasks)
+    from ..spectra.color import color_matching  # noqa: PLC0415
+    from ..spectra.spectrum import energy_from_photons  # noqa: PLC0415
 
     tasks = study.tasks
     assert tasks is not None

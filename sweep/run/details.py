@@ -13,7 +13,6 @@ from ..base.types import FloatArray, IndexArray, Parallel, Progress, delayed
 from ..camera.field import over_field, scene_at
 from ..camera.forward import AllPhases, ForwardModel, forward_model
 from ..camera.setup import Setup
-from ..curves.lights import Pair
 from ..designs.block import CurveBlock, edges_of_some
 from ..designs.space import Space
 from ..metrics.limiting import LimitingLights, limited_by_name, limiting_lights, limiting_lights_of
@@ -22,6 +21,7 @@ from ..metrics.separation import csd_name, separations
 from ..metrics.smooth import smooth_response
 from ..results.designs import computed_rows, few_rows, row_curves
 from ..results.tables import FEW, FOUND, LIMITED_BY, POINTS, RECOGNITION
+from ..spectra.lights import Pair
 from ..study import Study
 from .workers import tracked
 

@@ -12,7 +12,6 @@ import pyarrow as pa
 from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..camera.forward import forward_model
 from ..camera.setup import Setup
-from ..curves.lights import class_pairs
 from ..metrics.evaluate import evaluate
 from ..metrics.objective import Objective
 from ..metrics.quantity import HELD_OUT, WORST_CASE
@@ -20,6 +19,7 @@ from ..metrics.separation import csd_name
 from ..results.designs import computed_rows, row_curves
 from ..search.problem import Evaluation, Problem, best_feasible, starting_points
 from ..search.solver import search_from, smooth_objective
+from ..spectra.lights import class_pairs
 from ..study import Search, Study
 from .workers import tracked
 

@@ -11,7 +11,6 @@ import pyarrow as pa
 
 from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..camera.setup import Setup
-from ..curves.lights import Pair
 from ..designs.space import Space
 from ..designs.tolerance import AS_DESIGNED, Off, Tolerance
 from ..metrics.drawn import draws_of
@@ -20,6 +19,7 @@ from ..metrics.separation import csd_name
 from ..metrics.share import share_interval
 from ..results.designs import few_rows, row_space
 from ..results.tables import PLAIN
+from ..spectra.lights import Pair
 from ..study import Study
 from .workers import tracked
 

@@ -13,12 +13,12 @@ import pyarrow as pa
 from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..camera.forward import ForwardModel
 from ..camera.setup import Setup
-from ..curves.lights import class_pairs, pair_name
 from ..metrics.columns.confusion import D_PRIME, STATE_ERROR
 from ..metrics.evaluate import evaluate
 from ..metrics.separation import csd_name
 from ..results.designs import few_rows, row_curves
 from ..results.tables import FOUND, VISION, VISION_CONDITIONS, VISION_MISREAD
+from ..spectra.lights import class_pairs, pair_name
 from ..study import Study
 from ..vision.images import setup_at
 from ..vision.readers import Answers, SeedReading, read_images

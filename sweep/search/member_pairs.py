@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.types import BoolArray, FloatArray, IndexArray
-from ..curves.population import Population
 from ..metrics.members import population_imager
+from ..spectra.population import Population
 from .problem import Problem
 from .produced import Distances, Produced, ways_of
 

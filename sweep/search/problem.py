@@ -9,7 +9,6 @@ import numpy as np
 
 from ..base.types import FloatArray, IndexArray
 from ..camera.setup import Setup
-from ..curves.lights import Pair
 from ..designs.family import Family
 from ..designs.tolerance import AS_DESIGNED, Off, Tolerance
 from ..metrics.bound import FEASIBLE, Bound
@@ -17,6 +16,7 @@ from ..metrics.objective import Objective
 from ..metrics.own import OwnMetric
 from ..metrics.quantity import DN, OF_A_SHARE, WORST_CASE, Asked, Quantity
 from ..metrics.registry import quantities_of
+from ..spectra.lights import Pair
 from ..vision.section import SeededVision
 
 

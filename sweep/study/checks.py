@@ -10,10 +10,10 @@ from ..camera import psf
 from ..camera.memory import MOST_BYTES, too_large
 from ..camera.mosaic import Mosaic
 from ..camera.scene import OBJECT_RESOLUTION, FixedExposure, Scene
-from ..curves.color import luminance_per_photon_radiance
-from ..curves.lights import Lights
 from ..metrics.quantity import Asked, Quantity
 from ..metrics.registry import listed, quantities_of
+from ..spectra.color import luminance_per_photon_radiance
+from ..spectra.lights import Lights
 from ..vision.section import FEWEST_LAMPS, MOST_BITS, MOST_READ_NOISE_DN, MOST_WELL_E, Vision
 from .model import Study
 from .schema import StudySection
@@ -132,7 +132,7 @@ def _check_regions(section: StudySection, sources: Sources) -> None:
             sources.add(("scenarios", name, "target", "phase_px"), problem, "any", "[column, row]")
     if sources.faults:
         return
-    from ..curves.single_leds import every_led  # noqa: PLC0415  (few studies ask for it)
+    from ..spectra.single_leds import every_led  # noqa: PLC0415  (few studies ask for it)
 
     leds = every_led(regions)
     for norm in regions.norms:

@@ -10,12 +10,12 @@ import numpy as np
 from ..base.errors import DataError
 from ..base.types import FloatArray
 from ..camera.pixel import unquantized
-from ..curves.builtin.registry import BUILT_IN_LIGHTS
-from ..curves.color import VISIBLE_NM
-from ..curves.files import is_curve_file
-from ..curves.light_files import lights_file
-from ..curves.lights import Lights, make_lights
-from ..curves.population import DRIFT_NM_PER_K
+from ..spectra.builtin.registry import BUILT_IN_LIGHTS
+from ..spectra.color import VISIBLE_NM
+from ..spectra.files import is_curve_file
+from ..spectra.light_files import lights_file
+from ..spectra.lights import Lights, make_lights
+from ..spectra.population import DRIFT_NM_PER_K
 from .document import KeyPath
 from .model import Study
 from .schema import MOST_TYPES, StudySection
@@ -189,7 +189,7 @@ def with_population(lights: Lights, section: StudySection, sources: Sources) -> 
     population, at = section.population, ("population",)
     if population is None:
         return lights
-    from ..curves.members import spans_nm  # noqa: PLC0415  (only where lights have a population)
+    from ..spectra.members import spans_nm  # noqa: PLC0415  (only where lights have a population)
 
     known = [*lights.classes, *lights.names]
     for key, names in population.names.items():
@@ -238,7 +238,7 @@ def check_range(study: Study, sources: Sources) -> None:
     """
     if study.lights.population is None:
         return
-    from ..curves.members import Members  # noqa: PLC0415  (only where lights have a population)
+    from ..spectra.members import Members  # noqa: PLC0415  (only where lights have a population)
 
     lights = Members(study.lights, study.grid).lights
     for name in study.scenarios:

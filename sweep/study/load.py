@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from ..base.disk import is_folder
 from ..base.errors import Fault, StudyError
-from ..curves.spectrum import Curves, WavelengthGrid
+from ..spectra.spectrum import Curves, WavelengthGrid
 from .document import Document
 from .model import Study
 from .resolve import resolve

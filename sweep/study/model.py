@@ -17,9 +17,6 @@ from ..camera.plan import Plan, plan_scene
 from ..camera.scene import Geometry, Scene
 from ..camera.sensor import SensorCurves
 from ..camera.setup import Setup
-from ..curves.lights import Lights, Pair, class_pairs
-from ..curves.spectrum import WavelengthGrid
-from ..curves.tasks import StudyTasks
 from ..designs.space import Space
 from ..designs.technology import Technology
 from ..designs.tolerance import Tolerance
@@ -29,6 +26,9 @@ from ..metrics.own import OwnMetric
 from ..metrics.quantity import Asked, Quantity
 from ..metrics.separation import csd_name
 from ..search.problem import Problem
+from ..spectra.lights import Lights, Pair, class_pairs
+from ..spectra.spectrum import WavelengthGrid
+from ..spectra.tasks import StudyTasks
 from ..vision.section import SeededVision
 from .schema import StudySection
 

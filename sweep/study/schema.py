@@ -11,14 +11,14 @@ from ..camera.accuracy import STANDARD, AccuracySection
 from ..camera.pixel import Pixel
 from ..camera.scene import Geometry, Scene
 from ..camera.sensor import BUILT_IN_SENSORS
-from ..curves.population import Population
-from ..curves.single_leds import RegionMap
-from ..curves.spectrum import WavelengthGrid
 from ..designs.registry import FamilyOptions, told
 from ..designs.technology import Stated
 from ..designs.tolerance import Tolerance
 from ..metrics.bound import Bound
 from ..metrics.objective import Objective
+from ..spectra.population import Population
+from ..spectra.single_leds import RegionMap
+from ..spectra.spectrum import WavelengthGrid
 from ..vision.section import Vision
 from .axes import ScenarioTemplate, Span, Values, expanded
 from .schema_curves import (

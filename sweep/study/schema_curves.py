@@ -9,11 +9,11 @@ from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, Tag, Wit
 
 from ..base.types import Ratio, Seconds, Section
 from ..camera.pixel import ReadNoise
-from ..curves.builtin.registry import BUILT_IN_LIGHTS
-from ..curves.spectrum import Outside, Resampling
-from ..curves.tasks import SHIPPED
-from ..curves.text_tables import MOST_CURVES
 from ..designs.technology import Stated
+from ..spectra.builtin.registry import BUILT_IN_LIGHTS
+from ..spectra.spectrum import Outside, Resampling
+from ..spectra.tasks import SHIPPED
+from ..spectra.text_tables import MOST_CURVES
 
 _MOST_TASKS = 20
 _MOST_CLASSES = 40

@@ -12,8 +12,8 @@ from ..base.types import FloatArray
 from ..camera.angular import too_steep
 from ..camera.sensor import BUILT_IN_SENSORS, SensorCurves, make_sensor
 from ..camera.sensor_field import PLACES, SensorField
-from ..curves.facts import NORMALIZED, looks_normalized
 from ..designs.space import Space
+from ..spectra.facts import NORMALIZED, looks_normalized
 from .document import KeyPath
 from .schema import StudySection
 from .schema_curves import CurveFile, SensorSection

@@ -13,11 +13,11 @@ from ..base.disk import is_file
 from ..base.errors import MOST_FAULTS, DataError, Fault, StudyError, SweepError, nearest
 from ..base.types import FloatArray
 from ..camera.sensor import SensorCurves
-from ..curves.builtin.surrogate import BUILT_IN_RANGE_NM
-from ..curves.files import digest, read_curves
-from ..curves.lens_files import ChiefRays, read_chief_rays
-from ..curves.lights import Lights
-from ..curves.spectrum import Curves, WavelengthGrid, photons_from_energy
+from ..spectra.builtin.surrogate import BUILT_IN_RANGE_NM
+from ..spectra.files import digest, read_curves
+from ..spectra.lens_files import ChiefRays, read_chief_rays
+from ..spectra.lights import Lights
+from ..spectra.spectrum import Curves, WavelengthGrid, photons_from_energy
 from .document import Document, KeyPath, by_line
 from .schema_curves import CurveFile, LightFile, TaskFile
 

@@ -11,13 +11,13 @@ from ..base.own_code import Offered, is_in_file, offers
 from ..base.types import FloatArray
 from ..camera.mosaic import Mosaic
 from ..camera.sensor import SensorCurves
-from ..curves.builtin.surrogate import surrogate_parameters
 from ..designs.family import Family, Parameter
 from ..designs.plugin import PluginFamily
 from ..designs.registry import FAMILIES, build_family
 from ..designs.space import Filter, Kind, Space
 from ..designs.technology import PIGMENT
 from ..designs.ungridded import Drawn, Method, Paired, Ungridded
+from ..spectra.builtin.surrogate import surrogate_parameters
 from .document import KeyPath
 from .schema import DesignSection, Modification, StudySection, SweepSection
 from .sensors import check_filter

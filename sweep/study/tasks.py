@@ -10,10 +10,10 @@ from ..base.types import FloatArray
 from ..camera.pixel import Pixel, irradiance_factor
 from ..camera.scene import Scene
 from ..camera.sensor import SensorCurves
-from ..curves.builtin.task_sets import group, is_surface, separation_task, shipped, task_groups
-from ..curves.files import is_curve_file
-from ..curves.tasks import ILLUMINANTS, SHIPPED, Conditions, GriddedTask, StudyTasks
 from ..designs.space import Space
+from ..spectra.builtin.task_sets import group, is_surface, separation_task, shipped, task_groups
+from ..spectra.files import is_curve_file
+from ..spectra.tasks import ILLUMINANTS, SHIPPED, Conditions, GriddedTask, StudyTasks
 from .document import KeyPath
 from .schema import StudySection
 from .schema_curves import OwnTask, TaskFile, TasksSection

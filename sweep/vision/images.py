@@ -15,8 +15,8 @@ from ..camera.pixel import Pixel, irradiance_factor
 from ..camera.sampling import crosstalk_share, with_crosstalk
 from ..camera.scene import FixedExposure, Noise, Scene
 from ..camera.setup import Setup
-from ..curves.color import luminance_per_photon_radiance
-from ..curves.spectrum import hats
+from ..spectra.color import luminance_per_photon_radiance
+from ..spectra.spectrum import hats
 from .compiled_images import draw_numbers
 from .head import MARGIN, HeadMaps, head_maps
 from .materials import ambient_light, phantom, reflectance

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.errors import Fault, SweepError
 from ..base.types import FloatArray, IndexArray
-from ..curves.lights import Lights
+from ..spectra.lights import Lights
 from .section import Vision
 
 TRAIN, CHECK, TEST = "train", "check", "test"

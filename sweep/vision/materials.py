@@ -12,8 +12,8 @@ from functools import cache
 import numpy as np
 
 from ..base.types import FloatArray
-from ..curves.builtin.task_sets import group
-from ..curves.spectrum import WavelengthGrid
+from ..spectra.builtin.task_sets import group
+from ..spectra.spectrum import WavelengthGrid
 from .section import Illuminant, Material
 
 _ILLUMINANTS: dict[Illuminant, str] = {

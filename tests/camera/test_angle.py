@@ -16,10 +16,10 @@ from sweep.camera.plan import plan_scene
 from sweep.camera.scene import Scene
 from sweep.camera.sensor_field import SensorField
 from sweep.camera.setup import Setup
-from sweep.curves.spectrum import WavelengthGrid
 from sweep.designs.block import edges_of
 from sweep.designs.technology import Technology
 from sweep.metrics.evaluate import evaluate
+from sweep.spectra.spectrum import WavelengthGrid
 from sweep.study import load_study
 
 from ..cases import thinned

@@ -22,8 +22,8 @@ from sweep.camera.phases import lattice_px, scene_phases
 from sweep.camera.pixel import Pixel
 from sweep.camera.readout import draws_dn
 from sweep.camera.scene import Drive, FixedExposure, Scene, Target
-from sweep.curves.color import luminance_per_photon_radiance
-from sweep.curves.spectrum import LIGHT_M_S, PLANCK_J_S, WavelengthGrid, hats
+from sweep.spectra.color import luminance_per_photon_radiance
+from sweep.spectra.spectrum import LIGHT_M_S, PLANCK_J_S, WavelengthGrid, hats
 
 from ..hard.scenes import F2, FAR, NEAR, TILES, scene, target
 

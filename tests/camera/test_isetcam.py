@@ -24,8 +24,8 @@ from sweep.camera.plan import plan_scene
 from sweep.camera.psf import otf as transfer_function
 from sweep.camera.scene import FixedExposure, Scene
 from sweep.camera.setup import Setup
-from sweep.curves.lights import Lights
-from sweep.curves.spectrum import WavelengthGrid
+from sweep.spectra.lights import Lights
+from sweep.spectra.spectrum import WavelengthGrid
 
 from ..conftest import SHARED, needs_reference
 

@@ -12,9 +12,9 @@ import pytest
 from sweep.camera.accuracy import STANDARD
 from sweep.camera.forward import ForwardModel
 from sweep.camera.phases import read_at
-from sweep.curves.lights import class_pairs
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.separation import csd_name, separations
+from sweep.spectra.lights import class_pairs
 
 from ..hard.scenes import TILES, DesignScene, scene, target
 

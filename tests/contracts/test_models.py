@@ -19,12 +19,12 @@ from sweep.camera.pixel import Optics, Pixel, irradiance_factor
 from sweep.camera.readout import rounded
 from sweep.camera.scene import FixedExposure, Geometry, Scene
 from sweep.camera.setup import Setup
-from sweep.curves.lights import Lights
-from sweep.curves.spectrum import WavelengthGrid
 from sweep.designs.edge import SPAN_PER_WIDTH, edge, edge_gradient
 from sweep.designs.families.stopband import Stopband
 from sweep.metrics.pareto import non_dominated
 from sweep.metrics.separation import cfa_sensitivity, separation
+from sweep.spectra.lights import Lights
+from sweep.spectra.spectrum import WavelengthGrid
 
 
 @pytest.mark.parametrize(

@@ -15,8 +15,8 @@ import pytest
 from scipy.spatial.distance import cdist
 
 from sweep.camera.sensor import BUILT_IN_SENSORS
-from sweep.curves.builtin.registry import BUILT_IN_LIGHTS
-from sweep.curves.spectrum import WavelengthGrid
+from sweep.spectra.builtin.registry import BUILT_IN_LIGHTS
+from sweep.spectra.spectrum import WavelengthGrid
 
 from ..commanded import commanded
 
@@ -107,7 +107,7 @@ HELLO = '''\
 
 import typer
 
-from sweep.commands.options import OF_TOOL
+from sweep.cli.options import OF_TOOL
 
 PANEL = OF_TOOL
 
@@ -219,7 +219,7 @@ LAMPS = '''\
 
 import numpy as np
 
-from sweep.curves.lights import make_lights
+from sweep.spectra.lights import make_lights
 
 
 def lights(grid):
@@ -233,7 +233,7 @@ ROOM = """\
 import sys, {package} as room
 room.__path__.append(sys.argv.pop(1))
 {drawings}
-from sweep.commands.app import main
+from sweep.cli.app import main
 main()
 """
 NO_DRAWINGS = "import sweep.report.page; sweep.report.page._drawings = lambda _: ()"
@@ -272,9 +272,9 @@ def test_a_family_is_one_new_file(tmp_path: Path) -> None:
 def test_a_command_is_one_new_file(tmp_path: Path) -> None:
     file = tmp_path / "hello.py"
     file.write_text(HELLO)
-    done = with_file("sweep.commands.verbs", file, "hello", "world", drawn=True)
+    done = with_file("sweep.cli.commands", file, "hello", "world", drawn=True)
     assert (done.returncode, done.stdout, done.stderr) == (0, "Hello, world.\n", "")
-    assert " hello " in with_file("sweep.commands.verbs", file, "--help", drawn=True).stdout
+    assert " hello " in with_file("sweep.cli.commands", file, "--help", drawn=True).stdout
 
 
 def run_with(tmp_path: Path, package: str, file: str, program: str, study: str, *more: str) -> Path:
@@ -341,7 +341,7 @@ def test_an_objective_rule_is_one_new_file(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_data_set_is_one_new_file(tmp_path: Path) -> None:
     study = "study: lamps\nsensor: ar0820\nlights: lamps\ncfas: [RGGB]\n"
-    folder = run_with(tmp_path, "sweep.curves.builtin.data_sets", "lamps.py", LAMPS, study)
+    folder = run_with(tmp_path, "sweep.spectra.builtin.data_sets", "lamps.py", LAMPS, study)
     (row,) = pd.read_parquet(folder / "results.parquet").to_dict("records")
     points = pd.read_parquet(folder / "points.parquet").pivot_table(index="signal_type", columns="channel", values="dn")
     apart = np.linalg.norm(points.loc["yellow"] - points.loc["red"])

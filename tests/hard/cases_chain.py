@@ -16,11 +16,11 @@ from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
 from sweep.camera.scene import FixedExposure, Scene
 from sweep.camera.setup import Setup
-from sweep.curves.lights import Lights
-from sweep.curves.spectrum import WavelengthGrid
 from sweep.designs.families.stopband import Stopband
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.smooth import smooth_csd, smooth_response
+from sweep.spectra.lights import Lights
+from sweep.spectra.spectrum import WavelengthGrid
 
 from .registry import EPS, Result, hard_case, outcome, relative, worst
 

@@ -13,13 +13,13 @@ from scipy.io import savemat
 
 from sweep.base.errors import DataError, StudyError, SweepError
 from sweep.camera.sensor import make_sensor
-from sweep.curves.files import read_curves
-from sweep.curves.lights import make_lights
-from sweep.curves.spectrum import WavelengthGrid, check_samples, resample
 from sweep.designs.edge import edge, edge_gradient
 from sweep.designs.families.dual import Dual
 from sweep.designs.families.stopband import Stopband
 from sweep.metrics.bound import FEASIBLE
+from sweep.spectra.files import read_curves
+from sweep.spectra.lights import make_lights
+from sweep.spectra.spectrum import WavelengthGrid, check_samples, resample
 from sweep.study import load_study
 
 from .registry import EPS, Result, hard_case, outcome, refused, worst

@@ -14,9 +14,9 @@ from sweep.camera.pixel import Pixel
 from sweep.camera.readout import draws_dn
 from sweep.camera.scene import Scene
 from sweep.camera.setup import Setup
-from sweep.curves.lights import Lights
-from sweep.curves.spectrum import WavelengthGrid
 from sweep.metrics.evaluate import evaluate
+from sweep.spectra.lights import Lights
+from sweep.spectra.spectrum import WavelengthGrid
 
 from .registry import EPS, Result, hard_case, outcome, worst
 

@@ -16,7 +16,6 @@ from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
 from sweep.camera.scene import Scene
 from sweep.camera.setup import Setup
-from sweep.curves.lights import class_pairs
 from sweep.designs.families.dual import Dual
 from sweep.designs.families.stopband import MultiStopband
 from sweep.designs.family import Family
@@ -25,6 +24,7 @@ from sweep.designs.tolerance import SHIFTS, Off
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.quantity import WORST
 from sweep.metrics.separation import csd_name
+from sweep.spectra.lights import class_pairs
 
 from .scenes import FAMILY, GRID, SENSOR, TILES, csd_columns, lights, moving, target
 

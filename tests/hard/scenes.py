@@ -17,14 +17,14 @@ from sweep.camera.pixel import Pixel
 from sweep.camera.scene import Scene
 from sweep.camera.sensor import BUILT_IN_SENSORS
 from sweep.camera.setup import Setup
-from sweep.curves.builtin.registry import BUILT_IN_LIGHTS
-from sweep.curves.lights import Lights
-from sweep.curves.spectrum import WavelengthGrid
 from sweep.designs.families.stopband import Stopband
 from sweep.designs.technology import Interference, Technology
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.quantity import Asked
 from sweep.metrics.registry import quantities_of
+from sweep.spectra.builtin.registry import BUILT_IN_LIGHTS
+from sweep.spectra.lights import Lights
+from sweep.spectra.spectrum import WavelengthGrid
 
 GRID, FINE = WavelengthGrid(step_nm=5), WavelengthGrid(step_nm=1)
 SENSOR = BUILT_IN_SENSORS["ar0820"](GRID)

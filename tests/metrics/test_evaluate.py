@@ -16,12 +16,12 @@ from sweep.camera.scene import FixedExposure, Scene, WhitePatchExposure
 from sweep.camera.sensor import BUILT_IN_SENSORS
 from sweep.camera.sensor_field import SensorField
 from sweep.camera.setup import Setup
-from sweep.curves.builtin.registry import BUILT_IN_LIGHTS
-from sweep.curves.spectrum import WavelengthGrid
 from sweep.designs.families.stopband import Stopband
 from sweep.metrics.columns.sensitivity import sensitivities_gradient
 from sweep.metrics.evaluate import designed_quantities, evaluate
 from sweep.metrics.smooth import smooth_response
+from sweep.spectra.builtin.registry import BUILT_IN_LIGHTS
+from sweep.spectra.spectrum import WavelengthGrid
 
 from ..rounding import gamma
 

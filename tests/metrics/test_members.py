@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from sweep.curves.members import Members
-from sweep.curves.population import Population
 from sweep.metrics.members import population_imager
+from sweep.spectra.members import Members
+from sweep.spectra.population import Population
 from sweep.study import load_study
 
 from ..cases import thinned
@@ -193,7 +193,7 @@ def test_without_a_population_nothing_of_it_is_imported() -> None:
     code = (
         "import sys\n"
         "import sweep\n"
-        "import sweep.commands.audit, sweep.run.runner, sweep.search.solver\n"
+        "import sweep.cli.audit, sweep.run.runner, sweep.search.solver\n"
         f"study = sweep.load_study({str(STUDIES / 'stopband.yaml')!r})\n"
         "study.evaluate()\n"
         "own = [name for name in sys.modules if name.startswith('sweep.') and ('member' in name or 'robustness' in name)]\n"

@@ -14,12 +14,12 @@ import sweep
 from sweep.base.errors import StudyError
 from sweep.camera.forward import AllPhases, ForwardModel
 from sweep.camera.readout import draws_dn
-from sweep.curves.lights import Lights
 from sweep.metrics.columns.confusion import D_PRIME, ERROR, STATE_ERROR
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.recognition import DECIDERS, MOST_LIKELY, recognize
 from sweep.report import make_report, read_output, summary_lines
 from sweep.run import run_study
+from sweep.spectra.lights import Lights
 from sweep.study import load_study
 
 from ..hard.scenes import DARK, F2, FAR, FIXED, DesignScene, scene

@@ -18,8 +18,6 @@ from scipy.stats import norm
 
 from sweep.camera.linear import linear_model
 from sweep.camera.setup import Setup
-from sweep.curves.builtin.task_sets import group, separation_task, shipped
-from sweep.curves.tasks import SHIPPED, Conditions, StudyTasks
 from sweep.designs.block import CurveBlock
 from sweep.metrics.discrimination import detectability, pairwise_error
 from sweep.metrics.evaluate import designed_quantities
@@ -37,6 +35,8 @@ from sweep.metrics.tasks.color import (
 )
 from sweep.metrics.tasks.colorimetry import delta_e_2000, lab
 from sweep.metrics.tasks.judge import pair_errors
+from sweep.spectra.builtin.task_sets import group, separation_task, shipped
+from sweep.spectra.tasks import SHIPPED, Conditions, StudyTasks
 from sweep.study.load import study_of_keys
 
 KEYS = {

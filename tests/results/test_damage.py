@@ -16,7 +16,7 @@ import pandas as pd
 import pytest
 
 from sweep.base.errors import OutputError
-from sweep.commands.status import status_of
+from sweep.cli.status import status_of
 from sweep.report import make_report, read_output
 from sweep.results.inventory import Inventory
 from sweep.results.parts import PARTS, Parts

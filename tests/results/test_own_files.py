@@ -13,8 +13,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from sweep.base.errors import OutputError
-from sweep.commands.audit import audit_output
-from sweep.commands.status import status_of
+from sweep.cli.audit import audit_output
+from sweep.cli.status import status_of
 from sweep.report import make_report, read_output
 from sweep.results.inventory import Inventory
 from sweep.results.lock import LOCK, locked

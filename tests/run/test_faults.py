@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from sweep.base.errors import FailedDesignError, OutputError, SweepError
-from sweep.commands.status import status_of
+from sweep.cli.status import status_of
 from sweep.report import make_report, read_output
 from sweep.results.identity import CHUNK
 from sweep.results.lock import locked

@@ -34,7 +34,7 @@ def stop(phase, done, total):
 run_study(load_study(Path(sys.argv[1])), Path(sys.argv[2]) / "tiny", 1, stop)
 """
 CONTINUED = f"""{HIDDEN}
-from sweep.commands.start import start
+from sweep.cli.start import start
 sys.argv = ["sweep", "run", sys.argv[1], "--output", sys.argv[2], "--jobs", "1"]
 start()
 """

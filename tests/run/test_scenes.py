@@ -7,7 +7,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from sweep.commands.audit import audit_output, audit_rows, sampled
+from sweep.cli.audit import audit_output, audit_rows, sampled
 from sweep.report import make_report, read_output
 from sweep.run import run_study
 from sweep.study import Study, load_study

@@ -13,8 +13,6 @@ import pytest
 
 from sweep.base.errors import SweepError
 from sweep.camera.scene import FixedExposure, Scene
-from sweep.curves.lights import Lights
-from sweep.curves.population import Population
 from sweep.designs.families.stopband import Stopband
 from sweep.metrics.bound import FEASIBLE, Bound, total_violation
 from sweep.metrics.evaluate import designed_quantities
@@ -27,6 +25,8 @@ from sweep.search.gradients import Model
 from sweep.search.limit import _relaxed, limit_of, why_not
 from sweep.search.problem import Problem, SearchRun, starting_points
 from sweep.search.trade_off import check_proof
+from sweep.spectra.lights import Lights
+from sweep.spectra.population import Population
 
 from ..cases import thinned
 from .problems import PROBLEM, STUDY, best_of, csd_of, feasible_filters, noisy_problem, problem_of

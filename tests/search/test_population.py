@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from sweep.api.user_filters import evaluate_curves
-from sweep.curves.population import Population
 from sweep.designs.tolerance import Off
 from sweep.metrics.members import population_imager
 from sweep.metrics.objective import Objective
@@ -17,6 +16,7 @@ from sweep.metrics.smooth import smooth_csd
 from sweep.search.gradients import Model
 from sweep.search.limit import Limit, limit_of, why_not
 from sweep.search.problem import Problem, SearchRun, starting_points
+from sweep.spectra.population import Population
 from sweep.study import load_study
 
 from ..conftest import STUDIES

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from sweep.base.errors import BrokenProofError
-from sweep.commands.app import main
+from sweep.cli.app import main
 from sweep.designs.families.free_form import FreeForm
 from sweep.metrics.bound import FEASIBLE, Bound, total_violation
 from sweep.metrics.evaluate import designed_quantities

@@ -13,8 +13,8 @@ from typing import Any
 import jsonschema
 import pytest
 
-from sweep.commands.listing import list_lines, studies_of
-from sweep.commands.options import run_folders, study_files
+from sweep.cli.listing import list_lines, studies_of
+from sweep.cli.options import run_folders, study_files
 from sweep.study.document import Document
 from sweep.study.editors import SCHEMA_FILE, schema_text, study_schema
 
@@ -179,7 +179,7 @@ def test_completion_scripts_are_made_without_a_terminal(kind: str, word: str) ->
 
 
 def test_help_imports_nothing_heavy() -> None:
-    code = "import sys, sweep.commands.app\ntry: sweep.commands.app.app(['--help'])\nexcept SystemExit: pass\nprint(*sys.modules, file=sys.stderr)"
+    code = "import sys, sweep.cli.app\ntry: sweep.cli.app.app(['--help'])\nexcept SystemExit: pass\nprint(*sys.modules, file=sys.stderr)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     for command in ("run", "describe", "new", "list", "schema"):
         assert f" {command} " in done.stdout

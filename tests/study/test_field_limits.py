@@ -16,9 +16,9 @@ import pytest
 from ruamel.yaml import YAML
 
 from sweep.base.errors import StudyError
-from sweep.curves.color import chromaticity, color_matching, display_colors
-from sweep.curves.spectrum import WavelengthGrid
 from sweep.run.rows import Job, rules_of, run_job
+from sweep.spectra.color import chromaticity, color_matching, display_colors
+from sweep.spectra.spectrum import WavelengthGrid
 from sweep.study import Study, load_study
 from sweep.study.editors import study_schema
 

@@ -16,10 +16,10 @@ from ruamel.yaml import YAML
 from scipy.io import loadmat, savemat
 
 from sweep.base.errors import MOST_FAULTS, SweepError
-from sweep.commands.describe import described
-from sweep.curves.files import read_curves
+from sweep.cli.describe import described
 from sweep.run.rows import rules_of, run_job
 from sweep.run.sweep import Sweep
+from sweep.spectra.files import read_curves
 from sweep.study import Study, load_study
 
 from ..commanded import commanded

@@ -14,9 +14,9 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from sweep.base.errors import MOST_FAULTS, Fault, StudyError, SweepError, nearest
-from sweep.commands.listing import list_lines, studies_of
-from sweep.curves.text_tables import MOST_BYTES, MOST_CURVES, MOST_SAMPLES, MOST_VALUES
+from sweep.cli.listing import list_lines, studies_of
 from sweep.results.tables import RESOLVED
+from sweep.spectra.text_tables import MOST_BYTES, MOST_CURVES, MOST_SAMPLES, MOST_VALUES
 from sweep.study import load_study
 from sweep.study.document import MOST_DEPTH, Document, Tree
 from sweep.study.editors import study_schema

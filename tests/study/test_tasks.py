@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 from sweep.base.errors import OutputError, StudyError
-from sweep.curves.builtin import task_sets
-from sweep.curves.spectrum import Curves, WavelengthGrid
 from sweep.report import read_output, study_of
+from sweep.spectra.builtin import task_sets
+from sweep.spectra.spectrum import Curves, WavelengthGrid
 from sweep.study.load import load_study, study_of_keys
 
 from ..commanded import commanded
@@ -110,7 +110,7 @@ from sweep.metrics.evaluate import designed_quantities
 import numpy as np
 study = study_of_keys({"study": "x", "sensor": "ar0820", "lights": "tl16", "cfas": ["RGGB"]}, Path())
 designed_quantities(study.setup(study.spaces[0], "chart"), np.empty((1, 0, study.grid.size)))
-assert not {"sweep.study.tasks", "sweep.curves.builtin.spectra", "sweep.curves.builtin.task_sets"} & set(sys.modules)
+assert not {"sweep.study.tasks", "sweep.spectra.builtin.spectra", "sweep.spectra.builtin.task_sets"} & set(sys.modules)
 assert not any(name.startswith("task") or "delta" in name for name in study.quantities)
 """
     subprocess.run([sys.executable, "-c", script], check=True)

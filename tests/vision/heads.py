@@ -12,9 +12,9 @@ from sweep.camera.pixel import Pixel
 from sweep.camera.scene import Scene
 from sweep.camera.sensor import ar0820_sensor
 from sweep.camera.setup import Setup
-from sweep.curves.builtin.data_sets.tl16 import lights
-from sweep.curves.builtin.surrogate import surrogate_parameters
-from sweep.curves.spectrum import WavelengthGrid
+from sweep.spectra.builtin.data_sets.tl16 import lights
+from sweep.spectra.builtin.surrogate import surrogate_parameters
+from sweep.spectra.spectrum import WavelengthGrid
 from sweep.vision.section import Vision
 
 GRID = WavelengthGrid(step_nm=20)

@@ -17,9 +17,9 @@ from sweep.camera.noise import table
 from sweep.camera.readout import draws_dn
 from sweep.camera.sampling import Window, center_weights
 from sweep.camera.setup import READOUT
-from sweep.curves.builtin.spectra import shipped_groups
-from sweep.curves.color import luminance_per_photon_radiance
-from sweep.curves.spectrum import WavelengthGrid
+from sweep.spectra.builtin.spectra import shipped_groups
+from sweep.spectra.color import luminance_per_photon_radiance
+from sweep.spectra.spectrum import WavelengthGrid
 from sweep.vision.head import head_places_px
 from sweep.vision.images import HeadCamera, setup_at
 from sweep.vision.lamps import TEST, split_lamps

@@ -9,7 +9,7 @@ from pydantic import model_validator
 
 from ...base.errors import Fault, SweepError
 from ...base.types import FloatArray, Positive, Section
-from ...curves.spectrum import hats
+from ...spectra.spectrum import hats
 from ..family import Parameter
 from ..products import row_products
 from ..tolerance import AS_DESIGNED, Off

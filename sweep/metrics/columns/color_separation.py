@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 
 from ...base.types import FloatArray, IndexArray
-from ...curves.lights import class_pairs
+from ...spectra.lights import class_pairs
 from ..quantity import BEST_PLACE, DN, Asked, Columns, Quantity, ReadoutMetric
 from ..separation import csd_name, separations
 from ..smooth import SmoothDesign

@@ -10,7 +10,7 @@ import numpy as np
 from ...base.types import FloatArray, IndexArray
 from ...camera.forward import ForwardModel
 from ...camera.readout import NoisyReadout
-from ...curves.lights import Pair, class_pairs, pair_name
+from ...spectra.lights import Pair, class_pairs, pair_name
 from .. import confusion
 from ..discrimination import NoiseShape, contrast_to_noise, detectability, error_bounds, pairwise_error
 from ..quantity import Asked, Columns, NoiseMetric, Quantity

@@ -17,7 +17,7 @@ from ...base.types import FloatArray, IndexArray
 from ...camera.forward import ForwardModel
 from ...camera.noise.gaussian import share_below
 from ...camera.readout import NoisyReadout
-from ...curves.lights import class_pairs, pair_name
+from ...spectra.lights import class_pairs, pair_name
 from ..discrimination import NoiseShape
 from ..quantity import Asked, Columns, NoiseMetric, Quantity
 

@@ -6,8 +6,8 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from ...camera.setup import Setup
-from ...curves.tasks import Case
 from ...designs.block import Block
+from ...spectra.tasks import Case
 from ..quantity import Asked, Columns, DesignMetric, Quantity
 from ..smooth import Rows, SmoothDesign
 

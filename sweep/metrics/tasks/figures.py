@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from ...curves.tasks import Case, Measure, TaskName
+from ...spectra.tasks import Case, Measure, TaskName
 
 CSD, D_PRIME, ERROR = "csd", "dprime", "error"
 MEAN, MOST_95, MOST, SNR = "delta_e_mean", "delta_e_95", "delta_e_max", "snr"

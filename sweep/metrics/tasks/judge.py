@@ -13,9 +13,9 @@ import numpy as np
 from ...base.types import FloatArray
 from ...camera.noise.gaussian import share_below
 from ...camera.setup import Setup
-from ...curves.color import color_matching
-from ...curves.tasks import Case, Chart, Conditions, GriddedTask
 from ...designs.block import Block
+from ...spectra.color import color_matching
+from ...spectra.tasks import Case, Chart, Conditions, GriddedTask
 from ..quantity import Columns
 from ..smooth_noise import margin, squared_detectability
 from . import color

@@ -1,0 +1,58 @@
+"""The command line: every public function of a file in `commands` is a command."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import cache
+from importlib.metadata import version
+from inspect import isfunction
+from typing import Annotated, Any
+
+import typer
+
+from ..base.errors import EXIT_CODES
+from ..base.modules import files_in
+from . import commands
+from .endings import ends_in_lines
+from .options import PANELS
+
+app = typer.Typer(
+    name="sweep",
+    help="Sweeps and design-space exploration for color filter arrays that must tell traffic light colors apart.",
+    epilog="Exit codes: " + "; ".join(f"{code} {meaning}" for code, meaning in EXIT_CODES.items()) + ".",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"sweep {version('cfa-sweep')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _start(
+    context: typer.Context,
+    _: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Say the version, and end.")
+    ] = False,
+) -> None:
+    context.obj = time.monotonic()  # commands say how long they took
+
+
+for _module in sorted(files_in(commands), key=lambda module: PANELS.index(module.PANEL)):
+    for _name, _function in vars(_module).items():
+        if isfunction(_function) and _function.__module__ == _module.__name__ and not _name.startswith("_"):
+            app.command(_name.rstrip("_"), rich_help_panel=_module.PANEL)(_function)
+
+
+@cache
+def _parser() -> Callable[..., Any]:
+    return typer.main.get_command(app)
+
+
+def main() -> None:
+    """Run the command; what goes wrong is one line each on stderr and an exit code, 2 for a fault of the input."""
+    ends_in_lines(lambda: _parser()(prog_name="sweep", standalone_mode=False))

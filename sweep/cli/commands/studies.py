@@ -1,0 +1,171 @@
+"""Commands of studies."""
+
+from __future__ import annotations
+
+import math
+import time
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ...base.errors import Fault, InterruptedRunError, StudyError, SweepError
+from ...spectra import LightUnit
+from ..endings import say_faults
+from ..options import OF_STUDIES, AllowCode, Changes, DataFolder, Outputs, StudyPath, StudyPaths, changes_of
+from ..output import Json, Quiet, say
+
+PANEL = OF_STUDIES
+
+
+def check(study: StudyPath, data: DataFolder = None, changes: Changes = None, allow_code: AllowCode = False) -> None:
+    """Check a study file and count its designs, without running it."""
+    from ...study import load_study
+    from ...study.goals import likely_percents, out_of_reach
+
+    loaded = load_study(study, data, changes=changes_of(changes), allow_code=allow_code)
+    typer.echo(f"{study}: {loaded.n_designs:,} designs on {', '.join(loaded.mosaics)}; nothing wrong found.")
+    reach = [] if loaded.search is None else out_of_reach(loaded, loaded.search.space, loaded.search.scenario)
+    for warning in (*loaded.warnings, *likely_percents(loaded), *reach):
+        typer.echo(f"Note: {warning}.")
+
+
+def list_(
+    folder: Annotated[
+        str, typer.Argument(help="Folder of the studies; `data` lists the spectra of the package instead.")
+    ] = "studies",
+    data: DataFolder = None,
+    output: Outputs = Path("outputs"),
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """List the studies of a folder: question, number of designs, and whether they have been run.
+
+    `sweep list data` lists the spectra that the package ships; a folder of that name is `./data`.
+    """
+    from ..listing import data_facts, data_lines, list_facts, list_lines, studies_of
+
+    if folder == "data":
+        say(data_lines(), data_facts(), as_json=as_json, quiet=quiet)
+    else:
+        studies = studies_of(Path(folder), output, data)
+        say(list_lines(Path(folder), studies), list_facts(studies), as_json=as_json, quiet=quiet)
+
+
+def new(
+    name: Annotated[str, typer.Argument(help="Name of the study and of its file.", show_default=False)],
+    qe: Annotated[Path | None, typer.Option(help="A file of QE curves of a sensor.", show_default=False)] = None,
+    lights: Annotated[Path | None, typer.Option(help="A file of spectra of lights.", show_default=False)] = None,
+    pixel: Annotated[
+        Path | None, typer.Option(help="EMVA 1288 results (XML) of the sensor's pixel.", show_default=False)
+    ] = None,
+    quantity: Annotated[LightUnit, typer.Option(help="What the lights' numbers are.")] = "energy",
+    folder: Annotated[Path, typer.Option(help="Folder of the studies.")] = Path("studies"),
+    source: Annotated[
+        str | None, typer.Option("--from", help="A study, or the name of one, to begin with.", show_default=False)
+    ] = None,
+    copy: Annotated[
+        bool, typer.Option("--copy", help="Copy the files of curves beside the study, so that all can be moved.")
+    ] = False,
+) -> None:
+    """Write a commented study that runs as it is, for the built-in curves or for files of your own."""
+    from ...study.shipped import study_path
+    from ..new import copied, curve_files_of, new_study, study_from
+
+    if source is not None:
+        if qe or lights or pixel:
+            raise StudyError(Fault("a study that is copied has its own curves and pixel", key="--from", value=source))
+        begun = study_path(Path(source))
+        with copied((begun.parent / file, folder / file) for file in (curve_files_of(begun) if copy else ())):
+            lines = study_from(name, folder, begun)
+    elif copy:
+        with copied((file, folder / file.name) for file in (qe, lights) if file is not None):
+            qe, lights = (None if file is None else folder / file.name for file in (qe, lights))
+            lines = new_study(name, folder, qe, lights, quantity, pixel)
+    else:
+        lines = new_study(name, folder, qe, lights, quantity, pixel)
+    for line in lines:
+        typer.echo(line)
+
+
+def plan(
+    study: StudyPath,
+    data: DataFolder = None,
+    tolerance: Annotated[float | None, typer.Option(help="Tolerance of a CSD, DN.", show_default="the study's")] = None,
+    changes: Changes = None,
+    allow_code: AllowCode = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Say which effects each scene calls for, and why, without running it."""
+    from ...report.scenes import plan_facts, plan_lines
+    from ...study import load_study
+
+    if tolerance is not None and not 0 < tolerance < math.inf:
+        raise StudyError(f"--tolerance {tolerance:g}: must be above 0 DN, and finite")
+    loaded = load_study(study, data, changes=changes_of(changes), allow_code=allow_code)
+    planned = loaded.with_plans(tolerance)
+    notes = [f"Note: {warning}." for warning in loaded.warnings]
+    say([*notes, *plan_lines(planned)], plan_facts(planned), as_json=as_json, quiet=quiet)
+
+
+def run(
+    context: typer.Context,
+    studies: StudyPaths,
+    data: DataFolder = None,
+    output: Outputs = Path("outputs"),
+    jobs: Annotated[int | None, typer.Option(min=1, help="Workers.", show_default="all cores")] = None,
+    backend: Annotated[str, typer.Option(help="loky (processes), threading, or dask (a cluster).")] = "loky",
+    scheduler: Annotated[str | None, typer.Option(help="Of Dask: tcp://HOST:PORT.", show_default=False)] = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what is to do, and do nothing.")] = False,
+    fail_fast: Annotated[bool, typer.Option("--fail-fast", help="Stop at the first design that fails.")] = False,
+    retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Compute failed designs again.")] = False,
+    changes: Changes = None,
+    allow_code: AllowCode = False,
+    opens: Annotated[bool, typer.Option("--open", help="Open the report in the browser.")] = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Run studies one after the other: results, figures and report go to OUTPUT/<study>.
+
+    The same command continues an interrupted run, and replaces missing or damaged files.
+    Other files in the folder are kept; SHA256SUMS lists those of the run.
+    If one study cannot be run, the others are.
+    """
+    from ...run import RunOptions
+    from ..run import run_one
+
+    with_options = partial(
+        run_one,
+        data=data,
+        output=output,
+        jobs=jobs,
+        backend=backend,
+        scheduler=scheduler,
+        dry_run=dry_run,
+        options=RunOptions(fail_fast, retry_failed),
+        changes=changes_of(changes),
+        allow_code=allow_code,
+        opens=opens,
+        as_json=as_json,
+        quiet=quiet,
+    )
+    began_s, code = context.find_root().obj, 0
+    runs: list[dict[str, Any]] = []
+    for path in studies:
+        if len(studies) > 1 and not quiet:
+            typer.echo(f"== {path} ==", err=as_json)
+        try:
+            facts = with_options(path, began_s=began_s)
+        except InterruptedRunError:
+            raise
+        except SweepError as error:  # the others are run all the same
+            say_faults(error.faults)
+            code = max(code, error.exit_code)
+            facts = {"faults": [str(fault) for fault in error.faults], "exit_code": error.exit_code}
+        runs.append({"study": str(path), "exit_code": 0} | facts)
+        began_s = time.monotonic()
+    if as_json:
+        say((), {"runs": runs}, as_json=True)
+    return code

@@ -1,0 +1,236 @@
+"""A filter of a finished run: as CSV for who makes it, as other programs' files for who simulates with it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..base.errors import Fault, OutputError
+from ..base.types import FloatArray
+from ..report import Output, check_kept, read_output, study_of
+from ..results.atomic import write_bytes
+from ..results.designs import find_row, row_curves
+from ..spectra.filter_files import (
+    color_hints,
+    csv_text,
+    filter_names,
+    isetcam_mat,
+    rgb_weights,
+    speos_text,
+    unique_names,
+)
+from ..study import Study, folder_name
+from .options import Also
+
+_ROUNDING = 1e-9
+_MOST_SHOWN = 10
+_RGB = ("R", "G", "B")
+Row = Mapping[Any, Any]
+
+
+def export_design(
+    folder: Path,
+    key: str,
+    data: Path | None,
+    to: Path | None,
+    also: Collection[Also] = (),
+    *,
+    allow_code: bool = False,
+) -> list[str]:
+    """Write `<key>.csv` and `<key>.mat` of a design of a finished run, and say what it is.
+
+    The filter is computed again and compared with what the run kept of it.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the run.
+    key : str
+        A name, a design_id, or `best`.
+    data : Path or None
+        Folder of the study's files; without it, the curves that the run kept are taken.
+    to : Path or None
+        Folder of the new files, FOLDER/export without it.
+    also : collection of Also
+        Files of other programs beside them.
+    allow_code : bool
+        True to run the code that the study names.
+
+    Returns
+    -------
+    list of str
+        Lines to print.
+
+    Raises
+    ------
+    SweepError
+        For an unknown key, a design that failed, and a sensor without what `also` needs.
+    OutputError
+        For a folder without a finished run, for curves that are not those of the run, and where a file of other
+        content would be overwritten.
+    """
+    output = read_output(folder)
+    row = find_row(output, key)
+    study = study_of(output, data, allow_code=allow_code)
+    space, modified = row_curves(study, row)
+    camera = study.setup(space, row["scenario"]).camera
+    qe = camera.qe.copy()
+    qe[list(camera.modified)] = modified[0]
+    wavelength_nm, curves = study.grid.nodes_nm, dict(zip(camera.mosaic.channels, qe, strict=True))
+    bases = {} if space.filter is None else dict(space.filter.bases)
+    base_qe = {channel: study.sensor.curve(name) for channel, name in bases.items()}
+    _verify(output, row, {channel: curves[channel] for channel in bases}, base_qe)
+
+    transmissions = {
+        f"{channel}_over_{name}": relative_transmission(curves[channel], base_qe[channel])
+        for channel, name in bases.items()
+    }
+    table = curves | {name: values for name, values in transmissions.items() if np.isfinite(values).all()}
+    hints = color_hints(camera.mosaic.channels, bases)
+    path = (folder / "export" if to is None else to) / folder_name(key)
+    csv_path, mat_path = (path.with_name(path.name + suffix) for suffix in (".csv", ".mat"))
+    comment = _comment(output, row, bases)
+    files = {
+        csv_path: csv_text(wavelength_nm, table).encode("utf-8"),
+        mat_path: isetcam_mat(wavelength_nm, curves, hints, camera.mosaic.indices, comment),
+    }
+    lines = [
+        *_lines(output, row, bases),
+        *_remarks(wavelength_nm, bases, transmissions),
+        f"Files: {csv_path} ({', '.join(unique_names(table))}),",
+        f"       {mat_path} ({', '.join(filter_names(hints, curves))}: QE, so set the pixel's spectral QE to 1 in "
+        "ISETCam).",
+    ]
+    if Also.SPEOS in also:
+        for name, (channel, values) in zip(unique_names(map(folder_name, curves)), curves.items(), strict=True):
+            spectrum = path.with_name(f"{path.name}_{name}.spectrum")
+            about = f"{channel} of {_design(output, row)}: QE in percent, electrons per photon"
+            files[spectrum] = speos_text(wavelength_nm, values, about).encode("ascii")
+            lines.append(f"       {spectrum} ({channel}: QE in percent, for Speos)")
+    if Also.RGB in also:
+        weights = path.with_name(path.name + "_rgb_weights.csv")
+        text, weight_lines = _rgb_weights(study, curves)
+        files[weights] = text.encode("utf-8")
+        lines += [f"       {weights} (each channel as a sum of the sensor's R, G and B):", *weight_lines]
+    for file, content in files.items():
+        _refuse_other(file, content)
+    for file, content in files.items():
+        write_bytes(content, file)
+    return lines
+
+
+def relative_transmission(modified: FloatArray, base: FloatArray) -> FloatArray:
+    """Return the transmission of a modified channel relative to the curve that it replaces.
+
+    Parameters
+    ----------
+    modified : ndarray of shape (n_wavelengths,)
+        QE of the modified channel.
+    base : ndarray of shape (n_wavelengths,)
+        QE of the replaced channel.
+
+    Returns
+    -------
+    ndarray of shape (n_wavelengths,)
+        1 where both are zero, infinite where only `base` is.
+    """
+    unlit = np.where(modified > 0, np.inf, 1.0)
+    with np.errstate(over="ignore"):
+        return np.divide(modified, base, out=unlit, where=base > 0)
+
+
+def _verify(output: Output, row: Row, modified: Mapping[str, FloatArray], base_qe: Mapping[str, FloatArray]) -> None:
+    """Compare the modified channels with what the run kept of them, and with the row's sensitivity."""
+    check_kept(output, output.curves.designs.get(int(row["design_id"]), {}), modified)
+    if modified:
+        ratio = sum(values.sum() for values in modified.values()) / sum(base.sum() for base in base_qe.values())
+        if not abs(ratio - row["sensitivity"]) <= _ROUNDING * max(1.0, ratio):
+            problem = "computed again, this is not what the run has: sensitivity"
+            raise OutputError(Fault(problem, str(output.folder), allowed="the version of that run"))
+
+
+def _refuse_other(path: Path, content: bytes) -> None:
+    try:
+        held = path.read_bytes() if path.is_file() else content
+    except OSError as error:
+        raise OutputError(Fault(f"cannot be read: {error.strerror or error}", str(path))) from None
+    if held != content:
+        raise OutputError(Fault("holds something else already", str(path), allowed="another --to, or delete it"))
+
+
+def _parameters(output: Output, row: Row) -> dict[str, float]:
+    return {name: row[name] for name in output.parameters if row[name] is not None and row[name] == row[name]}
+
+
+def _design(output: Output, row: Row) -> str:
+    name = f"{row['name']}, " if isinstance(row["name"], str) else ""
+    return " ".join(f"{name}design {row['design_id']} of {output.study.study}".split())
+
+
+def _comment(output: Output, row: Row, bases: Mapping[str, str]) -> str:
+    """Comment of the `.mat` file."""
+    parameters = ", ".join(f"{name}={value:.12g}" for name, value in _parameters(output, row).items())
+    replaced = ", ".join(f"{channel} replaces {base}" for channel, base in bases.items())
+    origin = output.provenance.sensor
+    kind = "surrogate: modeled, not measured" if origin.surrogate else f"from {origin.source}"
+    parts = [
+        f"{row['cfa']}: {_design(output, row)}",
+        *([f"{row['family']}: {replaced}; {parameters}"] if parameters else []),
+        "data is QE, electrons per photon, filters and silicon together: set the pixel's spectral QE to 1",
+        f"sensor {origin.name}, {kind}",
+        "filterOrder is the tile",
+    ]
+    return ". ".join(" ".join(part.split()) for part in parts) + "."
+
+
+def _lines(output: Output, row: Row, bases: Mapping[str, str]) -> list[str]:
+    parameters = list(_parameters(output, row).items())
+    replaced = ", ".join(f"{channel} replaces {base}" for channel, base in bases.items())
+    lines = [f"{_design(output, row)}: {row['cfa']}" + (f", {row['family']}, {replaced}." if replaced else ", plain.")]
+    if parameters:
+        shown = ", ".join(f"{name} {value:.2f}" for name, value in parameters[:_MOST_SHOWN])
+        more = f" and {len(parameters) - _MOST_SHOWN} more" if len(parameters) > _MOST_SHOWN else ""
+        lines.append(f"Parameters: {shown}{more}.")
+    columns = [output.columns[name] for name in output.distances]
+    distances = ", ".join(f"{'/'.join(c.pair or ())} {c.amount(row[c.name])}" for c in columns)
+    where = f" in {row['scenario']}" if len(output.scenarios) > 1 else ""
+    sensitivity = f"sensitivity {row['sensitivity']:.4f}, " if bases else ""
+    lines.append(f"CSDs{where}: {distances}; {sensitivity}CFA sensitivity {row['cfa_sensitivity']:.4f}.")
+    if not row["feasible"]:
+        lines.append("Note: the design does not meet the study's constraints.")
+    if output.provenance.sensor.surrogate:
+        lines.append("Note: the curves are surrogates, modeled from stated parameters, not measured.")
+    return lines
+
+
+def _remarks(wavelength_nm: FloatArray, bases: Mapping[str, str], transmissions: Mapping[str, FloatArray]) -> list[str]:
+    """Describe the transmissions for the manufacturer of the filter."""
+    lines = []
+    for (channel, base), (name, values) in zip(bases.items(), transmissions.items(), strict=True):
+        beyond = wavelength_nm[values > 1 + _ROUNDING]
+        if not np.isfinite(values).all():
+            at = wavelength_nm[~np.isfinite(values)][0]
+            lines.append(f"Note: no {name} in the CSV: at {at:g} nm {channel} has light where {base} has none.")
+        elif beyond.size:
+            lines.append(
+                f"Note: {name} is up to {values.max():.3g} (above 1 between {beyond[0]:g} and {beyond[-1]:g} nm): "
+                f"the filter takes the place of that of {base}, it cannot be put before it."
+            )
+    return lines
+
+
+def _rgb_weights(study: Study, curves: Mapping[str, FloatArray]) -> tuple[str, list[str]]:
+    """CSV of each channel as a sum of R, G and B, and a line per channel; raises DataError without them."""
+    fit = rgb_weights(curves, np.stack([study.sensor.curve(name) for name in _RGB]), study.lights.photons)
+    lines = []
+    for channel, weights, residual, error in zip(fit.channels, fit.weights, fit.residual, fit.light_error, strict=True):
+        shown = [round(float(weight), 4) + 0.0 for weight in weights]  # no -0.0000
+        terms = " ".join(f"{weight:+.4f} {name}" for weight, name in zip(shown, _RGB, strict=True))
+        lines.append(
+            f"       {channel} = {terms}; the sum misses {residual:.2%} of the curve (root mean square), and "
+            f"of each of the study's lights at most {error:.2%} of the brightest one's electrons."
+        )
+    return fit.as_csv(), lines

@@ -1,0 +1,158 @@
+"""The studies of a folder, with what has been run of them, and the spectra that the package ships. Nothing is run."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from ..base.disk import is_folder, read_facts
+from ..base.errors import Fault, StudyError, SweepError
+from ..results.folder import held_by
+from ..results.lock import in_use
+from ..results.tables import PROVENANCE
+from ..run import output_folder
+from ..spectra.builtin.spectra import cards
+from ..spectra.builtin.stand_ins import surrogate_cards
+from ..study import Study, folder_name, load_study
+
+_QUESTION_LETTERS = 70
+
+
+@dataclass(frozen=True)
+class Listed:
+    """A study of a folder; `designs` is None, and `question` says why, where it cannot be loaded."""
+
+    name: str
+    designs: int | None
+    state: str
+    question: str
+
+
+def studies_of(folder: Path, outputs: Path, data: Path | None = None) -> list[Listed]:
+    """List the studies of a folder and the states of their runs.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of `*.yaml` and `*.yml` files.
+    outputs : Path
+        Folder of the runs.
+    data : Path, optional
+        Folder of the curve files; that of the study by default.
+
+    Returns
+    -------
+    list of Listed
+        The studies.
+
+    Raises
+    ------
+    StudyError
+        If the folder does not exist.
+    """
+    if not is_folder(folder):
+        raise StudyError(Fault("no such folder", str(folder), allowed="a folder of study files"))
+    try:
+        files = sorted(
+            path for path in folder.iterdir() if path.suffix in (".yaml", ".yml") and not path.name.startswith(".")
+        )
+    except OSError as error:
+        raise StudyError(Fault(f"cannot be read: {error.strerror or error}", str(folder))) from None
+    return [_listed(path, outputs, data) for path in files]
+
+
+def list_lines(folder: Path, studies: list[Listed]) -> list[str]:
+    """Format studies as a table: name, designs, state, question.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the studies.
+    studies : list of Listed
+        The studies.
+
+    Returns
+    -------
+    list of str
+        Lines of text.
+    """
+    if not studies:
+        return [f"No studies in {folder}. `sweep new NAME --folder {folder}` writes one."]
+    counts = ["" if x.designs is None else f"{x.designs:,} designs" for x in studies]
+    name_width, count_width = max(len(x.name) for x in studies), max(map(len, counts))
+    state_width = max(len(x.state) for x in studies)
+    lines = [
+        f"{x.name:<{name_width}}  {count:>{count_width}}  {x.state:<{state_width}}  {x.question}".rstrip()
+        for x, count in zip(studies, counts, strict=True)
+    ]
+    finished = sum(x.state.startswith("finished") for x in studies)
+    count = f"{len(studies)} {'study' if len(studies) == 1 else 'studies'}"
+    return [*lines, f"{count}, {finished} finished. Run one: sweep run {folder}/NAME.yaml"]
+
+
+def list_facts(studies: list[Listed]) -> dict[str, Any]:
+    """Format studies as a JSON object.
+
+    Parameters
+    ----------
+    studies : list of Listed
+        The studies.
+
+    Returns
+    -------
+    dict
+        The object.
+    """
+    return {"studies": [asdict(study) for study in studies]}
+
+
+def _listed(path: Path, outputs: Path, data: Path | None) -> Listed:
+    try:
+        study = load_study(path, data)
+        state = _state(study, outputs)
+    except SweepError as error:
+        more = f" (and {len(error.faults) - 1} more)" if error.faults[1:] else ""
+        return Listed(path.stem, None, "cannot be loaded", f"{error.faults[0]}{more}")
+    name = path.stem if study.name == path.stem else f"{path.stem} ({study.name})"
+    question = " ".join(study.section.question.split())
+    if len(question) > _QUESTION_LETTERS:
+        question = question[: _QUESTION_LETTERS - 3].rstrip() + "..."
+    return Listed(" ".join(name.split()), study.n_designs, state, question)
+
+
+def _state(study: Study, outputs: Path) -> str:
+    folder, note = output_folder(outputs / folder_name(study.name), study)
+    held = held_by(folder)
+    if held is None:
+        return "not run" if note is None else "changed since it was run"
+    if in_use(folder):
+        return "running"
+    if not held.finished:
+        return "interrupted"
+    best = (read_facts(folder / PROVENANCE).get("search") or {}).get("best_smooth_objective")
+    goal = study.quantities[study.objective.column]
+    return "finished" if best is None else f"finished, search found {goal.amount(best)}"
+
+
+def data_lines() -> list[str]:
+    """Return for each set of spectra its data card: kind, range, license, groups, source, credit and digest."""
+    lines, total = [], 0
+    sets = [*cards(), *surrogate_cards()]
+    for card in sets:
+        count = sum(card.groups.values())
+        total += count
+        origin = "surrogate: modeled, not measured" if card.surrogate else "as published"
+        lines += [
+            f"{card.name}: {count} {card.kind}s, {card.first_nm:g} to {card.last_nm:g} nm, {card.license}, {origin}",
+            f"  groups: {', '.join(f'{group} ({size})' for group, size in card.groups.items())}",
+            f"  source: {card.source}",
+            f"  credit: {card.credit}",
+            f"  sha256: {card.sha256}",
+        ]
+    return [*lines, f"{total} spectra in {len(sets)} sets. A study's tasks name their groups: tasks: {{own: ...}}."]
+
+
+def data_facts() -> dict[str, Any]:
+    """Return the same as plain values."""
+    return {"sets": [asdict(card) for card in (*cards(), *surrogate_cards())]}

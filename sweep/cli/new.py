@@ -1,0 +1,269 @@
+"""New study files: for the built-in curves, for a user's curves, or from an existing study; and their schema."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shlex
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from pathlib import Path
+
+from ..api.channels import sensor_file
+from ..base.disk import read_input
+from ..base.errors import DataError, Fault, OutputError, StudyError, SweepError
+from ..base.own_code import is_code
+from ..results.atomic import atomic, write_bytes, write_text
+from ..spectra import LightUnit
+from ..spectra.light_files import lights_file
+from ..spectra.text_tables import MOST_BYTES
+from ..study import Study, folder_name, load_study
+from ..study.editors import SCHEMA_FILE, TITLE, schema_text
+from ..study.schema import StudySection
+from .emva1288 import pixel_figures
+from .study_text import Sources, one_line, study_text
+
+_MOST_LETTERS = 100
+_MOST_STUDY = 500_000
+
+
+def new_study(
+    name: str, folder: Path, qe: Path | None, lights: Path | None, quantity: LightUnit, pixel: Path | None = None
+) -> list[str]:
+    """Write `folder`/<name>.yaml, and the schema that editors complete it with where the folder has none.
+
+    Parameters
+    ----------
+    name, folder : str, Path
+        Name of the study, and its folder, which is made where it is not there.
+    qe, lights : Path or None
+        Files of curves, which stay where they are; None takes what is built in.
+    quantity : {'energy', 'photons'}
+        Quantity of the lights.
+    pixel : Path or None
+        EMVA 1288 results, whose figures go into the study.
+
+    Returns
+    -------
+    list of str
+        Lines to print.
+
+    Raises
+    ------
+    StudyError
+        For a bad name.
+    OutputError
+        Where the file exists or cannot be written.
+    DataError
+        For curves that a study cannot use.
+    """
+    path = _new_path(name, folder)
+    sources = Sources()
+    if qe is not None:
+        sources = replace(sources, sensor=sensor_file(qe), sensor_path=_path_in_study(qe, folder))
+    if lights is not None:
+        start_nm, stop_nm = (400, 700) if sources.sensor is None else sources.sensor.range_nm
+        taken = lights_file(lights, quantity, start_nm, stop_nm)
+        sources = replace(sources, lights=taken, lights_path=_path_in_study(lights, folder))
+    if pixel is not None:
+        figures, missing = pixel_figures(pixel)
+        sources = replace(sources, pixel=figures, pixel_file=pixel, not_in_pixel=missing)
+    new_folders = [place for place in (folder, *folder.parents) if not os.path.lexists(place)]
+    try:
+        study = _write(path, name, sources)
+    except SweepError:
+        with suppress(OSError):  # a folder that something else is in by now stays
+            for place in new_folders:
+                place.rmdir()
+        raise
+    return [
+        f"{path}: {study.n_designs:,} designs on {', '.join(study.mosaics)}; objective {study.objective}.",
+        *_source_lines(sources),
+        *(f"Note: {warning}." for warning in study.warnings),
+        f"Next: sweep run {shlex.quote(str(path))}",
+    ]
+
+
+def _write(path: Path, name: str, sources: Sources) -> Study:
+    """Write a study that loads, and the schema before it, so that no study is without the one that it names."""
+    with atomic(path) as hidden:
+        hidden.write_text(study_text(name, sources, None), encoding="utf-8")
+        try:
+            # The photon ratio of its lights is written down, since another light in the file would change it.
+            ratio = load_study(hidden).lights.photon_ratio
+            hidden.write_text(study_text(name, sources, ratio), encoding="utf-8")
+            study = load_study(hidden)
+        except StudyError as error:
+            raise DataError([replace(fault, file=None, line=None) for fault in error.faults]) from None
+        _write_schema_beside(path)
+    return study
+
+
+def study_from(name: str, folder: Path, source: Path) -> list[str]:
+    """Copy a study under another name, with its comments.
+
+    Parameters
+    ----------
+    name : str
+        Name of the new study.
+    folder : Path
+        Folder of the new study.
+    source : Path
+        Study to copy.
+
+    Returns
+    -------
+    list of str
+        Lines to print.
+
+    Raises
+    ------
+    StudyError
+        If the name is invalid or the copy cannot be loaded.
+    OutputError
+        If the file exists.
+    """
+    path = _new_path(name, folder)
+    text = read_input(source, _MOST_STUDY, StudyError).decode("utf-8")
+    text, count = re.subn(r"^study:.*$", f"study: {name}", text, count=1, flags=re.MULTILINE)
+    if not count:
+        raise StudyError(Fault("no line `study: NAME`", str(source)))
+    with atomic(path) as hidden:
+        hidden.write_text(text, encoding="utf-8")
+        study = load_study(hidden)
+        _write_schema_beside(path)
+    line = f"{path}: {study.n_designs:,} designs on {', '.join(study.mosaics)}, as {source}."
+    return [line, f"Next: sweep run {shlex.quote(str(path))}"]
+
+
+def _new_path(name: str, folder: Path) -> Path:
+    """Path of a new study; raises StudyError for a name that no file can have, OutputError where the file exists."""
+    stem = name.removesuffix(".yaml").removesuffix(".yml")
+    if not (name and name == folder_name(name) == stem and name[0].isalnum() and len(name) <= _MOST_LETTERS):
+        better = folder_name(Path(stem).name).strip("._-")[:_MOST_LETTERS]
+        allowed = f"up to {_MOST_LETTERS} letters, digits, -, _ and ., with a letter or digit first, without .yaml"
+        raise StudyError(Fault("not the name of a study", None, None, "NAME", name, allowed, better or None))
+    path = folder / f"{name}.yaml"
+    if os.path.lexists(path):
+        raise OutputError(Fault("is there already, and stays as it is", str(path), allowed="another name"))
+    return path
+
+
+def _path_in_study(file: Path, folder: Path) -> str:
+    """Path of a file as the study says it: relative where it lies beside or below the study, else absolute.
+
+    So the study can be moved: alone, or with the files beside it.
+    """
+    file, folder = file.resolve(), folder.resolve()
+    return (file.relative_to(folder) if file.is_relative_to(folder) else file).as_posix()
+
+
+def _source_lines(sources: Sources) -> list[str]:
+    """Columns and figures that were taken from the files, for the user to look at."""
+    lines: list[str] = []
+    left_out: dict[str, str] = {}
+    if sources.sensor is not None:
+        channels = sources.sensor.channels
+        taken = ", ".join(f"{channel} from {one_line(column)}" for channel, column in channels.columns.items())
+        lines.append(f"Channels{' (guessed by shape, check them)' if channels.guessed else ''}: {taken}.")
+        left_out |= channels.left_out
+    if sources.lights is not None:
+        types = [f"{kind}: {', '.join(map(one_line, names))}" for kind, names in sources.lights.types.items()]
+        lines.append(f"Lights: {'; '.join(types)}.")
+        left_out |= sources.lights.left_out
+    if left_out:
+        lines.append(f"Left out, see the file: {', '.join(map(one_line, left_out))}.")
+    if sources.pixel:
+        missing = ", ".join(sources.not_in_pixel)
+        lines.append(f"Pixel: {', '.join(sources.pixel)} from {sources.pixel_file}; not in it: {missing}.")
+    return lines
+
+
+def curve_files_of(source: Path) -> list[str]:
+    """Return the curve files that a study names by relative paths.
+
+    Parameters
+    ----------
+    source : Path
+        The study file.
+
+    Returns
+    -------
+    list of str
+        The files; absolute paths are left out, as they stay valid.
+
+    Raises
+    ------
+    StudyError
+        If the study cannot be loaded or a path leads out of its folder.
+    """
+    names = [name for name in load_study(source).digests if not is_code(name) and not Path(name).is_absolute()]
+    for name in names:
+        if ".." in Path(name).parts:
+            raise StudyError(
+                Fault("lies outside the folder of the study", str(source), value=name, allowed="a whole path")
+            )
+    return names
+
+
+@contextmanager
+def copied(pairs: Iterable[tuple[Path, Path]]) -> Iterator[None]:
+    """Copy files, and remove the copies if the block fails.
+
+    Parameters
+    ----------
+    pairs : iterable of tuple of Path
+        Source and destination.
+
+    Yields
+    ------
+    None
+
+    Raises
+    ------
+    OutputError
+        If a different file exists at a destination.
+    """
+    copies: list[Path] = []
+    try:
+        for file, to in pairs:
+            content = read_input(file, MOST_BYTES, DataError)
+            if not os.path.lexists(to):
+                write_bytes(content, to)
+                copies.append(to)
+            elif read_input(to, MOST_BYTES, OutputError) != content:
+                raise OutputError(Fault("holds something else already", str(to), allowed="another --folder"))
+        yield
+    except SweepError:
+        for path in copies:
+            path.unlink(missing_ok=True)
+        raise
+
+
+def write_schema(path: Path) -> None:
+    """Write the JSON Schema of study files.
+
+    Parameters
+    ----------
+    path : Path
+        The file to write.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written, or holds anything except such a schema.
+    """
+    if os.path.lexists(path):
+        # The title is the second key of a schema; in earlier versions it was the section's name.
+        titles = [f'"title": {json.dumps(title)}'.encode() for title in (TITLE, StudySection.__name__)]
+        content = read_input(path, MOST_BYTES, OutputError)
+        if not any(title in content[:4096] for title in titles):
+            raise OutputError(Fault("holds something else already", str(path), allowed="another --output"))
+    write_text(schema_text(), path)
+
+
+def _write_schema_beside(path: Path) -> None:
+    if not os.path.lexists(path.with_name(SCHEMA_FILE)):
+        write_text(schema_text(), path.with_name(SCHEMA_FILE))

@@ -1,0 +1,94 @@
+"""The audit of a run: which columns it compares, what it says, and what the command returns."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from sweep.base.errors import BrokenPromiseError
+from sweep.cli import app as cli
+from sweep.cli.audit import Audit, audit_rows, sampled
+from sweep.run import run_study
+from sweep.study import Study, load_study
+
+from ..build import stopband_study
+
+STUDY = stopband_study(
+    "audited",
+    "{left_nm: [600, 610], left_width_nm: 20, right_nm: [640, 650], right_width_nm: 10}",
+    before="""\
+wavelengths: {step_nm: 5}
+pixel: {offset_dn: 168}
+scenarios: {chart: {}, dim: {exposure: {kind: white_patch, level: 0.3}}}
+tolerance_dn: 5
+production: {edge_shift_nm: 2}
+""",
+    after="search: {starts: 1, max_evaluations: 10}\n",
+)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, pd.DataFrame]:
+    folder = tmp_path_factory.mktemp("audit")
+    (folder / "audited.yaml").write_text(STUDY)
+    study = load_study(folder / "audited.yaml")
+    run_study(study, folder / "out", 1, lambda *_: None)
+    return study, pd.read_parquet(folder / "out" / "results.parquet")
+
+
+def test_every_csd_is_compared(run: tuple[Study, pd.DataFrame]) -> None:
+    study, frame = run
+    assert audit_rows(study, [frame]).faults == []
+    promised = [name for name, quantity in study.quantities.items() if quantity.promised]
+    assert [name for name in promised if name.startswith("worst_")]
+    row = sampled(frame).index[-1]
+    for name in promised:
+        for wrong in (frame.loc[row, name] + 6, np.nan):
+            changed = frame.copy()
+            changed.loc[row, name] = wrong
+            found = audit_rows(study, [changed])
+            assert list(found.broken["design_id"]) == [frame.loc[row, "design_id"]]
+            assert list(found.broken["quantity"]) == [name]
+            assert f"design {frame.loc[row, 'design_id']}: {name} is off" in str(found.faults[0])
+
+
+def test_progress_counts_all_that_is_recomputed(run: tuple[Study, pd.DataFrame]) -> None:
+    study, frame = run
+    calls: list[tuple[str, int, int]] = []
+    found = audit_rows(study, [frame.iloc[:5], frame.iloc[5:]], lambda *call: calls.append(call))
+    total = len(sampled(frame))
+    assert total == len(found.rows) >= 5
+    assert {(phase, n) for phase, _, n in calls} == {("designs computed again", total)}
+    assert [done for _, done, _ in calls] == sorted({done for _, done, _ in calls})
+    assert calls[-1][1] == total
+
+
+def broken_audit() -> Audit:
+    columns = {"design_id": [3, 4, 7], "scenario": ["chart"] * 3, "plan": "x", "allowed_dn": 0.1}
+    realized = {"realized_dn": [0.05, 1.4, 0.3], "quantity": "worst_csd_yellow_red"}
+    return Audit(pd.DataFrame(columns | realized), 1000)
+
+
+def test_an_error_above_the_tolerance_has_an_exit_code_of_its_own(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    monkeypatch.setattr("sweep.cli.audit.audit_output", lambda *_, **__: broken_audit())
+    monkeypatch.setattr(sys, "argv", ["sweep", "audit", str(tmp_path)])
+    with pytest.raises(SystemExit) as left:
+        cli.main()
+    assert left.value.code == BrokenPromiseError.exit_code == 5
+    said = capsys.readouterr()
+    assert "2 errors are larger than allowed" in said.out
+    assert said.err == (
+        "sweep: chart: design 4: worst_csd_yellow_red is off by more than allowed (got '1.4 DN'); "
+        "allowed: at most 0.1 DN\n"
+    )
+    kept = broken_audit().rows.iloc[:1]
+    monkeypatch.setattr("sweep.cli.audit.audit_output", lambda *_, **__: Audit(kept, 1000))
+    with pytest.raises(SystemExit) as left:
+        cli.main()
+    assert not left.value.code

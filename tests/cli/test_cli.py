@@ -1,0 +1,169 @@
+"""The commands as a user runs them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from sweep.report.pages import script
+from sweep.spectra.files import read_curves
+
+from ..build import SCENES, study_file
+from ..commanded import commanded, sweep
+from ..conftest import STUDIES, Finished
+
+
+@pytest.fixture(scope="module")
+def stopband(finished: Finished) -> tuple[Path, list[str]]:
+    folder = finished("stopband")
+    return folder, folder.with_name("stopband.said.txt").read_text().splitlines()
+
+
+def test_stopband_makes_its_files(stopband: tuple[Path, list[str]]) -> None:
+    folder, _ = stopband
+    made = {path.name for path in folder.iterdir()} - {".lock"}
+    assert made == {
+        "results.parquet",
+        "search.parquet",
+        "curves.parquet",
+        "points.parquet",
+        "limited_by.parquet",
+        "cfas.png",
+        "cfas.svg",
+        "figures",
+        "front.parquet",
+        "study.resolved.yaml",
+        "provenance.json",
+        "run.json",
+        "SHA256SUMS",
+        "pareto.png",
+        "pareto.svg",
+        "report.html",
+    }
+    assert len(pd.read_parquet(folder / "results.parquet")) > 100_000
+
+
+def test_summary_is_true_and_short(stopband: tuple[Path, list[str]]) -> None:
+    folder, lines = stopband
+    frame = pd.read_parquet(folder / "results.parquet")
+    best = frame[frame["feasible"] & frame["kind"].isin(["sweep", "search"])]["csd_yellow_red"].max()
+    rggb = frame[frame["cfa"] == "RGGB"]["csd_yellow_red"].iloc[0]
+    assert len(lines) <= 13
+    assert f"by {best:.0f} DN" in lines[0]
+    assert f"RGGB ({rggb:.0f} DN)" in lines[0]
+    assert str(folder) in lines[-1]
+
+
+def test_report_stands_alone(stopband: tuple[Path, list[str]]) -> None:
+    page = (stopband[0] / "report.html").read_text()
+    assert page.count("data:image/png;base64,") >= 4
+    own = page.replace(str(script("plotly-gl2d.min.js")), "")  # what that may ask for, the page's policy forbids
+    assert "default-src 'none'" in own
+    assert "http://" not in own
+    assert "https://" not in own
+    assert "surrogate" in page
+    assert "RYN_4Cy" in page
+
+
+@pytest.mark.slow
+@pytest.mark.long
+def test_report_command_makes_it_again(stopband: tuple[Path, list[str]]) -> None:
+    folder, lines = stopband
+    page = folder / "report.html"
+    before, made_ns = page.read_bytes(), page.stat().st_mtime_ns
+    done = sweep("report", str(folder))
+    assert done.returncode == 0
+    said = done.stdout.splitlines()
+    assert [line for line in said if not line.startswith("Took ")] == [x for x in lines if not x.startswith("Took ")]
+    assert page.stat().st_mtime_ns > made_ns
+    assert page.read_bytes() == before
+
+
+def test_wrong_input_is_one_line_and_exit_2(tmp_path: Path) -> None:
+    wrong = tmp_path / "wrong.yaml"
+    wrong.write_text(study_file(tmp_path).read_text().replace("starts", "start"))
+    done = sweep("run", str(wrong), "--output", str(tmp_path / "out"))
+    for code, out, said in (
+        (done.returncode, done.stdout, done.stderr),
+        commanded("check", wrong),
+        commanded("run", tmp_path / "absent.yaml"),
+        commanded("report", tmp_path),
+        commanded("audit", tmp_path),
+        commanded("plan", STUDIES / "stopband.yaml", "--tolerance", "inf"),
+        commanded("plan", STUDIES / "stopband.yaml", "--tolerance", "nan"),
+        commanded("check", tmp_path / "tiny.yaml", "--data", tmp_path / "nowhere"),
+    ):
+        assert (code, out) == (2, "")
+        assert len(said.splitlines()) == 1, said
+        assert said.startswith("sweep: ")
+        assert "Traceback" not in said
+    assert not (tmp_path / "out").exists()
+
+
+def test_check_counts_designs() -> None:
+    code, out, _ = commanded("check", STUDIES / "stopband.yaml")
+    assert code == 0
+    assert "116,286 designs" in out
+
+
+def test_plan_says_what_a_scene_calls_for(tmp_path: Path) -> None:
+    path = tmp_path / "scenes.yaml"
+    path.write_text(SCENES.replace("[150, 250]", "[280, 300]"))
+    code, out, said = commanded("plan", path, "--tolerance", "50")
+    assert code == 0, said
+    lines = out.splitlines()
+    # One plan suits both.
+    assert lines[0].startswith(
+        "road distance_m=280 ... road distance_m=300 (2 scenes): what is left out changes a CSD "
+    )
+    assert lines[0].endswith(" (tolerance 50 DN)")
+    assert lines[1].split() == ["effect", "computed", "bound", "/", "DN", "reason"]
+    for effect in ("noise", "blur", "sampling", "phase", "extinction"):
+        assert sum(line.strip().startswith(f"{effect} ") for line in lines) == 1
+    assert ["extinction", "left", "out", "0", "clear", "air"] in [line.split() for line in lines]
+    assert any(line.split()[:2] == ["blur", "computed"] for line in lines)
+    assert "2 scenes" in lines[-1]
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("plain_pictures")
+def test_hostile_names_come_out_as_text(tmp_path: Path) -> None:
+    name = "<script>alert(1)</script>"
+    text = study_file(tmp_path, 3).read_text().replace("study: tiny", f"study: '{name}'").replace("mine:", f"'{name}':")
+    (tmp_path / "hostile.yaml").write_text(text)
+    code, _, said = commanded("run", tmp_path / "hostile.yaml", "--output", tmp_path / "out", "--jobs", "1")
+    assert code == 0, said
+    (folder,) = (tmp_path / "out").iterdir()
+    page = (folder / "report.html").read_text()
+    assert "<script>alert" not in page
+    assert page.count("<script") == page.replace(str(script("plotly-gl2d.min.js")), "").count("</script") == 3
+    assert "&lt;script&gt;alert(1)&lt;/script&gt;" in page
+
+
+def test_an_infeasible_study_names_the_constraint_and_writes_nothing(tmp_path: Path) -> None:
+    text = study_file(tmp_path).read_text().replace("{min: 0.9}", "{min: 1.01}")
+    (tmp_path / "infeasible.yaml").write_text(text)
+    code, _, said = commanded("run", tmp_path / "infeasible.yaml", "--output", tmp_path / "out", "--jobs", "1")
+    assert code == 3
+    assert "no feasible design was found" in said
+    assert "constraints.sensitivity: out of reach: sensitivity >= 1.01; the best value found is 1" in said
+    assert "Traceback" not in said
+    assert not list((tmp_path / "out").iterdir())
+
+
+@pytest.mark.slow
+def test_measured_curves_run_to_a_report(tmp_path: Path) -> None:
+    done = sweep("run", str(STUDIES / "measured.yaml"), "--output", str(tmp_path), "--jobs", "2")
+    assert done.returncode == 0, done.stderr
+    frame = pd.read_parquet(tmp_path / "measured" / "results.parquet")
+    best = frame[frame["feasible"] & (frame["cfa"] == "RGBN")]
+    plain = frame[frame["cfa"] == "RGBW"]["csd_yellow_red"].iloc[0]
+    assert best["csd_yellow_red"].max() > plain
+    curves = pd.read_parquet(tmp_path / "measured" / "curves.parquet")
+    raw = read_curves(STUDIES / "data" / "qe_ar0132at_rgbw.csv")
+    at_630 = raw.values["W"][list(raw.wavelength_nm).index(630)]
+    assert curves[(curves["curve"] == "W") & (curves["wavelength_nm"] == 630)]["value"].item() == pytest.approx(
+        at_630, rel=1e-12
+    )

@@ -1,0 +1,265 @@
+"""`sweep describe`: what a file of curves holds, and everything that is wrong with it."""
+
+from __future__ import annotations
+
+from itertools import chain
+from pathlib import Path
+
+import colour
+import matplotlib.image
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from sweep.base.errors import DataError, OutputError
+from sweep.cli.describe import described
+from sweep.cli.new import write_schema
+from sweep.spectra.facts import condensed, facts_of
+from sweep.spectra.files import scan_curves
+from sweep.spectra.signal_color import VISIBLE, dominant_ranges_nm, light_color, outline
+from sweep.study.editors import schema_text
+
+from ..cases import thinned
+from ..commanded import commanded
+from ..conftest import SHARED, STUDIES, needs_measured
+from ..curve_texts import WAVE, bell, csv
+
+
+def is_png(path: Path) -> bool:
+    return path.read_bytes().startswith(b"\x89PNG") and len(path.read_bytes()) > 5000
+
+
+def faults(path: Path) -> list[str]:
+    return [str(fault) for fault in condensed(list(chain.from_iterable(scan_curves(path).faults)))]
+
+
+def test_qe_is_guessed_and_its_peak_named(tmp_path: Path) -> None:
+    path = csv(tmp_path, "wavelength_nm,R,G", WAVE, 0.6 * bell(600, 50), 0.7 * bell(540, 50))
+    found = described(path, tmp_path)
+    text = "\n".join(found.lines)
+    assert "2 curves: R, G." in text
+    assert "380 to 780 nm, step 10 nm, 41 samples" in text
+    assert "A guess: QE of a sensor" in text
+    assert "G  largest 0.7       at 540 nm" in text
+    assert "xy" not in text
+    assert found.faults == ()
+    assert found.lines[-1] == f"Picture: {tmp_path / 'curves.png'}"
+    assert is_png(tmp_path / "curves.png")
+
+
+def test_percent_is_told_with_its_scale(tmp_path: Path) -> None:
+    path = csv(tmp_path, "wavelength_nm,G", WAVE, 70 * bell(540, 50))
+    assert any("scale: 0.01" in line for line in described(path, tmp_path).lines)
+
+
+def test_lights_have_the_chromaticity_that_colour_science_gives(tmp_path: Path) -> None:
+    path = csv(tmp_path, "wavelength_nm,led", WAVE, bell(590, 20))
+    fine = np.arange(360.0, 781.0)
+    # Straight lines between the samples of what the file says, as the tool takes them.
+    values = np.interp(fine, WAVE, bell(590, 20))
+    for quantity, energy in (("energy", values), ("photons", values / fine)):
+        light = colour.SpectralDistribution(energy, fine)
+        oracle = colour.XYZ_to_xy(colour.sd_to_XYZ(light, method="Integration"))
+        (line,) = (line for line in described(path, tmp_path, quantity).lines if line.startswith("  led"))
+        words = line.split("xy ")[1].replace(",", "").split()
+        np.testing.assert_allclose([float(words[0]), float(words[1])], oracle, atol=4e-4)
+
+
+@pytest.mark.parametrize(
+    ("peak_nm", "region", "signal"),
+    [
+        *((450, None, None), (503, "green", "green"), (525, None, "green"), (550, None, None)),
+        *((591, "yellow", "yellow"), (605, "orange", "orange"), (625, "red", "red"), (660, None, "red")),
+    ],
+)
+def test_monochromatic_light_lies_in_its_region(peak_nm: int, region: str | None, signal: str | None) -> None:
+    spectrum = np.zeros(VISIBLE.size)
+    spectrum[int(peak_nm - VISIBLE.start_nm)] = 1.0
+    color = light_color(spectrum)
+    assert color is not None
+    assert color.dominant_nm == pytest.approx(peak_nm, abs=1)
+    assert color.purity == pytest.approx(1, abs=1e-6)
+    assert (color.region, color.signal) == (region, signal)
+    assert (color.distance == 0) == (region is not None)
+
+
+def test_white_purple_and_darkness_are_no_signal() -> None:
+    flat = light_color(np.ones(VISIBLE.size) * VISIBLE.nodes_nm)  # equal energy
+    assert flat is not None
+    np.testing.assert_allclose(flat.xy, (1 / 3, 1 / 3), atol=1e-3)
+    assert flat.signal is None
+    purple = np.zeros(VISIBLE.size)
+    purple[[90, 290]] = 1.0
+    color = light_color(purple)
+    assert color is not None
+    assert color.dominant_nm is None
+    assert color.signal is None
+    assert light_color(np.zeros(VISIBLE.size)) is None
+
+
+def test_the_outline_of_a_region_has_the_corners_of_the_standard() -> None:
+    corners = outline("green")
+    for corner in ((0.285, 0.520), (0.209, 0.400)):  # EN 12368's green, rounded: where its straight bounds meet
+        assert np.abs(corners - corner).sum(axis=1).min() < 3e-3
+    assert dominant_ranges_nm()["yellow"] == (586.0, 596.0)
+
+
+def test_distance_is_to_the_nearest_point_of_a_region() -> None:
+    spectrum = np.zeros(VISIBLE.size)
+    spectrum[int(700 - VISIBLE.start_nm)] = 1.0  # below y = 0.290, along the locus
+    color = light_color(spectrum)
+    assert color is not None
+    dense = np.concatenate(
+        [np.linspace(a, b, 500) for a, b in zip(outline("red"), np.roll(outline("red"), -1, axis=0), strict=True)]
+    )
+    brute = np.sqrt(((dense - np.array(color.xy)) ** 2).sum(axis=1)).min()
+    assert color.nearest == "red"
+    assert color.distance == pytest.approx(brute, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    thinned(
+        [
+            (
+                "wavelength_nm,R\n400,1\n410,nan\n420,-1\n430,-2\n",
+                ["not a usable number", "negative value, and 1 more"],
+            ),
+            ("wavelength_nm,R\n420,1\n430,1\n400,1\n400,1\n", ["not sorted", "occurs twice"]),
+            ("wavelength_km,R\n0.4,1\n0.7,1\n", ["no column wavelength", "looks like um"]),
+            ("wavelength_nm,R,G\n0.4,1,1\n0.7,1,1\n", ["R, G: wavelength unit: looks like um"]),
+            ("wavelength_nm;R\n400;0,5\n700;0.25\n", ["not a usable number (got '0,5')"]),
+            ("wavelength_nm,R,R,\n400,1,1,x\n700,1,1,1\n", ["occurs twice", "no name", "not a usable number"]),
+        ]
+    ),
+)
+def test_every_fault_is_one_line_and_the_rest_is_described(tmp_path: Path, text: str, words: list[str]) -> None:
+    path = tmp_path / "wrong.csv"
+    path.write_text(text, encoding="utf-8")
+    found = faults(path)
+    assert len(found) == len(words)
+    assert all(word in line for word, line in zip(words, found, strict=True)), found
+    lines = described(path, tmp_path / "out").lines
+    assert lines[-1].startswith("Picture: ")
+    assert not any("are clean" in line for line in lines)
+
+
+def test_micrometers_and_foreign_texts_are_read_as_meant(tmp_path: Path) -> None:
+    um = facts_of(scan_curves(csv(tmp_path, "wavelength_um,R", WAVE / 1000, bell(600, 50))))
+    assert um.curves[0].peak_nm == pytest.approx(600)
+    wide = csv(tmp_path, "wavelength_nm,R", WAVE, bell(600, 50), name="wide.csv", encoding="utf-16")
+    assert facts_of(scan_curves(wide)).curves[0].peak_nm == 600
+    assert faults(wide) == []
+    (tmp_path / "semi.csv").write_text("wavelength_nm;R\n400;0,5\n700;0,25\n")
+    np.testing.assert_array_equal(scan_curves(tmp_path / "semi.csv").values[:, 0], [0.5, 0.25])
+
+
+@pytest.mark.slow
+def test_odd_files_are_described(tmp_path: Path) -> None:
+    name = 'it\'s "$x_1$" \u4fe1\u53f7 _a'
+    quoted = csv(tmp_path, 'wavelength_nm,"it\'s ""$x_1$"" \u4fe1\u53f7 _a"', WAVE, bell(590, 20))
+    assert any(name in line for line in described(quoted, tmp_path).lines)
+    many = csv(
+        tmp_path,
+        "wavelength_nm," + ",".join(f"l{i}" for i in range(200)),
+        WAVE,
+        *[bell(400 + i, 20) for i in range(200)],
+    )
+    lines = described(many, tmp_path).lines
+    assert sum(line.startswith("  l") for line in lines) == 200
+    assert len(lines) < 210
+    zeros = described(csv(tmp_path, "wavelength_nm,a", WAVE, 0 * WAVE), tmp_path).lines
+    assert any("no value is above 0: a" in line for line in zeros)
+    huge = csv(tmp_path, "wavelength_nm,a", WAVE, 1e308 * np.ones(WAVE.size))
+    assert described(huge, tmp_path).lines
+    (tmp_path / "escape.csv").write_text("wavelength_nm,a\x1b[31m\n400,1\n700,1\n")
+    assert not any("\x1b" in line for line in described(tmp_path / "escape.csv", tmp_path).lines)
+    for text in ("", "wavelength_nm\n400\n", "wavelength_nm,R\n", "wavelength_nm,R\n400,nan\n"):
+        (tmp_path / "none.csv").write_text(text)
+        if text:
+            assert described(tmp_path / "none.csv", tmp_path).faults
+            continue
+        with pytest.raises(DataError, match="empty"):
+            described(tmp_path / "none.csv", tmp_path)
+
+
+def test_mat_of_isetcam_is_described(tmp_path: Path) -> None:
+    savemat(tmp_path / "q.mat", {"wavelength": WAVE, "data": np.where(WAVE == 500, np.nan, bell(600, 50))})
+    found = described(tmp_path / "q.mat", tmp_path)
+    assert "1 curve: curve_1" in found.lines[0]
+    assert "500 nm is not a finite number" in str(found.faults[0])
+
+
+def test_the_command_ends_with_the_picture_or_exit_2(tmp_path: Path) -> None:
+    path = csv(tmp_path, "wavelength_nm,R", WAVE, bell(600, 50) - 0.01)
+    code, out, said = commanded("describe", path, "--output", tmp_path / "out")
+    assert code == 2
+    assert out.splitlines()[-1] == f"Picture: {tmp_path / 'out' / 'curves.png'}"
+    assert len(said.splitlines()) == 1
+    assert "negative value, and " in said
+
+
+@pytest.mark.parametrize(
+    ("file", "guess"),
+    [
+        (STUDIES / "data" / "qe_ar0132at_rgbw.csv", "QE"),
+        (STUDIES / "data" / "led_luxeon.csv", "light"),
+        pytest.param(SHARED / "data" / "qe_mt9v024_rccc.csv", "QE", marks=needs_measured),
+        pytest.param(SHARED / "data" / "traffic_lica.csv", "light", marks=needs_measured),
+    ],
+)
+def test_measured_files_are_taken_for_what_they_are(tmp_path: Path, file: Path, guess: str) -> None:
+    found = described(file, tmp_path)
+    assert any(f"A guess: {guess}" in line for line in found.lines)
+    assert not found.faults
+
+
+def test_names_that_look_the_same_keep_their_colors(tmp_path: Path) -> None:
+    path = csv(tmp_path, "wavelength_nm,r\x07,r\\x07", WAVE, bell(505, 8), bell(628, 8))
+    green, red = (line for line in described(path, tmp_path, "energy").lines if line.startswith("  r"))
+    assert "r\\x07  " in green
+    assert "r\\x07 (3)" in red
+    assert ("green" in green, "red of EN" in red) == (True, True)
+
+
+def test_a_picture_of_another_stays(tmp_path: Path) -> None:
+    path = csv(tmp_path, "wavelength_nm,G", WAVE, 0.5 * bell(540, 50))
+    described(path, tmp_path)
+    picture = tmp_path / "curves.png"
+    assert matplotlib.image.imread(picture).shape[2] == 4
+    described(path, tmp_path)
+    picture.write_bytes(b"mine")
+    with pytest.raises(OutputError, match="holds something else already"):
+        described(path, tmp_path)
+    assert picture.read_bytes() == b"mine"
+
+
+def test_what_other_programs_save_is_named(tmp_path: Path) -> None:
+    savemat(tmp_path / "c.mat", {"wavelength": WAVE, "data": np.ones((WAVE.size, 1)) * 1j})
+    with pytest.raises(DataError, match="must be real numbers"):
+        scan_curves(tmp_path / "c.mat")
+    (tmp_path / "d.csv").write_text('wavelength_nm,a\n400,"0,01"\n500,1\n')
+    assert "a decimal comma? use a point" in faults(tmp_path / "d.csv")[0]
+    (tmp_path / "u.csv").write_text("wavelength_nm,a\n400,1\n500,1\n", encoding="utf-16-le")  # without its mark
+    assert "UTF-16? save as UTF-8" in faults(tmp_path / "u.csv")[0]
+
+
+def test_a_schema_replaces_only_a_schema(tmp_path: Path) -> None:
+    path = tmp_path / "study.schema.json"
+    path.write_text('{"title": "A study of sweep", "older": true}')
+    for _ in range(2):  # also one that it wrote itself
+        write_schema(path)
+        assert path.read_text() == schema_text()
+    path.write_text(schema_text().replace("A study of sweep", "StudySection", 1))  # and of an earlier version
+    write_schema(path)
+    assert path.read_text() == schema_text()
+    path.unlink()
+    path.symlink_to("/dev/zero")  # it never ends
+    with pytest.raises(OutputError, match="not a file"):
+        write_schema(path)
+    path.unlink()
+    for held in ("mine", '{"title": "mine"}', "[]"):
+        path.write_text(held)
+        with pytest.raises(OutputError, match="holds something else already"):
+            write_schema(path)
+        assert path.read_text() == held

@@ -1,0 +1,154 @@
+"""Every command ends in lines: no traceback for what a user, a machine or a shell does."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+import typer
+
+from sweep.base.errors import InfeasibleError
+from sweep.cli.endings import ends_in_lines
+
+from ..build import BASE
+from ..commanded import UNDRAWN, commanded
+
+COMMAND = [sys.executable, "-m", "sweep"]
+SWEPT = BASE.split("constraints:", maxsplit=1)[0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["run"], "Missing argument"),
+        (["run", "x.yaml", "--jobs", "0"], "--jobs"),
+        (["run", "x.yaml", "--jobs", "many"], "--jobs"),
+        (["run", "x.yaml", "--job", "2"], "No such option"),
+        (["chek", "x.yaml"], "No such command 'chek'"),
+        (["check", "a.yaml", "b"], "unexpected extra argument"),
+        (["check", "nowhere.yaml"], "nowhere.yaml: cannot be read: No such file or directory"),
+    ],
+)
+def test_a_wrong_command_is_one_line(arguments: list[str], expected: str) -> None:
+    code, out, said = commanded(*arguments)
+    assert (code, out) == (2, "")
+    assert said.startswith("sweep: "), said
+    assert said.count("\n") == 1, said
+    assert expected in said
+
+
+EARLY = """
+import os, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell in the background has it ignored
+class Finder:
+    def find_spec(self, name, path, target=None):
+        if name == "sweep.cli.app":
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Finder())
+from sweep.cli.start import start
+start()
+"""
+
+
+def test_a_stop_while_the_command_is_loaded_ends_it_without_a_word() -> None:
+    done = subprocess.run([sys.executable, "-c", EARLY], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
+
+
+@pytest.mark.slow
+def test_a_command_that_is_done_leaves_no_worker_behind(tmp_path: Path) -> None:
+    study = tmp_path / "tiny.yaml"
+    study.write_text(SWEPT)
+    # As UNDRAWN, but by the door that users take.
+    program = UNDRAWN.replace("cli.app import main", "cli.start import start as main")
+    arguments = ["run", str(study), "--output", str(tmp_path), "--jobs", "2"]
+    command = [sys.executable, "-c", program, *arguments]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True) as run:
+        said, _ = run.communicate()
+    assert run.returncode == 0
+    assert "report.html" in said.splitlines()[-1]
+    until = time.monotonic() + 10
+    while (left := _of_session(run.pid)) and time.monotonic() < until:
+        time.sleep(0.05)
+    assert left == []
+
+
+def _of_session(session: int) -> list[int]:
+    """Processes of a session that are still there, but for those that nobody has waited for."""
+    found = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            state, _, _, own = stat.read_text().rpartition(")")[2].split()[:4]
+            if int(own) == session and state != "Z":
+                found.append(int(stat.parent.name))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "expected"),
+    [
+        (MemoryError(), 2, "out of memory"),
+        (OSError(28, "No space left on device", "/x/y"), 2, "/x/y: No space left on device"),
+        (RuntimeError("can't start new thread"), 2, "threads: can't start new thread"),
+        (ImportError("libx.so: failed to map segment"), 2, "libx.so: failed to map segment"),
+        (UnicodeEncodeError("utf-8", "a\udcff", 1, 2, "surrogates not allowed"), 2, "no UTF-8"),
+        (KeyboardInterrupt(), 130, "interrupted"),
+        (typer.Abort(), 130, "interrupted"),
+        (InfeasibleError("out of\nreach"), 3, "out of reach"),
+    ],
+)
+def test_what_a_machine_refuses_is_one_line(
+    error: BaseException, code: int, expected: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def command() -> None:
+        raise error
+
+    with pytest.raises(SystemExit) as ended:
+        ends_in_lines(command)
+    assert ended.value.code == code
+    text = capfd.readouterr().err
+    assert text.startswith("sweep: ")
+    assert text.count("\n") == 1
+    assert expected in text
+
+
+def test_a_fault_of_the_program_keeps_its_traceback() -> None:
+    with pytest.raises(ZeroDivisionError):
+        ends_in_lines(lambda: 1 / 0)
+
+
+def test_the_end_of_a_file_is_no_interrupt(tmp_path: Path) -> None:
+    """Whatever raises EOFError, such as unpickling: typer takes it for the end of what a user types."""
+    program = """
+import sweep.study
+from sweep.cli.app import main
+def ended(*_, **__):
+    raise EOFError("Ran out of input")
+sweep.study.load_study = ended
+main()
+"""
+    command = [sys.executable, "-c", program, "run", str(tmp_path / "x.yaml")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "interrupted" not in done.stderr
+    assert "EOFError: Ran out of input" in done.stderr
+
+
+def test_a_reader_that_leaves_is_no_fault() -> None:
+    with subprocess.Popen([*COMMAND, "schema"], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as run:
+        assert run.stdout is not None
+        assert run.stderr is not None
+        run.stdout.close()
+        assert run.stderr.read() == b""
+
+
+@pytest.mark.slow
+def test_an_output_without_room_is_one_line() -> None:
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run([*COMMAND, "schema"], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr == "sweep: No space left on device\n"

@@ -1,0 +1,208 @@
+"""`sweep evaluate`: one filter beside RGGB, the CFA that it changes, and the limit."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import sweep
+
+from ..build import study_file
+from ..commanded import commanded
+from ..conftest import Finished
+from ..curve_texts import WAVE, bell, csv
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> Path:
+    """A transmission in percent, 300 to 800 nm."""
+    nm = np.arange(300.0, 801)
+    return csv(tmp_path, "wavelength_nm,T", nm, np.where(abs(nm - 630) < 15, 20.0, 95.0), name="filter.csv")
+
+
+def rows(said: str) -> dict[str, list[str]]:
+    """Cells of the table that the command prints, by CFA."""
+    lines = [line.replace(" DN", "").split() for line in said.splitlines() if line.count(" DN  ") > 1]
+    return {cells[0]: cells[1:] for cells in lines}
+
+
+def test_a_file_is_judged_as_a_study_judges_it(own: Path) -> None:
+    code, said, _ = commanded("evaluate", own, "--relative-to", "Y")
+    assert code == 0
+    study = sweep.load_study("stopband")
+    curve = sweep.read_curves(own)["T"] / 100
+    table = study.evaluate(N=curve, relative_to="Y")
+    found = rows(said)
+    assert list(found) == ["RGGB", "RYYCy", "RYNCy"]
+    plain = study.evaluate().set_index("name")
+    for cfa, expected in (("RYNCy", table.iloc[0]), ("RGGB", plain.loc["RGGB"]), ("RYYCy", plain.loc["RYYCy"])):
+        assert float(found[cfa][0]) == pytest.approx(expected["csd_yellow_red"], abs=0.05)
+        assert float(found[cfa][-1]) == pytest.approx(expected["cfa_sensitivity"], abs=5e-4)
+    assert "T read as a transmission, times Y; values in percent; it is N of RYNCy, in place of Y" in said
+
+
+def test_the_limit_is_of_filters_with_as_much_light(own: Path) -> None:
+    """A filter that attains it has no gap; one that is darker than the limit's other end has one."""
+    study = sweep.make_study(
+        cfas=["RYYCy", "RYNCy"],
+        boxes={"any": {"cfa": "RYNCy", "channel": "N", "base": "Y", "to": 0.0}},
+        constraints={"sensitivity": {"min": 0.9}},
+    )
+    limit = study.limit()
+    assert limit.curve is not None
+    best = pd.DataFrame({"N": limit.curve}, index=pd.Index(study.wavelength_nm, name="wavelength_nm"))
+    best.to_csv(own.with_name("best.csv"))
+    found = sweep.evaluate(own.with_name("best.csv"))
+    assert found.gap is not None
+    assert found.gap < 1e-4
+    assert found.limit == pytest.approx(limit.proven, abs=0.01)
+    mine = sweep.evaluate(own, relative_to="Y")
+    assert mine.limit is not None
+    assert mine.before_quantization_dn is not None
+    assert mine.gap == pytest.approx(1 - mine.before_quantization_dn / mine.limit)
+    assert 0.01 < mine.gap < 1
+
+
+def test_own_sensor_and_lights(tmp_path: Path, own: Path) -> None:
+    qe = csv(
+        tmp_path,
+        "wavelength_nm,R,G,B,W",
+        WAVE,
+        *(bell(c, 40) * 0.5 for c in (620, 540, 460)),
+        bell(560, 150) * 0.8,
+        name="qe.csv",
+    )
+    leds = csv(tmp_path, "wavelength_nm,a,b,c", WAVE, *(bell(c, 12) for c in (505, 592, 636)), name="leds.csv")
+    asked = ("evaluate", own, "--transmission", "--sensor", qe, "--lights", leds)
+    code, said, err = commanded(*asked)
+    assert (code, err) == (0, "")
+    assert "times W; values in percent; it is N of RGBN, in place of W" in said
+    assert list(rows(said)) == ["RGGB", "RGBW", "RGBN"]
+    assert "No limit is computed: the filter is the brightest on white, and sets the exposure" in said
+
+
+def test_a_filter_that_sets_the_exposure_has_no_limit(own: Path) -> None:
+    """95 % at most wavelengths."""
+    assert "No limit is computed: the filter is the brightest on white, and sets the" in commanded("evaluate", own)[1]
+
+
+def test_a_filter_a_little_above_the_curve_it_replaces_has_a_limit_too(tmp_path: Path) -> None:
+    """As one of few samples is: every 10 nm of Y lies above Y in places. No filter that leaves the exposure exceeds it."""
+    any_filter = {"cfa": "RYNCy", "channel": "N", "base": "Y", "to": 0.0}
+    study = sweep.make_study(cfas=["RYYCy", "RYNCy"], boxes={"any": any_filter})
+    y, nm = study.curve("Y").to_numpy(), study.wavelength_nm
+    few = nm[::10]
+    sampled = np.interp(nm, few, y[::10] * np.where(abs(few - 640) < 15, 0.4, 1.0))
+    found = sweep.evaluate(csv(tmp_path, "wavelength_nm,N", nm, sampled, name="few.csv"))
+    assert (sampled > y).any()
+    assert "no filter between 0 and the larger of Y and itself, which leaves the exposure to other pixels," in str(
+        found
+    )
+    assert found.limit is not None
+    assert found.before_quantization_dn is not None
+    ceiling, rng = np.maximum(y, sampled), np.random.default_rng(1)
+    stops = [np.where((nm > a) & (nm < a + w), rng.uniform(), 1.0) for a in range(560, 680, 10) for w in (10, 30, 50)]
+    rivals = np.array([ceiling * stop for stop in stops])
+    rivals = rivals[(rivals.sum(axis=1) <= y.sum()) & (rivals.sum(axis=1) >= sampled.sum())]
+    assert len(rivals) > 5
+    table = study.evaluate(N=np.concatenate([rivals, sampled[None]]))
+    assert table["csd_yellow_red"].max() <= found.limit + 2  # the table's are rounded: two of four steps
+    assert found.before_quantization_dn <= found.limit
+
+
+@pytest.mark.usefixtures("plain_pictures")
+@pytest.mark.slow
+def test_a_design_of_a_run_has_its_own_numbers_again_and_others_under_other_lights(tmp_path: Path) -> None:
+    run = sweep.load_study(study_file(tmp_path)).run(tmp_path, jobs=1)
+    best, mine = run.best, run.table[run.table["name"] == "mine"].iloc[0]
+    for design, row in ((None, best), ("mine", mine)):
+        found = sweep.evaluate(run.folder, design=design)
+        own = found.table.iloc[-1]
+        for name in ("csd_yellow_red", "csd_green_red", "sensitivity", "cfa_sensitivity"):
+            assert own[name] == pytest.approx(row[name], rel=1e-9)
+    leds = csv(tmp_path, "wavelength_nm,a,b", WAVE, bell(592, 12), bell(636, 12), name="leds.csv")
+    other = sweep.evaluate(run.folder, lights=str(leds))
+    assert other.goal.name == "csd_yellow_red"
+    assert other.table.iloc[-1]["csd_yellow_red"] > best["csd_yellow_red"]  # two lights are farther apart than many
+    assert other.table.iloc[-1]["cfa_sensitivity"] == pytest.approx(best["cfa_sensitivity"], rel=1e-9)
+    assert commanded("evaluate", run.folder, "--design", "RGGB")[::2] == (
+        2,
+        f"sweep: {run.folder}: --design: a plain CFA has no filter to judge (got 'RGGB')\n",
+    )
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        (["nowhere.csv"], "nowhere.csv: cannot be read"),
+        (["filter.csv", "--channel", "Q"], "--channel: no such channel of RYNCy (got 'Q'); allowed: R, Y, N, Cy"),
+        (["filter.csv", "--cfa", "RYQ"], "not the name of a 2x2 CFA"),
+        (["filter.csv", "--cfa", "RQNCy"], "which channel of RQNCy is the filter?"),
+        (["filter.csv", "--base", "Yy"], "did you mean 'Y'?"),
+        (["filter.csv", "--column", "t"], "--column: no such column (got 't'); allowed: T; did you mean 'T'?"),
+        (["filter.csv", "--relative-to", "Z"], "unknown curve (got 'Z')"),
+        (["filter.csv", "--sensor", "ar0802"], "did you mean 'ar0820'?"),
+        (["filter.csv", "--lights", "t16"], "did you mean 'tl16'?"),
+        (["filter.csv", "--design", "best"], "`design` goes with a run's folder"),
+        (["filter.csv", "--allow-code"], "`allow-code` goes with a run's folder"),
+        (["above.csv"], "values above 1"),
+        (["short.csv"], "the curve is truncated"),
+    ],
+)
+def test_faults_are_lines(own: Path, monkeypatch: pytest.MonkeyPatch, asked: list[str], said: str) -> None:
+    monkeypatch.chdir(own.parent)
+    csv(own.parent, "wavelength_nm,T", WAVE, np.full(WAVE.size, 1.5), name="above.csv")
+    csv(own.parent, "wavelength_nm,T", WAVE[5:], np.full(WAVE.size - 5, 0.5), name="short.csv")
+    code, out, err = commanded("evaluate", *asked)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert len(err.splitlines()) == 1
+
+
+@pytest.mark.slow
+def test_a_design_of_a_run_moves_as_it_did_there(finished: Finished) -> None:
+    folder = finished("angle")
+    table = pd.read_parquet(folder / "results.parquet")
+    best = table[table["kind"] == "search"].iloc[0]
+    found = sweep.evaluate(folder)
+    assert found.table["csd_yellow_red"].iloc[-1] == pytest.approx(best["csd_yellow_red"], abs=1e-9)
+    assert "that works by interference (effective index 1.8)" in str(found)
+
+
+def loaded_by(*asked: object) -> tuple[str, set[str]]:
+    """What the command says of these arguments, and all modules that it loads."""
+    code = f"import sys; from sweep.cli.app import app\ntry: app({[*map(str, asked)]!r})\n"
+    code += "except SystemExit: pass\nprint(*sys.modules, file=sys.stderr)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return done.stdout, set(done.stderr.split())
+
+
+def test_what_an_answer_does_not_need_is_not_loaded(own: Path, tmp_path: Path) -> None:
+    """Most of the time that the command takes is that of loading; tables, figures, workers and compiled code are not for
+    it, and linear programs only where there is a limit.
+    """
+    leds = csv(tmp_path, "wavelength_nm,a,b,c", WAVE, *(bell(c, 12) for c in (505, 592, 636)), name="leds.csv")
+    said, loaded = loaded_by("evaluate", own, "--relative-to", "Y")
+    assert "below" in said  # the gap to the limit: everything was computed
+    assert {"numpy", "scipy.optimize"} <= loaded
+    unlimited, few = loaded_by("evaluate", own, "--transmission", "--lights", leds)
+    assert "No limit is computed" in unlimited
+    assert not any(name.partition(".")[0] == "scipy" for name in few)
+    assert not (loaded | few) & {
+        "numba",
+        "scipy.interpolate",
+        "scipy.stats",
+        "pandas",
+        "pyarrow",
+        "matplotlib",
+        "colour",
+        "sklearn",
+        "joblib",
+        "jinja2",
+        "moocore",
+    }

@@ -1,0 +1,281 @@
+"""`sweep new`: a study that runs as it is, for the built-in curves and for a user's files."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sweep.api.channels import channel_of, layout_of
+from sweep.base.errors import DataError, OutputError, StudyError
+from sweep.cli.listing import list_lines, studies_of
+from sweep.cli.new import new_study
+from sweep.cli.study_text import scalar
+from sweep.study import load_study
+from sweep.study.document import Document
+
+from ..build import made
+from ..commanded import commanded
+from ..conftest import STUDIES
+from ..curve_texts import WAVE, bell, csv
+
+
+@pytest.fixture
+def rgbw(tmp_path: Path) -> Path:
+    (tmp_path / "data").mkdir()
+    columns = (60 * bell(600, 40), 60 * bell(540, 40), 50 * bell(460, 40), 80 * bell(550, 150))
+    return csv(tmp_path / "data", "wavelength_nm,red,QE green,B,Clear", WAVE, *columns)
+
+
+@pytest.fixture
+def leds(tmp_path: Path) -> Path:
+    columns = [bell(peak, 8) for peak in (450, 505, 591, 605, 628)] + [0 * WAVE]
+    return csv(tmp_path, 'wavelength_nm,"royal, blue",gn,"yes",or,"rd: 1",dark', WAVE, *columns, name="leds.csv")
+
+
+def test_a_study_of_the_built_in_curves_loads_and_says_what_is_next(tmp_path: Path) -> None:
+    lines = new_study("123", tmp_path, None, None, "energy")
+    study = load_study(tmp_path / "123.yaml")
+    assert study.name == "123"
+    assert "RYNCy" in study.mosaics
+    assert study.search is not None
+    assert lines[-1] == f"Next: sweep run {tmp_path / '123.yaml'}"
+    first = (tmp_path / "123.yaml").read_text().splitlines()[0]
+    assert first == "# yaml-language-server: $schema=study.schema.json"
+    assert (tmp_path / "study.schema.json").is_file()
+
+
+def test_what_is_commented_out_works_too(tmp_path: Path) -> None:
+    path = made(tmp_path)
+    text = path.read_text()
+    opened, count = re.subn(r"^(  )# (?=road|  target|  optics|  noise|slope|csd)", r"\1", text, flags=re.MULTILINE)
+    assert count >= 6
+    path.write_text(opened)
+    study = load_study(path)
+    assert {"chart", "road"} == set(study.scenarios)
+    assert "slope_per_nm" in study.constraints
+
+
+def test_files_fill_in_sensor_and_lights(tmp_path: Path, rgbw: Path, leds: Path) -> None:
+    path = made(tmp_path, qe=rgbw, lights=leds)
+    study = load_study(path)
+    (sensor,), (lights,) = study.section.sensor.files, study.section.lights.files
+    assert sensor.columns == {"R": "red", "G": "QE green", "B": "B", "C": "Clear"}
+    assert (sensor.file, lights.file) == (rgbw.resolve().as_posix(), leds.resolve().as_posix())
+    elsewhere = tmp_path / "moved" / "study.yaml"
+    elsewhere.parent.mkdir()
+    elsewhere.write_text(path.read_text())
+    np.testing.assert_array_equal(load_study(elsewhere).lights.photons, study.lights.photons)
+    assert sensor.scale == 0.01
+    assert lights.signals == {"green": ["gn"], "yellow": ["yes"], "orange": ["or"], "red": ["rd: 1"]}
+    assert "# left out: royal, blue: xy" in path.read_text()
+    assert "# left out: dark: no visible light" in path.read_text()
+    assert study.objective.column == "csd_yellow_red"
+    (sweep_,) = study.section.sweeps.values()
+    assert (sweep_.cfa, sweep_.base, sweep_.to) == ("RGBN", "C", "G")
+
+
+@pytest.mark.parametrize(
+    ("column", "channel"),
+    [
+        *(("R", "R"), ("red", "R"), ("RED", "R"), ("rRed", "R"), ("cCyan", "Cy"), ("wClear", "C"), ("QE_b (1)", "B")),
+        *(("White", "W"), ("mono", "C"), ("Cy", "Cy"), ("curve_1", None), ("b-w", None), ("", None)),
+    ],
+)
+def test_a_column_says_its_channel(column: str, channel: str | None) -> None:
+    assert channel_of(column) == channel
+
+
+def test_what_an_export_holds_is_taken_for_what_it_is(tmp_path: Path) -> None:
+    header = "wavelength_nm,QE Cy,N_over_Y,N,rR,cCy,yY,wC,xN,gG"
+    qe = csv(tmp_path, header, WAVE, *[0.5 * bell(460 + 20 * at, 45) for at in range(9)])
+    lines = new_study("mine", tmp_path, qe, None, "energy")
+    (sensor,) = load_study(tmp_path / "mine.yaml").section.sensor.files
+    assert sensor.columns == {"R": "rR", "G": "gG", "C": "wC", "Y": "yY", "Cy": "QE Cy"}
+    assert "Left out, see the file: N_over_Y, N, xN, cCy." in lines
+
+
+@pytest.mark.parametrize(
+    ("channels", "changed", "base", "to"),
+    [
+        ("R G B W", "RGBN", "W", "G"),
+        ("R G B", "RGNB", "G", "0.1"),
+        ("R C", "RCCN", "C", "0.1"),
+        ("R B C", "RCNB", "C", "0.1"),
+        ("R G Y Cy", "RYNCy", "Y", "G"),
+        ("R Y Cy", "RYNCy", "Y", "0.1"),
+        ("G Y", "YGGN", "G", "0.1"),
+        ("C", "CCCN", "C", "0.1"),
+        ("B", "BBBN", "B", "0.1"),
+    ],
+)
+def test_cfas_are_those_that_the_channels_allow(channels: str, changed: str, base: str, to: str) -> None:
+    layout = layout_of({name: 2.0 if name == "G" else 1.0 for name in channels.split()})
+    assert (layout.changed, layout.base, layout.to) == (changed, base, to)
+
+
+@pytest.mark.parametrize(("header", "count"), [("R,G,B", 3), ("curve_1", 1), ("a,b,c", 3), ("G", 1), ("Y,G", 2)])
+def test_any_sensor_makes_a_study_that_loads(tmp_path: Path, header: str, count: int) -> None:
+    qe = csv(tmp_path, f"wavelength_nm,{header}", WAVE, *[0.5 * bell(460 + 70 * i, 45) for i in range(count)])
+    study = load_study(made(tmp_path, qe=qe))
+    assert study.search is not None
+
+
+def test_a_short_range_of_the_sensor_is_the_grid(tmp_path: Path) -> None:
+    inside = (WAVE >= 420) & (WAVE <= 690)
+    qe = csv(tmp_path, "wavelength_nm,R,C", WAVE[inside], bell(600, 50)[inside], bell(550, 90)[inside])
+    study = load_study(made(tmp_path, qe=qe))
+    assert (study.grid.start_nm, study.grid.stop_nm) == (420, 690)
+
+
+def test_two_signal_types_are_enough_and_one_is_refused(tmp_path: Path) -> None:
+    two = csv(tmp_path, "wavelength_nm,a,b", WAVE, bell(505, 8), bell(628, 8))
+    assert load_study(made(tmp_path, lights=two)).objective.column == "csd_green_red"
+    one = csv(tmp_path, "wavelength_nm,a", WAVE, bell(505, 8), name="one.csv")
+    with pytest.raises(DataError, match="one signal color"):
+        made(tmp_path, "other", lights=one)
+    assert not (tmp_path / "studies" / "other.yaml").exists()
+
+
+def test_nothing_is_overwritten(tmp_path: Path) -> None:
+    path = made(tmp_path)
+    path.write_text("mine")
+    (tmp_path / "studies" / "study.schema.json").write_text("old")
+    with pytest.raises(OutputError, match="is there already"):
+        made(tmp_path)
+    assert path.read_text() == "mine"
+    made(tmp_path, "second")
+    assert (tmp_path / "studies" / "study.schema.json").read_text() == "old"
+    assert not [p for p in (tmp_path / "studies").iterdir() if p.name.startswith(".")]
+
+
+def test_a_study_that_cannot_be_made_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OutputError("full")
+
+    monkeypatch.setattr("sweep.cli.new.write_text", full)
+    with pytest.raises(OutputError, match="full"):
+        new_study("mine", tmp_path / "a" / "b", None, None, "energy")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_names_that_look_the_same_are_two_lights(tmp_path: Path) -> None:
+    lights = csv(tmp_path, "wavelength_nm,r\x07,r\\x07", WAVE, bell(505, 8), bell(628, 8))
+    (section,) = load_study(made(tmp_path, lights=lights)).section.lights.files
+    assert section.signals == {"green": ["r\x07"], "red": ["r\\x07"]}
+
+
+def test_what_is_next_can_be_pasted(tmp_path: Path) -> None:
+    lines = new_study("mine", tmp_path / "my studies", None, None, "energy")
+    assert lines[-1] == f"Next: sweep run '{tmp_path / 'my studies' / 'mine.yaml'}'"
+
+
+@pytest.mark.parametrize("name", ["", "a/b", "../up", "mine.yaml", ".hidden", "-x", "a b", "\u00fc", "x" * 101])
+def test_a_bad_name_is_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(StudyError) as caught:
+        made(tmp_path, name)
+    assert len(caught.value.faults) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *(
+            "R",
+            "yes",
+            "1e5",
+            "null",
+            "a, b",
+            "[x]",
+            "it's",
+            "# no",
+            "a: b",
+            '"',
+            "\u4fe1",
+            "a\nb",
+            " x",
+            "? red",
+            ": green",
+        ),
+        *("green\x85x", "?a", "a\u2028b", "a\u2029", "\x07", "\ufeffx", "True", "Off", "~", "\\n", "&a", "a.b-c"),
+    ],
+)
+def test_any_column_name_survives_yaml(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "x.yaml"
+    path.write_text(
+        f"a: {{b: {scalar(text)}}}\nc:\n  - {scalar(text)}  # x\nd: [{scalar(text)}, 1]\n", encoding="utf-8"
+    )
+    assert Document(path).data == {"a": {"b": text}, "c": [text], "d": [text, 1]}
+    assert scalar(text).isprintable()
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("plain_pictures")
+def test_measured_files_lead_to_a_report_without_editing(tmp_path: Path) -> None:
+    data, path = STUDIES / "data", tmp_path / "studies" / "mine.yaml"
+    files = ("--qe", str(data / "qe_ar0132at_rgbw.csv"), "--lights", str(data / "led_luxeon.csv"))
+    code, out, said = commanded("new", "mine", "--folder", path.parent, *files)
+    assert code == 0, said
+    assert out.splitlines()[-1] == f"Next: sweep run {path}"
+    (lights,) = load_study(path).section.lights.files
+    assert lights.signals["green"] == ["cyan_504", "green_528"]
+    assert lights.signals["yellow"] == ["amber_592"]
+    small = re.sub("count: 3.", "count: 3", path.read_text()).replace("starts: 16", "starts: 1")
+    path.write_text(re.sub("  front.*", "", small))
+    code, out, said = commanded("run", path, "--output", tmp_path / "out", "--jobs", 1)
+    assert code == 0, said
+    assert "RGBN" in out.splitlines()[0]
+    assert "finished, search found" in list_lines(path.parent, studies_of(path.parent, tmp_path / "out"))[0]
+    assert np.all([(tmp_path / "out" / "mine" / name).is_file() for name in ("report.html", "pareto.png")])
+
+
+def test_a_study_and_its_curves_can_be_moved(tmp_path: Path) -> None:
+    qe = csv(tmp_path, "wavelength_nm,R,G,B", WAVE, bell(620, 40), bell(540, 40), bell(460, 40), name="qe.csv")
+    assert commanded("new", "mine", "--qe", qe, "--copy", "--folder", tmp_path / "a")[0] == 0
+    qe.unlink()
+    (tmp_path / "a").rename(tmp_path / "b")
+    assert load_study(tmp_path / "b" / "mine.yaml").sensor.name == "qe"
+    bad = csv(tmp_path, "wavelength_nm,R", WAVE, -bell(620, 40), name="bad.csv")
+    assert commanded("new", "other", "--qe", bad, "--copy", "--folder", tmp_path / "b")[0] == 2
+    assert not (tmp_path / "b" / "bad.csv").exists()
+    (tmp_path / "b" / "bad.csv").write_text("mine")
+    code, _, err = commanded("new", "other", "--qe", bad, "--copy", "--folder", tmp_path / "b")
+    assert (code, "holds something else already" in err) == (2, True)
+
+
+def test_a_study_begins_with_a_shipped_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, said, _ = commanded("new", "mine", "--from", "stopband")
+    assert (code, "116,286 designs" in said) == (0, True)
+    made = load_study(tmp_path / "studies" / "mine.yaml")
+    assert made.name == "mine"
+    assert "# full factorial" in (tmp_path / "studies" / "mine.yaml").read_text()
+    for asked, expected in (
+        (("mine", "--from", "stopband"), "stays as it is"),
+        (("x", "--from", "stopbnd"), "did you mean"),
+    ):
+        code, _, err = commanded("new", *asked)
+        assert (code, expected in err) == (2, True)
+
+
+def test_a_study_begins_with_the_files_of_another(tmp_path: Path) -> None:
+    """Those of its tasks, too; what lies outside its folder has no place beside the copy."""
+    (tmp_path / "a" / "paints").mkdir(parents=True)
+    (tmp_path / "a" / "paints" / "mine.csv").write_text("nm,white\n390,0.5\n710,0.6\n")
+    own = "{classes: {mine: {file: FILE, quantity: reflectance}, road: asphalt}, under: d65}"
+    text = f"study: a\nsensor: ar0820\nlights: tl16\ncfas: [RGGB]\ntasks: {{shipped: [], own: {{paint: {own}}}}}\n"
+    (tmp_path / "a" / "a.yaml").write_text(text.replace("FILE", "paints/mine.csv"))
+    begin = ("new", "b", "--from", tmp_path / "a" / "a.yaml", "--folder", tmp_path / "b")
+    code, _, err = commanded(*begin)
+    assert (code, "no such file" in err) == (2, True)
+    assert not (tmp_path / "b" / "b.yaml").exists()
+    assert commanded(*begin, "--copy")[0] == 0
+    tasks = load_study(tmp_path / "b" / "b.yaml").tasks
+    assert tasks is not None
+    assert tasks.from_files.keys() == {("paint mine", "paints/mine.csv:white")}
+    (tmp_path / "a" / "a.yaml").write_text(text.replace("FILE", "../a/paints/mine.csv"))
+    code, _, err = commanded("new", "c", *begin[2:], "--copy")
+    assert (code, "lies outside the folder of the study" in err) == (2, True)

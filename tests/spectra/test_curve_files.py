@@ -1,0 +1,123 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from sweep.base.errors import DataError
+from sweep.spectra.files import digest, read_curves
+
+
+def written(tmp_path: Path, text: str, name: str = "curves.csv") -> Path:
+    path = tmp_path / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def faults(path: Path) -> list[str]:
+    with pytest.raises(DataError) as caught:
+        read_curves(path)
+    return [str(fault).replace(str(path), "FILE") for fault in caught.value.faults]
+
+
+def test_csv(tmp_path: Path) -> None:
+    path = written(tmp_path, "\ufeff# a note\nwavelength_nm, R ,G\n400,0.1,0.2\n\n410,0.3,0.4\n")
+    curves = read_curves(path)
+    assert list(curves.values) == ["R", "G"]
+    np.testing.assert_array_equal(curves.wavelength_nm, [400, 410])
+    np.testing.assert_array_equal(curves.values["G"], [0.2, 0.4])
+    assert curves.source == str(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("wavelength_nm,R\n400,0.1\n410,nan\n", ["FILE:3: R:", "not a usable number", "'nan'"]),
+        ("wavelength_nm,R\n400,0.1\n410,\n", ["FILE:3: R:", "not a usable number"]),
+        ("wavelength_nm,R\n400,0.1\n410,-0.2\n", ["FILE:3: R:", "'-0.2'", ">= 0"]),
+        ("wavelength_nm,R\n400,0.1\n410,x\n", ["FILE:3: R:", "'x'"]),
+        ("wavelength_nm,R\n400,0.1\n420,0.1\n410,0.2\n", ["FILE:4: wavelength_nm:", "not sorted"]),
+        ("wavelength_nm,R\n400,0.1\n400,0.2\n", ["FILE:3: wavelength_nm:", "twice"]),
+        ("wavelength_nm,R\n400,0.1\n410,0.2,0.3\n", ["FILE:3:", "columns", "got 3"]),
+        ("wavelength_km,R\n0.4,0.1\n0.41,0.2\n", ["FILE:1: wavelength_km:", "no column wavelength", "wavelength_nm"]),
+        ("wavelength_nm,R\n0.4,0.1\n0.7,0.2\n", ["FILE: R:", "um"]),
+        ("frequency,R\n400,0.1\n", ["FILE:1:", "wavelength_nm"]),
+        ("wavelength_nm,R,R\n400,0.1,0.2\n", ["FILE:1: R:", "column occurs twice"]),
+        ("wavelength_nm\n400\n410\n", ["FILE:1:", "no curve"]),
+        ("wavelength_nm,R\n400,1\n", ["two or more"]),
+        ("", ["FILE:", "empty"]),
+    ],
+)
+def test_a_fault_of_a_csv_names_file_line_column_value(tmp_path: Path, text: str, words: list[str]) -> None:
+    found = faults(written(tmp_path, text))
+    assert len(found) == 1
+    assert all(word in found[0] for word in words), found
+
+
+def test_every_fault_of_a_csv_is_named(tmp_path: Path) -> None:
+    assert len(faults(written(tmp_path, "wavelength_nm,R,G\n400,a,1\n410,1,-1\n405,nan,1\n"))) == 4
+
+
+def test_mat_of_isetcam(tmp_path: Path) -> None:
+    path = tmp_path / "filter.mat"
+    wave = np.arange(400, 701, 10.0)
+    data = np.stack([wave / 700, 1 - wave / 1000], axis=1)
+    names = np.array(["rRed", "gGreen"], dtype=object)
+    savemat(path, {"wavelength": wave, "data": data, "filterNames": names, "comment": "x"})
+    curves = read_curves(path)
+    assert list(curves.values) == ["rRed", "gGreen"]
+    np.testing.assert_array_equal(curves.values["gGreen"], data[:, 1])
+
+
+def test_mat_of_one_spectrum(tmp_path: Path) -> None:
+    path = tmp_path / "light.mat"
+    savemat(path, {"wavelength": np.arange(400, 701, 10.0)[:, None], "data": np.ones((1, 31))})
+    assert list(read_curves(path).values) == ["curve_1"]
+
+
+@pytest.mark.parametrize(
+    ("fields", "word"),
+    [
+        ({"wavelength": [400.0, 410.0], "dat": [1.0, 1.0]}, "did you mean 'dat'"),
+        ({"wavelength": [400.0, 410.0], "data": [[1.0, 1.0, 1.0]]}, "does not fit"),
+        ({"wavelength": [400.0, 410.0], "data": [1.0, np.nan]}, "not a finite"),
+        ({"wavelength": "text", "data": [1.0, 1.0]}, "must be real numbers"),
+    ],
+)
+def test_a_wrong_mat_is_one_line(tmp_path: Path, fields: dict[str, object], word: str) -> None:
+    path = tmp_path / "wrong.mat"
+    savemat(path, fields)
+    found = faults(path)
+    assert len(found) == 1
+    assert word in found[0]
+
+
+def test_damaged_files_are_faults(tmp_path: Path) -> None:
+    for content in (b"", b"not a mat file", b"\x89HDF\r\n\x1a\n" + bytes(200), b"MATLAB 7.3 MAT-file" + bytes(400)):
+        path = tmp_path / "damaged.mat"
+        path.write_bytes(content)
+        assert len(faults(path)) == 1
+    (tmp_path / "latin.csv").write_bytes(b"wavelength_nm,\xe9\n400,1\n700,1\n")
+    assert read_curves(tmp_path / "latin.csv").notes == ("the text is not UTF-8, and was read as Latin-1",)
+    assert "cannot be read" in faults(tmp_path / "absent.csv")[0]
+    assert ".csv, .tsv, .txt, .dat, .mat" in faults(written(tmp_path, "x", "curves.xls"))[0]
+
+
+def test_digest_is_sha256_of_the_bytes(tmp_path: Path) -> None:
+    # FIPS 180-2's example of "abc"
+    assert digest(written(tmp_path, "abc")).startswith("ba7816bf8f01cfea414140de5dae2223")
+
+
+def test_one_bad_cell_is_one_fault_and_old_line_ends_are_read(tmp_path: Path) -> None:
+    assert len(faults(written(tmp_path, "wavelength_nm,a\n400,1\nx,1\n700,2\n"))) == 1
+    path = tmp_path / "mac.csv"
+    path.write_bytes(b"wavelength_nm,a\r400,1\r700,2\r")
+    assert list(read_curves(path).values["a"]) == [1, 2]
+    assert "CSV" in faults(written(tmp_path, 'wavelength_nm,a\n400,"' + "1" * 200_000 + "\n"))[0]
+    savemat(
+        tmp_path / "names.mat",
+        {"wavelength": [400.0, 700.0], "data": np.ones((2, 2)), "filterNames": np.array(["", ""], dtype=object)},
+    )
+    assert list(read_curves(tmp_path / "names.mat").values) == ["curve_1", "curve_2"]

@@ -1,0 +1,225 @@
+"""Curve files that are damaged, too large or hold numbers that nothing can be computed with: one line each."""
+
+from __future__ import annotations
+
+import os
+import struct
+import zlib
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from sweep.base.errors import DataError, SweepError
+from sweep.cli.describe import described
+from sweep.spectra.files import read_curves, scan_curves
+from sweep.spectra.spectrum import LARGEST, LEAST_PEAK, check_samples
+from sweep.spectra.text_tables import MOST_CURVES, MOST_SAMPLES
+
+from ..watchdog import within
+
+HANG_S = 120.0
+WAVE = np.arange(400, 701, 10.0)
+
+
+def mat(compressed: bool = True, **more: object) -> bytes:
+    content = BytesIO()
+    names = np.array([["rRed", "gGreen"]], dtype=object)
+    data = np.stack([WAVE / 700, 1 - WAVE / 1000], axis=1)
+    savemat(
+        content, {"wavelength": WAVE[:, None], "data": data, "filterNames": names} | more, do_compression=compressed
+    )
+    return content.getvalue()
+
+
+def refused(path: Path, content: bytes) -> str:
+    path.write_bytes(content)
+    with pytest.raises(DataError) as caught, within(HANG_S):
+        read_curves(path)
+    assert len(caught.value.faults) == 1, str(caught.value)
+    return str(caught.value).replace(str(path), "FILE")
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_every_flipped_bit_of_a_mat_is_one_line_or_read(tmp_path: Path, compressed: bool) -> None:
+    whole, path = mat(compressed), tmp_path / "a.mat"
+    rng = np.random.default_rng(1)
+    n_refused = 0
+    for at in rng.integers(116, len(whole), 150):
+        content = bytearray(whole)
+        content[at] ^= 1 << int(rng.integers(8))
+        path.write_bytes(content)
+        try:
+            with within(HANG_S):
+                read_curves(path)
+        except DataError as error:
+            assert len(str(error).splitlines()) <= 2  # one for each curve  # noqa: PT017
+            n_refused += 1
+    assert n_refused > 20
+
+
+def test_every_cut_of_a_mat_is_one_line(tmp_path: Path) -> None:
+    for compressed in (False, True):
+        whole = mat(compressed)
+        for length in range(0, len(whole) - 1, 37):
+            assert refused(tmp_path / "a.mat", whole[:length]).startswith("FILE: ")
+
+
+def element(kind: int, data: bytes) -> bytes:
+    return struct.pack("<II", kind, len(data)) + data + bytes(-len(data) % 8)
+
+
+def array(name: bytes, dimensions: tuple[int, ...], data: bytes, kind: int = 6) -> bytes:
+    """An uncompressed variable of version 5 that says of itself what it is told to."""
+    head = element(6, struct.pack("<II", kind, 0)) + element(5, struct.pack(f"<{len(dimensions)}i", *dimensions))
+    return element(14, head + element(1, name) + data)
+
+
+HEADER = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
+FINE = array(b"wavelength", (31, 1), element(9, WAVE.tobytes()))
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (FINE + array(b"data", (2**31 - 1, 2**31 - 1), element(9, bytes(16))), "not a size of curves"),
+        (FINE + array(b"data", (-1, 31), element(9, bytes(16))), "not a size of curves"),
+        (FINE + array(b"data", (2, 1), array(b"", (1, 1), b"", kind=1), kind=1), "must be real numbers"),
+        (FINE + array(b"data", (31, 1), element(9, bytes(8))), "not a readable .mat file"),
+        (FINE + struct.pack("<II", 14, 2**32 - 1), "not a readable .mat file"),
+        (FINE + array(b"dta", (31, 1), element(9, WAVE.tobytes())), "no variable `data`"),
+        (FINE + element(99, b"12345678"), "not a readable .mat file"),
+        (struct.pack("<II", 15, 8) + zlib.compress(b"abc")[:8], "not a readable .mat file"),
+    ],
+)
+def test_a_damaged_mat_is_one_line(tmp_path: Path, content: bytes, said: str) -> None:
+    assert said in refused(tmp_path / "a.mat", HEADER + content)
+
+
+def test_other_variables_of_a_mat_may_be_anything(tmp_path: Path) -> None:
+    for compressed in (False, True):
+        path = tmp_path / "a.mat"
+        path.write_bytes(
+            mat(compressed, comment="x", more={"a": 1, "b": [[1.0]]}, cells=np.array([[1, "a"]], dtype=object))
+        )
+        assert list(read_curves(path).values) == ["rRed", "gGreen"]
+
+
+def lines(path: Path, header: str, *rows: str) -> Path:
+    path.write_text("\n".join([header, *rows]) + "\n")
+    return path
+
+
+def test_tables_that_are_too_large_are_one_line(tmp_path: Path) -> None:
+    names = ",".join(f"c{i}" for i in range(20_000))
+    wide = lines(
+        tmp_path / "wide.csv", "wavelength_nm," + names, *[f"{400 + i},{','.join(['0.5'] * 20_000)}" for i in range(3)]
+    )
+    long = lines(
+        tmp_path / "long.csv", "wavelength_nm,a", *[f"{400 + i * 1e-4:.4f},1" for i in range(MOST_SAMPLES + 1)]
+    )
+    for path, said in (
+        (wide, f"too many curves in one file (got 20000); allowed: at most {MOST_CURVES:,}"),
+        (long, f"too many samples in one file (got {MOST_SAMPLES + 1}); allowed: at most {MOST_SAMPLES:,}"),
+    ):
+        with pytest.raises(DataError) as caught, within(HANG_S):
+            read_curves(path)
+        assert str(caught.value) == f"{path}: {said}"
+    with (tmp_path / "large.csv").open("wb") as handle:
+        handle.truncate(10**12)
+    with pytest.raises(DataError, match="the file is too large"), within(HANG_S):
+        read_curves(tmp_path / "large.csv")
+
+
+def test_tables_up_to_the_limits_are_read(tmp_path: Path) -> None:
+    names = ",".join(f"c{i}" for i in range(MOST_CURVES))
+    rows = [f"{400 + i},{','.join(['0.5'] * MOST_CURVES)}" for i in range(20)]
+    with within(HANG_S):
+        assert len(read_curves(lines(tmp_path / "wide.csv", "wavelength_nm," + names, *rows)).values) == MOST_CURVES
+
+
+def test_of_many_faults_reading_stops(tmp_path: Path) -> None:
+    names = ",".join(f"c{i}" for i in range(1000))
+    path = lines(
+        tmp_path / "bad.csv", "wavelength_nm," + names, *[f"{400 + i},{','.join(['x'] * 1000)}" for i in range(300)]
+    )
+    with within(HANG_S):
+        scan = scan_curves(path)
+    assert str(scan.faults[0][-1]) == f"{path}:12: too many faults; what follows was not read"
+
+
+@pytest.mark.parametrize(
+    ("cell", "said"),
+    [
+        ("1e308", "FILE:3: a: value too large (got '1e308'); allowed: 0 to 1e+100"),
+        ("1e101", "value too large"),
+        ("1" * 5000, "FILE:3: a: not a usable number"),
+        ("1_0", "not a usable number (got '1_0')"),
+        ("\uff11", "not a usable number"),
+        ("0x10", "not a usable number"),
+        ("infinity", "not a usable number"),
+        ("1e-400000000000", None),
+        ("-0.0", None),
+        (" +1.5e-3\t", None),
+        (".5", None),
+        ("5.", None),
+    ],
+)
+def test_numbers_of_tables(tmp_path: Path, cell: str, said: str | None) -> None:
+    path = lines(tmp_path / "a.csv", "wavelength_nm,a", "400,1", f"500,{cell}", "700,1")
+    if said is None:
+        found = read_curves(path).values["a"][1]
+        assert found == float(cell)
+        assert not np.signbit(found)
+    else:
+        assert said in refused(path, path.read_bytes())
+
+
+def test_values_that_nothing_can_be_computed_with() -> None:
+    check_samples([400, 700], [LARGEST, 5e-324])
+    check_samples([400, 700], [LEAST_PEAK, 0])
+    check_samples([400, 700], [0, 0])
+    with pytest.raises(DataError, match="value at 700 nm is too large"):
+        check_samples([400, 700], [1, 1.01 * LARGEST])
+    with pytest.raises(DataError, match="the largest value is too small"):
+        check_samples([400, 700], [0, 0.99 * LEAST_PEAK])
+
+
+def test_a_picture_of_very_many_curves_is_of_an_even_share(monkeypatch: pytest.MonkeyPatch) -> None:
+    from sweep.cli import describe_picture as picture
+    from sweep.spectra.facts import Curve, Facts
+
+    monkeypatch.setattr(picture, "_MOST_DRAWN", 3)
+    curves = tuple(Curve(f"c{i}", WAVE, np.full(WAVE.size, i / 10)) for i in range(8))
+    figure = picture.draw("many", Facts(curves, ""), {})
+    assert figure.axes[0].get_title() == "many: 3 of 8 curves"
+    drawn = [line for line in figure.axes[0].lines if len(line.get_xdata()) == WAVE.size]
+    assert [line.get_ydata()[0] for line in drawn] == [0.0, 0.3, 0.6]
+
+
+def test_a_thinned_curve_keeps_every_group_s_extremes() -> None:
+    from sweep.cli.describe_picture import _MOST_POINTS, _thinned
+    from sweep.spectra.facts import Curve
+
+    rng = np.random.default_rng(3)
+    wave, values = np.linspace(400, 700, 100_003), rng.random(100_003)
+    values[77_777] = 9
+    x, y = _thinned(Curve("a", wave, values))
+    assert len(x) < 1.1 * _MOST_POINTS
+    assert (np.diff(x) > 0).all()
+    assert y.max() == 9
+    np.testing.assert_array_equal(y, values[np.searchsorted(wave, x)])
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
+def test_pipes_are_no_curve_files_and_no_pictures(tmp_path: Path) -> None:
+    for name in ("pipe.csv", "pipe.mat", "a.png"):
+        os.mkfifo(tmp_path / name)
+    for path in (tmp_path / "pipe.csv", tmp_path / "pipe.mat"):
+        with pytest.raises(DataError, match="not a file"), within(HANG_S):
+            read_curves(path)
+    good = lines(tmp_path / "a.csv", "wavelength_nm,R", "400,0.1", "550,0.5", "700,0.1")
+    with pytest.raises(SweepError, match="not a file"), within(HANG_S):
+        described(good, tmp_path)

@@ -1,0 +1,263 @@
+"""Files as instruments, spreadsheets and colleagues write them: read where they can be meant in one way, and told."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import shlex
+import zipfile
+from collections.abc import Callable
+from itertools import chain
+from pathlib import Path
+from unittest import mock
+
+import numpy as np
+import pytest
+
+from sweep.base.errors import SweepError
+from sweep.cli.emva1288 import read_xml
+from sweep.spectra import text_tables
+from sweep.spectra.files import read_curves, scan_curves
+from sweep.spectra.lens_files import read_chief_rays
+from sweep.study import load_study
+
+from ..build import one_line
+from ..cases import thinned
+from ..commanded import commanded
+from ..curve_texts import WAVE, bell
+
+QE = np.round(np.stack([bell(610, 45), bell(535, 42), bell(460, 35)], axis=1) * 0.6, 5)
+NAMES = ("R", "G", "B")
+
+
+def text(
+    mark: str = ",",
+    head: str = "wavelength_nm",
+    rows: slice = slice(None),
+    wave: np.ndarray = WAVE,
+    values: np.ndarray = QE,
+    cell: Callable[[float], str] = "{:g}".format,
+    decimal: str = ".",
+    tail: str = "",
+    before: str = "",
+) -> str:
+    lines = [mark.join([head, *NAMES]) + tail]
+    for nm, row in list(zip(wave, values, strict=True))[rows]:
+        lines.append(mark.join([f"{nm:g}".replace(".", decimal), *(cell(v).replace(".", decimal) for v in row)]) + tail)
+    return before + "\n".join(lines) + "\n"
+
+
+_OCEAN = (
+    "Data from R_1.txt Node\n\nDate: Tue\nUser: me\nIntegration Time (sec): 1,0E-1\n>>>>>Begin Spectral Data<<<<<\n"
+)
+_NUMBERS = text("\t").split("\n", 1)[1]
+_COLUMNS = [*zip(*[line.split(",") for line in text().splitlines()], strict=True)]
+
+VARIANTS: dict[str, tuple[str, str, str]] = {
+    "semicolons": ("a.csv", text(";"), "separated by semicolons"),
+    "tabs": ("a.tsv", text("\t"), "separated by tabs"),
+    "blanks": ("a.txt", text("   "), "separated by blanks"),
+    "decimal comma": ("a.csv", text(";", decimal=","), "decimal commas"),
+    "tabs and decimal comma": ("a.txt", text("\t", decimal=","), "decimal commas"),
+    "nm": ("a.csv", text(head="nm"), "wavelengths are column 'nm'"),
+    "Wavelength (nm)": ("a.csv", text(head="Wavelength (nm)"), "wavelengths are column 'Wavelength (nm)'"),
+    "Wellenlänge": ("a.csv", text(";", head="Wellenl\u00e4nge [nm]", decimal=","), "Wellenl\u00e4nge"),
+    "lambda": ("a.csv", text(head="lambda"), "taken for nm by their size"),
+    "micrometers": ("a.csv", text(head="wavelength_um", wave=WAVE / 1000), "in um were brought to nm"),
+    "falling": ("a.csv", text(rows=slice(None, None, -1)), "turned round"),
+    "title lines": ("a.csv", text(before="QE of sensor X\nmeasured 2024, room 3\n"), "2 title lines were left out"),
+    "trailing commas": ("a.csv", text(tail=","), "an empty last column was left out"),
+    "a row of units": ("a.csv", text(head="Wavelength").replace("\n", "\nnm,%,%,%\n", 1), "values are in percent"),
+    "percent signs": ("a.csv", text(cell=lambda v: f"{100 * v:g} %"), "percent signs"),
+    "wavelengths last": (
+        "a.csv",
+        "\n".join(",".join(r) for r in zip(*_COLUMNS[1:], _COLUMNS[0], strict=True)),
+        "column 'wavelength_nm'",
+    ),
+    "rows counted": (
+        "a.csv",
+        "\n".join(f"{'' if i == 0 else i - 1},{x}" for i, x in enumerate(text().splitlines())),
+        "counts the rows",
+    ),
+    "Ocean spectrometer": ("a.txt", _OCEAN + _NUMBERS + ">>>>>End Spectral Data<<<<<\n", "spectrometer's head"),
+    "Thorlabs spectrometer": (
+        "a.txt",
+        "[SpectrumHeader]\nDate;2024\n[Data]\n" + _NUMBERS.replace("\t", ";") + "[EndOfFile]\n",
+        "there is no header",
+    ),
+    "numbers alone": ("a.txt", _NUMBERS, "there is no header"),
+    "small negatives": ("a.csv", text(values=np.where(QE < 1e-3, -0.002, QE)), ""),
+    "one sample missing": ("a.csv", text().replace(f"600,{QE[22, 0]:g}", "600,", 1), ""),
+    "a row twice": ("a.csv", text().replace("\n600,", f"\n590,{','.join(f'{v:g}' for v in QE[21])}\n600,", 1), ""),
+}
+"""Name of the file, its text, and a word of the line that says how it was read; none where `--clean` must help."""
+
+
+@pytest.mark.usefixtures("plain_pictures")
+@pytest.mark.parametrize("name", thinned(VARIANTS, 3))
+def test_a_variant_reaches_a_study_or_ends_with_what_helps(tmp_path: Path, name: str) -> None:
+    file, content, said = VARIANTS[name]
+    path = tmp_path / file
+    path.write_text(content, encoding="latin-1" if "\u00e4" in content else "utf-8")
+    code, out, err = commanded("describe", path, "--output", tmp_path / "drawn")
+    if not said:
+        assert code == 2
+        help_line = next(line for line in out.splitlines() if "--clean" in line).split("`")[1]
+        clean = tmp_path / "clean.csv"
+        words = shlex.split(help_line.replace("NEW.csv", shlex.quote(str(clean))))
+        assert commanded(*words[1:])[0] == 0
+        assert "\n# changed: " in clean.read_text()
+        path = clean
+    else:
+        assert (code, err) == (0, "")
+        assert any(line.startswith("Read: ") and said in line for line in out.splitlines())
+    found = read_curves(path)
+    scale = 0.01 if name == "a row of units" else 1.0
+    np.testing.assert_allclose(found.wavelength_nm, WAVE, rtol=0, atol=1e-9)
+    if name in ("small negatives", "one sample missing"):
+        np.testing.assert_allclose(np.stack([*found.values.values()], axis=1), QE, atol=0.03)
+    else:
+        np.testing.assert_allclose(np.stack([*found.values.values()], axis=1), QE * scale, rtol=1e-5, atol=1e-12)
+    made = commanded("new", "mine", "--qe", path, "--folder", tmp_path / "studies")
+    assert made[0] == 0, made[2]
+    study = load_study(tmp_path / "studies" / "mine.yaml")
+    assert all(said in "".join(study.warnings) for said in found.notes)
+
+
+@pytest.mark.parametrize(
+    ("file", "content", "said"),
+    [
+        ("a.csv", text().replace("0.6", "0,6", 1), "wrong number of columns"),
+        ("a.csv", text(";").replace("0.6", "0,6", 1), "not a usable number (got '0,6')"),
+        ("a.csv", text(head="wavelength_nm", wave=WAVE / 1000), "looks like um"),
+        ("a.csv", text(head="frequency"), "no column wavelength (got 'frequency')"),
+        ("a.xlsx", "x", "unknown kind of curve file"),
+        ("a.spectrum", "x", "unknown kind of curve file"),
+    ],
+)
+def test_what_two_readers_could_read_in_two_ways_is_refused(tmp_path: Path, file: str, content: str, said: str) -> None:
+    path = tmp_path / file
+    path.write_text(content)
+    with one_line(said):
+        read_curves(path)
+
+
+def zipped() -> bytes:
+    held = io.BytesIO()
+    with zipfile.ZipFile(held, "w") as archive:
+        archive.writestr("curves", np.random.default_rng(1).bytes(20_000_000))
+    return held.getvalue()
+
+
+NO_TEXTS: dict[str, Callable[[], bytes]] = {
+    "zip": zipped,
+    "xls": lambda: b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(600),
+    "gzip": lambda: gzip.compress(text().encode()),
+    "program": lambda: b"\x7fELF\x02\x01\x01" + bytes(50),
+    "random": lambda: b"x" + np.random.default_rng(1).bytes(5000),
+}
+
+
+@pytest.mark.parametrize("kind", NO_TEXTS)
+def test_what_is_no_text_is_refused_before_its_lines_are_looked_at(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    path, study = tmp_path / "a.csv", tmp_path / "x.yaml"
+    path.write_bytes(NO_TEXTS[kind]())
+    sections = [
+        "sensor: {files: [{file: a.csv, columns: {R: R, C: C}}]}",
+        "lights: {files: [{file: a.csv, quantity: energy, signals: {red: [r], green: [g]}}]}",
+    ]
+    study.write_text("\n".join(["study: x", *sections, "cfas: [RCCC]", ""]))
+    monkeypatch.setattr(text_tables, "_laid_out", mock.Mock(side_effect=AssertionError))
+    line = "not a text table; allowed: text; save a spreadsheet as CSV"
+    assert commanded("describe", path) == (2, "", f"sweep: {path}: {line}\n")
+    assert line in commanded("check", study)[2]
+    study.write_text("\n".join(["study: x", "sensor: ar0820", *sections[1:], "cfas: [RGGB]", ""]))
+    assert line in commanded("check", study)[2]
+    with one_line("not a text table"):
+        read_chief_rays(path)
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be"])
+def test_a_text_in_utf_16_is_text(tmp_path: Path, encoding: str) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(text(), encoding)
+    scan = scan_curves(path)
+    np.testing.assert_allclose(scan.values, QE, rtol=1e-5)
+    assert ["NUL characters" in str(fault) for fault in chain(*scan.faults)] == ([] if encoding == "utf-16" else [True])
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_xml_with_entities_is_refused_in_every_encoding(tmp_path: Path, encoding: str) -> None:
+    path = tmp_path / "a.xml"
+    path.write_text(f"<?xml version='1.0' encoding='{encoding}'?><!DOCTYPE x [<!ENTITY a 'b'>]><x>&a;</x>", encoding)
+    with one_line("without entities"):
+        read_xml(path)
+    path.write_text(f"<?xml version='1.0' encoding='{encoding}'?><x>ä</x>", encoding)
+    assert read_xml(path).text == "ä"
+
+
+def mutated(rng: np.random.Generator) -> str:
+    """The table with a layout of its own, and in half of the cases with a damage that leaves the digits as they are."""
+    mark = str(rng.choice([",", ";", "\t", "  "]))
+    decimal = "," if mark in (";", "\t") and rng.integers(2) else "."
+    head = str(
+        rng.choice(["wavelength_nm", "nm", "Wavelength (nm)", "lambda", "Wavelength [um]", "wavelengthnm", "WL"])
+    )
+    wave = WAVE / 1000 if "um" in head else WAVE
+    before = str(rng.choice(["", "", "a title\n", "# note\n\n", "QE, measured; 2024\n"]))
+    lines = text(
+        mark, head, slice(None, None, int(rng.choice([1, -1]))), wave, decimal=decimal, before=before
+    ).splitlines()
+    if rng.integers(2):
+        at = int(rng.integers(len(lines)))
+        place = int(rng.integers(max(1, len(lines[at]))))
+        match int(rng.integers(7)):
+            case 0:
+                lines[at] = lines[at][:place] + mark + lines[at][place:]
+            case 1:
+                lines[at] = lines[at].replace(mark, "", 1)
+            case 2:
+                lines[at] = (
+                    lines[at][:place]
+                    + str(rng.choice(["x", '"', "NaN", "-", "\t", ";", "%", "\u00e9"]))
+                    + lines[at][place:]
+                )
+            case 3:
+                lines = lines[:at]
+            case 4:
+                lines.insert(at, lines[int(rng.integers(len(lines)))])
+            case 5:
+                lines.pop(at)
+            case _:
+                lines[at] = lines[at] + mark
+    return "\n".join(lines)
+
+
+def test_of_mutated_files_none_is_a_wrong_curve(tmp_path: Path) -> None:
+    """Every curve that is read from one of 400 files has the values of the clean one, wherever it has samples."""
+    rng, taken, path = np.random.default_rng(7), 0, tmp_path / "a.csv"
+    for _ in range(400):
+        path.write_text(mutated(rng), encoding="latin-1")
+        try:
+            found = read_curves(path)
+        except SweepError:
+            continue
+        taken += 1
+        at = [int(np.argmin(abs(WAVE - nm))) for nm in found.wavelength_nm]
+        np.testing.assert_allclose(WAVE[at], found.wavelength_nm, atol=1e-9, err_msg=path.read_text(encoding="latin-1"))
+        np.testing.assert_allclose(
+            np.stack([*found.values.values()], axis=1), QE[at], atol=1e-9, err_msg=path.read_text(encoding="latin-1")
+        )
+    assert taken > 150
+
+
+def test_what_no_rule_mends_is_not_cleaned(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(text().replace(f"600,{QE[22, 0]:g}", "600,-0.3", 1))
+    assert scan_curves(path).faults
+    code, _, err = commanded("describe", path, "--clean", tmp_path / "b.csv")
+    assert code == 2
+    assert "negative value at 600 nm" in err
+    assert not (tmp_path / "b.csv").exists()

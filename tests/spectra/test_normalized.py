@@ -1,0 +1,69 @@
+"""Curves whose largest value is 1: a relative response, which is said wherever it is taken for a QE."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from markupsafe import escape
+
+from sweep.cli.describe import described
+from sweep.cli.new import new_study
+from sweep.report.page import make_report
+from sweep.report.summary import summary_lines
+from sweep.results.output import read_output
+from sweep.run import run_study
+from sweep.spectra.facts import NORMALIZED
+from sweep.study import load_study
+
+NM = np.arange(390.0, 711, 5)
+STUDY = """\
+study: tiny
+sensor: {files: [{file: qe.csv, columns: {R: R, G: G, B: B}, SCALE}]}
+lights: tl16
+cfas: [RGGB]
+"""
+
+
+def qe_file(folder: Path, top: float) -> Path:
+    curves = [top * (1 - 1e-9) * np.exp(-(((NM - nm) / 80) ** 2)) for nm in (610, 540, 460)]
+    rows = [",".join(map(str, row)) for row in zip(NM, *curves, strict=True)]
+    (folder / "qe.csv").write_text("\n".join(["wavelength_nm,R,G,B", *rows]))
+    return folder / "qe.csv"
+
+
+@pytest.mark.parametrize(("top", "looks"), [(1.0, True), (0.8, False), (0.999, False)])
+def test_a_file_with_a_maximum_of_one_is_said_to_look_normalized(tmp_path: Path, top: float, looks: bool) -> None:
+    qe = qe_file(tmp_path, top)
+    assert (f"Note: {NORMALIZED}." in described(qe, tmp_path).lines) == looks
+    assert (f"Note: qe.csv: {NORMALIZED}." in new_study("mine", tmp_path, qe, None, "energy")) == looks
+
+
+@pytest.mark.parametrize(
+    ("top", "scale", "looks"),
+    [(1.0, "scale: 1", True), (1.0, "scale: 0.6", False), (100.0, "scale: 0.01", True), (0.8, "scale: 1", False)],
+)
+def test_a_study_says_so_by_what_its_scale_makes_of_it(tmp_path: Path, top: float, scale: str, looks: bool) -> None:
+    qe_file(tmp_path, top)
+    (tmp_path / "tiny.yaml").write_text(STUDY.replace("SCALE", scale))
+    study = load_study(tmp_path / "tiny.yaml")
+    assert study.warnings == ((f"qe.csv: {NORMALIZED}",) if looks else ())
+
+
+def test_a_transmission_of_one_is_no_relative_response(tmp_path: Path) -> None:
+    qe_file(tmp_path, 1.0)
+    text = STUDY.replace("SCALE", "relative_to: C").replace("{files", "{builtin: ar0820, files")
+    (tmp_path / "tiny.yaml").write_text(text)
+    assert load_study(tmp_path / "tiny.yaml").warnings == ()
+
+
+def test_a_run_and_its_report_say_so(tmp_path: Path) -> None:
+    qe_file(tmp_path, 1.0)
+    (tmp_path / "tiny.yaml").write_text(STUDY.replace("SCALE", "scale: 1"))
+    run_study(load_study(tmp_path / "tiny.yaml"), tmp_path / "out", 1, lambda *_: None)
+    output = read_output(tmp_path / "out")
+    assert f"Note: qe.csv: {NORMALIZED}." in summary_lines(output)
+    make_report(output)
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert f"Note: qe.csv: {escape(NORMALIZED)}." in page

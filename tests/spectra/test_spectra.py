@@ -1,0 +1,117 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from sweep.base.errors import DataError
+from sweep.spectra.spectrum import (
+    WavelengthGrid,
+    check_samples,
+    energy_from_photons,
+    equal_photons,
+    hats,
+    photons_from_energy,
+    resample,
+)
+
+from ..rounding import gamma
+
+GRID = WavelengthGrid()
+
+
+def test_default_grid_is_301_bins() -> None:
+    assert GRID.size == 301
+    assert GRID.nodes_nm[0] == 400
+    assert GRID.nodes_nm[-1] == 700
+    assert GRID.integrate(np.ones(301)) == 301
+
+
+@pytest.mark.parametrize(
+    ("keys", "word"),
+    [
+        ({"step_nm": 7.0}, "divide"),
+        ({"step_nm": 1e300}, "divide"),
+        ({"step_nm": 5e-324}, "too fine"),
+        ({"start_nm": 700.0, "stop_nm": 400.0}, "below"),
+        ({"start_nm": 0.4, "stop_nm": 0.7, "step_nm": 0.1}, "nm"),
+        ({"step_nm": float("nan")}, "finite"),
+    ],
+)
+def test_bad_grid_is_refused(keys: dict[str, float], word: str) -> None:
+    with pytest.raises(ValidationError, match=word):
+        WavelengthGrid(**keys)
+
+
+@pytest.mark.parametrize(
+    ("wave", "data", "word"),
+    [
+        ([400, 500, 700], [1, np.nan, 1], "500 nm is not a finite"),
+        ([400, 500, 700], [1, np.inf, 1], "not a finite"),
+        ([400, 500, 700], [1, -1e-9, 1], "negative value at 500"),
+        ([400, 700, 500], [1, 1, 1], "not sorted"),
+        ([400, 500, 500, 700], [1, 1, 1, 1], "occurs twice"),
+        ([0.4, 0.5, 0.7], [1, 1, 1], "um"),
+        ([400, np.nan, 700], [1, 1, 1], "wavelength is not a finite"),
+        ([400], [1], "two or more"),
+        ([400, 500], [1, 1, 1], "two or more"),
+    ],
+)
+def test_dirty_samples_are_refused(wave: list[float], data: list[float], word: str) -> None:
+    with pytest.raises(DataError, match=word):
+        check_samples(wave, data)
+
+
+def test_truncated_curve_is_refused_or_zero_outside() -> None:
+    wave, data = [450, 700], [1.0, 1.0]
+    with pytest.raises(DataError, match="truncated"):
+        resample(wave, data, GRID)
+    found = resample(wave, data, GRID, outside="zero")
+    assert found[49] == 0
+    assert (found[50:] == 1).all()
+
+
+def test_linear_takes_the_interpolant_at_the_nodes() -> None:
+    found = resample([400, 700], [0.0, 3.0], GRID)
+    np.testing.assert_allclose(found, (GRID.nodes_nm - 400) / 100, rtol=1e-14, atol=1e-16)
+
+
+@given(st.lists(st.just(0.0) | st.floats(1e-90, 1e6), min_size=2, max_size=40), st.integers(0, 2**32 - 1))
+def test_mean_keeps_the_integral(values: list[float], seed: int) -> None:
+    # A source on [399.5, 700.5] covers every bin whole, so the integral is kept to rounding.
+    inner = np.random.default_rng(seed).uniform(399.6, 700.4, len(values))
+    wave = np.unique(np.concatenate([[399.5], inner, [700.5]]))
+    data = np.resize(values, wave.size)
+    found = GRID.integrate(resample(wave, data, GRID, "mean"))
+    assert found == pytest.approx(np.trapezoid(data, wave), rel=1e-9, abs=1e-6)
+
+
+def test_mean_of_a_narrow_line_is_not_lost_between_nodes() -> None:
+    # A triangle of area 0.1 between two nodes: no node sees it, its bins do.
+    wave, data = [400, 550.3, 550.4, 550.5, 700], [0.0, 0.0, 1.0, 0.0, 0.0]
+    assert not resample(wave, data, GRID).any()
+    assert GRID.integrate(resample(wave, data, GRID, "mean")) == pytest.approx(0.1, rel=1e-9)
+
+
+def test_photon_energy_of_555_nm() -> None:
+    # h c / 555 nm = 3.5792e-19 J (CODATA 2018)
+    photons = photons_from_energy(np.array([555.0]), np.array([1.0]))
+    assert photons[0] == pytest.approx(1 / 3.57918e-19, rel=1e-5)
+    assert energy_from_photons(np.array([555.0]), photons)[0] == pytest.approx(1, rel=1e-15)
+
+
+def test_equal_photons() -> None:
+    shapes = np.stack([np.full(301, 5.0), np.linspace(0, 1, 301)])
+    np.testing.assert_allclose(GRID.integrate(equal_photons(GRID, shapes)), 1, rtol=gamma(GRID.size + 2))
+    with pytest.raises(DataError, match="no photons"):
+        equal_photons(GRID, np.zeros((1, 301)))
+
+
+def test_hats_interpolate_as_lines_do() -> None:
+    rng = np.random.default_rng(2)
+    for n in (1, 2, 7, 40):
+        knots, values = np.cumsum(rng.uniform(0.1, 2, n)), rng.uniform(-1, 1, n)
+        at = np.concatenate([rng.uniform(knots[0] - 1, knots[-1] + 1, 50), knots])
+        np.testing.assert_allclose(values @ hats(at, knots), np.interp(at, knots, values), rtol=0, atol=1e-14)
