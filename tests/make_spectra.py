@@ -23,7 +23,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-OUT = Path(__file__).parent.parent / "sweep" / "curves" / "builtin" / "spectra.parquet"
+OUT = Path(__file__).parent.parent / "sweep" / "spectra" / "builtin" / "spectra.parquet"
 FIRST_NM, LAST_NM = 400.0, 700.0
 """What the built-in sensor and lights cover."""
 
