@@ -1,1 +1,1 @@
-"""What the package offers to Python: studies and runs as objects; `sweep/__init__.py` gives its names out."""
+"""Python API: studies and runs as objects, exported by `sweep/__init__.py`."""

@@ -205,18 +205,7 @@ class Bands:
         return self._conditions
 
     def edges(self, centers_and_widths: FloatArray) -> FloatArray:
-        """Return rising edges.
-
-        Parameters
-        ----------
-        centers_and_widths : ndarray of shape (n, 2)
-            Center and width of each edge, nm.
-
-        Returns
-        -------
-        ndarray of shape (n, n_wavelengths)
-            Edges, 0 to 1.
-        """
+        """Return rising edges."""
         return edge(self._wave, centers_and_widths[:, :1], centers_and_widths[:, 1:])
 
     def _open(self, x: FloatArray, band: int) -> FloatArray:
@@ -252,7 +241,7 @@ class Bands:
 
 
 class Banded:
-    """Base class of families whose parameters are those of bands."""
+    """Base class of families with bands as parameters; methods as in `Family`."""
 
     start_dimensions: int | None = None
 
@@ -287,46 +276,13 @@ class Banded:
         return made
 
     def start(self, points: FloatArray) -> FloatArray:
-        """Raise an error: a search starts anywhere in the box.
-
-        Parameters
-        ----------
-        points : ndarray of shape (n, start_dimensions)
-            Points of the unit cube.
-
-        Returns
-        -------
-        ndarray of shape (n, n_parameters)
-            Starting designs.
-        """
+        """Raise an error: a search starts anywhere in the box."""
         return points
 
     def violation(self, x: FloatArray) -> FloatArray:
-        """Return edges out of order, nm; see `Bands.violation`.
-
-        Parameters
-        ----------
-        x : ndarray of shape (n_designs, n_parameters)
-            Parameters.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, n_conditions)
-            Values of the conditions, met where <= 0.
-        """
+        """Return edges out of order, nm; see `Bands.violation`."""
         return self._bands.violation(x)
 
     def violation_gradient(self, x: FloatArray) -> FloatArray:
-        """Return the derivative; see `Bands.violation_gradient`.
-
-        Parameters
-        ----------
-        x : ndarray of shape (n_parameters,)
-            Parameters of one design.
-
-        Returns
-        -------
-        ndarray of shape (n_conditions, n_parameters)
-            Derivatives of the conditions.
-        """
+        """Return the derivative; see `Bands.violation_gradient`."""
         return self._bands.violation_gradient(x)

@@ -92,7 +92,7 @@ class Block(Protocol):
 
 @dataclass(frozen=True)
 class CurveBlock:
-    """Filters given by their curves.
+    """Filters given by their curves; methods as in `Block`.
 
     Parameters
     ----------
@@ -106,30 +106,11 @@ class CurveBlock:
         return len(self.qe)
 
     def curves(self) -> FloatArray:
-        """Return the QE of the modified channels.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, n_modified, n_wavelengths)
-            QE of the modified channels.
-        """
+        """Return the QE of the modified channels."""
         return self.qe
 
     def product(self, weights: FloatArray, nodes: IndexArray) -> FloatArray:
-        """Sum QE times weights, in the precision of the weights.
-
-        Parameters
-        ----------
-        weights : ndarray of shape (n_modified * n_nodes, k)
-            Weights.
-        nodes : ndarray of int, shape (n_nodes,)
-            Wavelengths of the weights.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, k)
-            Sums over modified channels and wavelengths.
-        """
+        """Sum QE times weights, in the precision of the weights."""
         seen = self.qe if nodes.size == self.qe.shape[2] else self.qe[:, :, nodes]
         flat = seen.reshape(len(self.qe), -1)
         return row_products(flat.astype(weights.dtype, copy=False), weights)
@@ -150,18 +131,7 @@ class CurveBlock:
         return CurveBlock(self.qe[which])
 
     def shapes(self, base_qe: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return slope and transmission of the curves.
-
-        Parameters
-        ----------
-        base_qe : ndarray of shape (n_modified, n_wavelengths)
-            QE of the replaced curves.
-
-        Returns
-        -------
-        steepest, lowest : ndarray of shape (n_designs,)
-            Largest step between neighboring wavelengths, and smallest ratio to the base, 1 where the base is 0.
-        """
+        """Return slope and transmission of the curves."""
         steepest, lowest = np.zeros(len(self.qe)), np.full(len(self.qe), np.inf)
         for channel, base in enumerate(np.asarray(base_qe, dtype=float)):
             curves = np.ascontiguousarray(self.qe[:, channel], dtype=float)
@@ -273,7 +243,7 @@ class Tables:
 
 @dataclass(frozen=True)
 class EdgeBlock:
-    """Designs of a grid of stopbands by the indices of their edges.
+    """Designs of a grid of stopbands by the indices of their edges; methods as in `Block`.
 
     Parameters
     ----------
@@ -300,13 +270,7 @@ class EdgeBlock:
         return len(self.depth)
 
     def curves(self) -> FloatArray:
-        """Return the QE of the modified channel.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, n_modified, n_wavelengths)
-            QE of the modified channels.
-        """
+        """Return the QE of the modified channel."""
         return self.space.curves(self.space.points_of(self.numbers), self.tables.base.size)
 
     def some(self, which: IndexArray | slice) -> EdgeBlock:
@@ -326,20 +290,7 @@ class EdgeBlock:
         return EdgeBlock(self.space, self.numbers[which], self.tables, *ends)
 
     def product(self, weights: FloatArray, nodes: IndexArray) -> FloatArray:
-        """Sum QE times weights by table lookup.
-
-        Parameters
-        ----------
-        weights : ndarray of shape (n_modified * n_nodes, k)
-            Weights.
-        nodes : ndarray of int, shape (n_nodes,)
-            Wavelengths of the weights.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, k)
-            Sums over modified channels and wavelengths.
-        """
+        """Sum QE times weights by table lookup."""
         from .compiled import through_edges  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         found = np.empty((len(self), weights.shape[1]))
@@ -348,18 +299,7 @@ class EdgeBlock:
         return found
 
     def shapes(self, base_qe: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return slope and transmission of the curves by table lookup.
-
-        Parameters
-        ----------
-        base_qe : ndarray of shape (n_modified, n_wavelengths)
-            QE of the replaced curves.
-
-        Returns
-        -------
-        steepest, lowest : ndarray of shape (n_designs,)
-            Largest step between neighboring wavelengths, and smallest ratio to the base, 1 where the base is 0.
-        """
+        """Return slope and transmission of the curves by table lookup."""
         from .compiled import shapes_of_edges  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         steepest, lowest = np.empty(len(self)), np.empty(len(self))

@@ -21,12 +21,12 @@ _SLACK = 1e-9
 class PluginFamily:
     """Family by a class of user code: FILE.py:CLASS, or the name by which an installed package offers it.
 
-    The class has `parameters`, a list of (name, low, high) or (name, low, high, default), is constructed with
-    (wavelength_nm, base, target), and has `curves(x)`: ndarray of shape (n_designs, n_parameters) to QE, ndarray of
-    shape (n_designs, n_wavelengths). It may have `violation(x)`, ndarray of shape (n_designs, n), met where <= 0, and
-    `below_base = True`, which states that no curve of a well-formed design is above the base. Curves are checked to be
-    within 0 and 1, and below the base if that is stated. Gradients are central differences. A row of `curves(x)` must
-    not depend on the other rows.
+    Methods as in `Family`. The class has `parameters`, a list of (name, low, high) or (name, low, high, default), is
+    constructed with (wavelength_nm, base, target), and has `curves(x)`: ndarray of shape (n_designs, n_parameters) to
+    QE, ndarray of shape (n_designs, n_wavelengths). It may have `violation(x)`, ndarray of shape (n_designs, n), met
+    where <= 0, and `below_base = True`, which states that no curve of a well-formed design is above the base. Curves
+    are checked to be within 0 and 1, and below the base if that is stated. Gradients are central differences. A row of
+    `curves(x)` must not depend on the other rows.
 
     Worker processes get the text of a file; an installed package must be installed there.
     """
@@ -87,95 +87,29 @@ class PluginFamily:
         return np.clip(found, 0.0, 1.0)[:, None, :]
 
     def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
-        """Return the base or 1, which every well-formed curve is checked against.
-
-        Parameters
-        ----------
-        low, high : ndarray of shape (n_parameters,)
-            Ends of the box of parameters.
-
-        Returns
-        -------
-        ndarray of shape (n_modified, n_wavelengths)
-            Upper bound on the QE.
-        """
+        """Return the base or 1, which every well-formed curve is checked against."""
         assert low.shape == high.shape
         return np.asarray((self._base if self.below_base else np.ones_like(self._base))[None], dtype=float)
 
     def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
-        """Return 0.
-
-        Parameters
-        ----------
-        low, high : ndarray of shape (n_parameters,)
-            Ends of the box of parameters.
-
-        Returns
-        -------
-        ndarray of shape (n_modified, n_wavelengths)
-            Lower bound on the QE.
-        """
+        """Return 0."""
         assert low.shape == high.shape
         return np.zeros((1, self._base.size))
 
     def hull(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return 0 and 1, to which all curves are clipped.
-
-        Parameters
-        ----------
-        low, high : ndarray of shape (n_parameters,)
-            Ends of the box of parameters.
-
-        Returns
-        -------
-        low, high : ndarray of shape (n_modified, n_wavelengths)
-            Bounds on the QE.
-        """
+        """Return 0 and 1, to which all curves are clipped."""
         return self.lower(low, high), np.ones((1, self._base.size))
 
     def gradient(self, x: FloatArray) -> FloatArray:
-        """Return central differences, one-sided at the ends of a parameter.
-
-        Parameters
-        ----------
-        x : ndarray of shape (n_parameters,)
-            Parameters of one design.
-
-        Returns
-        -------
-        ndarray of shape (n_parameters, n_modified, n_wavelengths)
-            QE per unit of parameter.
-        """
+        """Return central differences, one-sided at the ends of a parameter."""
         return self._differences(x, self.curves)
 
     def violation(self, x: FloatArray) -> FloatArray:
-        """Return the conditions of the class; a condition that is always met if it has none.
-
-        Parameters
-        ----------
-        x : ndarray of shape (n_designs, n_parameters)
-            Parameters.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, n_conditions)
-            Values of the conditions, met where <= 0.
-        """
+        """Return the conditions of the class; a condition that is always met if it has none."""
         return self._array("violation", x, None) if hasattr(self._own, "violation") else np.zeros((len(x), 1))
 
     def violation_gradient(self, x: FloatArray) -> FloatArray:
-        """Return differences of the conditions.
-
-        Parameters
-        ----------
-        x : ndarray of shape (n_parameters,)
-            Parameters of one design.
-
-        Returns
-        -------
-        ndarray of shape (n_conditions, n_parameters)
-            Derivatives of the conditions.
-        """
+        """Return differences of the conditions."""
         return self._differences(x, self.violation).T
 
     def _differences(self, x: FloatArray, function: Callable[[FloatArray], FloatArray]) -> FloatArray:
@@ -209,18 +143,7 @@ class PluginFamily:
         return self
 
     def start(self, points: FloatArray) -> FloatArray:
-        """Raise an error: a search starts anywhere in the box.
-
-        Parameters
-        ----------
-        points : ndarray of shape (n, start_dimensions)
-            Points of the unit cube.
-
-        Returns
-        -------
-        ndarray of shape (n, n_parameters)
-            Starting designs.
-        """
+        """Raise an error: a search starts anywhere in the box."""
         return points
 
 

@@ -53,20 +53,7 @@ class Paired:
     size: int
 
     def points(self, axes: Axes, start: int, stop: int) -> FloatArray:
-        """Return the parameters of consecutive designs.
-
-        Parameters
-        ----------
-        axes : tuple
-            Values of each parameter.
-        start, stop : int
-            Range of the designs.
-
-        Returns
-        -------
-        ndarray of shape (stop - start, n_parameters)
-            Parameters.
-        """
+        """Return the parameters of consecutive designs."""
         columns = [np.asarray(axis[start:stop] if len(axis) > 1 else axis * (stop - start)) for axis in axes]
         return np.stack(columns, axis=1).astype(float)
 
@@ -91,20 +78,7 @@ class Drawn:
     seed: int
 
     def points(self, axes: Axes, start: int, stop: int) -> FloatArray:
-        """Return the parameters of consecutive designs; all are drawn, once.
-
-        Parameters
-        ----------
-        axes : tuple
-            Values of each parameter.
-        start, stop : int
-            Range of the designs.
-
-        Returns
-        -------
-        ndarray of shape (stop - start, n_parameters)
-            Parameters.
-        """
+        """Return the parameters of consecutive designs; all are drawn, once."""
         shares = _drawn.get((self, len(axes)), lambda: self._shares(len(axes)))[start:stop]
         low, high = (np.array([end(axis) for axis in axes], dtype=float) for end in (min, max))
         return np.asarray(np.minimum(low + shares * (high - low), high), dtype=float)

@@ -33,12 +33,12 @@ def _counts(electrons: float, prnu: float, most: int) -> tuple[int, FloatArray]:
         begin, end = poisson_shares(electrons, start, RARE, shares)
         return start + begin, shares[begin:end] / shares[begin:end].sum()
     half = int(_TAIL * _PER_DEVIATION * math.sqrt(1 + prnu * prnu * electrons)) + 1
-    own = np.empty(shares.size)
+    poisson = np.empty(shares.size)
     for i in range(-half, half + 1):
         z = _TAIL * i / half
-        begin, end = poisson_shares(max(electrons * (1 + prnu * z), 0.0), start, RARE, own)
-        weight = math.exp(-z * z / 2) / own[begin:end].sum()
-        some, here = shares[begin:end], own[begin:end]
+        begin, end = poisson_shares(max(electrons * (1 + prnu * z), 0.0), start, RARE, poisson)
+        weight = math.exp(-z * z / 2) / poisson[begin:end].sum()
+        some, here = shares[begin:end], poisson[begin:end]
         for k in range(here.size):
             some[k] += weight * here[k]
     return start, shares / shares.sum()
@@ -60,15 +60,15 @@ def bin_shares(sigma: float) -> FloatArray:
     """
     reach = int(_TAIL * sigma) + 1
     places = int(64 / sigma) + 1
-    found = np.empty((places + 1, 2 * reach + 1))
+    bins = np.empty((places + 1, 2 * reach + 1))
     for p in range(places + 1):
         for i in range(2 * reach + 1):
             low, high = (i - reach - p / places) / sigma, (i - reach + 1 - p / places) / sigma
             if low > 0:
-                found[p, i] = 0.5 * (math.erfc(low / math.sqrt(2)) - math.erfc(high / math.sqrt(2)))
+                bins[p, i] = 0.5 * (math.erfc(low / math.sqrt(2)) - math.erfc(high / math.sqrt(2)))
             else:
-                found[p, i] = 0.5 * (math.erfc(-high / math.sqrt(2)) - math.erfc(-low / math.sqrt(2)))
-    return found
+                bins[p, i] = 0.5 * (math.erfc(-high / math.sqrt(2)) - math.erfc(-low / math.sqrt(2)))
+    return bins
 
 
 @njit(cache=True, nogil=True)
@@ -117,7 +117,7 @@ def pixel_numbers(
     largest = min(slope * min(float(first + shares.size + group), well_e) + origin, beyond)
     low = min(max(math.floor(least) - reach - 1, 0), n_bins - 1)
     high = min(max(math.floor(largest) + reach + 1, 0), n_bins - 1)
-    found = np.zeros(high - low + 1)
+    probabilities = np.zeros(high - low + 1)
     k = 0
     while k < shares.size:
         count, weight = first + k, shares[k]
@@ -134,7 +134,7 @@ def pixel_numbers(
         y = min(slope * held + origin, beyond)
         cell = math.floor(y)
         if not table.size:
-            found[min(max(cell, low), high) - low] += weight
+            probabilities[min(max(cell, low), high) - low] += weight
             continue
         place = (y - cell) * places
         p = min(int(place), places - 1)
@@ -143,20 +143,20 @@ def pixel_numbers(
         begin = cell - reach - low
         for i in range(2 * reach + 1):
             b = min(max(begin + i, 0), high - low)
-            found[b] += left * table[p, i] + right * table[p + 1, i]
-    return low, found
+            probabilities[b] += left * table[p, i] + right * table[p + 1, i]
+    return low, probabilities
 
 
 @njit(cache=True, nogil=True)
 def _sum_of(one: FloatArray, other: FloatArray) -> FloatArray:
     """Return the distribution of the sum of two numbers."""
-    found = np.zeros(one.size + other.size - 1)
+    total = np.zeros(one.size + other.size - 1)
     for i in range(one.size):
         if one[i] > RARE:
-            share, some = one[i], found[i:]
+            share, some = one[i], total[i:]
             for j in range(other.size):
                 some[j] += share * other[j]
-    return found
+    return total
 
 
 @njit(cache=True, nogil=True)
@@ -192,11 +192,13 @@ def channel_numbers(
     values = np.empty(4096)
     for i in range(len(electrons)):
         first, shares = pixel_numbers(electrons[i, 0], most, well_e, prnu, read_e, line, n_bins, table)
-        own_first, own = first, shares
+        pixel_first, pixel_shares = first, shares
         for u in range(1, electrons.shape[1]):
             if electrons[i, u] != electrons[i, u - 1]:
-                own_first, own = pixel_numbers(electrons[i, u], most, well_e, prnu, read_e, line, n_bins, table)
-            first, shares = first + own_first, _sum_of(shares, own)
+                pixel_first, pixel_shares = pixel_numbers(
+                    electrons[i, u], most, well_e, prnu, read_e, line, n_bins, table
+                )
+            first, shares = first + pixel_first, _sum_of(shares, pixel_shares)
         low, high = 0, shares.size
         while low + 1 < high and shares[low] < RARE:
             low += 1
@@ -232,7 +234,7 @@ def overlaps(firsts: IndexArray, starts: IndexArray, roots: FloatArray, rows: In
     ndarray of shape (n_signals, n_signals)
         Coefficients.
     """
-    found = np.ones((rows.shape[1], rows.shape[1]))
+    products = np.ones((rows.shape[1], rows.shape[1]))
     for a in range(rows.shape[1]):
         for b in range(a):
             for c in range(rows.shape[0]):
@@ -243,11 +245,11 @@ def overlaps(firsts: IndexArray, starts: IndexArray, roots: FloatArray, rows: In
                 total = 0.0
                 for k in range(n):
                     total += roots[i + k] * roots[j + k]
-                found[a, b] *= total
+                products[a, b] *= total
                 if total == 0:
                     break
-            found[b, a] = found[a, b]
-    return found
+            products[b, a] = products[a, b]
+    return products
 
 
 @njit(cache=True, nogil=True)
@@ -265,28 +267,28 @@ def _ratios(
     """Return the overlap of one channel by the logarithm of the likelihood ratio, in steps."""
     i, j, n = _common(firsts, starts, one, other)
     most = int(_MOST_NATS / step)
-    found = np.zeros(2 * most + 1)
+    histogram = np.zeros(2 * most + 1)
     begin, end = 2 * most, 0
     for k in range(n):
         p, q = roots[i + k], roots[j + k]
         if p > 0 and q > 0:
             at = round(min(max(2 * (logs[i + k] - logs[j + k]) / step, -most), most)) + most
-            found[at] += p * q
+            histogram[at] += p * q
             begin, end = min(begin, at), max(end, at)
     if end < begin:
         return 0, np.zeros(1)
-    return begin - most, found[begin : end + 1]
+    return begin - most, histogram[begin : end + 1]
 
 
 @njit(cache=True, nogil=True)
 def _sum_of_few(one: FloatArray, other: FloatArray) -> FloatArray:
     """Return the distribution of the sum of two numbers, few of which occur in a long range."""
-    found, occurring = np.zeros(one.size + other.size - 1), np.flatnonzero(other)
+    total, occurring = np.zeros(one.size + other.size - 1), np.flatnonzero(other)
     for i in range(one.size):
         if one[i] > RARE:
             for j in occurring:
-                found[i + j] += one[i] * other[j]
-    return found
+                total[i + j] += one[i] * other[j]
+    return total
 
 
 @njit(cache=True, nogil=True)
@@ -309,12 +311,12 @@ def _least_error(
     first, one, other = 0, np.ones(1), np.ones(1)
     for c in range(rows.shape[0]):
         if rows[c, a] != rows[c, b]:
-            own_first, own = _ratios(firsts, starts, roots, logs, rows[c, a], rows[c, b], step)
-            first += own_first
+            ratio_first, ratios = _ratios(firsts, starts, roots, logs, rows[c, a], rows[c, b], step)
+            first += ratio_first
             if one.size <= other.size:
-                one = _sum_of_few(one, own)
+                one = _sum_of_few(one, ratios)
             else:
-                other = _sum_of_few(other, own)
+                other = _sum_of_few(other, ratios)
     return 0.5 * _mean_decay(one, other, first, step / 2)
 
 
@@ -366,11 +368,11 @@ def largest_error(
     float
         Error probability.
     """
-    found = 0.0
+    largest = 0.0
     bound = 0.5 * overlap[first][:, second].ravel()
-    while bound.max() > found:  # few are looked at, so that sorting them all is not worth it
+    while bound.max() > largest:  # few are looked at, so that sorting them all is not worth it
         at = bound.argmax()
         a, b = first[at // second.size], second[at % second.size]
-        found = max(found, _least_error(firsts, starts, roots, logs, rows, a, b, step))
+        largest = max(largest, _least_error(firsts, starts, roots, logs, rows, a, b, step))
         bound[at] = 0.0
-    return found
+    return largest

@@ -81,7 +81,7 @@ def affordable(pixel: Pixel, channels: Sequence[IndexArray]) -> bool:
     counts = min(most, 2 * _FAR * prnu * electrons + each) + 1
     reach = 2 * _FAR * sigma + 3
     bins = min(n_bins, counts * pixel.dn_per_e / wide + reach)
-    pixels = max(len(own) for own in channels)
+    pixels = max(len(pixels_of_channel) for pixels_of_channel in channels)
     sums = 10 * gains * each + counts * reach + (64 / sigma * reach if sigma > _LEAST_BINS else 0)
     return bins * pixels <= _MOST_BINS and sums + (bins * (pixels - 1)) ** 2 <= _MOST_SUMS
 
@@ -97,8 +97,10 @@ def _numbers(
     line = pixel.dn_per_e / wide, (pixel.offset_dn + 0.5) / wide
     read = math.ceil(pixel.well_e), pixel.well_e, pixel.prnu, pixel.read_noise_e, line, n_bins, table
     firsts, starts, shares, rows = list[IndexArray](), [np.zeros(1, np.intp)], list[FloatArray](), list[IndexArray]()
-    for own in channels:
-        flat = np.ascontiguousarray(np.sort(electrons[..., own], axis=-1).reshape(-1, len(own)))
+    for pixels_of_channel in channels:
+        flat = np.ascontiguousarray(
+            np.sort(electrons[..., pixels_of_channel], axis=-1).reshape(-1, len(pixels_of_channel))
+        )
         distinct, which = np.unique(flat, axis=0, return_inverse=True)
         first, start, share = channel_numbers(distinct, *read)
         rows.append(which.reshape(electrons.shape[:2]) + sum(first.size for first in firsts))

@@ -73,8 +73,8 @@ class Draws:
         out : ndarray of shape (n,)
             Distances, DN; changed in place.
         """
-        own = slice(int(self.starts[off]), int(self.starts[off + 1]))
-        out[own] = np.sqrt((self.apart(own, response) ** 2).sum(axis=-1))
+        draws = slice(int(self.starts[off]), int(self.starts[off + 1]))
+        out[draws] = np.sqrt((self.apart(draws, response) ** 2).sum(axis=-1))
 
     def apart(self, some: slice | IndexArray, response: FloatArray) -> FloatArray:
         """Return first minus second light of some draws.
@@ -258,8 +258,8 @@ class LampsAndCameras:
         step = max(1, _HELD // (len(offs) * max(1, len(setup.camera.modified)) * setup.camera.grid.size))
         found: dict[str, list[float]] = {csd_name(pair): [] for pair in pairs}
         for start in range(0, n_designs, step):
-            some = slice(start, min(start + step, n_designs))
-            for curves in np.stack([made(off, some) for off in offs], axis=1):
+            batch = slice(start, min(start + step, n_designs))
+            for curves in np.stack([made(off, batch) for off in offs], axis=1):
                 for pair, (value, _) in self.kept(curves, pairs).items():
                     found[csd_name(pair)].append(value)
         return {name: np.array(values) for name, values in found.items()}

@@ -278,16 +278,16 @@ def over_cases(imager: ForwardModel, cases: Columns) -> Columns:
     """
     quantities = quantities_of(Asked(imager.setup.lights.classes, any_place=True))
     best = {quantity.of: name for name, quantity in quantities.items() if quantity.extreme == "best place"}
-    found: Columns = {}
+    columns: Columns = {}
     for name, each in cases.items():
         if len(each) == 1:
-            found |= {own: each[0].copy() for own in (name, best.get(name)) if own is not None}
+            columns |= {column: each[0].copy() for column in (name, best.get(name)) if column is not None}
             continue
         moments = quantities[name].worse(np.swapaxes(each.reshape(imager.n_cases, -1, each.shape[1]), 0, 1))
-        found[name] = quantities[name].worse(moments)
+        columns[name] = quantities[name].worse(moments)
         if name in best:
-            found[best[name]] = moments.max(axis=0)
-    return found
+            columns[best[name]] = moments.max(axis=0)
+    return columns
 
 
 def evaluate(
@@ -358,12 +358,12 @@ def _distances_along(model: ForwardModel, changing: Changing, extra: _Extra) -> 
     n, names = int(changing.which.sum()), _csd_names(model.setup)
     cases = {name: np.empty((len(changing.fixed), n)) for name in names}
     for start in range(0, n, _AT_ONCE):
-        some = slice(start, start + _AT_ONCE)
-        values = changing.make(some)
+        batch = slice(start, start + _AT_ONCE)
+        values = changing.make(batch)
         for case, fixed in enumerate(changing.fixed):
             along = separations_along(fixed, changing.channel, values[:, case], model.setup.members)
             for pair, distance in along.items():
-                cases[csd_name(pair)][case, some] = distance
+                cases[csd_name(pair)][case, batch] = distance
     columns = over_cases(model, cases) | {EXPOSURE: np.full(n, changing.exposure_s)}
     return cases, columns | extra(n, changing.whole_of)
 

@@ -54,7 +54,7 @@ def separation(response: FloatArray, first: IndexArray, second: IndexArray) -> F
         CSD, DN.
     """
     response = np.asarray(response, dtype=float)
-    found = np.empty(len(response))
+    distances = np.empty(len(response))
     step = max(1, _BLOCK_PAIRS // max(1, len(first) * len(second)))
     for start in range(0, len(response), step):
         block = response[start : start + step]
@@ -63,12 +63,14 @@ def separation(response: FloatArray, first: IndexArray, second: IndexArray) -> F
             for channel in range(response.shape[2]):
                 values = block[:, :, channel]
                 total += (values[:, first, None] - values[:, None, second]) ** 2
-        found[start : start + step] = np.sqrt(total.min(axis=(1, 2)))
-    odd = np.flatnonzero((found < _SMALLEST) | (found > 1 / _SMALLEST))  # squares that a float does not hold well
+        distances[start : start + step] = np.sqrt(total.min(axis=(1, 2)))
+    odd = np.flatnonzero(
+        (distances < _SMALLEST) | (distances > 1 / _SMALLEST)
+    )  # squares that a float does not hold well
     for some, one, other in pair_blocks((len(odd), *response.shape[1:]), first, second):
         apart = response[odd[some]][:, one] - response[odd[some]][:, other]
-        found[odd[some]] = np.hypot.reduce(apart, axis=2, initial=0.0).min(axis=1)
-    return found
+        distances[odd[some]] = np.hypot.reduce(apart, axis=2, initial=0.0).min(axis=1)
+    return distances
 
 
 def pair_blocks(
@@ -169,12 +171,12 @@ def _distances(
     squared: FloatArray, odd: BoolArray, members: Mapping[str, IndexArray], response: Callable[[BoolArray], FloatArray]
 ) -> dict[Pair, FloatArray]:
     """Return roots of ndarray of shape (n_pairs, n_designs); non-finite designs and extreme squares by `separation`."""
-    found = dict(zip(class_pairs(list(members)), np.sqrt(squared), strict=True))
-    for (a, b), distance in found.items():
-        some = odd | ~((distance >= _SMALLEST) & (distance <= 1 / _SMALLEST))
-        if some.any():
-            distance[some] = separation(response(some), members[a], members[b])
-    return found
+    distances = dict(zip(class_pairs(list(members)), np.sqrt(squared), strict=True))
+    for (a, b), distance in distances.items():
+        recomputed = odd | ~((distance >= _SMALLEST) & (distance <= 1 / _SMALLEST))
+        if recomputed.any():
+            distance[recomputed] = separation(response(recomputed), members[a], members[b])
+    return distances
 
 
 _Apart = tuple[FloatArray, IndexArray, IndexArray, IndexArray]

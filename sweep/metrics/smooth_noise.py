@@ -195,23 +195,23 @@ def _of_signals(design: SmoothDesign, pair: Pair, of: _OfPairs) -> Rows:
     one, other = (members[name] for name in pair)
 
     def of_both(values: Smooth) -> tuple[Smooth, Smooth]:
-        """Of the first and of the second signal of every pair; the axes but signals and channels come first."""
+        """Combine the values of the first with those of the second signals, all pairs along one axis."""
         shape = (*values.shape[:-2], len(one), len(other), values.shape[-1])
         first = np.broadcast_to(values[..., one, None, :], shape)
         second = np.broadcast_to(values[..., None, other, :], shape)
         flat = (*values.shape[:-3], -1, values.shape[-1])
         return first.reshape(flat), second.reshape(flat)
 
-    def found(mean: Smooth, variance: Smooth) -> Smooth:
+    def of_pairs(mean: Smooth, variance: Smooth) -> Smooth:
         first, second = of_both(mean)
         return of(first - second, *of_both(variance))
 
-    along = found(
+    along = of_pairs(
         design.response + 1j * COMPLEX_STEP * design.response_by_u,
         design.variance + 1j * COMPLEX_STEP * design.variance_by_u,
     )
     shape = len(along), -1
-    return Rows(found(design.response, design.variance), along.imag.reshape(shape).T / COMPLEX_STEP)
+    return Rows(of_pairs(design.response, design.variance), along.imag.reshape(shape).T / COMPLEX_STEP)
 
 
 def smooth_detectability(setup: Setup, curves: FloatArray, pair: Pair) -> FloatArray:

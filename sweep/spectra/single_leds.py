@@ -26,7 +26,7 @@ _Width = Annotated[float, Field(ge=5, le=100)]
 
 
 class RegionMap(Section):
-    """Which lamps that a norm allows a camera can't tell apart: every yellow and every red LED in its color regions.
+    """Lamps of a norm that a camera cannot separate: all yellow and red LEDs in its color regions.
 
     `norms`: `en_12368` (European signal heads), `ite` (American ones), `un_r48` (vehicles; the same as SAE J578).
     `wanted_dn`: the distance that a pair should have. An LED is modeled: a hyperbolic secant with a peak and a full

@@ -150,7 +150,7 @@ class Production(Section):
 
 
 class Recognition(Section):
-    """How often noise confuses signal types.
+    """Error rates of classifying signal types under noise.
 
     `states`: the signal types to tell apart; all of them where it is left out. `patches`: raw patches that are drawn
     of every signal for each plain CFA, named design and answer of the search, half of them to train the classifiers;

@@ -161,7 +161,7 @@ LIGHTS_NAME: Any = named(BUILT_IN_LIGHTS)
 
 
 class Validation(Documented):
-    """How designs do on lights that they have not seen. The photons of a light are those of the study's own lights."""
+    """Validation on lights that the search does not use; they are as bright as the study's lights."""
 
     lights: Annotated[
         LightsSection | None,
@@ -219,7 +219,7 @@ class OwnTask(Documented):
 
 
 class TasksSection(Documented):
-    """What designs gain and lose elsewhere: patches that fill the field, on axis, at one exposure for all CFAs.
+    """Further tasks of the camera: patches that fill the field, on axis, at one exposure for all CFAs.
 
     The noise is that of photons and of read noise, in four pixels of the CFA.
     """

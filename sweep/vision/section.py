@@ -1,4 +1,4 @@
-"""What a study says of its benchmark of vision: scenes, lamps, images, and what an answer costs."""
+"""Section `vision` of a study: scenes, lamps, images and costs of answers."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MOST_BITS, MOST_WELL_E, MOST_READ_NOISE_DN = 12, 30_000.0, 100.0
 
 
 class LightLevel(Section):
-    """How bright it is around the signal head, and how long is exposed.
+    """Luminance around the signal head, and exposure time.
 
     `illuminance_lx` of the `light` on background, backplate and housing. `phantom_cd`: what low sun makes an unlit lens
     shine with, in half of the scenes (EN 12368 classes its ratio to a lit lens: 1 to 16); 0 without sun on the lens.

@@ -10,7 +10,7 @@ from ..bands import Banded
 
 
 class Dual(Banded):
-    """Two channels with a constant sum.
+    """Two channels with a constant sum; methods as in `Family`.
 
     N_a = base - swing, N_b = base + swing, with swing = depth (e(l; left) - e(l; right)) min(base, ceiling - base).
     With an open band and depth 1, the swing is the largest that keeps 0 <= N_a and N_b <= ceiling.
@@ -67,79 +67,24 @@ class Dual(Banded):
         return Dual(wavelength_nm, base, target)
 
     def curves(self, x: FloatArray) -> FloatArray:
-        """Return the QE of both channels.
-
-        Parameters
-        ----------
-        x : ndarray of shape (n_designs, n_parameters)
-            Parameters.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, n_modified, n_wavelengths)
-            QE of the modified channels.
-        """
+        """Return the QE of both channels."""
         swing = self._room * self._bands.shape(x)
         return np.stack([self._base - swing, self._base + swing], axis=1)
 
     def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
-        """Return the base, and the base plus the whole swing where the band can reach.
-
-        Parameters
-        ----------
-        low, high : ndarray of shape (n_parameters,)
-            Ends of the box of parameters.
-
-        Returns
-        -------
-        ndarray of shape (n_modified, n_wavelengths)
-            Upper bound on the QE.
-        """
+        """Return the base, and the base plus the whole swing where the band can reach."""
         return np.stack([self._base, self._base + self._room * self._bands.reach(low, high)])
 
     def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
-        """Return the base minus the whole swing where the band can reach, and the base.
-
-        Parameters
-        ----------
-        low, high : ndarray of shape (n_parameters,)
-            Ends of the box of parameters.
-
-        Returns
-        -------
-        ndarray of shape (n_modified, n_wavelengths)
-            Lower bound on the QE.
-        """
+        """Return the base minus the whole swing where the band can reach, and the base."""
         return np.stack([self._base - self._room * self._bands.reach(low, high), self._base])
 
     def hull(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the base with the least and the most swing.
-
-        Parameters
-        ----------
-        low, high : ndarray of shape (n_parameters,)
-            Ends of the box of parameters.
-
-        Returns
-        -------
-        low, high : ndarray of shape (n_modified, n_wavelengths)
-            Bounds on the QE.
-        """
+        """Return the base with the least and the most swing."""
         least, most = (self._room * shape for shape in self._bands.range(low, high))
         return np.stack([self._base - most, self._base + least]), np.stack([self._base - least, self._base + most])
 
     def gradient(self, x: FloatArray) -> FloatArray:
-        """Return the derivative of `curves` at one design.
-
-        Parameters
-        ----------
-        x : ndarray of shape (n_parameters,)
-            Parameters of one design.
-
-        Returns
-        -------
-        ndarray of shape (n_parameters, n_modified, n_wavelengths)
-            QE per unit of parameter.
-        """
+        """Return the derivative of `curves` at one design."""
         slope = self._room * self._bands.gradient(x)
         return np.stack([-slope, slope], axis=1)

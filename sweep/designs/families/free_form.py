@@ -35,7 +35,7 @@ class Nodes(Section):
 
 
 class FreeForm:
-    """Filter with a free transmission at each node.
+    """Filter with a free transmission at each node; methods as in `Family`.
 
     Notes
     -----
@@ -119,81 +119,26 @@ class FreeForm:
         return tuple(Parameter(f"transmission_{node:g}_nm", 0, 1, default=None) for node in self.nodes_nm)
 
     def curves(self, x: FloatArray) -> FloatArray:
-        """Return the QE of the modified channel.
-
-        Parameters
-        ----------
-        x : ndarray of shape (n_designs, n_parameters)
-            Parameters.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, n_modified, n_wavelengths)
-            QE of the modified channels.
-        """
+        """Return the QE of the modified channel."""
         return np.asarray((self._fixed + row_products(x, self._hats))[:, None, :], dtype=float)
 
     def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
-        """Return the curve with every transmission at its largest.
-
-        Parameters
-        ----------
-        low, high : ndarray of shape (n_parameters,)
-            Ends of the box of parameters.
-
-        Returns
-        -------
-        ndarray of shape (n_modified, n_wavelengths)
-            Upper bound on the QE.
-        """
+        """Return the curve with every transmission at its largest."""
         assert low.shape == high.shape
         return np.asarray(self.curves(high[None])[0], dtype=float)
 
     def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
-        """Return the curve with every transmission at its smallest.
-
-        Parameters
-        ----------
-        low, high : ndarray of shape (n_parameters,)
-            Ends of the box of parameters.
-
-        Returns
-        -------
-        ndarray of shape (n_modified, n_wavelengths)
-            Lower bound on the QE.
-        """
+        """Return the curve with every transmission at its smallest."""
         assert low.shape == high.shape
         return np.asarray(self.curves(low[None])[0], dtype=float)
 
     def hull(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the curves with every transmission at its smallest and largest.
-
-        Parameters
-        ----------
-        low, high : ndarray of shape (n_parameters,)
-            Ends of the box of parameters.
-
-        Returns
-        -------
-        low, high : ndarray of shape (n_modified, n_wavelengths)
-            Bounds on the QE.
-        """
+        """Return the curves with every transmission at its smallest and largest."""
         lower, upper = self.curves(np.stack([low, high]))
         return lower, upper
 
     def gradient(self, x: FloatArray) -> FloatArray:
-        """Return the derivative of `curves`, which is constant.
-
-        Parameters
-        ----------
-        x : ndarray of shape (n_parameters,)
-            Parameters of one design.
-
-        Returns
-        -------
-        ndarray of shape (n_parameters, n_modified, n_wavelengths)
-            QE per unit of parameter.
-        """
+        """Return the derivative of `curves`, which is constant."""
         assert x.shape == self.nodes_nm.shape
         return np.asarray(self._hats[:, None, :], dtype=float)
 
@@ -224,49 +169,16 @@ class FreeForm:
         return np.zeros_like(base), base
 
     def start(self, points: FloatArray) -> FloatArray:
-        """Return smooth dips of different position, width and depth.
-
-        Parameters
-        ----------
-        points : ndarray of shape (n, start_dimensions)
-            Points of the unit cube.
-
-        Returns
-        -------
-        ndarray of shape (n, n_parameters)
-            Starting designs.
-        """
+        """Return smooth dips of different position, width and depth."""
         span = self.nodes_nm[-1] - self.nodes_nm[0]
         center = self.nodes_nm[0] + span * points[:, :1]
         breadth = span * (0.05 + 0.35 * points[:, 1:2])
         return np.asarray(1 - points[:, 2:] * np.exp(-0.5 * ((self.nodes_nm - center) / breadth) ** 2), dtype=float)
 
     def violation(self, x: FloatArray) -> FloatArray:
-        """Return zeros: every transmission from 0 to 1 is well formed.
-
-        Parameters
-        ----------
-        x : ndarray of shape (n_designs, n_parameters)
-            Parameters.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, n_conditions)
-            Values of the conditions, met where <= 0.
-        """
+        """Return zeros: every transmission from 0 to 1 is well formed."""
         return np.zeros((len(x), 1))
 
     def violation_gradient(self, x: FloatArray) -> FloatArray:
-        """Return zeros.
-
-        Parameters
-        ----------
-        x : ndarray of shape (n_parameters,)
-            Parameters of one design.
-
-        Returns
-        -------
-        ndarray of shape (n_conditions, n_parameters)
-            Derivatives of the conditions.
-        """
+        """Return zeros."""
         return np.zeros((1, x.size))

@@ -10,7 +10,7 @@ from ..bands import Banded
 
 
 class MultiStopband(Banded):
-    """Filter with several stopbands.
+    """Filter with several stopbands; methods as in `Family`.
 
     Notes
     -----
@@ -69,79 +69,24 @@ class MultiStopband(Banded):
         return MultiStopband(wavelength_nm, base, target, options.bands)
 
     def curves(self, x: FloatArray) -> FloatArray:
-        """Return the QE of the modified channel.
-
-        Parameters
-        ----------
-        x : ndarray of shape (n_designs, n_parameters)
-            Parameters.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, n_modified, n_wavelengths)
-            QE of the modified channels.
-        """
+        """Return the QE of the modified channel."""
         return (self._base + self._change * self._bands.shape(x))[:, None, :]
 
     def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
-        """Return the base, or the target where it is higher and a band can reach.
-
-        Parameters
-        ----------
-        low, high : ndarray of shape (n_parameters,)
-            Ends of the box of parameters.
-
-        Returns
-        -------
-        ndarray of shape (n_modified, n_wavelengths)
-            Upper bound on the QE.
-        """
+        """Return the base, or the target where it is higher and a band can reach."""
         return (self._base + np.maximum(self._change, 0.0) * self._bands.reach(low, high))[None, :]
 
     def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
-        """Return the base, or the target where it is lower and a band can reach.
-
-        Parameters
-        ----------
-        low, high : ndarray of shape (n_parameters,)
-            Ends of the box of parameters.
-
-        Returns
-        -------
-        ndarray of shape (n_modified, n_wavelengths)
-            Lower bound on the QE.
-        """
+        """Return the base, or the target where it is lower and a band can reach."""
         return (self._base + np.minimum(self._change, 0.0) * self._bands.reach(low, high))[None, :]
 
     def hull(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return base and change with the bands least and most open.
-
-        Parameters
-        ----------
-        low, high : ndarray of shape (n_parameters,)
-            Ends of the box of parameters.
-
-        Returns
-        -------
-        low, high : ndarray of shape (n_modified, n_wavelengths)
-            Bounds on the QE.
-        """
+        """Return base and change with the bands least and most open."""
         ends = np.stack([self._base + self._change * shape for shape in self._bands.range(low, high)])
         return ends.min(axis=0)[None, :], ends.max(axis=0)[None, :]
 
     def gradient(self, x: FloatArray) -> FloatArray:
-        """Return the derivative of `curves` at one design.
-
-        Parameters
-        ----------
-        x : ndarray of shape (n_parameters,)
-            Parameters of one design.
-
-        Returns
-        -------
-        ndarray of shape (n_parameters, n_modified, n_wavelengths)
-            QE per unit of parameter.
-        """
+        """Return the derivative of `curves` at one design."""
         return (self._change * self._bands.gradient(x))[:, None, :]
 
     @property
@@ -199,16 +144,5 @@ class Stopband(MultiStopband):
         return self._base, self._change
 
     def edges(self, centers_and_widths: FloatArray) -> FloatArray:
-        """Return rising edges; see `SeparableFamily.edges`.
-
-        Parameters
-        ----------
-        centers_and_widths : ndarray of shape (n, 2)
-            Center and width of each edge, nm.
-
-        Returns
-        -------
-        ndarray of shape (n, n_wavelengths)
-            Edges, 0 to 1.
-        """
+        """Return rising edges; see `SeparableFamily.edges`."""
         return self._bands.edges(centers_and_widths)

@@ -69,18 +69,5 @@ class ColorSeparation(ReadoutMetric):
         return (*nearest, *best) if asked.any_place else tuple(nearest)
 
     def of_readout(self, response: FloatArray, members: Mapping[str, IndexArray]) -> Columns:
-        """Compute the columns; see `separation.separations`.
-
-        Parameters
-        ----------
-        response : ndarray of shape (n_designs, n_signals, n_channels)
-            Readout, DN.
-        members : mapping of str to ndarray of int
-            Signals of each type.
-
-        Returns
-        -------
-        dict of str to ndarray of shape (n_designs,)
-            Columns.
-        """
+        """Compute the columns; see `separation.separations`."""
         return {csd_name(pair): distances for pair, distances in separations(response, members).items()}

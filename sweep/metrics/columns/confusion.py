@@ -50,24 +50,7 @@ class Confusion(NoiseMetric):
     def of_noise(
         self, imager: ForwardModel, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
     ) -> Columns:
-        """Compute exact sums over the digital numbers of a few pixels, else Gaussian errors or bounds.
-
-        Parameters
-        ----------
-        imager : ForwardModel
-            Model of the scene.
-        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
-            QE of the modified channels.
-        read : NoisyReadout
-            Readout of these designs.
-        members : mapping of str to ndarray of int
-            Signals of each state.
-
-        Returns
-        -------
-        dict of str to ndarray of shape (n_designs,)
-            Columns.
-        """
+        """Compute exact sums over the digital numbers of a few pixels, else Gaussian errors or bounds."""
         mean, variance, _ = NoiseShape.of_cases(read)
         error, bound, state_bound = _errors(imager, curves, read, members)
         found: Columns = {}

@@ -40,20 +40,7 @@ class Lengths(FamilyMetric):
         )
 
     def of_parameters(self, family: Family | None, points: FloatArray) -> Columns:
-        """Return widths, nm; NaN where the family has none.
-
-        Parameters
-        ----------
-        family : Family or None
-            Family.
-        points : ndarray of shape (n_designs, n_parameters)
-            Parameters.
-
-        Returns
-        -------
-        dict of str to ndarray of shape (n_designs,)
-            Columns.
-        """
+        """Return widths, nm; NaN where the family has none."""
         rows = {} if family is None else family.dimensions
         nothing = np.full((len(points), 1), np.nan)
         lengths = {name: row_products(points, rows[name].T) if name in rows else nothing for name in _MEANINGS}

@@ -57,24 +57,7 @@ class Probabilities(NoiseMetric):
     def of_noise(
         self, imager: ForwardModel, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
     ) -> Columns:
-        """Compute the columns from mean and variance of the digital numbers.
-
-        Parameters
-        ----------
-        imager : ForwardModel
-            Model of the scene.
-        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
-            QE of the modified channels.
-        read : NoisyReadout
-            Readout of these designs.
-        members : mapping of str to ndarray of int
-            Signals of each state.
-
-        Returns
-        -------
-        dict of str to ndarray of shape (n_designs,)
-            Columns.
-        """
+        """Compute the columns from mean and variance of the digital numbers."""
         found: Columns = {}
         mean, variance, _ = NoiseShape.of_cases(read)
         for pair in class_pairs(list(members)):

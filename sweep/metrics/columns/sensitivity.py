@@ -67,20 +67,7 @@ class Sensitivity(DesignMetric):
         return own, whole
 
     def of_designs(self, setup: Setup, block: Block) -> Columns:
-        """Compute the paper's sensitivity of N relative to Y (NaN without a modified channel), and the CFA sensitivity.
-
-        Parameters
-        ----------
-        setup : Setup
-            Scene and camera.
-        block : Block
-            Designs.
-
-        Returns
-        -------
-        dict of str to ndarray of shape (n_designs,)
-            Columns.
-        """
+        """Compute the sensitivity of N relative to Y, NaN without a modified channel, and that of the CFA."""
         modified, counts = list(setup.camera.modified), setup.camera.mosaic.counts
         each = np.repeat(
             np.eye(len(modified)), setup.camera.grid.size, axis=0

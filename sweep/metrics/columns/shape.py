@@ -45,20 +45,7 @@ class Shape(DesignMetric):
         return slope, least
 
     def of_designs(self, setup: Setup, block: Block) -> Columns:
-        """Compute the steepest slope and the smallest ratio over the wavelengths; NaN without a modified channel.
-
-        Parameters
-        ----------
-        setup : Setup
-            Scene and camera.
-        block : Block
-            Designs.
-
-        Returns
-        -------
-        dict of str to ndarray of shape (n_designs,)
-            Columns.
-        """
+        """Compute the steepest slope and the smallest ratio over the wavelengths; NaN without a modified channel."""
         if not setup.camera.modified:
             return dict.fromkeys((_SLOPE, _LEAST), np.full(len(block), np.nan))
         steepest, lowest = block.shapes(np.asarray(setup.camera.base_qe, dtype=float))

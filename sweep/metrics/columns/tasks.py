@@ -47,20 +47,7 @@ class TaskFigures(DesignMetric):
         )
 
     def of_designs(self, setup: Setup, block: Block) -> Columns:
-        """Compute the columns; see `judge.task_columns`.
-
-        Parameters
-        ----------
-        setup : Setup
-            Scene and camera.
-        block : Block
-            Designs.
-
-        Returns
-        -------
-        dict of str to ndarray of shape (n_designs,)
-            Columns.
-        """
+        """Compute the columns; see `judge.task_columns`."""
         if setup.tasks is None:
             return {}
         from ..tasks.judge import task_columns

@@ -37,24 +37,7 @@ class ImageReading(VisionMetric):
         return (found,) if asked.vision else ()
 
     def of_images(self, setup: Setup, curves: FloatArray, vision: Vision, seed: int) -> Columns:
-        """Compute the mean over the images of one less the probability of the most probable state.
-
-        Parameters
-        ----------
-        setup : Setup
-            Scene and camera.
-        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
-            QE of the modified channels.
-        vision : Vision
-            Benchmark.
-        seed : int
-            Seed of the study.
-
-        Returns
-        -------
-        dict of str to ndarray of shape (n_designs,)
-            Columns.
-        """
+        """Compute the mean over the images of one less the probability of the most probable state."""
         from ...vision.readers import observer_error  # noqa: PLC0415  (only where a study asks for images)
 
         return {VISION_ERROR: np.array([observer_error(setup, each, vision, (seed, 0)) for each in curves])}

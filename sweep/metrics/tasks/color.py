@@ -125,12 +125,12 @@ class Looks:
         setup = self.setup
         factor = irradiance_factor(setup.scene.optics) * setup.camera.area_step_m2_nm * exposure_s
         shape = (len(self.modified), *photons.shape[:-1], len(setup.camera.qe))
-        found = np.empty(shape, dtype=self.modified.dtype)
-        found[...] = photons @ setup.camera.qe.T * factor
+        electrons = np.empty(shape, dtype=self.modified.dtype)
+        electrons[...] = photons @ setup.camera.qe.T * factor
         flat = photons.reshape(-1, photons.shape[-1])
         for at, channel in enumerate(setup.camera.modified):
-            found[..., channel] = (self.modified[:, at] @ flat.T).reshape(shape[:-1]) * factor
-        return found
+            electrons[..., channel] = (self.modified[:, at] @ flat.T).reshape(shape[:-1]) * factor
+        return electrons
 
     @property
     def qe(self) -> Smooth:
@@ -141,10 +141,10 @@ class Looks:
         ndarray of shape (n, n_channels, n_wavelengths)
             QE.
         """
-        found = np.empty((len(self.modified), *self.setup.camera.qe.shape), dtype=self.modified.dtype)
-        found[:] = self.setup.camera.qe
-        found[:, list(self.setup.camera.modified)] = self.modified
-        return found
+        qe = np.empty((len(self.modified), *self.setup.camera.qe.shape), dtype=self.modified.dtype)
+        qe[:] = self.setup.camera.qe
+        qe[:, list(self.setup.camera.modified)] = self.modified
+        return qe
 
     def noise(self, read_noise_e: float) -> ChannelNoise:
         """Return the noise of four pixels of the CFA.

@@ -121,8 +121,8 @@ class JudgedTask:
         return color.luminance_noise(self._matrix(case), gray, self._noise)[:, None]
 
     def _least_lux(self, case: Case) -> Smooth:
-        found = color.least_illuminance(self._matrix(case), self._gray(case), self._noise, LUMINANCE_RATIO)
-        return found[:, None]
+        least_lux = color.least_illuminance(self._matrix(case), self._gray(case), self._noise, LUMINANCE_RATIO)
+        return least_lux[:, None]
 
     def _vora(self, _: Case) -> Smooth:
         grid = self._looks.setup.camera.grid
@@ -208,13 +208,13 @@ def task_columns(setup: Setup, block: Block) -> Columns:
     size = max(1, min(_BLOCK, _MOST_DISTANCES // pairs))
     for start in range(0, len(curves), size):
         looks = Looks(setup, curves[start : start + size])
-        found: dict[str, FloatArray] = {}
+        figures: dict[str, FloatArray] = {}
         for task in tasks.tasks:
             judged = JudgedTask(task, looks, tasks.conditions)
             for name, figure, case in figures_of(task.key):
                 rows = judged.rows(figure.what, case)
-                found[name] = rows.max(axis=1) if figure.wanted == "less" else rows.min(axis=1)
-        parts.append(found)
+                figures[name] = rows.max(axis=1) if figure.wanted == "less" else rows.min(axis=1)
+        parts.append(figures)
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
@@ -240,12 +240,12 @@ def traded(looks: Looks, chart: Chart, case: int, conditions: Conditions) -> tup
     noise = looks.noise(conditions.read_noise_e)
     patches = looks.electrons(chart.photons[case] * conditions.illuminance_lx, conditions.exposure_s)
     gray = looks.electrons(chart.gray[case] * conditions.illuminance_lx, conditions.exposure_s)
-    found = []
+    points = []
     for regularization in REGULARIZATIONS:
         matrix = color.color_matrix(patches, chart.xyz[case], chart.white[case], noise, float(regularization))
         errors = color_errors(patches, matrix, chart, case)
-        found.append((float(errors.mean()), float(color.luminance_noise(matrix, gray, noise)[0])))
-    delta_e, snr = np.array(found).T
+        points.append((float(errors.mean()), float(color.luminance_noise(matrix, gray, noise)[0])))
+    delta_e, snr = np.array(points).T
     return delta_e, snr
 
 
