@@ -11,10 +11,11 @@ import numpy as np
 from ..base.errors import Fault
 from ..base.types import FloatArray
 from . import LightUnit
+from .cells import distinct, unit_by_size
 from .filter_files import csv_text
 from .signal_color import VISIBLE, LightColor, light_color
 from .spectrum import WavelengthGrid, photons_from_energy, resample, sample_faults
-from .text_tables import Scan, distinct, unit_by_size
+from .text_tables import Scan
 
 _NEEDED = WavelengthGrid()
 _BROAD_NM = 70.0

@@ -16,6 +16,7 @@ import numpy as np
 from ..base.disk import read_input
 from ..base.errors import DataError, Fault
 from ..base.types import FloatArray
+from .cells import distinct, number_of, unit_by_size
 from .spectrum import LARGEST, sample_faults
 
 WAVELENGTH = "wavelength_nm"
@@ -49,7 +50,6 @@ _UNITS_NM = {
 }
 _UNIT_WORDS = {1.0: "nm", 1e3: "um", 0.1: "angstrom", 1e9: "m"}
 _MOST_CELL_FAULTS = 10_000
-_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 _NAME_AND_UNIT = re.compile(r"(.*?)[\s_/,.\-]*[\[(]?\s*([^\W\d_]+)\s*[\])]?")
 
@@ -455,23 +455,6 @@ def table_numbers(
     return values, faults
 
 
-def number_of(cell: str) -> float | None:
-    """Return a finite number as tables have it, without Python's underscores and other scripts' digits.
-
-    Parameters
-    ----------
-    cell : str
-        Cell.
-
-    Returns
-    -------
-    float or None
-        None if it is none.
-    """
-    number = float(cell) if _NUMBER.fullmatch(cell.strip()) else math.nan
-    return number + 0.0 if math.isfinite(number) else None
-
-
 def check_size(file: str, line: int | None, n_samples: int, n_curves: int) -> None:
     """Refuse a table that would take minutes to read.
 
@@ -496,42 +479,3 @@ def check_size(file: str, line: int | None, n_samples: int, n_curves: int) -> No
     ):
         if count > most:
             raise DataError(Fault(f"too many {what} in one file", file, line, None, count, f"at most {most:,}"))
-
-
-def unit_by_size(wave: FloatArray) -> float:
-    """Return the factor from wavelengths to nm by their size: light between 100 nm and 20 um in nm, um or m.
-
-    Parameters
-    ----------
-    wave : ndarray of shape (n_samples,)
-        Wavelengths.
-
-    Returns
-    -------
-    float
-        Factor.
-    """
-    largest = float(np.nanmax(wave)) if np.isfinite(wave).any() else 0.0
-    return 1e9 if 0 < largest < 1e-4 else 1e3 if 0 < largest < 20 else 1.0
-
-
-def distinct(names: Sequence[str]) -> tuple[str, ...]:
-    """Return column names, numbered if empty or repeated.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Names.
-
-    Returns
-    -------
-    tuple of str
-        Names.
-    """
-    unique: dict[str, None] = {}
-    for index, name in enumerate(names):
-        candidate = name or f"column ({index + 2})"
-        while candidate in unique:
-            candidate = f"{candidate} ({index + 2})"
-        unique[candidate] = None
-    return tuple(unique)
