@@ -178,10 +178,10 @@ def workers(n_jobs: int, backend: str = "loky", scheduler: str | None = None) ->
         If Dask is not installed, or its scheduler does not answer.
     """
     settings: dict[str, Any] = {}
+    # These filters stay: joblib may warn of cancelled calls after a stop has left the block.
+    warnings.filterwarnings("ignore", message=".*have been cancelled", category=UserWarning)
+    warnings.filterwarnings("ignore", message="A worker stopped while some jobs", category=UserWarning)
     with ExitStack() as stack:
-        stack.enter_context(warnings.catch_warnings())
-        warnings.filterwarnings("ignore", message=".*have been cancelled", category=UserWarning)
-        warnings.filterwarnings("ignore", message="A worker stopped while some jobs", category=UserWarning)
         if backend == "dask":
             stack.enter_context(_client(scheduler))
         elif backend == "loky":
