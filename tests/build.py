@@ -138,10 +138,10 @@ def load(tmp_path: Path, text: str) -> Study:
     return load_study(path)
 
 
-def faults(tmp_path: Path, text: str) -> list[str]:
+def issues(tmp_path: Path, text: str) -> list[str]:
     with pytest.raises(StudyError) as caught:
         load(tmp_path, text)
-    return [str(fault).replace(f"{tmp_path}/", "") for fault in caught.value.faults]
+    return [str(issue).replace(f"{tmp_path}/", "") for issue in caught.value.issues]
 
 
 @contextmanager
@@ -149,7 +149,7 @@ def one_line(*said: str, alone: bool = True) -> Iterator[None]:
     """What is done here is refused with one fault, on one line, which has these words; or with others beside it."""
     with pytest.raises(SweepError) as caught:
         yield
-    lines = [str(fault) for fault in caught.value.faults]
+    lines = [str(issue) for issue in caught.value.issues]
     assert len(lines) == 1 or not alone, lines
     assert not any("\n" in line for line in lines)
     assert any(all(words in line for words in said) for line in lines), lines

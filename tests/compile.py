@@ -63,9 +63,9 @@ def designs_and_metrics() -> None:
     for well_e, bits in ((100.0, 8), (1e5, 16)):
         pixel = Pixel(well_e=well_e, bits=bits, read_noise_e=1.0)
         confusion.errors(np.array([[[9.0, 9, 9], [12.0, 12, 20]]]), channels, pixel, types)
-    asked, setup = vision(), head_setup()
-    scenes = draw_scenes(asked, split_lamps(setup.lights, asked, (1, 0))[TEST], SHUFFLED, 1, (5,))
-    HeadCamera(setup, NO_FILTERS, asked).images(scenes)
+    requested, setup = vision(), head_setup()
+    scenes = draw_scenes(requested, split_lamps(setup.lights, requested, (1, 0))[TEST], SHUFFLED, 1, (5,))
+    HeadCamera(setup, NO_FILTERS, requested).images(scenes)
 
 
 WORKS: tuple[Callable[[], None], ...] = (phases_of_lights, designs_and_metrics)

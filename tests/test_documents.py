@@ -11,10 +11,10 @@ import pandas as pd
 import pytest
 
 from sweep.cli.accuracy import measure_accuracy
-from sweep.metrics.share import told_share
+from sweep.metrics.share import format_share
 from sweep.study import load_study
 
-from .conftest import ROOT, STUDIES, Finished
+from .conftest import ROOT, STUDIES, FinishedJob
 from .printed import PRINTED, with_printed
 
 README = (ROOT / "README.md").read_text()
@@ -58,14 +58,14 @@ FINDINGS = dict(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in FINDINGS if name != "stopband"])
-def test_figures_of_a_finding_are_in_the_output_of_its_study(finished: Finished, name: str) -> None:
+def test_figures_of_a_finding_are_in_the_output_of_its_study(finished: FinishedJob, name: str) -> None:
     folder = finished(name)
     output = folder.with_name(f"{name}.said.txt").read_text()
     for figure in re.findall(r"\d[\d.]*(?: (?:DN|m|e|times))?(?= |,|\.|;)", FINDINGS[name]):
         assert figure in output, figure
 
 
-def stopband(finished: Finished) -> dict[str, pd.Series]:
+def stopband(finished: FinishedJob) -> dict[str, pd.Series]:
     """Rows of the finished study by their names."""
     table = pd.read_parquet(finished("stopband") / "results.parquet")
     return {row["name"]: row for _, row in table[table["kind"] != "sweep"].iterrows()}
@@ -112,12 +112,12 @@ def test_every_figure_of_the_readme_has_its_command() -> None:
 
 
 @pytest.mark.parametrize("said", list(FIGURES))
-def test_a_figure_of_the_readme_is_that_of_its_command(finished: Finished, said: str) -> None:
+def test_a_figure_of_the_readme_is_that_of_its_command(finished: FinishedJob, said: str) -> None:
     assert FIGURES[said](stopband(finished)) == said
 
 
 @pytest.mark.slow
-def test_the_figures_at_an_angle_are_those_of_their_command(finished: Finished) -> None:
+def test_the_figures_at_an_angle_are_those_of_their_command(finished: FinishedJob) -> None:
     scene = load_study(STUDIES / "angle.yaml").scenarios["field"]
     assert scene.optics.f_number == 1.6
     assert scene.field is not None
@@ -141,7 +141,7 @@ def test_the_figures_of_accuracy_are_those_of_their_command(tmp_path: Path) -> N
 
 
 @pytest.mark.slow
-def test_the_table_of_the_readme_is_that_of_its_command(finished: Finished) -> None:
+def test_the_table_of_the_readme_is_that_of_its_command(finished: FinishedJob) -> None:
     folder = finished("robust")
     rows = pd.read_parquet(folder / "results.parquet").merge(
         pd.read_parquet(folder / "robustness.parquet"), on="design_id"
@@ -161,7 +161,7 @@ def test_the_table_of_the_readme_is_that_of_its_command(finished: Finished) -> N
     for line, name in zip(lines, names, strict=True):
         row = rows.loc[name]
         shares = [told_apart[norm, row["design_id"]] for norm in ("en_12368", "ite")]
-        *of_norms, kept = (told_share(share).replace("%", " %") for share in (*shares, row["yield"]))
+        *of_norms, kept = (format_share(share).replace("%", " %") for share in (*shares, row["yield"]))
         assert line.endswith(f"| {' | '.join(of_norms)} |"), name
         values = (
             row["csd_yellow_red"],

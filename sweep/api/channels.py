@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.errors import DataError, Fault
+from ..base.errors import DataError, ValidationIssue
 from ..spectra.facts import Curve, qe_scale
 from ..spectra.filter_files import HINTS
 from ..spectra.light_files import MOST_LETTERS, clean_curves
@@ -232,12 +232,14 @@ def sensor_file(path: Path) -> SensorFile:
     curves = clean_curves(path)
     channels = channels_of(curves)
     if not channels.columns:
-        raise DataError(Fault("no curve that could be QE", str(path), allowed="values above 0 between 400 and 700 nm"))
+        raise DataError(
+            ValidationIssue("no curve that could be QE", str(path), allowed="values above 0 between 400 and 700 nm")
+        )
     wavelength_nm = next(iter(curves.values())).wavelength_nm
     if wavelength_nm[0] > _NEEDED_NM[0] or wavelength_nm[-1] < _NEEDED_NM[1]:
         allowed = f"{_NEEDED_NM[0]:g} to {_NEEDED_NM[1]:g} nm or more"
         raise DataError(
-            Fault(
+            ValidationIssue(
                 "QE of too few wavelengths",
                 str(path),
                 None,

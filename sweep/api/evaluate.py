@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..base.disk import is_file, is_folder
-from ..base.errors import DataError, Fault, nearest
+from ..base.errors import DataError, ValidationIssue, nearest
 from ..base.types import FloatArray
 from ..camera.mosaic import Mosaic
 from ..camera.sensor import SensorCurves
@@ -108,7 +108,9 @@ def evaluate(source: Path | str, *, design: str | None = None, **options: Any) -
         return evaluate_filter(filter_of_run(path, design, EvaluateOptions(**options)))
     for key, value in (("design", design), ("data", options.get("data")), ("allow-code", options.get("allow_code"))):
         if value:
-            raise DataError(Fault(f"`{key}` goes with a run's folder", str(path), None, f"--{key}", str(value)))
+            raise DataError(
+                ValidationIssue(f"`{key}` goes with a run's folder", str(path), None, f"--{key}", str(value))
+            )
     return evaluate_filter(filter_of_file(path, EvaluateOptions(**options)))
 
 
@@ -145,7 +147,9 @@ def filter_of_file(path: Path, options: EvaluateOptions) -> FilterUnderTest:
     if channel not in mosaic.channels:
         known = list(mosaic.channels)
         near = nearest(channel, known)
-        raise DataError(Fault(f"no such channel of {name}", None, None, "--channel", channel, ", ".join(known), near))
+        raise DataError(
+            ValidationIssue(f"no such channel of {name}", None, None, "--channel", channel, ", ".join(known), near)
+        )
     default = layout.base if (name, channel) == (layout.changed, NEW) else None
     base = options.base or default or diagonal_curve(mosaic, channel, qe.qe)
     qe.curve(base)
@@ -155,7 +159,7 @@ def filter_of_file(path: Path, options: EvaluateOptions) -> FilterUnderTest:
     top = float(curves.values[column].max())
     scale = qe_scale(top)
     if scale not in (1, _PERCENT):
-        raise DataError(Fault("values above 1", str(path), None, column, top, "0 to 1, or percent up to 100"))
+        raise DataError(ValidationIssue("values above 1", str(path), None, column, top, "0 to 1, or percent up to 100"))
     entry: dict[str, Any] = {"file": str(path.absolute()), "columns": {USER_CURVE + channel: column}, "scale": scale}
     entry |= {} if factor is None else {"relative_to": factor}
     read_as = "QE" if factor is None else f"a transmission, times {factor}"
@@ -198,7 +202,7 @@ def filter_of_run(folder: Path, design: str | None, options: EvaluateOptions) ->
     row = find_row(output, design or BEST)
     space, curves = row_curves(study, row)
     if space.filter is None:
-        raise DataError(Fault("a plain CFA has no filter to judge", str(folder), None, "--design", design))
+        raise DataError(ValidationIssue("a plain CFA has no filter to judge", str(folder), None, "--design", design))
     nodes_nm = study.grid.nodes_nm
     filters = {USER_CURVE + channel: curve for channel, curve in zip(space.filter.channels, curves[0], strict=True)}
     curves_nm = {name: (nodes_nm, curve) for name, curve in {**study.sensor.qe, **filters}.items()}
@@ -262,7 +266,9 @@ def _channel_without_curve(mosaic: Mosaic, sensor: SensorCurves) -> str:
     without = [channel for channel in mosaic.channels if channel not in sensor.qe]
     if len(without) != 1:
         allowed = ", ".join(without or mosaic.channels)
-        raise DataError(Fault(f"which channel of {mosaic.name} is the filter?", None, None, "--channel", None, allowed))
+        raise DataError(
+            ValidationIssue(f"which channel of {mosaic.name} is the filter?", None, None, "--channel", None, allowed)
+        )
     return without[0]
 
 
@@ -273,5 +279,5 @@ def _find_column(path: Path, curves: Curves, column: str | None, channel: str) -
     if chosen not in names:
         known, near = ", ".join(names), nearest(chosen, names)
         problem = "which column is the filter?" if column is None else "no such column"
-        raise DataError(Fault(problem, str(path), None, "--column", column, known, near))
+        raise DataError(ValidationIssue(problem, str(path), None, "--column", column, known, near))
     return chosen

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base.errors import DataError, Fault
+from ..base.errors import DataError, ValidationIssue
 from ..base.types import FloatArray
-from ..camera.exposure import may_set_exposure
+from ..camera.exposure import may_be_brightest
 from ..camera.mosaic import Mosaic
 from ..designs.technology import Technology
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY, reference_of
@@ -155,7 +155,7 @@ class FilterEvaluation:
             yield f"No limit is computed: {self.no_limit}."
             return
         gap = "" if self.gap is None else f", {100 * self.gap:.1f} % below"
-        bound, has = self.goal.told_bound(self.limit), self.goal.amount(self.before_quantization_dn, 1)
+        bound, has = self.goal.format_bound(self.limit), self.goal.amount(self.before_quantization_dn, 1)
         alike = "" if self.technology is None else f" that works by {self.technology.told}"
         where = f" in {scenes[0]}" if len(scenes) > 1 else ""
         yield (
@@ -274,7 +274,7 @@ def _upper_bound(
             qe[setup.camera.modified[0]] = ceiling
             with_ceiling = any_filter_problem(study, setup.with_camera(qe=qe))
             problem = with_lower_bound(with_ceiling, CFA_SENSITIVITY, light)
-            if exposed and may_set_exposure(problem.setup, float(curve.sum() / ceiling.sum())):
+            if exposed and may_be_brightest(problem.setup, float(curve.sum() / ceiling.sum())):
                 return None, None, "", "the filter is the brightest on white, and sets the exposure"
             limit, reason = upper_bound_or_reason(with_exposure_unchanged(problem) if exposed else problem)
             if limit is not None:
@@ -315,4 +315,6 @@ def diagonal_curve(mosaic: Mosaic, channel: str, curves: Mapping[str, FloatArray
         other = rows[1 - at[0][0]][1 - at[0][1]]
         if other in curves:
             return other
-    raise DataError(Fault(f"which curve does {channel} replace?", None, None, "--base", allowed=", ".join(curves)))
+    raise DataError(
+        ValidationIssue(f"which curve does {channel} replace?", None, None, "--base", allowed=", ".join(curves))
+    )

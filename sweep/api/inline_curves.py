@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from ..base.errors import DataError, Fault
+from ..base.errors import DataError, ValidationIssue
 from ..base.types import FloatArray
 from ..spectra import files
 from ..spectra.spectrum import Curves, WavelengthGrid, check_samples, resample
@@ -98,12 +98,14 @@ def to_curves(name: str, curve: CurveLike) -> Curves:
         import pandas as pd  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
         if not isinstance(curve, pd.Series):
-            raise DataError(Fault("no curve over wavelength", key=name, value=type(curve).__name__, allowed=_FORMS))
+            raise DataError(
+                ValidationIssue("no curve over wavelength", key=name, value=type(curve).__name__, allowed=_FORMS)
+            )
         wavelength_nm, values = curve.index.to_numpy(), curve.to_numpy()
     try:
         return Curves(*_checked(name, wavelength_nm, values), source=name)
     except (TypeError, ValueError):
-        raise DataError(Fault("a curve's samples are numbers", key=name, allowed=_FORMS)) from None
+        raise DataError(ValidationIssue("a curve's samples are numbers", key=name, allowed=_FORMS)) from None
 
 
 def table_to_curves(table: pd.DataFrame) -> Curves:
@@ -126,7 +128,7 @@ def table_to_curves(table: pd.DataFrame) -> Curves:
     """
     columns = {str(name): to_curves(str(name), column) for name, column in table.items()}
     if not columns:
-        raise DataError(Fault("a table without curves", allowed="a column per curve, nm as the index"))
+        raise DataError(ValidationIssue("a table without curves", allowed="a column per curve, nm as the index"))
     nodes_nm = next(iter(columns.values())).wavelength_nm
     return Curves(nodes_nm, {name: curves.values[name] for name, curves in columns.items()}, "table")
 
@@ -158,7 +160,9 @@ def on_grid(name: str, curve: CurveLike, grid: WavelengthGrid) -> FloatArray:
         rows = np.atleast_2d(np.asarray(curve, dtype=float))
         if rows.ndim != 2 or rows.shape[1] != grid.size:
             allowed = f"{grid.size} values, on the study's wavelengths, or rows of these; or {_FORMS}"
-            raise DataError(Fault("an array that does not fit the grid", key=name, value=curve.shape, allowed=allowed))
+            raise DataError(
+                ValidationIssue("an array that does not fit the grid", key=name, value=curve.shape, allowed=allowed)
+            )
         for row in rows:
             _checked(name, grid.nodes_nm, row)
         return rows
@@ -178,7 +182,7 @@ def _checked(name: str, wavelength_nm: Any, values: Any) -> tuple[FloatArray, Ma
 
 
 def _named(error: DataError, name: str) -> DataError:
-    return DataError([Fault(f.problem, None, None, name, f.value, f.allowed) for f in error.faults])
+    return DataError([ValidationIssue(f.problem, None, None, name, f.value, f.allowed) for f in error.issues])
 
 
 def _curve_in_file(name: str, path: Path) -> Curves:
@@ -186,6 +190,6 @@ def _curve_in_file(name: str, path: Path) -> Curves:
     if len(curves.values) != 1:
         shown = ", ".join(list(curves.values)[:10])
         allowed = f'one of them: sweep.read_curves("{path}")["NAME"]'
-        raise DataError(Fault("a file of several curves", str(path), None, name, shown, allowed))
+        raise DataError(ValidationIssue("a file of several curves", str(path), None, name, shown, allowed))
     (values,) = curves.values.values()
     return Curves(curves.wavelength_nm, {name: values}, str(path))

@@ -12,7 +12,7 @@ from pydantic import BaseModel
 
 from .. import study as studies_of_files
 from ..base.disk import is_file
-from ..base.errors import DataError, Fault
+from ..base.errors import DataError, ValidationIssue
 from ..spectra import LightUnit
 from ..spectra.light_files import lights_file
 from ..spectra.spectrum import Curves
@@ -53,7 +53,7 @@ def load_study(name: Path | str, data: Path | str | None = None, *, allow_code: 
     Raises
     ------
     SweepError
-        With one line per fault: file, line, key, value, allowed values and nearest name.
+        With one line per issue: file, line, key, value, allowed values and nearest name.
 
     Examples
     --------
@@ -137,7 +137,7 @@ def make_study(
     Raises
     ------
     SweepError
-        With one line per fault, as for a study file.
+        With one line per issue, as for a study file.
 
     Examples
     --------
@@ -202,7 +202,7 @@ def sensor(
         return sensor_source(source, channels, relative_to=relative_to, name=name, clear=clear)
     if not _is_table(source):
         allowed = "a built-in sensor, a file, or a table with nm as its index"
-        raise DataError(Fault("no sensor", value=type(source).__name__, allowed=allowed))
+        raise DataError(ValidationIssue("no sensor", value=type(source).__name__, allowed=allowed))
     columns = {str(channel): column for channel, column in source.items()}
     return sensor_source(None, columns | channels, relative_to=relative_to, name=name, clear=clear)
 
@@ -287,12 +287,14 @@ def lights(
     signals = None if types is None else {kind: list(columns) for kind, columns in types.items()}
     if _is_table(source):
         if signals is None:
-            raise DataError(Fault("signal types of a table must be said", key="types", allowed="{type: [column, ...]}"))
+            raise DataError(
+                ValidationIssue("signal types of a table must be said", key="types", allowed="{type: [column, ...]}")
+            )
         entry = {"file": "lights given", "quantity": quantity, "signals": signals}
         return CurveSource({"files": [entry]}, {"lights given": table_to_curves(source)})
     if not isinstance(source, Path | str):
         allowed = "built-in lights, a file, or a table with nm as its index"
-        raise DataError(Fault("no lights", value=type(source).__name__, allowed=allowed))
+        raise DataError(ValidationIssue("no lights", value=type(source).__name__, allowed=allowed))
     path = Path(source)
     if not is_file(path):
         return CurveSource({"builtin": str(source)})

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base.errors import Fault, OutputError, SweepError, nearest
+from ..base.errors import OutputError, SweepError, ValidationIssue, nearest
 from ..designs.space import Space
 from ..metrics.bound import total_violation
 from ..metrics.quantity import Column, Quantity
@@ -159,7 +159,7 @@ class LoadedStudy:
         rows = {name: on_grid(name, curve, study.grid) * factor for name, curve in channels.items()}
         counts = {name: len(curves) for name, curves in rows.items()}
         if len(set(counts.values())) > 1:
-            raise SweepError(Fault("different numbers of filters", value=counts))
+            raise SweepError(ValidationIssue("different numbers of filters", value=counts))
         chosen = find_cfa(study, list(channels)) if cfa is None else self._cfa(cfa, list(channels))
         bases = replaced_curves(study, chosen, list(channels), base)
         curves = np.stack([*rows.values()], axis=1)
@@ -169,7 +169,7 @@ class LoadedStudy:
 
     def _plain_and_named(self, cfa: str | None, scenarios: list[str]) -> pd.DataFrame:
         from ..results.tables import NAMED, PLAIN
-        from ..run.routes import found_of
+        from ..run.routes import quantities_at
         from ..run.rows import rules_of
 
         study, rules = self.study, rules_of(self.study)
@@ -177,14 +177,16 @@ class LoadedStudy:
         if not spaces:
             known = list(dict.fromkeys(s.cfa for s in study.spaces if s.kind in (PLAIN, NAMED)))
             near = None if cfa is None else nearest(cfa, known)
-            raise SweepError(Fault("no plain CFA or named design", value=cfa, allowed=", ".join(known), nearest=near))
+            raise SweepError(
+                ValidationIssue("no plain CFA or named design", value=cfa, allowed=", ".join(known), nearest=near)
+            )
         rows = []
         for name in scenarios:
             for space in spaces:
                 points = space.points(0, space.size)
-                values, faults = found_of(space, 0, points, study.setup(space, name), rules)
-                for text in faults.values():
-                    raise SweepError(Fault(f"{space.name} in {name}: {text}"))
+                values, issues = quantities_at(space, 0, points, study.setup(space, name), rules)
+                for text in issues.values():
+                    raise SweepError(ValidationIssue(f"{space.name} in {name}: {text}"))
                 worst = total_violation(values, study.constraints, space.violation(points))
                 columns = {quantity: values[quantity] for quantity in study.quantities}
                 rows.append((space.name, space.cfa, name, columns | {"violation": worst}))
@@ -231,7 +233,7 @@ class LoadedStudy:
             problem = with_lower_bound(problem, "sensitivity", sensitivity)
         limit, reason = upper_bound_or_reason(problem)
         if limit is None:
-            raise SweepError(Fault(f"no limit: {reason}"))
+            raise SweepError(ValidationIssue(f"no limit: {reason}"))
         return limit
 
     def plot(self, **channels: CurveLike) -> Figure:
@@ -299,14 +301,14 @@ class LoadedStudy:
 
         folder, _ = output_folder(Path(output) / folder_name(self.name), self.study)
         run_study(self.study, folder, jobs or os.cpu_count() or 1, _silent, ("sweep", "from Python"))
-        make_report(read_output(folder), mend=True)
+        make_report(read_output(folder), repair=True)
         return FinishedRun(folder)
 
     def _scenario(self, name: str) -> str:
         known = list(self.study.scenarios)
         if name not in known:
             raise SweepError(
-                Fault("unknown scenario", value=name, allowed=", ".join(known), nearest=nearest(name, known))
+                ValidationIssue("unknown scenario", value=name, allowed=", ".join(known), nearest=nearest(name, known))
             )
         return name
 
@@ -314,7 +316,9 @@ class LoadedStudy:
         known = [cfa for cfa, mosaic in self.study.mosaics.items() if set(channels) <= set(mosaic.channels)]
         if name not in known:
             problem = f"no CFA of the study with a channel {' and '.join(channels)}"
-            raise SweepError(Fault(problem, value=name, allowed=", ".join(known), nearest=nearest(name, self.cfas)))
+            raise SweepError(
+                ValidationIssue(problem, value=name, allowed=", ".join(known), nearest=nearest(name, self.cfas))
+            )
         return name
 
     def _modified(self, cfa: str | None, channel: str | None) -> Space:
@@ -325,7 +329,9 @@ class LoadedStudy:
             assert space.filter is not None
             if cfa in (None, space.cfa) and (channel is None or channel in space.filter.channels):
                 return space
-        raise SweepError(Fault("the study modifies no such channel", value=channel, allowed="a design, sweep or box"))
+        raise SweepError(
+            ValidationIssue("the study modifies no such channel", value=channel, allowed="a design, sweep or box")
+        )
 
 
 class FinishedRun:
@@ -374,7 +380,9 @@ class FinishedRun:
     def best(self) -> pd.Series:
         """Best feasible design that was swept or searched; raises SweepError if there is none."""
         if self.output.best.empty:
-            raise OutputError(Fault("the run has no feasible design that was swept or searched", str(self.folder)))
+            raise OutputError(
+                ValidationIssue("the run has no feasible design that was swept or searched", str(self.folder))
+            )
         return self.output.best.iloc[0].dropna()
 
     @property

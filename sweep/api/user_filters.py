@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from ..base.errors import DataError, Fault, nearest
+from ..base.errors import DataError, ValidationIssue, nearest
 from ..base.types import FloatArray
-from ..camera.exposure import leaves_exposure
+from ..camera.exposure import largest_sensitivity_not_brightest
 from ..camera.forward import forward_model
 from ..camera.setup import Setup
 from ..designs.families.stopband import Stopband
@@ -20,7 +20,7 @@ from ..metrics.columns.sensitivity import SENSITIVITY
 from ..metrics.evaluate import evaluate, family_quantities, image_quantities
 from ..metrics.objective import COMBINED
 from ..metrics.quantity import WORST, YIELD, Column, Columns
-from ..search.limit import Limit, limit_of, why_not
+from ..search.limit import Limit, limit_of, reason_without_bound
 from ..search.problem import Problem
 from ..spectra.lights import class_pairs
 from ..study import Study
@@ -89,7 +89,7 @@ def replaced_curves(study: Study, cfa: str, channels: Sequence[str], base: str |
         curve = base or stated.get(channel) or (default if default in study.sensor.qe else None)
         if curve is None:
             known = ", ".join(study.sensor.qe)
-            raise DataError(Fault(f"which curve does {channel} of {cfa} replace?", key="base", allowed=known))
+            raise DataError(ValidationIssue(f"which curve does {channel} of {cfa} replace?", key="base", allowed=known))
         study.sensor.curve(curve)  # raises for an unknown name
         bases[channel] = curve
     return bases
@@ -121,7 +121,9 @@ def user_filter_setup(study: Study, cfa: str, scenario: str, bases: Mapping[str,
     stated = {repr(f.technology): f.technology for f in filters if bases.keys() & set(f.channels)}
     if len(stated) > 1:
         several = ", ".join("none" if made is None else made.told for made in stated.values())
-        raise DataError(Fault(f"several technologies are stated for {' and '.join(bases)} of {cfa}", value=several))
+        raise DataError(
+            ValidationIssue(f"several technologies are stated for {' and '.join(bases)} of {cfa}", value=several)
+        )
     return study.setup_of(cfa, scenario, bases, next(iter(stated.values()), None))
 
 
@@ -152,11 +154,13 @@ def find_cfa(study: Study, channels: Sequence[str]) -> str:
         known = list(dict.fromkeys(channel for mosaic in study.mosaics.values() for channel in mosaic.channels))
         near = nearest(channels[0], known)
         raise DataError(
-            Fault(f"no CFA of the study has a channel {wanted}", None, None, None, None, ", ".join(known), near)
+            ValidationIssue(
+                f"no CFA of the study has a channel {wanted}", None, None, None, None, ", ".join(known), near
+            )
         )
     chosen = [name for name in candidates if name in modified] or candidates
     if len(chosen) > 1:
-        raise DataError(Fault(f"several CFAs have a channel {wanted}", key="cfa", allowed=", ".join(chosen)))
+        raise DataError(ValidationIssue(f"several CFAs have a channel {wanted}", key="cfa", allowed=", ".join(chosen)))
     return chosen[0]
 
 
@@ -185,14 +189,16 @@ def evaluate_curves(study: Study, setup: Setup, curves: FloatArray) -> Columns:
     """
     if not curves.max(initial=0.0) <= _MOST_QE:
         allowed = "0 to 1; a transmission is relative to a curve (`relative_to`), percent are divided by 100"
-        raise DataError(Fault("a QE above 1", value=round(float(curves.max()), 6), allowed=allowed))
-    asked = study.asked
-    values = evaluate(forward_model(setup), curves, asked.states, probabilities=asked.probabilities, own=asked.own)
+        raise DataError(ValidationIssue("a QE above 1", value=round(float(curves.max()), 6), allowed=allowed))
+    requested = study.requested
+    values = evaluate(
+        forward_model(setup), curves, requested.states, probabilities=requested.probabilities, own=requested.own
+    )
     if setup.lights.population is not None and not study.tolerance:
         from ..metrics.members import population_imager  # noqa: PLC0415  (only where lights have a population)
 
         values |= {WORST + name: worst for name, worst in population_imager(setup).worst(curves).items()}
-        if asked.wanted_yield:
+        if requested.wanted_yield:
             from ..metrics.drawn import LampsAndCameras  # noqa: PLC0415
 
             draws = LampsAndCameras(population_imager(setup), study.tolerance, study.section.seed)
@@ -301,7 +307,7 @@ def with_exposure_unchanged(problem: Problem) -> Problem:
     Problem
         The problem with an upper bound on the sensitivity.
     """
-    most = min(1.0, leaves_exposure(problem.setup))
+    most = min(1.0, largest_sensitivity_not_brightest(problem.setup))
     old = problem.constraints.get(SENSITIVITY)
     upper = most if old is None or old.max is None else min(most, old.max)
     bound = Bound(min=None if old is None else old.min, max=upper)
@@ -323,5 +329,5 @@ def upper_bound_or_reason(problem: Problem) -> tuple[Limit | None, str]:
     reason : str
         Empty, or the reason why there is no bound.
     """
-    reason = why_not(problem)
+    reason = reason_without_bound(problem)
     return (limit_of(problem), "") if reason is None else (None, reason)

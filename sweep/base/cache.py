@@ -14,7 +14,7 @@ _Value = TypeVar("_Value")
 class Cache(Generic[_Key, _Value]):
     """The values that were used last, at most `most` of them, shared by threads.
 
-    Threads wait for one another, so that each value is made once; what fails while it is made is not kept.
+    Threads wait for one another, so that each value is made once; failures are not kept.
     """
 
     def __init__(self, most: int) -> None:

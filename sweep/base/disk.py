@@ -1,7 +1,7 @@
 """Reading files: plain ones alone, no larger than their kind can be.
 
-In the tool's own folders, where others may have put something, links are not followed. What a user names may be a link;
-its faults name the file.
+In the tool's own folders, where others may have put something, links are not followed. Files that a user names may be
+links; issues name the file.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from io import BufferedReader
 from pathlib import Path
 from typing import Any
 
-from .errors import Fault, SweepError
+from .errors import SweepError, ValidationIssue
 
 MOST_FACTS = 64 * 2**20
 """Bytes of a JSON file that is read at once."""
 NO_UTF_16 = "UTF-8; UTF-16? save as UTF-8"
-"""What to allow where a text seems to be UTF-16."""
+"""Allowed values for a text that seems to be UTF-16."""
 
 
 # These are False, not an error, for a path that no file system takes.
@@ -188,16 +188,20 @@ def read_input(path: Path, most_bytes: int, refused: type[SweepError]) -> bytes:
     """
     try:
         if not stat.S_ISREG(path.stat().st_mode):
-            raise refused(Fault("not a file", str(path), allowed="a file on a disk; no folder, pipe or device"))
+            raise refused(
+                ValidationIssue("not a file", str(path), allowed="a file on a disk; no folder, pipe or device")
+            )
         with opened(path, links=True) as handle:  # a pipe may have come to its place
             size = os.fstat(handle.fileno()).st_size
             content = handle.read(most_bytes + 1) if size <= most_bytes else b""
     except (OSError, ValueError) as error:  # a ValueError: NUL in a path
         reason = (error.strerror if isinstance(error, OSError) else None) or error
-        raise refused(Fault(f"cannot be read: {reason}", str(path))) from None
-    size = max(size, len(content))  # what the kernel makes up as it is read has no size
+        raise refused(ValidationIssue(f"cannot be read: {reason}", str(path))) from None
+    size = max(size, len(content))  # virtual files have no size
     if size > most_bytes:
-        raise refused(Fault("the file is too large", str(path), None, None, f"{size:,} bytes", f"up to {most_bytes:,}"))
+        raise refused(
+            ValidationIssue("the file is too large", str(path), None, None, f"{size:,} bytes", f"up to {most_bytes:,}")
+        )
     return content
 
 

@@ -1,4 +1,4 @@
-"""Errors that carry data: what is wrong, where, what is allowed, and the nearest known name."""
+"""Errors with data: problem, file and line, allowed values, and the nearest known name."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import islice
 
-MOST_FAULTS = 50
+MOST_ISSUES = 50
 """So many are told; of more, how many there are."""
 _MOST_KNOWN = 1000
 _MOST_LETTERS = 100
@@ -37,10 +37,10 @@ def nearest(name: object, known: Iterable[str]) -> str | None:
         return None
     folded = {str(c).casefold(): str(c) for c in islice(known, _MOST_KNOWN) if len(str(c)) <= _MOST_LETTERS}
     sought, ordered = str(name).casefold(), {_in_order(c): c for c in reversed(folded)}
-    found = difflib.get_close_matches(sought, list(folded), n=1, cutoff=0.5)
+    matches = difflib.get_close_matches(sought, list(folded), n=1, cutoff=0.5)
     if sought not in folded and (alike := difflib.get_close_matches(_in_order(sought), list(ordered), n=1, cutoff=0.9)):
-        found = [ordered[alike[0]]]
-    return folded[found[0]] if found else None
+        matches = [ordered[alike[0]]]
+    return folded[matches[0]] if matches else None
 
 
 def _in_order(name: str) -> str:
@@ -49,7 +49,7 @@ def _in_order(name: str) -> str:
 
 
 @dataclass(frozen=True)
-class Fault:
+class ValidationIssue:
     """One thing wrong with an input; prints as one line."""
 
     problem: str
@@ -76,7 +76,7 @@ class Fault:
 
 EXIT_CODES = {
     0: "done",
-    2: "a fault of the input, the machine or the command line: a line says which",
+    2: "an error of the input, the machine or the command line: a line says which",
     3: "no design of the search can meet the constraints",
     4: "a design failed, with --fail-fast",
     5: "a result is above its own upper bound, or farther from the reference settings than the tolerance",
@@ -87,20 +87,20 @@ EXIT_CODES = {
 
 
 class SweepError(Exception):
-    """Base of all errors that a user can cause or mend. `exit_code` is what the command returns.
+    """Base of all errors that a user can cause or repair. `exit_code` is the exit code of the command.
 
-    `faults`: at most MOST_FAULTS of them; where there are more, the last one says how many.
+    `issues`: at most MOST_FAULTS of them; where there are more, the last one says how many.
     """
 
     exit_code = 2
 
-    def __init__(self, faults: Sequence[Fault] | Fault | str) -> None:
-        if isinstance(faults, str):
-            faults = (Fault(faults),)
-        elif isinstance(faults, Fault):
-            faults = (faults,)
-        self.faults = _told(faults)
-        super().__init__("\n".join(str(fault) for fault in self.faults))
+    def __init__(self, issues: Sequence[ValidationIssue] | ValidationIssue | str) -> None:
+        if isinstance(issues, str):
+            issues = (ValidationIssue(issues),)
+        elif isinstance(issues, ValidationIssue):
+            issues = (issues,)
+        self.issues = _told(issues)
+        super().__init__("\n".join(str(issue) for issue in self.issues))
 
 
 class StudyError(SweepError):
@@ -127,14 +127,14 @@ class FailedDesignError(SweepError):
     exit_code = 4
 
 
-class BrokenProofError(SweepError):
-    """A design that is better than what is proven to be out of reach: the program has a fault."""
+class UpperBoundExceededError(SweepError):
+    """A design exceeds a proven upper bound: an error of the program."""
 
     exit_code = 5
 
 
-class BrokenPromiseError(SweepError):
-    """An audit that found larger errors than were promised: the program has a fault."""
+class ErrorBoundExceededError(SweepError):
+    """An audit that found larger errors than were promised: an error of the program."""
 
     exit_code = 5
 
@@ -145,11 +145,11 @@ class InterruptedRunError(SweepError):
     exit_code = 130
 
 
-def _told(faults: Sequence[Fault]) -> tuple[Fault, ...]:
-    if len(faults) <= MOST_FAULTS:
-        return tuple(faults)
-    more = len(faults) - MOST_FAULTS + 1
-    return (*faults[: MOST_FAULTS - 1], Fault(f"and {more:,} more faults", faults[0].file))
+def _told(issues: Sequence[ValidationIssue]) -> tuple[ValidationIssue, ...]:
+    if len(issues) <= MOST_ISSUES:
+        return tuple(issues)
+    more = len(issues) - MOST_ISSUES + 1
+    return (*issues[: MOST_ISSUES - 1], ValidationIssue(f"and {more:,} more errors", issues[0].file))
 
 
 def _short(value: object, limit: int = 60) -> str:

@@ -25,15 +25,15 @@ import numba
 from numba.core import caching
 from platformdirs import user_cache_path
 
-from .errors import Fault, SweepError
+from .errors import SweepError, ValidationIssue
 
 _ROOT = Path(__file__).parent.parent
 _NAMES = ("compiled", "nearest", "vectorized")
-"""What the names of files with kernels begin with."""
+"""Prefix of the names of files with kernels."""
 _FORGOTTEN_S = 7 * 24 * 3600.0
 """Seconds after which code of other sources is removed."""
 _FORM = "each file after its SHA-256"
-"""Name of the form of the files, another one for another form: neither is to read what the other wrote."""
+"""Name of the form of the files, another one for another form: neither reads files of the other."""
 _DIGEST_BYTES = hashlib.sha256().digest_size
 
 _SETTINGS: Any = numba.config
@@ -67,8 +67,8 @@ class _Files(caching.IndexDataCacheFile):
 
     def load(self, key: Any) -> Any:
         """Load the code; None where there is none, or that of another key: two processes may have chosen one name."""
-        found = super().load(key)
-        return found[1] if found is not None and found[0] == key else None
+        entry = super().load(key)
+        return entry[1] if entry is not None and entry[0] == key else None
 
     def save(self, key: Any, data: Any) -> None:
         """Keep the code."""
@@ -85,7 +85,7 @@ class _Files(caching.IndexDataCacheFile):
         self._save_data(self._index_name, (self._source_stamp, overloads))
 
     def _load_data(self, name: str) -> Any:
-        """Load what a file holds; raises OSError where it is damaged."""
+        """Load a file; raises OSError if it is damaged."""
         content = Path(self._data_path(name)).read_bytes()
         digest, held = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
         if hashlib.sha256(held).digest() != digest:
@@ -134,7 +134,7 @@ class _Folder:
     def ensure_cache_path(self) -> None:
         """Make the folders; raises OSError where that fails, and SweepError where others may write one."""
         for folder in (self._own, self._path):
-            _make_own(folder)
+            _make_private(folder)
         tempfile.TemporaryFile(dir=self._path).close()
 
 
@@ -143,7 +143,7 @@ class _Code(caching.CompileResultCacheImpl):
 
 
 class _Cache(caching.FunctionCache):
-    """The machine code of a kernel on the disk. What cannot be loaded is compiled and kept anew."""
+    """The machine code of a kernel on the disk. Damaged code is compiled and kept anew."""
 
     _impl_class = _Code
 
@@ -166,29 +166,31 @@ class _Cache(caching.FunctionCache):
 
 
 @cache
-def _kept_in(asked: str) -> Path:
+def _kept_in(requested: str) -> Path:
     """Return the folder of the machine code: in the one that is asked for, beside the package, or the user's."""
     digest = hashlib.sha256(f"{_FORM}\0{numba.__version__}\0".encode())
     for path in sources():
         digest.update(path.relative_to(_ROOT).as_posix().encode() + b"\0" + path.read_bytes())
     beside = _ROOT / "__pycache__"
-    places = Path(asked) if asked else beside if os.access(_ROOT, os.W_OK) else user_cache_path("sweep")
-    found = places / f"kernels-{digest.hexdigest()[:16]}"
-    if not found.exists():
+    places = Path(requested) if requested else beside if os.access(_ROOT, os.W_OK) else user_cache_path("sweep")
+    folder = places / f"kernels-{digest.hexdigest()[:16]}"
+    if not folder.exists():
         for other in places.glob("kernels-*"):
             with suppress(OSError):
                 if time.time() - other.stat().st_mtime > _FORGOTTEN_S:
                     shutil.rmtree(other, ignore_errors=True)
-    return found
+    return folder
 
 
-def _make_own(folder: Path) -> None:
+def _make_private(folder: Path) -> None:
     """Make a folder that the user alone may write; raises SweepError where it is there, and others may."""
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     if not hasattr(os, "geteuid"):
         return
-    found = folder.lstat()
-    others = found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
-    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.geteuid() or others:
+    status = folder.lstat()
+    others = status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    if not stat.S_ISDIR(status.st_mode) or status.st_uid != os.geteuid() or others:
         allowed = "one that is yours, and that no one else may write: remove it, or set NUMBA_CACHE_DIR to another one"
-        raise SweepError(Fault("a folder of machine code that others may change", str(folder), allowed=allowed))
+        raise SweepError(
+            ValidationIssue("a folder of machine code that others may change", str(folder), allowed=allowed)
+        )

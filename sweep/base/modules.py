@@ -28,7 +28,7 @@ def files_in(folder: ModuleType) -> list[ModuleType]:
     return [import_module(f"{folder.__name__}.{file.name}") for file in iter_modules(folder.__path__)]
 
 
-def made_in(folder: ModuleType, base: Callable[[], T]) -> list[T]:
+def instances_in(folder: ModuleType, base: Callable[[], T]) -> list[T]:
     """Instantiate each class derived from `base` that the modules of a package define.
 
     Parameters
@@ -55,7 +55,7 @@ def made_in(folder: ModuleType, base: Callable[[], T]) -> list[T]:
     ]
 
 
-def loaded_later(names: dict[str, Any], homes: Mapping[str, str]) -> Callable[[str], Any]:
+def lazy_import(names: dict[str, Any], homes: Mapping[str, str]) -> Callable[[str], Any]:
     """Return the `__getattr__` of a package that imports its names on first use (PEP 562).
 
     Parameters

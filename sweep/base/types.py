@@ -107,6 +107,6 @@ Share = Annotated[float, Field(ge=1e-9, le=1)]
 Ratio = Annotated[float, Field(ge=1e-30, le=1e30)]
 """A factor between two scales."""
 Meters = Annotated[float, Field(ge=1e-4, le=1e9)]
-"""0.1 mm to a million kilometers: from what is smaller than any lamp to beyond the Moon."""
+"""0.1 mm to a million kilometers: from less than any lamp to beyond the Moon."""
 Seconds = Annotated[float, Field(ge=1e-15, le=1e9)]
 """Femtoseconds to 30 years."""

@@ -1,4 +1,4 @@
-"""Accuracy as settings: how finely the camera is sampled, and what that costs."""
+"""Accuracy settings: sampling of the camera, and its cost in time."""
 
 from __future__ import annotations
 

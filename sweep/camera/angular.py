@@ -113,10 +113,10 @@ def _arcs(cone: Cone) -> list[_Arc]:
     """Return the parts of a cone with all azimuths and with some, as far as they exist."""
     half, chief = cone.half_rad, cone.chief_rad
     area = math.sin(half) ** 2 * math.cos(chief)  # of the cone's projected solid angle, over pi
-    found = []
+    arcs = []
     if chief < half:
         inner = math.sin(half - chief) ** 2
-        found.append(_Arc(lambda u: inner * u, lambda u: np.full(u.shape, inner / area), lambda x: x / inner))
+        arcs.append(_Arc(lambda u: inner * u, lambda u: np.full(u.shape, inner / area), lambda x: x / inner))
     if chief > 0:
         # t = middle - width cos(pi u): the roots at both ends of P(t) become smooth.
         middle, width = max(half, chief), min(half, chief)
@@ -137,8 +137,8 @@ def _arcs(cone: Cone) -> list[_Arc]:
             t = np.arcsin(np.sqrt(np.clip(x, 0.0, 1.0)))
             return np.asarray(np.arccos(np.clip((middle - t) / width, -1.0, 1.0)) / math.pi)
 
-        found.append(_Arc(lambda u: np.sin(angle(u)) ** 2, density, place))
-    return found
+        arcs.append(_Arc(lambda u: np.sin(angle(u)) ** 2, density, place))
+    return arcs
 
 
 def _points(edges: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -257,8 +257,8 @@ def cone_of(scene: Scene) -> Cone:
     return Cone(half_angle_rad(scene.optics.f_number), math.radians(scene.optics.cra_deg))
 
 
-def too_steep(scene: Scene) -> tuple[tuple[str, ...], str, str, str] | None:
-    """Return the fault of a scene whose rays graze an interference filter.
+def grazing_ray_issue(scene: Scene) -> tuple[tuple[str, ...], str, str, str] | None:
+    """Return the issue of a scene whose rays graze an interference filter.
 
     Parameters
     ----------
@@ -268,7 +268,7 @@ def too_steep(scene: Scene) -> tuple[tuple[str, ...], str, str, str] | None:
     Returns
     -------
     tuple or None
-        Key, problem, value, and allowed values; None if there is no fault.
+        Key, problem, value, and allowed values; None if there is no issue.
     """
     chief_deg = scene.optics.cra_deg if scene.field is None else scene.field.steepest_deg
     steepest = cone_of(scene).half_rad + math.radians(chief_deg)
@@ -344,12 +344,12 @@ class AngularResponse:
         return result
 
 
-def known_at(carrier: FloatArray) -> IndexArray:
+def known_at(base_transmission: FloatArray) -> IndexArray:
     """Return the wavelengths at which a base transmission is large enough to know the filter on it.
 
     Parameters
     ----------
-    carrier : ndarray of shape (n_wavelengths,)
+    base_transmission : ndarray of shape (n_wavelengths,)
         Base transmission.
 
     Returns
@@ -357,26 +357,28 @@ def known_at(carrier: FloatArray) -> IndexArray:
     ndarray of int
         Indices of wavelengths.
     """
-    return np.flatnonzero(carrier > _LEAST_BASE * carrier.max())
+    return np.flatnonzero(base_transmission > _LEAST_BASE * base_transmission.max())
 
 
 _MATRICES: Cache[bytes, csr_matrix] = Cache(256)
 
 
-def _matrix(wavelength_nm: FloatArray, carrier: FloatArray, index: float, cone: Cone, n_rays: int | None) -> csr_matrix:
+def _matrix(
+    wavelength_nm: FloatArray, base_transmission: FloatArray, index: float, cone: Cone, n_rays: int | None
+) -> csr_matrix:
     """Return the matrix from a curve on a base transmission to the curve in the cone; cached."""
-    key = wavelength_nm.tobytes() + carrier.tobytes() + repr((index, cone, n_rays)).encode()
+    key = wavelength_nm.tobytes() + base_transmission.tobytes() + repr((index, cone, n_rays)).encode()
 
     def made() -> csr_matrix:
         from scipy.sparse import csr_matrix, diags_array  # noqa: PLC0415  (slow to import: only where filters move)
 
-        known = known_at(carrier)
+        known = known_at(base_transmission)
         rows, columns, shares = _means(wavelength_nm, wavelength_nm[known], index, cone, n_rays)
         shape = (wavelength_nm.size, wavelength_nm.size)
         mean = csr_matrix((shares, (rows, known[columns])), shape=shape)
-        inverse = np.zeros(carrier.size)
-        inverse[known] = 1 / carrier[known]
-        return csr_matrix(diags_array(carrier) @ mean @ diags_array(inverse))
+        inverse = np.zeros(base_transmission.size)
+        inverse[known] = 1 / base_transmission[known]
+        return csr_matrix(diags_array(base_transmission) @ mean @ diags_array(inverse))
 
     return _MATRICES.get(hashlib.sha256(key).digest(), made)
 

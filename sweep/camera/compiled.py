@@ -73,10 +73,10 @@ def covered_shares(x: FloatArray, y: FloatArray, half: float, radius: float) -> 
     ndarray of shape (n,)
         0 to 1.
     """
-    found = np.empty(x.size)
+    shares = np.empty(x.size)
     for at in range(x.size):
-        found[at] = covered_share(x[at], y[at], half, radius)
-    return found
+        shares[at] = covered_share(x[at], y[at], half, radius)
+    return shares
 
 
 @njit(cache=True, nogil=True)
@@ -99,48 +99,48 @@ def covered_by_disc(x: FloatArray, y: FloatArray, half: float, radius: float) ->
     ndarray of shape (n, n_rows, n_columns)
         0 to 1.
     """
-    found = np.empty((len(x), y.shape[1], x.shape[1]))
+    shares = np.empty((len(x), y.shape[1], x.shape[1]))
     for case in range(len(x)):
         for row in range(y.shape[1]):
             for column in range(x.shape[1]):
-                found[case, row, column] = covered_share(x[case, column], y[case, row], half, radius)
-    return found
+                shares[case, row, column] = covered_share(x[case, column], y[case, row], half, radius)
+    return shares
 
 
 @njit(cache=True, nogil=True)
-def gather(seen: FloatArray, shares: FloatArray, place: IndexArray, through: IndexArray, out: FloatArray) -> None:
+def gather(light: FloatArray, shares: FloatArray, place: IndexArray, through: IndexArray, out: FloatArray) -> None:
     """Add the light of pixels in place, pixel by pixel.
 
     Parameters
     ----------
-    seen : ndarray of shape (n_designs, n_channels, n_places, n_signals)
+    light : ndarray of shape (n_designs, n_channels, n_places, n_signals)
         Light behind each channel's filter at each place.
     shares : ndarray of shape (n_parts,)
         Weight of each part of a pixel.
     place : ndarray of int, shape (n_parts, n_cases, n_elements)
         Place of each part.
     through : ndarray of int, shape (n_parts, n_elements)
-        Row of `seen`, or -1 for a channel that does not count.
+        Row of `light`, or -1 for a channel that does not count.
     out : ndarray of shape (n_designs, n_cases, n_signals, n_elements)
         Array that is changed.
     """
     n_signals = out.shape[2]
-    own = np.empty(n_signals)
+    pixel_light = np.empty(n_signals)
     for design in range(out.shape[0]):
         for case in range(out.shape[1]):
             for unit in range(out.shape[3]):
-                own[:] = 0.0
+                pixel_light[:] = 0.0
                 some = False
                 for part in range(shares.size):
                     channel = through[part, unit]
                     if channel >= 0:
                         some = True
-                        share, light = shares[part], seen[design, channel, place[part, case, unit]]
+                        share, part_light = shares[part], light[design, channel, place[part, case, unit]]
                         for s in range(n_signals):
-                            own[s] += share * light[s]
+                            pixel_light[s] += share * part_light[s]
                 if some:
                     for s in range(n_signals):
-                        out[design, case, s, unit] += own[s]
+                        out[design, case, s, unit] += pixel_light[s]
 
 
 @njit(cache=True, nogil=True)
@@ -255,7 +255,7 @@ def means_of_cubic(
     coefficients : ndarray[n_coefficients, n_values]
         Of the cubic B-splines. Beyond the end the last piece goes on.
     out : ndarray[n, n_values]
-        What the means are put into.
+        Output array of the means.
     """
     last, per_unit = len(coefficients) - 1, 1 / (knots[5] - knots[4])
     four, folded = np.empty(4), np.zeros(len(coefficients))

@@ -97,7 +97,7 @@ class PixelLight:
 
 
 def different(window: Window, wanted: BoolArray) -> tuple[FloatArray, IndexArray]:
-    """Return the distinct places of pixels around the light's center; the image is round, so mirrored places are equal.
+    """Return the distinct pixel positions around the light's center; mirrored ones are equal in a round image.
 
     Parameters
     ----------

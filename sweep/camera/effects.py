@@ -70,9 +70,9 @@ class Box:
         """
         highest = self.high.copy()
         for channel in self.setup.camera.moving:
-            carrier = self.setup.camera.base_transmission(channel)
-            known = known_at(carrier)
-            highest[channel] = carrier * (self.high[channel, known] / carrier[known]).max()
+            base_transmission = self.setup.camera.base_transmission(channel)
+            known = known_at(base_transmission)
+            highest[channel] = base_transmission * (self.high[channel, known] / base_transmission[known]).max()
         return highest
 
     @cached_property
@@ -193,14 +193,14 @@ def _not_moving(box: Box) -> str | None:
 
 
 def _one_phase(box: Box) -> str | None:
-    return _without_target(box) or (None if box.setup.all_phases else "the scene names the place")
+    return _without_target(box) or (None if box.setup.all_phases else "the scene names the sampling phase")
 
 
 def _one_field_position(box: Box) -> str | None:
     field = box.setup.scene.field
     if field is None:
-        return "one place of the sensor"
-    return None if box.setup.positions_differ else "all places of the sensor see the same"
+        return "one field position"
+    return None if box.setup.positions_differ else "all field positions have the same light"
 
 
 def _averaged(box: Box) -> str | None:
@@ -259,4 +259,4 @@ EFFECTS: dict[str, Effect] = {
         Effect("flicker", _unpulsed, _pwm_bound_dn),
     )
 }
-"""Each effect by its name: those of the readout first, which decide what the bounds of the others are."""
+"""Each effect by its name: those of the readout first, which determine the bounds of the others."""

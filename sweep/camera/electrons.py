@@ -16,7 +16,7 @@ from ..base.types import BoolArray, FloatArray
 from ..designs.block import Block
 from ..designs.products import row_products
 from .exposure import SceneLight, exposure_times
-from .irradiance import background_irradiance, way_of_light
+from .irradiance import background_irradiance, path_factor
 from .pixel_response import PixelResponse, SplitLight
 from .setup import Setup
 
@@ -75,9 +75,9 @@ class Changing:
             Values of every channel.
         """
         values = self.values[part] if "values" in self.__dict__ else self.make(part)
-        found = np.repeat(self.fixed[None], len(values), axis=0)
-        found[..., self.channel] = values
-        return found
+        whole = np.repeat(self.fixed[None], len(values), axis=0)
+        whole[..., self.channel] = values
+        return whole
 
 
 def _expose(rates: FloatArray, fixed: FloatArray, uniform: FloatArray, time_s: float) -> None:
@@ -92,7 +92,7 @@ def _expose(rates: FloatArray, fixed: FloatArray, uniform: FloatArray, time_s: f
 
 def _background(setup: Setup) -> FloatArray:
     """Return electrons/s of the background per unit of QE, behind air and lens, ndarray of shape (n_wavelengths,)."""
-    dimmed = way_of_light(setup, setup.camera.grid.nodes_nm, background=True)
+    dimmed = path_factor(setup, setup.camera.grid.nodes_nm, background=True)
     return np.asarray(background_irradiance(setup) * setup.camera.area_step_m2_nm * dimmed, dtype=float)
 
 
@@ -101,7 +101,7 @@ class Electrons:
 
     `light`, `response`: the scene's; `position`: of the field, of each case, ndarray[n_cases]. `background`:
     electrons/s for each QE of the modified channels, ndarray[n_positions, n_modified, n_wavelengths]. `fixed`:
-    electrons/s of what no design changes, ndarray[n_cases, n_signals, n_elements].
+    electrons/s of the unmodified channels, ndarray[n_cases, n_signals, n_elements].
     """
 
     def __init__(self, light: SceneLight, response: PixelResponse, *, once: bool = False) -> None:
@@ -113,15 +113,21 @@ class Electrons:
         self.position = np.repeat(np.arange(len(positions)), response.shape[0] // len(positions))
         self._split = response.source if isinstance(response.source, SplitLight) and len(positions) == 1 else None
         background = [_background(position) for position in positions]
-        each = [np.repeat(dimmed[None], len(modified), axis=0) for dimmed in background]
-        self.background = np.stack([own.light(dimmed, modified) for own, dimmed in zip(angular, each, strict=True)])
+        spectra = [np.repeat(dimmed[None], len(modified), axis=0) for dimmed in background]
+        self.background = np.stack(
+            [
+                angular_response.light(dimmed, modified)
+                for angular_response, dimmed in zip(angular, spectra, strict=True)
+            ]
+        )
         if self._split is None:
             self.fixed = self._products(response.light[:, :, fixed], setup.camera.qe[None, fixed], fixed)[0]
         else:
             self.fixed = np.zeros((response.shape[0], len(light.signals), response.shape[1]))
             self._add_pixels(self._split, setup.camera.qe[None, fixed], fixed, self.fixed[None])
         rates = [
-            own.curves(setup.camera.qe[fixed], fixed) @ dimmed for own, dimmed in zip(angular, background, strict=True)
+            angular_response.curves(setup.camera.qe[fixed], fixed) @ dimmed
+            for angular_response, dimmed in zip(angular, background, strict=True)
         ]
         self._fixed_uniform = np.einsum("xuc,xc->xu", response.uniform[:, :, fixed], np.stack(rates)[self.position])
         self._modified_uniform = response.uniform[:, :, modified]
@@ -154,7 +160,7 @@ class Electrons:
             Light weighted by the angular response of the filters.
         """
         return np.concatenate(
-            [seen.light(light[self.position == at], channels) for at, seen in enumerate(self.light.angular)]
+            [response.light(light[self.position == at], channels) for at, response in enumerate(self.light.angular)]
         )
 
     def _products(self, light: FloatArray, qe: FloatArray, of: Sequence[int]) -> FloatArray:
@@ -162,31 +168,31 @@ class Electrons:
         parts = [self._products_at(at, light[self.position == at], qe, of) for at in range(len(self.light.angular))]
         return np.concatenate(parts, axis=1)
 
-    def _add_pixels(self, split: SplitLight, qe: FloatArray, of: Sequence[int], found: FloatArray) -> None:
+    def _add_pixels(self, split: SplitLight, qe: FloatArray, of: Sequence[int], out: FloatArray) -> None:
         """Add the products of a factored light in place."""
         spectra = self.light.angular[0].curves(qe, of)[:, :, None] * self.light.signals
-        split.add_sums(spectra, of, found)
+        split.add_sums(spectra, of, out)
 
-    def _products_at(self, place: int, light: FloatArray, qe: FloatArray, of: Sequence[int]) -> FloatArray:
+    def _products_at(self, field_index: int, light: FloatArray, qe: FloatArray, of: Sequence[int]) -> FloatArray:
         """Sum the products at one field position."""
         cases, units, channels, _ = light.shape
         size, n, n_signals = self.setup.camera.grid.size, len(qe), len(self.light.signals)
         weights = np.broadcast_to(light, (cases, units, channels, size)).reshape(cases * units, channels * size)
         # [n_designs, channels, n_signals, n_wavelengths]
-        seen = self.light.angular[place].curves(qe, of)[:, :, None] * self.light.signals
-        moved = np.moveaxis(seen, 2, 1).reshape(n, n_signals, channels * size)
+        through_filters = self.light.angular[field_index].curves(qe, of)[:, :, None] * self.light.signals
+        moved = np.moveaxis(through_filters, 2, 1).reshape(n, n_signals, channels * size)
         # A product for each design, so that how many there are changes it by no more than rounding.
-        found = (moved @ weights.T).reshape(n, n_signals, cases, units)
-        return np.asarray(np.moveaxis(found, 1, 2), dtype=float)
+        products = (moved @ weights.T).reshape(n, n_signals, cases, units)
+        return np.asarray(np.moveaxis(products, 1, 2), dtype=float)
 
     def _table(self) -> FloatArray:
         """Return signals times response, [channels x wavelengths, n_cases x n_signals x n_elements]."""
         cases, units, channels, size = self._modified.shape
         if not any(seen.matrices for seen in self.light.angular):
-            found = np.empty((channels, size, cases, len(self.light.signals), units))
+            table = np.empty((channels, size, cases, len(self.light.signals), units))
             response = np.ascontiguousarray(np.transpose(self._modified, (2, 3, 0, 1)))
-            np.multiply(response[:, :, :, None], self.light.signals.T[:, None, :, None], out=found)
-            return found.reshape(channels * size, -1)
+            np.multiply(response[:, :, :, None], self.light.signals.T[:, None, :, None], out=table)
+            return table.reshape(channels * size, -1)
         product = self._modified[:, None] * self.light.signals[:, None, None, :]
         product = self.at_each_position(product, self.setup.camera.modified)
         return np.ascontiguousarray(product.reshape(-1, channels * size).T)
@@ -204,18 +210,18 @@ class Electrons:
         ndarray of shape (n_designs, n_cases, n_signals, n_elements)
             Electrons/s of the signals, without background and dark current.
         """
-        found = np.repeat(self.fixed[None], len(curves), axis=0)
+        rates = np.repeat(self.fixed[None], len(curves), axis=0)
         if self._split is not None and self.setup.camera.modified:
-            self._add_pixels(self._split, curves, self.setup.camera.modified, found)
+            self._add_pixels(self._split, curves, self.setup.camera.modified, rates)
         if not self._touched.size:
-            return found
+            return rates
         if self._kept is None:
             part = self._products(self._modified, curves, self.setup.camera.modified)
         else:
             qe = curves.reshape(len(curves), -1).astype(self._kept.dtype)
             part = row_products(qe, self._kept).reshape(len(curves), *self.fixed.shape[:2], self._touched.size)
-        found[..., self._touched] += part
-        return found
+        rates[..., self._touched] += part
+        return rates
 
     def expected(self, curves: FloatArray, scales: FloatArray, exposure_s: FloatArray) -> FloatArray:
         """Return expected electrons before the full well.
@@ -274,10 +280,10 @@ class Electrons:
         ndarray of shape (n_designs, n_cases, n_elements)
             Electrons/s.
         """
-        found = np.zeros((len(rates), *self._modified_uniform.shape[:2]))
+        total = np.zeros((len(rates), *self._modified_uniform.shape[:2]))
         for index in range(rates.shape[2]):
-            found += self._modified_uniform[:, :, index] * rates[:, self.position, index, None]
-        return found
+            total += self._modified_uniform[:, :, index] * rates[:, self.position, index, None]
+        return total
 
     def changing(self, block: Block) -> Changing | None:
         """Return electrons of designs that differ in one channel alone, if each element is a channel.

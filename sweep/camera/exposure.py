@@ -78,7 +78,7 @@ def exposure_times(setup: Setup, modified_white: FloatArray, fixed: float | None
         return np.asarray(full_e / brightest, dtype=float)
 
 
-def may_set_exposure(setup: Setup, most: float = 1.0) -> bool:
+def may_be_brightest(setup: Setup, most: float = 1.0) -> bool:
     """Return whether a modified channel below its base curve may be the brightest on white and set the exposure.
 
     Parameters
@@ -93,10 +93,10 @@ def may_set_exposure(setup: Setup, most: float = 1.0) -> bool:
     bool
         True if it may set the exposure.
     """
-    return isinstance(setup.scene.exposure, WhitePatchExposure) and not leaves_exposure(setup) >= most
+    return isinstance(setup.scene.exposure, WhitePatchExposure) and not largest_sensitivity_not_brightest(setup) >= most
 
 
-def leaves_exposure(setup: Setup) -> float:
+def largest_sensitivity_not_brightest(setup: Setup) -> float:
     """Return the largest sensitivity at which no modified channel is the brightest on white.
 
     Parameters

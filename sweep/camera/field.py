@@ -79,7 +79,7 @@ def field_heights(setup: Setup) -> tuple[float, ...]:
     if scene.field is None or not setup.positions_differ:
         return (0.0,)
     if not scene.field.everywhere:
-        return scene.field.seen_heights
+        return scene.field.counted_heights
     count = setup.accuracy.field_positions
     return tuple(sorted({*(at / (count - 1) for at in range(count)), *scene.field.knots[0]}))
 

@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..base.cache import Cache
-from ..base.errors import Fault, SweepError
+from ..base.errors import SweepError, ValidationIssue
 from ..base.types import FloatArray, IndexArray
 from ..designs.block import Block
 from .electrons import Changing, Electrons
@@ -197,10 +197,10 @@ class ForwardModel:
         """Return the result of `read`, and keep that of a single design, from which several tables are made."""
         if len(curves) != 1 or self._in_parts:
             return read(curves)
-        asked = curves.tobytes()
+        requested = curves.tobytes()
         kept = self._latest.get(how)
-        if kept is None or kept[0] != asked:
-            kept = self._latest[how] = asked, read(curves)
+        if kept is None or kept[0] != requested:
+            kept = self._latest[how] = requested, read(curves)
         result: _Result = kept[1]
         return result
 
@@ -262,8 +262,8 @@ class ForwardModel:
             If the pixels of all phases do not fit into memory.
         """
         if self._phase_blocks:
-            most = f"at most those of {len(self._phase_blocks[0])} places: a smaller light, or a named place"
-            raise SweepError(Fault("too many pixels to draw", value=f"{self.n_cases} places", allowed=most))
+            most = f"at most those of {len(self._phase_blocks[0])} sampling phases: a smaller light, or a named phase"
+            raise SweepError(ValidationIssue("too many pixels to draw", value=f"{self.n_cases} phases", allowed=most))
         if self._in_parts:
             return np.concatenate([part.pixel_electrons(curves) for part in self._parts()], axis=1)
         exposure_s = self.light.exposure_s(curves)
@@ -307,7 +307,7 @@ class AllPhases(ForwardModel):
 
 _models: Cache[tuple[type[ForwardModel], bytes], ForwardModel] = Cache(16)
 _known: Cache[tuple[type[ForwardModel], int], tuple[Setup, ForwardModel]] = Cache(4)
-"""Models of the last blocks' setups, by the identity of the setup, which nobody changes."""
+"""Models of the last blocks' setups, by the identity of the setup, which is immutable."""
 
 
 def forward_model(setup: Setup, kind: type[ForwardModel] = ForwardModel) -> ForwardModel:

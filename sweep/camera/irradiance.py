@@ -14,10 +14,10 @@ import numpy as np
 
 from ..base.types import FloatArray
 from ..spectra.color import luminance_per_photon_radiance
-from .own_effects import Irradiance
 from .pixel import irradiance_factor
 from .scene import Scene
 from .setup import Setup
+from .user_effects import Irradiance
 
 _REFERENCE_NM = 550.0
 _CONTRAST = 0.02
@@ -41,7 +41,7 @@ def scene_irradiance(setup: Setup) -> Irradiance:
         glare = setup.scene.veiling_glare
         mean_cd_m2 = setup.scene.background_cd_m2 if glare.field_cd_m2 is None else glare.field_cd_m2
         irradiance = with_veiling_glare(irradiance, glare.share, _uniform(setup, mean_cd_m2))
-    for effect in setup.own_effects:
+    for effect in setup.user_effects:
         signals, background = effect.applied(irradiance, setup.scene)
         irradiance = replace(irradiance, signals=signals, background=background)
     return irradiance
@@ -185,7 +185,7 @@ def relative_illumination(scene: Scene) -> float:
     return math.cos(math.radians(scene.off_axis_deg)) ** 4
 
 
-def way_of_light(setup: Setup, wavelength_nm: FloatArray, *, background: bool = False) -> FloatArray:
+def path_factor(setup: Setup, wavelength_nm: FloatArray, *, background: bool = False) -> FloatArray:
     """Return the factor of air and lens on the light of a signal or of the background.
 
     Parameters

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from ..base.cache import Cache
-from ..base.errors import Fault, SweepError
+from ..base.errors import SweepError, ValidationIssue
 from ..base.types import FloatArray, IndexArray
 from .exposure import relative_slope
 from .forward import ForwardModel
@@ -25,7 +25,7 @@ from .setup import READOUT, Setup
 _STEPS_DN2 = 1 / 12
 """Variance of rounding to whole digital numbers, DN^2."""
 _FIELD_POSITIONS = 9
-"""Field positions at which a search looks where all places of the sensor count; its best design is read out at more."""
+"""Field positions at which a search looks where all field positions count; its best design is read out at more."""
 
 
 class LinearModel(ForwardModel):
@@ -98,8 +98,8 @@ class LinearModel(ForwardModel):
             Variance, DN^2.
         """
         electrons, pixel = self.by_pixel._expected(curves), self.readout.pixel
-        own = electrons + (pixel.prnu * electrons) ** 2 + pixel.read_noise_e**2
-        return self.by_pixel.readout.spread(pixel.dn_per_e**2 * own + _STEPS_DN2)
+        variance_e2 = electrons + (pixel.prnu * electrons) ** 2 + pixel.read_noise_e**2
+        return self.by_pixel.readout.spread(pixel.dn_per_e**2 * variance_e2 + _STEPS_DN2)
 
     def variance_gradient(self, curves: FloatArray, curves_gradient: FloatArray) -> FloatArray:
         """Return the exact derivative of `variance` at one design.
@@ -159,9 +159,9 @@ class LinearModel(ForwardModel):
         setup = replace(self.setup, left_out=self.setup.left_out - {"saturation", "quantization"})
         result = _ByPixel(setup)
         if result._phase_blocks:
-            most = f"at most those of {len(result._phase_blocks[0])} places: a smaller light, or a named place"
+            most = f"at most those of {len(result._phase_blocks[0])} sampling phases: a smaller light, or a named phase"
             problem = "too many pixels for a search under noise"
-            raise SweepError(Fault(problem, value=f"{result.n_cases} places", allowed=most))
+            raise SweepError(ValidationIssue(problem, value=f"{result.n_cases} phases", allowed=most))
         return result
 
     def _expected(self, curves: FloatArray) -> FloatArray:
@@ -171,13 +171,13 @@ class LinearModel(ForwardModel):
 
     def _with_slope(self, curves: FloatArray, curves_gradient: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return expected electrons and their derivative."""
-        own, n = self.electrons, len(curves_gradient)
+        electrons, n = self.electrons, len(curves_gradient)
         one = curves[None]
         exposure_s = self.light.exposure_s(one)
         scales = self.light.scales(exposure_s)
-        whole = own.expected(one, scales, exposure_s)[0]
-        light = (own.rates(curves_gradient) - own.fixed)[:, :, None] * scales[0][None, None, :, None, None]
-        uniform = own.through_filters(own.of_background(curves_gradient))
+        whole = electrons.expected(one, scales, exposure_s)[0]
+        light = (electrons.rates(curves_gradient) - electrons.fixed)[:, :, None] * scales[0][None, None, :, None, None]
+        uniform = electrons.through_filters(electrons.of_background(curves_gradient))
         slope = (light + uniform[:, :, None, None, :]).reshape(n, *whole.shape) * exposure_s
         relative = relative_slope(self.setup, self.light.white, curves, curves_gradient)
         return whole, np.asarray(slope + relative[:, None, None, None] * whole, dtype=float)
@@ -218,8 +218,8 @@ class LinearModel(ForwardModel):
         ndarray of shape (n_cases, n_signals, n_wavelengths)
             Electrons per unit of QE.
         """
-        own, channel = self.by_pixel, self.setup.camera.modified[modified]
-        response = own.electrons.response
+        by_pixel, channel = self.by_pixel, self.setup.camera.modified[modified]
+        response = by_pixel.electrons.response
         share = response.spread[:, :, channel]
         split = response.source
         if isinstance(split, SplitLight):
@@ -227,18 +227,18 @@ class LinearModel(ForwardModel):
         else:
             light = np.einsum("xu,xuw->xw", share, split[:, :, channel])
         uniform = (share * response.uniform[:, :, channel]).sum(axis=1)
-        return own._per_qe(modified, curves, light[:, None], uniform[:, None])[:, :, 0]
+        return by_pixel._per_qe(modified, curves, light[:, None], uniform[:, None])[:, :, 0]
 
     def _per_qe(self, modified: int, curves: FloatArray, light: FloatArray, uniform: FloatArray) -> FloatArray:
         """Return electrons per unit of QE of one modified channel, from light and uniform weights of its elements."""
-        own, channel = self.electrons, self.setup.camera.modified[modified]
+        electrons, channel = self.electrons, self.setup.camera.modified[modified]
         exposure_s = self.light.exposure_s(curves[None])
         scales = self.light.scales(exposure_s)[0]
-        seen = light[:, None, None] * self.light.signals[:, None, :]
-        seen = own.at_each_position(seen[..., None, :], [channel])[..., 0, :]
-        background = own.background[own.position, modified][:, None, None, None]
-        both = seen * scales[None, :, None, None, None] + uniform[:, None, None, :, None] * background
-        return np.asarray(both.reshape(-1, *both.shape[2:]) * exposure_s[0], dtype=float)
+        signal_light = light[:, None, None] * self.light.signals[:, None, :]
+        signal_light = electrons.at_each_position(signal_light[..., None, :], [channel])[..., 0, :]
+        background = electrons.background[electrons.position, modified][:, None, None, None]
+        total = signal_light * scales[None, :, None, None, None] + uniform[:, None, None, :, None] * background
+        return np.asarray(total.reshape(-1, *total.shape[2:]) * exposure_s[0], dtype=float)
 
 
 class _ByPixel(LinearModel):
@@ -266,5 +266,5 @@ def linear_model(setup: Setup) -> LinearModel:
     few = setup.accuracy.model_copy(
         update={"field_positions": min(setup.accuracy.field_positions, _FIELD_POSITIONS), "pwm_moments": 2}
     )
-    seen = replace(setup, left_out=setup.left_out | READOUT, accuracy=few)
-    return _models.get(hashlib.sha256(pickle.dumps(seen)).digest(), lambda: LinearModel(seen))
+    without_readout = replace(setup, left_out=setup.left_out | READOUT, accuracy=few)
+    return _models.get(hashlib.sha256(pickle.dumps(without_readout)).digest(), lambda: LinearModel(without_readout))

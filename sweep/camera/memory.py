@@ -74,7 +74,7 @@ def blocks(setup: Setup, phases: Phases) -> list[Phases]:
     return [phases.subset(slice(at, at + step)) for at in range(0, len(phases), step)]
 
 
-def too_large(setup: Setup) -> tuple[str, str, str] | None:
+def memory_problem(setup: Setup) -> tuple[str, str, str] | None:
     """Return the reason why a target's response is not computed.
 
     Parameters
@@ -93,12 +93,12 @@ def too_large(setup: Setup) -> tuple[str, str, str] | None:
     if (one := bytes_per_phase(setup, by_pixel=True)) > MOST_BYTES:
         problem = f"{pixels_per_phase(setup):,} pixels around the light, of {channels}, take too much memory"
         return problem, f"{one / 2**30:.1f} GiB", f"at most {MOST_BYTES / 2**30:g} GiB"
-    places = n_phases(setup)
-    if places > MOST_PHASES:
-        problem = f"a light at any place of a tile of {setup.camera.mosaic.indices.size:,} pixels has too many places"
-        allowed = f"at most {MOST_PHASES:,} (a tile of {MOST_PHASES // 16} pixels), or a named place"
-        return problem, f"{places:,}", allowed
-    if (total := places * bytes_per_phase(setup, by_pixel=False)) > MOST_BYTES:
-        problem = f"{places:,} places of the light, of {channels}, take too much memory"
+    phases = n_phases(setup)
+    if phases > MOST_PHASES:
+        problem = f"any sampling phase on a tile of {setup.camera.mosaic.indices.size:,} pixels: too many phases"
+        allowed = f"at most {MOST_PHASES:,} (a tile of {MOST_PHASES // 16} pixels), or a named phase"
+        return problem, f"{phases:,}", allowed
+    if (total := phases * bytes_per_phase(setup, by_pixel=False)) > MOST_BYTES:
+        problem = f"{phases:,} sampling phases, of {channels}, take too much memory"
         return problem, f"{total / 2**30:.1f} GiB", f"at most {MOST_BYTES / 2**30:g} GiB"
     return None

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.errors import Fault, SweepError
+from ..base.errors import SweepError, ValidationIssue
 from ..base.types import IndexArray
 
 _TOKEN = re.compile(r"[A-Z][a-z0-9]*")
@@ -57,7 +57,9 @@ class Mosaic:
             If the tile is empty or ragged.
         """
         if not rows or not rows[0] or any(len(row) != len(rows[0]) for row in rows):
-            raise SweepError(Fault("a tile needs rows of equal length", key=name, value=[list(row) for row in rows]))
+            raise SweepError(
+                ValidationIssue("a tile needs rows of equal length", key=name, value=[list(row) for row in rows])
+            )
         channels = tuple(dict.fromkeys(channel for row in rows for channel in row))
         return cls(name, channels, tuple(tuple(channels.index(channel) for channel in row) for row in rows))
 
@@ -83,7 +85,7 @@ class Mosaic:
         tokens = _TOKEN.findall(name)
         if "".join(tokens) != name or len(tokens) != 4:
             raise SweepError(
-                Fault(
+                ValidationIssue(
                     "not the name of a 2x2 CFA",
                     value=name,
                     allowed="four channels, each a capital and small letters (RGGB, RYYCy), or a mapping with `tile`",
@@ -92,7 +94,7 @@ class Mosaic:
         return cls.from_rows(name, [tokens[:2], tokens[2:]])
 
     @property
-    def colorless(self) -> Mosaic:
+    def without_filters(self) -> Mosaic:
         """The same tile with numbers for channels: the part that the light on a pixel depends on before its filter."""
         return Mosaic("", tuple(str(at) for at in range(len(self.channels))), self.tile)
 

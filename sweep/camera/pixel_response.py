@@ -18,10 +18,10 @@ import numpy as np
 
 from ..base.cache import Cache
 from ..base.types import FloatArray, IndexArray
-from ..spectra.spectrum import hats
+from ..spectra.spectrum import linear_basis
 from . import disc_image, psf, sampling
 from .field import field_heights, over_field
-from .irradiance import way_of_light
+from .irradiance import path_factor
 from .memory import pixels_per_phase
 from .phases import Phases
 from .setup import Setup
@@ -84,13 +84,13 @@ class SplitLight:
             result[:, pixels, through] += share * by_place[place]
         return result
 
-    def _seen(self, spectra: FloatArray) -> FloatArray:
+    def _filtered_light(self, spectra: FloatArray) -> FloatArray:
         """Sum over the wavelengths at each place: [..., n, n_wavelengths] to [..., n_places, n]."""
-        seen = spectra * self.factor
-        by_function = seen.sum(axis=-1, keepdims=True) if self.shares is None else seen @ self.shares.T
+        light = spectra * self.factor
+        by_function = light.sum(axis=-1, keepdims=True) if self.shares is None else light @ self.shares.T
         return np.asarray(self.values @ np.swapaxes(by_function, -1, -2), dtype=float)
 
-    def add_sums(self, spectra: FloatArray, channels: Sequence[int], found: FloatArray) -> None:
+    def add_sums(self, spectra: FloatArray, channels: Sequence[int], out: FloatArray) -> None:
         """Add sums over channels and wavelengths in place.
 
         Results of one design do not depend on other designs, except for rounding.
@@ -108,7 +108,7 @@ class SplitLight:
 
         row = np.full(self.n_channels, -1)
         row[list(channels)] = np.arange(len(channels))
-        gather(np.ascontiguousarray(self._seen(spectra)), self.parts, self.place, row[self.through], found)
+        gather(np.ascontiguousarray(self._filtered_light(spectra)), self.parts, self.place, row[self.through], out)
 
     def folded(self, weights: FloatArray, channel: int) -> FloatArray:
         """Sum light through one channel's filter over the elements.
@@ -130,8 +130,8 @@ class SplitLight:
             at = np.flatnonzero(through == channel)
             for case in range(len(weights)):
                 np.add.at(by_place[case], place[case, at], share * weights[case, at])
-        seen = by_place @ self.values
-        return np.asarray((seen if self.shares is None else seen @ self.shares) * self.factor, dtype=float)
+        folded = by_place @ self.values
+        return np.asarray((folded if self.shares is None else folded @ self.shares) * self.factor, dtype=float)
 
 
 @dataclass(frozen=True)
@@ -172,7 +172,7 @@ class PixelResponse:
         return self.source.shape[0], self.source.shape[1]
 
 
-def colorless(setup: Setup) -> Setup:
+def without_filters(setup: Setup) -> Setup:
     """Return the setup without filters, which responses do not depend on.
 
     Parameters
@@ -187,7 +187,7 @@ def colorless(setup: Setup) -> Setup:
     """
     camera = setup.camera
     dark = {"qe": np.zeros_like(camera.qe), "clear_qe": np.zeros_like(camera.clear_qe)}
-    return setup.with_camera(mosaic=camera.mosaic.colorless, modified=(), technologies=(), **dark)
+    return setup.with_camera(mosaic=camera.mosaic.without_filters, modified=(), technologies=(), **dark)
 
 
 def pixel_response(setup: Setup, phases: Phases | None, *, by_pixel: bool) -> PixelResponse:
@@ -212,7 +212,7 @@ def pixel_response(setup: Setup, phases: Phases | None, *, by_pixel: bool) -> Pi
         return _joined([pixel_response(position, phases, by_pixel=by_pixel) for position in over_field(setup)])
     if phases is None:
         made = _uniform(setup, by_pixel=by_pixel)
-        return replace(made, source=made.light * way_of_light(setup, wavelength_nm))
+        return replace(made, source=made.light * path_factor(setup, wavelength_nm))
     knots = psf.psf_knots_nm(wavelength_nm, setup.accuracy.psf_step_nm)
     if by_pixel:
         made = _pixels(setup, knots, phases, by_pixel=True)
@@ -221,8 +221,8 @@ def pixel_response(setup: Setup, phases: Phases | None, *, by_pixel: bool) -> Pi
         blocks = [phases.subset(slice(at, at + step)) for at in range(0, len(phases), step)]
         made = _joined([_pixels(setup, knots, block, by_pixel=False) for block in blocks])
     same = knots.size == wavelength_nm.size or _one_light(made.source)
-    between = None if same else hats(wavelength_nm, knots)
-    factor = way_of_light(setup, wavelength_nm)
+    between = None if same else linear_basis(wavelength_nm, knots)
+    factor = path_factor(setup, wavelength_nm)
     if isinstance(made.source, SplitLight):
         shares = made.source.shares
         shares = shares if shares is None or between is None else shares @ between
@@ -290,7 +290,7 @@ def channel_responses(setup: Setup) -> ChannelResponses:
     ChannelResponses
         The cache.
     """
-    return _CHANNELS.get(hashlib.sha256(pickle.dumps(colorless(setup))).digest(), ChannelResponses)
+    return _CHANNELS.get(hashlib.sha256(pickle.dumps(without_filters(setup))).digest(), ChannelResponses)
 
 
 def kept_response(setup: Setup, phases: Phases | None, *, by_pixel: bool) -> PixelResponse:
@@ -317,7 +317,7 @@ def kept_response(setup: Setup, phases: Phases | None, *, by_pixel: bool) -> Pix
         or 8 * count * len(heights) * len(setup.camera.mosaic.channels) ** 2 * setup.camera.grid.size > _KEPT_BYTES
     ):
         return pixel_response(setup, phases, by_pixel=by_pixel)
-    key = hashlib.sha256(pickle.dumps((heights, count, colorless(setup)))).digest()
+    key = hashlib.sha256(pickle.dumps((heights, count, without_filters(setup)))).digest()
     # The heights are those of the setup's own filters, which a colorless one does not have.
     return _RESPONSES.get(key, lambda: pixel_response(setup, phases, by_pixel=False))
 
@@ -362,15 +362,15 @@ def _pixels(setup: Setup, wavelength_nm: FloatArray, phases: Phases, *, by_pixel
     target, pixel, n = setup.scene.target, setup.camera.pixel, len(setup.camera.mosaic.channels)
     assert target is not None
     radius, half = sampling.radii_px(setup, target)[0], pixel.fill_factor**0.5 / 2
-    seen, of_channel, apart = _weights(setup, phases)
+    window, of_channel, apart = _weights(setup, phases)
     share = sampling.crosstalk_share(setup)
     spread = sampling.with_crosstalk(apart, share) if share else apart
     wanted = np.asarray((spread > 0).any(axis=3))
     profile = _profile(setup, wavelength_nm)
-    light = disc_image.light_on_pixels(seen, wanted, half, radius, profile, pixel.pitch_um)
+    light = disc_image.light_on_pixels(window, wanted, half, radius, profile, pixel.pitch_um)
     if by_pixel:
         return _apart(light, of_channel, apart, share)
-    # What each channel's readout takes of the pixels of each channel: [cases, rows, columns, channels x channels].
+    # Weights of the pixels of each channel in each channel's readout: [cases, rows, columns, channels x channels].
     taken = spread[..., :, None] * of_channel[..., None, :]
     shape = (len(apart), n, n)
     folded = light.folded(taken.reshape(*taken.shape[:3], n * n)).reshape(*shape, -1)
@@ -385,14 +385,14 @@ def _weights(setup: Setup, phases: Phases) -> tuple[sampling.Window, FloatArray,
     """
     target, mosaic, n = setup.scene.target, setup.camera.mosaic, len(setup.camera.mosaic.channels)
     assert target is not None
-    seen = sampling.window(mosaic, phases.center_px, sampling.reach_px(setup, target))
+    window = sampling.window(mosaic, phases.center_px, sampling.reach_px(setup, target))
     if target.readout == "mean":
         half, readout = setup.camera.pixel.fill_factor**0.5 / 2, sampling.radii_px(setup, target)[1]
-        weights = sampling.mean_weights(seen, half, readout, n)
+        weights = sampling.mean_weights(window, half, readout, n)
     else:
-        weights = sampling.center_weights(seen, phases.nearest_px - phases.center_px, mosaic)
-    of_channel = (seen.channel[..., None] == np.arange(n)).astype(float)
-    return seen, of_channel, weights[..., None] * of_channel
+        weights = sampling.center_weights(window, phases.nearest_px - phases.center_px, mosaic)
+    of_channel = (window.channel[..., None] == np.arange(n)).astype(float)
+    return window, of_channel, weights[..., None] * of_channel
 
 
 def _apart(light: disc_image.PixelLight, of_channel: FloatArray, apart: FloatArray, share: float) -> PixelResponse:

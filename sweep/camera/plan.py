@@ -113,7 +113,7 @@ def plan_scene(
                 computed -= {name}
             choices[name] = Choice(name, not leave_out, bound_dn, _reason(bound_dn, leave_out, needed))
     made = [choice for choice in choices.values() if choice is not None]
-    made += [Choice(effect.name, True, None, _OWN) for effect in boxes[0].setup.own_effects]
+    made += [Choice(effect.name, True, None, _OWN) for effect in boxes[0].setup.user_effects]
     return Plan(scenario, tolerance_dn, accuracy, tuple(made))
 
 

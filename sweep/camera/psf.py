@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from .scene import Scene
 
 _SHORTEST_UM = 0.4
-"""Wavelength of whose finest detail `too_much` counts the periods."""
+"""Wavelength of whose finest detail `psf_problem` counts the periods."""
 _MOST_PX = 128.0
 _MOST_PERIODS = 400.0
 _PANEL_NODES = 32
@@ -89,7 +89,7 @@ def defocus_um(scenario: Scene, pitch_um: float) -> float:
     return abs(target_image_um - focus_image_um) / (8 * scenario.optics.f_number**2)
 
 
-def too_much(scenario: Scene, pixel: Pixel) -> tuple[tuple[str, ...], str, str, str] | None:
+def psf_problem(scenario: Scene, pixel: Pixel) -> tuple[tuple[str, ...], str, str, str] | None:
     """Return the reason why a target's image is not computed.
 
     Parameters
@@ -272,7 +272,7 @@ class DiscProfile:
         table_um = np.arange(-_BEYOND, n_nodes + _BEYOND) * ((reach_um + step_um) / (n_nodes - 1))
         nodes = _chebyshev_nodes(table_um[-1], self.highest_per_um)
         samples = _hankel_sums(table_um[-1] * np.sqrt((1 + nodes) / 2), frequency, spectrum)
-        # What the first columns leave of any sample is at most the size of the next entry on the diagonal.
+        # The rest of any sample beyond the first columns is at most the size of the next entry on the diagonal.
         basis, triangle, _ = qr(samples.T, mode="economic", pivoting=True)
         kept = max(1, int((np.abs(np.diag(triangle)) > _RESIDUAL).sum()))
         self.shares = np.ascontiguousarray(basis[:, :kept].T)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.types import FloatArray
-from .scene import Drive
+from .scene import PwmDrive
 from .setup import Setup
 
 
-def extremes(drive: Drive, exposure_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+def extremes(drive: PwmDrive, exposure_s: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the least and most light in an exposure relative to the mean, over all starting times.
 
     The light is on for `duty` of each period, 1 / duty as bright as its mean. In n whole periods and a rest r it is on
@@ -17,7 +17,7 @@ def extremes(drive: Drive, exposure_s: FloatArray) -> tuple[FloatArray, FloatArr
 
     Parameters
     ----------
-    drive : Drive
+    drive : PwmDrive
         Duty and frequency.
     exposure_s : ndarray
         Exposure time, s.
@@ -35,12 +35,12 @@ def extremes(drive: Drive, exposure_s: FloatArray) -> tuple[FloatArray, FloatArr
     return least, most
 
 
-def smallest(drive: Drive, shortest_s: float, longest_s: float) -> float:
+def smallest(drive: PwmDrive, shortest_s: float, longest_s: float) -> float:
     """Return the least relative light of any exposure in a range: at its ends, or where a dark interval was just added.
 
     Parameters
     ----------
-    drive : Drive
+    drive : PwmDrive
         Duty and frequency.
     shortest_s, longest_s : float
         Range of the exposure time, s.
@@ -53,12 +53,12 @@ def smallest(drive: Drive, shortest_s: float, longest_s: float) -> float:
     return float(extremes(drive, _candidates(drive, shortest_s, longest_s, 1 - drive.duty))[0].min())
 
 
-def largest(drive: Drive, shortest_s: float, longest_s: float) -> float:
+def largest(drive: PwmDrive, shortest_s: float, longest_s: float) -> float:
     """Return the most relative light of any exposure in a range: at its ends, or where one more pulse just fits.
 
     Parameters
     ----------
-    drive : Drive
+    drive : PwmDrive
         Duty and frequency.
     shortest_s, longest_s : float
         Range of the exposure time, s.
@@ -71,7 +71,7 @@ def largest(drive: Drive, shortest_s: float, longest_s: float) -> float:
     return float(extremes(drive, _candidates(drive, shortest_s, longest_s, drive.duty))[1].max())
 
 
-def _candidates(drive: Drive, shortest_s: float, longest_s: float, rest: float) -> FloatArray:
+def _candidates(drive: PwmDrive, shortest_s: float, longest_s: float, rest: float) -> FloatArray:
     """Return the ends of a range of exposures, and the first exposures in it of whole periods and a rest."""
     times_s = (np.floor(shortest_s * drive.frequency_hz) + np.arange(3) + rest) / drive.frequency_hz
     return np.array([shortest_s, longest_s, *times_s[(times_s >= shortest_s) & (times_s <= longest_s)]])

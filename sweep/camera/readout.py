@@ -223,11 +223,11 @@ class Readout:
         from .compiled import whole_numbers  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         many = np.ascontiguousarray(electrons)
-        found = np.empty_like(many)
+        numbers = np.empty_like(many)
         top_e = self.pixel.saturation_e if clips else math.inf
         line = top_e, self.pixel.dn_per_e, self.pixel.offset_dn, float(self.pixel.full_scale_dn)
-        whole_numbers(many.reshape(-1), *line, found.reshape(-1))
-        return found
+        whole_numbers(many.reshape(-1), *line, numbers.reshape(-1))
+        return numbers
 
     def variance_dn(self, electrons: FloatArray) -> FloatArray:
         """Return the variance of the digital numbers, with rounding.
@@ -289,13 +289,13 @@ class Readout:
         """
         dn, variance_dn = self.transfer(electrons), self.variance_dn(electrons)
         # A digital number that is the same in all but one of a billion readouts: what is left of its noise is
-        # rounding of the arithmetic, by which two signals would seem told apart for certain.
+        # rounding of the arithmetic, by which two signals would seem separated with certainty.
         certain = variance_dn < _CERTAIN_DN2
         dn, variance_dn = np.where(certain, np.rint(dn), dn), np.where(certain, 0.0, variance_dn)
         mean, variance = self.folded(dn), self.spread(variance_dn)
         return (mean, variance, *self._shape_of_noise(electrons, variance))
 
-    def channels_of(self, pixels: FloatArray, place: int) -> FloatArray:
+    def channels_of(self, pixels: FloatArray, phase_index: int) -> FloatArray:
         """Return the channels from their pixels at one sampling phase.
 
         Parameters
@@ -312,9 +312,9 @@ class Readout:
         """
         setup = self.setup
         if setup.scene.target is None:
-            own = setup.camera.mosaic.indices.ravel()[:, None] == np.arange(len(setup.camera.mosaic.channels))
-            return np.asarray(pixels @ (own / setup.camera.mosaic.counts), dtype=float)
-        return np.asarray(pixels @ self._weights[place], dtype=float)
+            in_channel = setup.camera.mosaic.indices.ravel()[:, None] == np.arange(len(setup.camera.mosaic.channels))
+            return np.asarray(pixels @ (in_channel / setup.camera.mosaic.counts), dtype=float)
+        return np.asarray(pixels @ self._weights[phase_index], dtype=float)
 
     @property
     def few_pixels(self) -> tuple[IndexArray, ...] | None:

@@ -112,12 +112,12 @@ def window(mosaic: Mosaic, phases_px: FloatArray, reach_px: float) -> Window:
     return Window(channel, dx, dy)
 
 
-def mean_weights(seen: Window, half: float, readout_px: float, n_channels: int) -> FloatArray:
+def mean_weights(window: Window, half: float, readout_px: float, n_channels: int) -> FloatArray:
     """Return the weight of each pixel in the mean of its channel.
 
     Parameters
     ----------
-    seen : Window
+    window : Window
         Pixels around the light.
     half : float
         Half of the side of a pixel's light-sensitive square, pixels.
@@ -133,14 +133,14 @@ def mean_weights(seen: Window, half: float, readout_px: float, n_channels: int) 
     """
     from .compiled import covered_by_disc  # noqa: PLC0415  (compiled: kept off the start-up path)
 
-    weights = covered_by_disc(seen.columns, seen.rows, half, readout_px)
+    weights = covered_by_disc(window.columns, window.rows, half, readout_px)
     for channel in range(n_channels):
-        own = seen.channel == channel
-        weights[:, own] /= weights[:, own].sum(axis=1, keepdims=True)
+        in_channel = window.channel == channel
+        weights[:, in_channel] /= weights[:, in_channel].sum(axis=1, keepdims=True)
     return weights
 
 
-def center_weights(seen: Window, home: FloatArray, mosaic: Mosaic) -> FloatArray:
+def center_weights(window: Window, home: FloatArray, mosaic: Mosaic) -> FloatArray:
     """Return the weight of each pixel in the demosaicked value of its channel at one pixel.
 
     Normalized convolution with a tent as wide as the tile, (1 - |dx| / columns)(1 - |dy| / rows), which for a Bayer
@@ -148,7 +148,7 @@ def center_weights(seen: Window, home: FloatArray, mosaic: Mosaic) -> FloatArray
 
     Parameters
     ----------
-    seen : Window
+    window : Window
         Pixels around the light.
     home : ndarray of shape (n_cases, 2)
         Pixel that is read out, as (column, row) from the light's center, pixels.
@@ -161,13 +161,13 @@ def center_weights(seen: Window, home: FloatArray, mosaic: Mosaic) -> FloatArray
         Weights; those of each channel sum to 1.
     """
     # From pixel to pixel: whole numbers, so that equal weights are equal to the last bit.
-    dx, dy = (np.rint(a - home[:, axis, None, None]) for axis, a in enumerate((seen.dx, seen.dy)))
+    dx, dy = (np.rint(a - home[:, axis, None, None]) for axis, a in enumerate((window.dx, window.dy)))
     rows, columns = mosaic.indices.shape
     weights = np.maximum(0.0, 1 - np.abs(dx) / columns) * np.maximum(0.0, 1 - np.abs(dy) / rows)
     for channel in range(len(mosaic.channels)):
-        own = seen.channel == channel
-        values = weights[:, own]
-        weights[:, own] = values / values.sum(axis=1, keepdims=True)
+        in_channel = window.channel == channel
+        values = weights[:, in_channel]
+        weights[:, in_channel] = values / values.sum(axis=1, keepdims=True)
     return np.asarray(weights, dtype=float)
 
 
@@ -188,17 +188,17 @@ def with_crosstalk(light: FloatArray, share: float, *, periodic: bool = False) -
     ndarray of the same shape
         Light with crosstalk.
     """
-    found = (1 - share) * light
+    mixed = (1 - share) * light
     given = share / 4 * light
     for axis in (1, 2):
         if periodic:
-            found += np.roll(given, 1, axis=axis)
-            found += np.roll(given, -1, axis=axis)
+            mixed += np.roll(given, 1, axis=axis)
+            mixed += np.roll(given, -1, axis=axis)
             continue
-        to, of = np.moveaxis(found, axis, 0), np.moveaxis(given, axis, 0)
+        to, of = np.moveaxis(mixed, axis, 0), np.moveaxis(given, axis, 0)
         to[1:] += of[:-1]
         to[:-1] += of[1:]
-    return np.asarray(found, dtype=float)
+    return np.asarray(mixed, dtype=float)
 
 
 def crosstalk_share(setup: Setup) -> float:

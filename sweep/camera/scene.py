@@ -91,7 +91,9 @@ def _place(value: Any) -> Any:
     numbers = list(value) if isinstance(value, list | tuple) else []
     plain = all(isinstance(v, int | float) and not isinstance(v, bool) for v in numbers)
     if len(numbers) != 2 or not plain or not all(abs(v) <= _FARTHEST_PX for v in numbers):
-        raise ValueError(f"a place is `any`, or [column, row] in pixels, each -{_FARTHEST_PX:g} to {_FARTHEST_PX:g}")
+        raise ValueError(
+            f"a sampling phase is `any`, or [column, row] in pixels, each -{_FARTHEST_PX:g} to {_FARTHEST_PX:g}"
+        )
     return (float(numbers[0]), float(numbers[1]))
 
 
@@ -108,7 +110,7 @@ class Target(Geometry):
     least the radius in which every channel has a pixel); `center`: the demosaicked pixel at the center."""
 
 
-class Drive(Section):
+class PwmDrive(Section):
     """A pulsed LED (PWM); its mean intensity is the rated one."""
 
     duty: Share
@@ -180,7 +182,7 @@ class Scene(Section):
     """Traffic light at a distance."""
     background_cd_m2: float = Field(default=0.0, ge=0, le=1e15)
     """Luminance that is added over the whole field, also in front of the target, flat in photons, cd/m2."""
-    drive: Drive | None = None
+    drive: PwmDrive | None = None
     """Pulsed LED."""
     field: SensorField | None = None
     """Field positions, of which the worst counts."""
@@ -198,9 +200,9 @@ class Scene(Section):
         if self.intensity_cd is not None and isinstance(self.exposure, WhitePatchExposure):
             raise ValueError("intensity_cd needs a fixed exposure: the white patch is given in photons")
         if self.field is not None and self.optics.cra_deg:
-            raise ValueError("`field` says the chief ray angle of each place: leave out optics.cra_deg")
+            raise ValueError("`field` says the chief ray angle of each field position: leave out optics.cra_deg")
         if self.field is not None and self.target is not None and self.target.phase_px == "any":
-            raise ValueError("`field` needs a light at a named place of the mosaic, not `phase_px: any`")
+            raise ValueError("`field` needs a named sampling phase, not `phase_px: any`")
         if self.visibility_m is not None and self.target is None:
             raise ValueError("visibility_m needs a target with a distance")
         if self.veiling_glare is not None and self.target is None:

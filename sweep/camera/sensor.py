@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..base.errors import DataError, Fault, nearest
+from ..base.errors import DataError, ValidationIssue, nearest
 from ..base.types import FloatArray
 from ..designs.technology import Technology
 from ..spectra.builtin.ar0820 import ar0820
@@ -95,7 +95,7 @@ class SensorCurves:
         if name not in self.qe:
             known = list(self.qe)
             raise DataError(
-                Fault(
+                ValidationIssue(
                     "the sensor has no such curve",
                     value=name,
                     allowed=", ".join(known),
@@ -165,17 +165,17 @@ def make_sensor(name: str, qe: Mapping[str, FloatArray], source: str, clear: str
     DataError
         If a QE exceeds 1 or is below 1e-9 everywhere, or if `clear` is no curve.
     """
-    faults = []
+    issues = []
     for curve, values in qe.items():
         top = float(values.max())
         if not top <= 1 + 1e-9:
             hint = "looks like percent: set `scale: 0.01`" if top <= 100 else "set `scale`"
-            faults.append(Fault(f"QE above 1 ({hint})", source, None, curve, round(top, 6), "0 to 1"))
+            issues.append(ValidationIssue(f"QE above 1 ({hint})", source, None, curve, round(top, 6), "0 to 1"))
         if not top >= _LEAST_QE:
             what = "0" if top == 0 else f"below {_LEAST_QE:g}"
-            faults.append(Fault(f"QE is {what} on the whole grid", source, None, curve))
-    if faults:
-        raise DataError(faults)
+            issues.append(ValidationIssue(f"QE is {what} on the whole grid", source, None, curve))
+    if issues:
+        raise DataError(issues)
     chosen = clear or max(qe, key=lambda curve: float(qe[curve].sum()))
     has_clear = clear is not None or chosen.casefold() in _CLEAR_NAMES
     sensor = SensorCurves(name, dict(qe), chosen, source, has_clear=has_clear)

@@ -21,7 +21,7 @@ LINEAR = "linear"
 def _places(value: object) -> object:
     """Check `any` or a count."""
     if value != "any" and (isinstance(value, bool) or not isinstance(value, int) or not 2 <= value <= 100):
-        raise ValueError("places are `any`, or a whole number from 2 to 100")
+        raise ValueError("field positions are `any`, or a whole number from 2 to 100")
     return value
 
 
@@ -97,7 +97,7 @@ class SensorField(Section):
         return tuple(heights), tuple(self.cra_deg)
 
     @property
-    def seen_heights(self) -> tuple[float, ...]:
+    def counted_heights(self) -> tuple[float, ...]:
         """Image heights of counted positions; if all count, those at which the search for the worst begins."""
         if self.places is None and self.cra_deg is not None:
             return self.knots[0]

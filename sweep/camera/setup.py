@@ -10,8 +10,8 @@ from ..spectra.lights import Lights
 from ..spectra.tasks import StudyTasks
 from .accuracy import STANDARD, Accuracy
 from .camera import Camera
-from .own_effects import OwnEffect
 from .scene import Scene
+from .user_effects import UserEffect
 
 READOUT = frozenset({"noise", "quantization", "saturation"})
 """Effects without which digital numbers are linear in electrons."""
@@ -35,7 +35,7 @@ class Setup:
         Numerical settings.
     left_out : frozenset of str
         Effects that are not computed (see `effects`).
-    own_effects : tuple of OwnEffect
+    user_effects : tuple of UserEffect
         Effects of user code.
     """
 
@@ -45,7 +45,7 @@ class Setup:
     tasks: StudyTasks | None = field(default=None, kw_only=True)
     accuracy: Accuracy = field(default=STANDARD, kw_only=True)
     left_out: frozenset[str] = field(default=frozenset(), kw_only=True)
-    own_effects: tuple[OwnEffect, ...] = field(default=(), kw_only=True)
+    user_effects: tuple[UserEffect, ...] = field(default=(), kw_only=True)
 
     def with_camera(self, **changes: Any) -> Setup:
         """Return the setup with some attributes of its camera changed.

@@ -18,7 +18,7 @@ import pandas as pd
 import pyarrow as pa
 from threadpoolctl import threadpool_limits
 
-from ..base.errors import Fault, StudyError, SweepError
+from ..base.errors import StudyError, SweepError, ValidationIssue
 from ..base.types import FloatArray, IndexArray, Progress
 from ..camera.accuracy import PRESETS, REFERENCE, STANDARD, Accuracy
 from ..camera.forward import ForwardModel
@@ -270,7 +270,7 @@ def _in_new_process(setup: Setup, space: Space, numbers: IndexArray, dense: Spac
         with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
             return pool.submit(_measure, setup, space, numbers, dense, seconds).result()
     except BrokenProcessPool:
-        raise SweepError(Fault("the process of a measurement was killed", key="accuracy")) from None
+        raise SweepError(ValidationIssue("the process of a measurement was killed", key="accuracy")) from None
 
 
 def _measure(setup: Setup, space: Space, numbers: IndexArray, dense: Space | None, seconds: float) -> Measured:

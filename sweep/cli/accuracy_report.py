@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from ..base.errors import Fault, OutputError
+from ..base.errors import OutputError, ValidationIssue
 from ..report.accuracy_figure import PRESET
 from ..report.pages import inlined, page, rows
 from ..results.atomic import write_text
@@ -42,7 +42,9 @@ def read_hard_cases(folder: Path) -> pd.DataFrame | None:
         table = pd.DataFrame(json.loads(path.read_text(encoding="utf-8")))[list(_HARD_COLUMNS)]
         return table.astype({"error": float, "allowed": float})
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise OutputError(Fault(f"cannot be read: {error}", str(path), allowed="what `make accuracy` writes")) from None
+        raise OutputError(
+            ValidationIssue(f"cannot be read: {error}", str(path), allowed="a file that `make accuracy` writes")
+        ) from None
 
 
 def summary(table: pd.DataFrame, hard: pd.DataFrame | None) -> list[str]:

@@ -19,7 +19,7 @@ from .options import PANELS
 
 app = typer.Typer(
     name="sweep",
-    help="Sweeps and design-space exploration for color filter arrays that must tell traffic light colors apart.",
+    help="Sweeps and design-space exploration for color filter arrays that must separate traffic light colors.",
     epilog="Exit codes: " + "; ".join(f"{code} {meaning}" for code, meaning in EXIT_CODES.items()) + ".",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
@@ -54,5 +54,5 @@ def _parser() -> Callable[..., Any]:
 
 
 def main() -> None:
-    """Run the command; what goes wrong is one line each on stderr and an exit code, 2 for a fault of the input."""
+    """Run the command; each error is one line on stderr, and the exit code is 2 for invalid input."""
     ends_in_lines(lambda: _parser()(prog_name="sweep", standalone_mode=False))

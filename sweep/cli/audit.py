@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
-from ..base.errors import Fault
+from ..base.errors import ValidationIssue
 from ..base.types import Progress
 from ..report import read_output, study_of
 from ..results.inventory import Inventory
@@ -53,12 +53,12 @@ class Audit:
         return lines + [f"{name}: error {r:.3g} DN, allowed {a:.3g} DN." for name, a, r in worst.itertuples()]
 
     @property
-    def faults(self) -> list[Fault]:
+    def issues(self) -> list[ValidationIssue]:
         """The largest error of each scenario with errors that are too large."""
         excess = self.broken.assign(excess=self.broken["realized_dn"].fillna(np.inf) - self.broken["allowed_dn"])
         worst = excess.sort_values("excess", ascending=False).drop_duplicates("scenario")
         return [
-            Fault(
+            ValidationIssue(
                 f"design {row['design_id']}: {row['quantity']} is off by more than allowed",
                 key=str(row["scenario"]),
                 value=f"{row['realized_dn']:.6g} DN",

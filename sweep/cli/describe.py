@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from ..base.disk import read_input
-from ..base.errors import DataError, Fault, OutputError
+from ..base.errors import DataError, OutputError, ValidationIssue
 from ..results.atomic import write_bytes, write_text
 from ..spectra import LightUnit
-from ..spectra.facts import Curve, Facts, condensed, facts_of, mended, notes
+from ..spectra.facts import Curve, Facts, facts_of, merge_equal_issues, notes, repair_curves
 from ..spectra.files import scan_curves
 from ..spectra.signal_color import LightColor
 from .describe_picture import draw
@@ -31,10 +31,10 @@ _SOFTWARE = "sweep describe"
 
 @dataclass(frozen=True)
 class Description:
-    """A described file: lines to print, faults for which studies refuse it, and the same as plain values."""
+    """A described file: lines to print, issues for which studies refuse it, and the same as plain values."""
 
     lines: tuple[str, ...]
-    faults: tuple[Fault, ...]
+    issues: tuple[ValidationIssue, ...]
     facts: Mapping[str, Any]
 
 
@@ -63,14 +63,14 @@ def described(path: Path, folder: Path, quantity: LightUnit | None = None) -> De
         If the picture cannot be written, or a file of that name is no picture of a description.
     """
     scan = scan_curves(path)
-    faults = tuple(condensed(list(chain.from_iterable(scan.faults))))
+    issues = tuple(merge_equal_issues(list(chain.from_iterable(scan.issues))))
     facts = facts_of(scan)
     names = [curve.name for curve in facts.curves]
     lines = [f"{path}: {len(names)} curve{'' if len(names) == 1 else 's'}{': ' if names else ''}{_shown(names)}."]
     if not any(curve.values.size for curve in facts.curves):
-        return Description((*lines, "Nothing in it can be drawn."), faults, {"curves": []})
+        return Description((*lines, "Nothing in it can be drawn."), issues, {"curves": []})
     lines += [f"Read: {note}." for note in scan.notes]
-    as_qe = facts.looks_like_qe and quantity is None
+    as_qe = facts.is_likely_qe and quantity is None
     colors = {} if as_qe else facts.colors(quantity or "energy")
     lines += [_range(facts), _guess(facts, quantity)]
     width = min(max(map(len, names)), 40)
@@ -80,20 +80,20 @@ def described(path: Path, folder: Path, quantity: LightUnit | None = None) -> De
         words = [f"{name} {color.xy[0]:.4f} {color.xy[1]:.4f}" for name, color in energy if color is not None]
         lines += [f"  the same numbers as energy would be at xy: {'; '.join(words)}"] if words else []
     lines += [f"Note: {note}." for note in notes(facts, as_qe=as_qe)]
-    if not faults:
+    if not issues:
         lines.append("Its samples are clean: a study can read it.")
-    elif mended(scan).faults == ():
+    elif repair_curves(scan).issues == ():
         lines.append(f"`sweep describe {shlex.quote(str(path))} --clean NEW.csv` writes a file that a study can read.")
     picture = folder / f"{path.stem}.png"
     if os.path.lexists(picture) and _SOFTWARE.encode() not in read_input(picture, _MOST_PICTURE, OutputError)[:200]:
-        raise OutputError(Fault("holds something else already", str(picture), allowed="another --output"))
+        raise OutputError(ValidationIssue("holds something else already", str(picture), allowed="another --output"))
     write_bytes(_png(path.name, facts, colors), picture)
     values = {
         "kind": "qe" if as_qe else "lights",
         "picture": str(picture),
         "curves": [_curve_facts(curve, colors.get(curve.name)) for curve in facts.curves],
     }
-    return Description((*lines, f"Picture: {picture}"), faults, values)
+    return Description((*lines, f"Picture: {picture}"), issues, values)
 
 
 def _png(title: str, facts: Facts, colors: Mapping[str, LightColor | None]) -> bytes:
@@ -111,7 +111,7 @@ def _curve_facts(curve: Curve, color: LightColor | None) -> dict[str, Any]:
     return {"name": curve.name, **peak, **hue}
 
 
-def cleaned(path: Path, to: Path) -> list[str]:
+def clean_file(path: Path, to: Path) -> list[str]:
     """Write the curves of a file as clean CSV.
 
     Parameters
@@ -134,11 +134,11 @@ def cleaned(path: Path, to: Path) -> list[str]:
         If `to` exists or cannot be written.
     """
     scan = scan_curves(path)
-    clean = mended(scan)
-    if clean.faults:
-        raise DataError(condensed([replace(fault, file=str(path)) for fault in clean.faults]))
+    clean = repair_curves(scan)
+    if clean.issues:
+        raise DataError(merge_equal_issues([replace(issue, file=str(path)) for issue in clean.issues]))
     if os.path.lexists(to):
-        raise OutputError(Fault("is there already, and stays as it is", str(to), allowed="another --clean"))
+        raise OutputError(ValidationIssue("is there already, and stays as it is", str(to), allowed="another --clean"))
     write_text(clean.text(path.name, scan.notes), to)
     changes = clean.changes or ("nothing",)
     return [*(f"Read: {n}." for n in scan.notes), *(f"Changed: {change}." for change in changes), f"Clean: {to}"]
@@ -169,7 +169,7 @@ def _guess(facts: Facts, quantity: LightUnit | None) -> str:
     reason = (
         f"a typical curve is {broad:.0f} nm wide (integral over peak, 400 to 700 nm), the largest value is {top:.6g}"
     )
-    if facts.looks_like_qe:
+    if facts.is_likely_qe:
         return f"A guess: QE of a sensor, for {reason}. `--quantity energy` reads it as lights."
     return f"A guess: light spectra, for {reason}. Read as energy; `--quantity photons` reads photons."
 

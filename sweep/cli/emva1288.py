@@ -13,7 +13,7 @@ from xml.parsers import expat
 from pydantic import ValidationError
 
 from ..base.disk import read_input
-from ..base.errors import DataError, Fault
+from ..base.errors import DataError, ValidationIssue
 from ..camera.pixel import Pixel
 from ..spectra.text_tables import MOST_BYTES
 
@@ -76,21 +76,25 @@ def pixel_figures(path: Path) -> tuple[dict[str, float], list[str]]:
     for name, (key, units, factor) in _RESULTS.items():
         elements = root.findall(f"*/{name}") if root.tag == "results" else []
         if len(elements) > 1:
-            raise DataError(Fault("a result is there twice", str(path), key=name))
+            raise DataError(ValidationIssue("a result is there twice", str(path), key=name))
         value = _value(path, elements[0], units) * factor if elements else math.nan
         if math.isnan(value):
             missing.append(key)
         else:
             figures[key] = value
     if not figures:
-        raise DataError(Fault("not EMVA 1288 results", str(path), allowed="`results` with " + ", ".join(_RESULTS)))
+        raise DataError(
+            ValidationIssue("not EMVA 1288 results", str(path), allowed="`results` with " + ", ".join(_RESULTS))
+        )
     try:
         Pixel.model_validate(figures)
     except ValidationError as error:
         first = error.errors()[0]
         where = str(first["loc"][0]) if first["loc"] else None
-        fault = Fault("not a pixel's figure", str(path), key=where, value=first["input"], allowed=first["msg"])
-        raise DataError(fault) from None
+        issue = ValidationIssue(
+            "not a pixel's figure", str(path), key=where, value=first["input"], allowed=first["msg"]
+        )
+        raise DataError(issue) from None
     return figures, [*missing, "bits", "offset_dn", "pitch_um"]
 
 
@@ -98,11 +102,11 @@ def _value(path: Path, element: ElementTree.Element, units: tuple[str, ...]) -> 
     text = (element.findtext("Value") or "").strip()
     unit = "".join(c for c in element.findtext("Unit") or "" if c not in "$\\^{} \n\t")
     if unit not in units:
-        raise DataError(Fault("another unit", str(path), key=element.tag, value=unit, allowed=units[0]))
+        raise DataError(ValidationIssue("another unit", str(path), key=element.tag, value=unit, allowed=units[0]))
     try:
         return float(text)
     except ValueError:
-        raise DataError(Fault("not a number", str(path), key=element.tag, value=text)) from None
+        raise DataError(ValidationIssue("not a number", str(path), key=element.tag, value=text)) from None
 
 
 def read_xml(path: Path) -> ElementTree.Element:
@@ -126,7 +130,7 @@ def read_xml(path: Path) -> ElementTree.Element:
     file, content = str(path), read_input(path, MOST_BYTES, DataError)
 
     def refuse(*_: object) -> None:
-        raise DataError(Fault("not EMVA 1288 results", file, allowed="XML without entities of its own"))
+        raise DataError(ValidationIssue("not EMVA 1288 results", file, allowed="XML without entities of its own"))
 
     parser = expat.ParserCreate()
     parser.StartDoctypeDeclHandler = refuse  # entities, which make a small file a large one, are declared there
@@ -134,4 +138,4 @@ def read_xml(path: Path) -> ElementTree.Element:
         parser.Parse(content, True)
         return ElementTree.fromstring(content)
     except (expat.ExpatError, ElementTree.ParseError, ValueError, LookupError) as error:
-        raise DataError(Fault(f"not readable XML: {error}", file)) from None
+        raise DataError(ValidationIssue(f"not readable XML: {error}", file)) from None

@@ -36,18 +36,18 @@ def ends_in_lines(command: Callable[[], object]) -> NoReturn:
     """
     try:
         for stream in (sys.stdout, sys.stderr):
-            if hasattr(stream, "reconfigure"):  # a letter that the terminal does not know is no fault
+            if hasattr(stream, "reconfigure"):  # a letter that the terminal does not know is no issue
                 stream.reconfigure(errors="backslashreplace")
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         result = command()
         _flush()
         code = result if isinstance(result, int) else 0
         if code == _INTERRUPTED:
-            say_faults(["interrupted"])
+            print_issues(["interrupted"])
     except Exception as error:
         code = _exit_code(error)
     except KeyboardInterrupt:
-        say_faults(["interrupted"])
+        print_issues(["interrupted"])
         code = _INTERRUPTED
     try:
         _flush()
@@ -69,30 +69,30 @@ def _flush() -> None:
             stream.flush()
 
 
-def say_faults(faults: Iterable[object]) -> None:
-    """Print faults on stderr, one per line.
+def print_issues(issues: Iterable[object]) -> None:
+    """Print issues on stderr, one per line.
 
     Parameters
     ----------
-    faults : iterable
-        The faults.
+    issues : iterable
+        The issues.
     """
     with suppress(OSError, ValueError):
-        for fault in faults:
-            typer.echo(f"sweep: {' '.join(str(fault).split())}", err=True)
+        for issue in issues:
+            typer.echo(f"sweep: {' '.join(str(issue).split())}", err=True)
 
 
 def _exit_code(error: Exception) -> int:
-    """Say what went wrong and return the exit code; raises a fault of the program again."""
+    """Print the error and return the exit code; re-raises errors of the program."""
     if isinstance(error, SweepError):
-        say_faults(error.faults)
+        print_issues(error.issues)
         return error.exit_code
     if isinstance(error, BrokenPipeError):
         return _BROKEN_PIPE
     if isinstance(error, typer.Abort):
         if isinstance(error.__cause__, EOFError):  # typer takes any for the end of what a user types
             raise error.__cause__
-        say_faults(["interrupted"])
+        print_issues(["interrupted"])
         return _INTERRUPTED
     if type(error).__name__ == "NoArgsIsHelpError":  # `sweep` alone asks for help
         error.show()  # type: ignore[attr-defined]
@@ -100,12 +100,12 @@ def _exit_code(error: Exception) -> int:
     text = _text(error)
     if text is None:
         raise error
-    say_faults([text])
+    print_issues([text])
     return 2
 
 
 def _text(error: Any) -> str | None:
-    """Describe what a user or an administrator can mend, on one line; None for a fault of the program."""
+    """Describe an error that a user or an administrator can repair, on one line; None for an error of the program."""
     text = None
     if isinstance(error, _UsageError):
         where = "" if error.ctx is None else f"; see {error.ctx.command_path} --help"

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.errors import Fault, OutputError
+from ..base.errors import OutputError, ValidationIssue
 from ..base.types import FloatArray
 from ..report import Output, check_kept, read_output, study_of
 from ..results.atomic import write_bytes
@@ -23,7 +23,7 @@ from ..spectra.filter_files import (
     unique_names,
 )
 from ..study import Study, folder_name
-from .options import Also
+from .options import ExportFormat
 
 _ROUNDING = 1e-9
 _MOST_SHOWN = 10
@@ -36,7 +36,7 @@ def export_design(
     key: str,
     data: Path | None,
     to: Path | None,
-    also: Collection[Also] = (),
+    also: Collection[ExportFormat] = (),
     *,
     allow_code: bool = False,
 ) -> list[str]:
@@ -54,7 +54,7 @@ def export_design(
         Folder of the study's files; without it, the curves that the run kept are taken.
     to : Path or None
         Folder of the new files, FOLDER/export without it.
-    also : collection of Also
+    also : collection of ExportFormat
         Files of other programs beside them.
     allow_code : bool
         True to run the code that the study names.
@@ -104,13 +104,13 @@ def export_design(
         f"       {mat_path} ({', '.join(filter_names(hints, curves))}: QE, so set the pixel's spectral QE to 1 in "
         "ISETCam).",
     ]
-    if Also.SPEOS in also:
+    if ExportFormat.SPEOS in also:
         for name, (channel, values) in zip(unique_names(map(folder_name, curves)), curves.items(), strict=True):
             spectrum = path.with_name(f"{path.name}_{name}.spectrum")
             about = f"{channel} of {_design(output, row)}: QE in percent, electrons per photon"
             files[spectrum] = speos_text(wavelength_nm, values, about).encode("ascii")
             lines.append(f"       {spectrum} ({channel}: QE in percent, for Speos)")
-    if Also.RGB in also:
+    if ExportFormat.RGB in also:
         weights = path.with_name(path.name + "_rgb_weights.csv")
         text, weight_lines = _rgb_weights(study, curves)
         files[weights] = text.encode("utf-8")
@@ -149,16 +149,18 @@ def _verify(output: Output, row: Row, modified: Mapping[str, FloatArray], base_q
         ratio = sum(values.sum() for values in modified.values()) / sum(base.sum() for base in base_qe.values())
         if not abs(ratio - row["sensitivity"]) <= _ROUNDING * max(1.0, ratio):
             problem = "computed again, this is not what the run has: sensitivity"
-            raise OutputError(Fault(problem, str(output.folder), allowed="the version of that run"))
+            raise OutputError(ValidationIssue(problem, str(output.folder), allowed="the version of that run"))
 
 
 def _refuse_other(path: Path, content: bytes) -> None:
     try:
         held = path.read_bytes() if path.is_file() else content
     except OSError as error:
-        raise OutputError(Fault(f"cannot be read: {error.strerror or error}", str(path))) from None
+        raise OutputError(ValidationIssue(f"cannot be read: {error.strerror or error}", str(path))) from None
     if held != content:
-        raise OutputError(Fault("holds something else already", str(path), allowed="another --to, or delete it"))
+        raise OutputError(
+            ValidationIssue("holds something else already", str(path), allowed="another --to, or delete it")
+        )
 
 
 def _parameters(output: Output, row: Row) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""The studies of a folder, with what has been run of them, and the spectra that the package ships. Nothing is run."""
+"""List the studies of a folder with their runs, and the spectra that the package ships. Nothing is run."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from pathlib import Path
 from typing import Any
 
 from ..base.disk import is_folder, read_facts
-from ..base.errors import Fault, StudyError, SweepError
-from ..results.folder import held_by
+from ..base.errors import StudyError, SweepError, ValidationIssue
+from ..results.folder import run_in
 from ..results.lock import in_use
 from ..results.tables import PROVENANCE
 from ..run import output_folder
 from ..spectra.builtin.spectra import cards
-from ..spectra.builtin.stand_ins import surrogate_cards
+from ..spectra.builtin.surrogate_spectra import surrogate_cards
 from ..study import Study, folder_name, load_study
 
 _QUESTION_LETTERS = 70
 
 
 @dataclass(frozen=True)
-class Listed:
+class StudyListing:
     """A study of a folder; `designs` is None, and `question` says why, where it cannot be loaded."""
 
     name: str
@@ -29,7 +29,7 @@ class Listed:
     question: str
 
 
-def studies_of(folder: Path, outputs: Path, data: Path | None = None) -> list[Listed]:
+def studies_of(folder: Path, outputs: Path, data: Path | None = None) -> list[StudyListing]:
     """List the studies of a folder and the states of their runs.
 
     Parameters
@@ -52,24 +52,24 @@ def studies_of(folder: Path, outputs: Path, data: Path | None = None) -> list[Li
         If the folder does not exist.
     """
     if not is_folder(folder):
-        raise StudyError(Fault("no such folder", str(folder), allowed="a folder of study files"))
+        raise StudyError(ValidationIssue("no such folder", str(folder), allowed="a folder of study files"))
     try:
         files = sorted(
             path for path in folder.iterdir() if path.suffix in (".yaml", ".yml") and not path.name.startswith(".")
         )
     except OSError as error:
-        raise StudyError(Fault(f"cannot be read: {error.strerror or error}", str(folder))) from None
+        raise StudyError(ValidationIssue(f"cannot be read: {error.strerror or error}", str(folder))) from None
     return [_listed(path, outputs, data) for path in files]
 
 
-def list_lines(folder: Path, studies: list[Listed]) -> list[str]:
+def list_lines(folder: Path, studies: list[StudyListing]) -> list[str]:
     """Format studies as a table: name, designs, state, question.
 
     Parameters
     ----------
     folder : Path
         Folder of the studies.
-    studies : list of Listed
+    studies : list of StudyListing
         The studies.
 
     Returns
@@ -91,12 +91,12 @@ def list_lines(folder: Path, studies: list[Listed]) -> list[str]:
     return [*lines, f"{count}, {finished} finished. Run one: sweep run {folder}/NAME.yaml"]
 
 
-def list_facts(studies: list[Listed]) -> dict[str, Any]:
+def list_facts(studies: list[StudyListing]) -> dict[str, Any]:
     """Format studies as a JSON object.
 
     Parameters
     ----------
-    studies : list of Listed
+    studies : list of StudyListing
         The studies.
 
     Returns
@@ -107,23 +107,23 @@ def list_facts(studies: list[Listed]) -> dict[str, Any]:
     return {"studies": [asdict(study) for study in studies]}
 
 
-def _listed(path: Path, outputs: Path, data: Path | None) -> Listed:
+def _listed(path: Path, outputs: Path, data: Path | None) -> StudyListing:
     try:
         study = load_study(path, data)
         state = _state(study, outputs)
     except SweepError as error:
-        more = f" (and {len(error.faults) - 1} more)" if error.faults[1:] else ""
-        return Listed(path.stem, None, "cannot be loaded", f"{error.faults[0]}{more}")
+        more = f" (and {len(error.issues) - 1} more)" if error.issues[1:] else ""
+        return StudyListing(path.stem, None, "cannot be loaded", f"{error.issues[0]}{more}")
     name = path.stem if study.name == path.stem else f"{path.stem} ({study.name})"
     question = " ".join(study.section.question.split())
     if len(question) > _QUESTION_LETTERS:
         question = question[: _QUESTION_LETTERS - 3].rstrip() + "..."
-    return Listed(" ".join(name.split()), study.n_designs, state, question)
+    return StudyListing(" ".join(name.split()), study.n_designs, state, question)
 
 
 def _state(study: Study, outputs: Path) -> str:
     folder, note = output_folder(outputs / folder_name(study.name), study)
-    held = held_by(folder)
+    held = run_in(folder)
     if held is None:
         return "not run" if note is None else "changed since it was run"
     if in_use(folder):

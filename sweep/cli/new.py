@@ -13,8 +13,8 @@ from pathlib import Path
 
 from ..api.channels import sensor_file
 from ..base.disk import read_input
-from ..base.errors import DataError, Fault, OutputError, StudyError, SweepError
-from ..base.own_code import is_code
+from ..base.errors import DataError, OutputError, StudyError, SweepError, ValidationIssue
+from ..base.user_code import is_code
 from ..results.atomic import atomic, write_bytes, write_text
 from ..spectra import LightUnit
 from ..spectra.light_files import lights_file
@@ -39,7 +39,7 @@ def new_study(
     name, folder : str, Path
         Name of the study, and its folder, which is made where it is not there.
     qe, lights : Path or None
-        Files of curves, which stay where they are; None takes what is built in.
+        Files of curves, which stay where they are; None takes built-in curves.
     quantity : {'energy', 'photons'}
         Quantity of the lights.
     pixel : Path or None
@@ -96,7 +96,7 @@ def _write(path: Path, name: str, sources: Sources) -> Study:
             hidden.write_text(study_text(name, sources, ratio), encoding="utf-8")
             study = load_study(hidden)
         except StudyError as error:
-            raise DataError([replace(fault, file=None, line=None) for fault in error.faults]) from None
+            raise DataError([replace(issue, file=None, line=None) for issue in error.issues]) from None
         _write_schema_beside(path)
     return study
 
@@ -129,7 +129,7 @@ def study_from(name: str, folder: Path, source: Path) -> list[str]:
     text = read_input(source, _MOST_STUDY, StudyError).decode("utf-8")
     text, count = re.subn(r"^study:.*$", f"study: {name}", text, count=1, flags=re.MULTILINE)
     if not count:
-        raise StudyError(Fault("no line `study: NAME`", str(source)))
+        raise StudyError(ValidationIssue("no line `study: NAME`", str(source)))
     with atomic(path) as hidden:
         hidden.write_text(text, encoding="utf-8")
         study = load_study(hidden)
@@ -144,10 +144,10 @@ def _new_path(name: str, folder: Path) -> Path:
     if not (name and name == folder_name(name) == stem and name[0].isalnum() and len(name) <= _MOST_LETTERS):
         better = folder_name(Path(stem).name).strip("._-")[:_MOST_LETTERS]
         allowed = f"up to {_MOST_LETTERS} letters, digits, -, _ and ., with a letter or digit first, without .yaml"
-        raise StudyError(Fault("not the name of a study", None, None, "NAME", name, allowed, better or None))
+        raise StudyError(ValidationIssue("not the name of a study", None, None, "NAME", name, allowed, better or None))
     path = folder / f"{name}.yaml"
     if os.path.lexists(path):
-        raise OutputError(Fault("is there already, and stays as it is", str(path), allowed="another name"))
+        raise OutputError(ValidationIssue("is there already, and stays as it is", str(path), allowed="another name"))
     return path
 
 
@@ -203,7 +203,7 @@ def curve_files_of(source: Path) -> list[str]:
     for name in names:
         if ".." in Path(name).parts:
             raise StudyError(
-                Fault("lies outside the folder of the study", str(source), value=name, allowed="a whole path")
+                ValidationIssue("lies outside the folder of the study", str(source), value=name, allowed="a whole path")
             )
     return names
 
@@ -234,7 +234,7 @@ def copied(pairs: Iterable[tuple[Path, Path]]) -> Iterator[None]:
                 write_bytes(content, to)
                 copies.append(to)
             elif read_input(to, MOST_BYTES, OutputError) != content:
-                raise OutputError(Fault("holds something else already", str(to), allowed="another --folder"))
+                raise OutputError(ValidationIssue("holds something else already", str(to), allowed="another --folder"))
         yield
     except SweepError:
         for path in copies:
@@ -260,7 +260,7 @@ def write_schema(path: Path) -> None:
         titles = [f'"title": {json.dumps(title)}'.encode() for title in (TITLE, StudySection.__name__)]
         content = read_input(path, MOST_BYTES, OutputError)
         if not any(title in content[:4096] for title in titles):
-            raise OutputError(Fault("holds something else already", str(path), allowed="another --output"))
+            raise OutputError(ValidationIssue("holds something else already", str(path), allowed="another --output"))
     write_text(schema_text(), path)
 
 

@@ -1,4 +1,4 @@
-"""Arguments and options that several commands share, what the shell completes, and the groups of the help."""
+"""Arguments and options that several commands share, completion for the shell, and groups of the help."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from ..base.errors import Fault, StudyError
+from ..base.errors import StudyError, ValidationIssue
 
 OF_STUDIES = "Studies"
 OF_RESULTS = "Results"
@@ -20,7 +20,7 @@ PANELS = (OF_STUDIES, OF_RESULTS, OF_CURVES, OF_TOOL)
 """Groups of commands in the help, in order."""
 
 
-class Also(StrEnum):
+class ExportFormat(StrEnum):
     """Files of other programs that an export can write, too."""
 
     SPEOS = "speos"
@@ -95,7 +95,7 @@ def changes_of(texts: list[str] | None) -> dict[str, str]:
         key, mark, value = text.partition("=")
         if not mark or not all(key.split(".")):
             raise StudyError(
-                Fault("not KEY=VALUE", key="--set", value=text, allowed="constraints.sensitivity.min=0.92")
+                ValidationIssue("not KEY=VALUE", key="--set", value=text, allowed="constraints.sensitivity.min=0.92")
             )
         changes[key] = value
     return changes
@@ -121,7 +121,7 @@ Changes = Annotated[
 AllowCode = Annotated[
     bool,
     typer.Option(
-        "--allow-code", help="Run the code that the study names: Python files and what installed packages offer."
+        "--allow-code", help="Run the code that the study names: Python files and plugins of installed packages."
     ),
 ]
 RunFolder = Annotated[

@@ -13,13 +13,13 @@ from typing import Annotated, Any
 import typer
 
 Json = Annotated[bool, typer.Option("--json", help="Say one JSON object on stdout, and everything else on stderr.")]
-Quiet = Annotated[bool, typer.Option("--quiet", help="Say nothing but faults, and with --json the object.")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="Print errors alone, and with --json the object.")]
 _INTERVAL_S = 10.0
 _LEAST_SHARE, _LEAST_S = 0.01, 60.0
 """The time left is printed from this share of a phase, or this time, on: the first jobs wait for the compiler."""
 
 
-def say(lines: Iterable[str], facts: Mapping[str, Any], *, as_json: bool = False, quiet: bool = False) -> None:
+def print_result(lines: Iterable[str], facts: Mapping[str, Any], *, as_json: bool = False, quiet: bool = False) -> None:
     """Print the result of a command.
 
     Parameters
@@ -33,12 +33,12 @@ def say(lines: Iterable[str], facts: Mapping[str, Any], *, as_json: bool = False
     quiet : bool
         Print no progress and no summary.
     """
-    say_lines(lines, as_json=as_json, quiet=quiet)
+    print_lines(lines, as_json=as_json, quiet=quiet)
     if as_json:
         typer.echo(json.dumps(_plain(facts), allow_nan=False, ensure_ascii=False))
 
 
-def say_lines(lines: Iterable[str], *, as_json: bool, quiet: bool) -> None:
+def print_lines(lines: Iterable[str], *, as_json: bool, quiet: bool) -> None:
     """Print lines on stdout, or on stderr with `--json`.
 
     Parameters

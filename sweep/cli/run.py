@@ -1,4 +1,4 @@
-"""Run one study as the command asks, or say what that would do; draw the report of a finished run."""
+"""Run one study, or print the work that a run would do; draw the report of a finished run."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from .. import run as runner
-from ..base.errors import BrokenPromiseError, Fault, SweepError
+from ..base.errors import ErrorBoundExceededError, SweepError, ValidationIssue
 from ..base.types import in_turn
 from ..results.tables import REPORT
 from ..run.workers import workers
 from ..study import folder_name, load_study
-from .output import ProgressDisplay, say_lines
+from .output import ProgressDisplay, print_lines
 
 if TYPE_CHECKING:
     from ..base.types import Parallel
@@ -43,7 +43,7 @@ def run_one(
     quiet: bool,
     began_s: float,
 ) -> dict[str, Any]:
-    """Run a study, or continue it, draw its report and say what it found.
+    """Run a study, or continue it, draw its report and print the result.
 
     Parameters
     ----------
@@ -73,15 +73,15 @@ def run_one(
 
     if backend not in runner.BACKENDS:
         allowed = ", ".join(runner.BACKENDS)
-        raise SweepError(Fault("unknown backend", key="--backend", value=backend, allowed=allowed))
+        raise SweepError(ValidationIssue("unknown backend", key="--backend", value=backend, allowed=allowed))
     study = load_study(path, data, changes=changes, allow_code=allow_code)
     folder, other = runner.output_folder(output / folder_name(study.name), study)
     n_workers = jobs or os.cpu_count() or 1
     if other is not None:
         note(f"{other}.")
     if dry_run:
-        left = runner.to_do(study, folder, n_workers)
-        say_lines(runner.to_do_lines(left, folder), as_json=as_json, quiet=quiet)
+        left = runner.remaining_work(study, folder, n_workers)
+        print_lines(runner.remaining_work_lines(left, folder), as_json=as_json, quiet=quiet)
         counts = {"designs": study.n_designs, "finished_designs": left.finished, "parts": left.chunks}
         return {"folder": str(folder), **counts, "searches": left.searches}
     with runner.stopped_by_signals():
@@ -102,7 +102,7 @@ def run_one(
 
         audit_again(folder, data)
         with workers(n_workers if computed and backend == "loky" else 1) as parallel:
-            facts = finish(folder, began_s, mend=True, parallel=parallel, as_json=as_json, quiet=quiet)
+            facts = finish(folder, began_s, repair=True, parallel=parallel, as_json=as_json, quiet=quiet)
     if opens and not webbrowser.open((folder / REPORT).absolute().as_uri()):
         note(f"no browser was found for {folder / REPORT}.")
     return {"computed": bool(computed), **facts}
@@ -112,7 +112,7 @@ def finish(
     folder: Path,
     began_s: float,
     *,
-    mend: bool = False,
+    repair: bool = False,
     parallel: Parallel = in_turn,
     as_json: bool = False,
     quiet: bool = False,
@@ -125,7 +125,7 @@ def finish(
         Folder of the run.
     began_s : float
         Start of the run, as in `run_one`.
-    mend : bool
+    repair : bool
         Draw only missing or damaged files.
     parallel : Parallel
         Draws figures in parallel.
@@ -141,16 +141,16 @@ def finish(
 
     Raises
     ------
-    BrokenPromiseError
+    ErrorBoundExceededError
         If the run's own check failed.
     """
     from ..report import make_report, read_output, summary_lines  # noqa: PLC0415  (loaded while workers compute)
 
     result = read_output(folder)
-    make_report(result, mend=mend, parallel=parallel)
-    say_lines(summary_lines(result, time.monotonic() - began_s), as_json=as_json, quiet=quiet)
+    make_report(result, repair=repair, parallel=parallel)
+    print_lines(summary_lines(result, time.monotonic() - began_s), as_json=as_json, quiet=quiet)
     check = result.provenance.check
     if check is not None and not check.passed:
-        raise BrokenPromiseError([Fault(check.sentence.removesuffix("."), key=check.scenario)])
+        raise ErrorBoundExceededError([ValidationIssue(check.sentence.removesuffix("."), key=check.scenario)])
     facts = result.provenance.model_dump(mode="json")
     return {"folder": str(folder), **{key: facts[key] for key in _JSON_KEYS}}

@@ -1,4 +1,4 @@
-"""State of a run, from another terminal: what its folder says, without touching it."""
+"""State of a run, read from its folder in another terminal."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any
 
 from ..base.disk import read_facts
 from ..base.errors import OutputError
-from ..metrics.share import told_share
-from ..results.inventory import Inventory, faults_of, no_run
+from ..metrics.share import format_share
+from ..results.inventory import Inventory, issues_of, no_run
 from ..results.lock import in_use
 from ..results.parts import ANSWER, PARTS, ROWS, Parts
 from ..results.tables import PROVENANCE, RESULTS, rows_in
@@ -52,7 +52,7 @@ def status_of(folder: Path, *, verify: bool = False) -> Status:
     if finished or (verify and not running):
         wrong = inventory.wrong(quick=not verify) | inventory.wrong([PROVENANCE] if finished else [])
         if wrong:
-            raise OutputError(faults_of(folder, wrong))
+            raise OutputError(issues_of(folder, wrong))
     if finished:
         facts = read_facts(folder / PROVENANCE)
         state = "finished"
@@ -64,7 +64,7 @@ def status_of(folder: Path, *, verify: bool = False) -> Status:
         rows, answers = parts.paths(ROWS), parts.paths(ANSWER)
         done, total = sum(map(rows_in, rows)), _number(inventory.facts, "designs")
         state = "running" if running else "interrupted"
-        share = f" ({told_share(done / total)})" if total else ""
+        share = f" ({format_share(done / total)})" if total else ""
         continues = "" if running else "; the same command continues"
         lines = [f"{state}{continues}: {done:,} of {total:,} designs{share}, {len(rows):,} parts finished."]
         if answers:
@@ -75,7 +75,7 @@ def status_of(folder: Path, *, verify: bool = False) -> Status:
     elif finished or rows:
         lines.append(f"Finished parts: {folder / PARTS}/*.parquet, which pandas.read_parquet reads.")
     if verify and not running:
-        lines.append(f"ok: its {len(inventory.files)} files are what the run wrote.")
+        lines.append(f"ok: its {len(inventory.files)} files are as the run wrote them.")
     return Status(lines, {"folder": str(folder), "state": state, "verified": verify, **values})
 
 

@@ -21,7 +21,7 @@ _TYPICAL_NM = {"green": 505, "yellow": 590, "orange": 605, "red": 635}
 
 @dataclass(frozen=True)
 class Sources:
-    """Files that a study takes its curves and its pixel from; None for what is built in, or for the defaults.
+    """Files that a study takes its curves and its pixel from; None for built-in curves, or for the defaults.
 
     `sensor_path`, `lights_path`: paths as the study says them; `pixel_file`: the EMVA 1288 results, of which
     `pixel` has the keys of `pixel:` and `not_in_pixel` the keys that are missing.
@@ -67,7 +67,7 @@ def study_text(name: str, sources: Sources, photon_ratio: float | None) -> str:
     stop = 700 if sensor is None else sensor.range_nm[1]
     return f"""\
 # yaml-language-server: $schema=study.schema.json
-# Check it with `sweep check`, see what is to do with `sweep run ... --dry-run`.
+# Check it with `sweep check`, see the work with `sweep run ... --dry-run`.
 study: {scalar(name)}
 question: >-
   One {layout.base} pixel of {layout.plain[-1]} gets a stopband. Where should its edges lie, so that {pair[0]} and
@@ -141,7 +141,7 @@ def _lights(lights: LightsFile | None, path: str, photon_ratio: float | None) ->
         lines.append(f"  photon_ratio: {photon_ratio:.6g}   # {meaning}")
     other = "photons" if lights.quantity == "energy" else "energy"
     lines += ["  files:", f"    - file: {scalar(path)}"]
-    lines.append(f"      quantity: {lights.quantity}  # what the numbers are; or {other}")
+    lines.append(f"      quantity: {lights.quantity}  # unit of the numbers; or {other}")
     if lights.ends_early:
         lines.append("      outside: zero     # the file ends inside the wavelength range")
     if lights.fine:

@@ -12,7 +12,7 @@ from ..base.types import FloatArray
 from .edge import SPAN_PER_WIDTH, edge, edge_gradient
 from .family import Parameter
 from .products import row_products
-from .tolerance import Off
+from .tolerance import ProductionError
 
 _HALF = SPAN_PER_WIDTH / 2
 _PER_BAND = 5
@@ -87,11 +87,11 @@ class Bands:
         ends = bands[:, :DEPTH].reshape(-1, 2)
         slopes = edge_gradient(self._wave, ends[:, :1], ends[:, 1:])
         signs = np.repeat(bands[:, DEPTH], 2) * np.tile([1.0, -1.0], self._count)
-        both = self.edges(ends).reshape(self._count, 2, -1)
+        edges = self.edges(ends).reshape(self._count, 2, -1)
         rows = np.empty((self._count, _PER_BAND, self._wave.size))
         for at, slope in enumerate(slopes):  # by centers, and by widths
             rows[:, at:DEPTH:2] = (signs[:, None] * slope).reshape(self._count, 2, -1)
-        rows[:, DEPTH] = both[:, 0] - both[:, 1]
+        rows[:, DEPTH] = edges[:, 0] - edges[:, 1]
         return rows.reshape(-1, self._wave.size)
 
     def reach(self, low: FloatArray, high: FloatArray) -> FloatArray:
@@ -145,12 +145,12 @@ class Bands:
             most += np.outer(depths, left_high - right_low).max(axis=0)
         return least, most
 
-    def produced(self, off: Off) -> Bands:
+    def perturbed(self, off: ProductionError) -> Bands:
         """Return the bands as production makes them.
 
         Parameters
         ----------
-        off : Off
+        off : ProductionError
             Production error.
 
         Returns
@@ -211,8 +211,8 @@ class Bands:
     def _open(self, x: FloatArray, band: int) -> FloatArray:
         at = band * _PER_BAND
         if len(x) < _FEW:
-            both = self.edges(x[:, at : at + DEPTH].reshape(-1, 2)).reshape(len(x), 2, -1)
-            return np.asarray(both[:, 0] - both[:, 1], dtype=float)
+            edges = self.edges(x[:, at : at + DEPTH].reshape(-1, 2)).reshape(len(x), 2, -1)
+            return np.asarray(edges[:, 0] - edges[:, 1], dtype=float)
         left, right = (self._each_once(x[:, at + i : at + i + 2]) for i in (LEFT, RIGHT))
         return np.asarray(left - right, dtype=float)
 
@@ -258,12 +258,12 @@ class Banded:
         """See `Bands.dimensions`."""
         return self._bands.dimensions
 
-    def produced(self, off: Off) -> Self:
-        """Return the family with shifted bands between the same curves; see `Family.produced`.
+    def perturbed(self, off: ProductionError) -> Self:
+        """Return the family with shifted bands between the same curves; see `Family.perturbed`.
 
         Parameters
         ----------
-        off : Off
+        off : ProductionError
             Production error.
 
         Returns
@@ -272,7 +272,7 @@ class Banded:
             The family as production makes it.
         """
         made = copy(self)
-        made._bands = self._bands.produced(off)
+        made._bands = self._bands.perturbed(off)
         return made
 
     def start(self, points: FloatArray) -> FloatArray:

@@ -236,7 +236,7 @@ class Tables:
             changed = self.change[nodes, None] * weights
             return EdgeSums(self.base[nodes] @ weights, self.left[:, nodes] @ changed, self.right[:, nodes] @ changed)
 
-        # Many weights are told by where they are: they are held as long as what they give, and nobody changes them.
+        # Many weights are recognized by identity: they live as long as their products, and are never modified.
         data = weights.__array_interface__["data"][0] if weights.size > _FEW_WEIGHTS else weights.tobytes()
         return self._products.get((data, weights.shape, weights.strides, nodes.tobytes()), lambda: (weights, made()))[1]
 
@@ -293,10 +293,10 @@ class EdgeBlock:
         """Sum QE times weights by table lookup."""
         from .compiled import through_edges  # noqa: PLC0415  (compiled: kept off the start-up path)
 
-        found = np.empty((len(self), weights.shape[1]))
+        sums_of_designs = np.empty((len(self), weights.shape[1]))
         sums = self.tables.product(weights, nodes)
-        through_edges(sums.base, sums.left, sums.right, self.at_left, self.at_right, self.depth, found)
-        return found
+        through_edges(sums.base, sums.left, sums.right, self.at_left, self.at_right, self.depth, sums_of_designs)
+        return sums_of_designs
 
     def shapes(self, base_qe: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return slope and transmission of the curves by table lookup."""
@@ -330,7 +330,7 @@ def _shapes(curves: FloatArray, inverse: FloatArray, dark: FloatArray) -> tuple[
 
 _tables: Cache[bytes, Tables] = Cache(_KEPT_TABLES)
 _known: Cache[int, tuple[Space, Tables | None]] = Cache(_KEPT_TABLES)
-"""Those of the spaces of the last blocks, by the spaces themselves, which nobody changes."""
+"""Tables of the spaces of the last blocks, by the spaces, which are immutable."""
 
 
 def by_edges(space: Space) -> bool:
@@ -403,10 +403,10 @@ def edges_of_some(space: Space, numbers: IndexArray) -> EdgeBlock | None:
 
 def _tables_of(space: Space) -> Tables | None:
     """Return the tables of a grid's edges; equal grids share them."""
-    found = _separable(space)
-    if found is None:
+    family_and_curves = _separable(space)
+    if family_and_curves is None:
         return None
-    family, base, change = found
+    family, base, change = family_and_curves
     key = hashlib.sha256(pickle.dumps((space.axes, base, change, family.edges(np.array([[600.0, 10.0]]))))).digest()
 
     def made() -> Tables:

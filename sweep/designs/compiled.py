@@ -87,15 +87,15 @@ def spans(edges: FloatArray) -> IndexArray:
     ndarray of int, shape (n_edges, 2)
         Ranges.
     """
-    found = np.empty((edges.shape[0], 2), np.intp)
+    ranges = np.empty((edges.shape[0], 2), np.intp)
     for e in range(edges.shape[0]):
         begin, end = 0, edges.shape[1]
         while begin < end and edges[e, begin] == 0.0:
             begin += 1
         while end > 0 and edges[e, end - 1] == 1.0:
             end -= 1
-        found[e, 0], found[e, 1] = begin, end
-    return found
+        ranges[e, 0], ranges[e, 1] = begin, end
+    return ranges
 
 
 @njit(cache=True, nogil=True, fastmath=_NUMBERS)
@@ -180,13 +180,13 @@ def edge_shapes(
     ndarray of shape (n_edges, 2)
         Steepest step and lowest ratio.
     """
-    found, curve = np.empty((edges.shape[0], 2)), np.empty(base.size)
+    shapes, curve = np.empty((edges.shape[0], 2)), np.empty(base.size)
     for e in range(edges.shape[0]):
-        own = slice(max(spans[e, 0] - 1, 0), min(spans[e, 1] + 1, base.size))
-        for w in range(own.start, own.stop):
+        near_edge = slice(max(spans[e, 0] - 1, 0), min(spans[e, 1] + 1, base.size))
+        for w in range(near_edge.start, near_edge.stop):
             curve[w] = base[w] + change[w] * edges[e, w]
-        found[e] = _shape(curve[own], inverse[own], dark[own])
-    return found
+        shapes[e] = _shape(curve[near_edge], inverse[near_edge], dark[near_edge])
+    return shapes
 
 
 @njit(cache=True, nogil=True, fastmath=_NUMBERS)
@@ -270,8 +270,10 @@ def shapes_of_edges(
         else:
             begin = min(left_spans[one, 0], right_spans[other, 0])
             end = max(left_spans[one, 1], right_spans[other, 1])
-            own = slice(max(begin - 1, 0), min(end + 1, base.size))  # with the steps to both sides
-            _between_edges(base[own], change[own], depth[d], left[one, own], right[other, own], curve[own])
-            step, low = _shape(curve[own], inverse[own], dark[own])
+            between = slice(max(begin - 1, 0), min(end + 1, base.size))  # with the steps to both sides
+            _between_edges(
+                base[between], change[between], depth[d], left[one, between], right[other, between], curve[between]
+            )
+            step, low = _shape(curve[between], inverse[between], dark[between])
         steepest[d] = larger(step, larger(before[begin, 0], after[end, 0]))
         lowest[d] = smaller(low, smaller(before[begin, 1], after[end, 1]))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Protocol, Self, runtime_checkable
 
 from ..base.types import FloatArray, Section
-from .tolerance import Off
+from .tolerance import ProductionError
 
 
 @dataclass(frozen=True)
@@ -152,12 +152,12 @@ class Family(Protocol):
     def dimensions(self) -> Mapping[str, FloatArray]:
         """Lengths in production by name: rows r, ndarray of shape (n, n_parameters); a length is min(r @ x), nm."""
 
-    def produced(self, off: Off) -> Self:
+    def perturbed(self, off: ProductionError) -> Self:
         """Return the family as production makes it.
 
         Parameters
         ----------
-        off : Off
+        off : ProductionError
             Production error.
 
         Returns

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from ..base.errors import Fault, SweepError
-from ..base.own_code import OwnCode
+from ..base.errors import SweepError, ValidationIssue
 from ..base.types import FloatArray
+from ..base.user_code import UserCode
 from .family import Parameter
-from .tolerance import Off
+from .tolerance import ProductionError
 
 _STEP = 1e-5
 """Half of a central difference, in units of a parameter's range."""
@@ -34,7 +34,7 @@ class PluginFamily:
     n_modified = 1
     start_dimensions: int | None = None
 
-    def __init__(self, code: OwnCode, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None):
+    def __init__(self, code: UserCode, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None):
         self.kind = code.name
         self._given = code, wavelength_nm, base, target
         self._base = base
@@ -49,15 +49,17 @@ class PluginFamily:
     def _array(self, name: str, x: FloatArray, width: int | None) -> FloatArray:
         """Call a method of the class and check its result, ndarray of shape (n_designs, width)."""
         try:
-            found = np.asarray(self._given[0].called(getattr(self._own, name), x.copy()), dtype=float)
+            values = np.asarray(self._given[0].called(getattr(self._own, name), x.copy()), dtype=float)
         except (TypeError, ValueError):
-            raise SweepError(Fault(f"{self.kind}: {name} gives no array of numbers")) from None
-        if found.ndim != 2 or len(found) != len(x) or (width is not None and found.shape[1] != width):
+            raise SweepError(ValidationIssue(f"{self.kind}: {name} gives no array of numbers")) from None
+        if values.ndim != 2 or len(values) != len(x) or (width is not None and values.shape[1] != width):
             allowed = f"({len(x)}, {'n' if width is None else width})"
-            raise SweepError(Fault(f"{self.kind}: {name} has another shape", value=found.shape, allowed=allowed))
-        if not np.isfinite(found).all():
-            raise SweepError(Fault(f"{self.kind}: {name} is not finite"))
-        return found
+            raise SweepError(
+                ValidationIssue(f"{self.kind}: {name} has another shape", value=values.shape, allowed=allowed)
+            )
+        if not np.isfinite(values).all():
+            raise SweepError(ValidationIssue(f"{self.kind}: {name} is not finite"))
+        return values
 
     def curves(self, x: FloatArray) -> FloatArray:
         """Return the QE of the modified channel; see `Family.curves`.
@@ -77,14 +79,14 @@ class PluginFamily:
         SweepError
             If the curve of a well-formed design is out of its bounds; others are clipped to 0 and 1.
         """
-        found = self._array("curves", x, self._base.size)
-        well_formed = found[(self.violation(x) <= _SLACK).all(axis=1)]
+        curves = self._array("curves", x, self._base.size)
+        well_formed = curves[(self.violation(x) <= _SLACK).all(axis=1)]
         top = self._base if self.below_base else 1.0
         if (well_formed < -_SLACK).any() or (well_formed > top + _SLACK).any():
             allowed = "0 to the base curve" if self.below_base else "0 to 1"
             ends = f"{well_formed.min():.6g} to {well_formed.max():.6g}"
-            raise SweepError(Fault(f"{self.kind}: a curve is out of its bounds", value=ends, allowed=allowed))
-        return np.clip(found, 0.0, 1.0)[:, None, :]
+            raise SweepError(ValidationIssue(f"{self.kind}: a curve is out of its bounds", value=ends, allowed=allowed))
+        return np.clip(curves, 0.0, 1.0)[:, None, :]
 
     def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
         """Return the base or 1, which every well-formed curve is checked against."""
@@ -125,12 +127,12 @@ class PluginFamily:
         """None, since the edges are unknown."""
         return {}
 
-    def produced(self, off: Off) -> PluginFamily:
+    def perturbed(self, off: ProductionError) -> PluginFamily:
         """Return the same family; a study with production tolerances refuses it.
 
         Parameters
         ----------
-        off : Off
+        off : ProductionError
             Production error.
 
         Returns
@@ -139,7 +141,7 @@ class PluginFamily:
             The same family.
         """
         if any(off):
-            raise SweepError(Fault(f"{self.kind} has no edges that production could shift"))
+            raise SweepError(ValidationIssue(f"{self.kind} has no edges that production could shift"))
         return self
 
     def start(self, points: FloatArray) -> FloatArray:
@@ -150,11 +152,11 @@ class PluginFamily:
 def _parameters(kind: str, said: Any) -> tuple[Parameter, ...]:
     """Check and return the parameters of a class."""
     try:
-        found = tuple(Parameter(str(name), *map(float, numbers)) for name, *numbers in said)
+        parameters = tuple(Parameter(str(name), *map(float, numbers)) for name, *numbers in said)
     except (TypeError, ValueError):
-        found = ()
-    names = [parameter.name for parameter in found]
-    if not found or len(set(names)) < len(names) or not all(p.low < p.high for p in found):
+        parameters = ()
+    names = [parameter.name for parameter in parameters]
+    if not parameters or len(set(names)) < len(names) or not all(p.low < p.high for p in parameters):
         allowed = "a list of (name, low, high) with low < high, each name once"
-        raise SweepError(Fault(f"{kind}: no usable `parameters`", allowed=allowed))
-    return found
+        raise SweepError(ValidationIssue(f"{kind}: no usable `parameters`", allowed=allowed))
+    return parameters

@@ -30,8 +30,8 @@ def row_products(rows: FloatArray, matrix: FloatArray) -> FloatArray:
     """
     if 0 < len(matrix) <= _FEW_TERMS:
         columns = np.ascontiguousarray(rows.T)
-        found = matrix[0][:, None] * columns[0]
+        products = matrix[0][:, None] * columns[0]
         for at in range(1, len(matrix)):
-            found += matrix[at][:, None] * columns[at]
-        return np.asarray(found.T)
+            products += matrix[at][:, None] * columns[at]
+        return np.asarray(products.T)
     return np.asarray(np.matmul(np.ascontiguousarray(rows)[:, None, :], matrix)[:, 0])

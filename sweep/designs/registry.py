@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from pydantic import create_model
+from pydantic import Field, create_model
 
-from ..base.errors import Fault, SweepError, nearest
+from ..base.errors import SweepError, ValidationIssue, nearest
 from ..base.modules import files_in
 from ..base.types import FloatArray, Section
 from . import families
@@ -15,8 +15,8 @@ from .family import Family
 
 def _found() -> dict[str, type[Family]]:
     every = [value for file in files_in(families) for value in vars(file).values()]
-    own = [value for value in every if "kind" in getattr(value, "__dict__", {})]
-    return {family.kind: family for family in own}
+    with_kind = [value for value in every if "kind" in getattr(value, "__dict__", {})]
+    return {family.kind: family for family in with_kind}
 
 
 FAMILIES = _found()
@@ -26,7 +26,10 @@ FAMILIES = _found()
 def _optional(kinds: dict[str, type[Family]]) -> dict[str, Any]:
     """Return the options of all families as optional fields."""
     every = {name: field for family in kinds.values() for name, field in family.Options.model_fields.items()}
-    return {name: (field.rebuild_annotation() | None, None) for name, field in every.items()}
+    return {
+        name: (field.rebuild_annotation() | None, Field(default=None, description=field.description))
+        for name, field in every.items()
+    }
 
 
 class FamilyOptions(create_model("_FamilyOptions", __base__=Section, **_optional(FAMILIES))):  # type: ignore[misc]
@@ -41,11 +44,11 @@ def told() -> str:
     str
         Text.
     """
-    each = []
+    families = []
     for kind, family in FAMILIES.items():
         options = ", ".join(family.Options.model_fields)
-        each.append(kind + (f" (options: {options})" if options else ""))
-    return ", ".join(each)
+        families.append(kind + (f" (options: {options})" if options else ""))
+    return ", ".join(families)
 
 
 def build_family(
@@ -75,15 +78,17 @@ def build_family(
     family = FAMILIES.get(kind)
     if family is None:
         allowed = ", ".join(FAMILIES)
-        raise SweepError(Fault("unknown family", value=kind, allowed=allowed, nearest=nearest(kind, FAMILIES)))
+        raise SweepError(
+            ValidationIssue("unknown family", value=kind, allowed=allowed, nearest=nearest(kind, FAMILIES))
+        )
     if (target is not None) != family.needs_target:
-        raise SweepError(Fault(f"{kind} {'needs' if family.needs_target else 'has no'} `to`"))
+        raise SweepError(ValidationIssue(f"{kind} {'needs' if family.needs_target else 'has no'} `to`"))
     given = {name: value for name in FamilyOptions.model_fields if (value := getattr(options, name)) is not None}
-    own = family.Options.model_fields
-    needed = {name for name, field in own.items() if field.is_required()}
+    known_options = family.Options.model_fields
+    needed = {name for name, field in known_options.items() if field.is_required()}
     for name in FamilyOptions.model_fields:
-        if (name in given and name not in own) or (name in needed and name not in given):
+        if (name in given and name not in known_options) or (name in needed and name not in given):
             owners = " or ".join(owner for owner, made in FAMILIES.items() if name in made.Options.model_fields)
             problem = f"`{name}` goes with {owners}, and {owners} with `{name}`"
-            raise SweepError(Fault(problem, value=given.get(name)))
+            raise SweepError(ValidationIssue(problem, value=given.get(name)))
     return family.of_study(wavelength_nm, base, target, family.Options(**given))

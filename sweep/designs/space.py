@@ -12,8 +12,8 @@ import numpy as np
 from ..base.types import FloatArray, IndexArray
 from .family import Family
 from .technology import Technology
-from .tolerance import AS_DESIGNED, Off
-from .ungridded import Axes, Ungridded
+from .tolerance import AS_DESIGNED, ProductionError
+from .ungridded import Axes, ListedDesigns
 
 Kind = Literal["reference", "design", "sweep", "search"]
 
@@ -61,7 +61,7 @@ class Space:
         Values of each parameter; in a grid the last one runs fastest.
     gridded : bool
         False for a box that is searched but not swept.
-    rows : Ungridded, optional
+    rows : ListedDesigns, optional
         Designs that are no grid.
     """
 
@@ -71,7 +71,7 @@ class Space:
     filter: Filter | None = None
     axes: Axes = ()
     gridded: bool = True
-    rows: Ungridded | None = None
+    rows: ListedDesigns | None = None
 
     @property
     def size(self) -> int:
@@ -99,12 +99,12 @@ class Space:
             Index of the value, one array per axis.
         """
         rest = numbers
-        found = []
+        digits = []
         for axis in reversed(self.axes):  # mixed radix: NumPy's own unravel_index stops at 64 axes
             whole = rest // len(axis)  # several times as fast as divmod
-            found.append(rest - whole * len(axis))
+            digits.append(rest - whole * len(axis))
             rest = whole
-        return found[::-1]
+        return digits[::-1]
 
     def points(self, start: int, stop: int) -> FloatArray:
         """Return the parameters of consecutive designs.
@@ -141,7 +141,7 @@ class Space:
         columns = [np.asarray(axis, dtype=float)[digit] for axis, digit in digits]
         return np.stack(columns, axis=1) if columns else np.empty((len(numbers), 0))
 
-    def curves(self, points: FloatArray, n_wavelengths: int, off: Off = AS_DESIGNED) -> FloatArray:
+    def curves(self, points: FloatArray, n_wavelengths: int, off: ProductionError = AS_DESIGNED) -> FloatArray:
         """Return the QE of the modified channels.
 
         Parameters
@@ -150,7 +150,7 @@ class Space:
             Parameters.
         n_wavelengths : int
             Size of the grid.
-        off : Off
+        off : ProductionError
             Production error.
 
         Returns
@@ -161,7 +161,7 @@ class Space:
         if self.filter is None:
             return np.empty((len(points), 0, n_wavelengths))
         family = self.filter.family
-        return (family.produced(off) if any(off) else family).curves(points)
+        return (family.perturbed(off) if any(off) else family).curves(points)
 
     def violation(self, points: FloatArray) -> FloatArray:
         """Return the largest violation of the family's own conditions.

@@ -13,18 +13,17 @@ PIGMENT = "pigment"
 
 
 class Interference(Section):
-    """Thin layers: at an angle t a band stands at l sqrt(1 - (sin t / n)^2) (Smith, Modern Optical Engineering).
-
-    `effective_index`: n, that of the whole stack; about 1.5 to 2.2 for evaporated layers.
-    """
+    """Thin layers: at an angle t a band stands at l sqrt(1 - (sin t / n)^2) (Smith, Modern Optical Engineering)."""
 
     effective_index: float = Field(ge=1.05, le=10)
+    """Effective index n of the whole stack; about 1.5 to 2.2 for evaporated layers."""
 
 
 class Technology(Section):
     """A pigment, or `interference`."""
 
     interference: Interference | None = None
+    """Thin-film coating, which moves with the angle of the light."""
 
     @property
     def index(self) -> float:

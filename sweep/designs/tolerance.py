@@ -11,7 +11,7 @@ SHIFTS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 """Where in the range of a tolerance the worst case is looked for, in units of its half width."""
 
 
-class Off(NamedTuple):
+class ProductionError(NamedTuple):
     """Production error: a feature designed at l nm is at l (1 + thickness) + shift_nm.
 
     Parameters
@@ -42,7 +42,7 @@ class Off(NamedTuple):
         return moved / (1 + self.thickness) if self.thickness else moved
 
 
-AS_DESIGNED = Off()
+AS_DESIGNED = ProductionError()
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class Tolerance:
         """
         return Tolerance(factor * self.edge_shift_nm, factor * self.thickness)
 
-    def at(self, edge: float, film: float) -> Off:
+    def at(self, edge: float, film: float) -> ProductionError:
         """Return a production error within the tolerance.
 
         Parameters
@@ -89,15 +89,15 @@ class Tolerance:
 
         Returns
         -------
-        Off
+        ProductionError
             Production error.
         """
-        return Off(edge * self.edge_shift_nm + 0.0, film * self.thickness + 0.0)  # no negative zeros
+        return ProductionError(edge * self.edge_shift_nm + 0.0, film * self.thickness + 0.0)  # no negative zeros
 
     @property
-    def places(self) -> tuple[Off, ...]:
+    def places(self) -> tuple[ProductionError, ...]:
         """Production errors at which the worst case is searched: both from end to end, and two mixed corners."""
         if not self:
             return (AS_DESIGNED,)
-        both = self.edge_shift_nm > 0 and self.thickness > 0
-        return (*(self.at(s, s) for s in SHIFTS), *((self.at(s, -s) for s in (-1.0, 1.0)) if both else ()))
+        independent = self.edge_shift_nm > 0 and self.thickness > 0
+        return (*(self.at(s, s) for s in SHIFTS), *((self.at(s, -s) for s in (-1.0, 1.0)) if independent else ()))

@@ -16,7 +16,7 @@ Method = Literal["sobol", "lhs"]
 _KEPT = 2
 
 
-class Ungridded(Protocol):
+class ListedDesigns(Protocol):
     """Designs over the values of each parameter."""
 
     @property
@@ -41,7 +41,7 @@ class Ungridded(Protocol):
 
 
 @dataclass(frozen=True)
-class Paired:
+class PairedDesigns:
     """Designs of which the i-th has the i-th value of every axis; an axis of one value holds for all.
 
     Parameters
@@ -59,7 +59,7 @@ class Paired:
 
 
 @dataclass(frozen=True)
-class Drawn:
+class SampledDesigns:
     """Designs between the smallest and largest value of every axis, by SciPy's `qmc`.
 
     Parameters
@@ -94,4 +94,4 @@ class Drawn:
         return np.asarray(sobol.random_base2(max(1, (self.size - 1).bit_length()))[: self.size], dtype=float)
 
 
-_drawn: Cache[tuple[Drawn, int], FloatArray] = Cache(_KEPT)
+_drawn: Cache[tuple[SampledDesigns, int], FloatArray] = Cache(_KEPT)

@@ -21,7 +21,9 @@ class Bound(Section):
     """Allowed range of a quantity, with at least one end."""
 
     min: Number | None = None
+    """Smallest allowed value."""
     max: Number | None = None
+    """Largest allowed value."""
 
     @model_validator(mode="after")
     def _ordered(self) -> Bound:

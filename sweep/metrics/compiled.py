@@ -11,7 +11,7 @@ from ..base.types import FloatArray, IndexArray
 from ..camera.noise.compiled import poisson_shares
 
 RARE = 1e-40
-"""What occurs less often than this, relative to the most frequent, is left out."""
+"""Counts less probable than this, relative to the most probable one, are left out."""
 _TAIL = 13.0
 _PER_DEVIATION = 1.3
 _MOST_NATS = 100.0

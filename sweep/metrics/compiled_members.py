@@ -20,11 +20,11 @@ def _on_side(start: FloatArray, end: FloatArray) -> tuple[float, float]:
         slope += step * start[c]
         along += step * step
     at = 0.0 if along == 0.0 else min(max(-slope / along, 0.0), 1.0)
-    found = 0.0
+    squared = 0.0
     for c in range(start.size):
         value = start[c] + at * (end[c] - start[c])
-        found += value * value
-    return found, at
+        squared += value * value
+    return squared, at
 
 
 @njit(cache=True, nogil=True)
@@ -33,9 +33,9 @@ def _on_triangle(corners: FloatArray, weights: FloatArray) -> float:
     best = np.inf
     for one in range(3):
         other = (one + 1) % 3
-        found, at = _on_side(corners[one], corners[other])
-        if found < best:
-            best = found
+        squared, at = _on_side(corners[one], corners[other])
+        if squared < best:
+            best = squared
             weights[:] = 0.0
             weights[one] = 1 - at
             weights[other] += at
@@ -135,10 +135,10 @@ def nearest_members(
                     continue
                 for corner in range(1, 3):
                     _corner(response, one, other, shares[triangle, corner], corners[corner])
-                found = _on_triangle(corners, weights)
-                if found < out[i, j, p]:
-                    out[i, j, p] = found
-                    least = min(least, found)
+                nearest = _on_triangle(corners, weights)
+                if nearest < out[i, j, p]:
+                    out[i, j, p] = nearest
+                    least = min(least, nearest)
                     for k in range(2):
                         at[i, j, p, k] = cells[triangle, k]
                         where[i, j, p, k] = 0.0

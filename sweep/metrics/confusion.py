@@ -17,9 +17,9 @@ from ..camera.pixel import Pixel
 from ..spectra.lights import class_pairs
 
 FLOOR = 1e-18
-"""What tails that are left out may add to an error or to its bound."""
+"""Largest contribution of neglected tails to an error or to its bound."""
 _FAR = 14.0
-"""Standard deviations beyond which what a pixel reads is left out."""
+"""Standard deviations beyond which readings of a pixel are left out."""
 _LEAST_BINS = 1e-4
 """Read noise below this, in bins, moves nothing into another bin."""
 _NATS = 0.25
@@ -76,13 +76,13 @@ def affordable(pixel: Pixel, channels: Sequence[IndexArray]) -> bool:
     (wide, sigma, n_bins), prnu = _bins(pixel), pixel.prnu
     most = math.ceil(pixel.well_e)
     electrons = min(most / max(1 - _FAR * prnu, 0.01), 100 * pixel.well_e + 1e5)
-    each = 2 * _FAR * math.sqrt(electrons) + 125  # counts of one gain
+    counts_of_gain = 2 * _FAR * math.sqrt(electrons) + 125  # counts of one gain
     gains = 2 * _FAR * 1.3 * math.sqrt(1 + prnu**2 * electrons) + 3 if prnu else 1
-    counts = min(most, 2 * _FAR * prnu * electrons + each) + 1
+    counts = min(most, 2 * _FAR * prnu * electrons + counts_of_gain) + 1
     reach = 2 * _FAR * sigma + 3
     bins = min(n_bins, counts * pixel.dn_per_e / wide + reach)
     pixels = max(len(pixels_of_channel) for pixels_of_channel in channels)
-    sums = 10 * gains * each + counts * reach + (64 / sigma * reach if sigma > _LEAST_BINS else 0)
+    sums = 10 * gains * counts_of_gain + counts * reach + (64 / sigma * reach if sigma > _LEAST_BINS else 0)
     return bins * pixels <= _MOST_BINS and sums + (bins * (pixels - 1)) ** 2 <= _MOST_SUMS
 
 
@@ -141,7 +141,7 @@ def errors(
     unknown = np.asarray(np.isnan(electrons).any(axis=(1, 2)))
     electrons = np.where(unknown[:, None, None], 0.0, np.minimum(electrons, 100 * pixel.well_e + 1e5))
     pairs = class_pairs(list(members))
-    found = {pair: np.empty(n_designs) for pair in pairs}
+    pair_errors = {pair: np.empty(n_designs) for pair in pairs}
     bounds = {pair: np.empty(n_designs) for pair in pairs}
     state = np.empty(n_designs)
     step = _NATS / len(channels)
@@ -157,14 +157,14 @@ def errors(
             sums = np.zeros(n_signals)
             for pair in pairs:
                 one, other = members[pair[0]], members[pair[1]]
-                both = overlap[np.ix_(one, other)]
+                overlaps_of_pair = overlap[np.ix_(one, other)]
                 for signals, axis in ((one, 1), (other, 0)):
-                    sums[signals] += both.sum(axis=axis)
-                worst = max(both.sum(axis=1).max(), both.sum(axis=0).max())
+                    sums[signals] += overlaps_of_pair.sum(axis=axis)
+                worst = max(overlaps_of_pair.sum(axis=1).max(), overlaps_of_pair.sum(axis=0).max())
                 bounds[pair][start + d] = min(worst + FLOOR, 1.0)
                 error = kernels.largest_error(overlap, one, other, *parts, logs, rows, step)
-                found[pair][start + d] = min(error + FLOOR, 0.5)
+                pair_errors[pair][start + d] = min(error + FLOOR, 0.5)
             state[start + d] = min(sums.max() + FLOOR, 1.0)
-    for values in (*found.values(), *bounds.values(), state):
+    for values in (*pair_errors.values(), *bounds.values(), state):
         values[unknown] = np.nan
-    return Errors(found, bounds, state)
+    return Errors(pair_errors, bounds, state)

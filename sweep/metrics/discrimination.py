@@ -46,7 +46,7 @@ def contrast_to_noise(mean: FloatArray, variance: FloatArray, first: IndexArray,
     ndarray of shape (n_designs,)
         Ratio; 0 for coincident points.
     """
-    found = np.empty(len(mean))
+    ratio = np.empty(len(mean))
     for block, _, difference, ours, theirs in _pairs(mean, variance, first, second):
         distance = _length(difference)
         nearest = distance == distance.min(axis=1, keepdims=True)
@@ -54,8 +54,8 @@ def contrast_to_noise(mean: FloatArray, variance: FloatArray, first: IndexArray,
         floor = _length(along * np.sqrt((ours + theirs) / 2))
         floor = np.where(nearest, floor, -1.0).max(axis=1)
         contrast = distance.min(axis=1)
-        found[block] = _ratio(contrast, floor)
-    return found
+        ratio[block] = _ratio(contrast, floor)
+    return ratio
 
 
 def detectability(mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
@@ -75,11 +75,11 @@ def detectability(mean: FloatArray, variance: FloatArray, first: IndexArray, sec
     ndarray of shape (n_designs,)
         d'.
     """
-    found = np.empty(len(mean))
+    smallest = np.empty(len(mean))
     for block, _, difference, ours, theirs in _pairs(mean, variance, first, second):
         z = _ratio(difference, np.sqrt((ours + theirs) / 2))
-        found[block] = _length(z).min(axis=1)
-    return found
+        smallest[block] = _length(z).min(axis=1)
+    return smallest
 
 
 def pairwise_error(
@@ -105,11 +105,11 @@ def pairwise_error(
     ndarray of shape (n_designs,)
         Probability; 0.5 for coincident points.
     """
-    found = np.empty((len(mean), len(first) * len(second)))
-    for block, both, difference, ours, theirs in _pairs(mean, variance, first, second):
-        seen = difference if shape is None else shape.seen(block, both, difference)
+    errors = np.empty((len(mean), len(first) * len(second)))
+    for block, pair, difference, ours, theirs in _pairs(mean, variance, first, second):
+        gaussian_difference = difference if shape is None else shape.gaussian_only(block, pair, difference)
         total = ours + theirs
-        z = _ratio(seen, np.sqrt(total))
+        z = _ratio(gaussian_difference, np.sqrt(total))
         shares = [np.divide(v, total, out=np.full_like(total, 0.5), where=total > 0) for v in (ours, theirs)]
         whole = _length(z)
         some = ~np.isinf(whole)
@@ -118,9 +118,9 @@ def pairwise_error(
         error = share_below(-np.where(some, whole * _ratio(whole, spread), np.inf))
         if shape is not None:
             error = np.maximum(error, _LEFT_OUT)
-            error = np.minimum(error, shape.bound(block, both, difference, total))
-        found[block] = error
-    return np.asarray(found.max(axis=1), dtype=float)
+            error = np.minimum(error, shape.bound(block, pair, difference, total))
+        errors[block] = error
+    return np.asarray(errors.max(axis=1), dtype=float)
 
 
 @dataclass(frozen=True)
@@ -158,7 +158,7 @@ class NoiseShape:
         noise = cls(read.gaussian.reshape(shape), read.reach_dn.reshape(shape))
         return read.mean.reshape(shape), read.variance.reshape(shape), noise
 
-    def seen(self, block: slice, both: _Both, difference: FloatArray) -> FloatArray:
+    def gaussian_only(self, block: slice, pair: _Both, difference: FloatArray) -> FloatArray:
         """Return the differences in channels with Gaussian noise at both points, 0 in others.
 
         Parameters
@@ -176,9 +176,9 @@ class NoiseShape:
             Differences, DN.
         """
         gaussian = self.gaussian[block]
-        return np.where(gaussian[:, both[0]] & gaussian[:, both[1]], difference, 0.0)
+        return np.where(gaussian[:, pair[0]] & gaussian[:, pair[1]], difference, 0.0)
 
-    def bound(self, block: slice, both: _Both, difference: FloatArray, total: FloatArray) -> FloatArray:
+    def bound(self, block: slice, pair: _Both, difference: FloatArray, total: FloatArray) -> FloatArray:
         """Return a bound on the error on either side of a plane, for independent pixels of any distribution.
 
         Chernoff's bound exp((L_a(s) + L_b(-s)) / 2) for some s > 0, with the normal S^-1 D, and Bennett's inequality
@@ -199,14 +199,14 @@ class NoiseShape:
         ndarray of shape (n, n_pairs)
             Bound.
         """
-        found = np.full(difference.shape[:2], np.inf)
+        bound = np.full(difference.shape[:2], np.inf)
         # Each design for itself: what stands beside it in a block changes nothing.
         some = ~self.gaussian[block].all(axis=(1, 2))
         if not some.any():
-            return found
+            return bound
         difference = difference[some]
         reach = self.reach_dn[block][some]
-        reach = np.maximum(reach[:, both[0]], reach[:, both[1]])
+        reach = np.maximum(reach[:, pair[0]], reach[:, pair[1]])
         total = np.maximum(total[some], _LEAST_VARIANCE)
         normal = difference / np.maximum(total, reach**2 / 50)  # a plane that suits terms as rare as Bennett allows
         apart = (normal * difference).sum(axis=-1)
@@ -215,8 +215,8 @@ class NoiseShape:
             x = s * normal * reach
             with np.errstate(over="ignore"):
                 least = np.minimum(least, (total / reach**2 * (np.expm1(x) - x)).sum(axis=-1) - s * apart)
-        found[some] = np.minimum(np.exp(least / 2) + _LEFT_OUT, 0.5)
-        return found
+        bound[some] = np.minimum(np.exp(least / 2) + _LEFT_OUT, 0.5)
+        return bound
 
 
 def error_bounds(
@@ -242,26 +242,29 @@ def error_bounds(
     state_bound : ndarray of shape (n_designs,)
         Bound over all types.
     """
-    each = {}
+    bounds = {}
     state = np.zeros(mean.shape[:2])
     for pair in class_pairs(list(members)):
         first, second = (members[name] for name in pair)
         sums = np.zeros(mean.shape[:2])
-        for block, both, difference, ours, theirs in _pairs(mean, variance, first, second):
+        for block, signals, difference, ours, theirs in _pairs(mean, variance, first, second):
             if noise is None:
                 overlap = np.exp(-_distance(difference, ours, theirs))
             else:
-                seen = noise.seen(block, both, difference)
-                alike = np.broadcast_to(ours, seen.shape)
-                gaussian = np.exp(-_distance(seen, alike, np.where(seen > 0, theirs, alike))) + _LEFT_OUT
-                sides = noise.bound(block, both, difference, ours + theirs)
+                gaussian_difference = noise.gaussian_only(block, signals, difference)
+                alike = np.broadcast_to(ours, gaussian_difference.shape)
+                gaussian = (
+                    np.exp(-_distance(gaussian_difference, alike, np.where(gaussian_difference > 0, theirs, alike)))
+                    + _LEFT_OUT
+                )
+                sides = noise.bound(block, signals, difference, ours + theirs)
                 overlap = np.minimum(gaussian, np.where(sides < 0.5, sides, 1.0))
             overlap = overlap.reshape(len(difference), len(first), len(second))
             sums[block, first] += overlap.sum(axis=2)
             sums[block, second] += overlap.sum(axis=1)
-        each[pair] = np.minimum(sums.max(axis=1), 1.0)
+        bounds[pair] = np.minimum(sums.max(axis=1), 1.0)
         state += sums
-    return each, np.minimum(state.max(axis=1), 1.0)
+    return bounds, np.minimum(state.max(axis=1), 1.0)
 
 
 def _distance(difference: FloatArray, ours: FloatArray, theirs: FloatArray) -> FloatArray:
@@ -271,9 +274,9 @@ def _distance(difference: FloatArray, ours: FloatArray, theirs: FloatArray) -> F
     and still a bound.
     """
     z = _ratio(difference, np.sqrt(ours + theirs))
-    both = (ours > 0) & (theirs > 0)
+    noisy = (ours > 0) & (theirs > 0)
     small, large = np.sqrt(np.minimum(ours, theirs)), np.sqrt(np.maximum(ours, theirs))
-    ratio = np.divide(small, large, out=np.ones_like(small), where=both)
+    ratio = np.divide(small, large, out=np.ones_like(small), where=noisy)
     # (Sa + Sb) / (2 sqrt(Sa Sb)) - 1 = (1 - r)^2 / (2 r) for r = sqrt(small / large): no digits are lost near 1.
     with np.errstate(over="ignore"):
         return np.asarray((z**2 / 4 + np.log1p((1 - ratio) ** 2 / (2 * ratio)) / 2).sum(axis=-1), dtype=float)

@@ -16,18 +16,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.types import FloatArray, IndexArray
-from ..designs.tolerance import Off, Tolerance
+from ..designs.tolerance import ProductionError, Tolerance
 from ..spectra.lights import Pair
 from ..spectra.members import Members
 from .members import PopulationImager
 from .separation import csd_name
 
 _PARTS, _PARTS_OF_BOTH = 101, 25
-"""Equal parts of the range of a tolerance, and of each where there are two; what is drawn is the middle of one."""
+"""Equal parts of the range of a tolerance, and of each where there are two; draws are middles of parts."""
 _NEAR = 0.1
 """Of the draws that may have less: the share of them whose mean is taken."""
 _MISTAKEN = 0.05
-"""The chance that fewer than the wanted share of all lamps and cameras have what is told of a design."""
+"""The chance that fewer than the wanted share of all lamps and cameras reach the stated value of a design."""
 _HELD = 4_000_000
 """Values of responses that are held at once."""
 
@@ -38,7 +38,7 @@ class Draws:
 
     Parameters
     ----------
-    offs : tuple of Off
+    offs : tuple of ProductionError
         Production errors.
     starts : ndarray of int
         First draw of each production error, and the end.
@@ -50,7 +50,7 @@ class Draws:
         Field position, 0 to 1.
     """
 
-    offs: tuple[Off, ...]
+    offs: tuple[ProductionError, ...]
     starts: IndexArray
     below: IndexArray
     share: FloatArray
@@ -94,8 +94,8 @@ class Draws:
         n_cases, below, share = response.shape[-3], self.below[some], self.share[some]
         case = np.minimum((self.place[some] * n_cases).astype(np.intp), n_cases - 1)
         low, high = (response[..., case[:, None], below + step, :] for step in (0, 1))
-        both = low + share[..., None] * (high - low)
-        return np.asarray(both[..., 0, :] - both[..., 1, :], dtype=float)
+        lights = low + share[..., None] * (high - low)
+        return np.asarray(lights[..., 0, :] - lights[..., 1, :], dtype=float)
 
 
 def draws_of(members: Members, pair: Pair, tolerance: Tolerance, seed: Sequence[int]) -> Draws:
@@ -130,9 +130,9 @@ def draws_of(members: Members, pair: Pair, tolerance: Tolerance, seed: Sequence[
         signals = starts.size // widths
         at = np.minimum((chosen[:, side] * signals).astype(int), signals - 1)
         width = np.minimum((chosen[:, 2 + side] * widths).astype(int), widths - 1)
-        known = [members.drift_and_own(members.signal(int(row))) for row in starts[::widths]]
-        drifts, own = np.array([drift for drift, _ in known]), np.array([ends for _, ends in known])
-        nm = drifts[at] * warmer[:, side] + own[at, 0] + u[:, side] * (own[at, 1] - own[at, 0])
+        known = [members.drift_and_independent(members.signal(int(row))) for row in starts[::widths]]
+        drifts, independent = np.array([drift for drift, _ in known]), np.array([ends for _, ends in known])
+        nm = drifts[at] * warmer[:, side] + independent[at, 0] + u[:, side] * (independent[at, 1] - independent[at, 0])
         rows.append(starts[at * widths + width])
         steps.append(members.steps_of(nm))
     first, shifts = np.stack(rows, axis=1), np.stack(steps, axis=1)
@@ -143,7 +143,7 @@ def draws_of(members: Members, pair: Pair, tolerance: Tolerance, seed: Sequence[
     return Draws(offs, starts, (first + below)[order], (shifts - below)[order], place[order, 0])
 
 
-def _offs(tolerance: Tolerance, edge: FloatArray, film: FloatArray) -> tuple[tuple[Off, ...], IndexArray]:
+def _offs(tolerance: Tolerance, edge: FloatArray, film: FloatArray) -> tuple[tuple[ProductionError, ...], IndexArray]:
     """Return production errors, and which of them each draw has, from numbers in 0..1."""
     kinds = tolerance.edge_shift_nm > 0, tolerance.thickness > 0
     parts = _PARTS_OF_BOTH if all(kinds) else _PARTS
@@ -179,9 +179,9 @@ def rank_below(draws: int, share: float) -> int:
 class LampsAndCameras:
     """Draws of a scene for each two types; independent of those that count a yield."""
 
-    def __init__(self, seen: PopulationImager, tolerance: Tolerance, seed: int) -> None:
+    def __init__(self, population_imager: PopulationImager, tolerance: Tolerance, seed: int) -> None:
         """Store the scene with all members of its lights, the tolerance and the seed."""
-        self.seen, self._tolerance, self._seed = seen, tolerance, seed
+        self.population_imager, self._tolerance, self._seed = population_imager, tolerance, seed
         self._draws: dict[Pair, Draws] = {}
 
     def draws(self, pair: Pair) -> Draws:
@@ -198,7 +198,7 @@ class LampsAndCameras:
             The draws.
         """
         if pair not in self._draws:
-            self._draws[pair] = draws_of(self.seen.members, pair, self._tolerance, (self._seed, 2))
+            self._draws[pair] = draws_of(self.population_imager.members, pair, self._tolerance, (self._seed, 2))
         return self._draws[pair]
 
     def kept(self, curves: FloatArray, pairs: Sequence[Pair]) -> dict[Pair, tuple[float, IndexArray]]:
@@ -216,16 +216,22 @@ class LampsAndCameras:
         dict of pair to (float, ndarray of int)
             Distance, DN, and the draws whose mean it is; NaN where a response is NaN.
         """
-        imager = self.seen.imager
-        found = {pair: np.empty(self.draws(pair).size) for pair in pairs}
+        imager = self.population_imager.imager
+        distances_of = {pair: np.empty(self.draws(pair).size) for pair in pairs}
         step = max(
-            1, _HELD // (imager.n_cases * self.seen.setup.lights.photons.shape[0] * len(self.seen.setup.camera.qe))
+            1,
+            _HELD
+            // (
+                imager.n_cases
+                * self.population_imager.setup.lights.photons.shape[0]
+                * len(self.population_imager.setup.camera.qe)
+            ),
         )
         for start in range(0, len(curves), step):
             for off, response in enumerate(imager.smooth(curves[start : start + step]), start):
-                for pair, distances in found.items():
+                for pair, distances in distances_of.items():
                     self.draws(pair).distances(off, response, distances)
-        return {pair: self._of_share(distances) for pair, distances in found.items()}
+        return {pair: self._of_share(distances) for pair, distances in distances_of.items()}
 
     def _of_share(self, distances: FloatArray) -> tuple[float, IndexArray]:
         """Return the distance that the wanted share has, and the draws whose mean it is."""
@@ -235,7 +241,7 @@ class LampsAndCameras:
         return (float(distances[chosen].mean()) if np.isfinite(distances).all() else np.nan), chosen
 
     def columns(
-        self, made: Callable[[Off, slice], FloatArray], n_designs: int, pairs: Sequence[Pair]
+        self, made: Callable[[ProductionError, slice], FloatArray], n_designs: int, pairs: Sequence[Pair]
     ) -> dict[str, FloatArray]:
         """Return the distance that the wanted share has, for several designs.
 
@@ -254,20 +260,20 @@ class LampsAndCameras:
         dict of str to ndarray of shape (n_designs,)
             Distance, DN, by the name of the CSD.
         """
-        offs, setup = self.draws(pairs[0]).offs, self.seen.setup
+        offs, setup = self.draws(pairs[0]).offs, self.population_imager.setup
         step = max(1, _HELD // (len(offs) * max(1, len(setup.camera.modified)) * setup.camera.grid.size))
-        found: dict[str, list[float]] = {csd_name(pair): [] for pair in pairs}
+        columns: dict[str, list[float]] = {csd_name(pair): [] for pair in pairs}
         for start in range(0, n_designs, step):
             batch = slice(start, min(start + step, n_designs))
             for curves in np.stack([made(off, batch) for off in offs], axis=1):
                 for pair, (value, _) in self.kept(curves, pairs).items():
-                    found[csd_name(pair)].append(value)
-        return {name: np.array(values) for name, values in found.items()}
+                    columns[csd_name(pair)].append(value)
+        return {name: np.array(values) for name, values in columns.items()}
 
     @property
     def _ranks(self) -> tuple[int, int]:
         """Number of draws that may have less than the wanted share has, and number of them whose mean is taken."""
-        population = self.seen.members.population
+        population = self.population_imager.members.population
         assert population.wanted_yield is not None
         below = rank_below(population.draws, population.wanted_yield)
         return below, max(1, round(_NEAR * below))

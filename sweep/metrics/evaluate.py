@@ -19,15 +19,24 @@ from ..spectra.lights import class_pairs
 from ..vision.section import Vision
 from .columns.color_separation import ColorSeparation
 from .columns.exposure import EXPOSURE
-from .own import OwnMetric, own_quantities
-from .quantity import BEST_PLACE, Asked, Columns, DesignMetric, FamilyMetric, NoiseMetric, ReadoutMetric, VisionMetric
+from .quantity import (
+    BEST_PLACE,
+    Columns,
+    DesignMetric,
+    FamilyMetric,
+    NoiseMetric,
+    ReadoutMetric,
+    RequestedQuantities,
+    VisionMetric,
+)
 from .registry import METRICS, quantities_of
 from .separation import csd_name, separations, separations_along
+from .user_metrics import UserMetric, user_quantities
 
 _FINER_MOMENTS, _PULSE_ROUNDS, _PULSE_STEPS = 8, 3, 9
 """Factor by which moments of a pulse are finer at one phase; rounds in which the worst is refined; moments of each."""
 _AT_ONCE = 1024
-"""Designs that differ in one channel alone and are read at once, so that what they read stays in the cache."""
+"""Designs that differ in one channel alone and are read at once, so that their readout stays in the cache."""
 OTHERS = [metric for metric in METRICS if isinstance(metric, ReadoutMetric) and not isinstance(metric, ColorSeparation)]
 """Metrics that need the whole readout of every design."""
 _COMPARED_AT_ONCE = 1024
@@ -127,7 +136,7 @@ def _csds(model: ForwardModel, curves: FloatArray) -> FloatArray:
     return np.asarray(_by_phase(model, cases, model.n_cases)[0])
 
 
-def _bends_over_pulse(setup: Setup) -> bool:
+def _nonlinear_over_pulse(setup: Setup) -> bool:
     """Return whether a CSD may be smallest at any moment of a pulse: behind a readout that clips without rounding."""
     drive, steps = setup.scene.drive, setup.scene.noise is None and setup.computes("quantization")
     return drive is not None and setup.computes("flicker") and not setup.linear and not steps
@@ -187,7 +196,7 @@ def _refine_phases(model: ForwardModel, block: Block, columns: Columns) -> None:
         for number, name in enumerate(names):
             columns[name][design] = smallest[number]
             columns[BEST_PLACE + name][design] = -largest[number]
-            if _bends_over_pulse(setup):
+            if _nonlinear_over_pulse(setup):
                 for column, end in ((name, number), (BEST_PLACE + name, number + len(names))):
                     there = _over_pulse(model, curves, [number], at.subset(np.array([end])))[0]
                     columns[column][design] = min(columns[column][design], there)
@@ -212,14 +221,14 @@ def _refine_heights(model: ForwardModel, block: Block, cases: Columns, columns: 
 
 
 def _whole_readout(
-    model: ForwardModel, own: Sequence[OwnMetric], n: int, whole: Callable[[slice], FloatArray]
+    model: ForwardModel, own: Sequence[UserMetric], n: int, whole: Callable[[slice], FloatArray]
 ) -> Columns:
     """Columns of n designs by own metrics and those of `OTHERS`; `whole`: the readout of a part of the designs."""
     if not (own or OTHERS):
         return {}
     setup = model.setup
     # A CFA of which an own metric says nothing says so of one design, and no more are read for it.
-    first = own_quantities(own, setup, whole(slice(0, 1))) if own else {}
+    first = user_quantities(own, setup, whole(slice(0, 1))) if own else {}
     columns = {name: np.full(n, values[0]) for name, values in first.items()}
     present = [metric for metric in own if np.isfinite(first[metric.name][0])]
     if present or OTHERS:
@@ -228,7 +237,7 @@ def _whole_readout(
         for start in range(0, n, step):
             response = whole(slice(start, start + step))
             others = over_cases(model, by_case(response, setup.members, OTHERS)) if OTHERS else {}
-            parts.append(others | own_quantities(present, setup, response))
+            parts.append(others | user_quantities(present, setup, response))
         columns |= {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     return columns
 
@@ -276,14 +285,14 @@ def over_cases(imager: ForwardModel, cases: Columns) -> Columns:
     dict of str to ndarray of shape (n_designs,)
         Columns.
     """
-    quantities = quantities_of(Asked(imager.setup.lights.classes, any_place=True))
+    quantities = quantities_of(RequestedQuantities(imager.setup.lights.classes, any_place=True))
     best = {quantity.of: name for name, quantity in quantities.items() if quantity.extreme == "best place"}
     columns: Columns = {}
-    for name, each in cases.items():
-        if len(each) == 1:
-            columns |= {column: each[0].copy() for column in (name, best.get(name)) if column is not None}
+    for name, values in cases.items():
+        if len(values) == 1:
+            columns |= {column: values[0].copy() for column in (name, best.get(name)) if column is not None}
             continue
-        moments = quantities[name].worse(np.swapaxes(each.reshape(imager.n_cases, -1, each.shape[1]), 0, 1))
+        moments = quantities[name].worse(np.swapaxes(values.reshape(imager.n_cases, -1, values.shape[1]), 0, 1))
         columns[name] = quantities[name].worse(moments)
         if name in best:
             columns[best[name]] = moments.max(axis=0)
@@ -296,7 +305,7 @@ def evaluate(
     states: Sequence[str] = (),
     *,
     probabilities: bool = False,
-    own: Sequence[OwnMetric] = (),
+    own: Sequence[UserMetric] = (),
 ) -> Columns:
     """Evaluate a batch of designs as the camera reads them out.
 
@@ -314,7 +323,7 @@ def evaluate(
         Signal types that noise may confuse.
     probabilities : bool
         Compute their contrast detection probability.
-    own : sequence of OwnMetric
+    own : sequence of UserMetric
         Metrics of user code.
 
     Returns
@@ -339,7 +348,7 @@ def evaluate(
         )
     if setup.all_phases:
         _refine_phases(model, block, columns)
-    elif _bends_over_pulse(setup) and setup.scene.field is None:
+    elif _nonlinear_over_pulse(setup) and setup.scene.field is None:
         _refine_moments(model, block, columns)
     if setup.all_heights:
         _refine_heights(model, block, cases, columns)

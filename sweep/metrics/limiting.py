@@ -54,16 +54,18 @@ def limiting_lights(setup: Setup, response: FloatArray) -> LimitingLights:
     members = [setup.members[name] for name in setup.lights.classes]
     bounds = np.cumsum([0, *map(len, members)])
     pairs = class_pairs(setup.lights.classes)
-    found = np.empty((len(response), len(pairs), 2), dtype=np.intp)
+    nearest = np.empty((len(response), len(pairs), 2), dtype=np.intp)
     if pairs:
-        nearest_pairs(np.ascontiguousarray(response, dtype=float), np.concatenate(members), bounds, found)
-    return {pair: _named(setup, found[:, at]) for at, pair in enumerate(pairs)}
+        nearest_pairs(np.ascontiguousarray(response, dtype=float), np.concatenate(members), bounds, nearest)
+    return {pair: _named(setup, nearest[:, at]) for at, pair in enumerate(pairs)}
 
 
 def _named(setup: Setup, lights: IndexArray) -> NDArray[np.object_]:
     """Return the names of two lights each; empty for -1."""
-    each, which = np.unique(lights, axis=0, return_inverse=True)
-    names = [None if one < 0 else BETWEEN.join((setup.lights.names[one], setup.lights.names[two])) for one, two in each]
+    distinct, which = np.unique(lights, axis=0, return_inverse=True)
+    names = [
+        None if one < 0 else BETWEEN.join((setup.lights.names[one], setup.lights.names[two])) for one, two in distinct
+    ]
     return np.array(names, dtype=object)[which.reshape(-1)]
 
 

@@ -100,15 +100,15 @@ class PopulationImager:
             CSD by its name, DN; NaN where the response is NaN.
         """
         pairs = pairs or class_pairs(self.setup.lights.classes)
-        found = {pair: np.full(len(curves), np.nan) for pair in pairs}
+        smallest = {pair: np.full(len(curves), np.nan) for pair in pairs}
         step = max(1, _HELD // (self.imager.n_cases * self.setup.lights.photons.shape[0] * len(self.setup.camera.qe)))
         for start in range(0, len(curves), step):
             for index, response in enumerate(self.imager.smooth(curves[start : start + step]), start):
                 if np.isfinite(response).all():
                     for pair in pairs:
                         least = min(float(self.nearest(case, pair, alone=True).squared.min()) for case in response)
-                        found[pair][index] = np.sqrt(least)
-        return {csd_name(pair): values for pair, values in found.items()}
+                        smallest[pair][index] = np.sqrt(least)
+        return {csd_name(pair): values for pair, values in smallest.items()}
 
     def nearest(self, response: FloatArray, pair: Pair, *, parts: int = 1, alone: bool = False) -> NearestMembers:
         """Return the nearest members of two types.

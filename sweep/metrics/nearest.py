@@ -13,7 +13,7 @@ from ..base.types import FloatArray, IndexArray
 from ..designs.vectorized import smaller
 
 _NUMBERS = {"nnan", "nsz"}
-"""Lets the compiler take the smaller of several numbers at once; what NaN gives means nothing."""
+"""Lets the compiler compare several numbers at once; the result for NaN is undefined."""
 _LANES, _AT_ONCE = 64, 16
 """Designs side by side, and pairs between two looks at whether the rest may be left out."""
 

@@ -11,10 +11,10 @@ from pydantic import Field, GetJsonSchemaHandler, create_model, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from ..base.modules import made_in
+from ..base.modules import instances_in
 from ..base.types import FloatArray, Section
 from . import rules
-from .quantity import DECADES, Asked, Quantity
+from .quantity import DECADES, Quantity, RequestedQuantities
 from .registry import quantities_of
 from .rule import Rule
 from .rules.standard import Minimum
@@ -25,7 +25,7 @@ COMBINED = "objective"
 """Column of an objective that is not simply one of the quantities."""
 
 
-RULES: Mapping[str, Rule] = {rule.name: rule for rule in made_in(rules, Rule)}
+RULES: Mapping[str, Rule] = {rule.name: rule for rule in instances_in(rules, Rule)}
 """Every rule by its key in a study."""
 _FIELDS: dict[str, Any] = {name: (dict[str, Weight], {}) for name in RULES}
 
@@ -66,8 +66,8 @@ class Objective(create_model("_Rules", __base__=Section, **_FIELDS)):  # type: i
     @property
     def weights(self) -> Mapping[str, float]:
         """Weight of each quantity."""
-        found: Mapping[str, float] = getattr(self, self.rule.name)
-        return found
+        weights: Mapping[str, float] = getattr(self, self.rule.name)
+        return weights
 
     @property
     def column(self) -> str:
@@ -95,12 +95,12 @@ class Objective(create_model("_Rules", __base__=Section, **_FIELDS)):  # type: i
         return terms[0] if len(terms) == 1 and self.rule.wanted == "more" else self.rule.words(terms)
 
 
-def columns_of(asked: Asked, objective: Objective) -> Mapping[str, Quantity]:
+def columns_of(requested: RequestedQuantities, objective: Objective) -> Mapping[str, Quantity]:
     """Return the quantities of a study's result table.
 
     Parameters
     ----------
-    asked : Asked
+    requested : RequestedQuantities
         Requested quantities.
     objective : Objective
         Objective.
@@ -111,8 +111,8 @@ def columns_of(asked: Asked, objective: Objective) -> Mapping[str, Quantity]:
         Quantities of all metrics, and a combined objective, in order.
     """
     if objective.column != COMBINED:
-        return quantities_of(asked)
+        return quantities_of(requested)
     whole = Quantity(COMBINED, COMBINED, f"the study's objective: {objective}", wanted="more")
     if objective.rule.wanted == "less":
         whole = replace(whole, unit=DECADES, label=str(objective), digits=3, infinite=True)
-    return {**quantities_of(asked), COMBINED: whole}
+    return {**quantities_of(requested), COMBINED: whole}

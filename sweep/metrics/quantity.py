@@ -19,8 +19,8 @@ from ..designs.family import Family
 from ..spectra.lights import Pair
 from ..spectra.tasks import TaskName
 from ..vision.section import Vision
-from .own import OwnMetric
 from .smooth import Rows, SmoothDesign
+from .user_metrics import UserMetric
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
@@ -30,7 +30,7 @@ WORST = "worst_"
 the lights."""
 WORST_CASE: Literal["worst case"] = "worst case"
 YIELD = "yield_"
-"""How the name of what the wanted share of drawn lamps and cameras has begins."""
+"""Prefix of the columns of a yield: values that the wanted share of drawn lamps and cameras reaches."""
 OF_A_SHARE: Literal["yield"] = "yield"
 BEST_PLACE = "best_place_"
 """How the name of a CSD's largest value over the places where the light may fall on the mosaic begins, each at its
@@ -38,7 +38,7 @@ worst moment of a pulsed light."""
 HELD_OUT = "held_out_"
 """How the name of a CSD of lights that the study does not optimize for begins."""
 DN = "DN"
-"""Unit of what is measured in digital numbers."""
+"""Unit of digital numbers."""
 DECADES = "decades"
 """Unit of how far an error is below 1: its logarithm to base 10."""
 Columns = dict[str, FloatArray]
@@ -110,8 +110,8 @@ class Column:
         str
             Text.
         """
-        own = self.digits if digits is None else digits
-        return f"{value:.{own}f} {self.unit}" if self.unit else f"{value:.{self.digits}f}"
+        places = self.digits if digits is None else digits
+        return f"{value:.{places}f} {self.unit}" if self.unit else f"{value:.{self.digits}f}"
 
     def told(self, value: float) -> str:
         """Format a value for sentences and plots: in DN whole from 10 on.
@@ -128,7 +128,7 @@ class Column:
         """
         return self.amount(value, 0 if self.unit == DN and abs(value) >= 10 else None)
 
-    def told_bound(self, value: float) -> str:
+    def format_bound(self, value: float) -> str:
         """Format an upper bound, rounded up.
 
         Parameters
@@ -178,7 +178,7 @@ class Quantity(Column):
         It exists only with a modified channel, in some families, or for some CFAs.
     infinite, signed : bool
         It may be infinite, or negative.
-    promised : bool
+    has_error_bound : bool
         The error bound of a plan covers it.
     nominal : bool
         It has no worst case.
@@ -205,7 +205,7 @@ class Quantity(Column):
     needs: Literal["modified", "family", "own", ""] = ""
     infinite: bool = False
     signed: bool = False
-    promised: bool = False
+    has_error_bound: bool = False
     nominal: bool = False
     rows: Literal["values", "squares", "decades"] = "values"
     apart: Literal["", "DN", "noise"] = ""
@@ -226,7 +226,7 @@ class Quantity(Column):
     @property
     def column(self) -> Column:
         """The part that a run keeps."""
-        return Column(**{each.name: getattr(self, each.name) for each in fields(Column)})
+        return Column(**{column.name: getattr(self, column.name) for column in fields(Column)})
 
     def worst(self, over: Sequence[str]) -> Quantity:
         """Return the worst case of the quantity.
@@ -260,15 +260,15 @@ class Quantity(Column):
         Quantity
             Yield.
         """
-        told = f"{100 * share:.10g} %"
+        percent = f"{100 * share:.10g} %"
         meaning = (
-            f"at least {told} of the drawn lamps and cameras (`population`, `production`) have this `{self.name}`, and "
-            f"with 95 % confidence {told} of all, where the design was not chosen by the same draws: the mean of draws "
-            "of a rank so low, before clipping and rounding, with everything on; no limit is computed of it"
+            f"at least {percent} of the drawn lamps and cameras (`population`, `production`) have this `{self.name}`, "
+            f"and with 95 % confidence {percent} of all, where the design was not chosen by the same draws: the mean "
+            "of draws of a rank so low, before clipping and rounding, with all effects; it has no upper bound"
         )
-        label = f"{self.words} of {told} of drawn lamps and cameras"
+        label = f"{self.words} of {percent} of drawn lamps and cameras"
         named = replace(self, name=YIELD + self.name, meaning=meaning, label=label, extreme=OF_A_SHARE, of=self.name)
-        unknown = replace(named, apart="", linear=None, promised=False, smooth_members=None)
+        unknown = replace(named, apart="", linear=None, has_error_bound=False, smooth_members=None)
         return replace(unknown, rows="values", smooth=self.smooth_drawn, smooth_drawn=None)
 
     def value(self, rows: Rows) -> float:
@@ -321,7 +321,7 @@ class Quantity(Column):
 
 
 @dataclass(frozen=True)
-class Asked:
+class RequestedQuantities:
     """Quantities requested by a study.
 
     Parameters
@@ -336,7 +336,7 @@ class Asked:
         Tasks.
     probabilities, vision : bool
         Contrast detection probability; benchmark of vision.
-    own : tuple of OwnMetric
+    own : tuple of UserMetric
         Metrics of user code.
     brightest : str
         Curve whose light is 1, if there is no clear pixel.
@@ -351,7 +351,7 @@ class Asked:
     tasks: tuple[TaskName, ...] = ()
     probabilities: bool = False
     vision: bool = False
-    own: tuple[OwnMetric, ...] = ()
+    own: tuple[UserMetric, ...] = ()
     brightest: str = ""
 
 
@@ -361,12 +361,12 @@ class Metric(ABC):
     order: ClassVar[int]
 
     @abstractmethod
-    def quantities(self, asked: Asked) -> Sequence[Quantity]:
+    def quantities(self, requested: RequestedQuantities) -> Sequence[Quantity]:
         """Return the columns in a study.
 
         Parameters
         ----------
-        asked : Asked
+        requested : RequestedQuantities
             Requested quantities.
 
         Returns

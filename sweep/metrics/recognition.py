@@ -108,13 +108,13 @@ def recognize(
     """
     members = [imager.setup.members[name] for name in states]
     signals = np.concatenate(members)
-    state = np.repeat(np.arange(len(states)), [len(own) for own in members])
+    state = np.repeat(np.arange(len(states)), [len(type_signals) for type_signals in members])
     electrons = imager.pixel_electrons(curves)[0]
     place = rng.integers(len(electrons), size=(patches, len(signals)))
     truth = np.broadcast_to(state, place.shape)
     n_pixels = electrons.shape[2]
-    seen = np.sort(rng.permutation(n_pixels)[:_MOST_PIXELS])
-    drawn = np.empty((*place.shape, seen.size), dtype=np.float32)  # [patches, n_signals, pixels that are seen]
+    chosen_pixels = np.sort(rng.permutation(n_pixels)[:_MOST_PIXELS])
+    drawn = np.empty((*place.shape, chosen_pixels.size), dtype=np.float32)  # [patches, n_signals, pixels that are seen]
     said = np.empty(place.shape, dtype=state.dtype)
     read = imager.read_with_noise(curves)
     mean = read.mean[0][:, signals]  # [n_places, n_signals, n_channels]
@@ -122,12 +122,12 @@ def recognize(
     step = max(1, _AT_ONCE // (len(signals) * n_pixels))
     for block in (slice(start, start + step) for start in range(0, patches, step)):
         whole = draws_dn(electrons[place[block], signals], imager.readout.pixel, rng)
-        drawn[block] = whole[..., seen]
+        drawn[block] = whole[..., chosen_pixels]
         for at in np.unique(place[block]):
             here = place[block] == at
             values = imager.channels_of(whole[here], int(at) * imager.n_cases // len(mean))  # [n, n_channels]
             said[block][here] = state[_likeliest(values, mean[at], variance[at])]
-    found = dict(_accuracy(MOST_LIKELY, truth, said))
+    accuracy = dict(_accuracy(MOST_LIKELY, truth, said))
     half = patches // 2
     train, test = (part.reshape(-1, part.shape[-1]) for part in (drawn[:half], drawn[half:]))
     for name, classifier in CLASSIFIERS.items():
@@ -135,8 +135,8 @@ def recognize(
             taken_for = classifier(train, truth[:half].ravel(), test)
         else:  # every pixel of every patch reads the same
             taken_for = np.zeros(len(test), dtype=np.intp)
-        found |= dict(_accuracy(name, truth[half:].ravel(), taken_for))
-    return found
+        accuracy |= dict(_accuracy(name, truth[half:].ravel(), taken_for))
+    return accuracy
 
 
 def _likeliest(values: FloatArray, mean: FloatArray, variance: FloatArray) -> IndexArray:

@@ -5,23 +5,23 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import lru_cache
 
-from ..base.modules import made_in
+from ..base.modules import instances_in
 from . import columns
-from .quantity import Asked, Metric, Quantity
+from .quantity import Metric, Quantity, RequestedQuantities
 
 EDGES = "edges that production shifts"
 POPULATION = "the population of the lights, before clipping and rounding"
 
-METRICS = tuple(sorted(made_in(columns, Metric), key=lambda metric: metric.order))
+METRICS = tuple(sorted(instances_in(columns, Metric), key=lambda metric: metric.order))
 """All metrics in the order of their columns."""
 
 
-def listed(asked: Asked) -> list[Quantity]:
+def listed(requested: RequestedQuantities) -> list[Quantity]:
     """Return the columns of a study in order, worst cases and yields last.
 
     Parameters
     ----------
-    asked : Asked
+    requested : RequestedQuantities
         Requested quantities.
 
     Returns
@@ -29,30 +29,30 @@ def listed(asked: Asked) -> list[Quantity]:
     list of Quantity
         Columns; names of pairs may coincide.
     """
-    found = [quantity for metric in METRICS for quantity in metric.quantities(asked)]
-    worst = [own for quantity in found if (own := _worst(quantity, asked)) is not None]
-    drawn = [quantity for quantity in found if asked.wanted_yield and quantity.smooth_drawn is not None]
-    return [*found, *worst, *(quantity.of_share(asked.wanted_yield) for quantity in drawn)]
+    quantities = [quantity for metric in METRICS for quantity in metric.quantities(requested)]
+    worst = [worst_case for quantity in quantities if (worst_case := _worst(quantity, requested)) is not None]
+    drawn = [quantity for quantity in quantities if requested.wanted_yield and quantity.smooth_drawn is not None]
+    return [*quantities, *worst, *(quantity.of_share(requested.wanted_yield) for quantity in drawn)]
 
 
-def _worst(quantity: Quantity, asked: Asked) -> Quantity | None:
+def _worst(quantity: Quantity, requested: RequestedQuantities) -> Quantity | None:
     """Return the worst case of a quantity that may be maximized, over edges and over the population of lights."""
-    over = [EDGES] if asked.edge_shift else []
-    seen = quantity.smooth_members if asked.population else None
-    if seen is not None:
+    over = [EDGES] if requested.edge_shift else []
+    smooth_over_members = quantity.smooth_members if requested.population else None
+    if smooth_over_members is not None:
         over.append(POPULATION)
     if not quantity.goal or quantity.nominal or not over:
         return None
-    return replace(quantity.worst(over), smooth=quantity.smooth if seen is None else seen)
+    return replace(quantity.worst(over), smooth=quantity.smooth if smooth_over_members is None else smooth_over_members)
 
 
 @lru_cache(maxsize=64)
-def quantities_of(asked: Asked) -> dict[str, Quantity]:
+def quantities_of(requested: RequestedQuantities) -> dict[str, Quantity]:
     """Return the columns of a study by name.
 
     Parameters
     ----------
-    asked : Asked
+    requested : RequestedQuantities
         Requested quantities.
 
     Returns
@@ -60,4 +60,4 @@ def quantities_of(asked: Asked) -> dict[str, Quantity]:
     dict of str to Quantity
         Columns in order.
     """
-    return {quantity.name: quantity for quantity in listed(asked)}
+    return {quantity.name: quantity for quantity in listed(requested)}

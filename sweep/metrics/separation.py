@@ -199,8 +199,8 @@ def _pairs_apart(others: FloatArray, members: Mapping[str, IndexArray]) -> _Apar
         apart, first, second = (np.concatenate(parts) for parts in zip(*nearest, strict=True))
         return apart, first, second, starts
 
-    own = [np.array([len(others), *map(len, members.values())]), *members.values(), np.ascontiguousarray(others)]
-    return _apart.get(hashlib.sha256(b"".join(part.tobytes() for part in own)).digest(), made)
+    key_parts = [np.array([len(others), *map(len, members.values())]), *members.values(), np.ascontiguousarray(others)]
+    return _apart.get(hashlib.sha256(b"".join(part.tobytes() for part in key_parts)).digest(), made)
 
 
 def cfa_sensitivity(total_qe: FloatArray, counts: IndexArray, clear_qe: FloatArray) -> FloatArray:

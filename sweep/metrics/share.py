@@ -30,7 +30,7 @@ def share_interval(kept: int, n: int) -> tuple[float, float]:
     return max(0.0, (middle - half) / (1 + z)), min(1.0, (middle + half) / (1 + z))
 
 
-def told_share(share: float, digits: int = 1) -> str:
+def format_share(share: float, digits: int = 1) -> str:
     """Format a share in percent, with more digits where rounding would give 0 or 100 %.
 
     Parameters

@@ -111,7 +111,7 @@ class Rows:
         """True if all values and derivatives are finite."""
         return bool(np.isfinite(self.values).all() and np.isfinite(self.by_u).all())
 
-    def cleaned(self) -> Rows:
+    def clean_file(self) -> Rows:
         """Return the rows with zeros for NaN and infinity.
 
         Returns
@@ -163,8 +163,8 @@ class SmoothDesign:
         """
         if key not in self._made:
             self._made[key] = make()
-        found: Made = self._made[key]
-        return found
+        value: Made = self._made[key]
+        return value
 
     @cached_property
     def _response(self) -> tuple[FloatArray, FloatArray]:
@@ -244,8 +244,8 @@ class SmoothDesign:
         values, slopes = [], []
         for case in range(len(response)):
             known = bool(np.isfinite(response[case]).all())
-            own = response[case] if known else np.zeros_like(response[case])
-            near = self._members.nearest(own, pair, parts=self._members.parts)
+            base = response[case] if known else np.zeros_like(response[case])
+            near = self._members.nearest(base, pair, parts=self._members.parts)
             apart = near.of(response[case], 0) - near.of(response[case], 1)
             slope = near.of(by_u[:, case], 0) - near.of(by_u[:, case], 1)
             some = np.isfinite(near.squared)
@@ -267,18 +267,18 @@ class SmoothDesign:
             Rows.
         """
         assert self._drawn is not None
-        draws, imager = self._drawn.draws(pair), self._drawn.seen.imager
-        made = [self.family.produced(off) if any(off) else self.family for off in draws.offs]
+        draws, imager = self._drawn.draws(pair), self._drawn.population_imager.imager
+        made = [self.family.perturbed(off) if any(off) else self.family for off in draws.offs]
         curves = np.stack([family.curves(self.x[None])[0] for family in made])
         value, chosen = self._drawn.kept(curves, [pair])[pair]
         slope = np.zeros(self._free.size)
         if np.isfinite(value):
             which = np.searchsorted(draws.starts, chosen, side="right") - 1
             for off in np.unique(which):
-                some, own = chosen[which == off], curves[off]
-                apart = draws.apart(some, imager.smooth(own[None])[0])
+                some, design_curves = chosen[which == off], curves[off]
+                apart = draws.apart(some, imager.smooth(design_curves[None])[0])
                 by_u = made[off].gradient(self.x)[self._free] * self._span[:, None, None]
-                slopes = (draws.apart(some, imager.gradient(own, by_u)) * apart).sum(axis=-1)
+                slopes = (draws.apart(some, imager.gradient(design_curves, by_u)) * apart).sum(axis=-1)
                 length = np.linalg.norm(apart, axis=-1)
                 slope += np.divide(slopes, length, out=np.zeros_like(slopes), where=length > 0).sum(axis=1)
         return Rows(np.array([value]), slope[None] / chosen.size)

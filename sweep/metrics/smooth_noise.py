@@ -233,6 +233,6 @@ def smooth_detectability(setup: Setup, curves: FloatArray, pair: Pair) -> FloatA
     """
     imager = linear_model(setup)
     mean, variance = imager.smooth(curves), imager.variance(curves)
-    both = setup.members[pair[0]], setup.members[pair[1]]
-    over = [detectability(mean[:, case], variance[:, case], *both) for case in range(mean.shape[1])]
+    members = setup.members[pair[0]], setup.members[pair[1]]
+    over = [detectability(mean[:, case], variance[:, case], *members) for case in range(mean.shape[1])]
     return np.asarray(np.min(over, axis=0), dtype=float)

@@ -5,7 +5,7 @@ Names are loaded at their first use: a worker that draws needs few of them.
 
 from typing import TYPE_CHECKING
 
-from ..base.modules import loaded_later
+from ..base.modules import lazy_import
 
 if TYPE_CHECKING:
     from ..results.designs import check_kept, study_of
@@ -21,7 +21,7 @@ __all__ = [
     "study_of",
     "summary_lines",
 ]
-__getattr__ = loaded_later(
+__getattr__ = lazy_import(
     globals(),
     {
         "Output": "..results.output",

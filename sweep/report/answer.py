@@ -19,7 +19,14 @@ from .lamps import lamp_lines, over_population, robustness_lines
 from .leaders import Leaders, Row, capital, full_name, label, leaders_of, of_reference, upper_bound_beside
 from .noise import usable_lines
 from .series import lead_sentence, leads_of, series_figures
-from .terms import assumed, constraints_told, missed_told, moves_with_light, technology_of, unknown_lines
+from .terms import (
+    assumed_technology,
+    format_constraints,
+    format_missed_constraints,
+    is_angle_dependent,
+    technology_of,
+    unknown_lines,
+)
 
 _MOST_SCENARIOS = 6
 """Scenarios beside the leading one whose best design the answer names."""
@@ -54,9 +61,9 @@ def _of_designs(output: Output) -> list[str]:
         failed = searched[searched["status"] != "ok"]
         if len(failed) == len(searched):
             return [f"Every design failed: {failed['status'].iloc[0]}."]
-        under = constraints_told(output)
+        under = format_constraints(output)
         none = f"No design meets every constraint{f': {under}' if under else ''}."
-        return [none, *unknown_lines(output), *who_else(output)]
+        return [none, *unknown_lines(output), *largest_separation_elsewhere(output)]
     usable = list(usable_lines(output))
     # Where the question is of noise, separations matter where another CFA begins to lead.
     series = usable + [lead_sentence(s) for s in series_figures(output) if not usable or len(leads_of(s)) > 1]
@@ -65,10 +72,17 @@ def _of_designs(output: Output) -> list[str]:
     leaders = leaders_of(output)
     lamps = robustness_lines(output, leaders.chosen)
     others = _best_of_other_scenarios(output)
-    return [*_best(output, leaders), *others, *lamps, *lamp_lines(output), *who_else(output), *series]
+    return [
+        *_best(output, leaders),
+        *others,
+        *lamps,
+        *lamp_lines(output),
+        *largest_separation_elsewhere(output),
+        *series,
+    ]
 
 
-def _said_separation(output: Output, row: Row) -> str:
+def _format_separation(output: Output, row: Row) -> str:
     """Return the separation of a row and its light in words."""
     separation = output.trade_off[0]
     amount = separation.told(row[separation.name])
@@ -96,14 +110,14 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
         if len(output.scenarios) > 1:
             yield f"In {leaders.scenario}, no design meets every constraint."
         return
-    under, stated = constraints_told(output), technology_of(output, best)
+    under, stated = format_constraints(output), technology_of(output, best)
     who = full_name(best) + ("" if stated is None else f" ({stated.told})")
     if best["kind"] in (PLAIN, NAMED):
         who = f"the best {'CFA' if best['kind'] == PLAIN else 'design'} of this study, {who},"
     text = f"With {under}, {who}" if under else capital(who)
     if output.goal.name not in (separation.name, separation.of):
         text += f" has the best {output.goal.words}, {output.goal.amount(best[output.goal.name])}, and"
-    text += f" {_said_separation(output, best)}"
+    text += f" {_format_separation(output, best)}"
     held_out = float(best.get(HELD_OUT + (separation.of or separation.name), np.nan))
     if np.isfinite(held_out):
         text += f" ({separation.told(held_out)} on lights that it has not seen)"
@@ -114,7 +128,7 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
             values = [f"{float(row[name]):.3g} {output.columns[name].unit}".rstrip() for row in rows]
             beside = f" ({plain['name']} {values[1]})" if plain is not None else ""
             yield f"Its {output.words(name)} is {values[0]}{beside}."
-    if filter_told := assumed(output, best):
+    if filter_told := assumed_technology(output, best):
         yield filter_told
     if limits := _limits(output, best):
         yield limits
@@ -124,7 +138,7 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
         if row["kind"] != FOUND:
             same = " that meets the same" if output.constraints else ""
             name = f"the best of {row['cfa']}{same}, {label(row)},"
-        yield f"{capital(name)} {_said_separation(output, row)}{_limited_told(output, row)}."
+        yield f"{capital(name)} {_format_separation(output, row)}{_format_limit(output, row)}."
 
 
 def _limits(output: Output, best: Row) -> str:
@@ -137,11 +151,11 @@ def _limits(output: Output, best: Row) -> str:
         parts.append(f"The two lights that limit it are {lights}.")
     bound, search = upper_bound_beside(output, best), output.provenance.search
     if bound is not None and search is not None:
-        alike = " that moves like it" if moves_with_light(output, best) else ""
+        alike = " that moves like it" if is_angle_dependent(output, best) else ""
         same = "the same constraints" if output.constraints else "no constraint"
         parts.append(
             f"Upper bound for any filter{alike} in {search.channel} of {search.cfa} under {same}"
-            f"{_in(output, search.scenario)}: {output.trade_off[0].told_bound(bound)} "
+            f"{_in(output, search.scenario)}: {output.trade_off[0].format_bound(bound)} "
             "(proven, before quantization)."
         )
     return " ".join(parts)
@@ -158,7 +172,7 @@ def _best_of_other_scenarios(output: Output) -> Iterator[str]:
             yield f"In {scenario}, no design meets every constraint."
         else:
             against = _times(output, best, leaders.plain)
-            yield f"In {scenario}, {full_name(best)} {_said_separation(output, best)}{against}."
+            yield f"In {scenario}, {full_name(best)} {_format_separation(output, best)}{against}."
     if left := len(output.scenarios) - 1 - len(others[:_MOST_SCENARIOS]):
         yield f"Of {left} more scenario{'s' if left > 1 else ''}, the report's tables have the best designs."
 
@@ -171,7 +185,7 @@ def _limited(output: Output, row: Row) -> str:
     return lights if isinstance(lights, str) and of_two else ""
 
 
-def _limited_told(output: Output, row: Row) -> str:
+def _format_limit(output: Output, row: Row) -> str:
     lights = _limited(output, row)
     return f" (limited by {lights})" if lights else ""
 
@@ -192,7 +206,7 @@ def _times(output: Output, best: Row, plain: Row | None) -> str:
     return f": {best[separation.name] / of:.2f} times {what} of {name} ({separation.told(of)}) and {times}"
 
 
-def who_else(output: Output) -> list[str]:
+def largest_separation_elsewhere(output: Output) -> list[str]:
     """Return the design with the largest separation, if it is not the best one, and the constraints that it violates.
 
     Parameters
@@ -216,9 +230,9 @@ def who_else(output: Output) -> list[str]:
         leads = most["design_id"] == best["design_id"] and best["kind"] in (SWEPT, FOUND)
         return [f"Nothing else in this run {more}{where}."] if leads else []
     figures = f"{separation.told(most[separation.name])} at {most[CFA_SENSITIVITY]:.3f} {of_reference(output)}"
-    missed = "" if most["kind"] == PLAIN else missed_told(output, most)  # nothing is asked of a plain CFA
+    missed = "" if most["kind"] == PLAIN else format_missed_constraints(output, most)  # nothing is asked of a plain CFA
     ending = f", but {missed}" if missed else ""
-    return [f"{capital(full_name(most))} {verb} of all{where}: {figures}{_limited_told(output, most)}{ending}."]
+    return [f"{capital(full_name(most))} {verb} of all{where}: {figures}{_format_limit(output, most)}{ending}."]
 
 
 _RESAMPLES = 10_000
@@ -276,7 +290,7 @@ def generalization_gap(falls: FloatArray, seed: int) -> tuple[float, float, floa
     return float(falls.mean()), float(low), float(high)
 
 
-def large_numbers(output: Output) -> list[tuple[str, str, str]]:
+def headline_numbers(output: Output) -> list[tuple[str, str, str]]:
     """Return separation, light and distance to the upper bound of the best design, with a comparison.
 
     Without a bound, its separation per exposure. Without a best design there are none.
@@ -296,13 +310,13 @@ def large_numbers(output: Output) -> list[tuple[str, str, str]]:
     if best is None:
         return []
 
-    def beside(column: str, told: Callable[[float], str]) -> str:
+    def beside(column: str, formatted: Callable[[float], str]) -> str:
         """Return a value as a multiple of that of a plain CFA."""
         if plain is None or not float(plain[column]) > 0:
             return ""
         if column == separation.name and separation.unit == DECADES:  # a ratio of logarithms says nothing
-            return f"{plain['name']} {told(float(plain[column]))}"
-        return f"{best[column] / plain[column]:.2f} times {plain['name']} ({told(float(plain[column]))})"
+            return f"{plain['name']} {formatted(float(plain[column]))}"
+        return f"{best[column] / plain[column]:.2f} times {plain['name']} ({formatted(float(plain[column]))})"
 
     value, measure = float(best[separation.name]), per_exposure(separation.name)
     numbers = [
@@ -311,7 +325,7 @@ def large_numbers(output: Output) -> list[tuple[str, str, str]]:
     ]
     bound, search = upper_bound_beside(output, best), output.provenance.search
     if bound is not None and search is not None:
-        shown = f"{separation.told_bound(bound)}: proven under the same constraints, before quantization"
+        shown = f"{separation.format_bound(bound)}: proven under the same constraints, before quantization"
         name = f"below the upper bound for any filter in {search.channel} of {search.cfa}"
         numbers.append((separation.told(bound - value), name, shown))
     elif best[measure] == best[measure] and separation.unit != DECADES and separation.metric not in (D_PRIME, CNR):

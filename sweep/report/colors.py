@@ -39,9 +39,9 @@ def error_curves(output: Output) -> dict[str, pd.DataFrame]:
     dict of str to pandas.DataFrame
         Curves by light.
     """
-    if output.traded is None:
+    if output.error_against_noise is None:
         return {}
-    rows = output.traded[output.traded["scenario"] == output.scenarios[0]]
+    rows = output.error_against_noise[output.error_against_noise["scenario"] == output.scenarios[0]]
     return {str(light): curves for light, curves in rows.groupby("light", sort=False)}
 
 

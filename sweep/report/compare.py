@@ -12,12 +12,12 @@ from pathlib import Path
 
 import pandas as pd
 
-from ..base.errors import Fault, OutputError, SweepError
+from ..base.errors import OutputError, SweepError, ValidationIssue
 from ..results.atomic import write_bytes, write_text
 from ..results.output import Output, read_output
 from ..results.tables import write_csv
 from ..study import folder_name
-from .answer import who_else
+from .answer import largest_separation_elsewhere
 from .compare_fronts import draw_fronts, fronts_in, hypervolumes, on_the_same_axes
 from .compare_tables import (
     best_of_runs,
@@ -30,7 +30,7 @@ from .compare_tables import (
 )
 from .figures import Drawing, pictures_of
 from .pages import aligned, inlined, page, rows
-from .terms import constraint_told
+from .terms import format_constraint
 
 Areas = tuple[str, pd.DataFrame]
 """The box of the hypervolumes in words, and a row per front."""
@@ -79,14 +79,14 @@ def compare_runs(folders: Sequence[Path], to: Path | None) -> Comparison:
     """
     if not 2 <= len(folders) <= len(_LETTERS):
         allowed = f"2 to {len(_LETTERS)} folders"
-        raise SweepError(Fault("cannot be compared", None, None, "FOLDERS", len(folders), allowed))
+        raise SweepError(ValidationIssue("cannot be compared", None, None, "FOLDERS", len(folders), allowed))
     target = to or Path("outputs") / _folder_of(folders)
     _refuse_other(target)
     outputs = [read_output(folder) for folder in folders]
     runs = {f"{letter} {' '.join(o.study.study.split())}": o for letter, o in zip(_LETTERS, outputs, strict=False)}
     areas, figure, notes = compare_fronts(runs)
     answer = [*ranking(runs), *_largest(areas)]
-    answer += [f"{run}: {line}" for run, output in runs.items() for line in who_else(output)]
+    answer += [f"{run}: {line}" for run, output in runs.items() for line in largest_separation_elsewhere(output)]
     notes = [*_same_folders(runs), *curve_notes(runs), *_constraint_note(runs), *notes]
     best = best_of_runs(runs)
     shown, left_out = side_by_side(best, runs)
@@ -182,20 +182,20 @@ def _largest(areas: Mapping[str, Areas]) -> list[str]:
 
 
 def _same_folders(runs: Mapping[str, Output]) -> list[str]:
-    places: dict[Path, list[str]] = {}
+    runs_of_folder: dict[Path, list[str]] = {}
     for run, output in runs.items():
-        places.setdefault(output.folder.resolve(), []).append(run)
-    return [f"{' and '.join(names)} are the same folder." for names in places.values() if len(names) > 1]
+        runs_of_folder.setdefault(output.folder.resolve(), []).append(run)
+    return [f"{' and '.join(names)} are the same folder." for names in runs_of_folder.values() if len(names) > 1]
 
 
 def _constraint_note(runs: Mapping[str, Output]) -> list[str]:
-    asked = {
-        run: " and ".join(constraint_told(output, *bound) for bound in sorted(output.constraints.items())) or "none"
+    requested = {
+        run: " and ".join(format_constraint(output, *bound) for bound in sorted(output.constraints.items())) or "none"
         for run, output in runs.items()
     }
-    if len(set(asked.values())) < 2:
+    if len(set(requested.values())) < 2:
         return []
-    return [f"The best designs meet different constraints ({'; '.join(f'{r}: {c}' for r, c in asked.items())})."]
+    return [f"The best designs meet different constraints ({'; '.join(f'{r}: {c}' for r, c in requested.items())})."]
 
 
 def _folder_of(folders: Sequence[Path]) -> str:
@@ -214,10 +214,12 @@ def _refuse_other(target: Path) -> None:
             if _MARK in handle.read(_MARK_WITHIN):
                 return
     except OSError:
-        pass  # what is there, if anything, is told below
+        pass  # a message about the file follows below
     for name in (PAGE, TABLE, *(f"{PICTURE}.{kind}" for kind in _KINDS)):
         if os.path.lexists(target / name):
-            raise OutputError(Fault("holds something else already", str(target / name), allowed="another --output"))
+            raise OutputError(
+                ValidationIssue("holds something else already", str(target / name), allowed="another --output")
+            )
 
 
 def _write_or_remove(content: bytes | None, path: Path) -> None:
@@ -228,7 +230,7 @@ def _write_or_remove(content: bytes | None, path: Path) -> None:
     try:
         path.unlink(missing_ok=True)
     except OSError as error:
-        raise OutputError(Fault(f"cannot be removed: {error.strerror or error}", str(path))) from None
+        raise OutputError(ValidationIssue(f"cannot be removed: {error.strerror or error}", str(path))) from None
 
 
 def _section(title: str, table: pd.DataFrame, otherwise: str) -> list[str]:

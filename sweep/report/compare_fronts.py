@@ -15,7 +15,7 @@ from ..base.types import FloatArray
 from ..metrics.objective import COMBINED
 from ..metrics.pareto import hypervolume
 from ..metrics.quantity import DN, WORST_CASE
-from ..metrics.share import told_share
+from ..metrics.share import format_share
 from ..results.output import Output
 from ..results.tables import FOUND
 from .figures import CURVE_CYCLE, canvas, legend_beside
@@ -193,7 +193,7 @@ def hypervolumes(fronts: Sequence[ComparedFront]) -> tuple[str, pd.DataFrame]:
                 "separation / DN": f"{low[0]:.1f} to {high[0]:.1f}",
                 "sensitivity": f"{low[1]:.4f} to {high[1]:.4f}",
                 "hypervolume": area,
-                "of the box": told_share(area / whole) if whole > 0 else "-",
+                "of the box": format_share(area / whole) if whole > 0 else "-",
             }
         )
     words = (

@@ -145,8 +145,8 @@ def ranking(runs: Mapping[str, Output]) -> list[str]:
     lines, groups = [], dict[tuple[str, str], dict[str, float]]()
     for run, output in runs.items():
         if output.best.empty:
-            asked = len(output.kind(SWEPT, FOUND)) > 0
-            lines.append(f"{run} has no {'feasible design' if asked else 'design that was swept or searched'}.")
+            requested = len(output.kind(SWEPT, FOUND)) > 0
+            lines.append(f"{run} has no {'feasible design' if requested else 'design that was swept or searched'}.")
         else:
             groups.setdefault(_maximized(output), {})[run] = float(output.best.iloc[0][output.goal.name])
     ranked = []

@@ -23,7 +23,7 @@ COLORS = {
     "reference": "#7a7a7a",
     "limit": "#009e73",
 }
-"""Okabe and Ito's palette, which the color-blind can tell apart; every group has a marker of its own, too."""
+"""Okabe and Ito's palette, distinguishable by color-blind readers; every group has a marker of its own, too."""
 CURVE_COLORS = {
     "R": "#d62728",
     "Rx": "#8c2d04",
@@ -42,7 +42,7 @@ _DPI = 160
 _COMPRESSION = 3
 """Compression level of a PNG: at its usual 6 a file is a tenth smaller and takes twice as long."""
 Drawing = Callable[[], "Figure"]
-"""A drawing that is put off: a process that draws nothing need not load what draws."""
+"""A delayed drawing: a process that draws nothing does not load matplotlib."""
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from ..metrics.quantity import DN, WORST, WORST_CASE
-from ..metrics.share import told_share
+from ..metrics.share import format_share
 from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN
 from ..spectra.color import NORM_NAMES
@@ -74,7 +74,7 @@ def robustness_lines(output: Output, best: Row | None) -> Iterator[str]:
     shares = []
     for row in rows:
         if np.isfinite(row.get("yield", np.nan)):
-            share, low, high = (told_share(row[name], 2) for name in ("yield", "yield_low", "yield_high"))
+            share, low, high = (format_share(row[name], 2) for name in ("yield", "yield_low", "yield_high"))
             name = "the search's answer" if row["kind"] == FOUND else row["name"]
             shares.append(f"{name} {share} ({low} to {high})")
     if shares:
@@ -215,10 +215,10 @@ def lamp_lines(output: Output) -> Iterator[str]:
         shown = chosen[0] if chosen else max(designs, key=lambda one: one.share)
         plain = [one for one in designs if one.row["kind"] == PLAIN and one is not shown]
         beside = max(plain, key=lambda one: one.share, default=None)
-        rival = "" if beside is None else f", {full_name(beside.row)} {told_share(beside.share)}"
+        rival = "" if beside is None else f", {full_name(beside.row)} {format_share(beside.share)}"
         yield (
             f"Of all {shown.pairs:,} pairs of a yellow and a red LED that {norm} allows, "
-            f"{full_name(shown.row)} keeps {told_share(shown.share)} at least {regions.wanted_dn:g} {DN} "
+            f"{full_name(shown.row)} keeps {format_share(shown.share)} at least {regions.wanted_dn:g} {DN} "
             f"apart{rival}; its nearest are {shown.led('yellow')} and {shown.led('red')}, {shown.distance}."
         )
     peaks, widths = (f"{low:g} to {high:g} nm" for low, high in (regions.peak_nm, regions.fwhm_nm))
@@ -246,7 +246,7 @@ def lamp_table(output: Output) -> pd.DataFrame:
             "norm": norm,
             "design": label(one.row),
             "pairs": f"{one.pairs:,}",
-            "separated": told_share(one.share),
+            "separated": format_share(one.share),
             "nearest yellow": one.led("yellow"),
             "nearest red": one.led("red"),
             "their distance": one.distance,
@@ -289,7 +289,7 @@ def _draw(maps: Sequence[LampMap], title: str, wanted_dn: float) -> Figure:
         if min(dn.shape) > 1 and np.nanmin(dn) < wanted_dn <= np.nanmax(dn):
             axes.contour(red, yellow, dn, levels=[wanted_dn], colors="white", linewidths=1.4)
         axes.plot(one.nearest["red_nm"], one.nearest["yellow_nm"], "x", color="#d55e00", markersize=8, clip_on=False)
-        axes.set_title(f"{label(one.row)}: {told_share(one.share)}, nearest {one.distance}", fontsize=9)
+        axes.set_title(f"{label(one.row)}: {format_share(one.share)}, nearest {one.distance}", fontsize=9)
     figure.supxlabel("peak of the red LED / nm", fontsize=9)
     figure.supylabel("peak of the yellow LED / nm", fontsize=9)
     bar = figure.colorbar(drawn, ax=panels, label=f"smallest CSD / {DN}")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from ..base.errors import BrokenProofError, Fault
+from ..base.errors import UpperBoundExceededError, ValidationIssue
 from ..metrics.quantity import DN
 from ..results.facts import SearchFacts
 from ..results.output import Output
@@ -199,7 +199,7 @@ def upper_bound_beside(output: Output, row: Row) -> float | None:
 
     Raises
     ------
-    BrokenProofError
+    UpperBoundExceededError
         If a value exceeds its bound by more.
     """
     search = upper_bound(output)
@@ -212,7 +212,7 @@ def upper_bound_beside(output: Output, row: Row) -> float | None:
         return bound
     if output.goal.unit == DN and value > bound + math.sqrt(len(output.mosaic(search.cfa).channels)):
         problem = f"broken proof: {label(row)} has {value:.9g} DN, but its upper bound is {bound:.9g} DN"
-        raise BrokenProofError(Fault(f"{problem}; this is a fault of the program, not of the study"))
+        raise UpperBoundExceededError(ValidationIssue(f"{problem}; this is an error of the program, not of the study"))
     return None
 
 

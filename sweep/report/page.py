@@ -20,7 +20,7 @@ from ..results.tables import FIGURES, FOUND, NAMED, PLAIN, REPORT, VISION_FIGURE
 from . import signal_figures as signals
 from . import tables
 from . import values as content
-from .answer import answer_sentences, large_numbers
+from .answer import answer_sentences, headline_numbers
 from .colors import color_drawings
 from .figures import Drawing, draw_curves, pictures_of
 from .lamps import lamp_drawings, lamp_table
@@ -34,7 +34,7 @@ from .sensor_map import map_drawings
 from .series import draw_series
 from .summary import counts_line, summary_lines
 from .tables import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
-from .terms import constraints_told, terms_of
+from .terms import format_constraints, terms_of
 from .trade_off import draw_trade_off, overview_figure, pareto_figure, traded_cfas
 
 _FIRST_LINES, _FIRST_LEADS = 1, 2
@@ -49,14 +49,14 @@ _SHOWN = {
 """Places of the page -> how the names of the pictures there begin; the page draws all other figures itself."""
 
 
-def make_report(output: Output, *, mend: bool = False, parallel: Parallel = in_turn) -> None:
+def make_report(output: Output, *, repair: bool = False, parallel: Parallel = in_turn) -> None:
     """Write `pareto.png`/`.svg`, `figures/*`, the comparison with published figures and `report.html`.
 
     Parameters
     ----------
     output : Output
         Finished run.
-    mend : bool
+    repair : bool
         Only files that are missing, damaged or out of date.
     parallel : callable
         Runs calls on the cores.
@@ -70,11 +70,11 @@ def make_report(output: Output, *, mend: bool = False, parallel: Parallel = in_t
         inventory = Inventory(output.folder)
         listed = [name for name in inventory.files if is_drawn(name)]
         wrong = inventory.wrong({REPORT, *listed})
-        if mend and not wrong:
+        if repair and not wrong:
             return
-        some = wrong if mend and REPORT not in wrong else None
+        some = wrong if repair and REPORT not in wrong else None
         contents = _contents(output, some, parallel)
-        inventory.write({n: made for n, made in contents.items() if not mend or n in wrong or n not in listed})
+        inventory.write({n: made for n, made in contents.items() if not repair or n in wrong or n not in listed})
         inventory.remove(n for n in listed if n not in contents and (some is None or n in some))
 
 
@@ -118,7 +118,7 @@ def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
         "terms_first": series_first and drawn["series"][0]["y_label"] == output.trade_off[0].axis,
         "answer": answer_sentences(output),
         "first_lines": _FIRST_LEADS if series_first and output.study.recognition is None else _FIRST_LINES,
-        "numbers": large_numbers(output),
+        "numbers": headline_numbers(output),
         "counts": counts_line(output),
         "interactive": drawn,
         "profiles": {cfa: rows(profile_table(profiles)) for cfa, profiles in output.profiles.items()},
@@ -130,10 +130,10 @@ def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
         "comparison": rows(tables.comparison_table(output)),
         "best": rows(tables.best_table(output)),
         "recognition": rows(recognition_table(output)),
-        "left_out": rows(tables.worst_left_out(output)),
+        "left_out": rows(tables.costliest_omission(output)),
         "geometry": rows(tables.geometry_table(output)),
         "published": rows(published),
-        "constraints": constraints_told(output),
+        "constraints": format_constraints(output),
         "terms": terms_of(output),
         "summary": summary_lines(output),
         "provenance": output.provenance.model_dump(mode="json"),

@@ -29,7 +29,7 @@ class SceneGroup:
     @property
     def title(self) -> str:
         """Scenes in a few words."""
-        return scenes_told(self.scenarios)
+        return format_scenes(self.scenarios)
 
     @property
     def computed(self) -> str:
@@ -37,7 +37,7 @@ class SceneGroup:
         return ", ".join(effect.effect for effect in self.effects if effect.computed)
 
 
-def scenes_told(names: Sequence[str]) -> str:
+def format_scenes(names: Sequence[str]) -> str:
     """Return scenes in a few words.
 
     Parameters
@@ -153,7 +153,7 @@ def plan_lines(study: Study) -> Iterator[str]:
     for plans in groups.values():
         left_out_dn = max(plan.error_bound_dn for plan in plans)
         yield (
-            f"{scenes_told([plan.scenario for plan in plans])}: what is left out changes a CSD by at most "
+            f"{format_scenes([plan.scenario for plan in plans])}: what is left out changes a CSD by at most "
             f"{left_out_dn:.2g} DN (tolerance {plans[0].tolerance_dn:g} DN)"
         )
         effects = zip(*(plan.choices for plan in plans), strict=True)

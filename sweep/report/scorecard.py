@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _MARKERS = "osD^vPX*"
 _MOST_FACTOR = 10.0
 _SAME = 1e-9
-"""Designs whose values differ by less, relative to the largest, are told apart by rounding alone."""
+"""Designs whose values differ by less, relative to the largest, differ by rounding alone."""
 
 
 @dataclass(frozen=True)

@@ -97,7 +97,7 @@ def sensor_figures(output: Output) -> Iterator[SensorFigure]:
             yield SensorFigure(str(scenario), output.columns[name].words, shown[-_MOST:], level, corner, left_out)
 
 
-def told_map(figure: SensorFigure) -> str:
+def map_caption(figure: SensorFigure) -> str:
     """Return the caption of a map.
 
     Parameters
@@ -157,4 +157,4 @@ def map_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
         File name, caption and drawing.
     """
     for number, figure in enumerate(sensor_figures(output), 1):
-        yield f"places-{number}", told_map(figure), partial(_draw, figure)
+        yield f"places-{number}", map_caption(figure), partial(_draw, figure)

@@ -181,7 +181,7 @@ def series_figures(output: Output) -> list[SeriesFigure]:
         upper = {n: y for n, y in upper.items() if np.isfinite(y).all() and not np.array_equal(y, worst[n])}
         lines = {name: Line(y, upper.get(name)) for name, y in worst.items()}
         if lines:
-            band = "over the places on the mosaic" if upper else ""
+            band = "over the sampling phases" if upper else ""
             title = f"{output.study.study}, {base}: {separation.words}"
             x = np.array(list(scenarios.values()))
             among = base if [other for _, other in series].count(key) > 1 else ""
@@ -248,17 +248,17 @@ def leads_of(series: SeriesFigure) -> list[tuple[str | None, int, int]]:
     values = series.values
     least = _LEAST_LEAD if series.y_label.endswith(f" / {DN}") else 0.0
     leads: list[tuple[str | None, int, int]] = []
-    for place in range(len(series.x)):
-        most = max(y[place] for y in values.values())
+    for at in range(len(series.x)):
+        most = max(y[at] for y in values.values())
         before = leads[-1][0] if leads else None
         leader: str | None = None
         if most >= least:
-            ties = [design for design, y in values.items() if y[place] == most]
+            ties = [design for design, y in values.items() if y[at] == most]
             leader = before if before in ties else ties[0]
         if leads and before == leader:
-            leads[-1] = (leader, leads[-1][1], place)
+            leads[-1] = (leader, leads[-1][1], at)
         else:
-            leads.append((leader, place, place))
+            leads.append((leader, at, at))
     return leads
 
 

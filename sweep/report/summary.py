@@ -11,7 +11,7 @@ from .answer import answer_sentences
 from .leaders import capital, of_reference
 from .scorecard import score_lines, scorecard
 from .tables import comparison_lines, comparison_with_published
-from .terms import assumed_line
+from .terms import assumed_technology_line
 from .values import drawn_rows
 
 _MOST_PARAMETERS = 10
@@ -85,7 +85,7 @@ def summary_lines(output: Output, took_s: float | None = None) -> list[str]:
         lines.append(
             f"A light has {ratio:.4g} of the photons of the white patch (photon_ratio in study.resolved.yaml)."
         )
-    if note := assumed_line(output):
+    if note := assumed_technology_line(output):
         lines.append(note)
     computed = f"{facts.duration_s:.1f} s by {_count(facts.workers, 'worker')}"
     lines.append(f"Computed in {computed}." if took_s is None else f"Took {took_s:.1f} s; computed in {computed}.")
@@ -142,7 +142,7 @@ def _limit_line(output: Output, search: SearchFacts) -> str:
     """Return the upper bound with its filters and response."""
     if search.no_limit is not None or search.limit_proven is None:
         return f"Upper bound: none computed ({search.no_limit})."
-    proven = output.goal.told_bound(search.limit_proven)
+    proven = output.goal.format_bound(search.limit_proven)
     gap = "nothing is left to gain"
     if search.gap is not None:
         gap = f"the search's answer is {100 * search.gap:.1f} % below it"

@@ -75,7 +75,7 @@ def _shown(output: Output, rows: pd.DataFrame, keys: list[str], rest: list[str])
     return shown.rename(columns=words)
 
 
-def worst_left_out(output: Output, most: int = 10) -> pd.DataFrame:
+def costliest_omission(output: Output, most: int = 10) -> pd.DataFrame:
     """Return the lights whose absence from the search costs most.
 
     Parameters

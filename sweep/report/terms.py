@@ -15,7 +15,7 @@ from .leaders import Row, capital
 from .values import modifications
 
 
-def constraint_told(output: Output, name: str, bound: Bound) -> str:
+def format_constraint(output: Output, name: str, bound: Bound) -> str:
     """Return a constraint in words: `slope at most 0.06 per nm`.
 
     Parameters
@@ -42,7 +42,7 @@ def constraint_told(output: Output, name: str, bound: Bound) -> str:
     return f"{words} from {bound.min:g} to {_amount(column, bound.max)}"
 
 
-def constraints_told(output: Output) -> str:
+def format_constraints(output: Output) -> str:
     """Return all constraints in words; empty if there are none.
 
     Parameters
@@ -55,10 +55,10 @@ def constraints_told(output: Output) -> str:
     str
         Text.
     """
-    return " and ".join(constraint_told(output, name, bound) for name, bound in output.constraints.items())
+    return " and ".join(format_constraint(output, name, bound) for name, bound in output.constraints.items())
 
 
-def missed_told(output: Output, row: Row) -> str:
+def format_missed_constraints(output: Output, row: Row) -> str:
     """Return the violated constraints of a row: `its sensitivity is below 0.9`.
 
     Parameters
@@ -126,8 +126,8 @@ def terms_of(output: Output) -> list[str]:
     list of str
         Lines.
     """
-    asked = (output.trade_off[0].name, *output.constraints)
-    columns = [output.columns[name] for name in asked if name in output.columns]
+    requested = (output.trade_off[0].name, *output.constraints)
+    columns = [output.columns[name] for name in requested if name in output.columns]
     lines = []
     for name in dict.fromkeys(column.of if column.extreme else column.name for column in columns):
         column = output.columns[name]
@@ -176,7 +176,7 @@ def technology_of(output: Output, row: Row) -> Technology | None:
     return stated[0] if len(stated) == 1 else None
 
 
-def assumed(output: Output, row: Row) -> str:
+def assumed_technology(output: Output, row: Row) -> str:
     """Return a note on the angle of the light for a row's filter; empty if no technology is stated.
 
     Parameters
@@ -196,11 +196,11 @@ def assumed(output: Output, row: Row) -> str:
         return ""
     if stated.interference is None:
         return "A pigment does not move with the angle of the light."
-    rays = _told_light(output.study.scenarios[row["scenario"]])
+    rays = _format_light(output.study.scenarios[row["scenario"]])
     return f"Such a filter moves with the angle of the light; the figures are {rays}."
 
 
-def moves_with_light(output: Output, row: Row) -> bool:
+def is_angle_dependent(output: Output, row: Row) -> bool:
     """Return whether a row's filter moves with the angle of the light.
 
     Parameters
@@ -218,18 +218,18 @@ def moves_with_light(output: Output, row: Row) -> bool:
     return any(t is not None and t.interference is not None for t in _technologies(output, row))
 
 
-def _told_light(scene: Scene) -> str:
+def _format_light(scene: Scene) -> str:
     """Return the rays of a scene in words."""
     lens = f"behind f/{scene.optics.f_number:g}"
     if scene.field is None:
         return f"{lens} at a chief ray angle of {scene.optics.cra_deg:g} degrees"
     angles = scene.field.knots[1]
     ends = f"{min(angles):g} to {max(angles):g}"
-    places = "all" if scene.field.everywhere else f"{len(scene.field.seen_heights)}"
-    return f"{lens} at chief ray angles of {ends} degrees, the worst of {places} places of the sensor"
+    places = "all" if scene.field.everywhere else f"{len(scene.field.counted_heights)}"
+    return f"{lens} at chief ray angles of {ends} degrees, the worst of {places} field positions"
 
 
-def assumed_line(output: Output) -> str:
+def assumed_technology_line(output: Output) -> str:
     """Return a note on surrogate curves and on filters without a technology; else empty.
 
     Parameters

@@ -254,15 +254,15 @@ def traded_cfas(output: Output) -> list[str]:
     list of str
         Lines.
     """
-    rows, traded = output.kind(SWEPT), []
+    rows, error_against_noise = output.kind(SWEPT), []
     for cfa in dict.fromkeys(m.cfa for m in modifications(output)):
         swept = rows[(rows["cfa"] == cfa) & (rows["status"] == "ok")]["sensitivity"].to_numpy(dtype=float)
         traced = _trade_offs(output, output.scenarios[0], cfa)[0]
         x = swept if traced is None else np.concatenate([swept, traced.x])
         x = x[np.isfinite(x)]
         if x.size and np.ptp(x) > _LEAST_RANGE:
-            traded.append(cfa)
-    return traded
+            error_against_noise.append(cfa)
+    return error_against_noise
 
 
 def draw_trade_off(figure: TradeOff) -> Figure:

@@ -10,7 +10,7 @@ import pandas as pd
 from scipy.stats import rankdata
 
 from ..base.types import BoolArray, FloatArray
-from ..metrics.share import told_share
+from ..metrics.share import format_share
 from ..results.output import Output
 from ..results.tables import VISION, VISION_CONDITIONS
 from ..vision.scenes import SHUFFLED, UNSEEN, states_of
@@ -55,7 +55,7 @@ class Benchmark:
         return [reader for reader in READER_NAMES if self.images[reader].notna().any()]
 
     @property
-    def judge(self) -> str:
+    def main_reader(self) -> str:
         """Reader by which designs are compared: the network, or without one the observer."""
         return NETWORK if NETWORK in self.readers else OBSERVER
 
@@ -125,7 +125,7 @@ class Benchmark:
         Interval
             Difference.
         """
-        wrong = self.wrong(self.judge, order)
+        wrong = self.wrong(self.main_reader, order)
         return mean_of((wrong[design] - wrong[self.reference]).to_numpy(), self.weights(order))
 
     def scenes(self, order: str, lamps: str = UNSEEN) -> pd.DataFrame:
@@ -198,7 +198,7 @@ def benchmark_of(output: Output) -> Benchmark:
     return output.once("vision", lambda: Benchmark(vision, output.study.seed, *tables))
 
 
-def said_interval(interval: Interval) -> str:
+def format_interval(interval: Interval) -> str:
     """Format a value with its interval.
 
     Parameters
@@ -214,7 +214,7 @@ def said_interval(interval: Interval) -> str:
     return f"{interval.value:.2f} ({interval.low:.2f} to {interval.high:.2f})"
 
 
-def said_percent(interval: Interval) -> str:
+def format_percent(interval: Interval) -> str:
     """Format a share with its interval, in percent, without the sign.
 
     Parameters
@@ -227,7 +227,9 @@ def said_percent(interval: Interval) -> str:
     str
         Text.
     """
-    value, low, high = (told_share(share).removesuffix("%") for share in (interval.value, interval.low, interval.high))
+    value, low, high = (
+        format_share(share).removesuffix("%") for share in (interval.value, interval.low, interval.high)
+    )
     return f"{value} ({low} to {high})"
 
 
@@ -267,16 +269,16 @@ def ranks_of(benchmark: Benchmark) -> Ranks:
     errors = {reader: _by_condition(benchmark.wrong(reader, SHUFFLED), here, weights) for reader in readers}
     table = benchmark.conditions.set_index(["name", "distance_m", "level"])
     known = {n: np.array([[table[n][d, *at] for at in where] for d in benchmark.designs]) for n in list(PREDICTORS)[:3]}
-    judged = errors[benchmark.judge]
+    evaluation = errors[benchmark.main_reader]
     everywhere, between = {}, {}
     for name in PREDICTORS:
-        given = errors[name] if name in errors else np.broadcast_to(known[name], judged.shape)
-        if benchmark.judge == name:
+        given = errors[name] if name in errors else np.broadcast_to(known[name], evaluation.shape)
+        if benchmark.main_reader == name:
             continue
         sign = -1.0 if name in _FALLS else 1.0
-        flat = _spearman(sign * given.reshape(len(given), -1), judged.reshape(len(judged), -1))
+        flat = _spearman(sign * given.reshape(len(given), -1), evaluation.reshape(len(evaluation), -1))
         everywhere[name] = interval_around(float(flat[0]), flat[1:])
-        at_each = np.stack([_spearman(sign * given[:, :, at], judged[:, :, at]) for at in range(len(where))])
+        at_each = np.stack([_spearman(sign * given[:, :, at], evaluation[:, :, at]) for at in range(len(where))])
         mean = np.ma.masked_invalid(at_each).mean(axis=0).filled(np.nan)
         between[name] = interval_around(float(mean[0]), mean[1:])
     conditions = pd.DataFrame(
@@ -284,7 +286,7 @@ def ranks_of(benchmark: Benchmark) -> Ranks:
     )
     for name in everywhere:
         conditions[name] = (errors[name][0] if name in errors else known[name]).ravel()
-    conditions["error"] = judged[0].ravel()
+    conditions["error"] = evaluation[0].ravel()
     return Ranks(everywhere, between, conditions)
 
 

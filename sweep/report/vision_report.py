@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ..metrics.share import told_share
+from ..metrics.share import format_share
 from ..results.output import Output
 from ..results.tables import VISION_MISREAD
 from ..vision.scenes import FIXED, SEEN, SHUFFLED, UNSEEN
@@ -24,9 +24,9 @@ from .vision import (
     Benchmark,
     Ranks,
     benchmark_of,
+    format_interval,
+    format_percent,
     ranks_of,
-    said_interval,
-    said_percent,
 )
 
 if TYPE_CHECKING:
@@ -57,24 +57,24 @@ def vision_sentences(output: Output) -> Iterator[str]:
     benchmark = benchmark_of(output)
     ranks = ranks_of(benchmark)
     csd = ranks.between.get("csd")
-    who = READER_NAMES[benchmark.judge]
+    who = READER_NAMES[benchmark.main_reader]
     if csd is not None:
         how = "does not predict" if not csd.low > 0 else "predicts" if csd.value >= _WELL else "predicts badly"
-        others = ", ".join(f"{PREDICTORS[n]} {said_interval(v)}" for n, v in ranks.between.items() if n != "csd")
+        others = ", ".join(f"{PREDICTORS[n]} {format_interval(v)}" for n, v in ranks.between.items() if n != "csd")
         yield (
             f"The color separation {how} which CFA the {who} reads best at the same distance and light: its rank "
-            f"correlation is {said_interval(csd)} (1: it does, below 0: the other way round); {others}."
+            f"correlation is {format_interval(csd)} (1: it does, below 0: the other way round); {others}."
         )
     yield from _against_reference(benchmark)
-    if benchmark.judge == NETWORK:
+    if benchmark.main_reader == NETWORK:
         pairs = [
             (d, benchmark.error(d, NETWORK, SHUFFLED), benchmark.error(d, OBSERVER, SHUFFLED))
             for d in benchmark.designs
         ]
         best = min(pairs, key=lambda pair: pair[1].value)
         yield (
-            f"The network reads {said_percent(best[1])} % of the images of {best[0]} wrongly, the ideal observer "
-            f"{said_percent(best[2])} % (lamps not seen in training, lenses in any order)."
+            f"The network reads {format_percent(best[1])} % of the images of {best[0]} wrongly, the ideal observer "
+            f"{format_percent(best[2])} % (lamps not seen in training, lenses in any order)."
         )
 
 
@@ -89,7 +89,7 @@ def _against_reference(benchmark: Benchmark) -> Iterator[str]:
             else:
                 same.append(design)
     parts = [f"{words}{', '.join(designs)}" for words, designs in groups.items() if designs]
-    who = READER_NAMES[benchmark.judge]
+    who = READER_NAMES[benchmark.main_reader]
     yield f"Beside {benchmark.reference}, the {who} errs (percent of the images) {'; '.join(parts)}."
 
 
@@ -101,17 +101,17 @@ def _vision_table(benchmark: Benchmark) -> pd.DataFrame:
         for reader in benchmark.readers:
             for order in (FIXED, SHUFFLED):
                 title = f"{READER_NAMES[reader]}, lenses {'in order' if order == FIXED else 'shuffled'}"
-                row[f"error %: {title}"] = said_percent(benchmark.error(design, reader, order))
-        if benchmark.judge == NETWORK:
+                row[f"error %: {title}"] = format_percent(benchmark.error(design, reader, order))
+        if benchmark.main_reader == NETWORK:
             seen = benchmark.error(design, NETWORK, SHUFFLED, SEEN)
-            row["error %: network, shuffled, lamps seen in training"] = said_percent(seen)
+            row["error %: network, shuffled, lamps seen in training"] = format_percent(seen)
         if design == benchmark.reference:
             row[f"less that of {benchmark.reference} %"] = "-"
         else:
             difference = benchmark.difference(design, SHUFFLED)
             note = "" if difference.excludes_zero else ", not separated"
-            row[f"less that of {benchmark.reference} %"] = said_percent(difference) + note
-        row["F1"] = f"{macro_f1(benchmark.confusion(design, benchmark.judge, SHUFFLED).to_numpy()):.3f}"
+            row[f"less that of {benchmark.reference} %"] = format_percent(difference) + note
+        row["F1"] = f"{macro_f1(benchmark.confusion(design, benchmark.main_reader, SHUFFLED).to_numpy()):.3f}"
         for reader in benchmark.readers[:2]:
             row[f"cost with unknown (share): {READER_NAMES[reader]}"] = _unknown(benchmark, design, reader)
         rows.append(row)
@@ -123,7 +123,7 @@ def _unknown(benchmark: Benchmark, design: str, reader: str) -> str:
     rows, cost = benchmark.said(design, reader, SHUFFLED), benchmark.vision.unknown_cost
     wrong = (rows["said"] != rows["state"]).to_numpy(dtype=bool)
     cost_of, unknown = costs(wrong, rows["p"].to_numpy(dtype=float), cost)
-    return f"{cost_of.mean():.3f} ({told_share(float(unknown.mean()), 0)})"
+    return f"{cost_of.mean():.3f} ({format_share(float(unknown.mean()), 0)})"
 
 
 def _vision_conditions_table(benchmark: Benchmark, ranks: Ranks) -> pd.DataFrame:
@@ -141,7 +141,7 @@ def _vision_conditions_table(benchmark: Benchmark, ranks: Ranks) -> pd.DataFrame
 
 def _confusion_table(benchmark: Benchmark) -> pd.DataFrame:
     """Return counts of answers, one row per design and state, lenses in any order."""
-    parts = {design: benchmark.confusion(design, benchmark.judge, SHUFFLED) for design in benchmark.designs}
+    parts = {design: benchmark.confusion(design, benchmark.main_reader, SHUFFLED) for design in benchmark.designs}
     table = pd.concat(parts, names=["design", "state"])
     return table.rename(columns=lambda name: f"said {name}").reset_index()
 
@@ -151,8 +151,8 @@ def _ranks_table(ranks: Ranks) -> pd.DataFrame:
     rows = [
         {
             "predictor": PREDICTORS[name],
-            "over designs, distances and levels": said_interval(ranks.everywhere[name]),
-            "between designs at one distance and level": said_interval(ranks.between[name]),
+            "over designs, distances and levels": format_interval(ranks.everywhere[name]),
+            "between designs at one distance and level": format_interval(ranks.between[name]),
         }
         for name in ranks.everywhere
     ]
@@ -174,8 +174,8 @@ def vision_parts(output: Output) -> dict[str, pd.DataFrame]:
     """
     benchmark = benchmark_of(output)
     ranks = ranks_of(benchmark)
-    who = READER_NAMES[benchmark.judge]
-    beside = ", in brackets by the ideal observer" if benchmark.judge == NETWORK else ""
+    who = READER_NAMES[benchmark.main_reader]
+    beside = ", in brackets by the ideal observer" if benchmark.main_reader == NETWORK else ""
     return {
         "Errors of each design, percent of the images, with 95 % intervals": _vision_table(benchmark),
         f"Percent of the images that the {who} reads wrongly{beside}; lenses shuffled": _vision_conditions_table(
@@ -202,8 +202,8 @@ def vision_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
     benchmark = benchmark_of(output)
     ranks = ranks_of(benchmark)
     levels = {name: level.illuminance_lx for name, level in benchmark.vision.levels.items()}
-    who = READER_NAMES[benchmark.judge]
-    errors = partial(_draw_errors, ranks.conditions, levels, benchmark.judge)
+    who = READER_NAMES[benchmark.main_reader]
+    errors = partial(_draw_errors, ranks.conditions, levels, benchmark.main_reader)
     yield "vision-errors", f"Images that the {who} reads wrongly, over the distance", errors
     if ranks.between:
         yield "vision-ranks", f"What predicts the {who}'s errors", partial(_draw_ranks, ranks, list(levels), who)
@@ -220,18 +220,18 @@ def _misread(benchmark: Benchmark, pictures: pd.DataFrame) -> list[tuple[str, ND
     answers = benchmark.images
     answers = answers[(answers["order"] == SHUFFLED) & (answers["lamps"] == UNSEEN)]
     keys = ["name", "seed", "image"]
-    columns = [*keys, "distance_m", "level", "state", benchmark.judge]
+    columns = [*keys, "distance_m", "level", "state", benchmark.main_reader]
     rows = shown[[*keys, "rows", "columns", "pixels"]].merge(answers[columns], on=keys, how="left").to_dict("records")
     return [
         (
-            f"{row['name']}\n{row['distance_m']:g} m, {row['level']}\n{row['state']} > {row[benchmark.judge]}",
+            f"{row['name']}\n{row['distance_m']:g} m, {row['level']}\n{row['state']} > {row[benchmark.main_reader]}",
             np.frombuffer(row["pixels"], dtype=np.uint8).reshape(row["rows"], row["columns"], 3),
         )
         for row in rows
     ]
 
 
-def _draw_errors(conditions: pd.DataFrame, levels: Mapping[str, float], judge: str) -> Figure:
+def _draw_errors(conditions: pd.DataFrame, levels: Mapping[str, float], main_reader: str) -> Figure:
     """Draw one panel per level: the error with each design; dashed the ideal observer's."""
     figure, panels = canvas_grid(1, len(levels), 4.2 * len(levels), 4.2)
     for axes, (level, lux) in zip(panels, levels.items(), strict=True):
@@ -245,7 +245,7 @@ def _draw_errors(conditions: pd.DataFrame, levels: Mapping[str, float], judge: s
         axes.set(title=f"{level}, {lux:g} lx", xlabel="distance / m")
         axes.set_ylim(bottom=0)
     panels[0].set_ylabel("images read wrongly / %")
-    legend_beside(panels[-1], "dashed: ideal observer" if judge != OBSERVER else None)
+    legend_beside(panels[-1], "dashed: ideal observer" if main_reader != OBSERVER else None)
     return figure
 
 
@@ -262,7 +262,7 @@ def _draw_ranks(ranks: Ranks, levels: Sequence[str], who: str) -> Figure:
                 axes.plot(x, 100 * dots["error"], marker, color=color, markersize=4, label=label, alpha=0.8)
         if name != OBSERVER:
             axes.set_xscale("log" if name == "pair_error" else "symlog")
-        between, everywhere = said_interval(ranks.between[name]), said_interval(ranks.everywhere[name])
+        between, everywhere = format_interval(ranks.between[name]), format_interval(ranks.everywhere[name])
         title = f"{PREDICTORS[name]}\nrank correlation between CFAs {between}\nover everything {everywhere}"
         axes.set_title(title, fontsize=8)
         axes.set_xlabel(_LABELS[name])

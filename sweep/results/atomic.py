@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from ..base.errors import Fault, OutputError
+from ..base.errors import OutputError, ValidationIssue
 
 LEFT_OVER = r"\.tmp-\d+-.*"
 """Hidden names of files that are being written; readers of Parquet folders skip names that begin with a dot."""
@@ -44,7 +44,7 @@ def atomic(path: Path) -> Iterator[Path]:
             os.fsync(handle.fileno())
         hidden.replace(path)
     except OSError as error:
-        raise OutputError(Fault(f"cannot be written: {error.strerror or error}", str(path))) from None
+        raise OutputError(ValidationIssue(f"cannot be written: {error.strerror or error}", str(path))) from None
     finally:
         with suppress(OSError):
             hidden.unlink()

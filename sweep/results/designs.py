@@ -10,9 +10,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from ..base.errors import Fault, OutputError, SweepError, nearest
-from ..base.own_code import CODE_OF, is_code
+from ..base.errors import OutputError, SweepError, ValidationIssue, nearest
 from ..base.types import FloatArray
+from ..base.user_code import CODE_OF, is_code
 from ..designs.space import Space
 from ..study import Study, load_study
 from ..study.sources import KeptSources
@@ -134,7 +134,9 @@ def find_row(output: Output, key: str) -> Mapping[Any, Any]:
     named = table[table["name"] == key]
     if key == BEST:
         if output.best.empty:
-            raise SweepError(Fault("the run has no feasible design that was swept or searched", str(output.folder)))
+            raise SweepError(
+                ValidationIssue("the run has no feasible design that was swept or searched", str(output.folder))
+            )
         row: dict[Any, Any] = output.best.iloc[0].to_dict()
     elif len(named):
         row = named.iloc[0].to_dict()
@@ -142,16 +144,18 @@ def find_row(output: Output, key: str) -> Mapping[Any, Any]:
         filters = (part.filter(pc.equal(part["filter_id"], int(key))) for part in batches(output.folder / RESULTS))
         rows = next((part for part in filters if part.num_rows), pa.table({})).to_pylist()
         if not rows:
-            raise OutputError(Fault("has too few rows", str(output.folder / RESULTS), None, "filter_id", int(key)))
+            raise OutputError(
+                ValidationIssue("has too few rows", str(output.folder / RESULTS), None, "filter_id", int(key))
+            )
         row = rows[0]
     else:
         names = list(dict.fromkeys(map(str, table["name"].dropna())))
         shown = [*names[:_MOST_SHOWN], *(["..."] if len(names) > _MOST_SHOWN else [])]
         allowed = f"{BEST}, a name ({', '.join(shown)}), or a filter_id from 0 to {output.provenance.filters - 1:,}"
         near = nearest(key, [*names, BEST])
-        raise SweepError(Fault("no such design", str(output.folder), None, "--design", key, allowed, near))
+        raise SweepError(ValidationIssue("no such design", str(output.folder), None, "--design", key, allowed, near))
     if row["status"] != "ok":
-        raise SweepError(Fault("the design failed", str(output.folder), None, "--design", row["status"]))
+        raise SweepError(ValidationIssue("the design failed", str(output.folder), None, "--design", row["status"]))
     return row
 
 
@@ -180,7 +184,7 @@ def study_of(output: Output, data: Path | None, *, allow_code: bool = False) -> 
         where = "--data FOLDER, which holds it, and " if in_files else ""
         whose = ", ".join(in_files or [name.removeprefix(CODE_OF) for name in code])
         problem = f"it was made with the code of {whose}"
-        raise OutputError(Fault(problem, str(output.folder), allowed=f"{where}--allow-code, if you trust it"))
+        raise OutputError(ValidationIssue(problem, str(output.folder), allowed=f"{where}--allow-code, if you trust it"))
     kept = output.curves
     if data is None and digests.keys() - code:
         return load_study(path, kept=KeptSources(kept.sensor, kept.lights, kept.tasks), allow_code=code)
@@ -214,5 +218,7 @@ def check_kept(output: Output, kept: Mapping[_Key, FloatArray], made: Mapping[_K
     different = [str(name) for name, values in made.items() if name in kept and not same(kept[name], values)]
     if different:
         shown = ", ".join(different[:_MOST_SHOWN]) + (" and more" if len(different) > _MOST_SHOWN else "")
-        problem = f"computed again, these are not what the run has: {shown}"
-        raise OutputError(Fault(problem, str(output.folder), allowed="the curve files and the version of that run"))
+        problem = f"computed again, these differ from the run: {shown}"
+        raise OutputError(
+            ValidationIssue(problem, str(output.folder), allowed="the curve files and the version of that run")
+        )

@@ -9,7 +9,7 @@ from typing import get_args
 import pyarrow as pa
 
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY, reference_of
-from ..metrics.quantity import DN, Asked, Column
+from ..metrics.quantity import DN, Column, RequestedQuantities
 from ..metrics.registry import listed
 from ..spectra.tasks import Measure, TaskName
 from . import tables as files
@@ -42,12 +42,12 @@ _VERDICTS = {
         "plan",
         "promised_dn",
     ): "how the scene was simulated (`provenance.json` says it in full), and a bound on what the effects that were "
-    "left out change in any CSD, also at the best place and with shifted edges",
-    ("status",): "`ok`, or what failed",
+    "left out change in any CSD, also at the best sampling phase and with shifted edges",
+    ("status",): "`ok`, or the failure",
 }
 _WORST = (
     "the worst case of a CSD or sensitivity over edges that production shifts and films that it makes too thick or "
-    "too thin (five places from one end of both to the other, and the two other corners), "
+    "too thin (five errors from one end of both to the other, and the two other corners), "
     "and of a CSD over the population of the lights: then that of the response before clipping and rounding, with "
     "everything on, over all members exactly"
 )
@@ -108,8 +108,8 @@ def columns_table() -> list[str]:
     types = ("<a>", "<b>")
     rows = [_row(names, "", meaning) for names, meaning in _KEYS.items()]
     tasks = tuple(TaskName("<task>", metric, ("<light>",)) for metric in get_args(Measure))
-    asked = Asked(types, types, any_place=True, probabilities=True, tasks=tasks, vision=True)
-    for quantity in listed(asked):
+    requested = RequestedQuantities(types, types, any_place=True, probabilities=True, tasks=tasks, vision=True)
+    for quantity in listed(requested):
         more = _WITHOUT_CLEAR if quantity.name == CFA_SENSITIVITY else ""
         rows.append(_row((quantity.name,), quantity.unit, quantity.meaning + more))
     rows.append(_row(("<own metric>",), "its own", _OWN))
@@ -124,7 +124,7 @@ FILES = {
     files.LIMITED_BY: "the two lights that limit each CSD, of plain CFAs, named designs, answers of the search, and "
     "of the swept designs that the report draws: the best of each CFA, those that lead, the feasible front, and up to "
     f"{MOST_POINTS:,} other feasible and as many infeasible ones, evenly: `design_id`, `limited_by_<a>_<b>` (of a "
-    "light at any place, at the worst one of the lattice that was computed)",
+    "any sampling phase, at the worst one of the lattice that was computed)",
     files.VALIDATED: "where a study validates on other lights: `design_id` and `held_out_csd_<a>_<b>`, their CSDs, DN",
     files.ROBUSTNESS: "where the lights have a population, for each plain CFA, named design and answer of the search: "
     "`design_id`; how many times as large population and production tolerances must be for the worst CSD to fall below "
@@ -141,11 +141,11 @@ FILES = {
     "`design_id`, relative image `height`, `cra_deg` and the CSDs there, DN, before clipping and rounding",
     files.SEARCH_LOG: "every evaluation of the search and of its front: "
     + ", ".join(files.search_schema(["<parameters>"]).names),
-    files.FRONT: "what the search found at each level of sensitivity, and the limit there; between two levels rows "
+    files.FRONT: "results of the search at each level of sensitivity, and the limit there; between two levels rows "
     "with the limit alone: " + ", ".join(files.front_schema(["<parameters>"]).names),
     files.CURVES: "a row per curve and wavelength: " + ", ".join(SCHEMA.names),
-    files.POINTS: "what the clouds draw: design_id, signal_type, signal, channel, dn",
-    files.RECOGNITION: "raw patches told apart by classifiers, where a study asks for them, with 95 % intervals",
+    files.POINTS: "points of the clouds: design_id, signal_type, signal, channel, dn",
+    files.RECOGNITION: "raw patches classified, where a study asks for them, with 95 % intervals",
     files.CROSSINGS: "where a study with `recognition` has scenarios that differ in one number: the number `at` which "
     "a plain CFA, named design or answer of the search has the allowed error, between those of two scenarios (`low`, "
     "`high`), with everything on, and the `error` there; null where no study may have a scene between the two",
@@ -161,13 +161,13 @@ FILES = {
     files.VISION_MISREAD: "images that were read wrongly, in false colors: bytes of rows x columns x 3 in `pixels`",
     files.AUDIT: "rows of `sweep audit`: errors against the reference settings, and those that are allowed",
     files.RESOLVED: "the study with every default written out; a study file itself",
-    files.PROVENANCE: "versions, seed, command, machine, plans of the scenes, what the columns mean",
+    files.PROVENANCE: "versions, seed, command, machine, plans of the scenes, meanings of the columns",
     files.REPORT: "the report: one file that you can send, without the network",
     "cfas.png": "all CFAs: separation against the light of the whole CFA; also `.svg`",
     "pareto.png": "the trade-off in one modified pixel, where there is one; also `.svg`",
     f"{files.FIGURES}/": "all other figures as PNG and SVG",
     "paper_comparison.csv": "published figures beside ours, where a study gives some; also `.parquet`",
-    files.RUN: "whose folder it is: the fingerprint of the study and what goes into it",
+    files.RUN: "owner of the folder: the fingerprint of the study and its inputs",
     files.SUMS: "the digests for `sha256sum -c SHA256SUMS`",
 }
 """Every file of a run's folder, in the order in which one asks for them."""
@@ -181,7 +181,7 @@ def files_table() -> list[str]:
     list of str
         Lines.
     """
-    return ["| file | what it holds |", "| --- | --- |", *(f"| `{name}` | {what} |" for name, what in FILES.items())]
+    return ["| file | contents |", "| --- | --- |", *(f"| `{name}` | {what} |" for name, what in FILES.items())]
 
 
 def _row(names: tuple[str, ...], unit: str, meaning: str) -> str:

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from ..base.errors import Fault, OutputError
+from ..base.errors import OutputError, ValidationIssue
 from ..metrics.quantity import Column
 
 _MOST_SHOWN = 10
@@ -16,7 +16,7 @@ _Model = TypeVar("_Model", bound=BaseModel)
 
 
 class _Facts(BaseModel):
-    """Facts that a run wrote; more of them, from a later version, are no fault."""
+    """Facts that a run wrote; more of them, from a later version, are no issue."""
 
     model_config = ConfigDict(frozen=True, extra="ignore", ser_json_inf_nan="constants")
 
@@ -37,7 +37,7 @@ class SensorOrigin(Origin):
 
 
 class EffectFacts(_Facts):
-    """An effect, computed or not, and why; a bound on what it changes in a CSD, DN, None where none is known."""
+    """An effect, computed or not, and why; a bound on its change of a CSD, DN, None where none is known."""
 
     effect: str
     computed: bool
@@ -89,8 +89,8 @@ class CheckFacts(_Facts):
 class SearchFacts(_Facts):
     """A search in figures; see `search.limit.Limit` for those of the limit.
 
-    `cfa`, `channel`: what was searched in. `bounded`: kind and name of the spaces whose feasible filters the limit
-    holds for, in the search's scenario.
+    `cfa`, `channel`: the searched ones. `bounded`: kind and name of the spaces whose feasible filters the limit holds
+    for, in the search's scenario.
     """
 
     algorithm: str
@@ -149,7 +149,7 @@ class Provenance(_Facts):
     hypervolume_least_sensitivity: float | None = None
 
 
-def lacking(kind: type[BaseModel], facts: Mapping[str, Any]) -> list[str]:
+def missing_keys(kind: type[BaseModel], facts: Mapping[str, Any]) -> list[str]:
     """Return the keys that facts lack, or have with another type.
 
     Parameters
@@ -167,7 +167,7 @@ def lacking(kind: type[BaseModel], facts: Mapping[str, Any]) -> list[str]:
     try:
         kind.model_validate(facts)
     except ValidationError as error:
-        return list(dict.fromkeys(".".join(map(str, fault["loc"])) for fault in error.errors()))
+        return list(dict.fromkeys(".".join(map(str, issue["loc"])) for issue in error.errors()))
     return []
 
 
@@ -193,12 +193,12 @@ def checked_facts(path: Path, kind: type[_Model], facts: Mapping[str, Any]) -> _
     OutputError
         If keys are missing, with their names.
     """
-    if lacks := lacking(kind, facts):
-        raise lacking_in(path, lacks[:_MOST_SHOWN])
+    if lacks := missing_keys(kind, facts):
+        raise missing_parts_error(path, lacks[:_MOST_SHOWN])
     return kind.model_validate(facts)
 
 
-def lacking_in(path: Path, names: Sequence[str]) -> OutputError:
+def missing_parts_error(path: Path, names: Sequence[str]) -> OutputError:
     """Return the error of a file with missing parts.
 
     Parameters
@@ -214,4 +214,4 @@ def lacking_in(path: Path, names: Sequence[str]) -> OutputError:
         Error.
     """
     again = "delete it, and `sweep run` of the study makes it again"
-    return OutputError(Fault(f"lacks {', '.join(names)}; {again}", str(path)))
+    return OutputError(ValidationIssue(f"lacks {', '.join(names)}; {again}", str(path)))

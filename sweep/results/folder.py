@@ -8,7 +8,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from ..base.errors import Fault, OutputError
+from ..base.errors import OutputError, ValidationIssue
 from ..study import Study
 from .identity import fingerprint, identity
 from .inventory import Inventory
@@ -16,7 +16,7 @@ from .inventory import Inventory
 _MOST_SHOWN = 3
 
 
-def held_by(folder: Path) -> Inventory | None:
+def run_in(folder: Path) -> Inventory | None:
     """Return the run in a folder.
 
     Parameters
@@ -35,7 +35,7 @@ def held_by(folder: Path) -> Inventory | None:
         If `run.json` is damaged.
     """
     inventory = Inventory(folder)
-    return inventory if inventory.fingerprint or inventory.strangers() else None
+    return inventory if inventory.fingerprint or inventory.foreign_files() else None
 
 
 def output_folder(base: Path, study: Study) -> tuple[Path, str | None]:
@@ -58,13 +58,13 @@ def output_folder(base: Path, study: Study) -> tuple[Path, str | None]:
     note = None
     for number in count(1):
         folder = base if number == 1 else base.with_name(f"{base.name}-{number}")
-        held = held_by(folder)
+        held = run_in(folder)
         if held is None or held.fingerprint == fingerprint(study):
             return folder, None if note is None else f"{note}; this one is in {folder}"
         if held.fingerprint:
             note = f"{folder} holds another study of this name ({_changed(held, study)})"
         else:
-            note = f"{folder / held.strangers()[0]} is not of a run of this study"
+            note = f"{folder / held.foreign_files()[0]} is not of a run of this study"
     raise AssertionError
 
 
@@ -93,7 +93,7 @@ def begin(folder: Path, study: Study) -> Inventory:
         inventory.begin(fingerprint(study), {"identity": identity(study), "designs": study.n_designs})
     elif inventory.fingerprint != fingerprint(study):
         problem = f"holds another study ({_changed(inventory, study)})"
-        raise OutputError(Fault(problem, str(folder), allowed="another folder"))
+        raise OutputError(ValidationIssue(problem, str(folder), allowed="another folder"))
     return inventory
 
 

@@ -17,9 +17,9 @@ from typing import Any
 import pyarrow as pa
 
 from ..base.disk import MOST_FACTS, digest_of, is_link, is_real_folder, parsed_facts, read_plain
-from ..base.errors import Fault, OutputError
+from ..base.errors import OutputError, ValidationIssue
 from .atomic import write_bytes
-from .tables import AUDIT, FIGURES, MADE_BY_RUN, PROVENANCE, RUN, SUMS, is_drawn, is_own, json_of, write_table
+from .tables import AUDIT, FIGURES, MADE_BY_RUN, PROVENANCE, RUN, SUMS, is_drawn, is_user_code, json_of, write_table
 
 _SUM = re.compile(r"([0-9a-f]{64})  (\S+)")
 _MISSING, _DAMAGED, _UNLISTED = "is missing", "is damaged", f"is not listed in {SUMS}"
@@ -32,7 +32,7 @@ class Inventory:
     ----------
     folder : Path
     facts : dict
-        What `run.json` says: `fingerprint` and `identity` of the study, and its number of designs.
+        Contents of `run.json`: `fingerprint` and `identity` of the study, and its number of designs.
     files : dict of str
         Name (`figures/chart.png`) -> SHA-256 of the file.
     """
@@ -43,7 +43,7 @@ class Inventory:
         self.facts: dict[str, Any] = {}
         with suppress(OSError):
             text = read_plain(folder / SUMS, MOST_FACTS).decode("utf-8", "replace")
-            self.files = {name: sha for sha, name in _SUM.findall(text) if is_own(name) or name == RUN}
+            self.files = {name: sha for sha, name in _SUM.findall(text) if is_user_code(name) or name == RUN}
         path = folder / RUN
         if os.path.lexists(path):
             with suppress(OSError):
@@ -52,7 +52,7 @@ class Inventory:
                     self.facts = parsed_facts(content)
             if not isinstance(self.facts.get("fingerprint"), str):
                 problem = "is damaged, so that nothing is known of the run; move its folder away"
-                raise OutputError(Fault(problem, str(path), allowed="another --output"))
+                raise OutputError(ValidationIssue(problem, str(path), allowed="another --output"))
 
     @property
     def fingerprint(self) -> str:
@@ -81,7 +81,7 @@ class Inventory:
         return self.folder / name
 
     def wrong(self, names: Iterable[str] | None = None, *, quick: bool = False) -> dict[str, str]:
-        """Return the files that are not what the run wrote, and their faults.
+        """Return the files that differ from those of the run, and their issues.
 
         Parameters
         ----------
@@ -90,19 +90,19 @@ class Inventory:
         quick : bool
             Only say which are missing.
         """
-        faults = dict.fromkeys(self.unlisted() if names is None else (), _UNLISTED)
+        issues = dict.fromkeys(self.unlisted() if names is None else (), _UNLISTED)
         for name in sorted(self.files if names is None else names):
             path = self.path(name)
             if name not in self.files or not os.path.lexists(path) or self._linked(name):
-                faults[name] = _MISSING
+                issues[name] = _MISSING
             elif not quick:
                 try:
                     damaged = digest_of(path) != self.files[name]
                 except OSError:
                     damaged = True
                 if damaged:
-                    faults[name] = _DAMAGED
-        return faults
+                    issues[name] = _DAMAGED
+        return issues
 
     def unlisted(self) -> list[str]:
         """Return the files of a finished run that a damaged list does not name; provenance is written last.
@@ -113,7 +113,7 @@ class Inventory:
             Names.
         """
         finished = os.path.lexists(self.path(PROVENANCE))
-        return [name for name in self._present() if finished and is_own(name) and name not in self.files]
+        return [name for name in self._present() if finished and is_user_code(name) and name not in self.files]
 
     def _present(self) -> list[str]:
         """Return the names of the files in the folder and among its figures."""
@@ -137,9 +137,9 @@ class Inventory:
             If a file is missing or damaged, with its name.
         """
         if wrong := self.wrong(names):
-            raise OutputError(faults_of(self.folder, wrong))
+            raise OutputError(issues_of(self.folder, wrong))
 
-    def strangers(self) -> list[str]:
+    def foreign_files(self) -> list[str]:
         """Return the files of others under names that the run's commands give; none in the folder of a run.
 
         Returns
@@ -149,7 +149,7 @@ class Inventory:
         """
         if self.facts:
             return []
-        return [name for name in self._present() if is_own(name) or name == SUMS]
+        return [name for name in self._present() if is_user_code(name) or name == SUMS]
 
     def begin(self, fingerprint: str, facts: Mapping[str, Any]) -> None:
         """Write which study the folder is of.
@@ -166,8 +166,8 @@ class Inventory:
         OutputError
             If files of others are there, or the disk refuses.
         """
-        for name in self.strangers():
-            raise OutputError(Fault("is not of this run; move it away", str(self.folder / name)))
+        for name in self.foreign_files():
+            raise OutputError(ValidationIssue("is not of this run; move it away", str(self.folder / name)))
         self.facts = {"fingerprint": fingerprint, **facts}
         self.write({RUN: json_of(self.facts).encode("utf-8")})
 
@@ -186,7 +186,7 @@ class Inventory:
         """
         for name, content in contents.items():
             if self._linked(name):
-                raise OutputError(Fault("is not of this run; move it away", str(self.folder / FIGURES)))
+                raise OutputError(ValidationIssue("is not of this run; move it away", str(self.folder / FIGURES)))
             path = self.path(name)
             with suppress(OSError):  # an empty folder in its place goes
                 path.rmdir()
@@ -210,9 +210,9 @@ class Inventory:
             If the disk refuses.
         """
         write_table(table, self.path(name))
-        self.adopt(name)
+        self.list_file(name)
 
-    def adopt(self, name: str) -> None:
+    def list_file(self, name: str) -> None:
         """List a file that was written.
 
         Parameters
@@ -248,12 +248,14 @@ class Inventory:
                 try:
                     path.unlink(missing_ok=True)
                 except OSError as error:
-                    raise OutputError(Fault(f"cannot be removed: {error.strerror or error}", str(path))) from None
+                    raise OutputError(
+                        ValidationIssue(f"cannot be removed: {error.strerror or error}", str(path))
+                    ) from None
             self.files.pop(name, None)
         if gone:
             self._save()
 
-    def outdate(self) -> None:
+    def discard_derived(self) -> None:
         """Remove report and audit, which follow from tables that are gone."""
         self.remove([name for name in self.files if is_drawn(name) or name == AUDIT])
 
@@ -282,10 +284,10 @@ def no_run(folder: Path) -> OutputError:
     OutputError
         Error.
     """
-    return OutputError(Fault("no run here", str(folder), allowed="a folder that `sweep run` made"))
+    return OutputError(ValidationIssue("no run here", str(folder), allowed="a folder that `sweep run` made"))
 
 
-def faults_of(folder: Path, wrong: Mapping[str, str]) -> list[Fault]:
+def issues_of(folder: Path, wrong: Mapping[str, str]) -> list[ValidationIssue]:
     """Return a line for each file that is not as the run wrote it.
 
     Parameters
@@ -300,7 +302,10 @@ def faults_of(folder: Path, wrong: Mapping[str, str]) -> list[Fault]:
     list of Fault
         Lines.
     """
-    return [Fault(f"{what}; `sweep run` of its study makes it again", str(folder / n)) for n, what in wrong.items()]
+    return [
+        ValidationIssue(f"{what}; `sweep run` of its study makes it again", str(folder / n))
+        for n, what in wrong.items()
+    ]
 
 
 def _names(folder: Path) -> list[str]:

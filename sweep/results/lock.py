@@ -12,7 +12,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from ..base.disk import is_real_folder
-from ..base.errors import Fault, OutputError
+from ..base.errors import OutputError, ValidationIssue
 from .atomic import LEFT_OVER
 from .parts import PARTS
 from .tables import FIGURES
@@ -47,12 +47,12 @@ def locked(output: Path) -> Iterator[None]:
     try:
         output.mkdir(parents=True, exist_ok=True)
         if os.path.lexists(output / LOCK) and not _is_lock(output / LOCK):
-            raise OutputError(Fault("is not of this run; move it away", str(output / LOCK)))
+            raise OutputError(ValidationIssue("is not of this run; move it away", str(output / LOCK)))
         lock.acquire(timeout=_WAIT_S)
     except Timeout:
-        raise OutputError(Fault("in use by another command", str(output))) from None
+        raise OutputError(ValidationIssue("in use by another command", str(output))) from None
     except OSError as error:
-        raise OutputError(Fault(f"cannot be written: {error.strerror or error}", str(output))) from None
+        raise OutputError(ValidationIssue(f"cannot be written: {error.strerror or error}", str(output))) from None
     try:
         _clear(output)
         yield

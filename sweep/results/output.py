@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from ..base.errors import Fault, OutputError
+from ..base.errors import OutputError, ValidationIssue
 from ..base.types import IndexArray
 from ..camera.mosaic import Mosaic
 from ..metrics.bound import Bound
@@ -24,7 +24,7 @@ from ..study import StudySection
 from . import tables as files
 from .curves import SCHEMA as CURVES_SCHEMA
 from .curves import KeptCurves
-from .facts import Provenance, checked_facts, lacking_in
+from .facts import Provenance, checked_facts, missing_parts_error
 from .inventory import Inventory, no_run
 from .profiles import ParameterProfile, Profiles
 from .tables import FEW, FOUND, NAMED, PLAIN, PROVENANCE, RESOLVED, RESULTS, SWEPT, read_table
@@ -56,7 +56,8 @@ class Output:
     `study`: the study that was run, and `resolved` its file. `profiles`: over the whole table, per CFA; none where a
     sweep is no grid. `swept_points`: ids of the swept designs that figures show as points. `searched`: the search's
     evaluations. `audited`: rows of `sweep audit`; `left_out`: a row per light that was left out of a search; `regions`:
-    cells of the maps of color regions. `traded`: color error against noise, `rendered`: areas of pictures; `places`:
+    cells of the maps of color regions. `error_against_noise`: color error against noise, `rendered`: areas of
+    pictures; `places`:
     separations over the sensor; `vision`: tables of the benchmark of vision by their files' names.
     """
 
@@ -76,7 +77,7 @@ class Output:
     audited: pd.DataFrame | None
     left_out: pd.DataFrame | None
     regions: pd.DataFrame | None
-    traded: pd.DataFrame | None
+    error_against_noise: pd.DataFrame | None
     rendered: pd.DataFrame | None
     places: pd.DataFrame | None
     vision: Mapping[str, pd.DataFrame]
@@ -254,14 +255,16 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
     if not inventory.fingerprint:
         raise no_run(folder)
     if PROVENANCE not in inventory.files:
-        raise OutputError(Fault("no finished run here", str(folder), allowed="a folder that `sweep run` finished"))
+        raise OutputError(
+            ValidationIssue("no finished run here", str(folder), allowed="a folder that `sweep run` finished")
+        )
     optional = {name for name in (*files.MADE_BY_RUN, files.AUDIT) if name in inventory.files}.difference(_ALWAYS)
     if not audited:
         optional.discard(files.AUDIT)
     inventory.require([*_ALWAYS, *sorted(optional)])
     resolved = _mapping(folder / RESOLVED, lambda text: YAML(typ="safe").load(text))
     if lacks := [key for key in _ALWAYS_WRITTEN if key not in resolved]:
-        raise lacking_in(folder / RESOLVED, lacks)
+        raise missing_parts_error(folder / RESOLVED, lacks)
     study = checked_facts(folder / RESOLVED, StudySection, resolved)
     provenance = checked_facts(folder / PROVENANCE, Provenance, _mapping(folder / PROVENANCE, json.loads))
     quantities = (column.name for column in provenance.quantities)
@@ -281,7 +284,7 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
     try:
         curves = KeptCurves.of_table(read_table(folder / files.CURVES))
     except ValueError as error:
-        raise OutputError(Fault(f"cannot be read: {error}", str(folder / files.CURVES))) from None
+        raise OutputError(ValidationIssue(f"cannot be read: {error}", str(folder / files.CURVES))) from None
     return Output(
         folder=folder,
         study=study,
@@ -299,7 +302,7 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         audited=more.get(files.AUDIT),
         left_out=more.get(files.LEFT_OUT),
         regions=more.get(files.REGIONS_MAP),
-        traded=more.get(files.TRADED),
+        error_against_noise=more.get(files.TRADED),
         rendered=more.get(files.RENDERED),
         places=more.get(files.SENSOR_MAP),
         vision={name: more[name] for name in files.VISION_TABLES if name in more},
@@ -312,9 +315,9 @@ def _mapping(path: Path, parse: Callable[[str], Any]) -> dict[str, Any]:
     try:
         content = parse(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError, YAMLError) as error:
-        raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
+        raise OutputError(ValidationIssue(f"cannot be read: {error}", str(path))) from None
     if not isinstance(content, dict):
-        raise OutputError(Fault("not a mapping", str(path)))
+        raise OutputError(ValidationIssue("not a mapping", str(path)))
     return content
 
 
@@ -323,6 +326,6 @@ def _check_columns(path: Path, wanted: Sequence[str]) -> None:
     try:
         names = pq.read_schema(path).names
     except (OSError, pa.ArrowException) as error:
-        raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
+        raise OutputError(ValidationIssue(f"cannot be read: {error}", str(path))) from None
     if missing := [name for name in dict.fromkeys(wanted) if name not in names]:
-        raise lacking_in(path, missing)
+        raise missing_parts_error(path, missing)

@@ -13,7 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from ..base.disk import is_real_folder, read_plain
-from ..base.errors import Fault, OutputError
+from ..base.errors import OutputError, ValidationIssue
 from .atomic import write_bytes
 
 PARTS = "parts"
@@ -66,7 +66,7 @@ class Parts:
         self.folder = output / PARTS
         self._names: dict[str, str] = {}
         if os.path.lexists(self.folder) and not is_real_folder(self.folder):
-            raise OutputError(Fault("is no folder of this run; move it away", str(self.folder)))
+            raise OutputError(ValidationIssue("is no folder of this run; move it away", str(self.folder)))
         for path in sorted(self.folder.iterdir()) if is_real_folder(self.folder) else ():
             self.add(path.name)
 

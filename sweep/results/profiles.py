@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 
 from ..base.types import FloatArray
-from .tables import SWEPT, holds
+from .tables import SWEPT, word_mask
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -69,7 +69,9 @@ class Profiles:
         """
         import pandas as pd  # noqa: PLC0415  (slow to import: workers do without)
 
-        wanted = holds(table, "kind", SWEPT) & holds(table, "scenario", self.scenario) & table["feasible"].to_numpy()
+        wanted = (
+            word_mask(table, "kind", SWEPT) & word_mask(table, "scenario", self.scenario) & table["feasible"].to_numpy()
+        )
         rows = table.select([*self.parameters, self.objective, "cfa"]).filter(pa.array(wanted)).to_pandas()
         for name in self.parameters:
             bests = rows.dropna(subset=[name]).groupby(["cfa", name], observed=True)[self.objective].max()

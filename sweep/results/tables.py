@@ -13,7 +13,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from ..base.errors import Fault, OutputError
+from ..base.errors import OutputError, ValidationIssue
 from ..base.types import BoolArray
 from .atomic import atomic, write_text
 
@@ -100,7 +100,7 @@ def is_drawn(name: str) -> bool:
     return _DRAWN.fullmatch(name) is not None
 
 
-def is_own(name: str) -> bool:
+def is_user_code(name: str) -> bool:
     """Return whether a name is one that commands give to files of a run, beside its two lists.
 
     Parameters
@@ -364,7 +364,7 @@ def batches(path: Path, columns: Sequence[str] | None = None) -> Iterator[pa.Tab
         for batch in file.iter_batches(ROW_GROUP, columns=columns):
             yield pa.Table.from_batches([batch])
     except (OSError, pa.ArrowException) as error:
-        raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
+        raise OutputError(ValidationIssue(f"cannot be read: {error}", str(path))) from None
 
 
 def rows_in(path: Path) -> int:
@@ -386,7 +386,7 @@ def rows_in(path: Path) -> int:
         return 0
 
 
-def holds(table: pa.Table, column: str, *words: str) -> BoolArray:
+def word_mask(table: pa.Table, column: str, *words: str) -> BoolArray:
     """Return where a dictionary-encoded column holds one of some words.
 
     Parameters
@@ -427,4 +427,4 @@ def read_table(path: Path) -> pa.Table:
     try:
         return pq.read_table(path, page_checksum_verification=True)
     except (OSError, pa.ArrowException) as error:
-        raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
+        raise OutputError(ValidationIssue(f"cannot be read: {error}", str(path))) from None

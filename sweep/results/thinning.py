@@ -14,10 +14,10 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from ..base.errors import Fault, OutputError
+from ..base.errors import OutputError, ValidationIssue
 from ..base.types import BoolArray, IndexArray
 from ..metrics.columns.exposure import EXPOSURE
-from .tables import PLAIN, SWEPT, batches, holds
+from .tables import PLAIN, SWEPT, batches, word_mask
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -141,7 +141,7 @@ def swept_points(path: Path) -> IndexArray:
     """
     parts = [np.zeros(0, dtype=np.uint8)]
     for table in batches(path, ["kind", "feasible", "pareto", "status"]):
-        swept = holds(table, "kind", SWEPT) & holds(table, "status", "ok")
+        swept = word_mask(table, "kind", SWEPT) & word_mask(table, "status", "ok")
         feasible, pareto = table["feasible"].to_numpy(), table["pareto"].to_numpy()
         part = np.where(feasible, _FEASIBLE, _INFEASIBLE).astype(np.uint8)
         part[feasible & pareto] = _ON_FRONT
@@ -185,7 +185,7 @@ def thinned(
     try:
         total = int(pq.read_metadata(path).num_rows)
     except (OSError, pa.ArrowException) as error:
-        raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
+        raise OutputError(ValidationIssue(f"cannot be read: {error}", str(path))) from None
     step = max(1, -(-total // MOST_ROWS))
     kept: list[pa.Table] = []
     counted: Counter[_Group] = Counter()
@@ -196,9 +196,9 @@ def thinned(
         for row in groups.aggregate([([], "count_all")]).to_pylist():
             counted[*(row[name] for name in _COUNTED)] += row["count_all"]
         ids, feasible = table["design_id"].to_numpy(), table["feasible"].to_numpy()
-        wanted = ~holds(table, "kind", SWEPT) | table["pareto"].to_numpy() | (ids % step == 0) | np.isin(ids, keep)
+        wanted = ~word_mask(table, "kind", SWEPT) | table["pareto"].to_numpy() | (ids % step == 0) | np.isin(ids, keep)
         if step > 1:
-            wanted[leading_at(table, separation)] = True
+            wanted[leading_rows(table, separation)] = True
             for rows in row_groups(table).values():
                 among = np.zeros(table.num_rows, dtype=bool)
                 among[rows] = feasible[rows]
@@ -225,7 +225,7 @@ def row_groups(table: pa.Table) -> dict[tuple[str, str], IndexArray]:
         Indices.
     """
     cfas, scenarios = (
-        {name: holds(table, column, name) for name in table[column].unique().to_pylist()}
+        {name: word_mask(table, column, name) for name in table[column].unique().to_pylist()}
         for column in ("cfa", "scenario")
     )
     groups = {(cfa, scene): np.flatnonzero(cfas[cfa] & scenarios[scene]) for cfa, scene in product(cfas, scenarios)}
@@ -254,7 +254,7 @@ def best_at(table: pa.Table, order: Sequence[str], most: int, among: BoolArray) 
     return np.asarray(at[pc.sort_indices(few, sort_keys=keys)[:most].to_numpy()])
 
 
-def leading_at(table: pa.Table, separation: str, among: BoolArray | None = None) -> IndexArray:
+def leading_rows(table: pa.Table, separation: str, among: BoolArray | None = None) -> IndexArray:
     """Return the rows with the largest separation, and the largest per exposure time, in each scenario.
 
     Parameters
@@ -274,7 +274,7 @@ def leading_at(table: pa.Table, separation: str, among: BoolArray | None = None)
         ]
     leaders = []
     for scenario in table["scenario"].unique().to_pylist():
-        rows = np.flatnonzero(among & holds(table, "scenario", scenario))
+        rows = np.flatnonzero(among & word_mask(table, "scenario", scenario))
         for values in measures if rows.size else ():
             most = rows[values[rows] == values[rows].max()]
             leaders.append(most[ids[most].argmin()])

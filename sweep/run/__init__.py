@@ -5,11 +5,11 @@ Names are loaded at their first use: a worker process begins here, and needs few
 
 from typing import TYPE_CHECKING
 
-from ..base.modules import loaded_later
+from ..base.modules import lazy_import
 
 if TYPE_CHECKING:
     from ..results.folder import output_folder
-    from .dry_run import to_do, to_do_lines
+    from .dry_run import remaining_work, remaining_work_lines
     from .runner import run_study
     from .sweep import RunOptions
     from .workers import BACKENDS, stopped_by_signals
@@ -18,12 +18,12 @@ __all__ = [
     "BACKENDS",
     "RunOptions",
     "output_folder",
+    "remaining_work",
+    "remaining_work_lines",
     "run_study",
     "stopped_by_signals",
-    "to_do",
-    "to_do_lines",
 ]
-__getattr__ = loaded_later(
+__getattr__ = lazy_import(
     globals(),
     {
         "BACKENDS": ".workers",
@@ -31,7 +31,7 @@ __getattr__ = loaded_later(
         "output_folder": "..results.folder",
         "run_study": ".runner",
         "stopped_by_signals": ".workers",
-        "to_do": ".dry_run",
-        "to_do_lines": ".dry_run",
+        "remaining_work": ".dry_run",
+        "remaining_work_lines": ".dry_run",
     },
 )

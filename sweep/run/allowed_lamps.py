@@ -15,9 +15,9 @@ from ..camera.forward import ForwardModel
 from ..camera.setup import Setup
 from ..results.designs import few_rows, row_curves
 from ..spectra.lights import Lights
-from ..spectra.single_leds import Norm, SingleLeds, every_led
+from ..spectra.single_leds import Norm, SingleLeds, all_leds
 from ..study import Study
-from .workers import tracked
+from .workers import with_progress
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -59,14 +59,14 @@ def regions_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
     """
     regions = study.section.regions
     assert regions is not None
-    leds = every_led(regions)
+    leds = all_leds(regions)
     allowed = {norm: (leds.allowed(norm, "yellow"), leds.allowed(norm, "red")) for norm in regions.norms}
     few, calls = few_rows(rows), []
     for row in few:
         space, curves = row_curves(study, row)
         setup = study.setup(space, row["scenario"]).with_all_effects
         calls.append(delayed(_cells, setup, curves, allowed, regions.wanted_dn))
-    answers = zip(few, tracked(parallel, calls, "color regions", progress), strict=True)
+    answers = zip(few, with_progress(parallel, calls, "color regions", progress), strict=True)
     cells = [{"design_id": row["design_id"], **cell} for row, made in answers for cell in made]
     return pa.Table.from_pylist(cells, schema=_SCHEMA)
 

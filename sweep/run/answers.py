@@ -16,13 +16,13 @@ from .workers import Workers
 
 
 @dataclass
-class KeptAnswers:
+class CachedCalls:
     """Calls on the workers, each answer kept, so that a killed search repeats no finished call.
 
     The type of an answer is the annotation of its function.
     """
 
-    crew: Workers
+    pool: Workers
     parts: Parts
     fingerprint: str
     _round: int = 0
@@ -50,7 +50,7 @@ class KeptAnswers:
         kept = {at: self._answer(key, call) for at, (key, call) in enumerate(zip(keys, waiting, strict=True))}
         kept = {at: answer for at, answer in kept.items() if answer is not None}
         missing = [at for at in range(len(waiting)) if at not in kept]
-        fresh = self.crew.unordered(waiting[at] for at in missing)
+        fresh = self.pool.unordered(waiting[at] for at in missing)
         for at, key in enumerate(keys):
             while at not in kept:
                 number, answer = next(fresh)

@@ -21,7 +21,7 @@ from ..metrics.evaluate import evaluate
 from ..metrics.quantity import WORST_CASE
 from ..results.designs import row_space
 from ..results.facts import CheckFacts
-from ..results.tables import holds
+from ..results.tables import word_mask
 from ..study import Study
 from .routes import text_of, worst_cases
 from .workers import Workers
@@ -64,7 +64,7 @@ def _compared(study: Study, space: Space, scenario: str, rows: Sequence[Row]) ->
     setup = study.setup(space, scenario)
     model = ForwardModel(replace(setup.with_all_effects, accuracy=REFERENCE))
     nominal = evaluate(model, space.curves(points, study.grid.size))
-    csds = [quantity for quantity in study.quantities.values() if quantity.promised]
+    csds = [quantity for quantity in study.quantities.values() if quantity.has_error_bound]
     worst = [quantity for quantity in csds if quantity.extreme == WORST_CASE]
     exact = {quantity.name: nominal[quantity.name] for quantity in csds if quantity not in worst}
     if worst:
@@ -72,7 +72,7 @@ def _compared(study: Study, space: Space, scenario: str, rows: Sequence[Row]) ->
     differences = []
     for name, values in exact.items():
         kept = np.array([row[name] for row in rows], dtype=float)
-        # A column that the scene does not have is missing in both; one that is missing in one of them is a fault.
+        # A column that the scene does not have is missing in both; one that is missing in one of them is an issue.
         both_missing = np.isnan(kept) & np.isnan(values)
         differences.append(np.nan_to_num(np.where(both_missing, 0.0, np.abs(values - kept)), nan=np.inf))
     realized, names = np.stack(differences), list(exact)
@@ -85,7 +85,7 @@ def _compared(study: Study, space: Space, scenario: str, rows: Sequence[Row]) ->
 
 
 def _allowed_dn(setup: Setup, tolerance_dn: float) -> float:
-    """Return the difference of a CSD from the reference that is no fault, DN.
+    """Return the difference of a CSD from the reference that is no issue, DN.
 
     That is the tolerance. A readout in whole numbers without noise steps by up to sqrt(channels) DN between
     neighboring samples: with images of a light, moments of a pulse or all field positions, that is added.
@@ -95,7 +95,7 @@ def _allowed_dn(setup: Setup, tolerance_dn: float) -> float:
     return tolerance_dn + (math.sqrt(len(setup.camera.mosaic.channels)) if steps and sampled else 0.0)
 
 
-def check_run(study: Study, results: Path, seconds: float, crew: Workers) -> tuple[CheckFacts | None, list[str]]:
+def check_run(study: Study, results: Path, seconds: float, pool: Workers) -> tuple[CheckFacts | None, list[str]]:
     """Compare a seeded sample of a run's rows with the reference within a time, at least one row.
 
     Parameters
@@ -106,7 +106,7 @@ def check_run(study: Study, results: Path, seconds: float, crew: Workers) -> tup
         Result table.
     seconds : float
         Time, s; each worker takes a part of it.
-    crew : Workers
+    pool : Workers
         Workers.
 
     Returns
@@ -117,13 +117,13 @@ def check_run(study: Study, results: Path, seconds: float, crew: Workers) -> tup
         One for each row that could not.
     """
     sample = _sampled(study, results)
-    parts = [sample[at :: crew.count] for at in range(crew.count)]
+    parts = [sample[at :: pool.count] for at in range(pool.count)]
     rows: list[dict[str, Any]] = []
     warnings: list[str] = []
-    calls = (delayed(_checked, study, part, seconds / crew.count) for part in parts if part)
-    for compared, faults in crew(calls, killed=lambda _: ([], ["a worker was killed in the check of the run"])):
+    calls = (delayed(_checked, study, part, seconds / pool.count) for part in parts if part)
+    for compared, issues in pool(calls, killed=lambda _: ([], ["a worker was killed in the check of the run"])):
         rows += compared
-        warnings += faults
+        warnings += issues
     if not rows:
         return None, warnings
     shown = max(rows, key=lambda row: (row["realized_dn"] > row["allowed_dn"], row["realized_dn"]))
@@ -154,7 +154,7 @@ def _sampled(study: Study, results: Path) -> list[Row]:
         groups = rng.permutation(table.num_row_groups)
         sizes = np.cumsum([table.metadata.row_group(int(group)).num_rows for group in groups])
         part = table.read_row_groups(sorted(groups[: 1 + int(np.searchsorted(sizes, _ENOUGH_ROWS))].tolist()))
-    part = part.filter(holds(part, "status", "ok"))
+    part = part.filter(word_mask(part, "status", "ok"))
     chosen = rng.choice(part.num_rows, size=min(part.num_rows, _MOST_ROWS), replace=False)
     rows = part.take(chosen).to_pylist()
     return [{name: math.nan if value is None else value for name, value in row.items()} for row in rows]

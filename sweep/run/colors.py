@@ -31,11 +31,11 @@ _RENDERED = pa.schema(
 
 def _shown(study: Study, highlights: pd.DataFrame) -> Iterator[tuple[dict[str, Any], Any]]:
     """Yield keys and colors of plain CFAs, named designs and the answer."""
-    from ..metrics.tasks.color import Looks  # noqa: PLC0415  (few studies have tasks)
+    from ..metrics.tasks.color import PatchCamera  # noqa: PLC0415  (few studies have tasks)
 
     for row in few_rows(highlights):
         space, curves = row_curves(study, row)
-        yield {key: row[key] for key in _KEYS}, Looks(study.setup(space, row["scenario"]), curves)
+        yield {key: row[key] for key in _KEYS}, PatchCamera(study.setup(space, row["scenario"]), curves)
 
 
 def _chart_of(tasks: StudyTasks) -> tuple[tuple[str, ...], Chart]:
@@ -44,7 +44,7 @@ def _chart_of(tasks: StudyTasks) -> tuple[tuple[str, ...], Chart]:
     return task.key.cases, task.chart
 
 
-def traded_table(study: Study, highlights: pd.DataFrame) -> pa.Table:
+def error_against_noise_table(study: Study, highlights: pd.DataFrame) -> pa.Table:
     """Compute color error against noise.
 
     Parameters
@@ -59,14 +59,14 @@ def traded_table(study: Study, highlights: pd.DataFrame) -> pa.Table:
     pyarrow.Table
         One row per design, light and regularization of the color matrix.
     """
-    from ..metrics.tasks.judge import REGULARIZATIONS, traded  # noqa: PLC0415  (few studies have tasks)
+    from ..metrics.tasks.evaluation import REGULARIZATIONS, error_against_noise  # noqa: PLC0415  (few studies have tasks)
 
     assert study.tasks is not None
     cases, chart = _chart_of(study.tasks)
     rows = []
-    for design, looks in _shown(study, highlights):
+    for design, patch_camera in _shown(study, highlights):
         for at, case in enumerate(cases):
-            traded_off = traded(looks, chart, at, study.tasks.conditions)
+            traded_off = error_against_noise(patch_camera, chart, at, study.tasks.conditions)
             for regularization, delta_e, snr in zip(REGULARIZATIONS, *traded_off, strict=True):
                 values = {"light": case, "regularization": float(regularization), "delta_e_mean": delta_e, "snr": snr}
                 rows.append(design | values)
@@ -88,7 +88,7 @@ def rendered_table(study: Study, highlights: pd.DataFrame) -> pa.Table:
     pyarrow.Table
         One row per design, picture and area; those of the eye itself have no design.
     """
-    from ..metrics.tasks.judge import rendered_areas  # noqa: PLC0415
+    from ..metrics.tasks.evaluation import rendered_areas  # noqa: PLC0415
     from ..spectra.builtin.task_sets import NIGHT_LIGHT, NIGHT_LX, night_scene  # noqa: PLC0415  (few studies have tasks)
     from ..spectra.color import color_matching  # noqa: PLC0415
     from ..spectra.spectrum import energy_from_photons  # noqa: PLC0415
@@ -100,16 +100,18 @@ def rendered_table(study: Study, highlights: pd.DataFrame) -> pa.Table:
     streets = night_scene(study.grid)
     street = np.stack(list(streets.values()))
     white = chart.gray[night] / 0.18 * NIGHT_LX
-    seen = [
+    lamp_xyz = [
         energy_from_photons(study.grid.nodes_nm, photons) @ color_matching(study.grid).T for photons in (street, white)
     ]
     names = [str(number) for number in range(1, len(chart.xyz[day]) + 1)]
-    rows = _areas({}, CHART, names, chart.xyz[day] / chart.white[day]) + _areas({}, NIGHT, streets, seen[0] / seen[1])
+    rows = _areas({}, CHART, names, chart.xyz[day] / chart.white[day]) + _areas(
+        {}, NIGHT, streets, lamp_xyz[0] / lamp_xyz[1]
+    )
     dark = replace(tasks.conditions, illuminance_lx=NIGHT_LX)
-    for design, looks in _shown(study, highlights):
+    for design, patch_camera in _shown(study, highlights):
         patches = chart.photons[day] * tasks.conditions.illuminance_lx
-        rows += _areas(design, CHART, names, *rendered_areas(looks, chart, day, patches, tasks.conditions))
-        rows += _areas(design, NIGHT, streets, *rendered_areas(looks, chart, night, street, dark))
+        rows += _areas(design, CHART, names, *rendered_areas(patch_camera, chart, day, patches, tasks.conditions))
+        rows += _areas(design, NIGHT, streets, *rendered_areas(patch_camera, chart, night, street, dark))
     return pa.Table.from_pylist(rows, schema=_RENDERED)
 
 

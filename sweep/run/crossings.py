@@ -20,7 +20,7 @@ from ..metrics.columns.confusion import STATE_ERROR, state_errors
 from ..results.designs import few_rows, row_curves
 from ..study import Study
 from ..study.axes import series_of
-from .workers import tracked
+from .workers import with_progress
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -75,7 +75,7 @@ def crossings_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progre
                 calls.append(delayed(_crossing, between, curves, study.states, numbers, errors, allowed))
                 design = {"design_id": row["design_id"], "name": row["name"], "series": series, "key": key}
                 made.append(design | {"low": numbers[0], "high": numbers[1]})
-    answers = tracked(parallel, calls, "where designs stop being usable", progress)
+    answers = with_progress(parallel, calls, "where designs stop being usable", progress)
     return pa.Table.from_pylist([row | at for row, at in zip(made, answers, strict=True)], schema=_SCHEMA)
 
 
@@ -190,22 +190,22 @@ def _crossing(
     from scipy.optimize import brentq  # noqa: PLC0415  (few studies ask for it)
 
     by_ratio = min(ends) > 0
-    places = tuple(math.log(end) if by_ratio else end for end in ends)
-    known = dict(zip(places, errors, strict=True))
+    positions = tuple(math.log(end) if by_ratio else end for end in ends)
+    known = dict(zip(positions, errors, strict=True))
 
-    def number_at(place: float) -> float:
-        return math.exp(place) if by_ratio else place
+    def number_at(position: float) -> float:
+        return math.exp(position) if by_ratio else position
 
-    def error_at(place: float) -> float:
-        if place not in known:
-            known[place] = state_error_of(between(number_at(place)), curves, states)
-        return known[place]
+    def error_at(position: float) -> float:
+        if position not in known:
+            known[position] = state_error_of(between(number_at(position)), curves, states)
+        return known[position]
 
-    def decades(place: float) -> float:
-        return math.log10(max(error_at(place), _LEAST) / allowed)
+    def decades(position: float) -> float:
+        return math.log10(max(error_at(position), _LEAST) / allowed)
 
     try:
-        place = brentq(decades, *places, xtol=_CLOSE * (1.0 if by_ratio else abs(ends[1] - ends[0])))
-        return {"at": number_at(place), "error": error_at(place)}
+        position = brentq(decades, *positions, xtol=_CLOSE * (1.0 if by_ratio else abs(ends[1] - ends[0])))
+        return {"at": number_at(position), "error": error_at(position)}
     except ValidationError:
         return {}

@@ -30,7 +30,7 @@ from ..search.limit import Limit
 from ..study import Study
 from ..study.axes import series_of
 from .allowed_lamps import regions_table
-from .colors import rendered_table, traded_table
+from .colors import error_against_noise_table, rendered_table
 from .crossings import crossings_table
 from .details import Details, limited_by_table, recognition_table, sensor_map_table
 from .held_out import held_out_table
@@ -47,7 +47,7 @@ _POINTS = pa.schema(
 
 
 @dataclass(frozen=True)
-class Shown:
+class DerivedInput:
     """Input of the derived tables.
 
     Parameters
@@ -93,7 +93,7 @@ class Shown:
         return computed_rows(self.on_front[~self.on_front["design_id"].isin(ids)])
 
 
-def row_tables(study: Study) -> dict[str, Callable[[Shown], pa.Table]]:
+def row_tables(study: Study) -> dict[str, Callable[[DerivedInput], pa.Table]]:
     """Return the derived tables of a study.
 
     Parameters
@@ -107,7 +107,7 @@ def row_tables(study: Study) -> dict[str, Callable[[Shown], pa.Table]]:
         Function of each table, by file name, in the order of their computation.
     """
     recognition, tasks = study.section.recognition, study.tasks
-    tables: dict[str, Callable[[Shown], pa.Table]] = {
+    tables: dict[str, Callable[[DerivedInput], pa.Table]] = {
         CURVES: _curves_table,
         POINTS: _points_table,
         LIMITED_BY: lambda s: limited_by_table(s.study, s.details, s.points, s.parallel, s.progress),
@@ -125,12 +125,12 @@ def row_tables(study: Study) -> dict[str, Callable[[Shown], pa.Table]]:
     if recognition is not None and recognition.patches:
         tables[RECOGNITION] = lambda s: recognition_table(s.study, s.rows, s.details)
     if tasks is not None and "color" in tasks.by_name:
-        tables[TRADED] = lambda s: traded_table(s.study, s.rows)
+        tables[TRADED] = lambda s: error_against_noise_table(s.study, s.rows)
         tables[RENDERED] = lambda s: rendered_table(s.study, s.rows)
     return tables
 
 
-def _curves_table(shown: Shown) -> pa.Table:
+def _curves_table(shown: DerivedInput) -> pa.Table:
     """Return the curves of sensor, lights, files of user tasks, drawn designs, front and upper bound."""
     study, limit = shown.study, shown.limit()
     lights = zip(study.lights.types, study.lights.names, study.lights.photons, strict=True)
@@ -158,7 +158,7 @@ def _filters(study: Study, rows: list[dict[Any, Any]]) -> dict[int, FilterCurves
     return filters
 
 
-def _points_table(shown: Shown) -> pa.Table:
+def _points_table(shown: DerivedInput) -> pa.Table:
     """Return the digital numbers of each signal in each channel of drawn designs and the front."""
     lights, parts = shown.study.lights, [_POINTS.empty_table()]
     for row in [*shown.drawn, *shown.other_front]:

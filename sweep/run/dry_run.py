@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..results.folder import held_by
+from ..results.folder import run_in
 from ..results.identity import fingerprint
 from ..results.parts import Parts
 from ..results.tables import PLAIN, RESULTS
@@ -19,7 +19,7 @@ from .workers import Workers
 
 
 @dataclass(frozen=True)
-class ToDo:
+class RemainingWork:
     """Remaining work of a study.
 
     Parameters
@@ -40,7 +40,7 @@ class ToDo:
     searches: bool
 
 
-def to_do(study: Study, output: Path, n_jobs: int) -> ToDo:
+def remaining_work(study: Study, output: Path, n_jobs: int) -> RemainingWork:
     """Plan a study and read which parts are kept, without computing or writing.
 
     Parameters
@@ -54,25 +54,25 @@ def to_do(study: Study, output: Path, n_jobs: int) -> ToDo:
 
     Returns
     -------
-    ToDo
+    RemainingWork
         Remaining work.
     """
-    held = held_by(output)
+    held = run_in(output)
     whole = held is not None and held.fingerprint == fingerprint(study) and not held.wrong([RESULTS], quick=True)
     study = study.with_plans()
     if whole:
-        return ToDo(study, study.n_designs, 0, searches=False)
+        return RemainingWork(study, study.n_designs, 0, searches=False)
     sweep = Sweep(study, rules_of(study), Parts(output), Workers(n_jobs))
     rows = sum(sweep.jobs[index].size for index in sweep.todo)
-    return ToDo(study, study.n_designs - rows, len(sweep.todo), searches=study.search is not None)
+    return RemainingWork(study, study.n_designs - rows, len(sweep.todo), searches=study.search is not None)
 
 
-def to_do_lines(todo: ToDo, output: Path) -> Iterator[str]:
+def remaining_work_lines(todo: RemainingWork, output: Path) -> Iterator[str]:
     """Yield lines that describe the remaining work.
 
     Parameters
     ----------
-    todo : ToDo
+    todo : RemainingWork
         Remaining work.
     output : Path
         Output folder.

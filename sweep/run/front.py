@@ -9,8 +9,8 @@ import pyarrow as pa
 
 from ..base.types import BoolArray, FloatArray, IndexArray
 from ..metrics.pareto import non_dominated
-from ..results.tables import FEW, SWEPT, holds
-from ..results.thinning import best_at, leading_at, row_groups
+from ..results.tables import FEW, SWEPT, word_mask
+from ..results.thinning import best_at, leading_rows, row_groups
 from .routes import Rules
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ _Group = tuple[str, str]
 """A CFA and a scenario."""
 
 
-def few_of(table: pa.Table, rules: Rules) -> pa.Table:
+def report_rows(table: pa.Table, rules: Rules) -> pa.Table:
     """Return the rows of a table that a report may need: front, best and leading rows of each CFA and scenario.
 
     Plain CFAs, named designs and answers are all kept. `pareto` marks the front of any part of a run's rows, so that
@@ -44,9 +44,9 @@ def few_of(table: pa.Table, rules: Rules) -> pa.Table:
     pyarrow.Table
         Table.
     """
-    few, on_front = holds(table, "kind", *FEW), table["pareto"].to_numpy()
+    few, on_front = word_mask(table, "kind", *FEW), table["pareto"].to_numpy()
     feasible = table["feasible"].to_numpy()
-    kept = [np.flatnonzero(few), leading_at(table, rules.front[0], ~few)]
+    kept = [np.flatnonzero(few), leading_rows(table, rules.front[0], ~few)]
     for at in row_groups(table).values():
         swept = at[~few[at]]
         marked = swept[on_front[swept]]
@@ -61,7 +61,7 @@ def _values(table: pa.Table, axes: tuple[str, str]) -> FloatArray:
     return np.stack([table[name].to_numpy() for name in axes], axis=1)
 
 
-class Gathered:
+class RunRows:
     """Rows of a run that its report shows, and the Pareto front of each CFA and scenario.
 
     Parameters
@@ -79,7 +79,7 @@ class Gathered:
         self._front: dict[_Group, set[tuple[float, ...]]] = {}
 
     def add(self, few: pa.Table) -> None:
-        """Add the result of `few_of` for a part of the rows.
+        """Add the result of `report_rows` for a part of the rows.
 
         Parameters
         ----------
@@ -88,7 +88,7 @@ class Gathered:
         """
         self._waiting.append(few)
         if sum(table.num_rows for table in self._waiting) > _AT_ONCE:
-            self._waiting = [few_of(self._all(), self.rules)]
+            self._waiting = [report_rows(self._all(), self.rules)]
 
     def _all(self) -> pa.Table:
         return (
@@ -119,8 +119,8 @@ class Gathered:
         ndarray of shape (n, 2)
             Both quantities, each pair once.
         """
-        wanted = holds(self._rows, "kind", SWEPT) & holds(self._rows, "cfa", cfa)
-        wanted &= holds(self._rows, "scenario", scenario) & self._rows["pareto"].to_numpy()
+        wanted = word_mask(self._rows, "kind", SWEPT) & word_mask(self._rows, "cfa", cfa)
+        wanted &= word_mask(self._rows, "scenario", scenario) & self._rows["pareto"].to_numpy()
         values = _values(self._rows.filter(pa.array(wanted)), self.rules.front)
         return np.unique(values[non_dominated(values)], axis=0)
 
@@ -154,9 +154,9 @@ class Gathered:
         pandas.DataFrame
             Rows.
         """
-        few, drawn = holds(self._rows, "kind", *FEW), self._drawn()
+        few, drawn = word_mask(self._rows, "kind", *FEW), self._drawn()
         best = [
-            best_at(self._rows, self.rules.order, BEST_PER_CFA, drawn & holds(self._rows, "cfa", cfa))
+            best_at(self._rows, self.rules.order, BEST_PER_CFA, drawn & word_mask(self._rows, "cfa", cfa))
             for cfa in self._cfas()
         ]
         return self._frame([np.flatnonzero(few), *best])
@@ -169,19 +169,19 @@ class Gathered:
         pandas.DataFrame
             Rows.
         """
-        leaders = leading_at(self._rows, self.rules.front[0])
-        at = [leaders[holds(self._rows, "kind", SWEPT)[leaders]]]
+        leaders = leading_rows(self._rows, self.rules.front[0])
+        at = [leaders[word_mask(self._rows, "kind", SWEPT)[leaders]]]
         front = self._drawn() & self.marked(self._rows)["pareto"].to_numpy()
         sensitivity = self._rows[self.rules.front[1]].to_numpy()
         for cfa in self._cfas():
-            rows = np.flatnonzero(front & holds(self._rows, "cfa", cfa))
+            rows = np.flatnonzero(front & word_mask(self._rows, "cfa", cfa))
             rows = rows[np.argsort(sensitivity[rows], kind="stable")]
             at.append(rows[np.linspace(0, max(0, rows.size - 1), min(FRONT_ROWS, rows.size)).round().astype(int)])
         return self._frame(at)
 
     def _drawn(self) -> BoolArray:
         """Return the feasible swept rows of the first scenario."""
-        swept = holds(self._rows, "kind", SWEPT) & holds(self._rows, "scenario", self.scenario)
+        swept = word_mask(self._rows, "kind", SWEPT) & word_mask(self._rows, "scenario", self.scenario)
         return np.asarray(swept & self._rows["feasible"].to_numpy())
 
     def _cfas(self) -> list[str]:

@@ -21,7 +21,7 @@ from ..search.problem import Evaluation, Problem, best_feasible, starting_points
 from ..search.solver import search_from, smooth_objective
 from ..spectra.lights import class_pairs
 from ..study import Search, Study
-from .workers import tracked
+from .workers import with_progress
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -61,7 +61,7 @@ def held_out_table(
     for row in shown:
         space, curves = row_curves(study, row)
         calls.append(delayed(_on_lights, replace(study.setup(space, row["scenario"]), lights=lights), curves))
-    csds = tracked(parallel, calls, "held-out lights", progress)
+    csds = with_progress(parallel, calls, "held-out lights", progress)
     names = [HELD_OUT + csd_name(pair) for pair in class_pairs(lights.classes)]
     schema = pa.schema([("design_id", pa.int64()), *((name, pa.float64()) for name in names)])
     held_out = [{"design_id": row["design_id"], **csd} for row, csd in zip(shown, csds, strict=True)]
@@ -111,12 +111,14 @@ def left_out_table(study: Study, search: Search, best: Evaluation, parallel: Par
         optimum = best_feasible([e for run in parallel(calls) for e in run.log])
         optima += [] if optimum is None else [(nominal, optimum)]
     calls, rows = [], []
-    for asked, optimum in optima:
-        starts = [asked.to_unit(optimum.x), *points]
-        for at in _left_out_signals(asked):
-            calls.append(delayed(_without, asked, at, starts, *budget))
-            rows.append(dict(zip(_NAMES, (asked.objective.column, lights.types[at], lights.names[at]), strict=True)))
-    answers = tracked(parallel, calls, "lights left out", progress)
+    for requested, optimum in optima:
+        starts = [requested.to_unit(optimum.x), *points]
+        for at in _left_out_signals(requested):
+            calls.append(delayed(_without, requested, at, starts, *budget))
+            rows.append(
+                dict(zip(_NAMES, (requested.objective.column, lights.types[at], lights.names[at]), strict=True))
+            )
+    answers = with_progress(parallel, calls, "lights left out", progress)
     figures = [dict(zip(_FIGURES, answer or (None,) * 3, strict=True)) for answer in answers]
     schema = pa.schema([*((name, pa.string()) for name in _NAMES), *((name, pa.float64()) for name in _FIGURES)])
     return pa.Table.from_pylist([row | values for row, values in zip(rows, figures, strict=True)], schema=schema)

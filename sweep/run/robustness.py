@@ -12,7 +12,7 @@ import pyarrow as pa
 from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..camera.setup import Setup
 from ..designs.space import Space
-from ..designs.tolerance import AS_DESIGNED, Off, Tolerance
+from ..designs.tolerance import AS_DESIGNED, ProductionError, Tolerance
 from ..metrics.drawn import draws_of
 from ..metrics.members import PopulationImager, population_imager
 from ..metrics.separation import csd_name
@@ -21,7 +21,7 @@ from ..results.designs import few_rows, row_space
 from ..results.tables import PLAIN
 from ..spectra.lights import Pair
 from ..study import Study
-from .workers import tracked
+from .workers import with_progress
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -65,12 +65,12 @@ class Candidate:
             replace(self.setup, lights=replace(self.setup.lights, population=population.scaled(scale)))
         )
 
-    def curves(self, off: Off) -> FloatArray:
+    def curves(self, off: ProductionError) -> FloatArray:
         """Return the filters as production makes them.
 
         Parameters
         ----------
-        off : Off
+        off : ProductionError
             Production error.
 
         Returns
@@ -80,7 +80,7 @@ class Candidate:
         """
         return np.asarray(self.space.curves(self.point, self.setup.camera.grid.size, off), dtype=float)
 
-    def worst(self, pair: Pair, scale: float) -> tuple[float, Off]:
+    def worst(self, pair: Pair, scale: float) -> tuple[float, ProductionError]:
         """Return the smallest CSD over a scaled population and scaled tolerances.
 
         Parameters
@@ -94,14 +94,14 @@ class Candidate:
         -------
         csd_dn : float
             CSD, DN.
-        off : Off
+        off : ProductionError
             Its production error.
         """
         imager, made = self.imager(scale), self.space.filter is not None
-        places = self.tolerance.scaled(scale).places if made else (AS_DESIGNED,)
-        csds = imager.worst(np.concatenate([self.curves(off) for off in places]), [pair])[csd_name(pair)]
+        errors = self.tolerance.scaled(scale).places if made else (AS_DESIGNED,)
+        csds = imager.worst(np.concatenate([self.curves(off) for off in errors]), [pair])[csd_name(pair)]
         at = int(csds.argmin())
-        return float(csds[at]), places[at]
+        return float(csds[at]), errors[at]
 
 
 def robustness_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: Progress) -> pa.Table:
@@ -135,7 +135,7 @@ def robustness_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progr
         best = max(plain, key=lambda one: one[f"worst_{csd_name(pair)}"], default=row)
         rival = None if best["design_id"] == row["design_id"] else _design(study, best)
         calls.append(delayed(_robustness, _design(study, row), rival, pair, study.section.seed))
-    answers = zip(few, tracked(parallel, calls, "robustness", progress), strict=True)
+    answers = zip(few, with_progress(parallel, calls, "robustness", progress), strict=True)
     made = [{"design_id": row["design_id"], **numbers, **lights} for row, (numbers, lights) in answers]
     return pa.Table.from_pylist(made, schema=pa.schema(_FIELDS))
 

@@ -19,8 +19,8 @@ from ..designs.tolerance import AS_DESIGNED, Tolerance
 from ..metrics.bound import Bound
 from ..metrics.evaluate import evaluate, family_quantities, image_quantities
 from ..metrics.objective import COMBINED, Objective, columns_of
-from ..metrics.own import OwnMetric
-from ..metrics.quantity import OF_A_SHARE, WORST_CASE, YIELD, Asked, Columns, Quantity
+from ..metrics.quantity import OF_A_SHARE, WORST_CASE, YIELD, Columns, Quantity, RequestedQuantities
+from ..metrics.user_metrics import UserMetric
 from ..results.identity import CHUNK
 from ..results.tables import FEW
 from ..vision.section import Vision
@@ -38,7 +38,7 @@ class Rules:
     ----------
     schema : pyarrow.Schema
         Schema of the result table.
-    asked : Asked
+    requested : RequestedQuantities
         Requested quantities.
     objective : Objective
         Objective.
@@ -59,7 +59,7 @@ class Rules:
     """
 
     schema: pa.Schema
-    asked: Asked
+    requested: RequestedQuantities
     objective: Objective
     constraints: Mapping[str, Bound]
     front: tuple[str, str]
@@ -77,7 +77,7 @@ class Rules:
     @cached_property
     def quantities(self) -> Mapping[str, Quantity]:
         """Quantities by column name."""
-        return columns_of(self.asked, self.objective)
+        return columns_of(self.requested, self.objective)
 
     @property
     def worst(self) -> list[Quantity]:
@@ -85,7 +85,7 @@ class Rules:
         return [quantity for quantity in self.quantities.values() if quantity.extreme == WORST_CASE]
 
 
-def found_of(
+def quantities_at(
     space: Space, start: int, points: FloatArray, setup: Setup, rules: Rules
 ) -> tuple[Columns, dict[int, str]]:
     """Compute the quantities of designs of a space.
@@ -106,10 +106,10 @@ def found_of(
     Returns
     -------
     columns : dict of str to ndarray[n_designs]
-    faults : dict of int to str
-        Text of the fault of each design that failed, or that has a quantity that is not finite.
+    issues : dict of int to str
+        Text of the issue of each design that failed, or that has a quantity that is not finite.
     """
-    faults: dict[int, str] = {}
+    issues: dict[int, str] = {}
 
     def computed(begin: int, end: int) -> list[Columns]:
         try:
@@ -118,15 +118,15 @@ def found_of(
             if end - begin > 1:
                 middle = (begin + end) // 2
                 return computed(begin, middle) + computed(middle, end)
-            faults[begin] = f"error: {text_of(error)}"
+            issues[begin] = f"error: {text_of(error)}"
             return [dict.fromkeys(rules.quantities, np.array([np.nan]))]
 
-    from_curves = rules.vision is not None or rules.asked.states or rules.asked.wanted_yield or rules.worst
+    from_curves = rules.vision is not None or rules.requested.states or rules.requested.wanted_yield or rules.worst
     size = CHUNK * (1 if from_curves else _CHUNKS_BY_EDGES)
     parts = [part for begin in range(0, len(points), size) for part in computed(begin, min(begin + size, len(points)))]
     names = rules.quantities.keys() & set.intersection(*map(set, parts))
     columns = {name: np.concatenate([part[name] for part in parts]) for name in names}
-    return columns, _not_finite(columns, setup, rules) | faults
+    return columns, _not_finite(columns, setup, rules) | issues
 
 
 def text_of(error: Exception) -> str:
@@ -147,17 +147,17 @@ def text_of(error: Exception) -> str:
 
 def _columns(space: Space, start: int, setup: Setup, points: FloatArray, rules: Rules) -> Columns:
     """Return the quantities of a block of designs, ndarray of shape (n_designs,) each."""
-    size, asked = setup.camera.grid.size, rules.asked
+    size, requested = setup.camera.grid.size, rules.requested
     model = forward_model(setup, AllPhases if rules.drawn and space.kind in FEW else ForwardModel)
     edges = edges_of(space, start, start + len(points))
     designs = CurveBlock(space.curves(points, size)) if edges is None else edges
-    columns = evaluate(model, designs, asked.states, probabilities=asked.probabilities, own=asked.own)
+    columns = evaluate(model, designs, requested.states, probabilities=requested.probabilities, own=requested.own)
     columns |= family_quantities(None if space.filter is None else space.filter.family, points)
     if rules.vision is not None:
         columns |= image_quantities(setup, space.curves(points, size), rules.vision, rules.seed)
     if rules.worst:
-        columns |= worst_cases(space, model, points, columns, rules.worst, rules.tolerance, asked.own)
-    if asked.wanted_yield:
+        columns |= worst_cases(space, model, points, columns, rules.worst, rules.tolerance, requested.own)
+    if requested.wanted_yield:
         columns |= _of_a_share(space, setup, points, rules)
     if rules.objective.column == COMBINED:
         columns[COMBINED] = rules.objective.of(columns)
@@ -171,7 +171,7 @@ def worst_cases(
     nominal: Columns,
     worst: Sequence[Quantity],
     tolerance: Tolerance,
-    own: Sequence[OwnMetric] = (),
+    own: Sequence[UserMetric] = (),
 ) -> Columns:
     """Return worst cases over production errors, and of CSDs over the population of the lights, ndarray[n_designs].
 
@@ -186,7 +186,7 @@ def worst_cases(
         Worst cases to compute.
     tolerance : Tolerance
         Production errors.
-    own : sequence of OwnMetric
+    own : sequence of UserMetric
         See `evaluate`.
     """
     setup = model.setup
@@ -219,11 +219,11 @@ def _not_finite(columns: Columns, setup: Setup, rules: Rules) -> dict[int, str]:
     Quantities of a family and metrics of user code may be missing; for a plain CFA, those of a modified channel.
     """
     needs = ("family", "own") if setup.camera.modified else ("family", "own", "modified")
-    lacking = {name for name, quantity in rules.quantities.items() if quantity.needs in needs}
-    if lacking & set(rules.objective.weights):
-        lacking.add(COMBINED)
+    missing_keys = {name for name, quantity in rules.quantities.items() if quantity.needs in needs}
+    if missing_keys & set(rules.objective.weights):
+        missing_keys.add(COMBINED)
     faulty = np.zeros(len(next(iter(columns.values()))), dtype=bool)
-    for name in columns.keys() - lacking:
+    for name in columns.keys() - missing_keys:
         infinite = rules.quantities[name].infinite
         faulty |= ~(np.isfinite(columns[name]) | ((columns[name] == np.inf) & infinite))
     return dict.fromkeys(np.flatnonzero(faulty).tolist(), "not finite")

@@ -22,7 +22,7 @@ from ..results.dictionary import described
 from ..results.identity import CHUNK
 from ..results.tables import SWEPT, result_schema
 from ..study import Study
-from .routes import Rules, found_of
+from .routes import Rules, quantities_at
 
 _MOST_CHUNKS, _LEAST_JOBS = 16, 64
 _DRAWN_DESIGNS = 32
@@ -85,7 +85,7 @@ def jobs_of(study: Study) -> Iterator[Job]:
 
 def _job_size(study: Study, space: Space) -> int:
     """Return the number of designs of a job, independent of the workers; several chunks for fast designs."""
-    if study.asked.wanted_yield:
+    if study.requested.wanted_yield:
         return _DRAWN_DESIGNS
     if study.states or not by_edges(space):
         return CHUNK
@@ -129,7 +129,7 @@ def rules_of(study: Study) -> Rules:
     section, recognition = study.section, study.section.recognition
     return Rules(
         schema=described(result_schema(study.parameters, list(study.quantities)), study.quantities),
-        asked=study.asked,
+        requested=study.requested,
         objective=study.objective,
         constraints=study.constraints,
         front=study.trade_off,
@@ -145,7 +145,7 @@ def run_job(job: Job, setup: Setup, rules: Rules) -> pa.Table:
     """Evaluate a job; a design that fails becomes a row with its status.
 
     `pareto` marks the non-dominated designs of this job alone, among those that meet every constraint but those on the
-    front's axes; `front.Gathered` finds those of the whole table.
+    front's axes; `front.RunRows` finds those of the whole table.
 
     Parameters
     ----------
@@ -160,16 +160,16 @@ def run_job(job: Job, setup: Setup, rules: Rules) -> pa.Table:
         A row per design, of `rules.schema`.
     """
     points = job.space.points(job.start, job.stop)
-    columns, faults = found_of(job.space, job.start, points, setup, rules)
+    columns, issues = quantities_at(job.space, job.start, points, setup, rules)
     ok = np.ones(job.size, dtype=bool)
-    ok[list(faults)] = False
+    ok[list(issues)] = False
     misshape = job.space.violation(points)
     violation = total_violation(columns, rules.constraints, misshape)
     eligible = ok & (total_violation(columns, rules.constraints, misshape, leave_out=rules.front) <= FEASIBLE)
-    texts = dict.fromkeys(["ok"] if ok.any() else []) | dict.fromkeys(faults.values())
+    texts = dict.fromkeys(["ok"] if ok.any() else []) | dict.fromkeys(issues.values())
     numbers = {text: at for at, text in enumerate(texts)}
     status = np.zeros(job.size, dtype=np.intp)
-    status[list(faults)] = [numbers[text] for text in faults.values()]
+    status[list(issues)] = [numbers[text] for text in issues.values()]
     verdicts = {
         "violation": np.where(ok, violation, np.nan),
         "feasible": ok & (violation <= FEASIBLE),

@@ -15,12 +15,12 @@ import numpy as np
 import pyarrow as pa
 
 from ..base.disk import read_facts
-from ..base.errors import BrokenProofError, Fault, InfeasibleError, StudyError
+from ..base.errors import InfeasibleError, StudyError, UpperBoundExceededError, ValidationIssue
 from ..base.types import Progress
 from ..metrics.bound import FEASIBLE
 from ..metrics.pareto import hypervolume
 from ..results.dictionary import described
-from ..results.facts import Provenance, lacking
+from ..results.facts import Provenance, missing_keys
 from ..results.folder import begin
 from ..results.inventory import Inventory
 from ..results.lock import LOCK, locked
@@ -40,13 +40,13 @@ from ..results.tables import (
 from ..results.thinning import swept_points
 from ..search.limit import Limit
 from ..study import Study
-from ..study.goals import out_of_reach
+from ..study.goals import unreachable_constraints
 from ..vision.installed import require_network
-from .answers import KeptAnswers
+from .answers import CachedCalls
 from .check import check_run
-from .derived import Shown, row_tables
+from .derived import DerivedInput, row_tables
 from .details import design_details
-from .front import Gathered, few_of
+from .front import RunRows, report_rows
 from .held_out import left_out_table
 from .provenance import plan_facts, provenance, resolved_yaml
 from .rows import rules_of
@@ -135,8 +135,10 @@ def run_study(
         SIGINT or SIGTERM came; finished parts are kept.
     """
     started = time.monotonic()
-    if study.search is not None and (beyond := out_of_reach(study, study.search.space, study.search.scenario)):
-        raise InfeasibleError([Fault(f"{study.name}: no design can be feasible"), *beyond])
+    if study.search is not None and (
+        beyond := unreachable_constraints(study, study.search.space, study.search.scenario)
+    ):
+        raise InfeasibleError([ValidationIssue(f"{study.name}: no design can be feasible"), *beyond])
     if study.section.vision is not None and study.section.vision.network:
         require_network()
     with stopped_by_signals(), locked(output):
@@ -144,13 +146,13 @@ def run_study(
         inventory.remove(inventory.unlisted())  # nothing is known of them
         wrong = set(inventory.wrong(sorted(files_of(study))))
         facts = read_facts(inventory.path(PROVENANCE))
-        if lacking(Provenance, facts) or (options.retry_failed and facts["failed"]):
+        if missing_keys(Provenance, facts) or (options.retry_failed and facts["failed"]):
             wrong.add(PROVENANCE)
         if not wrong:
             return ()
-        with workers(n_jobs, backend, scheduler) as crew:
-            how = {"command": list(command), "workers": crew.count, "backend": backend, "scheduler": scheduler}
-            run = _Run(study.with_plans(), inventory, crew, progress, options, started, how)
+        with workers(n_jobs, backend, scheduler) as pool:
+            how = {"command": list(command), "workers": pool.count, "backend": backend, "scheduler": scheduler}
+            run = _Run(study.with_plans(), inventory, pool, progress, options, started, how)
             try:
                 return run.make(wrong)
             except (StudyError, InfeasibleError):
@@ -167,7 +169,7 @@ class _Run:
 
     study: Study
     inventory: Inventory
-    crew: Workers
+    pool: Workers
     progress: Progress
     options: RunOptions
     started: float
@@ -175,8 +177,8 @@ class _Run:
 
     def __post_init__(self) -> None:
         self.rules, self.parts = rules_of(self.study), Parts(self.inventory.folder)
-        self.sweep = Sweep(self.study, self.rules, self.parts, self.crew)
-        self.gathered = Gathered(self.rules, next(iter(self.study.scenarios)))
+        self.sweep = Sweep(self.study, self.rules, self.parts, self.pool)
+        self.gathered = RunRows(self.rules, next(iter(self.study.scenarios)))
 
     def make(self, wrong: set[str]) -> tuple[str, ...]:
         """Make files and those that depend on them; provenance comes last, and marks a finished run.
@@ -195,11 +197,11 @@ class _Run:
         if wrong & _whole(study):
             wrong = files_of(study)
             self.inventory.remove([PROVENANCE])
-            self.inventory.outdate()
+            self.inventory.discard_derived()
             self._search_and_sweep()
         else:
             for table in batches(self.inventory.path(RESULTS)):
-                self.gathered.add(few_of(table, self.rules))
+                self.gathered.add(report_rows(table, self.rules))
             self.gathered.finish()
         if wrong & row_tables(study).keys():
             self._write_row_tables(wrong)
@@ -220,25 +222,25 @@ class _Run:
         kept = self._kept("search")
         try:
             return run_search(self.study, self.study.search, kept, self.progress)
-        except BrokenProofError:
+        except UpperBoundExceededError:
             kept.drop_limits()
             raise
 
-    def _kept(self, what: str) -> KeptAnswers:
+    def _kept(self, what: str) -> CachedCalls:
         """Return calls whose answers are part files."""
-        return KeptAnswers(self.crew, self.parts, f"{self.sweep.fingerprint} {what}")
+        return CachedCalls(self.pool, self.parts, f"{self.sweep.fingerprint} {what}")
 
     def _search_and_sweep(self) -> None:
         """Search, sweep, and write the tables of both; an infeasible search ends the run before the sweep."""
         answer, sweep, gathered = self.answer, self.sweep, self.gathered
         sweep.run(gathered, self.progress, self.options)
-        answered = [] if answer is None else [answer_row(self.study, answer, self.rules, self.crew)]
+        answered = [] if answer is None else [answer_row(self.study, answer, self.rules, self.pool)]
         for row in answered:
             gathered.add(row)
         gathered.finish()
         marked = map(gathered.marked, chain(sweep.tables(), answered))
         write_tables(marked, self.rules.schema, self.inventory.path(RESULTS))
-        self.inventory.adopt(RESULTS)
+        self.inventory.list_file(RESULTS)
         if answer is not None:
             self._write(SEARCH_LOG, search_log(answer))
             if answer.search.levels:
@@ -249,9 +251,11 @@ class _Run:
 
     def _write_row_tables(self, names: set[str]) -> None:
         rows, on_front = self.gathered.frame(), self.gathered.front_frame()
-        details = design_details(self.study, names, rows, on_front, self.crew, self.progress)
+        details = design_details(self.study, names, rows, on_front, self.pool, self.progress)
         points = swept_points(self.inventory.path(RESULTS))
-        shown = Shown(self.study, rows, on_front, details, points, self._limit, self.crew, self._kept, self.progress)
+        shown = DerivedInput(
+            self.study, rows, on_front, details, points, self._limit, self.pool, self._kept, self.progress
+        )
         for name, make in row_tables(self.study).items():
             if name in names:
                 self._write(name, make(shown))
@@ -299,12 +303,12 @@ class _Run:
                 facts["hypervolume_least_sensitivity"] = answer.search.levels[0]
         duration_s = round(time.monotonic() - self.started, 3)
         seconds = max(_CHECK_S, _CHECK_SHARE * duration_s)
-        facts["check"], unchecked = check_run(study, self.inventory.path(RESULTS), seconds, self.crew)
+        facts["check"], unchecked = check_run(study, self.inventory.path(RESULTS), seconds, self.pool)
         how = self.how | {"duration_s": duration_s}
         return Provenance(**provenance(study, how), **facts, warnings=(*warnings, *unchecked))
 
 
-def _hypervolumes(answer: SearchAnswer, gathered: Gathered) -> dict[str, float]:
+def _hypervolumes(answer: SearchAnswer, gathered: RunRows) -> dict[str, float]:
     """Return the area that sweep and search dominate above no separation and the lowest level of sensitivity."""
     reference = np.array([0.0, answer.search.levels[0] - 1e-6])
     runs = (*answer.runs, *(run for point in answer.front for run in point.runs))

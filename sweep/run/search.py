@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from ..base.errors import Fault, InfeasibleError
-from ..base.own_code import kind_in_words
+from ..base.errors import InfeasibleError, ValidationIssue
 from ..base.types import FloatArray, Parallel, Progress, delayed
+from ..base.user_code import kind_in_words
 from ..designs.space import Space
 from ..metrics.bound import FEASIBLE
 from ..metrics.columns.sensitivity import cfa_sensitivity_at
 from ..results.tables import front_schema, search_schema
 from ..search.certificate import ROUNDING
-from ..search.limit import Limit, limit_of, why_not
+from ..search.limit import Limit, limit_of, reason_without_bound
 from ..search.problem import Evaluation, Problem, SearchRun, best_feasible, starting_points
-from ..search.solver import best_reachable, search_from
+from ..search.solver import extreme_value, search_from
 from ..search.trade_off import Effort, FrontPoint, calls_at_levels, check_proof, gap_of, trade_off
 from ..study import Search, Study
 from .routes import Rules
@@ -68,7 +68,7 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
     ------
     InfeasibleError
         If no start finds a feasible design, with the best reachable value of each constraint.
-    BrokenProofError
+    UpperBoundExceededError
         If a design exceeds its upper bound.
     """
     problem = study.problem(search)
@@ -76,9 +76,9 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
     starts = starting_points(problem, n_starts, study.section.seed)
     per_start = search.max_evaluations // n_starts
     effort = Effort(search.algorithm, starts, per_start, study.section.seed)
-    no_limit = why_not(problem)
+    no_limit = reason_without_bound(problem)
     limited = no_limit is None
-    # All at once, so that no core waits for another: few of these calls need what others find.
+    # All at once, so that no core waits for another: few of these calls need results of others.
     calls = [
         delayed(search_from, problem, i, u, search.algorithm, per_start, effort.seed) for i, u in enumerate(starts)
     ]
@@ -113,17 +113,17 @@ def limit_alone(study: Study, search: Search) -> Limit | None:
         None if there is no upper bound.
     """
     problem = study.problem(search)
-    return limit_of(problem) if why_not(problem) is None else None
+    return limit_of(problem) if reason_without_bound(problem) is None else None
 
 
 def _infeasible(study: Study, problem: Problem, starts: FloatArray, per_start: int) -> InfeasibleError:
-    faults = [Fault(f"{study.name}: no feasible design was found")]
+    issues = [ValidationIssue(f"{study.name}: no feasible design was found")]
     for name, bound in problem.constraints.items():
-        value = best_reachable(problem, name, starts, per_start)
+        value = extreme_value(problem, name, starts, per_start)
         met = "reachable alone" if bound.violation(np.array([value]))[0] <= FEASIBLE else "out of reach"
         best = f"the best value found is {value:.6g}" if np.isfinite(value) else "no well-formed filter was found"
-        faults.append(Fault(f"{met}: {name} {bound}; {best}", key=f"constraints.{name}"))
-    return InfeasibleError(faults)
+        issues.append(ValidationIssue(f"{met}: {name} {bound}; {best}", key=f"constraints.{name}"))
+    return InfeasibleError(issues)
 
 
 def answer_row(study: Study, answer: SearchAnswer, rules: Rules, parallel: Parallel) -> pa.Table:

@@ -11,17 +11,17 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
-from ..base.errors import FailedDesignError, Fault
+from ..base.errors import FailedDesignError, ValidationIssue
 from ..base.types import Call, Progress, delayed
 from ..camera.setup import Setup
 from ..results.identity import fingerprint
 from ..results.parts import ROWS, Parts, write_part
-from ..results.tables import decoded, encoded, holds
+from ..results.tables import decoded, encoded, word_mask
 from ..study import Study
-from .front import Gathered, few_of
+from .front import RunRows, report_rows
 from .routes import Rules
 from .rows import Job, failed_rows, job_key, jobs_of, run_job
-from .workers import WorkerKilledError, Workers, heed_stop
+from .workers import WorkerKilledError, Workers, raise_if_stopped
 
 _SCENES_PER_WORKER, _FEW = 2, 64
 """Least number of scenes for each worker, and largest number of designs, where one worker computes a whole scene."""
@@ -31,7 +31,7 @@ _KeyedJob = tuple[Job, str, Setup]
 
 
 @dataclass(frozen=True)
-class Finished:
+class FinishedJob:
     """Finished job.
 
     Parameters
@@ -39,7 +39,7 @@ class Finished:
     part : str or bytes
         Name of its part file, or its content if the worker could not write it.
     few : pyarrow.Table
-        Result of `few_of`.
+        Result of `report_rows`.
     failed : int
         Designs that failed.
     """
@@ -72,7 +72,7 @@ class Sweep:
     study: Study
     rules: Rules
     parts: Parts
-    crew: Workers
+    pool: Workers
     warnings: list[str] = field(default_factory=list)
     failed: int = 0
 
@@ -104,12 +104,12 @@ class Sweep:
     def _setup(self, job: Job) -> Setup:
         return self._setups[id(job.space), job.scenario]
 
-    def run(self, gathered: Gathered, progress: Progress, options: RunOptions) -> None:
+    def run(self, gathered: RunRows, progress: Progress, options: RunOptions) -> None:
         """Compute the remaining jobs.
 
         Parameters
         ----------
-        gathered : Gathered
+        gathered : RunRows
             Receives all rows.
         progress : callable
             Called with a phase, work done and work in total.
@@ -129,14 +129,14 @@ class Sweep:
                     self.parts.forget(key)
                     continue
                 self.failed += failed
-                gathered.add(few_of(table, self.rules))
+                gathered.add(report_rows(table, self.rules))
                 done += table.num_rows
         progress("designs", done, self.study.n_designs)
         batches = self._batches(self.todo)
-        folder = None if self.crew.backend == "dask" else self.parts.folder  # a cluster may have other disks
+        folder = None if self.pool.backend == "dask" else self.parts.folder  # a cluster may have other disks
         keyed = ([(self.jobs[i], self.keys[i], self._setup(self.jobs[i])) for i in batch] for batch in batches)
         calls = [delayed(_compute, jobs, self.rules, folder) for jobs in keyed]
-        for at, results in self.crew.unordered(calls, _quarantined):
+        for at, results in self.pool.unordered(calls, _quarantined):
             for index, finished in zip(batches[at], results, strict=True):
                 if isinstance(finished.part, str):
                     self.parts.add(finished.part)
@@ -198,7 +198,7 @@ class Sweep:
 
         scenes = [list(jobs) for _, jobs in groupby(todo, lambda index: self.jobs[index].scenario)]
         scenes.sort(key=lambda jobs: -light_px(self.jobs[jobs[0]].scenario))
-        enough = len(scenes) >= _SCENES_PER_WORKER * self.crew.count
+        enough = len(scenes) >= _SCENES_PER_WORKER * self.pool.count
         batches: list[list[int]] = []
         for jobs in scenes:
             few = sum(self.jobs[index].size for index in jobs) <= _FEW
@@ -206,23 +206,23 @@ class Sweep:
         return batches
 
 
-def _compute(jobs: Sequence[_KeyedJob], rules: Rules, folder: Path | None) -> list[Finished]:
+def _compute(jobs: Sequence[_KeyedJob], rules: Rules, folder: Path | None) -> list[FinishedJob]:
     """Compute jobs, and write their parts if a folder is given."""
     return [_finished(key, folder, rules, run_job(job, setup, rules)) for job, key, setup in jobs]
 
 
-def _finished(key: str, folder: Path | None, rules: Rules, table: pa.Table) -> Finished:
-    heed_stop()
+def _finished(key: str, folder: Path | None, rules: Rules, table: pa.Table) -> FinishedJob:
+    raise_if_stopped()
     content = encoded(table)
     part = content if folder is None else write_part(folder, key, ROWS, content)
-    return Finished(part, few_of(table, rules), _failed(table))
+    return FinishedJob(part, report_rows(table, rules), _failed(table))
 
 
 def _failed(table: pa.Table) -> int:
-    return int(np.count_nonzero(~holds(table, "status", "ok")))
+    return int(np.count_nonzero(~word_mask(table, "status", "ok")))
 
 
-def _quarantined(call: Call) -> list[Finished]:
+def _quarantined(call: Call) -> list[FinishedJob]:
     """Compute jobs whose worker died twice one by one; one that kills again by halves, down to the design."""
     jobs, rules, folder = call[1]
     return [_finished(key, folder, rules, _alone(job, setup, rules)) for job, key, setup in jobs]
@@ -244,5 +244,7 @@ def _alone(job: Job, setup: Setup, rules: Rules) -> pa.Table:
 
 
 def _first_failure(table: pa.Table) -> FailedDesignError:
-    row = table.filter(pa.array(~holds(table, "status", "ok"))).slice(0, 1).to_pylist()[0]
-    return FailedDesignError(Fault(f"design {row['design_id']} failed ({row['status']}); finished parts are kept"))
+    row = table.filter(pa.array(~word_mask(table, "status", "ok"))).slice(0, 1).to_pylist()[0]
+    return FailedDesignError(
+        ValidationIssue(f"design {row['design_id']} failed ({row['status']}); finished parts are kept")
+    )

@@ -111,7 +111,7 @@ class Workers:
             parallel = joblib.Parallel(n_jobs, return_as="generator_unordered", batch_size=1, pre_dispatch="2*n_jobs")
             try:
                 for at, result in parallel(dispatched()):
-                    heed_stop()
+                    raise_if_stopped()
                     del waiting[at], begun[at]
                     yield at, result
             except Exception as error:
@@ -191,7 +191,7 @@ def workers(n_jobs: int, backend: str = "loky", scheduler: str | None = None) ->
         yield Workers(n_jobs, backend)
 
 
-def tracked(parallel: Parallel, calls: Sequence[Call], phase: str, progress: Progress) -> Iterator[Any]:
+def with_progress(parallel: Parallel, calls: Sequence[Call], phase: str, progress: Progress) -> Iterator[Any]:
     """Yield the answers of calls in order, with the progress of a phase.
 
     Parameters
@@ -237,7 +237,7 @@ def stopped_by_signals() -> Iterator[None]:
         return
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     for number, handler in before.items():
-        if handler is not signal.SIG_IGN:  # as a shell has it for what runs in the background
+        if handler is not signal.SIG_IGN:  # as a shell sets it for background jobs
             signal.signal(number, _ask_to_stop)
     try:
         yield
@@ -249,7 +249,7 @@ def stopped_by_signals() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def heed_stop() -> None:
+def raise_if_stopped() -> None:
     """Raise KeyboardInterrupt if a stop was requested, before a result is kept that it may have spoiled."""
     if _stop.is_set():
         raise KeyboardInterrupt

@@ -38,11 +38,11 @@ class AnyHeight:
         field = whole.setup.scene.field
         assert field is not None
         self._whole, self._field = whole, field
-        self._heights = {*field.seen_heights, *field.knots[0]}
+        self._heights = {*field.counted_heights, *field.knots[0]}
         self._looked_at = field_heights(whole.setup)
         self._models: dict[float, LinearModel] = {}
-        asked = {*whole.objective.weights, *whole.constraints} & whole.pairs.keys()
-        self._pairs = {name: whole.pairs[name] for name in sorted(asked) if whole.quantities[name].apart == DN}
+        requested = {*whole.objective.weights, *whole.constraints} & whole.pairs.keys()
+        self._pairs = {name: whole.pairs[name] for name in sorted(requested) if whole.quantities[name].apart == DN}
 
     @property
     def problem(self) -> Problem:

@@ -67,7 +67,7 @@ class Certificate:
 
 
 @dataclass(frozen=True)
-class Solved:
+class LinearSolution:
     """Result of a linear program for a t and some sides, in the objective's unit.
 
     Parameters

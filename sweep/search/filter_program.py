@@ -23,10 +23,10 @@ from ..base.types import FloatArray, IndexArray
 from ..camera.linear import LinearModel, linear_model
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.columns.sensitivity import SENSITIVITY
-from .certificate import ROUNDING, Certificate, Sides, Solved
+from .certificate import ROUNDING, Certificate, LinearSolution, Sides
 from .least_noise import least_variance
+from .perturbed import Distances
 from .problem import Problem
-from .produced import Distances
 
 if TYPE_CHECKING:
     from .member_pairs import MemberPairs
@@ -123,8 +123,8 @@ class FilterProgram:
                 rate = 0.0 if weight is None else made.scale / weight
                 matrices.append(made.rows)
                 per_sensitivity = made.scale if quantity.name == SENSITIVITY and least > -np.inf else 0.0
-                own = [least, slack, rate, made.constant, per_sensitivity]
-                columns.append(np.tile(own, (made.rows.shape[0], 1)))
+                coefficients = [least, slack, rate, made.constant, per_sensitivity]
+                columns.append(np.tile(coefficients, (made.rows.shape[0], 1)))
             if bound.max is not None:
                 matrices.append(-made.rows)
                 most = [-bound.max * made.scale, slack, 0.0, -made.constant, 0.0]
@@ -145,7 +145,7 @@ class FilterProgram:
             apart = gain[:, first, None] - gain[:, None, second]
             squares = (fixed[:, first, None] - fixed[:, None, second]) ** 2
             if noise is not None and self.problem.quantities[name].apart == "noise":
-                own_noise, others = ((each[:, first, None] + each[:, None, second]) / 2 for each in noise)
+                own_noise, others = ((variance[:, first, None] + variance[:, None, second]) / 2 for variance in noise)
                 apart, squares = apart / np.sqrt(own_noise)[..., None], squares / others
             others_squared = squares.sum(axis=3).ravel()
             rows = apart.reshape(-1, self.base.size)
@@ -157,14 +157,18 @@ class FilterProgram:
     def _set_pairs(self) -> None:
         problem = self.problem
         apart, columns = [np.empty((0, self.base.size))], [np.empty((0, 6))]
-        for name, found in self._distances():
+        for name, distances in self._distances():
             bound, weight = problem.constraints.get(name), problem.objective.weights.get(name)
             if weight is None and (bound is None or bound.min is None):
                 continue
-            apart.append(found.rows)
+            apart.append(distances.rows)
             least, slack = (0.0, 0.0) if bound is None else (bound.min or 0.0, FEASIBLE * bound.scale)
-            own = [least, slack, 0.0 if weight is None else 1 / weight]
-            columns.append(np.column_stack([found.added, found.squared, np.tile(own, (found.squared.size, 1))]))
+            coefficients = [least, slack, 0.0 if weight is None else 1 / weight]
+            columns.append(
+                np.column_stack(
+                    [distances.added, distances.squared, np.tile(coefficients, (distances.squared.size, 1))]
+                )
+            )
         self.apart = np.concatenate(apart)
         *added, self._squared, self._least, self._slack, self._rate = np.concatenate(columns).T
         self.added = np.stack(added, axis=1)
@@ -187,8 +191,8 @@ class FilterProgram:
     @property
     def noisy(self) -> bool:
         """True if a distance is in units of the noise."""
-        asked = {*self.problem.objective.weights, *self.problem.constraints} & self.problem.pairs.keys()
-        return any(self.problem.quantities[name].apart == "noise" for name in asked)
+        requested = {*self.problem.objective.weights, *self.problem.constraints} & self.problem.pairs.keys()
+        return any(self.problem.quantities[name].apart == "noise" for name in requested)
 
     def reaches(self, curve: FloatArray) -> float:
         """Return the objective of a filter with the least noise, which is no less than its own.
@@ -231,12 +235,12 @@ class FilterProgram:
             Difference, DN; 0 if none is needed.
         """
         least = self._least - self._slack if relaxed else self._least
-        asked = np.maximum(least, t * self._rate)
-        found = np.sqrt(np.maximum(0.0, asked**2 - self._squared))
+        requested = np.maximum(least, t * self._rate)
+        difference = np.sqrt(np.maximum(0.0, requested**2 - self._squared))
         inside = 0.0 if relaxed else np.where(self._least > 0, _INSIDE_DN, 0.0)
-        return np.asarray(np.where(found > 0, found + inside + self._rate * margin, 0.0), dtype=float)
+        return np.asarray(np.where(difference > 0, difference + inside + self._rate * margin, 0.0), dtype=float)
 
-    def solve(self, t: float, sides: Sides) -> Solved:
+    def solve(self, t: float, sides: Sides) -> LinearSolution:
         """Find the filter with the largest margin above t, and a bound for all filters with these sides.
 
         Parameters
@@ -248,7 +252,7 @@ class FilterProgram:
 
         Returns
         -------
-        Solved
+        LinearSolution
             Filter and bound.
         """
         self.solved += 1
@@ -259,21 +263,21 @@ class FilterProgram:
         own_added = self._added(pairs, signs)
         floor = np.concatenate([self._rows.needed(t), self.needed(t)[pairs] - own_added])
         rate = np.concatenate([self._rows.rate, self._rate[pairs]])
-        status, weights, found = self._best_margin(rows, floor, rate)
+        status, weights, solution = self._best_margin(rows, floor, rate)
         if status == _INFEASIBLE:  # what does not depend on t cannot be met: the least that all rows must give up
             sizes = np.concatenate([self._sizes[0], self._sizes[1][pairs]])
-            status, weights, found = self._best_margin(rows, floor, sizes)
-            found = None if found is None or found[-1] < -ROUNDING else found
+            status, weights, solution = self._best_margin(rows, floor, sizes)
+            solution = None if solution is None or solution[-1] < -ROUNDING else solution
         if weights is None:
-            return Solved(np.inf)
+            return LinearSolution(np.inf)
         weights[weights < _LEAST_WEIGHT * weights.max(initial=0.0)] = 0.0
         used = weights[-pairs.size :] > 0 if pairs.size else some[:0]
         needs = Sides().joined(pairs[used], signs[used])
         certificate = self._certificate(weights, rows, pairs, own_added)
         beyond = self.beyond(certificate)
-        if found is None:
-            return Solved(beyond, needs=needs, certificate=certificate)
-        return Solved(beyond, float(found[-1]), found[:-1], needs, certificate)
+        if solution is None:
+            return LinearSolution(beyond, needs=needs, certificate=certificate)
+        return LinearSolution(beyond, float(solution[-1]), solution[:-1], needs, certificate)
 
     def _added(self, pairs: IndexArray, signs: FloatArray) -> FloatArray:
         """Return the largest additional difference of some pairs on their side, DN."""
@@ -300,7 +304,7 @@ class FilterProgram:
         self, rows: csr_matrix, floor: FloatArray, rate: FloatArray
     ) -> tuple[int, FloatArray | None, FloatArray | None]:
         """Solve: maximize m subject to rows @ N >= floor + rate m; return status, row weights and (N, m)."""
-        found = linprog(
+        result = linprog(
             c=np.append(np.zeros(self.base.size), -1.0),
             A_ub=hstack([-rows, csr_matrix(rate[:, None])]).tocsr(),
             b_ub=-floor,
@@ -308,9 +312,9 @@ class FilterProgram:
             method="highs",
             options={"primal_feasibility_tolerance": _SOLVER_TOLERANCE},
         )
-        if found.status != _SOLVED:
-            return int(found.status), None, None
-        return _SOLVED, np.maximum(0.0, -found.ineqlin.marginals), found.x
+        if result.status != _SOLVED:
+            return int(result.status), None, None
+        return _SOLVED, np.maximum(0.0, -result.ineqlin.marginals), result.x
 
     def _certificate(self, weights: FloatArray, rows: csr_matrix, pairs: IndexArray, added: FloatArray) -> Certificate:
         low, high = self._box
@@ -349,9 +353,9 @@ class FilterProgram:
 
         def excluded(t: float) -> bool:
             floor, apart = rows.needed(t, relaxed=True), self.needed(t, relaxed=True)
-            asked = certificate.row_weights @ floor[certificate.rows]
-            asked += certificate.pair_weights @ apart[certificate.pairs]
-            return bool(asked > certificate.most)
+            requested = certificate.row_weights @ floor[certificate.rows]
+            requested += certificate.pair_weights @ apart[certificate.pairs]
+            return bool(requested > certificate.most)
 
         if excluded(at_least):
             return -np.inf

@@ -18,7 +18,7 @@ import numpy as np
 from ..base.types import FloatArray, IndexArray
 from ..camera.linear import linear_model
 from ..camera.setup import Setup
-from ..designs.tolerance import AS_DESIGNED, Off
+from ..designs.tolerance import AS_DESIGNED, ProductionError
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY, SENSITIVITY, light_of
 from ..metrics.quantity import Quantity
@@ -36,7 +36,7 @@ _ON_BOUND = -0.5 * FEASIBLE
 """The same where nothing lies inside, such as a slope of 0: half of what still counts as feasible."""
 _SETTLED, _SETTLED_EVALUATIONS = 1e-6, 16
 """A search whose latest evaluations all lie within this share of the box, with objectives within this share of their
-size and violations as near, has arrived: what it still does is to look for less than rounding leaves. SLSQP's line
+size and violations as near, has converged: further steps are below rounding. SLSQP's line
 searches take ten steps, so it has begun anew without coming away from there.
 """
 _CONDITION_NM = 100.0
@@ -97,9 +97,9 @@ def _finite(point: Point) -> Point:
     return replace(
         point,
         evaluation=replace(point.evaluation, violation=np.inf),
-        terms=point.terms.cleaned(),
-        conditions=point.conditions.cleaned(),
-        quantities={name: rows.cleaned() for name, rows in point.quantities.items()},
+        terms=point.terms.clean_file(),
+        conditions=point.conditions.clean_file(),
+        quantities={name: rows.clean_file() for name, rows in point.quantities.items()},
     )
 
 
@@ -119,16 +119,16 @@ class Model:
         self._free = problem.free
         self._rule, self._weights = problem.objective.rule, problem.objective.weights
         wanted = (*self._weights, *problem.constraints)
-        self._produced = {name: problem.produced(name) for name in wanted}
-        places = dict.fromkeys((AS_DESIGNED, *(off for every in self._produced.values() for off in every)))
-        self._families = {off: problem.family.produced(off) if any(off) else problem.family for off in places}
+        self._perturbed = {name: problem.perturbed(name) for name in wanted}
+        errors = dict.fromkeys((AS_DESIGNED, *(off for every in self._perturbed.values() for off in every)))
+        self._families = {off: problem.family.perturbed(off) if any(off) else problem.family for off in errors}
         over = any(problem.over_population(name) for name in wanted)
         self._members = _members_of(problem.setup) if over else None
         self._drawn = _drawn_of(problem) if any(problem.of_a_share(name) for name in wanted) else None
         wanted_less = self._rule.wanted == "less"
-        self._power = 1 if problem.signed_goal or wanted_less else 2  # what may be below 0 has no root
+        self._power = 1 if problem.signed_goal or wanted_less else 2  # a quantity that may be negative has no root
         self._back_off = {name: _back_off(problem, name, bound) for name, bound in problem.constraints.items()}
-        self._seen: dict[bytes, Point] = {}
+        self._points: dict[bytes, Point] = {}
 
     def at(self, u: FloatArray) -> Point:
         """Simulate and log a point once; beyond the budget, or where `u` is NaN, stop the search.
@@ -146,22 +146,22 @@ class Model:
         # A copy, since `u` is nlopt's own buffer.
         u = np.clip(np.array(u, dtype=float), 0.0, 1.0)
         key = u.tobytes()
-        if self._seen and self.stop is not None and not np.isfinite(u).all():
+        if self._points and self.stop is not None and not np.isfinite(u).all():
             self.stop()
             self.lost = True
-            return next(iter(self._seen.values()))
-        if key not in self._seen and len(self._run.log) >= self._budget and self.stop is not None:
+            return next(iter(self._points.values()))
+        if key not in self._points and len(self._run.log) >= self._budget and self.stop is not None:
             self.stop()
             self.spent = True
-            return next(iter(self._seen.values()))
-        if key not in self._seen:
+            return next(iter(self._points.values()))
+        if key not in self._points:
             # Only the newest is asked for again: the constraints follow the objective at the same point.
             # A filter without light has no exposure.
             with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-                self._seen = {key: _finite(self._simulate(u))}
-            self._run.log.append(self._seen[key].evaluation)
+                self._points = {key: _finite(self._simulate(u))}
+            self._run.log.append(self._points[key].evaluation)
             self._latest.append(u)
-        return self._seen[key]
+        return self._points[key]
 
     @property
     def settled(self) -> bool:
@@ -183,22 +183,24 @@ class Model:
             for off, family in self._families.items()
         }
         terms, objective = self._terms(made)
-        own = problem.family.violation(x[None])[0]
-        conditions = [Rows(own, problem.family.violation_gradient(x)[:, free] * self._span).scaled(1 / _CONDITION_NM)]
-        worst = float(max(own.max(initial=0.0), 0.0))
+        violations = problem.family.violation(x[None])[0]
+        conditions = [
+            Rows(violations, problem.family.violation_gradient(x)[:, free] * self._span).scaled(1 / _CONDITION_NM)
+        ]
+        worst = float(max(violations.max(initial=0.0), 0.0))
         quantities = {}
         for name, bound in problem.constraints.items():
             rows = quantities[name] = self._rows(name, made)
             conditions += _conditions(self._quantities[name], bound, rows, self._back_off[name])
             worst = max(worst, float(bound.violation(np.array([self._quantities[name].value(rows)]))[0]))
         light = light_of(made[AS_DESIGNED])
-        own, whole = (float(light[name][0]) for name in (SENSITIVITY, CFA_SENSITIVITY))
-        evaluation = Evaluation(x, objective, own, whole, worst)
+        violations, whole = (float(light[name][0]) for name in (SENSITIVITY, CFA_SENSITIVITY))
+        evaluation = Evaluation(x, objective, violations, whole, worst)
         own_term = np.arange(len(terms)) * (not self._rule.smallest)  # what is smallest needs one bound
         term = np.repeat(own_term, [rows.values.size for rows in terms])
         return Point(evaluation, Rows.joined(terms), self._power, term, Rows.joined(conditions), quantities)
 
-    def _terms(self, made: Mapping[Off, SmoothDesign]) -> tuple[list[Rows], float]:
+    def _terms(self, made: Mapping[ProductionError, SmoothDesign]) -> tuple[list[Rows], float]:
         """Return the rows of the objective's weighted quantities, and its value."""
         terms, columns = [], {}
         for name, weight in self._weights.items():
@@ -209,11 +211,11 @@ class Model:
             return terms, float(min(rows.values.min() for rows in terms))
         return terms, float(self._problem.objective.of(columns)[0])
 
-    def _rows(self, name: str, made: Mapping[Off, SmoothDesign]) -> Rows:
+    def _rows(self, name: str, made: Mapping[ProductionError, SmoothDesign]) -> Rows:
         """Return the rows of a quantity."""
         smooth = self._quantities[name].smooth
         assert smooth is not None
-        return Rows.joined([smooth(made[off]) for off in self._produced[name]])
+        return Rows.joined([smooth(made[off]) for off in self._perturbed[name]])
 
 
 def _term(quantity: Quantity, rows: Rows, weight: float, rule: Rule, power: int) -> Rows:
@@ -239,14 +241,14 @@ def _back_off(problem: Problem, name: str, bound: Bound) -> float:
 
 def _conditions(quantity: Quantity, bound: Bound, rows: Rows, back_off: float) -> list[Rows]:
     """Return rows that are <= 0 where a bound is met, with a relative margin of `back_off`."""
-    found, scale = [], bound.scale
+    conditions, scale = [], bound.scale
     if quantity.rows == "decades" and bound.max is not None:
         least = -math.log10(bound.max)
         return [rows.scaled(-1.0, least + back_off * max(1.0, least))]
     if bound.min is not None and quantity.rows == "squares":
-        found.append(rows.scaled(-1 / scale**2, (bound.min * (1 + back_off) / scale) ** 2))
+        conditions.append(rows.scaled(-1 / scale**2, (bound.min * (1 + back_off) / scale) ** 2))
     elif bound.min is not None:
-        found.append(rows.scaled(-1 / scale, bound.min / scale + back_off))
+        conditions.append(rows.scaled(-1 / scale, bound.min / scale + back_off))
     if bound.max is not None:
-        found.append(rows.scaled(1 / scale, -bound.max / scale + back_off))
-    return found
+        conditions.append(rows.scaled(1 / scale, -bound.max / scale + back_off))
+    return conditions

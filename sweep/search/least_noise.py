@@ -51,8 +51,8 @@ def least_variance(
     constant = at_base - per_qe @ base
     electrons = np.maximum(_least_light(per_qe, box, row, least) + constant, 0.0)
     # The weighted sum of the pixels' squares is no less than the square of their weighted sum over that of the weights.
-    own = electrons + pixel.prnu**2 * electrons**2 / share + pixel.read_noise_e**2 * share
-    return np.asarray((pixel.dn_per_e**2 * own + share / 12) * (1 - _ROUNDING), dtype=float)
+    variance_e2 = electrons + pixel.prnu**2 * electrons**2 / share + pixel.read_noise_e**2 * share
+    return np.asarray((pixel.dn_per_e**2 * variance_e2 + share / 12) * (1 - _ROUNDING), dtype=float)
 
 
 def _least_light(light: FloatArray, box: tuple[FloatArray, FloatArray], row: FloatArray, least: float) -> FloatArray:

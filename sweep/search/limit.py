@@ -5,7 +5,7 @@ sensitivities and CSDs, whichever of two signals N makes the brighter one, for t
 quantization in the scene of the search. For d' it is a bound with the least noise (`least_noise.py`), which no filter
 need approach. The result is a bracket: a filter that attains the lower end, and linear programs which prove that no
 filter is above the upper end. Worst cases of CSDs are over the population of the lights, and over production where
-that moves the whole shape of a filter (`produced.py`). Constraints that only some families have (widths of edges and
+that moves the whole shape of a filter (`perturbed.py`). Constraints that only some families have (widths of edges and
 bands) are left out, and so are other worst cases: with more filters the upper end stays true.
 """
 
@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.errors import BrokenProofError, Fault, SweepError
+from ..base.errors import SweepError, UpperBoundExceededError, ValidationIssue
 from ..base.types import FloatArray
-from ..camera.exposure import may_set_exposure
+from ..camera.exposure import may_be_brightest
 from ..camera.pixel import unquantized
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.columns.sensitivity import SENSITIVITY
@@ -29,8 +29,8 @@ from ..metrics.quantity import DN, WORST_CASE
 from ..metrics.smooth import smooth_csd, smooth_response
 from ..metrics.smooth_noise import smooth_detectability
 from .certificate import ROUNDING
+from .perturbed import all_ways, perturbed_filters
 from .problem import Problem
-from .produced import all_ways, ways_of
 
 if TYPE_CHECKING:
     from .any_height import AnyHeight
@@ -107,11 +107,11 @@ def limit_of(
     Raises
     ------
     SweepError
-        If the response is not linear; see `why_not`.
+        If the response is not linear; see `reason_without_bound`.
     """
-    refused = why_not(problem)
+    refused = reason_without_bound(problem)
     if refused is not None:
-        raise SweepError(Fault(f"no limit: {refused}"))
+        raise SweepError(ValidationIssue(f"no limit: {refused}"))
     relaxed, left_out = _relaxed(problem)
     heights = _any_height_of(relaxed) if relaxed.setup.all_heights else None
     distances = any(relaxed.quantities[name].apart for name in relaxed.objective.weights)
@@ -149,14 +149,14 @@ def check_bound(value: float, proven: float, where: str = "") -> None:
 
     Raises
     ------
-    BrokenProofError
+    UpperBoundExceededError
         If the value exceeds the bound.
     """
     if not value <= proven + _PROOF_TOLERANCE * max(1.0, proven):
-        raise BrokenProofError(
-            Fault(
+        raise UpperBoundExceededError(
+            ValidationIssue(
                 f"broken proof{where}: a filter has {value:.9g}, but the upper bound is {proven:.9g}; what is finished "
-                "is kept; this is a fault of the program, not of the study"
+                "is kept; this is an error of the program, not of the study"
             )
         )
 
@@ -178,7 +178,7 @@ def gap_between(value: float, proven: float) -> float:
 
     Raises
     ------
-    BrokenProofError
+    UpperBoundExceededError
         If the value exceeds the bound.
     """
     check_bound(value, proven)
@@ -192,7 +192,7 @@ def _members_of(problem: Problem, over: Sequence[str]) -> MemberPairs:
 
 
 def _any_height_of(problem: Problem) -> AnyHeight:
-    from .any_height import AnyHeight  # noqa: PLC0415  (only where all places of the sensor count)
+    from .any_height import AnyHeight  # noqa: PLC0415  (only where all field positions count)
 
     return AnyHeight(problem)
 
@@ -221,29 +221,29 @@ def _attaining(
     A program knows some members and positions, so that its filter may miss a bounded worst case. Then the bounds are
     raised by twice the violation until a filter meets those of the problem; None if none does.
     """
-    asked, solved = problem, 0
+    requested, solved = problem, 0
     for _ in range(_ATTEMPTS):
         worst = {} if members is None else {name: members.least(name, curve) for name in members.names}
         worst |= {} if heights is None else heights.least(curve)
         attained = _attained(problem, curve, worst)
         if attained > -np.inf:
             return attained, curve, solved
-        lacking = {n: b.min - worst[n] for n, b in problem.constraints.items() if n in worst and b.min is not None}
-        lacking = {name: lack for name, lack in lacking.items() if lack > 0}
-        if not lacking:
+        missing_keys = {n: b.min - worst[n] for n, b in problem.constraints.items() if n in worst and b.min is not None}
+        missing_keys = {name: lack for name, lack in missing_keys.items() if lack > 0}
+        if not missing_keys:
             break
-        bounds = asked.constraints
-        raised = {n: Bound.model_construct(min=(bounds[n].min or 0.0) + 2 * lack) for n, lack in lacking.items()}
-        asked = replace(asked, constraints={**bounds, **raised})
-        program, found = _proof(asked, members, tolerance, _ATTEMPT_PROGRAMS)
+        bounds = requested.constraints
+        raised = {n: Bound.model_construct(min=(bounds[n].min or 0.0) + 2 * lack) for n, lack in missing_keys.items()}
+        requested = replace(requested, constraints={**bounds, **raised})
+        program, solution = _proof(requested, members, tolerance, _ATTEMPT_PROGRAMS)
         solved += program.solved
-        if found.curve is None:
+        if solution.curve is None:
             break
-        curve = found.curve
+        curve = solution.curve
     return -np.inf, None, solved
 
 
-def why_not(problem: Problem) -> str | None:
+def reason_without_bound(problem: Problem) -> str | None:
     """Return the reason why a problem has no linear upper bound.
 
     Parameters
@@ -260,7 +260,7 @@ def why_not(problem: Problem) -> str | None:
     why = _NOT_LINEAR
     if any(problem.quantities[name].states for name in unknown):
         why = "is not convex in the filter: its noise grows with the light; d' has a limit"
-    if problem.own_goal:
+    if problem.has_user_objective:
         why = "is an own metric, of which nothing is known"
     base, family = problem.setup.camera.base_qe[0], problem.family
     reasons: tuple[tuple[Callable[[], bool], str], ...] = (
@@ -278,7 +278,7 @@ def why_not(problem: Problem) -> str | None:
         ),
         (lambda: _clips(problem), "signals exceed the full well or the range of the ADC"),
         (
-            lambda: may_set_exposure(problem.setup, _most_sensitive(problem)),
+            lambda: may_be_brightest(problem.setup, _most_sensitive(problem)),
             "the modified channel could set the exposure",
         ),
     )
@@ -293,8 +293,8 @@ def _most_sensitive(problem: Problem) -> float:
 
 def _moves(problem: Problem) -> bool:
     """Return whether filters also count as production makes them."""
-    asked = (*problem.constraints, *problem.objective.weights)
-    return len(ways_of(problem)) > 1 and any(problem.worst_distance(name) for name in asked)
+    requested = (*problem.constraints, *problem.objective.weights)
+    return len(perturbed_filters(problem)) > 1 and any(problem.worst_distance(name) for name in requested)
 
 
 def _relaxed(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
@@ -303,23 +303,23 @@ def _relaxed(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
     Worst cases of CSDs over a population or production stay; others become nominal ones, which are no worse.
     """
     quantities = problem.quantities
-    asked = (*problem.constraints, *problem.objective.weights)
-    moves = len(ways_of(problem)) > 1
-    stay = {name for name in asked if problem.worst_distance(name) and (problem.population or moves)}
-    nominal = {name for name in asked if quantities[name].extreme == WORST_CASE} - stay
-    plains = {name: quantities[name].of if name in nominal else name for name in asked}
+    requested = (*problem.constraints, *problem.objective.weights)
+    moves = len(perturbed_filters(problem)) > 1
+    stay = {name for name in requested if problem.worst_distance(name) and (problem.population or moves)}
+    nominal = {name for name in requested if quantities[name].extreme == WORST_CASE} - stay
+    plains = {name: quantities[name].of if name in nominal else name for name in requested}
     left_out: list[str] = []
     kept: dict[str, Bound] = {}
     for name, bound in problem.constraints.items():
         plain = plains[name]
         better = "min" if quantities[name].wanted == "less" else "max"
-        own = bound.model_copy(update={better: None}) if name in nominal else bound
-        if not quantities[plain].has_limit or own.min is own.max is None:
+        relaxed_bound = bound.model_copy(update={better: None}) if name in nominal else bound
+        if not quantities[plain].has_limit or relaxed_bound.min is relaxed_bound.max is None:
             left_out.append(name)
             nominal -= {name} - problem.objective.weights.keys()
             continue
-        left_out += [] if own == bound else [f"the {better} of {name}"]
-        ends = [b for b in (own, kept.get(plain)) if b is not None]
+        left_out += [] if relaxed_bound == bound else [f"the {better} of {name}"]
+        ends = [b for b in (relaxed_bound, kept.get(plain)) if b is not None]
         least, most = [b.min for b in ends if b.min is not None], [b.max for b in ends if b.max is not None]
         kept[plain] = Bound.model_construct(min=max(least, default=None), max=min(most, default=None))
     weights: dict[str, float] = {}
@@ -327,13 +327,13 @@ def _relaxed(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
         plain = plains[name]
         weights[plain] = min(weight, weights.get(plain, weight))
     if (stay or nominal) and problem.tolerance:
-        left_out += _shifts_left_out([plains[name] for name in asked if name in nominal], problem)
+        left_out += _shifts_left_out([plains[name] for name in requested if name in nominal], problem)
     return replace(problem, objective=Objective(minimum=weights), constraints=kept), tuple(left_out)
 
 
 def _shifts_left_out(nominal: Sequence[str], problem: Problem) -> list[str]:
     """Return a note on production errors that the bound leaves out."""
-    if len(ways_of(problem)) == 1:
+    if len(perturbed_filters(problem)) == 1:
         return ["edge shifts"]
     some = [] if all_ways(problem) else ["some edge shifts"]
     return [*some, *(f"edge shifts of {name}" for name in dict.fromkeys(nominal))]
@@ -341,7 +341,7 @@ def _shifts_left_out(nominal: Sequence[str], problem: Problem) -> list[str]:
 
 def _top(problem: Problem) -> FloatArray:
     """Return an upper bound on the filters of the box, in any worst case, ndarray of shape (n_wavelengths,)."""
-    moved = ways_of(problem)[1:] if _moves(problem) else ()
+    moved = perturbed_filters(problem)[1:] if _moves(problem) else ()
     tops = [problem.family.upper(problem.low, problem.high)[0], *(way.high for way in moved)]
     return np.asarray(np.max(tops, axis=0), dtype=float)
 
@@ -378,11 +378,11 @@ def _attained(problem: Problem, curve: FloatArray, over: Mapping[str, float]) ->
     `over` has worst cases, or smallest distances of the scene, that are already known.
     """
     curves = curve[None, None]
-    found = designed_quantities(problem.setup, curves) | {name: np.array([value]) for name, value in over.items()}
+    columns = designed_quantities(problem.setup, curves) | {name: np.array([value]) for name, value in over.items()}
     for name in {*problem.objective.weights, *problem.constraints} & problem.pairs.keys():
         of = smooth_csd if problem.quantities[name].apart == DN else smooth_detectability
-        found[name] = np.minimum(of(problem.setup, curves, problem.pairs[name]), over.get(name, np.inf))
+        columns[name] = np.minimum(of(problem.setup, curves, problem.pairs[name]), over.get(name, np.inf))
     for name, bound in problem.constraints.items():
-        if not bound.violation(found[name])[0] <= FEASIBLE:
+        if not bound.violation(columns[name])[0] <= FEASIBLE:
             return -np.inf
-    return float(problem.objective.of(found)[0])
+    return float(problem.objective.of(columns)[0])

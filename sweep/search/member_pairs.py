@@ -15,8 +15,8 @@ import numpy as np
 from ..base.types import BoolArray, FloatArray, IndexArray
 from ..metrics.members import population_imager
 from ..spectra.population import Population
+from .perturbed import Distances, PerturbedFilter, perturbed_filters
 from .problem import Problem
-from .produced import Distances, Produced, ways_of
 
 _NEARER_DN = 0.01
 """Members that are nearer than all known ones by no more than this are not added."""
@@ -79,8 +79,8 @@ class _Known:
             Differences.
         """
         low, high = (values[self.case[:, None], self.below + step] for step in (0, 1))
-        both = low + self.share[..., None] * (high - low)
-        return np.asarray(both[:, 0] - both[:, 1], dtype=float)
+        ends = low + self.share[..., None] * (high - low)
+        return np.asarray(ends[:, 0] - ends[:, 1], dtype=float)
 
 
 class MemberPairs:
@@ -94,9 +94,9 @@ class MemberPairs:
         if setup.lights.population is None:
             alone = Population.model_validate({"drift_nm_per_k": 0.0})
             setup = replace(setup, lights=replace(setup.lights, population=alone))
-        self._seen, self.names, self._ways = population_imager(setup), tuple(names), ways_of(problem)
+        self._imager, self.names, self._ways = population_imager(setup), tuple(names), perturbed_filters(problem)
         self._types = {name: pair for name in names if (pair := problem.quantities[name].pair) is not None}
-        imager, channel, base = self._seen.imager, problem.setup.camera.modified[0], problem.setup.camera.base_qe
+        imager, channel, base = self._imager.imager, problem.setup.camera.modified[0], problem.setup.camera.base_qe
         self._gain = imager.per_qe(0, base)[:, :, channel]
         self._others = np.delete(imager.smooth(base[None])[0], channel, axis=2)
         self._made: dict[str, Distances] = {}
@@ -157,8 +157,8 @@ class MemberPairs:
             Distance, DN.
         """
         known = self._known[name]
-        produced = np.stack([way.curve(curve) for way in self._ways])[known.way]
-        apart = (known.difference(self._gain) * produced).sum(axis=1)
+        perturbed = np.stack([way.curve(curve) for way in self._ways])[known.way]
+        apart = (known.difference(self._gain) * perturbed).sum(axis=1)
         return float(np.sqrt((apart**2 + (known.difference(self._others) ** 2).sum(axis=1)).min()))
 
     def least(self, name: str, curve: FloatArray) -> float:
@@ -193,25 +193,25 @@ class MemberPairs:
         """
         added = False
         for name in self.names:
-            found, squared = self._nearest(name, curve)
+            pairs, squared = self._nearest(name, curve)
             nearer = np.sqrt(squared) < self.least_known(name, curve) - _NEARER_DN
             if nearer.any():
                 added, known = True, self._known[name]
-                self._known[name] = known.joined(found, nearer)
+                self._known[name] = known.joined(pairs, nearer)
                 self._made.pop(name, None)
         return added
 
-    def _nearest(self, name: str, curve: FloatArray, ways: Sequence[Produced] = ()) -> tuple[_Known, FloatArray]:
+    def _nearest(self, name: str, curve: FloatArray, ways: Sequence[PerturbedFilter] = ()) -> tuple[_Known, FloatArray]:
         """Return the nearest members of each two lights and part of their shifts, and their squared distances."""
         parts = []
         for number, way in enumerate(ways or self._ways):
-            response = self._seen.imager.smooth(way.curve(curve)[None, None])[0]
+            response = self._imager.imager.smooth(way.curve(curve)[None, None])[0]
             for case, values in enumerate(response):
-                near = self._seen.nearest(values, self._types[name], parts=self._seen.parts)
+                near = self._imager.nearest(values, self._types[name], parts=self._imager.parts)
                 one, other, part = np.nonzero(np.isfinite(near.squared))
                 below = near.steps[one, other, part] + np.stack([near.first[one], near.second[other]], axis=1)
                 share = near.shares[one, other, part]
                 where = np.full(one.size, number), np.full(one.size, case)
                 parts.append((*where, below, share, near.squared[one, other, part]))
-        outs, cases, spectra, shares, squared = (np.concatenate(each) for each in zip(*parts, strict=True))
+        outs, cases, spectra, shares, squared = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
         return _Known(outs, cases, spectra, shares), squared

@@ -10,12 +10,12 @@ import numpy as np
 from ..base.types import FloatArray, IndexArray
 from ..camera.setup import Setup
 from ..designs.family import Family
-from ..designs.tolerance import AS_DESIGNED, Off, Tolerance
+from ..designs.tolerance import AS_DESIGNED, ProductionError, Tolerance
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.objective import Objective
-from ..metrics.own import OwnMetric
-from ..metrics.quantity import DN, OF_A_SHARE, WORST_CASE, Asked, Quantity
+from ..metrics.quantity import DN, OF_A_SHARE, WORST_CASE, Quantity, RequestedQuantities
 from ..metrics.registry import quantities_of
+from ..metrics.user_metrics import UserMetric
 from ..spectra.lights import Pair
 from ..vision.section import SeededVision
 
@@ -40,7 +40,7 @@ class Problem:
         Production tolerances of worst cases.
     states : tuple of str
         Signal types that noise may confuse.
-    own : tuple of OwnMetric
+    own : tuple of UserMetric
         Metrics of user code.
     seed : int
         Seed of random lamps and cameras.
@@ -57,7 +57,7 @@ class Problem:
     edge_shift_nm: float = 0.0
     states: tuple[str, ...] = ()
     thickness: float = 0.0
-    own: tuple[OwnMetric, ...] = ()
+    own: tuple[UserMetric, ...] = ()
     seed: int = 0
     vision: SeededVision | None = None
 
@@ -65,11 +65,13 @@ class Problem:
     def quantities(self) -> Mapping[str, Quantity]:
         """Quantities that objective and constraints may name."""
         tasks = () if self.setup.tasks is None else self.setup.tasks.keys
-        asked = Asked(self.setup.lights.classes, self.states, edge_shift=True, tasks=tasks, own=self.own)
+        requested = RequestedQuantities(
+            self.setup.lights.classes, self.states, edge_shift=True, tasks=tasks, own=self.own
+        )
         population = self.setup.lights.population
         wanted = 0.0 if population is None else population.wanted_yield or 0.0
-        asked = replace(asked, population=self.population, wanted_yield=wanted, vision=self.vision is not None)
-        return quantities_of(asked)
+        requested = replace(requested, population=self.population, wanted_yield=wanted, vision=self.vision is not None)
+        return quantities_of(requested)
 
     @property
     def population(self) -> bool:
@@ -119,11 +121,11 @@ class Problem:
         bool
             True if it is.
         """
-        asked = self.quantities[quantity]
-        return asked.extreme == WORST_CASE and asked.apart == DN
+        requested = self.quantities[quantity]
+        return requested.extreme == WORST_CASE and requested.apart == DN
 
     @property
-    def own_goal(self) -> bool:
+    def has_user_objective(self) -> bool:
         """True if the objective is a metric of user code."""
         return any(self.quantities[name].needs == "own" for name in self.objective.weights)
 
@@ -135,8 +137,8 @@ class Problem:
     @property
     def pairs(self) -> dict[str, Pair]:
         """Signal types of each distance, in DN or in units of the noise."""
-        own = [q for q in self.quantities.values() if q.apart and not q.extreme]
-        return {q.name: q.pair for q in own if q.pair is not None}
+        distances = [q for q in self.quantities.values() if q.apart and not q.extreme]
+        return {q.name: q.pair for q in distances if q.pair is not None}
 
     @property
     def free(self) -> IndexArray:
@@ -148,7 +150,7 @@ class Problem:
         """Tolerance of production."""
         return Tolerance(self.edge_shift_nm, self.thickness)
 
-    def produced(self, quantity: str) -> tuple[Off, ...]:
+    def perturbed(self, quantity: str) -> tuple[ProductionError, ...]:
         """Return the production errors over which a quantity is the smallest.
 
         Parameters

@@ -41,7 +41,7 @@ class Proof:
         Upper bound on any filter.
     open_parts : int
         Parts that were not closed.
-    parts : tuple of Covered
+    parts : tuple of SideRegion
         Parts that cover all filters, with their bounds.
     """
 
@@ -49,7 +49,7 @@ class Proof:
     curve: FloatArray | None
     proven: float
     open_parts: int
-    parts: tuple[Covered, ...] = ()
+    parts: tuple[SideRegion, ...] = ()
 
     def proven_at(self, program: FilterProgram, sensitivity: float) -> float:
         """Return the upper bound at another least sensitivity.
@@ -80,7 +80,7 @@ class Proof:
 
 
 @dataclass(frozen=True)
-class Covered:
+class SideRegion:
     """Part of the choices of sides.
 
     Parameters
@@ -174,7 +174,7 @@ class SideSearch:
         self._most = most_programs
         self._conflicts = _Conflicts(len(program.apart))
         self._best = self._closed = -np.inf
-        self._closed_parts: list[Covered] = []
+        self._closed_parts: list[SideRegion] = []
         self._curve: FloatArray | None = None
 
     def run(self) -> Proof:
@@ -191,7 +191,7 @@ class SideSearch:
         for side in (1.0, -1.0):
             self._dive(side)
         order = count()
-        parts = [(-self._program.top, next(order), Sides(), Covered(self._program.top))]
+        parts = [(-self._program.top, next(order), Sides(), SideRegion(self._program.top))]
         left = []
         while parts and -parts[0][0] > self._closing and self._program.solved < self._most:
             beyond, _, sides, part = heappop(parts)
@@ -204,8 +204,8 @@ class SideSearch:
             elif not more:
                 left.append((beyond, part))
             for one, reach in more:
-                own = Covered(min(part.cap, reach), part.certificates)
-                heappush(parts, (-min(beyond, reach), next(order), one, own))
+                region = SideRegion(min(part.cap, reach), part.certificates)
+                heappush(parts, (-min(beyond, reach), next(order), one, region))
         left += [(-beyond, part) for beyond, _, _, part in parts]
         far = sum(beyond > self._closing for beyond, _ in left)
         proven = max([self._closed, self._best, *(beyond for beyond, _ in left)])
@@ -223,20 +223,22 @@ class SideSearch:
         if value > self._best:
             self._best, self._curve = value, moved
 
-    def _divided(self, beyond: float, sides: Sides, part: Covered) -> tuple[float, Covered, list[tuple[Sides, float]]]:
+    def _divided(
+        self, beyond: float, sides: Sides, part: SideRegion
+    ) -> tuple[float, SideRegion, list[tuple[Sides, float]]]:
         """Return the bound of a part, the part, and its children with their bounds, if any."""
         t = beyond
         solved = self._program.solve(t, sides)
         beyond = min(beyond, solved.beyond)
         if solved.certificate is not None:
-            part = Covered(part.cap, (*part.certificates, solved.certificate))
+            part = SideRegion(part.cap, (*part.certificates, solved.certificate))
         if solved.curve is not None:
             self._offer(solved.curve)
         if solved.beyond <= self._closing:
             self._conflicts.add(solved.needs)
             self._closed = max(self._closed, solved.beyond)
             self._closed_parts.append(
-                Covered(np.inf, part.certificates[-1:])
+                SideRegion(np.inf, part.certificates[-1:])
             )  # it closes other parts of its sides, too
         if solved.curve is None or beyond <= self._closing:
             return beyond, part, []

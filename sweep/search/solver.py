@@ -40,9 +40,9 @@ _X_TOLERANCE = 1e-9
 _FAR = 1e4
 """So many times its value at the start a term under noise may reach; a number that no design comes near."""
 _LEAST_SCALE = 1e-6
-"""Of what may be below 0, whose size is not known."""
+"""Absolute tolerance of quantities that may be negative."""
 _UNKNOWN = 1e9
-"""So many times its value at the start what may be below 0 may reach to either side."""
+"""Range of quantities that may be negative, in multiples of the value at the start."""
 
 
 def search_from(
@@ -182,7 +182,7 @@ def _direct(
     return opt, [*u0]
 
 
-def best_reachable(problem: Problem, quantity: str, starts: FloatArray, max_evaluations: int) -> float:
+def extreme_value(problem: Problem, quantity: str, starts: FloatArray, max_evaluations: int) -> float:
     """Return the extreme of a quantity in the box without other constraints.
 
     Parameters
@@ -202,11 +202,11 @@ def best_reachable(problem: Problem, quantity: str, starts: FloatArray, max_eval
         Largest value if the study asks for a minimum, else the smallest one.
     """
     alone = replace(problem, constraints={quantity: problem.constraints[quantity]})
-    own = problem.quantities[quantity]
-    sign = 1.0 if problem.constraints[quantity].min is not None or own.rows == "decades" else -1.0
-    found = [v for u0 in starts for v in _extremes(alone, quantity, sign, u0, max_evaluations)]
-    best = sign * max((sign * value for value in found), default=-np.inf)
-    return own.of_row(best) if np.isfinite(best) else best
+    definition = problem.quantities[quantity]
+    sign = 1.0 if problem.constraints[quantity].min is not None or definition.rows == "decades" else -1.0
+    values = [v for u0 in starts for v in _extremes(alone, quantity, sign, u0, max_evaluations)]
+    best = sign * max((sign * value for value in values), default=-np.inf)
+    return definition.of_row(best) if np.isfinite(best) else best
 
 
 def _extremes(problem: Problem, quantity: str, sign: float, u0: FloatArray, max_evaluations: int) -> list[float]:
@@ -216,12 +216,12 @@ def _extremes(problem: Problem, quantity: str, sign: float, u0: FloatArray, max_
     first = model.at(u0).quantities[quantity]
     scale = max(float(np.abs(first.values).max()), 1e-6)
     n_rows = first.values.size
-    seen: list[float] = []
+    values: list[float] = []
 
     def objective(z: FloatArray, gradient: FloatArray) -> float:
         point = model.at(z[:-1])
         if point.evaluation.violation < np.inf and (point.conditions.values[:n_own] <= FEASIBLE).all():
-            seen.append(sign * float((sign * point.quantities[quantity].values).min()))
+            values.append(sign * float((sign * point.quantities[quantity].values).min()))
         if gradient.size:
             gradient[:] = 0.0
             gradient[-1] = 1.0
@@ -248,4 +248,4 @@ def _extremes(problem: Problem, quantity: str, sign: float, u0: FloatArray, max_
     opt.set_xtol_rel(_X_TOLERANCE)
     with contextlib.suppress(nlopt.RoundoffLimited, nlopt.ForcedStop, nlopt.runtime_error, RuntimeError):
         opt.optimize([*u0, float((sign * first.values).min()) / scale])
-    return seen
+    return values

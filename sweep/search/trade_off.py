@@ -87,7 +87,7 @@ def check_proof(best: Evaluation | None, limit: Limit | None, where: str = "") -
 
     Raises
     ------
-    BrokenProofError
+    UpperBoundExceededError
         If it does.
     """
     if best is not None and limit is not None:
@@ -137,8 +137,15 @@ def calls_at_levels(problem: Problem, levels: Sequence[float], effort: Effort, *
     between = _between(levels)
     around = [(*before, *after) for before, after in zip([(), *between], [*between, ()], strict=True)]
     calls = zip(at_level, around, strict=True) if limited else ()
-    limits = [delayed(limit_of, p, _FRONT_LIMIT_DN, _FRONT_PROGRAMS, own) for p, own in calls]
-    return [*limits, *(call for own in at_level for call in _searches(own, effort, 0, effort.starts[:_FRONT_STARTS]))]
+    limits = [delayed(limit_of, p, _FRONT_LIMIT_DN, _FRONT_PROGRAMS, level_problem) for p, level_problem in calls]
+    return [
+        *limits,
+        *(
+            call
+            for level_problem in at_level
+            for call in _searches(level_problem, effort, 0, effort.starts[:_FRONT_STARTS])
+        ),
+    ]
 
 
 def most_searches(n_levels: int, n_starts: int) -> int:
@@ -193,17 +200,17 @@ def trade_off(
 
     Raises
     ------
-    BrokenProofError
+    UpperBoundExceededError
         If a design exceeds its upper bound.
     """
     limits: list[Limit | None] = [*islice(answers, len(levels))] if limited else [None] * len(levels)
     runs: list[list[SearchRun]] = [[] for _ in levels]
     done, total = 0, 2 * len(levels)
 
-    def taken(found: Iterator[SearchRun], sizes: Sequence[int]) -> None:
+    def taken(neighbors_of: Iterator[SearchRun], sizes: Sequence[int]) -> None:
         nonlocal done
-        for own, size in zip(runs, sizes, strict=True):
-            own.extend(islice(found, size))
+        for calls_of_level, size in zip(runs, sizes, strict=True):
+            calls_of_level.extend(islice(neighbors_of, size))
             done += 1
             progress("front levels", done, total)
 
@@ -212,11 +219,14 @@ def trade_off(
 
     first = len(effort.starts[:_FRONT_STARTS])
     taken(answers, [first] * len(levels))
-    found = [(best(k - 1), best(k + 1)) for k in range(len(levels))]
-    points = [[problem.to_unit(e.x) for e in both if e is not None] for both in found]
+    neighbors_of = [(best(k - 1), best(k + 1)) for k in range(len(levels))]
+    points = [[problem.to_unit(e.x) for e in neighbors if e is not None] for neighbors in neighbors_of]
     at_level = [with_least(problem, SENSITIVITY, level) for level in levels]
-    calls = [_searches(own, effort, first, us) for own, us in zip(at_level, points, strict=True)]
-    taken(parallel(call for own in calls for call in own), [len(own) for own in calls])
+    calls = [_searches(calls_of_level, effort, first, us) for calls_of_level, us in zip(at_level, points, strict=True)]
+    taken(
+        parallel(call for calls_of_level in calls for call in calls_of_level),
+        [len(calls_of_level) for calls_of_level in calls],
+    )
     onward = [*_tangents(_between(levels), limits), ()]
     front = tuple(FrontPoint(level, best(k), tuple(runs[k]), limits[k], onward[k]) for k, level in enumerate(levels))
     for point in front:
@@ -226,8 +236,8 @@ def trade_off(
 
 def _searches(problem: Problem, effort: Effort, first: int, points: Iterable[FloatArray]) -> list[Call]:
     """Return the call of a search from each point; `first` is the number of the first one."""
-    own = effort.algorithm, effort.evaluations, effort.seed
-    return [delayed(search_from, problem, at, u, *own) for at, u in enumerate(points, first)]
+    settings = effort.algorithm, effort.evaluations, effort.seed
+    return [delayed(search_from, problem, at, u, *settings) for at, u in enumerate(points, first)]
 
 
 def _between(levels: Sequence[float]) -> list[tuple[float, ...]]:
@@ -239,12 +249,12 @@ def _tangents(
     between: Sequence[tuple[float, ...]], limits: Sequence[Limit | None]
 ) -> Iterator[tuple[tuple[float, float], ...]]:
     """Yield the smaller bound of both neighboring proofs at the sensitivities between them."""
-    for own, (below, above) in zip(between, pairwise(limits), strict=True):
+    for levels, (below, above) in zip(between, pairwise(limits), strict=True):
         if below is None or above is None:
             yield ()
             continue
-        first, second = below.elsewhere[len(below.elsewhere) - len(own) :], above.elsewhere[: len(own)]
-        yield tuple(zip(own, map(min, first, second), strict=True))
+        first, second = below.elsewhere[len(below.elsewhere) - len(levels) :], above.elsewhere[: len(levels)]
+        yield tuple(zip(levels, map(min, first, second), strict=True))
 
 
 def with_least(problem: Problem, name: str, level: float) -> Problem:

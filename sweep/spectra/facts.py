@@ -8,13 +8,13 @@ from itertools import chain
 
 import numpy as np
 
-from ..base.errors import Fault
+from ..base.errors import ValidationIssue
 from ..base.types import FloatArray
 from . import LightUnit
 from .cells import distinct, unit_by_size
 from .filter_files import csv_text
 from .signal_color import VISIBLE, LightColor, light_color
-from .spectrum import WavelengthGrid, photons_from_energy, resample, sample_faults
+from .spectrum import WavelengthGrid, photons_from_energy, resample, sample_issues
 from .text_tables import Scan
 
 _NEEDED = WavelengthGrid()
@@ -31,7 +31,7 @@ NORMALIZED = (
     "the curves have a maximum of 1: they look normalized, and are taken as QE; electrons, noise, SNR and what a "
     "stated exposure gives are then those of a pixel with that QE; `scale` brings them to the pixel's own"
 )
-"""A note of curves that `looks_normalized`."""
+"""A note of curves that `is_normalized_response`."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class Facts:
         return np.unique(np.concatenate([curve.wavelength_nm for curve in self.curves]))
 
     @property
-    def looks_like_qe(self) -> bool:
+    def is_likely_qe(self) -> bool:
         """True if at least half of the curves are as broad as a pixel's, and none exceeds 100 %."""
         lit = [curve for curve in self.curves if curve.peak > 0]
         broad = sum(curve.width_nm >= _BROAD_NM for curve in lit)
@@ -188,8 +188,8 @@ def notes(facts: Facts, *, as_qe: bool) -> list[str]:
     if few:
         worst = min(few, key=lambda curve: curve.samples_in_peak)
         samples = "1 sample" if worst.samples_in_peak == 1 else f"{worst.samples_in_peak} samples"
-        place = f"only {samples} of half its height or more around its peak at {worst.peak_nm:g} nm"
-        lines.append(f"{worst.name} has {place}" + (f", and {len(few) - 1} more curves likewise" if few[1:] else ""))
+        finding = f"only {samples} of half its height or more around its peak at {worst.peak_nm:g} nm"
+        lines.append(f"{worst.name} has {finding}" + (f", and {len(few) - 1} more curves likewise" if few[1:] else ""))
     dark = [curve.name for curve in facts.curves if not curve.peak > 0]
     if dark:
         lines.append(f"no value is above 0: {', '.join(dark)}")
@@ -199,12 +199,12 @@ def notes(facts: Facts, *, as_qe: bool) -> list[str]:
             scale = qe_scale(top)
             reason = "percent" if scale == 1 / _PERCENT else "a relative scale"
             lines.append(f"values up to {top:.6g} are above 1, so no QE: {reason}? Then set `scale: {scale:.4g}`")
-        elif looks_normalized(top):
+        elif is_normalized_response(top):
             lines.append(NORMALIZED)
     return lines
 
 
-def looks_normalized(top: float) -> bool:
+def is_normalized_response(top: float) -> bool:
     """Return whether QE curves are relative responses: no pixel has a QE of just 1.
 
     Parameters
@@ -238,12 +238,12 @@ def qe_scale(top: float) -> float:
     return 1 / _PERCENT if 2 < top <= _PERCENT else float(f"{1 / top * (1 - 5e-4):.4g}")
 
 
-def condensed(faults: Sequence[Fault]) -> list[Fault]:
-    """Combine equal faults of many columns to one, with their number and the first place.
+def merge_equal_issues(issues: Sequence[ValidationIssue]) -> list[ValidationIssue]:
+    """Combine equal issues of many columns to one, with their number and the first place.
 
     Parameters
     ----------
-    faults : sequence of Fault
+    issues : sequence of ValidationIssue
         Faults.
 
     Returns
@@ -251,31 +251,31 @@ def condensed(faults: Sequence[Fault]) -> list[Fault]:
     list of Fault
         Faults.
     """
-    alike: dict[tuple[str, str | None], list[Fault]] = {}
-    for fault in faults:
-        alike.setdefault((fault.problem, fault.key), []).append(fault)
-    by_place: dict[tuple[str, int | None, str], list[Fault]] = {}
+    alike: dict[tuple[str, str | None], list[ValidationIssue]] = {}
+    for issue in issues:
+        alike.setdefault((issue.problem, issue.key), []).append(issue)
+    by_place: dict[tuple[str, int | None, str], list[ValidationIssue]] = {}
     for (problem, _), group in alike.items():
         more = f"{problem}, and {len(group) - 1:,} more like it" if len(group) > 1 else problem
         by_place.setdefault((more, group[0].line, repr(group[0].value)), []).append(replace(group[0], problem=more))
     return [_joined(group) for group in by_place.values()]
 
 
-def _joined(group: Sequence[Fault]) -> Fault:
-    names = [fault.key or "" for fault in group]
+def _joined(group: Sequence[ValidationIssue]) -> ValidationIssue:
+    names = [issue.key or "" for issue in group]
     shown = ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
     return replace(group[0], key=shown or None)
 
 
 @dataclass(frozen=True)
-class Mended:
-    """Repaired curves in rising order, with the changes and the remaining faults."""
+class RepairedCurves:
+    """Repaired curves in rising order, with the changes and the remaining issues."""
 
     wavelength_nm: FloatArray
     names: tuple[str, ...]
     values: FloatArray
     changes: tuple[str, ...]
-    faults: tuple[Fault, ...]
+    issues: tuple[ValidationIssue, ...]
 
     def text(self, file: str, notes: tuple[str, ...]) -> str:
         """Return a clean CSV with the changes in its first lines.
@@ -297,11 +297,11 @@ class Mended:
         return head + csv_text(self.wavelength_nm, dict(zip(self.names, self.values.T, strict=True)))
 
 
-def mended(scan: Scan) -> Mended:
+def repair_curves(scan: Scan) -> RepairedCurves:
     """Repair the curves of a scan where that is possible in one way only.
 
     Negatives of up to 2 % of the peak become 0, single gaps between two samples are interpolated linearly, and
-    duplicate rows are removed. Everything else stays, and is a fault.
+    duplicate rows are removed. Everything else stays, and is an issue.
 
     Parameters
     ----------
@@ -310,7 +310,7 @@ def mended(scan: Scan) -> Mended:
 
     Returns
     -------
-    Mended
+    RepairedCurves
         Repaired curves.
     """
     changes: list[str] = []
@@ -327,12 +327,14 @@ def mended(scan: Scan) -> Mended:
         changes.append(f"{np.count_nonzero(again)} rows that repeat another were left out")
     wave, values = wave[~again], values[~again]
     for name, column in zip(scan.names, values.T, strict=True):
-        changes += _mend(wave, column, name)
-    groups = sample_faults("", wave, scan.names, values) if wave.size > 1 else [[Fault("fewer than two samples")]]
-    return Mended(wave, scan.names, values, tuple(changes), tuple(chain.from_iterable(groups)))
+        changes += _repair_curve(wave, column, name)
+    groups = (
+        sample_issues("", wave, scan.names, values) if wave.size > 1 else [[ValidationIssue("fewer than two samples")]]
+    )
+    return RepairedCurves(wave, scan.names, values, tuple(changes), tuple(chain.from_iterable(groups)))
 
 
-def _mend(wave: FloatArray, column: FloatArray, name: str) -> list[str]:
+def _repair_curve(wave: FloatArray, column: FloatArray, name: str) -> list[str]:
     """Change a curve in place, and return the changes."""
     changes = []
     finite = np.isfinite(column)

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from ..base.disk import read_input
-from ..base.errors import DataError, Fault, nearest
-from .spectrum import Curves, sample_faults
+from ..base.errors import DataError, ValidationIssue, nearest
+from .spectrum import Curves, sample_issues
 from .text_tables import MOST_BYTES, MOST_VALUES, Scan, check_size, scan_text
 
 _MAT_VARIABLES = ("wavelength", "data", "filterNames")
@@ -76,8 +76,8 @@ def read_curves(path: Path) -> Curves:
         If the file cannot be read or is not clean, with file, line, column and value.
     """
     scan = scan_curves(path)
-    if scan.faults:
-        raise DataError(scan.faults[0])
+    if scan.issues:
+        raise DataError(scan.issues[0])
     return Curves(scan.wavelength_nm, dict(zip(scan.names, scan.values.T, strict=True)), str(path), notes=scan.notes)
 
 
@@ -92,7 +92,7 @@ def scan_curves(path: Path) -> Scan:
     Returns
     -------
     Scan
-        Curves and faults.
+        Curves and issues.
 
     Raises
     ------
@@ -101,7 +101,9 @@ def scan_curves(path: Path) -> Scan:
     """
     kind = _KINDS.get(path.suffix.casefold())
     if kind is None:
-        raise DataError(Fault("unknown kind of curve file", str(path), value=path.suffix, allowed=", ".join(_KINDS)))
+        raise DataError(
+            ValidationIssue("unknown kind of curve file", str(path), value=path.suffix, allowed=", ".join(_KINDS))
+        )
     return kind(path)
 
 
@@ -123,20 +125,22 @@ def _scan_mat(path: Path) -> Scan:
         raise
     except NotImplementedError:
         raise DataError(
-            Fault("a version 7.3 (HDF5) .mat file", file, allowed="version 5: save with -v6 or -v7")
+            ValidationIssue("a version 7.3 (HDF5) .mat file", file, allowed="version 5: save with -v6 or -v7")
         ) from None
     except Exception as error:  # of damaged bytes SciPy's decoders raise whatever they meet first
-        raise DataError(Fault(f"not a readable .mat file: {error or type(error).__name__}", file)) from None
+        raise DataError(ValidationIssue(f"not a readable .mat file: {error or type(error).__name__}", file)) from None
     if np.iscomplexobj(wave) or np.iscomplexobj(data):
-        raise DataError(Fault("`wavelength` and `data` must be real numbers", file))
+        raise DataError(ValidationIssue("`wavelength` and `data` must be real numbers", file))
     if data.shape[0] != wave.size and data.shape[-1] == wave.size:
         data = data.T
     if data.ndim != 2 or data.shape[0] != wave.size or not data.size:
-        raise DataError(Fault("`data` does not fit `wavelength`", file, value=data.shape, allowed=f"({wave.size}, n)"))
+        raise DataError(
+            ValidationIssue("`data` does not fit `wavelength`", file, value=data.shape, allowed=f"({wave.size}, n)")
+        )
     check_size(file, None, *data.shape)
     wave, data = wave.astype(float), data.astype(float) + 0.0
     columns = _mat_names(fields.get("filterNames"), data.shape[1])
-    return Scan(wave, columns, data, tuple(map(tuple, sample_faults(file, wave, columns, data))))
+    return Scan(wave, columns, data, tuple(map(tuple, sample_issues(file, wave, columns, data))))
 
 
 def _check_mat(file: str, variables: list[tuple[str, tuple[int, ...], str]]) -> None:
@@ -144,14 +148,18 @@ def _check_mat(file: str, variables: list[tuple[str, tuple[int, ...], str]]) -> 
     kinds = {name: kind for name, _, kind in variables}
     for needed in ("wavelength", "data"):
         if needed not in kinds:
-            raise DataError(Fault(f"no variable `{needed}`", file, value=[*kinds], nearest=nearest(needed, kinds)))
+            raise DataError(
+                ValidationIssue(f"no variable `{needed}`", file, value=[*kinds], nearest=nearest(needed, kinds))
+            )
         if kinds[needed] not in _MAT_NUMBERS:
-            raise DataError(Fault("`wavelength` and `data` must be real numbers", file))
+            raise DataError(ValidationIssue("`wavelength` and `data` must be real numbers", file))
     if kinds.get("filterNames", "cell") not in ("cell", "char"):
-        raise DataError(Fault("`filterNames` must be texts", file))
+        raise DataError(ValidationIssue("`filterNames` must be texts", file))
     for name, shape, _ in variables:
         if name in _MAT_VARIABLES and (min(shape, default=0) < 0 or math.prod(shape) > MOST_VALUES):
-            raise DataError(Fault("not a size of curves", file, None, name, shape, f"at most {MOST_VALUES:,} values"))
+            raise DataError(
+                ValidationIssue("not a size of curves", file, None, name, shape, f"at most {MOST_VALUES:,} values")
+            )
 
 
 def _mat_names(raw: object, count: int) -> tuple[str, ...]:

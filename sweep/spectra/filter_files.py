@@ -85,13 +85,13 @@ def color_hints(channels: Sequence[str], bases: Mapping[str, str]) -> list[str]:
     """
     hints: dict[str, str] = {}
     for channel in sorted(channels, key=lambda channel: channel in bases):  # a plain channel keeps its own letter
-        hint_of_name = _own_hint(bases.get(channel, channel))
+        hint_of_name = _column_hint(bases.get(channel, channel))
         free = [hint for hint in (*hint_of_name, *_FREE, *HINTS) if hint not in hints.values()]
         hints[channel] = free[0] if free else "k"
     return [hints[channel] for channel in channels]
 
 
-def _own_hint(name: str) -> str:
+def _column_hint(name: str) -> str:
     folded = name.casefold()
     if folded in _CLEAR:
         return "w"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..base.errors import DataError, Fault
+from ..base.errors import DataError, ValidationIssue
 from ..base.types import FloatArray
 from .text_tables import TextTable, lens_table, table_numbers
 
@@ -57,19 +57,23 @@ def read_chief_rays(path: Path, corner_mm: float | None = None) -> ChiefRays:
         If the file cannot be read or is not clean, with file, line, column and value.
     """
     table = lens_table(path, _FIRST)
-    if table.faults:
-        raise DataError(table.faults[0])
+    if table.issues:
+        raise DataError(table.issues[0])
     unit, column = _columns(table)
     names = [_FIRST.replace("mm", unit), table.header[column]]
     if len(table.rows) > _MOST_ROWS:
-        raise DataError(Fault("too many rows", table.file, None, None, len(table.rows), f"at most {_MOST_ROWS}"))
+        raise DataError(
+            ValidationIssue("too many rows", table.file, None, None, len(table.rows), f"at most {_MOST_ROWS}")
+        )
     for line, row in table.rows:
         if len(row) != len(table.header):
-            raise DataError(Fault("wrong number of columns", table.file, line, None, len(row), str(len(table.header))))
+            raise DataError(
+                ValidationIssue("wrong number of columns", table.file, line, None, len(row), str(len(table.header)))
+            )
     rows = [(line, [row[0], row[column]]) for line, row in table.rows]
-    values, faults = table_numbers(table.file, names, rows, table.decimal, noun="image height")
-    if faults:
-        raise DataError(faults[0])
+    values, issues = table_numbers(table.file, names, rows, table.decimal, noun="image height")
+    if issues:
+        raise DataError(issues[0])
     return _to_corner(table, unit, values, names, corner_mm)
 
 
@@ -77,18 +81,22 @@ def _columns(table: TextTable) -> tuple[str, int]:
     """Return the unit of the heights, and the index of the column of angles."""
     file, line, header = table.file, table.line, table.header
     if table.unit == 0:
-        raise DataError(Fault("there is no header", file, line, None, None, _ALLOWED))
+        raise DataError(ValidationIssue("there is no header", file, line, None, None, _ALLOWED))
     plain = [re.sub(r"[\s_.,/]+", " ", cell).casefold().strip() for cell in header]
     units = [unit for unit, pattern in _UNITS.items() if pattern.search(plain[0])]
     if len(units) != 1:
         problem = "the first column does not say the unit of image heights"
-        raise DataError(Fault(problem, file, line, header[0], None, _ALLOWED))
+        raise DataError(ValidationIssue(problem, file, line, header[0], None, _ALLOWED))
     pattern = _ANGLE if len(header) == 2 else _CRA
     angles = [at for at in range(1, len(header)) if pattern.search(plain[at])]
     if len(angles) != 1:
-        raise DataError(Fault("which column has chief ray angles?", file, line, None, ", ".join(header), _ALLOWED))
+        raise DataError(
+            ValidationIssue("which column has chief ray angles?", file, line, None, ", ".join(header), _ALLOWED)
+        )
     if re.search(r"\brad\b|radian", plain[angles[0]]):
-        raise DataError(Fault("chief ray angles are in radians", file, line, header[angles[0]], None, "degrees"))
+        raise DataError(
+            ValidationIssue("chief ray angles are in radians", file, line, header[angles[0]], None, "degrees")
+        )
     return units[0], angles[0]
 
 
@@ -98,15 +106,19 @@ def _to_corner(table: TextTable, unit: str, values: FloatArray, names: list[str]
     def check(passes: bool, problem: str, row: int, column: int, allowed: str | None = None) -> None:
         if not passes:
             line, value = table.rows[row][0], values[row, column].item()
-            raise DataError(Fault(problem, table.file, line, names[column], value, allowed))
+            raise DataError(ValidationIssue(problem, table.file, line, names[column], value, allowed))
 
     heights, cra_deg = values.T
     if heights.size < 2:
-        raise DataError(Fault("a lens needs two rows or more", table.file, table.rows[-1][0], None, heights.size))
+        raise DataError(
+            ValidationIssue("a lens needs two rows or more", table.file, table.rows[-1][0], None, heights.size)
+        )
     steep = int(np.argmax(cra_deg > _STEEPEST_DEG))
     whole = {"percent": 100.0, "relative": 1.0}.get(unit)
     if whole is not None and corner_mm is not None:
-        raise DataError(Fault(f"`corner_mm` needs heights in mm, not {unit}", table.file, table.line, names[0]))
+        raise DataError(
+            ValidationIssue(f"`corner_mm` needs heights in mm, not {unit}", table.file, table.line, names[0])
+        )
     corner = float(heights[-1]) if corner_mm is None else corner_mm
     check(heights[0] == 0, "image heights begin in the middle of the sensor", 0, 0, "0")
     check(cra_deg[steep] <= _STEEPEST_DEG, "too steep a chief ray", steep, 1, f"0 to {_STEEPEST_DEG:g} degrees")

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ..base.errors import DataError, Fault
+from ..base.errors import DataError, ValidationIssue
 from . import LightUnit
-from .facts import Curve, Facts, condensed, facts_of
+from .facts import Curve, Facts, facts_of, merge_equal_issues
 from .files import scan_curves
 from .signal_color import LightColor
 from .spectrum import WavelengthGrid
@@ -74,11 +74,11 @@ def clean_curves(path: Path) -> dict[str, Curve]:
     Raises
     ------
     DataError
-        If curves are not clean, with all faults.
+        If curves are not clean, with all issues.
     """
     scan = scan_curves(path)
-    if scan.faults:
-        raise DataError(condensed(list(chain.from_iterable(scan.faults))))
+    if scan.issues:
+        raise DataError(merge_equal_issues(list(chain.from_iterable(scan.issues))))
     return dict(zip(scan.names, facts_of(scan).curves, strict=True))
 
 
@@ -118,7 +118,9 @@ def lights_file(path: Path, quantity: LightUnit, start_nm: float = 400, stop_nm:
     if len(used) < 2:
         listed = "; ".join(f"{kind}: {', '.join(columns)}" for kind, columns in used.items()) or "none"
         problem = f"lights of one signal color or none (`sweep describe {path}` shows where they lie)"
-        raise DataError(Fault(problem, str(path), None, None, listed, "two of green, yellow, orange, red, or more"))
+        raise DataError(
+            ValidationIssue(problem, str(path), None, None, listed, "two of green, yellow, orange, red, or more")
+        )
     wave = next(iter(curves.values())).wavelength_nm
     ends_early = bool(wave[0] > start_nm or wave[-1] < stop_nm)
     fine = bool(np.diff(wave).min() < _USUAL.step_nm)

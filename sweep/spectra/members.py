@@ -122,7 +122,7 @@ class Members:
         """
         return (self._first + cell + share) * self._step_nm
 
-    def drift_and_own(self, signal: int) -> tuple[float, tuple[float, float]]:
+    def drift_and_independent(self, signal: int) -> tuple[float, tuple[float, float]]:
         """Return drift and independent shifts of a signal.
 
         Parameters
@@ -135,7 +135,7 @@ class Members:
         drift, shifts : float, tuple of float
             nm/K, and range of shifts by binning and ageing, nm.
         """
-        return _drift_and_own(self._lights, self.population, signal)
+        return _drift_and_independent(self._lights, self.population, signal)
 
     def regions(self, pair: Pair) -> tuple[list[ShiftRegion], IndexArray]:
         """Return the distinct regions of two types, and the region of each two signals and widths.
@@ -178,7 +178,7 @@ class Members:
         ShiftRegion
             Shifts.
         """
-        (a, own_a), (b, own_b) = self.drift_and_own(one), self.drift_and_own(other)
+        (a, own_a), (b, own_b) = self.drift_and_independent(one), self.drift_and_independent(other)
         key = (a, *own_a, b, *own_b)
         if key not in self._regions:
             corners = _corners(self.population, (a, b), (own_a, own_b))
@@ -205,18 +205,18 @@ def spans_nm(lights: Lights, population: Population) -> list[tuple[float, float]
     """
     spans = []
     for signal in range(len(lights.names)):
-        drift, (low, high) = _drift_and_own(lights, population, signal)
+        drift, (low, high) = _drift_and_independent(lights, population, signal)
         ends = [drift * warmer for warmer in population.warmer_k]
         spans.append((min(ends) + low, max(ends) + high))
     return spans
 
 
-def _drift_and_own(lights: Lights, population: Population, signal: int) -> tuple[float, tuple[float, float]]:
+def _drift_and_independent(lights: Lights, population: Population, signal: int) -> tuple[float, tuple[float, float]]:
     """Return drift, nm/K, and range of independent shifts of a signal."""
     kind, name = lights.types[signal], lights.names[signal]
     drift = population.drift(kind, name)
     assert drift is not None
-    return drift, population.own_nm(kind, name)
+    return drift, population.independent_nm(kind, name)
 
 
 def moved(photons: FloatArray, steps: int) -> FloatArray:
@@ -267,10 +267,10 @@ def stretched(grid: WavelengthGrid, photons: FloatArray, factor: float) -> Float
 
 
 def _corners(
-    population: Population, drifts: tuple[float, float], own: tuple[tuple[float, float], tuple[float, float]]
+    population: Population, drifts: tuple[float, float], independent: tuple[tuple[float, float], tuple[float, float]]
 ) -> list[_Point]:
     """Return points whose hull is the region of two lights, nm."""
-    (a, b), (x, y) = drifts, own
+    (a, b), (x, y) = drifts, independent
     warmings = [(warmer, warmer) for warmer in population.warmer_k]
     if population.temperatures == "independent":
         warmings = [(one, other) for one in population.warmer_k for other in population.warmer_k]

@@ -24,7 +24,7 @@ _LEAST_BELOW, _ROUNDING = 10, 1e-6
 _MOST_HELD = 1_000_000
 """Draws of two types that every worker of a search holds: of so many 40 MB, for each two types."""
 _ALL = ""
-"""Key of what holds for every signal."""
+"""Key of the value for every signal."""
 
 DRIFT_NM_PER_K: Mapping[str, float] = {"green": 0.03, "yellow": 0.1, "orange": 0.1, "red": 0.1}
 """Drift of the peak where a study states none.
@@ -50,41 +50,46 @@ def _spans_by_name(value: Any) -> Any:
 
 
 class Population(Section):
-    """The lamps that the study's lights stand for, by how their spectra shift; `worst_csd_...` is over all of them.
+    """Population of lamps around the study's lights, by shifts of their spectra; `worst_csd_...` is over all of them.
 
-    `temperature_c`: ambient, from the coldest to the hottest; `self_heating_k`: by how much the junction may be warmer;
-    the study's spectra are those at a junction of `reference_c`. `drift_nm_per_k`: left out, 0.03 for green and 0.1 for
-    yellow, orange and red. `temperatures`: two lights are compared at one junction temperature (`common`), or each has
-    its own (`independent`). `binning_nm`: so far off, to either side, a lamp may be; `ageing_nm`: from and to so much
-    it moves in its life; both are independent of each other and for each signal. `width`: each spectrum is stretched
-    about its middle by each of these factors. Where values differ, keys are signal types or names of signals; a value
-    alone holds for all. `wanted_dn`: what share of lamps and cameras has at least this CSD is told, from `draws` of two
-    lights, their temperatures, bins, ages and widths, a place of the field, and how its filter came out, each evenly.
-    `wanted_yield`: a share of such draws, at most 1,000,000 others; `yield_csd_...` is a distance that it
-    has at least, which a search may maximize or keep above a bound.
+    Where values differ, keys are signal types or names of signals; a value alone holds for all.
     """
 
     temperature_c: Annotated[
         tuple[_Celsius, _Celsius],
         BeforeValidator(from_to, json_schema_input_type=Annotated[list[_Celsius], Field(min_length=2, max_length=2)]),
     ] = (25.0, 25.0)
+    """Ambient temperature from the coldest to the hottest, degrees C, evenly."""
     reference_c: _Celsius = 25.0
+    """Junction temperature of the study's spectra, degrees C."""
     self_heating_k: float = Field(default=0.0, ge=0, le=200)
+    """Largest excess of the junction temperature over the ambient, K, from 0, evenly."""
     drift_nm_per_k: Annotated[
         dict[str, _Drift], BeforeValidator(_by_name, json_schema_input_type=_Drift | dict[str, _Drift])
     ] = {}
+    """Shift of a spectrum with the junction temperature, nm/K: left out, 0.03 for green and 0.1 for yellow, orange
+    and red."""
     temperatures: Literal["common", "independent"] = "common"
+    """Two lights are compared at one junction temperature (`common`), or each has its own (`independent`)."""
     binning_nm: Annotated[
         dict[str, _Off], BeforeValidator(_by_name, json_schema_input_type=_Off | dict[str, _Off])
     ] = {}
+    """Largest shift by binning to either side, nm; independent for each signal."""
     ageing_nm: Annotated[
         dict[str, tuple[_Aged, _Aged]],
         BeforeValidator(_spans_by_name, json_schema_input_type=list[_Aged] | dict[str, list[_Aged]]),
     ] = {}
+    """Shift by ageing, from and to, nm; independent for each signal."""
     width: list[Annotated[float, Field(ge=0.5, le=2)]] = Field(default=[1.0], min_length=1, max_length=9)
+    """Factors by which each spectrum is stretched about its middle."""
     wanted_dn: float | None = Field(default=None, ge=0, le=1e6)
+    """CSD for which the share of lamps and cameras that have it is estimated, DN."""
     wanted_yield: float | None = Field(default=None, ge=0.5, le=0.9999)
+    """Share of random lamps and cameras: `yield_csd_...` is the CSD that this share has at least, as objective or
+    constraint."""
     draws: int = Field(default=100_000, ge=100, le=10_000_000)
+    """Random draws for `wanted_dn` and `wanted_yield`: two lights with temperature, binning, ageing and width, a
+    field position, and a production error, each evenly."""
 
     @model_validator(mode="after")
     def _ordered(self) -> Population:
@@ -155,7 +160,7 @@ class Population(Section):
         low_c, high_c : float
             Temperatures, degrees Celsius.
         """
-        drift, (low, high) = self.drift(kind, name), self.own_nm(kind, name)
+        drift, (low, high) = self.drift(kind, name), self.independent_nm(kind, name)
         ends = self.warmer_k
         if drift:
             ends_k = sorted((shift_nm - off) / drift for off in (low, high))
@@ -177,7 +182,7 @@ class Population(Section):
         """
         return _of(self.drift_nm_per_k, kind, name, DRIFT_NM_PER_K.get(kind))
 
-    def own_nm(self, kind: str, name: str) -> tuple[float, float]:
+    def independent_nm(self, kind: str, name: str) -> tuple[float, float]:
         """Return the range of shifts by binning and ageing alone.
 
         Parameters

@@ -18,7 +18,7 @@ EQUAL_ENERGY = (1 / 3, 1 / 3)
 NEAR_NM = 30.0
 """A light outside every region is taken for a signal color up to this difference of dominant wavelengths."""
 _NO_HUE = 1e-3
-"""Excitation purity of what has no dominant wavelength."""
+"""Excitation purity of a color without a dominant wavelength."""
 LEAST_PURITY = 0.5
 """Below this excitation purity a light is whitish, and its dominant wavelength says little."""
 

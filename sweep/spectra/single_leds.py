@@ -28,25 +28,29 @@ _Width = Annotated[float, Field(ge=5, le=100)]
 class RegionMap(Section):
     """Lamps of a norm that a camera cannot separate: all yellow and red LEDs in its color regions.
 
-    `norms`: `en_12368` (European signal heads), `ite` (American ones), `un_r48` (vehicles; the same as SAE J578).
-    `wanted_dn`: the distance that a pair should have. An LED is modeled: a hyperbolic secant with a peak and a full
-    width at half maximum, from and to `peak_nm` every `peak_step_nm`, from and to `fwhm_nm` every `fwhm_step_nm`. Those
-    whose color is inside the region are allowed, and count equally. The red regions of `ite` and `un_r48` have no end
-    toward the red: there `peak_nm` is the end. Photons are those of the study's lights, filters as designed.
+    An LED is modeled as a hyperbolic secant with a peak and a width. LEDs whose color is inside the region are allowed,
+    and count equally. The red regions of `ite` and `un_r48` have no end toward the red: there `peak_nm` is the end.
+    Photons are those of the study's lights, filters as designed.
     """
 
     norms: list[Norm] = Field(default=["en_12368"], min_length=1, max_length=3)
+    """`en_12368` (European signal heads), `ite` (American ones), `un_r48` (vehicles; the same as SAE J578)."""
     wanted_dn: float = Field(gt=0, le=1e6)
+    """CSD that a pair of lamps should have, DN."""
     peak_nm: Annotated[
         tuple[_Peak, _Peak],
         BeforeValidator(from_to, json_schema_input_type=Annotated[list[_Peak], Field(min_length=2, max_length=2)]),
     ] = (560.0, 660.0)
+    """Peak wavelengths from and to, nm."""
     peak_step_nm: float = Field(default=1.0, ge=0.1, le=20)
+    """Step of the peak wavelengths, nm."""
     fwhm_nm: Annotated[
         tuple[_Width, _Width],
         BeforeValidator(from_to, json_schema_input_type=Annotated[list[_Width], Field(min_length=2, max_length=2)]),
     ] = (10.0, 30.0)
+    """Full widths at half maximum from and to, nm."""
     fwhm_step_nm: float = Field(default=2.0, ge=0.1, le=50)
+    """Step of the widths, nm."""
 
     @model_validator(mode="after")
     def _ordered(self) -> RegionMap:
@@ -119,12 +123,12 @@ class SingleLeds:
         return np.asarray(shapes, dtype=float).reshape(-1, grid.size)
 
 
-def every_led(asked: RegionMap) -> SingleLeds:
+def all_leds(requested: RegionMap) -> SingleLeds:
     """Return all peaks with all widths.
 
     Parameters
     ----------
-    asked : RegionMap
+    requested : RegionMap
         Ranges.
 
     Returns
@@ -132,7 +136,7 @@ def every_led(asked: RegionMap) -> SingleLeds:
     SingleLeds
         LEDs.
     """
-    peaks, widths = np.meshgrid(asked.peaks_nm, asked.widths_nm, indexing="ij")
+    peaks, widths = np.meshgrid(requested.peaks_nm, requested.widths_nm, indexing="ij")
     return SingleLeds(peaks.ravel(), widths.ravel())
 
 

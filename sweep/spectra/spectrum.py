@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import model_validator
 
-from ..base.errors import DataError, Fault
+from ..base.errors import DataError, ValidationIssue
 from ..base.types import FloatArray, Positive, Section
 
 Resampling = Literal["linear", "mean"]
@@ -24,7 +24,7 @@ PLANCK_J_S = 6.62607015e-34
 LIGHT_M_S = 299792458.0
 """Speed of light in vacuum, exact in the SI."""
 LARGEST = 1e100
-"""Limit of a curve's values, in any unit. Products of what is larger leave the range of floats."""
+"""Limit of a curve's values, in any unit. Products of larger values overflow."""
 LEAST_PEAK = 1e-100
 """Least peak of a curve that is not 0; its other values may be as small as they like."""
 _GRID_SLACK = 1e-9
@@ -38,8 +38,11 @@ class WavelengthGrid(Section):
     """
 
     start_nm: Positive = 400.0
+    """First wavelength, nm."""
     stop_nm: Positive = 700.0
+    """Last wavelength, nm."""
     step_nm: Positive = 1.0
+    """Step, nm."""
 
     @model_validator(mode="after")
     def _whole_steps(self) -> WavelengthGrid:
@@ -131,40 +134,44 @@ class Curves:
             return resample(self.wavelength_nm, self.values[name], grid, method, outside)
         except DataError as error:
             raise DataError(
-                [Fault(f.problem, self.source, None, name, f.value, f.allowed) for f in error.faults]
+                [ValidationIssue(f.problem, self.source, None, name, f.value, f.allowed) for f in error.issues]
             ) from None
 
 
-def _wavelength_faults(wave: FloatArray) -> Iterator[Fault]:
+def _wavelength_issues(wave: FloatArray) -> Iterator[ValidationIssue]:
     if not np.isfinite(wave).all():
-        yield Fault("wavelength is not a finite number", allowed="finite nm")
+        yield ValidationIssue("wavelength is not a finite number", allowed="finite nm")
         return
     step = np.diff(wave)
     if (step == 0).any():
         twice = float(wave[1:][step == 0][0])
-        yield Fault("wavelength occurs twice", value=twice, allowed="strictly increasing")
+        yield ValidationIssue("wavelength occurs twice", value=twice, allowed="strictly increasing")
     elif not (step > 0).all():
         first = float(wave[1:][step < 0][0])
-        yield Fault("wavelengths are not sorted", value=first, allowed="strictly increasing")
+        yield ValidationIssue("wavelengths are not sorted", value=first, allowed="strictly increasing")
     if not (wave[0] >= 100 and wave[-1] <= 20000):
         hints = ((1e-4, "looks like m"), (20.0, "looks like um"), (np.inf, "not optical wavelengths in nm"))
         hint = next(hint for below, hint in hints if not wave[-1] >= below)
-        yield Fault(f"wavelength unit: {hint}", value=(float(wave[0]), float(wave[-1])), allowed="100 to 20000 nm")
+        yield ValidationIssue(
+            f"wavelength unit: {hint}", value=(float(wave[0]), float(wave[-1])), allowed="100 to 20000 nm"
+        )
 
 
-def _value_faults(wave: FloatArray, data: FloatArray) -> Iterator[Fault]:
+def _value_issues(wave: FloatArray, data: FloatArray) -> Iterator[ValidationIssue]:
     bad = ~np.isfinite(data)
     if bad.any():
-        yield Fault(f"value at {wave[bad][0]:g} nm is not a finite number", value=float(data[bad][0]), allowed=">= 0")
+        yield ValidationIssue(
+            f"value at {wave[bad][0]:g} nm is not a finite number", value=float(data[bad][0]), allowed=">= 0"
+        )
     elif (data < 0).any():
         at = int(np.argmax(data < 0))
-        yield Fault(f"negative value at {wave[at]:g} nm", value=float(data[at]), allowed=">= 0")
+        yield ValidationIssue(f"negative value at {wave[at]:g} nm", value=float(data[at]), allowed=">= 0")
     elif data.max() > LARGEST:
         at, allowed = int(np.argmax(data)), f"0 to {LARGEST:g}"
-        yield Fault(f"value at {wave[at]:g} nm is too large", value=float(data[at]), allowed=allowed)
+        yield ValidationIssue(f"value at {wave[at]:g} nm is too large", value=float(data[at]), allowed=allowed)
     elif 0 < data.max() < LEAST_PEAK:
         allowed = f"0 everywhere, or {LEAST_PEAK:g} or more somewhere"
-        yield Fault("the largest value is too small", value=float(data.max()), allowed=allowed)
+        yield ValidationIssue("the largest value is too small", value=float(data.max()), allowed=allowed)
 
 
 def check_samples(wavelength_nm: ArrayLike, values: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -183,22 +190,24 @@ def check_samples(wavelength_nm: ArrayLike, values: ArrayLike) -> tuple[FloatArr
     Raises
     ------
     DataError
-        With one fault for everything that is wrong.
+        With one issue for everything that is wrong.
     """
     wave = np.asarray(wavelength_nm, dtype=float)
     data = np.asarray(values, dtype=float)
     if wave.ndim != 1 or data.shape != wave.shape or wave.size < 2:
         raise DataError(
-            Fault("a curve needs two or more samples, one value per wavelength", value=(wave.shape, data.shape))
+            ValidationIssue(
+                "a curve needs two or more samples, one value per wavelength", value=(wave.shape, data.shape)
+            )
         )
-    faults = [*_wavelength_faults(wave), *_value_faults(wave, data)]
-    if faults:
-        raise DataError(faults)
+    issues = [*_wavelength_issues(wave), *_value_issues(wave, data)]
+    if issues:
+        raise DataError(issues)
     return wave, data
 
 
-def sample_faults(file: str, wave: FloatArray, names: Sequence[str], data: FloatArray) -> list[list[Fault]]:
-    """Return the faults of the curves of a file by `check_samples`.
+def sample_issues(file: str, wave: FloatArray, names: Sequence[str], data: FloatArray) -> list[list[ValidationIssue]]:
+    """Return the issues of the curves of a file by `check_samples`.
 
     Parameters
     ----------
@@ -221,7 +230,7 @@ def sample_faults(file: str, wave: FloatArray, names: Sequence[str], data: Float
         try:
             check_samples(wave, data[:, index])
         except DataError as error:
-            groups.append([Fault(f.problem, file, None, name, f.value, f.allowed) for f in error.faults])
+            groups.append([ValidationIssue(f.problem, file, None, name, f.value, f.allowed) for f in error.issues])
     return groups
 
 
@@ -264,7 +273,7 @@ def resample(
     slack = _GRID_SLACK * grid.stop_nm
     if outside == "refuse" and (wave[0] > nodes[0] + slack or wave[-1] < nodes[-1] - slack):
         raise DataError(
-            Fault(
+            ValidationIssue(
                 "the curve is truncated: it does not cover the wavelength grid",
                 value=f"{wave[0]:g} to {wave[-1]:g} nm",
                 allowed=f"at least {nodes[0]:g} to {nodes[-1]:g} nm, or `outside: zero`",
@@ -351,7 +360,7 @@ def equal_photons(grid: WavelengthGrid, photons: FloatArray) -> FloatArray:
     total = grid.integrate(photons)
     if not (total >= LEAST_PEAK).all():
         raise DataError(
-            Fault(
+            ValidationIssue(
                 "a light has no photons on the wavelength grid",
                 allowed=f"{grid.start_nm:g} to {grid.stop_nm:g} nm",
             )
@@ -359,7 +368,7 @@ def equal_photons(grid: WavelengthGrid, photons: FloatArray) -> FloatArray:
     return photons / total[..., None]
 
 
-def hats(at: FloatArray, knots: FloatArray) -> FloatArray:
+def linear_basis(at: FloatArray, knots: FloatArray) -> FloatArray:
     """Return the linear basis of interpolation between knots; constant beyond the ends.
 
     Parameters

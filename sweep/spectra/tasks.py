@@ -24,7 +24,7 @@ SHIPPED: Mapping[str, str] = {
     "vegetation": "leaves by day and green signals",
     "unseen_lamps": "green, yellow and red lamps that no search has seen",
 }
-"""Every task that the package ships, and what it is about."""
+"""Subject of every task that the package ships."""
 ILLUMINANTS: Mapping[str, tuple[str, str]] = {
     "d65": ("cie_illuminants", "D65"),
     "d50": ("cie_illuminants", "D50"),

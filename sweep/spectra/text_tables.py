@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from ..base.disk import read_input
-from ..base.errors import DataError, Fault
+from ..base.errors import DataError, ValidationIssue
 from ..base.types import FloatArray
 from .cells import distinct, number_of, unit_by_size
-from .spectrum import LARGEST, sample_faults
+from .spectrum import LARGEST, sample_issues
 
 WAVELENGTH = "wavelength_nm"
 """Name of the first column of the package's own files."""
@@ -66,7 +66,7 @@ class Scan:
         Columns.
     values : ndarray of shape (n_samples, n_curves)
         Values; NaN for anything else.
-    faults : tuple of tuple of Fault
+    issues : tuple of tuple of ValidationIssue
         Faults in groups; `read_curves` stops at the first group.
     notes : tuple of str
         Notes on the way it was read.
@@ -75,7 +75,7 @@ class Scan:
     wavelength_nm: FloatArray
     names: tuple[str, ...]
     values: FloatArray
-    faults: tuple[tuple[Fault, ...], ...]
+    issues: tuple[tuple[ValidationIssue, ...], ...]
     notes: tuple[str, ...] = ()
 
 
@@ -94,7 +94,7 @@ class TextTable:
     decimal: str = "."
     unit: float = 1.0
     factor: float = 1.0
-    faults: list[Fault] = field(default_factory=list)
+    issues: list[ValidationIssue] = field(default_factory=list)
 
 
 def scan_text(path: Path) -> Scan:
@@ -108,7 +108,7 @@ def scan_text(path: Path) -> Scan:
     Returns
     -------
     Scan
-        Curves; an ambiguous table has faults.
+        Curves; an ambiguous table has issues.
 
     Raises
     ------
@@ -146,7 +146,9 @@ def text_table(path: Path, first: str = WAVELENGTH) -> TextTable:
     text, notes = _decoded(path)
     table = _laid_out(str(path), text.replace("\0", ""), first, notes)
     if "\0" in text:
-        table.faults.append(Fault("NUL characters in the text", str(path), allowed="UTF-8; UTF-16? save as UTF-8"))
+        table.issues.append(
+            ValidationIssue("NUL characters in the text", str(path), allowed="UTF-8; UTF-16? save as UTF-8")
+        )
     _drop_empty_column(table)
     return table
 
@@ -177,7 +179,7 @@ def _decoded(path: Path) -> tuple[str, list[str]]:
     wide = content[:2] in _UTF_16 and content[:4] != codecs.BOM_UTF32_LE
     beginning = content[:_BEGINNING_BYTES]
     if content[:2] not in _UTF_16 and b"\0" in beginning and _CONTROLS.search(beginning):
-        raise DataError(Fault("not a text table", str(path), allowed="text; save a spreadsheet as CSV"))
+        raise DataError(ValidationIssue("not a text table", str(path), allowed="text; save a spreadsheet as CSV"))
     try:
         return content.decode("utf-16" if wide else "utf-8-sig"), ["the text is UTF-16"] if wide else []
     except UnicodeDecodeError:
@@ -194,7 +196,7 @@ def _laid_out(file: str, text: str, first: str, notes: list[str]) -> TextTable:
         kept = kept[begin + 1 :]
     if kept and _END.fullmatch(kept[-1][1].strip()):
         kept.pop()
-    empty = Fault("the file is empty", file, allowed=f"a header `{first},...` and rows of numbers")
+    empty = ValidationIssue("the file is empty", file, allowed=f"a header `{first},...` and rows of numbers")
     if not kept:
         raise DataError(empty)
     mark = _mark([line for _, line in kept[:_RELEVANT]])
@@ -259,7 +261,7 @@ def _rows(file: str, kept: Sequence[tuple[int, str]], mark: str) -> list[tuple[i
         try:
             (cells,) = csv.reader([line], delimiter=mark, strict=line.count('"') % 2 == 1)
         except (csv.Error, ValueError) as error:
-            raise DataError(Fault(f"not a readable CSV: {error}", file, n)) from None
+            raise DataError(ValidationIssue(f"not a readable CSV: {error}", file, n)) from None
         if any(cell.strip() for cell in cells):
             rows.append((n, cells))
     return rows
@@ -312,18 +314,20 @@ def _put_wavelength_first(table: TextTable) -> None:
     at = [i for i, unit in enumerate(units) if unit is not None]
     if len(at) != 1 and units[0] is None:
         allowed = f"`{WAVELENGTH}` as the first column"
-        table.faults.append(Fault("no column wavelength", table.file, table.line, header[0], header[0], allowed))
+        table.issues.append(
+            ValidationIssue("no column wavelength", table.file, table.line, header[0], header[0], allowed)
+        )
         return
-    place = at[0]
-    table.unit = units[place] or 0.0
-    if header[place] != WAVELENGTH or place:
-        table.notes.append(f"wavelengths are column {header[place]!r}")
+    column = at[0]
+    table.unit = units[column] or 0.0
+    if header[column] != WAVELENGTH or column:
+        table.notes.append(f"wavelengths are column {header[column]!r}")
     if table.unit not in (0.0, 1.0):
         table.notes.append(f"wavelengths in {_UNIT_WORDS[table.unit]} were brought to nm")
-    index = [i for i in range(place) if _counts(table, i)]
+    index = [i for i in range(column) if _counts(table, i)]
     if index:
         table.notes.append("a column that counts the rows was left out")
-    order = [place, *(i for i in range(len(header)) if i != place and i not in index)]
+    order = [column, *(i for i in range(len(header)) if i != column and i not in index)]
     width = len(header)
     table.header = [WAVELENGTH, *(header[i] for i in order[1:])]
     if order != list(range(width)):
@@ -355,7 +359,7 @@ def _find_decimal(table: TextTable) -> None:
 
 def _numbers(table: TextTable) -> Scan:
     """Return the numbers of a table, in nm and in rising order."""
-    layout = [*table.faults, *_header_faults(table)]
+    layout = [*table.issues, *_header_issues(table)]
     waves = [number_of(row[0].replace(table.decimal, ".")) for _, row in table.rows if row]
     known = [wave for wave in waves if wave is not None]
     falling = len(known) > 1 and known == sorted(known, reverse=True) and known[0] > known[-1]
@@ -370,26 +374,28 @@ def _numbers(table: TextTable) -> Scan:
     wave = values[:, 0] if unit == 1 else np.round(values[:, 0] * unit, 6)
     curves = values[:, 1:] if table.factor == 1 else values[:, 1:] * table.factor
     names = distinct(table.header[1:])
-    if layout or cells:  # what is wrong with the wavelengths beside faults that have a line of their own
+    if layout or cells:  # what is wrong with the wavelengths beside issues that have a line of their own
         sorted_nm = np.unique(wave[np.isfinite(wave)])
-        samples = sample_faults(table.file, sorted_nm, [WAVELENGTH], np.zeros((sorted_nm.size, 1)))
+        samples = sample_issues(table.file, sorted_nm, [WAVELENGTH], np.zeros((sorted_nm.size, 1)))
     else:
-        samples = sample_faults(table.file, wave, names, curves)
+        samples = sample_issues(table.file, wave, names, curves)
     groups = tuple(tuple(group) for group in (layout, cells, *samples) if group)
     return Scan(wave, names, curves, groups, tuple(table.notes))
 
 
-def _header_faults(table: TextTable) -> list[Fault]:
+def _header_issues(table: TextTable) -> list[ValidationIssue]:
     header, file, line = table.header, table.file, table.line
     if header[0] != WAVELENGTH:
-        return []  # has its fault already
+        return []  # has its issue already
     twice = [name for index, name in enumerate(header) if name in header[:index]]
-    faults = [Fault("column occurs twice", file, line, name) for name in twice]
+    issues = [ValidationIssue("column occurs twice", file, line, name) for name in twice]
     if "" in header:
-        faults.append(Fault("a column has no name", file, line, value=header))
+        issues.append(ValidationIssue("a column has no name", file, line, value=header))
     if len(header) < 2:
-        faults.append(Fault("the file has no curve", file, line, allowed="one column or more beside the wavelength"))
-    return faults
+        issues.append(
+            ValidationIssue("the file has no curve", file, line, allowed="one column or more beside the wavelength")
+        )
+    return issues
 
 
 def table_numbers(
@@ -400,8 +406,8 @@ def table_numbers(
     *,
     falling: bool = False,
     noun: str = "wavelength",
-) -> tuple[FloatArray, list[Fault]]:
-    """Return the numbers of a table and the faults, row by row.
+) -> tuple[FloatArray, list[ValidationIssue]]:
+    """Return the numbers of a table and the issues, row by row.
 
     Parameters
     ----------
@@ -422,37 +428,39 @@ def table_numbers(
     -------
     numbers : ndarray of shape (n_samples, n_columns)
         Numbers; NaN where a cell is none.
-    faults : list of Fault
+    issues : list of ValidationIssue
         Faults.
     """
     values = np.full((len(rows), len(header)), np.nan)
-    faults: list[Fault] = []
+    issues: list[ValidationIssue] = []
     order = "strictly decreasing" if falling else "strictly increasing"
     for index, (line, row) in enumerate(rows):
-        if len(faults) >= _MOST_CELL_FAULTS:
-            faults.append(Fault("too many faults; what follows was not read", file, line))
+        if len(issues) >= _MOST_CELL_FAULTS:
+            issues.append(ValidationIssue("too many errors; the rest was not read", file, line))
             break
         if len(row) != len(header):
-            faults.append(Fault("wrong number of columns", file, line, None, len(row), str(len(header))))
+            issues.append(ValidationIssue("wrong number of columns", file, line, None, len(row), str(len(header))))
             continue
         for column, text in enumerate(row):
             cell = text.replace(decimal, ".").strip()
             number = number_of(cell)
             if number is None:
                 comma = "; a decimal comma? use a point" if _DECIMAL_COMMA.fullmatch(cell) else ""
-                faults.append(Fault("not a usable number", file, line, header[column], cell, f"finite, >= 0{comma}"))
+                issues.append(
+                    ValidationIssue("not a usable number", file, line, header[column], cell, f"finite, >= 0{comma}")
+                )
                 continue
             if number < 0 and column:
-                faults.append(Fault("negative value", file, line, header[column], cell, "finite, >= 0"))
+                issues.append(ValidationIssue("negative value", file, line, header[column], cell, "finite, >= 0"))
             if number > LARGEST:
-                faults.append(Fault("value too large", file, line, header[column], cell, f"0 to {LARGEST:g}"))
+                issues.append(ValidationIssue("value too large", file, line, header[column], cell, f"0 to {LARGEST:g}"))
             values[index, column] = number
         now, before = values[index, 0].item(), values[index - 1, 0].item() if index else math.nan
         if now == before:
-            faults.append(Fault(f"{noun} occurs twice", file, line, header[0], now, order))
+            issues.append(ValidationIssue(f"{noun} occurs twice", file, line, header[0], now, order))
         elif (now > before) if falling else (now < before):
-            faults.append(Fault(f"{noun}s are not sorted", file, line, header[0], now, order))
-    return values, faults
+            issues.append(ValidationIssue(f"{noun}s are not sorted", file, line, header[0], now, order))
+    return values, issues
 
 
 def check_size(file: str, line: int | None, n_samples: int, n_curves: int) -> None:
@@ -478,4 +486,6 @@ def check_size(file: str, line: int | None, n_samples: int, n_curves: int) -> No
         ("values", n_samples * n_curves, MOST_VALUES),
     ):
         if count > most:
-            raise DataError(Fault(f"too many {what} in one file", file, line, None, count, f"at most {most:,}"))
+            raise DataError(
+                ValidationIssue(f"too many {what} in one file", file, line, None, count, f"at most {most:,}")
+            )

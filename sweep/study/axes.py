@@ -19,9 +19,13 @@ class Axis(Section):
     """Values of one parameter: a list, or `count` equidistant ones from `min` to `max`."""
 
     values: list[Number] | None = Field(default=None, min_length=1)
+    """List of values."""
     min: Number | None = None
+    """Smallest value."""
     max: Number | None = None
+    """Largest value."""
     count: int | None = Field(default=None, ge=1, le=1_000_000)
+    """Number of equidistant values."""
 
     @model_validator(mode="after")
     def _one_form(self) -> Axis:
@@ -72,12 +76,10 @@ _MOST_KEYS = 500_000
 
 
 class ScenarioTemplate(Scene):
-    """A scenario as the file has it; with `each`, of one for every combination of its values.
-
-    `each`: dotted keys of the scenario (target.distance_m) -> values.
-    """
+    """Scenario as the file has it; with `each`, one for every combination of its values."""
 
     each: Annotated[dict[Name, Values], Field(min_length=1)] | None = None
+    """Dotted key of the scenario (target.distance_m) -> values."""
 
 
 def expanded(value: Any) -> Any:

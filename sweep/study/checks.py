@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from ..camera import psf
-from ..camera.memory import MOST_BYTES, too_large
+from ..camera.memory import MOST_BYTES, memory_problem
 from ..camera.mosaic import Mosaic
 from ..camera.scene import OBJECT_RESOLUTION, FixedExposure, Scene
-from ..metrics.quantity import Asked, Quantity
+from ..metrics.quantity import Quantity, RequestedQuantities
 from ..metrics.registry import listed, quantities_of
 from ..spectra.color import luminance_per_photon_radiance
 from ..spectra.lights import Lights
@@ -34,17 +34,21 @@ def check_scenes(section: StudySection, sources: Sources) -> None:
     section : StudySection
         The keys of the study, checked against the schema.
     sources : Sources
-        Files, curves and the faults so far.
+        Files, curves and the issues so far.
     """
     _check_regions(section, sources)
     for name, scene in section.scenarios.items():
-        if (refused := psf.too_much(scene, section.pixel)) is not None:
+        if (refused := psf.psf_problem(scene, section.pixel)) is not None:
             key, problem, value, allowed = refused
             sources.add(("scenarios", name, *key), problem, value, allowed)
 
 
 def check_lights(
-    section: StudySection, lights: Lights, mosaics: Mapping[str, Mosaic], asked: Asked, sources: Sources
+    section: StudySection,
+    lights: Lights,
+    mosaics: Mapping[str, Mosaic],
+    requested: RequestedQuantities,
+    sources: Sources,
 ) -> None:
     """Check keys that name signal types or columns, or that need lamps.
 
@@ -56,22 +60,22 @@ def check_lights(
         The lights of the study.
     mosaics : mapping of str to Mosaic
         CFAs by name.
-    asked : Asked
+    requested : RequestedQuantities
         Quantities of the study.
     sources : Sources
-        Files, curves and the faults so far.
+        Files, curves and the issues so far.
     """
-    _check_columns(asked, sources)
+    _check_columns(requested, sources)
     _check_recognition(section, lights, sources)
     _check_vision(section, lights, mosaics, sources)
     _check_published(section, lights, mosaics, sources)
 
 
-def _check_columns(asked: Asked, sources: Sources) -> None:
+def _check_columns(requested: RequestedQuantities, sources: Sources) -> None:
     """Check that every pair of signal types has columns of its own."""
-    seen: dict[str, Quantity] = {}
-    for quantity in listed(replace(asked, edge_shift=False)):
-        other = seen.setdefault(quantity.name, quantity)
+    by_name: dict[str, Quantity] = {}
+    for quantity in listed(replace(requested, edge_shift=False)):
+        other = by_name.setdefault(quantity.name, quantity)
         if other.pair != quantity.pair and other.pair is not None and quantity.pair is not None:
             pairs = f"{'/'.join(other.pair)} and {'/'.join(quantity.pair)}"
             problem = f"the pairs {pairs} share the column {quantity.name}"
@@ -99,7 +103,7 @@ def _check_recognition(section: StudySection, lights: Lights, sources: Sources) 
 
 def _check_published(section: StudySection, lights: Lights, mosaics: Mapping[str, Mosaic], sources: Sources) -> None:
     """Check the names of published figures."""
-    nominal = quantities_of(Asked(lights.classes)).values()
+    nominal = quantities_of(RequestedQuantities(lights.classes)).values()
     columns = [q.name for q in nominal if q.ends and q.needs != "family"]
     known = dict.fromkeys([*mosaics, *section.designs, *section.geometry])
     for table, rows in section.published.items():
@@ -128,13 +132,13 @@ def _check_regions(section: StudySection, sources: Sources) -> None:
         sources.add(("regions", "fwhm_nm"), problem, list(regions.fwhm_nm), f"{grid.step_nm:g} nm or more")
     for name, scene in section.scenarios.items():
         if scene.target is not None and scene.target.phase_px == "any":
-            problem = "`regions` needs a light at a named place of the mosaic"
+            problem = "`regions` needs a named sampling phase"
             sources.add(("scenarios", name, "target", "phase_px"), problem, "any", "[column, row]")
-    if sources.faults:
+    if sources.issues:
         return
-    from ..spectra.single_leds import every_led  # noqa: PLC0415  (few studies ask for it)
+    from ..spectra.single_leds import all_leds  # noqa: PLC0415  (few studies ask for it)
 
-    leds = every_led(regions)
+    leds = all_leds(regions)
     for norm in regions.norms:
         for kind in ("yellow", "red"):
             if not leds.allowed(norm, kind).peak_nm.size:
@@ -150,7 +154,7 @@ def check_size(study: Study, sources: Sources) -> None:
     study : Study
         The study.
     sources : Sources
-        Files, curves and the faults so far.
+        Files, curves and the issues so far.
 
     Raises
     ------
@@ -159,7 +163,7 @@ def check_size(study: Study, sources: Sources) -> None:
     """
     for name in study.scenarios:
         for space in study.spaces:
-            if (refused := too_large(study.setup(space, name))) is not None:
+            if (refused := memory_problem(study.setup(space, name))) is not None:
                 problem, value, allowed = refused
                 sources.add(("scenarios", name, "target"), f"{problem} (CFA {space.cfa})", value, allowed)
                 raise sources.error
@@ -173,7 +177,7 @@ def check_count(study: Study, sources: Sources) -> None:
     study : Study
         The study.
     sources : Sources
-        Files, curves and the faults so far.
+        Files, curves and the issues so far.
 
     Raises
     ------
@@ -184,7 +188,7 @@ def check_count(study: Study, sources: Sources) -> None:
         sources.add(("cfas",), "no designs", None, "a CFA with a curve for each channel, a design, a sweep or a search")
     if study.n_designs > _MOST_DESIGNS:
         sources.add(("sweeps",), "too many designs", f"{study.n_designs:,}", f"at most {_MOST_DESIGNS:,}")
-    if sources.faults:
+    if sources.issues:
         raise sources.error
 
 
@@ -201,8 +205,8 @@ def _check_vision(section: StudySection, lights: Lights, mosaics: Mapping[str, M
         if different < FEWEST_LAMPS:
             allowed = f"at least {FEWEST_LAMPS} different lamps: one to train, one to check, one to test"
             sources.add(("vision", "lenses"), f"too few lamps of type {lens}", different, allowed)
-        seen = luminance_per_photon_radiance(section.wavelengths, lights.photons[lights.members[lens]])
-        if not seen.min() > _LEAST_LUMINANCE:
+        luminance = luminance_per_photon_radiance(section.wavelengths, lights.photons[lights.members[lens]])
+        if not luminance.min() > _LEAST_LUMINANCE:
             problem = f"a lamp of type {lens} is not visible, and has no luminous intensity"
             sources.add(("vision", "lenses"), problem, lens, "lamps that the eye sees")
     for name, mosaic in mosaics.items():
@@ -212,7 +216,7 @@ def _check_vision(section: StudySection, lights: Lights, mosaics: Mapping[str, M
             sources.add(("vision", "crop_px"), problem, vision.crop_px, "a multiple of every tile")
     for distance_m in vision.distances_m:
         scene = Scene(target=vision.target(distance_m), optics=vision.optics, exposure=FixedExposure(exposure_s=1.0))
-        if (refused := psf.too_much(scene, section.pixel)) is not None:
+        if (refused := psf.psf_problem(scene, section.pixel)) is not None:
             _, problem, value, allowed = refused
             sources.add(("vision", "distances_m"), f"{problem} at {distance_m:g} m", value, allowed)
     _check_pixel(section, sources)
@@ -245,8 +249,8 @@ def _check_memory(vision: Vision, lights: Lights, mosaics: Mapping[str, Mosaic],
         lamps = 8 * places * n_lenses * len(lights.names) * pixels * len(vision.distances_m)
         cases = 8 * places * 2 * math.factorial(n_lenses) * (1 + test_lamps * len(vision.intensities_cd)) * pixels
         if (every := max(lamps, cases)) > MOST_BYTES:
-            problem = f"{places} places of the head take too much memory (CFA {name})"
-            allowed = f"at most {MOST_BYTES / 2**30:g} GiB: smaller images, fewer places, lamps or distances"
+            problem = f"{places} positions of the head take too much memory (CFA {name})"
+            allowed = f"at most {MOST_BYTES / 2**30:g} GiB: smaller images, fewer positions, lamps or distances"
             sources.add(("vision",), problem, f"{every / 2**30:.1f} GiB", allowed)
             return
         planes = len(mosaic.channels) if vision.input == "demosaicked" else 1

@@ -1,4 +1,4 @@
-"""YAML as plain values that know their lines, and pydantic's errors as one-line faults that name their line.
+"""YAML as plain values that know their lines, and pydantic's errors as one-line issues that name their line.
 
 The tree is built from ruamel.yaml's nodes and only up to limits. The library's constructor builds everything first: a
 few hundred bytes of aliases become billions of values.
@@ -21,7 +21,7 @@ from ruamel.yaml.nodes import Node, ScalarNode, SequenceNode
 from ruamel.yaml.reader import ReaderError
 
 from ..base.disk import NO_UTF_16, not_utf8, read_input
-from ..base.errors import MOST_FAULTS, Fault, StudyError, nearest
+from ..base.errors import MOST_ISSUES, StudyError, ValidationIssue, nearest
 
 MOST_DEPTH = 20
 """Levels of nesting; a study needs seven."""
@@ -31,7 +31,7 @@ _MOST = (500_000, 50_000)
 """Bytes of a study file, and keys and values in it."""
 _MOST_RESOLVED = (8_000_000, 400_000)
 """The same of a `*.resolved.yaml`, as a run writes it: with every default, and each of up to 2000 scenarios."""
-_MOST_LOOKED_AT = 2 * MOST_FAULTS
+_MOST_LOOKED_AT = 2 * MOST_ISSUES
 """Errors of the schema that are read; of a value that may have several types there is one for each."""
 _PLAIN = {
     **dict.fromkeys(("", "~", "null", "Null", "NULL")),
@@ -192,7 +192,7 @@ class Tree:
         value: object = None,
         allowed: str | None = None,
     ) -> StudyError:
-        return StudyError(Fault(problem, self._file, line, ".".join(path) or None, value, allowed))
+        return StudyError(ValidationIssue(problem, self._file, line, ".".join(path) or None, value, allowed))
 
 
 def yaml_text(data: Mapping[str, Any]) -> str:
@@ -220,7 +220,7 @@ def yaml_text(data: Mapping[str, Any]) -> str:
     try:
         yaml.dump(data, text)
     except YAMLError as error:
-        raise StudyError(Fault(f"not a value of a study: {' '.join(str(error).split())}")) from None
+        raise StudyError(ValidationIssue(f"not a value of a study: {' '.join(str(error).split())}")) from None
     return text.getvalue()
 
 
@@ -239,7 +239,7 @@ class Document:
         self.data: dict[str, Any] = self._tree.root
         if not isinstance(self.data, dict):
             allowed = "`study: name` and further keys"
-            raise StudyError(Fault("a study file is a mapping of keys", self.file, 1, allowed=allowed))
+            raise StudyError(ValidationIssue("a study file is a mapping of keys", self.file, 1, allowed=allowed))
 
     def change(self, key: str, text: str) -> None:
         """Set a key, as the option `--set` does.
@@ -260,7 +260,7 @@ class Document:
         try:
             value = Tree(f"value: {text}", None, _MOST[1]).root["value"]
         except StudyError as error:
-            raise StudyError([replace(fault, file=option, line=None, key=None) for fault in error.faults]) from None
+            raise StudyError([replace(issue, file=option, line=None, key=None) for issue in error.issues]) from None
         *path, last = key.split(".")
         node: Any = self.data
         for at, part in enumerate(path):
@@ -269,9 +269,13 @@ class Document:
             node = _child(node, int(part) if isinstance(node, list) and part.isdecimal() else part)
             if not isinstance(node, dict | list):
                 where = ".".join(path[: at + 1])
-                raise StudyError(Fault(f"`{where}` is no mapping in {self.file}", option, allowed="the whole of it"))
+                raise StudyError(
+                    ValidationIssue(f"`{where}` is no mapping in {self.file}", option, allowed="the whole of it")
+                )
         if isinstance(node, list) and not (last.isdecimal() and int(last) < len(node)):
-            raise StudyError(Fault("no such entry of the list", option, value=last, allowed=f"0 to {len(node) - 1}"))
+            raise StudyError(
+                ValidationIssue("no such entry of the list", option, value=last, allowed=f"0 to {len(node) - 1}")
+            )
         self._tree.put(node, int(last) if isinstance(node, list) else last, value, option)
 
     def place(self, path: Sequence[Key]) -> Place:
@@ -300,15 +304,15 @@ class Document:
         keys = node if isinstance(node, dict) else range(len(node)) if isinstance(node, list) else ()
         return next((inner for key in keys if isinstance(inner := self._tree.place(node, key), str)), place)
 
-    def fault(
+    def issue(
         self,
         path: Sequence[Key],
         problem: str,
         value: object = None,
         allowed: str | None = None,
         near: str | None = None,
-    ) -> Fault:
-        """Create a fault with the position of a key.
+    ) -> ValidationIssue:
+        """Create an issue with the position of a key.
 
         Parameters
         ----------
@@ -325,15 +329,15 @@ class Document:
 
         Returns
         -------
-        Fault
-            The fault.
+        ValidationIssue
+            The issue.
         """
         place = None if self.file is None else self.place(path)
         file, line = (place, None) if isinstance(place, str) else (self.file, place)
-        return Fault(problem, file, line, dotted(path), value, allowed, near)
+        return ValidationIssue(problem, file, line, dotted(path), value, allowed, near)
 
-    def faults(self, error: ValidationError, model: type[BaseModel]) -> list[Fault]:
-        """Convert pydantic's errors to faults of this file.
+    def issues(self, error: ValidationError, model: type[BaseModel]) -> list[ValidationIssue]:
+        """Convert pydantic's errors to issues of this file.
 
         Parameters
         ----------
@@ -347,20 +351,20 @@ class Document:
         list of Fault
             Sorted by line.
         """
-        faults: dict[tuple[KeyPath, str], Fault] = {}
+        issues: dict[tuple[KeyPath, str], ValidationIssue] = {}
         items = error.errors(include_url=False)
         schema = model.model_json_schema() if any(item["type"] == "extra_forbidden" for item in items) else {}
         meant = set()
         for item in islice(items, _MOST_LOOKED_AT):
             path = self._path(item["loc"])
-            fault = self._fault(path, item, schema)
-            faults.setdefault((path, fault.problem), fault)
+            issue = self._issue(path, item, schema)
+            issues.setdefault((path, issue.problem), issue)
             if item["type"] == "extra_forbidden":
-                meant.add((*path[:-1], fault.nearest))
-        # A misspelled key is one fault, not a second one because the right key is missing.
-        kept = [fault for (path, problem), fault in faults.items() if problem != "missing" or path not in meant]
+                meant.add((*path[:-1], issue.nearest))
+        # A misspelled key is one issue, not a second one because the right key is missing.
+        kept = [issue for (path, problem), issue in issues.items() if problem != "missing" or path not in meant]
         more = len(items) - _MOST_LOOKED_AT
-        return by_line(kept) + ([Fault(f"and about {more:,} more faults", self.file)] if more > 0 else [])
+        return by_line(kept) + ([ValidationIssue(f"and about {more:,} more errors", self.file)] if more > 0 else [])
 
     def _path(self, loc: Sequence[Key]) -> KeyPath:
         """Return `loc` without the tags that pydantic adds for unions, and with a missing last key kept."""
@@ -378,24 +382,24 @@ class Document:
                 path.append(key)
         return tuple(path)
 
-    def _fault(self, path: KeyPath, item: Any, schema: dict[str, Any]) -> Fault:
+    def _issue(self, path: KeyPath, item: Any, schema: dict[str, Any]) -> ValidationIssue:
         kind, value, context = item["type"], item["input"], item.get("ctx", {})
         tag = str(context.get("discriminator")).strip("'")
         if kind == "extra_forbidden":
             known = _known_keys(schema, path[:-1], self.data)
-            return self.fault(path, "unknown key", None, ", ".join(known), nearest(path[-1], known))
+            return self.issue(path, "unknown key", None, ", ".join(known), nearest(path[-1], known))
         if kind in ("missing", "value_error", "union_tag_not_found"):
             place = (*path, tag) if kind == "union_tag_not_found" else path
-            return self.fault(place, str(context["error"]) if kind == "value_error" else "missing")
+            return self.issue(place, str(context["error"]) if kind == "value_error" else "missing")
         if kind == "union_tag_invalid":
             got = value.get(tag) if isinstance(value, dict) else value
-            return self.fault((*path, tag), "unknown kind", got, context.get("expected_tags", ""))
+            return self.issue((*path, tag), "unknown kind", got, context.get("expected_tags", ""))
         shown = value if not isinstance(value, dict | list) else type(value).__name__
         if kind == "bool_type" and (meant := _YAML_1_1_BOOLEANS.get(str(value).casefold())):
-            return self.fault(path, f"true or false expected: write {meant}", shown)
+            return self.issue(path, f"true or false expected: write {meant}", shown)
         allowed = item["msg"].removeprefix("Input should be ").removeprefix("a valid ")
         allowed = "mapping" if allowed.startswith("dictionary") else allowed
-        return self.fault(path, "not allowed", shown, "true or false" if allowed == "boolean" else allowed)
+        return self.issue(path, "not allowed", shown, "true or false" if allowed == "boolean" else allowed)
 
 
 def _known_keys(schema: dict[str, Any], path: Sequence[Key], data: Any) -> list[str]:
@@ -445,20 +449,20 @@ def _written(node: Any, key: Key) -> Key:
     return key
 
 
-def by_line(faults: Iterable[Fault]) -> list[Fault]:
-    """Sort faults by line.
+def by_line(issues: Iterable[ValidationIssue]) -> list[ValidationIssue]:
+    """Sort issues by line.
 
     Parameters
     ----------
-    faults : iterable of Fault
-        The faults.
+    issues : iterable of ValidationIssue
+        The issues.
 
     Returns
     -------
     list of Fault
-        Sorted; faults without a line last.
+        Sorted; issues without a line last.
     """
-    return sorted(faults, key=lambda fault: (fault.line is None, fault.file or "", fault.line or 0))
+    return sorted(issues, key=lambda issue: (issue.line is None, issue.file or "", issue.line or 0))
 
 
 def dotted(path: Sequence[Key]) -> str:
@@ -484,8 +488,8 @@ def _text(path: Path, most_bytes: int) -> str:
     except UnicodeDecodeError as error:
         problem, wide = not_utf8(content, error)
         line = None if wide else content.count(b"\n", 0, error.start) + 1
-        raise StudyError(Fault(problem, str(path), line, allowed=NO_UTF_16 if wide else "UTF-8")) from None
+        raise StudyError(ValidationIssue(problem, str(path), line, allowed=NO_UTF_16 if wide else "UTF-8")) from None
     if "\0" in text:
         line = text.count("\n", 0, text.index("\0")) + 1
-        raise StudyError(Fault("NUL characters in the text", str(path), line, allowed=NO_UTF_16))
+        raise StudyError(ValidationIssue("NUL characters in the text", str(path), line, allowed=NO_UTF_16))
     return text

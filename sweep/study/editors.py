@@ -29,7 +29,7 @@ class _Untitled(GenerateJsonSchema):
 
 
 def study_schema() -> Json:
-    """Return the schema of what the loader takes: sections as mappings or as their short forms, nothing unknown.
+    """Return the schema of studies: sections as mappings or as their short forms, nothing unknown.
 
     It is wider than the loader in what only a whole file tells: names that refer to others, what goes together.
     """

@@ -1,4 +1,4 @@
-"""Objective, constraints and search of a study, checked against its quantities, its spaces and what can be reached."""
+"""Objective, constraints and search of a study, checked against its quantities, its spaces and their limits."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..base.errors import Fault
+from ..base.errors import ValidationIssue
 from ..camera.scene import WhitePatchExposure
 from ..designs.space import Space
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY, SENSITIVITY
-from ..metrics.quantity import DN, OF_A_SHARE, WORST_CASE, Asked, Quantity
+from ..metrics.quantity import DN, OF_A_SHARE, WORST_CASE, Quantity, RequestedQuantities
 from ..metrics.registry import quantities_of
 from ..search.solver import ALGORITHMS, DIRECT, GRADIENT
 from .axes import Axis
@@ -26,7 +26,7 @@ _LEAST_ERROR = 1e-12
 """Smallest error that is stated where errors are no exact sums."""
 
 
-def check_goals(section: StudySection, sources: Sources, asked: Asked) -> None:
+def check_goals(section: StudySection, sources: Sources, requested: RequestedQuantities) -> None:
     """Check that objective and constraints name quantities the study has.
 
     Parameters
@@ -34,15 +34,15 @@ def check_goals(section: StudySection, sources: Sources, asked: Asked) -> None:
     section : StudySection
         The keys of the study, checked against the schema.
     sources : Sources
-        Files, curves and the faults so far.
-    asked : Asked
+        Files, curves and the issues so far.
+    requested : RequestedQuantities
         Quantities of the study, and the states they are computed for.
     """
-    known, rule = quantities_of(asked), section.objective.rule
+    known, rule = quantities_of(requested), section.objective.rule
     stated = sources.document.data.get("objective")
     for name in section.objective.weights:
         path: KeyPath = ("objective", rule.name, name) if isinstance(stated, dict) else ("objective",)
-        if not _is_known(path, "objective", name, section, sources, asked):
+        if not _is_known(path, "objective", name, section, sources, requested):
             continue
         _check_slopes(path, known[name], section, sources)
         if known[name].wanted != rule.wanted:
@@ -50,7 +50,7 @@ def check_goals(section: StudySection, sources: Sources, asked: Asked) -> None:
             sources.add(path, f"{known[name].wanted} of {name} is better", None, right)
     for name, bound in section.constraints.items():
         path = ("constraints", name)
-        if not _is_known(path, "quantity", name, section, sources, asked):
+        if not _is_known(path, "quantity", name, section, sources, requested):
             continue
         if known[name].smooth is None and section.search is not None:
             sources.add(path, f"the search does not know {name}", None, "a study without `search`")
@@ -71,28 +71,32 @@ def _check_slopes(path: KeyPath, quantity: Quantity, section: StudySection, sour
         sources.add(path, f"{quantity.name} has no derivatives, which {section.search.algorithm} needs", None, allowed)
 
 
-def _is_known(path: KeyPath, what: str, name: str, section: StudySection, sources: Sources, asked: Asked) -> bool:
-    """Return whether there is such a quantity; else add a fault, with what the study would need for it."""
-    known = _names(what, asked)
+def _is_known(
+    path: KeyPath, what: str, name: str, section: StudySection, sources: Sources, requested: RequestedQuantities
+) -> bool:
+    """Return whether there is such a quantity; else add an issue with the missing key."""
+    known = _names(what, requested)
     if name in known:
         return True
-    shifted = quantities_of(replace(asked, edge_shift=True)).get(name)
+    shifted = quantities_of(replace(requested, edge_shift=True)).get(name)
     if shifted is not None and shifted.extreme == WORST_CASE and not section.production.tolerance:
         needed = "`production.edge_shift_nm`" + (" or `population`" if shifted.apart == DN else "")
         sources.add(path, f"{name} needs {needed}", None, "a shift above 0")
-    elif name in {n for n, q in quantities_of(replace(asked, wanted_yield=1.0)).items() if q.extreme == OF_A_SHARE}:
+    elif name in {n for n, q in quantities_of(replace(requested, wanted_yield=1.0)).items() if q.extreme == OF_A_SHARE}:
         sources.add(path, f"{name} needs `population.wanted_yield`", None, "a share, such as 0.99")
-    elif not asked.states and name in {*quantities_of(replace(asked, states=asked.classes))} - {*quantities_of(asked)}:
+    elif not requested.states and name in {*quantities_of(replace(requested, states=requested.classes))} - {
+        *quantities_of(requested)
+    }:
         sources.add(path, f"{name} needs `recognition`", None, "`recognition: {}`, and noise in every scenario")
     else:
-        more = replace(asked, states=asked.classes, edge_shift=True, wanted_yield=1.0)
+        more = replace(requested, states=requested.classes, edge_shift=True, wanted_yield=1.0)
         sources.unknown(path, what, name, known, _names(what, more))
     return False
 
 
-def _names(what: str, asked: Asked) -> list[str]:
+def _names(what: str, requested: RequestedQuantities) -> list[str]:
     """Return the quantities that an objective or a constraint can be of."""
-    return [name for name, q in quantities_of(asked).items() if (q.goal if what == "objective" else q.ends)]
+    return [name for name, q in quantities_of(requested).items() if (q.goal if what == "objective" else q.ends)]
 
 
 def search_of(section: StudySection, spaces: Sequence[Space], sources: Sources) -> Search | None:
@@ -105,20 +109,20 @@ def search_of(section: StudySection, spaces: Sequence[Space], sources: Sources) 
     spaces : sequence of Space
         Design spaces of the study.
     sources : Sources
-        Files, curves and the faults so far.
+        Files, curves and the issues so far.
 
     Returns
     -------
     Search or None
-        None if the study has no search, or after adding faults.
+        None if the study has no search, or after adding issues.
     """
-    asked = section.search
-    if asked is None:
+    requested = section.search
+    if requested is None:
         return None
     boxes = {space.name: space for space in spaces if space.kind in ("sweep", "search")}
     names = [*section.sweeps, *section.boxes]
     scenarios = list(section.scenarios)
-    chosen = asked.space or (names[0] if len(names) == 1 else None)
+    chosen = requested.space or (names[0] if len(names) == 1 else None)
     if chosen is None:
         problem = "missing: the search needs one sweep or box"
         sources.add(("search", "space"), problem, None, ", ".join(names) or "a sweep")
@@ -126,21 +130,21 @@ def search_of(section: StudySection, spaces: Sequence[Space], sources: Sources) 
         sources.unknown(("search", "space"), "sweep or box", chosen, names)
     elif chosen in boxes and all(min(axis) == max(axis) for axis in boxes[chosen].axes):
         sources.add(("search", "space"), "every parameter is fixed", chosen, "one free parameter or more")
-    if asked.scenario is not None and asked.scenario not in scenarios:
-        sources.unknown(("search", "scenario"), "scenario", asked.scenario, scenarios)
-    if asked.algorithm not in ALGORITHMS:
+    if requested.scenario is not None and requested.scenario not in scenarios:
+        sources.unknown(("search", "scenario"), "scenario", requested.scenario, scenarios)
+    if requested.algorithm not in ALGORITHMS:
         what = "algorithm (it must take inequality constraints)"
-        sources.unknown(("search", "algorithm"), what, asked.algorithm, list(ALGORITHMS))
-    scenario = asked.scenario or scenarios[0]
-    if chosen not in boxes or asked.algorithm not in ALGORITHMS or scenario not in scenarios:
+        sources.unknown(("search", "algorithm"), what, requested.algorithm, list(ALGORITHMS))
+    scenario = requested.scenario or scenarios[0]
+    if chosen not in boxes or requested.algorithm not in ALGORITHMS or scenario not in scenarios:
         return None
     levels: tuple[float, ...] = ()
-    if asked.front is not None:
-        levels = Axis(min=asked.front.min, max=asked.front.max, count=asked.front.count).points()
-    seen = section.scenarios[scenario]
-    if seen.drive is not None and isinstance(seen.exposure, WhitePatchExposure):
+    if requested.front is not None:
+        levels = Axis(min=requested.front.min, max=requested.front.max, count=requested.front.count).points()
+    scene = section.scenarios[scenario]
+    if scene.drive is not None and isinstance(scene.exposure, WhitePatchExposure):
         sources.add(("search", "scenario"), "a search under a pulsed light needs a fixed exposure", scenario)
-    effort = asked.algorithm, asked.starts, asked.max_evaluations
+    effort = requested.algorithm, requested.starts, requested.max_evaluations
     return Search(boxes[chosen], scenario, *effort, levels)
 
 
@@ -156,7 +160,7 @@ def check_searched(section: StudySection, space: Space, known: Mapping[str, Quan
     known : mapping of str to Quantity
         Quantities by name.
     sources : Sources
-        Files, curves and the faults so far.
+        Files, curves and the issues so far.
     """
     assert space.filter is not None
     assert section.search is not None
@@ -170,7 +174,7 @@ def check_searched(section: StudySection, space: Space, known: Mapping[str, Quan
         sources.add(("search", "front"), problem, None, "an objective of CSDs")
 
 
-def likely_percents(study: Study) -> Iterator[str]:
+def bounds_like_percentages(study: Study) -> Iterator[str]:
     """Find bounds on ratios that look like percentages.
 
     Parameters
@@ -191,7 +195,7 @@ def likely_percents(study: Study) -> Iterator[str]:
                 yield f"{place}: {value:g} of a ratio; is it a percentage? {value:g} % are {value / 100:g}"
 
 
-def out_of_reach(study: Study, space: Space, scenario: str) -> list[Fault]:
+def unreachable_constraints(study: Study, space: Space, scenario: str) -> list[ValidationIssue]:
     """Find constraints that no filter of a design space can meet.
 
     Bounds sensitivities by the largest curve within the parameter box, widths by the box, and CSDs by the largest
@@ -212,15 +216,15 @@ def out_of_reach(study: Study, space: Space, scenario: str) -> list[Fault]:
     list of Fault
         One per constraint.
     """
-    faults = []
+    issues = []
     most = dict(_most(study, space, scenario))
     for name, bound in study.constraints.items():
         plain = study.quantities[name].of or name
         if bound.min is not None and plain in most and bound.min > most[plain] * (1 + _SLACK):
             largest = math.ceil(most[plain] * 1e4) / 1e4
             problem = f"out of reach: {name} {bound}; no filter of {space.name} has more than {largest:g}"
-            faults.append(Fault(problem, key=f"constraints.{name}"))
-    return faults
+            issues.append(ValidationIssue(problem, key=f"constraints.{name}"))
+    return issues
 
 
 def _most(study: Study, space: Space, scenario: str) -> Iterator[tuple[str, float]]:
@@ -232,7 +236,7 @@ def _most(study: Study, space: Space, scenario: str) -> Iterator[tuple[str, floa
     if space.filter is None:
         return
     low, high = (np.array([end(axis) for axis in space.axes], dtype=float) for end in (min, max))
-    made = [space.filter.family.produced(off) for off in study.tolerance.places]
+    made = [space.filter.family.perturbed(off) for off in study.tolerance.places]
     top = np.max([family.hull(low, high)[1] for family in made], axis=0)
     counts, modified = setup.camera.mosaic.counts, list(setup.camera.modified)
     qe = setup.camera.qe.copy()

@@ -1,4 +1,4 @@
-"""The lights of a study: from files or built in, with their population; and checks of what scenes ask of them."""
+"""The lights of a study: from files or built in, with their population; and checks of the scenes' needs."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def with_light_files(section: StudySection, sources: Sources) -> StudySection:
     section : StudySection
         The keys of the study, checked against the schema.
     sources : Sources
-        Files, curves and the faults so far.
+        Files, curves and the issues so far.
 
     Returns
     -------
@@ -59,7 +59,7 @@ def with_light_files(section: StudySection, sources: Sources) -> StudySection:
         try:
             taken = lights_file(place, "energy", section.wavelengths.start_nm, section.wavelengths.stop_nm)
         except DataError as error:
-            sources.faults.extend(error.faults)
+            sources.issues.extend(error.issues)
             return lights
         kinds = [f"{kind}: {', '.join(columns)}" for kind, columns in taken.types.items()]
         left_out = [f"{column} is left out ({reason})" for column, reason in taken.left_out.items()]
@@ -67,13 +67,13 @@ def with_light_files(section: StudySection, sources: Sources) -> StudySection:
         stated = lights.model_dump(exclude_unset=True, exclude={"builtin", "files"})
         return LightsSection.model_validate(taken.keys(name) | stated)
 
-    before = len(sources.faults)
+    before = len(sources.issues)
     changed: dict[str, object] = {"lights": read(section.lights, ("lights",))}
     validation = section.validation
     if validation is not None and validation.lights is not None:
         lights = read(validation.lights, ("validate", "lights"))
         changed["validation"] = validation.model_copy(update={"lights": lights})
-    if len(sources.faults) > before:
+    if len(sources.issues) > before:
         raise sources.error
     return section.model_copy(update=changed)
 
@@ -86,19 +86,19 @@ def lights_of(section: LightsSection, sources: Sources, at: KeyPath = ("lights",
     section : LightsSection
         Keys of the lights.
     sources : Sources
-        Files, curves and the faults so far.
+        Files, curves and the issues so far.
     at : sequence of str and int
         Keys that lead to the section.
 
     Returns
     -------
     Lights or None
-        None after adding faults.
+        None after adding issues.
 
     Raises
     ------
     StudyError
-        With every fault so far, if the study cannot be used.
+        With every issue so far, if the study cannot be used.
     """
     section = offered_curves(sources, at, section, "sweep.lights", BUILT_IN_LIGHTS)
     if section.builtin is not None:
@@ -107,7 +107,7 @@ def lights_of(section: LightsSection, sources: Sources, at: KeyPath = ("lights",
             value = getattr(section, key)
             sources.add((*at, key), "a built-in data set has its own", value, "this key beside `files`")
         return None if excess else sources.built_in(at, section.builtin, BUILT_IN_LIGHTS)
-    before = len(sources.faults)
+    before = len(sources.issues)
     files = (*at, "files")
     count = sum(len(columns) for entry in section.files for columns in entry.signals.values())
     if not sources.fits(files, "lights", count):
@@ -117,18 +117,18 @@ def lights_of(section: LightsSection, sources: Sources, at: KeyPath = ("lights",
         curves = sources.curves((*files, index), entry)
         for signal_type, columns in entry.signals.items():
             for position, column in enumerate(columns):
-                place = (*files, index, "signals", signal_type, position)
+                found_path = (*files, index, "signals", signal_type, position)
                 label = f"{Path(entry.file).stem}:{column}"
                 if sources.kept is not None:
-                    photons = sources.kept_curve(place, sources.kept.lights, (signal_type, label))
+                    photons = sources.kept_curve(found_path, sources.kept.lights, (signal_type, label))
                 else:
-                    photons = sources.photons(place, curves, column, entry)
+                    photons = sources.photons(found_path, curves, column, entry)
                 if photons is not None:
                     by_type.setdefault(signal_type, []).append((label, signal_type, photons))
-    if len(sources.faults) > before:
+    if len(sources.issues) > before:
         return None
     if len(by_type) < 2:
-        sources.add(files, "only one signal type", list(by_type), "two or more, to tell them apart")
+        sources.add(files, "only one signal type", list(by_type), "two or more")
         return None
     if len(by_type) > MOST_TYPES:
         sources.add(files, "too many signal types", len(by_type), f"at most {MOST_TYPES}")
@@ -148,7 +148,7 @@ def held_out_lights(section: StudySection, lights: Lights | None, sources: Sourc
     lights : Lights or None
         Lights of the study.
     sources : Sources
-        Files, curves and the faults so far.
+        Files, curves and the issues so far.
 
     Returns
     -------
@@ -179,12 +179,12 @@ def with_population(lights: Lights, section: StudySection, sources: Sources) -> 
     section : StudySection
         The keys of the study, checked against the schema.
     sources : Sources
-        Files, curves and the faults so far.
+        Files, curves and the issues so far.
 
     Returns
     -------
     Lights
-        Lights with their population; faults are added to `sources`.
+        Lights with their population; issues are added to `sources`.
     """
     population, at = section.population, ("population",)
     if population is None:
@@ -205,10 +205,10 @@ def with_population(lights: Lights, section: StudySection, sources: Sources) -> 
             problem = "lights of a population have their photons, not their luminous intensity, in common"
             sources.add(("scenarios", name, "intensity_cd"), problem, scene.intensity_cd, "photon_radiance")
         if scene.target is not None and scene.target.phase_px == "any":
-            problem = "worst cases over a population need a light at a named place of the mosaic"
+            problem = "worst cases over a population need a named sampling phase"
             sources.add(("scenarios", name, "target", "phase_px"), problem, "any", "[column, row]")
         if scene.field is not None and scene.field.everywhere:
-            problem = "worst cases over a population need places of the sensor that are counted"
+            problem = "worst cases over a population need a number of field positions"
             sources.add(("scenarios", name, "field", "places"), problem, "any", "a number, 2 to 100")
     ends = [end for span in spans_nm(lights, population) for end in span]
     steps = (max(ends) - min(ends)) / section.wavelengths.step_nm
@@ -229,7 +229,7 @@ def check_range(study: Study, sources: Sources) -> None:
     study : Study
         The study.
     sources : Sources
-        Files, curves and the faults so far.
+        Files, curves and the issues so far.
 
     Raises
     ------
@@ -262,7 +262,7 @@ def check_luminances(section: StudySection, lights: Lights, sources: Sources) ->
     lights : Lights
         Lights of the study.
     sources : Sources
-        Files, curves and the faults so far.
+        Files, curves and the issues so far.
     """
     nodes = section.wavelengths.nodes_nm
     visible = (nodes >= VISIBLE_NM[0]) & (nodes <= VISIBLE_NM[1])

@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from ..base.disk import is_folder
-from ..base.errors import Fault, StudyError
+from ..base.errors import StudyError, ValidationIssue
 from ..spectra.spectrum import Curves, WavelengthGrid
 from .document import Document
 from .model import Study
@@ -43,12 +43,12 @@ def load_study(
     changes
         Dotted key -> value to take instead, as a study file would have it.
     allow_code
-        Code that the study names may run, or of it what has these digests.
+        Code that the study names may run, or only code with these digests.
 
     Raises
     ------
     StudyError
-        With a fault for each thing wrong: file:line, key, value, what is allowed, nearest name.
+        With one issue per problem: file:line, key, value, allowed values, nearest name.
     """
     document = Document(path)
     for key, text in changes.items():
@@ -59,7 +59,7 @@ def load_study(
         finer = WavelengthGrid(start_nm=grid.start_nm, stop_nm=grid.stop_nm, step_nm=step_nm)
         section = section.model_copy(update={"wavelengths": finer})
     if data is not None and not is_folder(data):
-        raise StudyError(Fault("no such folder", None, None, "--data", str(data)))
+        raise StudyError(ValidationIssue("no such folder", None, None, "--data", str(data)))
     folders = [path.parent] if data is None else [data, path.parent]
     return resolve(section, Sources(document, section.wavelengths, folders, kept, allow_code=allow_code))
 
@@ -96,11 +96,11 @@ def study_of_keys(
 
 
 def _checked(document: Document) -> StudySection:
-    """Return the study as its schema has it. Raises StudyError with the faults of the schema."""
+    """Return the study as its schema has it. Raises StudyError with the issues of the schema."""
     try:
         return StudySection.model_validate(document.data)
     except ValidationError as error:
-        raise StudyError(document.faults(error, StudySection)) from None
+        raise StudyError(document.issues(error, StudySection)) from None
 
 
 def folder_name(study_name: str) -> str:

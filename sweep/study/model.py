@@ -7,24 +7,24 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..base.errors import Fault, StudyError
+from ..base.errors import StudyError, ValidationIssue
 from ..camera.camera import Camera
 from ..camera.effects import Box
 from ..camera.mosaic import Mosaic
-from ..camera.own_effects import OwnEffect
 from ..camera.pixel import Pixel
 from ..camera.plan import Plan, plan_scene
 from ..camera.scene import Geometry, Scene
 from ..camera.sensor import SensorCurves
 from ..camera.setup import Setup
+from ..camera.user_effects import UserEffect
 from ..designs.space import Space
 from ..designs.technology import Technology
 from ..designs.tolerance import Tolerance
 from ..metrics.bound import Bound
 from ..metrics.objective import Objective, columns_of
-from ..metrics.own import OwnMetric
-from ..metrics.quantity import Asked, Quantity
+from ..metrics.quantity import Quantity, RequestedQuantities
 from ..metrics.separation import csd_name
+from ..metrics.user_metrics import UserMetric
 from ..search.problem import Problem
 from ..spectra.lights import Lights, Pair, class_pairs
 from ..spectra.spectrum import WavelengthGrid
@@ -66,8 +66,8 @@ class Study:
     warnings: tuple[str, ...]
     held_out: Lights | None = None
     tasks: StudyTasks | None = None
-    own: tuple[OwnMetric, ...] = ()
-    own_effects: tuple[OwnEffect, ...] = ()
+    own: tuple[UserMetric, ...] = ()
+    user_effects: tuple[UserEffect, ...] = ()
     plans: Mapping[str, Plan] = field(default_factory=dict)
 
     @property
@@ -78,8 +78,8 @@ class Study:
     @property
     def leaves_one_out(self) -> bool:
         """Return whether each light is left out of a search in turn."""
-        asked = self.section.validation
-        return asked is not None and asked.leave_one_out and self.search is not None
+        requested = self.section.validation
+        return requested is not None and requested.leave_one_out and self.search is not None
 
     @property
     def pair_over_population(self) -> Pair | None:
@@ -94,12 +94,12 @@ class Study:
     @property
     def quantities(self) -> Mapping[str, Quantity]:
         """Quantities of the result table: those of a design, worst cases, a combined objective."""
-        return columns_of(self.asked, self.objective)
+        return columns_of(self.requested, self.objective)
 
     @property
-    def asked(self) -> Asked:
+    def requested(self) -> RequestedQuantities:
         """Quantities that the study asks for of its designs."""
-        made = asked_of(self.section, self.lights, self.tasks, self.own)
+        made = requested_quantities(self.section, self.lights, self.tasks, self.own)
         return replace(made, any_place=self.any_place, brightest=self.sensor.brightest)
 
     @property
@@ -109,7 +109,7 @@ class Study:
 
     @property
     def any_place(self) -> bool:
-        """Return whether a scenario asks for the worst of all places of the light on the mosaic."""
+        """Return whether a scenario asks for the worst sampling phase."""
         targets = [scenario.target for scenario in self.scenarios.values()]
         return any(target is not None and target.phase_px == "any" for target in targets)
 
@@ -203,7 +203,7 @@ class Study:
             scene,
             tasks=self.tasks,
             accuracy=self.section.accuracy,
-            own_effects=self.own_effects,
+            user_effects=self.user_effects,
             left_out=self.plans[scenario].left_out if scenario in self.plans else frozenset(),
         )
 
@@ -241,7 +241,7 @@ class Study:
         low, high = setup.camera.qe.copy(), setup.camera.qe.copy()
         if space.filter is not None:
             ends = [np.array([end(axis) for axis in space.axes], dtype=float) for end in (min, max)]
-            families = [space.filter.family.produced(off) for off in self.tolerance.places]
+            families = [space.filter.family.perturbed(off) for off in self.tolerance.places]
             lows, highs = zip(*(family.hull(*ends) for family in families), strict=True)
             low[list(setup.camera.modified)] = np.min(lows, axis=0)
             high[list(setup.camera.modified)] = np.max(highs, axis=0)
@@ -275,7 +275,7 @@ class Study:
             return plan_scene(scenario, boxes, tolerance_dn, self.section.accuracy, for_noise=bool(self.states))
         except ArithmeticError:
             problem = "the numbers of this scene, or of the pixel, are too large or too small to compute with"
-            raise StudyError(Fault(problem, key=f"scenarios.{scenario}")) from None
+            raise StudyError(ValidationIssue(problem, key=f"scenarios.{scenario}")) from None
 
     def with_plans(self, tolerance_dn: float | None = None) -> Study:
         """Plan all scenarios.
@@ -333,7 +333,9 @@ class Study:
         return None if vision is None else SeededVision(vision, self.section.seed)
 
 
-def asked_of(section: StudySection, lights: Lights, tasks: StudyTasks | None, own: tuple[OwnMetric, ...]) -> Asked:
+def requested_quantities(
+    section: StudySection, lights: Lights, tasks: StudyTasks | None, own: tuple[UserMetric, ...]
+) -> RequestedQuantities:
     """Return the quantities that a study computes, as far as its lights and tasks determine them.
 
     Parameters
@@ -344,16 +346,16 @@ def asked_of(section: StudySection, lights: Lights, tasks: StudyTasks | None, ow
         Lights of the study.
     tasks : StudyTasks or None
         Tasks of the study.
-    own : tuple of OwnMetric
+    own : tuple of UserMetric
         Metrics of the user.
 
     Returns
     -------
-    Asked
+    RequestedQuantities
         The quantities.
     """
     recognition = section.recognition
-    return Asked(
+    return RequestedQuantities(
         lights.classes,
         _states(section, lights),
         edge_shift=bool(section.production.tolerance),

@@ -11,12 +11,12 @@ from ..metrics.registry import quantities_of
 from . import checks
 from .goals import check_goals, check_searched, search_of
 from .lights import check_luminances, check_range, held_out_lights, lights_of, with_light_files, with_population
-from .model import Study, asked_of
+from .model import Study, requested_quantities
 from .schema import CfaSection, StudySection
 from .sensors import check_lenses, sensor_of, with_chief_rays, with_technologies
 from .sources import Sources
 from .spaces import SpaceBuilder, check_cfas
-from .user_code import check_names, own_effects, own_metrics, try_effects, try_metrics
+from .user_code import check_names, try_effects, try_metrics, user_effects, user_metrics
 
 _Made = TypeVar("_Made")
 
@@ -29,7 +29,7 @@ def resolve(section: StudySection, sources: Sources) -> Study:
     section : StudySection
         The keys of the study, checked against the schema.
     sources : Sources
-        Files, curves and the faults so far.
+        Files, curves and the issues so far.
 
     Returns
     -------
@@ -39,11 +39,11 @@ def resolve(section: StudySection, sources: Sources) -> Study:
     Raises
     ------
     StudyError
-        With every fault so far, if the study cannot be used.
+        With every issue so far, if the study cannot be used.
     """
 
     def attempt(make: Callable[[], _Made]) -> _Made | None:
-        """Return the result, or None where it is refused; its faults are in `sources`."""
+        """Return the result, or None where it is refused; its issues are in `sources`."""
         try:
             return make()
         except StudyError:
@@ -63,29 +63,29 @@ def resolve(section: StudySection, sources: Sources) -> Study:
         lights = with_population(lights, section, sources)
     tasks, spaces = None, []
     if section.tasks is not None:
-        from .tasks import check_seen, tasks_of  # noqa: PLC0415  (few studies have tasks)
+        from .tasks import check_task_scenes, tasks_of  # noqa: PLC0415  (few studies have tasks)
 
         tasks = tasks_of(section.tasks, sources)
-    metrics = attempt(lambda: own_metrics(section, sources))
-    effects = attempt(lambda: own_effects(section, sources))
+    metrics = attempt(lambda: user_metrics(section, sources))
+    effects = attempt(lambda: user_effects(section, sources))
     check_cfas(section, sources)
     if sensor is not None:
         spaces = SpaceBuilder(section, sources, sensor, mosaics).spaces()
         check_lenses(section, sensor, spaces, sources)
         if tasks is not None:
-            check_seen(tasks, section, sensor, spaces, sources)
+            check_task_scenes(tasks, section, sensor, spaces, sources)
     checks.check_scenes(section, sources)
     search = search_of(section, spaces, sources)
     if lights is not None:
-        asked = asked_of(section, lights, tasks, metrics or ())
-        checks.check_lights(section, lights, mosaics, asked, sources)
+        requested = requested_quantities(section, lights, tasks, metrics or ())
+        checks.check_lights(section, lights, mosaics, requested, sources)
         check_luminances(section, lights, sources)
         is_whole = metrics is not None and (tasks is not None or section.tasks is None)
-        if is_whole and check_names(metrics or (), asked, spaces, sources):
-            check_goals(section, sources, asked)
+        if is_whole and check_names(metrics or (), requested, spaces, sources):
+            check_goals(section, sources, requested)
             if search is not None:
-                check_searched(section, search.space, quantities_of(asked), sources)
-    if sources.faults or sensor is None or lights is None:
+                check_searched(section, search.space, quantities_of(requested), sources)
+    if sources.issues or sensor is None or lights is None:
         raise sources.error
     study = Study(
         name=section.study,
@@ -106,7 +106,7 @@ def resolve(section: StudySection, sources: Sources) -> Study:
         held_out=held_out,
         tasks=tasks,
         own=metrics or (),
-        own_effects=effects or (),
+        user_effects=effects or (),
     )
     for check in (checks.check_size, try_effects, try_metrics, check_range, checks.check_count):
         check(study, sources)

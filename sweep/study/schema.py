@@ -23,7 +23,6 @@ from ..vision.section import Vision
 from .axes import ScenarioTemplate, Span, Values, expanded
 from .schema_curves import (
     LIGHTS_NAME,
-    Documented,
     LightsSection,
     Name,
     SensorSection,
@@ -43,15 +42,17 @@ MOST_TYPES = 40
 
 
 class CfaSection(Section):
-    """A tile of at most 64 x 64 pixels, row by row. `curves`: channels to curves of the sensor with another name."""
+    """Color filter array: its smallest repeated tile."""
 
     tile: Annotated[list[Annotated[list[Name], Field(max_length=_MOST_ROWS)]], Field(max_length=_MOST_ROWS)] | None = (
         None
     )
+    """Channels of the tile, row by row; at most 64 x 64 pixels."""
     curves: dict[Name, Name] = {}
+    """Channel -> curve of the sensor, where the names differ."""
 
 
-class Modification(Documented):
+class Modification(Section):
     """A family of filters put into `channel` of a CFA: it starts from curve `base` and goes `to` a curve or a floor.
 
     A number for `to` is a floor: that fraction of the base curve. `dual` replaces two channels (a list) and goes `to` a
@@ -74,6 +75,7 @@ class Modification(Documented):
     to: Name | Annotated[float, Field(ge=0, le=1)] | None = None
     """The curve that it follows inside the band; a number is a floor, that share of the base."""
     options: FamilyOptions = FamilyOptions()
+    """Options of the family, such as `bands` or `nodes`."""
     technology: Stated = None
     """`pigment`, or `interference: {effective_index: 1.8}`, which moves with the angle of the light; left out, as on
     axis."""
@@ -83,6 +85,7 @@ class DesignSection(Modification):
     """One filter by its parameters, or by the name of a built-in one."""
 
     at: dict[Name, Number] | Name
+    """Parameter -> value, or the name of a built-in design."""
 
 
 class SweepSection(Modification):
@@ -133,6 +136,7 @@ class BoxSection(Modification):
     """A box that is searched but not swept; a parameter that is not named may take all its family's values."""
 
     box: dict[Name, Span] = {}
+    """Parameter -> range."""
 
 
 class Production(Section):
@@ -150,18 +154,17 @@ class Production(Section):
 
 
 class Recognition(Section):
-    """Error rates of classifying signal types under noise.
-
-    `states`: the signal types to tell apart; all of them where it is left out. `patches`: raw patches that are drawn
-    of every signal for each plain CFA, named design and answer of the search, half of them to train the classifiers;
-    0 draws none. `error_max`: a CFA is usable while no two states are confused more often. `probabilities`: columns of
-    CDP, too, which is discussed for IEEE P2020.
-    """
+    """Error rates of classifying signal types under noise."""
 
     states: Annotated[list[Name], Field(min_length=2, max_length=MOST_TYPES)] | None = None
+    """Signal types to classify; left out, all of them."""
     patches: int = Field(default=200, ge=0, le=5000)
+    """Raw patches of every signal, drawn for each plain CFA, named design and answer of the search, half of them
+    to train the classifiers; 0: none."""
     error_max: float = Field(default=1e-3, ge=1e-300, lt=0.5)
+    """Largest error probability of two states at which a CFA counts as usable."""
     probabilities: bool = False
+    """Add columns of the contrast detection probability (CDP), which is discussed for IEEE P2020."""
 
     @model_validator(mode="after")
     def _enough(self) -> Recognition:
@@ -174,8 +177,11 @@ class Levels(Section):
     """Equidistant levels of sensitivity."""
 
     min: float = Field(ge=1e-6, lt=2)
+    """Lowest sensitivity."""
     max: float = Field(ge=1e-6, lt=2)
+    """Highest sensitivity."""
     count: int = Field(ge=1, le=1000)
+    """Number of levels."""
 
     @model_validator(mode="after")
     def _ordered(self) -> Levels:
@@ -186,20 +192,21 @@ class Levels(Section):
         return self
 
 
-class SearchSection(Documented):
-    """A search in a box, or in that of a sweep (from the smallest to the largest value of each parameter).
-
-    `front`: repeat the search over these levels of the least sensitivity.
-    """
+class SearchSection(Section):
+    """Search in a box, or in that of a sweep (from the smallest to the largest value of each parameter)."""
 
     space: Name | None = None
     """The sweep or box to search; may be left out where there is one."""
     front: Levels | None = None
+    """Levels of the lowest allowed sensitivity at which the search is repeated for the trade-off."""
     scenario: Name | None = None
+    """Scenario of the search; may be left out where there is one."""
     algorithm: Name = "SLSQP"
     """SLSQP, MMA, CCSAQ; without gradients COBYLA, ISRES, ORIG_DIRECT_L, AGS."""
     starts: int = Field(default=16, ge=1, le=10_000)
+    """Starting points."""
     max_evaluations: int = Field(default=2000, ge=10, le=10_000_000)
+    """Largest number of evaluations of each start."""
 
 
 def _cfas(value: Any) -> Any:
@@ -213,7 +220,7 @@ def _cfas(value: Any) -> Any:
     return {name: {} if tile is None else tile for name, tile in value.items()} if isinstance(value, dict) else value
 
 
-class StudySection(Documented):
+class StudySection(Section):
     """A whole study file: YAML 1.2 in UTF-8, without tags.
 
     At most 500,000 bytes, 50,000 keys and values (those of an alias counted each time), 20 levels of nesting and 100
@@ -224,7 +231,7 @@ class StudySection(Documented):
     study: Annotated[str, Field(min_length=1, max_length=100)]
     """The name of the study, and of the folder of its results."""
     question: str = ""
-    """What the study asks; heads its report."""
+    """Question of the study; heads its report."""
     seed: int = Field(default=1, ge=0, lt=2**32)
     """Of every random draw."""
     wavelengths: WavelengthGrid = WavelengthGrid()
@@ -232,14 +239,14 @@ class StudySection(Documented):
     sensor: Annotated[
         SensorSection, BeforeValidator(builtin, json_schema_input_type=named(BUILT_IN_SENSORS) | SensorSection)
     ]
-    """QE curves: `ar0820`, a built-in surrogate, the name of what a package offers, or a mapping with `files`."""
+    """QE curves: `ar0820`, a built-in surrogate, a plugin of a package, or a mapping with `files`."""
     pixel: Pixel = Pixel()
     """The pixel and its readout."""
     lights: Annotated[
         LightsSection,
         BeforeValidator(builtin, json_schema_input_type=LIGHTS_NAME | LightsSection),
     ]
-    """Traffic lights: `tl16`, a built-in surrogate, a file, what a package offers, or a mapping with `files`."""
+    """Traffic lights: `tl16`, a built-in surrogate, a file, a plugin of a package, or a mapping with `files`."""
     scenarios: Annotated[
         dict[Name, Scene],
         BeforeValidator(expanded, json_schema_input_type=dict[Name, ScenarioTemplate]),
@@ -265,15 +272,15 @@ class StudySection(Documented):
     boxes: Annotated[dict[Name, BoxSection], Field(max_length=1000)] = {}
     """Ranges of filters that are searched but not swept, by name."""
     production: Production = Production()
-    """What production does to a filter; then worst_... quantities exist."""
+    """Production tolerances of the filter; then worst_... quantities exist."""
     population: Population | None = None
     """The lamps that the lights stand for: temperature, binning, ageing; then worst_csd_... quantities exist."""
     regions: RegionMap | None = None
-    """Which yellow and red lamps that a norm allows each CFA tells apart."""
+    """Map of the yellow and red lamps that a norm allows and each CFA separates."""
     recognition: Recognition | None = None
     """How often noise confuses signal types; needs noise in every scenario."""
     tasks: TasksAsked = None
-    """What else designs are judged by: `all`, a list of tasks of the package, or a mapping with own ones."""
+    """Further tasks of the camera: `all`, a list of tasks of the package, or a mapping with own ones."""
     vision: Vision | None = None
     """Images of signal heads, read by the ideal observer and by a network; lamps need luminous intensity."""
     metrics: Annotated[
@@ -283,8 +290,8 @@ class StudySection(Documented):
     effects: Annotated[list[Name], Field(max_length=_MOST_OWN)] = []
     """Own effects on the light: FILE.py:NAME, or names that installed packages offer; always computed."""
     objective: Objective = Objective(minimum={"csd_yellow_red": 1.0})
-    """What is maximized: a CSD or sensitivity, or several: {minimum: {...}} or {sum: {...}} with weights; or, of errors
-    under noise, made small: {least: {...}}."""
+    """Maximized quantity: a CSD or sensitivity, or several: {minimum: {...}} or {sum: {...}} with weights; or, of
+    errors under noise, made small: {least: {...}}."""
     constraints: dict[Name, Bound] = {}
     """Quantity -> {min: ...}, {max: ...} or both."""
     search: SearchSection | None = None
@@ -296,5 +303,5 @@ class StudySection(Documented):
 
     @property
     def wanted_yield(self) -> float:
-        """The share of random lamps and cameras of which quantities tell what it has; 0: none."""
+        """The share of random lamps and cameras of a yield; 0: none."""
         return 0.0 if self.population is None else self.population.wanted_yield or 0.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, Tag, WithJsonSchema, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
 
 from ..base.types import Ratio, Seconds, Section
 from ..camera.pixel import ReadNoise
@@ -31,13 +31,7 @@ ResamplingRule = Annotated[
 OutsideRule = Annotated[Outside, Field(description="`zero` takes 0 where the samples end inside the grid.")]
 
 
-class Documented(Section):
-    """A section whose keys are described by the text below them, for editors."""
-
-    model_config = ConfigDict(use_attribute_docstrings=True)
-
-
-class CurveFile(Documented):
+class CurveFile(Section):
     """QE curves from one file: `columns` maps the sensor's curve names to the file's column names."""
 
     file: _Path
@@ -56,13 +50,15 @@ class CurveFile(Documented):
     outside: OutsideRule = "refuse"
 
 
-class SensorSection(Documented):
+class SensorSection(Section):
     """A built-in sensor by its name, curves from files, or both: own curves beside the built-in ones."""
 
     builtin: str | None = None
     """A built-in sensor; a curve of a file takes the place of its curve of the same name."""
     name: Name | None = None
+    """Name of the sensor in the report."""
     files: list[CurveFile] = []
+    """Files of QE curves."""
     clear: Name | None = None
     """The pixel without filter: the reference of the CFA's sensitivity.
 
@@ -81,30 +77,31 @@ class SensorSection(Documented):
         return self
 
 
-class LightFile(Documented):
-    """Lights from one file: `signals` maps a signal type to the file's columns."""
+class LightFile(Section):
+    """Lights from one file."""
 
     file: FilePath
     quantity: Annotated[str, Field(pattern="^(energy|photons)$"), WithJsonSchema({"enum": ["energy", "photons"]})]
-    """What the file's numbers are."""
+    """Unit of the file's numbers."""
     signals: Annotated[dict[Name, FileColumns], Field(min_length=1)]
+    """Signal type -> columns of the file."""
     resampling: ResamplingRule = "linear"
     outside: OutsideRule = "refuse"
 
 
-class TaskFile(Documented):
+class TaskFile(Section):
     """Spectra of a task's class from one file. Only their shape counts: all spectra of a task have the same photons."""
 
     file: FilePath
     quantity: Literal["energy", "photons", "reflectance"]
-    """What the file's numbers are: of lamps `energy` or `photons`, of surfaces `reflectance`, in any unit."""
+    """Unit of the file's numbers: of lamps `energy` or `photons`, of surfaces `reflectance`, in any unit."""
     columns: FileColumns | None = None
     """Columns of the file; left out, all of them."""
     resampling: ResamplingRule = "linear"
     outside: OutsideRule = "refuse"
 
 
-class LightsSection(Documented):
+class LightsSection(Section):
     """A built-in data set by its name, or lights from files.
 
     A file alone in the place of the mapping is taken as energy; the colors of its columns tell their signal types, and
@@ -112,8 +109,11 @@ class LightsSection(Documented):
     """
 
     builtin: str | None = None
+    """A built-in data set."""
     name: Name | None = None
+    """Name of the lights in the report."""
     files: list[LightFile] = []
+    """Files of spectra."""
     photon_ratio: Ratio | None = None
     """K: photons of a signal patch over those of the white patch; from the spectra where it is left out."""
 
@@ -160,7 +160,7 @@ LIGHTS_NAME: Any = named(BUILT_IN_LIGHTS)
 """The type of lights that are named alone."""
 
 
-class Validation(Documented):
+class Validation(Section):
     """Validation on lights that the search does not use; they are as bright as the study's lights."""
 
     lights: Annotated[
@@ -209,8 +209,8 @@ _ClassSpectra = Annotated[
 ]
 
 
-class OwnTask(Documented):
-    """Classes of spectra to tell apart: from the groups that `sweep list data` shows, and from files."""
+class UserTask(Section):
+    """Classes of spectra to separate: from the groups that `sweep list data` shows, and from files."""
 
     classes: Annotated[dict[Name, _ClassSpectra], Field(min_length=2, max_length=_MOST_CLASSES)]
     """Class -> a group of spectra, {file: ..., quantity: ...}, or a list of these; all are lamps, or all surfaces."""
@@ -218,7 +218,7 @@ class OwnTask(Documented):
     """Lights of a task of surfaces: d65, d50, a (a filament), led, hps, lps (sodium of high and low pressure)."""
 
 
-class TasksSection(Documented):
+class TasksSection(Section):
     """Further tasks of the camera: patches that fill the field, on axis, at one exposure for all CFAs.
 
     The noise is that of photons and of read noise, in four pixels of the CFA.
@@ -227,7 +227,7 @@ class TasksSection(Documented):
     shipped: Annotated[list[Name], Field(json_schema_extra={"items": {"enum": list(SHIPPED)}})] = list(SHIPPED)
     """Tasks of the package: color, low_light, vehicle_lamps, emergency, road_marking, traffic_signs, vegetation,
     unseen_lamps; all of them where it is left out."""
-    own: Annotated[dict[_TaskName, OwnTask], Field(max_length=_MOST_TASKS)] = {}
+    own: Annotated[dict[_TaskName, UserTask], Field(max_length=_MOST_TASKS)] = {}
     """Tasks of your own, by name."""
     exposure_s: Seconds = 0.01
     """Exposure, the same for every CFA."""

@@ -9,11 +9,11 @@ import numpy as np
 
 from ..base.errors import DataError
 from ..base.types import FloatArray
-from ..camera.angular import too_steep
+from ..camera.angular import grazing_ray_issue
 from ..camera.sensor import BUILT_IN_SENSORS, SensorCurves, make_sensor
 from ..camera.sensor_field import PLACES, SensorField
 from ..designs.space import Space
-from ..spectra.facts import NORMALIZED, looks_normalized
+from ..spectra.facts import NORMALIZED, is_normalized_response
 from .document import KeyPath
 from .schema import StudySection
 from .schema_curves import CurveFile, SensorSection
@@ -35,17 +35,17 @@ def sensor_of(section: SensorSection, sources: Sources) -> SensorCurves | None:
     section : SensorSection
         Keys of the sensor.
     sources : Sources
-        Files, curves and the faults so far.
+        Files, curves and the issues so far.
 
     Returns
     -------
     SensorCurves or None
-        None after adding faults.
+        None after adding issues.
 
     Raises
     ------
     StudyError
-        With every fault so far, if the study cannot be used.
+        With every issue so far, if the study cannot be used.
     """
     section = offered_curves(sources, ("sensor",), section, "sweep.sensors", BUILT_IN_SENSORS)
     built_in: SensorCurves | None = None
@@ -53,23 +53,23 @@ def sensor_of(section: SensorSection, sources: Sources) -> SensorCurves | None:
         built_in = sources.built_in(("sensor",), section.builtin, BUILT_IN_SENSORS)
         if built_in is None or not section.files:
             return built_in
-    before = len(sources.faults)
+    before = len(sources.issues)
     if not sources.fits(("sensor", "files"), "curves", sum(len(entry.columns) for entry in section.files)):
         return None
     known = {} if built_in is None else built_in.qe
     added = _curves_of_files(sources, section, known)
-    if len(sources.faults) > before:
+    if len(sources.issues) > before:
         return None
     source = ", ".join(entry.file for entry in section.files)
     clear = section.clear or (None if built_in is None else built_in.clear)
     try:
         made = make_sensor(section.name or section.builtin or "sensor", {**known, **added}, source, clear)
     except DataError as error:
-        for fault in error.faults:
-            index = next((i for i, entry in enumerate(section.files) if fault.key in entry.columns), None)
-            place = ("sensor",) if index is None else ("sensor", "files", index, "columns", fault.key or "")
-            path = ("sensor", "clear") if fault.key is None else place
-            sources.add(path, fault.problem, fault.value, fault.allowed, fault.nearest)
+        for issue in error.issues:
+            index = next((i for i, entry in enumerate(section.files) if issue.key in entry.columns), None)
+            place = ("sensor",) if index is None else ("sensor", "files", index, "columns", issue.key or "")
+            path = ("sensor", "clear") if issue.key is None else place
+            sources.add(path, issue.problem, issue.value, issue.allowed, issue.nearest)
         return None
     if built_in is None:
         return made
@@ -107,7 +107,7 @@ def _columns(sources: Sources, path: KeyPath, entry: CurveFile, factor: float | 
     curves = sources.curves(path, entry)
     if curves is not None and entry.relative_to is None:
         top = max((float(curves.values[c].max()) for c in entry.columns.values() if c in curves.values), default=0.0)
-        if looks_normalized(entry.scale * top):
+        if is_normalized_response(entry.scale * top):
             sources.warnings.append(f"{entry.file}: {NORMALIZED}")
     scaled = {}
     for name, column in entry.columns.items():
@@ -130,12 +130,12 @@ def with_chief_rays(section: StudySection, sources: Sources) -> StudySection:
     section : StudySection
         The keys of the study, checked against the schema.
     sources : Sources
-        Files, curves and the faults so far.
+        Files, curves and the issues so far.
 
     Returns
     -------
     StudySection
-        The study with chief ray angles instead of file names; faults are added to `sources`.
+        The study with chief ray angles instead of file names; issues are added to `sources`.
     """
     scenarios = dict(section.scenarios)
     read: dict[tuple[str, float | None], SensorField] = {}
@@ -146,7 +146,7 @@ def with_chief_rays(section: StudySection, sources: Sources) -> StudySection:
         key = (field.file, field.corner_mm)
         if key not in read:
             rays = sources.chief_rays(("scenarios", name, "field", "profile"), *key)
-            # Without a file that can be read, a field without angles lets the other faults be found.
+            # Without a file that can be read, a field without angles lets the other issues be found.
             read[key] = (
                 SensorField(cra_max_deg=0.0)
                 if rays is None
@@ -173,12 +173,12 @@ def with_technologies(sensor: SensorCurves, section: StudySection, sources: Sour
     section : StudySection
         The keys of the study, checked against the schema.
     sources : Sources
-        Files, curves and the faults so far.
+        Files, curves and the issues so far.
 
     Returns
     -------
     SensorCurves
-        The sensor with them; faults are added to `sources`.
+        The sensor with them; issues are added to `sources`.
     """
     clear = sensor.curve(sensor.clear)
     kind = "clear" if sensor.has_clear else "brightest"
@@ -205,7 +205,7 @@ def check_filter(space: Space, path: KeyPath, sensor: SensorCurves, sources: Sou
     sensor : SensorCurves
         Sensor of the study.
     sources : Sources
-        Files, curves and the faults so far.
+        Files, curves and the issues so far.
     """
     made = space.filter
     assert made is not None
@@ -235,12 +235,12 @@ def check_lenses(section: StudySection, sensor: SensorCurves, spaces: Sequence[S
     spaces : sequence of Space
         Design spaces.
     sources : Sources
-        Files, curves and the faults so far.
+        Files, curves and the issues so far.
     """
     filters = [space.filter.technology for space in spaces if space.filter is not None]
     if all(t is None or t.interference is None for t in (*filters, *sensor.technologies.values())):
         return
     for name, scenario in section.scenarios.items():
-        if (refused := too_steep(scenario)) is not None:
+        if (refused := grazing_ray_issue(scenario)) is not None:
             key, problem, value, allowed = refused
             sources.add(("scenarios", name, *key), problem, value, allowed)

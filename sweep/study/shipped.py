@@ -8,7 +8,7 @@ from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
 from ..base.disk import is_file, is_folder
-from ..base.errors import Fault, StudyError, nearest
+from ..base.errors import StudyError, ValidationIssue, nearest
 
 _STUDIES, _SHARED = "studies", "share/cfa-sweep/studies"
 _INSTALLED = f"{_SHARED}/stopband.yaml"
@@ -60,4 +60,4 @@ def study_path(given: Path) -> Path:
     local = sorted(path.stem for path in folders[0].glob("*") if path.suffix in _KINDS)
     known = list(dict.fromkeys([*local, *shipped_names()]))
     problem = "no such file, and no study of that name"
-    raise StudyError(Fault(problem, value=name, allowed=", ".join(known), nearest=nearest(name, known)))
+    raise StudyError(ValidationIssue(problem, value=name, allowed=", ".join(known), nearest=nearest(name, known)))

@@ -1,4 +1,4 @@
-"""Files and built-in curves that a study names, and all faults that are found in it."""
+"""Files and built-in curves that a study names, and all issues that are found in it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from ..base.disk import is_file
-from ..base.errors import MOST_FAULTS, DataError, Fault, StudyError, SweepError, nearest
+from ..base.errors import MOST_ISSUES, DataError, StudyError, SweepError, ValidationIssue, nearest
 from ..base.types import FloatArray
 from ..camera.sensor import SensorCurves
 from ..spectra.builtin.surrogate import BUILT_IN_RANGE_NM
@@ -45,10 +45,10 @@ class KeptSources:
 
 @dataclass
 class Sources:
-    """Reader of the files of one study, each once; collects faults, warnings and digests.
+    """Reader of the files of one study, each once; collects issues, warnings and digests.
 
     `kept`: the curves of a finished run; no file is read then. `given`: files that are not on a disk, by their names.
-    `allow_code`: code that the study names may run, or of it what has these digests.
+    `allow_code`: code that the study names may run, or only code with these digests.
     """
 
     document: Document
@@ -57,20 +57,20 @@ class Sources:
     kept: KeptSources | None = None
     given: Mapping[str, Curves] = field(default_factory=dict)
     allow_code: bool | Mapping[str, str] = False
-    faults: list[Fault] = field(default_factory=list)
+    issues: list[ValidationIssue] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     digests: dict[str, str] = field(default_factory=dict)
     _read: dict[str, Curves | None] = field(default_factory=dict)
 
     @property
     def error(self) -> StudyError:
-        """All faults, in the order of their lines."""
-        return StudyError(by_line(self.faults))
+        """All issues, in the order of their lines."""
+        return StudyError(by_line(self.issues))
 
     def add(
         self, path: KeyPath, problem: str, value: object = None, allowed: str | None = None, near: str | None = None
     ) -> None:
-        """Add a fault.
+        """Add an issue.
 
         Parameters
         ----------
@@ -85,10 +85,10 @@ class Sources:
         near : str, optional
             Nearest valid name.
         """
-        self.faults.append(self.document.fault(path, problem, value, allowed, near))
+        self.issues.append(self.document.issue(path, problem, value, allowed, near))
 
     def add_error(self, path: KeyPath, error: SweepError) -> None:
-        """Add the faults of an error.
+        """Add the issues of an error.
 
         Parameters
         ----------
@@ -97,12 +97,12 @@ class Sources:
         error : SweepError
             The error.
         """
-        for fault in error.faults:
-            problem = f"{fault.file}: {fault.problem}" if fault.file else fault.problem
-            self.add(path, problem, fault.value, fault.allowed, fault.nearest)
+        for issue in error.issues:
+            problem = f"{issue.file}: {issue.problem}" if issue.file else issue.problem
+            self.add(path, problem, issue.value, issue.allowed, issue.nearest)
 
     def unknown(self, path: KeyPath, what: str, value: str, known: Iterable[str], others: Iterable[str] = ()) -> None:
-        """Add a fault for an unknown name.
+        """Add an issue for an unknown name.
 
         Parameters
         ----------
@@ -118,11 +118,11 @@ class Sources:
             Further names to suggest.
         """
         known = list(known)
-        near = nearest(value, [*known, *others]) if len(self.faults) < MOST_FAULTS else None  # of more nobody reads it
+        near = nearest(value, [*known, *others]) if len(self.issues) < MOST_ISSUES else None
         self.add(path, f"unknown {what}", value, ", ".join(known), near)
 
     def fits(self, path: KeyPath, what: str, count: int) -> bool:
-        """Return True if curves on the wavelength grid fit into memory; add a fault otherwise.
+        """Return True if curves on the wavelength grid fit into memory; add an issue otherwise.
 
         Parameters
         ----------
@@ -158,7 +158,7 @@ class Sources:
         Returns
         -------
         SensorCurves, Lights or None
-            None after adding faults.
+            None after adding issues.
         """
         if name not in known:
             allowed = f"{', '.join(known)}, or a mapping with `files`"
@@ -167,7 +167,7 @@ class Sources:
         return known[name](self.grid) if self.in_built_in_range("the built-in curves") else None
 
     def in_built_in_range(self, what: str) -> bool:
-        """Return True if the wavelength grid lies inside that of the built-in curves; add one fault otherwise.
+        """Return True if the wavelength grid lies inside that of the built-in curves; add one issue otherwise.
 
         Parameters
         ----------
@@ -182,9 +182,9 @@ class Sources:
         low, high = BUILT_IN_RANGE_NM
         inside = low <= self.grid.start_nm < self.grid.stop_nm <= high
         grid = f"{self.grid.start_nm:g} to {self.grid.stop_nm:g} nm"
-        fault = self.document.fault(("wavelengths",), f"{what} end before the grid", grid, f"{low:g} to {high:g} nm")
-        if not inside and fault not in self.faults:
-            self.faults.append(fault)
+        issue = self.document.issue(("wavelengths",), f"{what} end before the grid", grid, f"{low:g} to {high:g} nm")
+        if not inside and issue not in self.issues:
+            self.issues.append(issue)
         return inside
 
     def photons(
@@ -206,7 +206,7 @@ class Sources:
         Returns
         -------
         ndarray of shape (n_wavelengths,) or None
-            Relative photons per nm; None after adding faults.
+            Relative photons per nm; None after adding issues.
         """
         values = self.column(path, curves, column, entry)
         if values is None or curves is None:
@@ -243,7 +243,7 @@ class Sources:
         Returns
         -------
         ndarray of shape (n_wavelengths,) or None
-            None after adding faults.
+            None after adding issues.
         """
         if curves is None:
             return None
@@ -253,8 +253,8 @@ class Sources:
         try:
             return curves.on(self.grid, column, entry.resampling, entry.outside)
         except DataError as error:
-            for fault in error.faults:
-                self.add(path, f"{entry.file}, column {column}: {fault.problem}", fault.value, fault.allowed)
+            for issue in error.issues:
+                self.add(path, f"{entry.file}, column {column}: {issue.problem}", issue.value, issue.allowed)
             return None
 
     def kept_curve(self, path: KeyPath, curves: Mapping[_Key, FloatArray], name: _Key) -> FloatArray | None:
@@ -272,7 +272,7 @@ class Sources:
         Returns
         -------
         ndarray of shape (n_wavelengths,) or None
-            None after adding a fault.
+            None after adding an issue.
         """
         if name not in curves:
             self.add(path, "the run kept no such curve", name)
@@ -291,7 +291,7 @@ class Sources:
         Returns
         -------
         Curves or None
-            None after adding faults.
+            None after adding issues.
         """
         if self.kept is not None:
             return None
@@ -320,12 +320,12 @@ class Sources:
         Returns
         -------
         ChiefRays or None
-            None after adding faults.
+            None after adding issues.
         """
         return self._content(path, file, lambda place: read_chief_rays(place, corner_mm))
 
     def _content(self, path: KeyPath, file: str, read: Callable[[Path], _Content]) -> _Content | None:
-        """Return what is in a file, and keep its notes and its digest; None after adding faults."""
+        """Return the contents of a file, and keep its notes and its digest; None after adding issues."""
         place = self.file(path, file)
         if place is None:
             return None
@@ -333,7 +333,7 @@ class Sources:
             content = read(place)
             self.digests[file] = digest(place)
         except DataError as error:
-            self.faults.extend(error.faults)
+            self.issues.extend(error.issues)
             return None
         self.warnings += [f"{file}: {note}" for note in content.notes]
         return content
@@ -351,7 +351,7 @@ class Sources:
         Returns
         -------
         Path or None
-            None after adding a fault.
+            None after adding an issue.
         """
         place = next((folder / file for folder in self.folders if is_file(folder / file)), None)
         if place is None:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import cast
 
 from ..base.errors import SweepError, nearest
-from ..base.own_code import Offered, is_in_file, offers
 from ..base.types import FloatArray
+from ..base.user_code import Offered, is_in_file, offers
 from ..camera.mosaic import Mosaic
 from ..camera.sensor import SensorCurves
 from ..designs.family import Family, Parameter
@@ -16,7 +16,7 @@ from ..designs.plugin import PluginFamily
 from ..designs.registry import FAMILIES, build_family
 from ..designs.space import Filter, Kind, Space
 from ..designs.technology import PIGMENT
-from ..designs.ungridded import Drawn, Method, Paired, Ungridded
+from ..designs.ungridded import ListedDesigns, Method, PairedDesigns, SampledDesigns
 from ..spectra.builtin.surrogate import surrogate_parameters
 from .document import KeyPath
 from .schema import DesignSection, Modification, StudySection, SweepSection
@@ -37,7 +37,7 @@ def check_cfas(section: StudySection, sources: Sources) -> None:
     section : StudySection
         The keys of the study, checked against the schema.
     sources : Sources
-        Files, curves and the faults so far.
+        Files, curves and the issues so far.
     """
     for kind, entries in (("designs", section.designs), ("sweeps", section.sweeps), ("boxes", section.boxes)):
         for name, entry in entries.items():
@@ -47,7 +47,7 @@ def check_cfas(section: StudySection, sources: Sources) -> None:
 
 @dataclass(frozen=True)
 class SpaceBuilder:
-    """Maker of the spaces of a study; what is wrong goes to the faults of `sources`."""
+    """Builder of the design spaces of a study; issues go to `sources`."""
 
     section: StudySection
     sources: Sources
@@ -86,7 +86,7 @@ class SpaceBuilder:
         return spaces
 
     def _fits(self) -> bool:
-        """Return whether the axes of all grids and boxes can be written out; else add a fault."""
+        """Return whether the axes of all grids and boxes can be written out; else add an issue."""
         sweeps, boxes = self.section.sweeps.values(), self.section.boxes.values()
         stated = [*(sweep.grid or sweep.box or sweep.paired or {} for sweep in sweeps), *(box.box for box in boxes)]
         total = sum(axis.size for axes in stated for axis in axes.values())
@@ -138,18 +138,18 @@ class SpaceBuilder:
         entry: Modification,
         axes: Mapping[str, tuple[float, ...]],
         axes_path: KeyPath,
-        rows: Ungridded | None = None,
+        rows: ListedDesigns | None = None,
     ) -> list[Space]:
-        before = len(self.sources.faults)
+        before = len(self.sources.issues)
         path = axes_path[:-1]
         mosaic = self.mosaics.get(entry.cfa)
         for key, curve in (("base", entry.base), ("to", entry.to)):
             if isinstance(curve, str) and curve not in self.sensor.qe:
                 self.sources.unknown((*path, key), "curve", curve, self.sensor.qe)
         self._check_channels(path, entry, mosaic)
-        if len(self.sources.faults) > before or mosaic is None:  # a CFA without a mosaic has a fault of its own
+        if len(self.sources.issues) > before or mosaic is None:  # a CFA without a mosaic has an issue of its own
             return []
-        assert entry.base is not None  # else there is a fault
+        assert entry.base is not None  # else there is an issue
         base = self.sensor.curve(entry.base)
         target = self.sensor.curve(entry.to) if isinstance(entry.to, str) else None
         if isinstance(entry.to, float | int):
@@ -163,7 +163,7 @@ class SpaceBuilder:
         if rows is not None and rows.size * len(ordered) > _MOST_DRAWN:
             allowed = f"at most {_MOST_DRAWN // len(ordered):,} designs of {len(ordered)} parameters"
             self.sources.add(path, "too many designs that are no grid", f"{rows.size:,}", allowed)
-        if len(self.sources.faults) > before:
+        if len(self.sources.issues) > before:
             return []
         target_name = "" if entry.to is None else str(entry.to)
         made = Filter(family, dict.fromkeys(entry.channel, entry.base), target_name, entry.technology)
@@ -213,16 +213,16 @@ class SpaceBuilder:
         return ordered
 
 
-def _sweep_axes(sweep: SweepSection, seed: int) -> tuple[str, dict[str, tuple[float, ...]], Ungridded | None]:
+def _sweep_axes(sweep: SweepSection, seed: int) -> tuple[str, dict[str, tuple[float, ...]], ListedDesigns | None]:
     """Return the key of a sweep's parameters, their values, and its designs where they are no grid."""
     if sweep.grid is not None:
         return "grid", {name: axis.points() for name, axis in sweep.grid.items()}, None
     if sweep.box is not None:
         method: Method = "sobol" if sweep.sobol is not None else "lhs"
-        drawn = Drawn(method, sweep.sobol or sweep.lhs or 0, seed)
+        drawn = SampledDesigns(method, sweep.sobol or sweep.lhs or 0, seed)
         return "box", {name: axis.points() for name, axis in sweep.box.items()}, drawn
     if sweep.paired is not None:
         columns = {name: axis.points() for name, axis in sweep.paired.items()}
-        return "zip", columns, Paired(max(map(len, columns.values())))
+        return "zip", columns, PairedDesigns(max(map(len, columns.values())))
     designs = sweep.listed or []
-    return "list", {name: tuple(design[name] for design in designs) for name in designs[0]}, Paired(len(designs))
+    return "list", {name: tuple(design[name] for design in designs) for name in designs[0]}, PairedDesigns(len(designs))

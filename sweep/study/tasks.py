@@ -16,7 +16,7 @@ from ..spectra.files import is_curve_file
 from ..spectra.tasks import ILLUMINANTS, SHIPPED, Conditions, GriddedTask, StudyTasks
 from .document import KeyPath
 from .schema import StudySection
-from .schema_curves import OwnTask, TaskFile, TasksSection
+from .schema_curves import TaskFile, TasksSection, UserTask
 from .sources import Sources
 
 _AT = ("tasks",)
@@ -31,14 +31,14 @@ def tasks_of(section: TasksSection, sources: Sources) -> StudyTasks | None:
     section : TasksSection
         Keys of the tasks.
     sources : Sources
-        Files, curves and the faults so far.
+        Files, curves and the issues so far.
 
     Returns
     -------
     StudyTasks or None
-        None after adding faults.
+        None after adding issues.
     """
-    before = len(sources.faults)
+    before = len(sources.issues)
     user_tasks = section.own.values()
     named = [entry for task in user_tasks for spectra in task.classes.values() for entry in spectra]
     if section.shipped or any(task.under for task in user_tasks) or any(isinstance(entry, str) for entry in named):
@@ -46,29 +46,29 @@ def tasks_of(section: TasksSection, sources: Sources) -> StudyTasks | None:
     for name in section.shipped:
         if name not in SHIPPED:
             sources.unknown((*_AT, "shipped"), "task", name, SHIPPED)
-    if len(sources.faults) > before:
+    if len(sources.issues) > before:
         return None
     from_files: dict[tuple[str, str], FloatArray] = {}
-    made = [_own_task(name, task, from_files, sources) for name, task in section.own.items()]
-    if len(sources.faults) > before:
+    made = [_user_task(name, task, from_files, sources) for name, task in section.own.items()]
+    if len(sources.issues) > before:
         return None
     conditions = Conditions(section.exposure_s, section.read_noise_e, section.illuminance_lx)
     tasks = (*(shipped(sources.grid, name) for name in section.shipped), *(task for task in made if task is not None))
     return StudyTasks(conditions, tasks, from_files)
 
 
-def _own_task(
-    name: str, task: OwnTask, from_files: dict[tuple[str, str], FloatArray], sources: Sources
+def _user_task(
+    name: str, task: UserTask, from_files: dict[tuple[str, str], FloatArray], sources: Sources
 ) -> GriddedTask | None:
-    """Return a task, or None after adding faults; its spectra of files go to `from_files`, see `StudyTasks`."""
-    before, at = len(sources.faults), (*_AT, "own", name)
+    """Return a task, or None after adding issues; its spectra of files go to `from_files`, see `StudyTasks`."""
+    before, at = len(sources.issues), (*_AT, "own", name)
     for light in task.under:
         if light not in ILLUMINANTS:
             sources.unknown((*at, "under"), "light", light, ILLUMINANTS)
     if len(set(task.under)) < len(task.under):
         sources.add((*at, "under"), "a light is named twice", task.under)
     _check_names(name, task, at, sources)
-    if len(sources.faults) > before:
+    if len(sources.issues) > before:
         return None
     classes: dict[str, FloatArray] = {}
     for kind, entries in task.classes.items():
@@ -89,13 +89,13 @@ def _own_task(
         classes[kind] = np.array(spectra).reshape(-1, sources.grid.size)
     sizes = [len(spectra) for spectra in classes.values()]
     pairs = (sum(sizes) ** 2 - sum(size**2 for size in sizes)) // 2
-    if len(sources.faults) == before and pairs > _MOST_PAIRS:
+    if len(sources.issues) == before and pairs > _MOST_PAIRS:
         allowed = f"at most {_MOST_PAIRS:,}: fewer spectra"
         sources.add((*at, "classes"), "too many pairs of spectra", pairs, allowed)
-    return separation_task(sources.grid, name, classes, task.under) if len(sources.faults) == before else None
+    return separation_task(sources.grid, name, classes, task.under) if len(sources.issues) == before else None
 
 
-def _check_names(name: str, task: OwnTask, path: KeyPath, sources: Sources) -> None:
+def _check_names(name: str, task: UserTask, path: KeyPath, sources: Sources) -> None:
     """Check that its groups and lights are known, and that its classes are all lamps, or all surfaces."""
     known = task_groups()
     if name in SHIPPED:
@@ -109,7 +109,7 @@ def _check_names(name: str, task: OwnTask, path: KeyPath, sources: Sources) -> N
                 surfaces.add(is_surface(entry))
             elif is_curve_file(entry):
                 allowed = f"{{file: {entry}, quantity: reflectance}}, or energy, or photons"
-                sources.add((*path, "classes", kind), "what its numbers are is not told", entry, allowed)
+                sources.add((*path, "classes", kind), "the unit of its numbers is missing", entry, allowed)
             else:
                 sources.unknown((*path, "classes", kind), "group of spectra", entry, known)
     if len(surfaces) > 1:
@@ -135,7 +135,7 @@ def _kept(owner: str, path: KeyPath, entry: TaskFile, sources: Sources) -> dict[
 
 
 def _read(path: KeyPath, entry: TaskFile, sources: Sources) -> dict[str, FloatArray]:
-    """Return column -> reflectance or relative photons on the grid; a column that is 0 there adds a fault."""
+    """Return column -> reflectance or relative photons on the grid; a column that is 0 there adds an issue."""
     curves = sources.curves(path, entry)
     if curves is None:
         return {}
@@ -157,7 +157,7 @@ def _read(path: KeyPath, entry: TaskFile, sources: Sources) -> dict[str, FloatAr
     return spectra
 
 
-def check_seen(
+def check_task_scenes(
     tasks: StudyTasks, section: StudySection, sensor: SensorCurves, spaces: Sequence[Space], sources: Sources
 ) -> None:
     """Check that no filter of a task depends on the angle and that no patch saturates a pixel.
@@ -173,7 +173,7 @@ def check_seen(
     spaces : sequence of Space
         Design spaces.
     sources : Sources
-        Files, curves and the faults so far.
+        Files, curves and the issues so far.
     """
     filters = [space.filter.technology for space in spaces if space.filter is not None]
     if any(t is not None and t.interference is not None for t in (*filters, *sensor.technologies.values())):

@@ -10,17 +10,17 @@ import numpy as np
 from pydantic import ValidationError
 
 from ..base.disk import is_file
-from ..base.errors import Fault, SweepError
-from ..base.own_code import CODE_OF, Installed, Offered, OwnCode, file_of, installed, is_in_file, offers, read_code
+from ..base.errors import SweepError, ValidationIssue
+from ..base.user_code import CODE_OF, Installed, Offered, UserCode, file_of, installed, is_in_file, offers, read_code
 from ..camera.irradiance import scene_irradiance
-from ..camera.own_effects import OwnEffect
 from ..camera.scene import Scene
 from ..camera.setup import Setup
+from ..camera.user_effects import UserEffect
 from ..designs.space import Space
-from ..metrics.own import OwnMetric, Readings
-from ..metrics.quantity import WORST, Asked
+from ..metrics.quantity import WORST, RequestedQuantities
 from ..metrics.registry import quantities_of
 from ..metrics.smooth import smooth_response
+from ..metrics.user_metrics import Readings, UserMetric
 from .document import KeyPath
 from .model import Study
 from .schema import StudySection
@@ -58,12 +58,12 @@ def is_from_outside(name: str, group: Offered, known: Iterable[str]) -> bool:
 
 
 def allowed(sources: Sources, path: KeyPath, name: str) -> bool:
-    """Return True if code may run; add a fault otherwise.
+    """Return True if code may run; add an issue otherwise.
 
     Parameters
     ----------
     sources : Sources
-        Files, curves and the faults so far.
+        Files, curves and the issues so far.
     path : sequence of str and int
         Keys that lead to the value.
     name : str
@@ -75,19 +75,19 @@ def allowed(sources: Sources, path: KeyPath, name: str) -> bool:
         True if `--allow-code` or `allow_code` was given.
     """
     if not sources.allow_code:
-        whose = "a Python file" if is_in_file(name) else "what an installed package offers"
+        whose = "a Python file" if is_in_file(name) else "a plugin of an installed package"
         problem = f"the study names {whose}, whose code would run"
         sources.add(path, problem, name, "--allow-code, if you trust it")
     return bool(sources.allow_code)
 
 
-def code_of(sources: Sources, name: str, group: Offered) -> OwnCode:
+def code_of(sources: Sources, name: str, group: Offered) -> UserCode:
     """Read code of a file or an installed package, and record its digest.
 
     Parameters
     ----------
     sources : Sources
-        Files, curves and the faults so far.
+        Files, curves and the issues so far.
     name : str
         Name of the class or function.
     group : Offered
@@ -95,7 +95,7 @@ def code_of(sources: Sources, name: str, group: Offered) -> OwnCode:
 
     Returns
     -------
-    OwnCode
+    UserCode
         The code, not run yet.
 
     Raises
@@ -106,22 +106,22 @@ def code_of(sources: Sources, name: str, group: Offered) -> OwnCode:
     if not is_in_file(name):
         offer = installed(group, name)
         if offer is None:
-            raise SweepError(Fault("no installed package offers it", value=name))
+            raise SweepError(ValidationIssue("no installed package offers it", value=name))
         _digested(sources, f"{CODE_OF}{offer.told} ({group}: {name})", offer.digest)
-        return OwnCode(name, None, group, offer.digest)
+        return UserCode(name, None, group, offer.digest)
     file = file_of(name)
     place = next((folder / file for folder in sources.folders if is_file(folder / file)), None)
     if place is None:
-        raise SweepError(Fault("no such file", value=file, allowed=f"a path relative to {sources.searched}"))
+        raise SweepError(ValidationIssue("no such file", value=file, allowed=f"a path relative to {sources.searched}"))
     source, digest = read_code(place)
     _digested(sources, file, digest)
-    return OwnCode(name, source)
+    return UserCode(name, source)
 
 
 def _digested(sources: Sources, name: str, digest: str) -> None:
     """Note the digest; raises SweepError where only other code may run."""
     if not isinstance(sources.allow_code, bool) and sources.allow_code.get(name) != digest:
-        raise SweepError(Fault("not the code that the run had", value=name))
+        raise SweepError(ValidationIssue("not the code that the run had", value=name))
     sources.digests[name] = digest
 
 
@@ -135,7 +135,7 @@ def offered_curves(sources: Sources, at: KeyPath, section: _Curves, group: Offer
     Parameters
     ----------
     sources : Sources
-        Files, curves and the faults so far.
+        Files, curves and the issues so far.
     at : sequence of str and int
         Keys that lead to the section.
     section : section
@@ -164,12 +164,14 @@ def offered_curves(sources: Sources, at: KeyPath, section: _Curves, group: Offer
         code = code_of(sources, name, group)
         stated = code.called(code.loaded) if callable(code.loaded) else code.loaded
         if not isinstance(stated, Mapping) or stated.get("builtin") == name:
-            raise SweepError(Fault(f"{name} says nothing of curves", value=stated, allowed="a mapping with `files`"))
+            raise SweepError(
+                ValidationIssue(f"{name} says nothing of curves", value=stated, allowed="a mapping with `files`")
+            )
         made: _Curves = type(section).model_validate(dict(stated))
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
-        sources.add(at, f"what a package offers is no such section: {where}: {first['msg']}", name)
+        sources.add(at, f"the plugin gives no such section: {where}: {first['msg']}", name)
         raise sources.error from None
     except SweepError as error:
         sources.add_error(at, error)
@@ -180,7 +182,7 @@ def offered_curves(sources: Sources, at: KeyPath, section: _Curves, group: Offer
     return made.model_copy(update={"name": made.name or name, "files": [*made.files, *section.files], **added})
 
 
-def own_metrics(section: StudySection, sources: Sources) -> tuple[OwnMetric, ...]:
+def user_metrics(section: StudySection, sources: Sources) -> tuple[UserMetric, ...]:
     """Load the user's metrics.
 
     Parameters
@@ -188,7 +190,7 @@ def own_metrics(section: StudySection, sources: Sources) -> tuple[OwnMetric, ...
     section : StudySection
         The keys of the study, checked against the schema.
     sources : Sources
-        Files, curves and the faults so far.
+        Files, curves and the issues so far.
 
     Returns
     -------
@@ -201,13 +203,13 @@ def own_metrics(section: StudySection, sources: Sources) -> tuple[OwnMetric, ...
         If one cannot be loaded.
     """
 
-    def make(code: OwnCode) -> OwnMetric:
-        metric = OwnMetric(code)
+    def make(code: UserCode) -> UserMetric:
+        metric = UserMetric(code)
         for stated in ("name", "unit", "label", "wanted", "digits"):
             getattr(metric, stated)
         return metric
 
-    metrics = _read_own("metrics", section.metrics, "sweep.metrics", make, sources)
+    metrics = _read_user_code("metrics", section.metrics, "sweep.metrics", make, sources)
     for name in section.metrics:
         whose = "that file" if is_in_file(name) else "an installed package"
         sources.warnings.append(
@@ -217,7 +219,7 @@ def own_metrics(section: StudySection, sources: Sources) -> tuple[OwnMetric, ...
     return metrics
 
 
-def own_effects(section: StudySection, sources: Sources) -> tuple[OwnEffect, ...]:
+def user_effects(section: StudySection, sources: Sources) -> tuple[UserEffect, ...]:
     """Load the user's effects.
 
     Parameters
@@ -225,7 +227,7 @@ def own_effects(section: StudySection, sources: Sources) -> tuple[OwnEffect, ...
     section : StudySection
         The keys of the study, checked against the schema.
     sources : Sources
-        Files, curves and the faults so far.
+        Files, curves and the issues so far.
 
     Returns
     -------
@@ -237,11 +239,11 @@ def own_effects(section: StudySection, sources: Sources) -> tuple[OwnEffect, ...
     StudyError
         If one cannot be loaded.
     """
-    return _read_own("effects", section.effects, "sweep.effects", OwnEffect, sources)
+    return _read_user_code("effects", section.effects, "sweep.effects", UserEffect, sources)
 
 
-def _read_own(
-    key: str, names: Sequence[str], group: Offered, make: Callable[[OwnCode], _Made], sources: Sources
+def _read_user_code(
+    key: str, names: Sequence[str], group: Offered, make: Callable[[UserCode], _Made], sources: Sources
 ) -> tuple[_Made, ...]:
     is_list = isinstance(sources.document.data.get(key), list)
     made, failed = [], set[str]()
@@ -269,14 +271,14 @@ def try_effects(study: Study, sources: Sources) -> None:
     study : Study
         The study.
     sources : Sources
-        Files, curves and the faults so far.
+        Files, curves and the issues so far.
 
     Raises
     ------
     StudyError
         If one fails.
     """
-    for name in study.scenarios if study.own_effects else ():
+    for name in study.scenarios if study.user_effects else ():
         try:
             scene_irradiance(study.setup(study.spaces[0], name))
         except SweepError as error:
@@ -284,19 +286,21 @@ def try_effects(study: Study, sources: Sources) -> None:
             raise sources.error from None
 
 
-def check_names(own: Sequence[OwnMetric], asked: Asked, spaces: Sequence[Space], sources: Sources) -> bool:
-    """Return True if every column has a single meaning; add a fault otherwise.
+def check_names(
+    own: Sequence[UserMetric], requested: RequestedQuantities, spaces: Sequence[Space], sources: Sources
+) -> bool:
+    """Return True if every column has a single meaning; add an issue otherwise.
 
     Parameters
     ----------
-    own : sequence of OwnMetric
+    own : sequence of UserMetric
         Metrics of the user.
-    asked : Asked
+    requested : RequestedQuantities
         Quantities of the study.
     spaces : sequence of Space
         Design spaces.
     sources : Sources
-        Files, curves and the faults so far.
+        Files, curves and the issues so far.
 
     Returns
     -------
@@ -305,7 +309,7 @@ def check_names(own: Sequence[OwnMetric], asked: Asked, spaces: Sequence[Space],
     """
     if not own:
         return True
-    widest = replace(asked, own=(), states=asked.classes, any_place=True, edge_shift=True, population=True)
+    widest = replace(requested, own=(), states=requested.classes, any_place=True, edge_shift=True, population=True)
     taken = {*quantities_of(replace(widest, probabilities=True, vision=True)), *RESERVED}
     taken |= {name for space in spaces for name in space.parameters}
     for metric in own:
@@ -325,7 +329,7 @@ def try_metrics(study: Study, sources: Sources) -> None:
     study : Study
         The study.
     sources : Sources
-        Files, curves and the faults so far.
+        Files, curves and the issues so far.
 
     Raises
     ------
@@ -335,21 +339,21 @@ def try_metrics(study: Study, sources: Sources) -> None:
     setups = {space.cfa: study.setup(space, next(iter(study.scenarios))) for space in study.spaces} if study.own else {}
     searched = None if study.search is None else study.search.space.cfa
     wanted = {*study.objective.weights, *study.constraints}
-    lacking: dict[str, list[str]] = {metric.name: [] for metric in study.own}
+    missing_keys: dict[str, list[str]] = {metric.name: [] for metric in study.own}
     for metric in study.own:
         for cfa, setup in setups.items():
             try:
-                lacking[metric.name] += [] if _tried(metric, setup) else [cfa]
+                missing_keys[metric.name] += [] if _tried(metric, setup) else [cfa]
             except SweepError as error:
                 sources.add_error(("metrics",), error)
                 break  # it fails on the others, too
-        if searched in lacking[metric.name] and {metric.name, WORST + metric.name} & wanted:
+        if searched in missing_keys[metric.name] and {metric.name, WORST + metric.name} & wanted:
             sources.add(("metrics",), f"{metric.code.name} gives None for {searched}, which is searched", metric.name)
-    if sources.faults:
+    if sources.issues:
         raise sources.error
 
 
-def _tried(metric: OwnMetric, setup: Setup) -> bool:
+def _tried(metric: UserMetric, setup: Setup) -> bool:
     """Return whether a CFA has it; it gives the same alone and beside others. Raises SweepError where it does not.
 
     Its filters are the curves that they replace, and darker ones.
@@ -366,5 +370,5 @@ def _tried(metric: OwnMetric, setup: Setup) -> bool:
     if joined.shape != together.shape or not np.allclose(
         joined, together, rtol=_SAME, atol=_SAME * np.abs(together).max()
     ):
-        raise SweepError(Fault(f"{metric.code.name}: a design's number depends on the designs beside it"))
+        raise SweepError(ValidationIssue(f"{metric.code.name}: a design's number depends on the designs beside it"))
     return True

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ..base.machine_code import njit
 
 _MARGIN = 50.0
-"""What is less likely than the most likely by more than this factor's logarithm counts as impossible."""
+"""Cases less likely than the most likely by more than this logarithm of a factor count as impossible."""
 _LOOK = 16
 
 
@@ -83,10 +83,10 @@ def cases_on_table(
         for p in range(unlit.shape[1]):
             electrons = unlit[place, p]
             for position in range(orders.shape[1]):
-                own = orders[order, position]
+                kind_here = orders[order, position]
                 if sunny:
-                    electrons += phantoms[place, position, own, p]
-                if own == kind:
+                    electrons += phantoms[place, position, kind_here, p]
+                if kind_here == kind:
                     electrons += candelas[case] * lamps[place, position, lamp, p]
             below = min(int(np.sqrt(electrons) / step), last)
             part = (electrons / (step * step) - float(below) * below) / (2.0 * below + 1)

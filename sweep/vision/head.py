@@ -150,7 +150,7 @@ def _disc(setup: Setup, vision: Vision, centers: FloatArray, knots_nm: FloatArra
     assert target is not None
     dx, dy = _apart(vision, centers)
     shape = (len(centers), dy.shape[1], dx.shape[1])
-    seen = Window(
+    window = Window(
         np.zeros(shape[1:], dtype=np.intp), np.broadcast_to(dx[:, None], shape), np.broadcast_to(dy[..., None], shape)
     )
     radius = target.object_resolution_px / 2
@@ -159,7 +159,7 @@ def _disc(setup: Setup, vision: Vision, centers: FloatArray, knots_nm: FloatArra
     wave = tuple(knots_nm * 1e-3)
     profile = psf.profile(radius * pixel.pitch_um, furthest, wave, vision.optics.f_number, defocus)
     every = np.ones(shape, dtype=bool)
-    return light_on_pixels(seen, every, pixel.fill_factor**0.5 / 2, radius, profile, pixel.pitch_um).by_pixel()
+    return light_on_pixels(window, every, pixel.fill_factor**0.5 / 2, radius, profile, pixel.pitch_um).by_pixel()
 
 
 def _rectangle(
@@ -186,9 +186,9 @@ def _rectangle(
     rows, of_row = np.unique(waves[1].reshape(-1, nu.size), axis=0, return_inverse=True)
     shape = waves[0].shape[:2]
     of_column, of_row = of_column.reshape(shape), of_row.reshape(shape)
-    found = np.empty((*shape, shape[1], knots_nm.size))
+    pixels = np.empty((*shape, shape[1], knots_nm.size))
     for knot in range(knots_nm.size):
         otf = transfer[:, knot][which.reshape(radial.shape)]  # [nu of columns, nu of rows]
         image = rows @ otf.T @ columns.T
-        found[..., knot] = image[of_row[:, :, None], of_column[:, None, :]]
-    return found
+        pixels[..., knot] = image[of_row[:, :, None], of_column[:, None, :]]
+    return pixels

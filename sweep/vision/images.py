@@ -16,7 +16,7 @@ from ..camera.sampling import crosstalk_share, with_crosstalk
 from ..camera.scene import FixedExposure, Noise, Scene
 from ..camera.setup import Setup
 from ..spectra.color import luminance_per_photon_radiance
-from ..spectra.spectrum import hats
+from ..spectra.spectrum import linear_basis
 from .compiled_images import draw_numbers
 from .head import MARGIN, HeadMaps, head_maps
 from .materials import ambient_light, phantom, reflectance
@@ -100,13 +100,13 @@ class HeadElectrons:
         ndarray of shape (n, n_pixels)
             Expected electrons.
         """
-        found = self.unlit[place, background]
+        electrons = self.unlit[place, background]
         sunny = np.flatnonzero(phantom_on)
         for position, kinds in enumerate(orders_of_lenses(self.lamps.shape[1])[order].T):
-            found[sunny] += self.phantoms[place[sunny], position, kinds[sunny]]
+            electrons[sunny] += self.phantoms[place[sunny], position, kinds[sunny]]
             on = np.flatnonzero(lit[0] == kinds)
-            found[on] += (self.time_s * lit[2][on, None]) * self.lamps[place[on], position, lit[1][on]]
-        return found
+            electrons[on] += (self.time_s * lit[2][on, None]) * self.lamps[place[on], position, lit[1][on]]
+        return electrons
 
 
 class HeadCamera:
@@ -166,11 +166,11 @@ class HeadCamera:
         radiance = said.illuminance_lx / math.pi / luminance_per_photon_radiance(grid, ambient[None])[0]
         arriving = ambient * (radiance * factor)
         housing, plate, glass = (arriving * reflectance(grid, of) for of in ("dark gray", "black", "black"))
-        around = np.stack([arriving * reflectance(grid, each) for each in self.vision.backgrounds])
+        around = np.stack([arriving * reflectance(grid, background) for background in self.vision.backgrounds])
         uniform = np.ones((1, *maps.backplate.shape[1:]))
-        unlit = self._seen(maps, uniform, around) + self._seen(maps, maps.backplate, plate - around)
-        unlit += self._seen(maps, maps.housing, (housing - plate)[None])
-        unlit += self._seen(maps, maps.lenses.sum(axis=1), (glass - housing)[None])
+        unlit = self._electrons(maps, uniform, around) + self._electrons(maps, maps.backplate, plate - around)
+        unlit += self._electrons(maps, maps.housing, (housing - plate)[None])
+        unlit += self._electrons(maps, maps.lenses.sum(axis=1), (glass - housing)[None])
         return HeadElectrons(
             np.maximum(unlit, 0.0) * time_s + self.pixel.dark_e_per_s * time_s,
             self._phantoms(maps, setup, said) * time_s,
@@ -199,27 +199,27 @@ class HeadCamera:
     def _of_lenses(self, maps: HeadMaps, spectra: FloatArray) -> FloatArray:
         """Return spectra on each lens, ndarray of shape (n_places, n_lenses, n_spectra, n_pixels)."""
         places, positions = maps.lenses.shape[:2]
-        seen = self._seen(maps, maps.lenses.reshape(-1, *maps.lenses.shape[2:]), spectra)
-        return np.maximum(seen.reshape(places, positions, *seen.shape[1:]), 0.0)
+        lens_electrons = self._electrons(maps, maps.lenses.reshape(-1, *maps.lenses.shape[2:]), spectra)
+        return np.maximum(lens_electrons.reshape(places, positions, *lens_electrons.shape[1:]), 0.0)
 
-    def _seen(self, maps: HeadMaps, light: FloatArray, spectra: FloatArray) -> FloatArray:
+    def _electrons(self, maps: HeadMaps, light: FloatArray, spectra: FloatArray) -> FloatArray:
         """Return electrons/s of images with spectra, through each pixel's filter, with crosstalk.
 
         `light` has shape (n, side, side, n_knots), the result (n, n_spectra, n_pixels).
         """
         setup = self.setup
-        on_knots = hats(setup.camera.grid.nodes_nm, maps.knots_nm)
+        on_knots = linear_basis(setup.camera.grid.nodes_nm, maps.knots_nm)
         weight = np.einsum("cw,sw,kw->cks", self.qe, spectra, on_knots, optimize=True) * setup.camera.area_step_m2_nm
-        found = np.empty((len(light), len(spectra), *self._channel.shape))
+        electrons = np.empty((len(light), len(spectra), *self._channel.shape))
         for channel in range(len(self.qe)):
-            own = self._channel == channel
-            found[:, :, own] = np.moveaxis(light[:, own] @ weight[channel], 2, 1)
+            in_channel = self._channel == channel
+            electrons[:, :, in_channel] = np.moveaxis(light[:, in_channel] @ weight[channel], 2, 1)
         share = crosstalk_share(setup)
         if share:
-            flat = found.reshape(-1, *self._channel.shape)
-            found = with_crosstalk(flat, share).reshape(found.shape)
+            flat = electrons.reshape(-1, *self._channel.shape)
+            electrons = with_crosstalk(flat, share).reshape(electrons.shape)
         inner = slice(MARGIN, -MARGIN)
-        return found[:, :, inner, inner].reshape(*found.shape[:2], -1)
+        return electrons[:, :, inner, inner].reshape(*electrons.shape[:2], -1)
 
     def n_places(self) -> int:
         """Return the number of positions of the head on the mosaic.
@@ -245,19 +245,19 @@ class HeadCamera:
             Electrons.
         """
         n_pixels = self.vision.crop_px**2
-        found = np.empty((len(scenes), n_pixels))
+        electrons = np.empty((len(scenes), n_pixels))
         candelas = np.array(self.vision.intensities_cd)
         for distance in np.unique(scenes.distance):
             for level in np.unique(scenes.level):
                 here = np.flatnonzero((scenes.distance == distance) & (scenes.level == level))
                 if not here.size:
                     continue
-                own = scenes.some(here)
-                lit = (own.state - 1, own.lamp, candelas[own.intensity])
-                place = (own.place * self.n_places()).astype(np.intp)
+                here_scenes = scenes.some(here)
+                lit = (here_scenes.state - 1, here_scenes.lamp, candelas[here_scenes.intensity])
+                place = (here_scenes.place * self.n_places()).astype(np.intp)
                 heads = self.electrons(int(distance), int(level))
-                found[here] = heads.of(place, own.background, own.order, own.phantom, lit)
-        return found
+                electrons[here] = heads.of(place, here_scenes.background, here_scenes.order, here_scenes.phantom, lit)
+        return electrons
 
     def images(self, scenes: Scenes) -> Numbers:
         """Return images of scenes, each with its own photons.
@@ -274,6 +274,6 @@ class HeadCamera:
         """
         electrons = self.expected(scenes)
         node, share = self.table.at(electrons.ravel())
-        found = np.empty(electrons.size, dtype=np.int16)
-        draw_numbers(node, share, self.table.below, uniforms(scenes, electrons.shape[1]).ravel(), found)
-        return found.reshape(len(scenes), self.vision.crop_px, self.vision.crop_px)
+        numbers = np.empty(electrons.size, dtype=np.int16)
+        draw_numbers(node, share, self.table.below, uniforms(scenes, electrons.shape[1]).ravel(), numbers)
+        return numbers.reshape(len(scenes), self.vision.crop_px, self.vision.crop_px)

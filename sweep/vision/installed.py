@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 
-from ..base.errors import Fault, SweepError
+from ..base.errors import SweepError, ValidationIssue
 
 
 def require_network() -> None:
@@ -18,5 +18,5 @@ def require_network() -> None:
     if any(find_spec(name) is None for name in ("jax", "optax")):
         allowed = "pip install 'cfa-sweep[vision]', or `network: false`"
         raise SweepError(
-            Fault("the network needs JAX and Optax, which are not installed", key="vision", allowed=allowed)
+            ValidationIssue("the network needs JAX and Optax, which are not installed", key="vision", allowed=allowed)
         )

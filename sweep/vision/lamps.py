@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.errors import Fault, SweepError
+from ..base.errors import SweepError, ValidationIssue
 from ..base.types import FloatArray, IndexArray
 from ..spectra.lights import Lights
 from .section import Vision
@@ -41,7 +41,7 @@ class Lamps:
         set of str
             Digests.
         """
-        return {spectrum_digest(lights.photons[i]) for own in self.of_lens for i in own}
+        return {spectrum_digest(lights.photons[i]) for lamps in self.of_lens for i in lamps}
 
 
 def spectrum_digest(spectrum: FloatArray) -> str:
@@ -87,16 +87,16 @@ def split_lamps(lights: Lights, vision: Vision, seed: tuple[int, int]) -> dict[s
     rng = np.random.default_rng((*seed, 1))
     parts: dict[str, list[IndexArray]] = {part: [] for part in _PARTS}
     for lens in vision.lenses:
-        own: dict[str, list[int]] = {}
+        by_digest: dict[str, list[int]] = {}
         for i in lights.members[lens]:
-            own.setdefault(spectrum_digest(lights.photons[i]), []).append(int(i))
-        groups = [own[key] for key in own]
+            by_digest.setdefault(spectrum_digest(lights.photons[i]), []).append(int(i))
+        groups = [by_digest[key] for key in by_digest]
         order = rng.permutation(len(groups))
         few = max(1, len(groups) // 4)
         for part, some in ((TEST, order[:few]), (CHECK, order[few : 2 * few]), (TRAIN, order[2 * few :])):
             parts[part].append(np.array([i for at in some for i in groups[at]], dtype=np.intp))
-    found = {part: Lamps(tuple(own)) for part, own in parts.items()}
-    seen = found[TRAIN].digests(lights) | found[CHECK].digests(lights)
-    if seen & found[TEST].digests(lights):
-        raise SweepError(Fault("a lamp of the test has the spectrum of one to learn from", key="vision"))
-    return found
+    split = {part: Lamps(tuple(by_digest)) for part, by_digest in parts.items()}
+    learned = split[TRAIN].digests(lights) | split[CHECK].digests(lights)
+    if learned & split[TEST].digests(lights):
+        raise SweepError(ValidationIssue("a lamp of the test has the spectrum of one to learn from", key="vision"))
+    return split

@@ -120,9 +120,9 @@ class Network:
         ndarray of shape (n, n_states)
             Probabilities.
         """
-        told = _told(self.weights, _scaled(planes, self.mean, self.deviation))
-        found = np.asarray(told, dtype=float)
-        return np.asarray(found / found.sum(axis=1, keepdims=True), dtype=float)
+        probabilities = _told(self.weights, _scaled(planes, self.mean, self.deviation))
+        values = np.asarray(probabilities, dtype=float)
+        return np.asarray(values / values.sum(axis=1, keepdims=True), dtype=float)
 
 
 def _scaled(planes: FloatArray, mean: float, deviation: float) -> Any:

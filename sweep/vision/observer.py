@@ -45,9 +45,9 @@ def _cases(camera: HeadCamera, lamps: Lamps, order: str, sunny: bool) -> _Cases:
     rest = np.array([(o, sun, at) for o in orders for sun in range(1 + sunny) for at in range(n_places)])
     sun_share = np.where(rest[:, 1] == 1, PHANTOM_SHARE, 1 - PHANTOM_SHARE) if sunny else np.ones(len(rest))
     lit = [(-1, -1, 0.0, 1.0)]
-    for kind, own in enumerate(lamps.of_lens):
-        each = 1 / (len(own) * len(intensities))
-        lit += [(kind, int(lamp), candelas, each) for lamp in own for candelas in intensities]
+    for kind, lamp_indices in enumerate(lamps.of_lens):
+        share = 1 / (len(lamp_indices) * len(intensities))
+        lit += [(kind, int(lamp), candelas, share) for lamp in lamp_indices for candelas in intensities]
     whole = np.array(lit)
     first, second = np.repeat(np.arange(len(lit)), len(rest)), np.tile(np.arange(len(rest)), len(lit))
     table = np.concatenate([whole[first, :2].astype(np.intp), rest[second]], axis=1)
@@ -76,22 +76,22 @@ def posteriors(camera: HeadCamera, scenes: Scenes, images: Numbers, lamps: Lamps
     ndarray of shape (n_images, n_states)
         Probabilities.
     """
-    found = np.empty((len(scenes), len(states_of(camera.vision))))
+    probabilities = np.empty((len(scenes), len(states_of(camera.vision))))
     groups = np.stack([scenes.distance, scenes.level, scenes.background], axis=1)
     for distance, level in np.unique(groups[:, :2], axis=0):
         heads = camera.electrons(int(distance), int(level))
         cases = _cases(camera, lamps, order, camera.levels[level].phantom_cd > 0)
         for background in np.unique(groups[(groups[:, 0] == distance) & (groups[:, 1] == level), 2]):
             here = np.flatnonzero((groups == (distance, level, background)).all(axis=1))
-            found[here] = _of_states(camera, images[here].reshape(len(here), -1), heads, int(background), cases)
-    return found
+            probabilities[here] = _of_states(camera, images[here].reshape(len(here), -1), heads, int(background), cases)
+    return probabilities
 
 
 def _of_states(camera: HeadCamera, images: Numbers, heads: HeadElectrons, background: int, cases: _Cases) -> FloatArray:
     """Return the probability of each state before a background, ndarray of shape (n_images, n_states)."""
     n_cases, unlit = len(cases.table), heads.unlit[:, background]
     telling = np.argsort(-_telling(heads, unlit), kind="stable")
-    dark, sun, lamp = (np.ascontiguousarray(each[..., telling]) for each in (unlit, heads.phantoms, heads.lamps))
+    dark, sun, lamp = (np.ascontiguousarray(part[..., telling]) for part in (unlit, heads.phantoms, heads.lamps))
     node = np.empty((n_cases, telling.size), dtype=np.int32)
     share = np.empty(node.shape, dtype=np.float32)
     light, last = cases.candelas * heads.time_s, camera.table.last
@@ -100,9 +100,9 @@ def _of_states(camera: HeadCamera, images: Numbers, heads: HeadElectrons, backgr
     likelihood = np.empty((len(images), n_cases))
     log_likelihoods(np.ascontiguousarray(images[:, telling]), node, share, camera.table.shares, likelihood)
     weights = np.exp(likelihood - likelihood.max(axis=1, keepdims=True)) * cases.share
-    own = cases.table[:, 0] + 1 == np.arange(1 + len(camera.vision.lenses))[:, None]
-    found = weights @ own.T.astype(float)
-    return np.asarray(found / found.sum(axis=1, keepdims=True), dtype=float)
+    is_state = cases.table[:, 0] + 1 == np.arange(1 + len(camera.vision.lenses))[:, None]
+    probabilities = weights @ is_state.T.astype(float)
+    return np.asarray(probabilities / probabilities.sum(axis=1, keepdims=True), dtype=float)
 
 
 def _telling(heads: HeadElectrons, unlit: FloatArray) -> FloatArray:

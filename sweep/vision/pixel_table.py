@@ -88,7 +88,7 @@ def pixel_table(pixel: Pixel) -> PixelTable:
 
 def _nodes_e(pixel: Pixel) -> FloatArray:
     """Return the expected electrons of the nodes, from 0 to saturation."""
-    last = math.sqrt(moments.Ends.of(moments.without_prnu(pixel)).last_e)
+    last = math.sqrt(moments.LinearRange.of(moments.without_prnu(pixel)).last_e)
     return np.asarray((np.arange(math.ceil(last / ROOT_STEP) + 2) * ROOT_STEP) ** 2, dtype=float)
 
 
@@ -102,7 +102,7 @@ def _without_prnu(pixel: Pixel) -> FloatArray:
     logs = counts * np.log(np.maximum(electrons, 1e-300)) - electrons - gammaln(counts + 1)
     poisson = np.exp(logs)
     poisson[0] = counts == 0
-    poisson[:, -1] += np.maximum(1 - poisson.sum(axis=1), 0.0)  # what is more than the well holds
+    poisson[:, -1] += np.maximum(1 - poisson.sum(axis=1), 0.0)  # electrons beyond the full well
     held = np.minimum(counts, pixel.well_e)
     mean, sigma = held * pixel.dn_per_e + pixel.offset_dn, pixel.read_noise_e * pixel.dn_per_e
     top = pixel.full_scale_dn
@@ -130,10 +130,10 @@ def _with_prnu(shares: FloatArray, pixel: Pixel) -> FloatArray:
     electrons = _nodes_e(pixel)
     z = np.linspace(-6, 6, 49)
     weight = gaussian.density(z) / gaussian.density(z).sum()
-    seen = np.minimum(electrons[:, None] * np.maximum(1 + pixel.prnu * z, 0.0), electrons[-1])
-    left = np.clip(np.searchsorted(electrons, seen, side="right") - 1, 0, electrons.size - 2)
-    share = (seen - electrons[left]) / np.diff(electrons)[left]
-    rows = np.broadcast_to(np.arange(electrons.size)[:, None], seen.shape).ravel()
+    scaled_electrons = np.minimum(electrons[:, None] * np.maximum(1 + pixel.prnu * z, 0.0), electrons[-1])
+    left = np.clip(np.searchsorted(electrons, scaled_electrons, side="right") - 1, 0, electrons.size - 2)
+    share = (scaled_electrons - electrons[left]) / np.diff(electrons)[left]
+    rows = np.broadcast_to(np.arange(electrons.size)[:, None], scaled_electrons.shape).ravel()
     entries = np.concatenate([(weight * (1 - share)).ravel(), (weight * share).ravel()])
     columns = np.concatenate([left.ravel(), left.ravel() + 1])
     mixed = csr_matrix((entries, (np.tile(rows, 2), columns)), shape=(electrons.size, electrons.size))

@@ -51,20 +51,22 @@ def demosaicked(images: FloatArray, mosaic: Mosaic) -> FloatArray:
     high, wide = images.shape[-2:]
     channel = tile[np.ix_(*(np.arange(side) % size for side, size in zip((high, wide), tile.shape, strict=True)))]
     tents = [1 - np.abs(np.arange(-size + 1, size)) / size for size in tile.shape]
-    found = np.empty((*images.shape, len(mosaic.channels)))
+    channels = np.empty((*images.shape, len(mosaic.channels)))
     for number in range(len(mosaic.channels)):
-        own = (channel == number).astype(float)
+        in_channel = (channel == number).astype(float)
         # Beyond the border is nothing; at a border one channel may lack a neighbor, and never all of them.
-        found[..., number] = _convolved(own * images, tents) / np.maximum(_convolved(own, tents), 1e-12)
-    return found
+        channels[..., number] = _convolved(in_channel * images, tents) / np.maximum(
+            _convolved(in_channel, tents), 1e-12
+        )
+    return channels
 
 
 def _convolved(images: FloatArray, tents: list[FloatArray]) -> FloatArray:
     """Convolve with the product of a tent along the rows' axis and one along the columns'."""
-    found = images
+    result = images
     for axis, tent in zip((-2, -1), tents, strict=True):
-        found = convolve1d(found, tent, axis=axis, mode="constant")
-    return found
+        result = convolve1d(result, tent, axis=axis, mode="constant")
+    return result
 
 
 def false_colors(image: FloatArray, mosaic: Mosaic, mean_nm: FloatArray, offset_dn: float) -> FloatArray:

@@ -74,13 +74,13 @@ def read_images(setup: Setup, curves: FloatArray, vision: Vision, seed: tuple[in
         key = _key(seed, order)[:-1]
         test = _drawn(camera, lamps[TEST], order, vision.test_images, _key(seed, order))
         known = _drawn(camera, lamps[TRAIN], order, vision.test_images // 2, (*key, 1))
-        told = _of_networks(camera, lamps, order, key, [test[1], known[1]]) if vision.network else _none()
+        answers = _of_networks(camera, lamps, order, key, [test[1], known[1]]) if vision.network else _none()
         for where, (scenes, images), whole, half, of in zip(
-            (unseen, seen), (test, known), *told[:2], (lamps[TEST], lamps[TRAIN]), strict=True
+            (unseen, seen), (test, known), *answers[:2], (lamps[TEST], lamps[TRAIN]), strict=True
         ):
             # The observer of the lamps that were learned from is not asked for: the bound is that of the test.
             ideal = posteriors(camera, scenes, images, of, order) if where is unseen else np.empty((0, 0))
-            where[order] = Answers(scenes, ideal, whole, half, told[2])
+            where[order] = Answers(scenes, ideal, whole, half, answers[2])
     return SeedReading(unseen, seen, *_pictures(camera, unseen[ORDERS[-1]], test[1]))
 
 
@@ -158,20 +158,20 @@ def _of_networks(
     scenes, images = _drawn(camera, lamps[TRAIN], order, vision.train_images, (*key, 2))
     checked, check = _drawn(camera, lamps[CHECK], order, vision.check_images, (*key, 3))
     planes, held_out = planes_of(camera, images), (planes_of(camera, check), checked.state)
-    told, epochs = [], []
+    probabilities, epochs = [], []
     for count in (len(scenes), len(scenes) // 2):
         some = slice(0, count)
         n_states = len(states_of(vision))
         network = train(planes[some], scenes.state[some], held_out, n_states, vision.epochs, (*key, 4))
-        told.append([network.probabilities(planes_of(camera, each)) for each in tests])
+        probabilities.append([network.probabilities(planes_of(camera, test_images)) for test_images in tests])
         epochs.append(network.epochs)
-    return told[0], told[1], epochs[0]
+    return probabilities[0], probabilities[1], epochs[0]
 
 
 def _pictures(camera: HeadCamera, answers: Answers, images: Numbers) -> tuple[FloatArray, list[int]]:
     """Return images that the network (without one, the observer) read wrongly, up to a number."""
-    told = answers.network if answers.network.size else answers.observer
-    wrong = np.flatnonzero(told.argmax(axis=1) != answers.scenes.state)[:_SHOWN]
+    probabilities = answers.network if answers.network.size else answers.observer
+    wrong = np.flatnonzero(probabilities.argmax(axis=1) != answers.scenes.state)[:_SHOWN]
     curves = camera.qe
     mean_nm = curves @ camera.setup.camera.grid.nodes_nm / np.maximum(curves.sum(axis=1), 1e-300)
     mosaic, offset = camera.setup.camera.mosaic, camera.pixel.offset_dn

@@ -91,7 +91,7 @@ class Scenes:
         Scenes
             Scenes.
         """
-        return Scenes(**{each.name: getattr(self, each.name)[which] for each in fields(self)})
+        return Scenes(**{field.name: getattr(self, field.name)[which] for field in fields(self)})
 
 
 def draw_scenes(vision: Vision, lamps: Lamps, order: str, count: int, key: tuple[int, ...]) -> Scenes:
@@ -124,7 +124,7 @@ def draw_scenes(vision: Vision, lamps: Lamps, order: str, count: int, key: tuple
     lit = np.maximum(state - 1, 0)
     which = rng.random(count)
     lamp = np.array([lamps.of_lens[k][int(u * len(lamps.of_lens[k]))] for k, u in zip(lit, which, strict=True)])
-    sunny = np.array([each.phantom_cd > 0 for each in levels])
+    sunny = np.array([light_level.phantom_cd > 0 for light_level in levels])
     return Scenes(
         state=state,
         lamp=np.where(state > 0, lamp, -1),

@@ -44,15 +44,17 @@ def nested_weights(groups: IndexArray, rng: np.random.Generator, draws: int = DR
         Weights; each row sums to 1.
     """
     names, which = np.unique(groups, return_inverse=True)
-    found = np.zeros((draws, groups.size))
+    weights = np.zeros((draws, groups.size))
     taken = rng.multinomial(len(names), np.full(len(names), 1 / len(names)), size=draws)
     for number in range(len(names)):
-        own = np.flatnonzero(which == number)
+        of_group = np.flatnonzero(which == number)
         for draw in range(draws):
             times = int(taken[draw, number])
             if times:
-                found[draw, own] = rng.multinomial(times * own.size, np.full(own.size, 1 / own.size))
-    return np.asarray(found / found.sum(axis=1, keepdims=True), dtype=float)
+                weights[draw, of_group] = rng.multinomial(
+                    times * of_group.size, np.full(of_group.size, 1 / of_group.size)
+                )
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True), dtype=float)
 
 
 def interval(value: float, samples: FloatArray) -> Interval:
@@ -134,9 +136,9 @@ def confusion_matrix(truth: IndexArray, said: IndexArray, n_states: int) -> Inde
     ndarray of int, shape (n_states, n_states)
         Counts.
     """
-    found = np.zeros((n_states, n_states), dtype=np.intp)
-    np.add.at(found, (truth, said), 1)
-    return found
+    counts = np.zeros((n_states, n_states), dtype=np.intp)
+    np.add.at(counts, (truth, said), 1)
+    return counts
 
 
 def macro_f1(matrix: IndexArray) -> float:

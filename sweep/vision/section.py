@@ -23,49 +23,62 @@ MOST_BITS, MOST_WELL_E, MOST_READ_NOISE_DN = 12, 30_000.0, 100.0
 
 
 class LightLevel(Section):
-    """Luminance around the signal head, and exposure time.
-
-    `illuminance_lx` of the `light` on background, backplate and housing. `phantom_cd`: what low sun makes an unlit lens
-    shine with, in half of the scenes (EN 12368 classes its ratio to a lit lens: 1 to 16); 0 without sun on the lens.
-    """
+    """Ambient light at the signal head, and exposure time."""
 
     illuminance_lx: float = Field(ge=0, le=1e6)
+    """Illuminance of background, backplate and housing, lx."""
     light: Illuminant = "daylight"
+    """Spectrum of the ambient light."""
     exposure_s: Seconds
+    """Exposure time, s."""
     phantom_cd: float = Field(default=0.0, ge=0, le=1e6)
+    """Intensity of an unlit lens in low sun, in half of the scenes, cd (EN 12368 classes its ratio to a lit lens:
+    1 to 16); 0: no sun on the lens."""
 
 
 class Vision(Section):
-    """A benchmark of vision: images of signal heads, read by the ideal observer and by a small network.
+    """Benchmark of vision: images of signal heads, read by the ideal observer and by a small network.
 
-    `lenses`: the signal types of the head's two to four lenses, from the top. `distances_m`: of the heads; `levels`: of
-    light. `intensities_cd`: of a lit lamp, all equally frequent. `crop_px`: side of an image, even. `places_per_pixel`:
-    places of the head along a pixel, over the CFA's tile. `train_images`, `check_images` (for early stopping) and
-    `test_images`: of each seed, order of lenses and CFA. `epochs`: passes over the training images at most.
-    `unknown_cost`: of the answer "unknown", where a wrong one costs 1. `network`: false leaves the network out.
-    `input`: what the network sees, the `raw` pixels, a plane for each of the tile, or every channel at every pixel,
-    `demosaicked` by a tent as wide as the tile. The observer reads raw pixels: on average over heads as they are drawn
-    here, no reader of either errs less.
+    The observer reads raw pixels: on average over heads as they are drawn here, no reader of either input errs less.
     """
 
     lenses: Annotated[list[_Text], Field(min_length=2, max_length=4)] = ["red", "yellow", "green"]
+    """Signal types of the head's two to four lenses, from the top."""
     distances_m: Annotated[list[Meters], Field(min_length=1, max_length=20)]
+    """Distances of the head, m."""
     levels: Annotated[dict[_Text, LightLevel], Field(min_length=1, max_length=10)]
+    """Levels of ambient light by name."""
     intensities_cd: Annotated[list[_Intensity], Field(min_length=1, max_length=6)] = [20.0, 60.0, 200.0]
+    """Intensities of a lit lamp, cd, all equally frequent."""
     backgrounds: Annotated[list[Material], Field(min_length=1)] = ["foliage", "sky", "gray"]
+    """Materials behind the head, all equally frequent."""
     fov_deg: float = Field(default=60.0, ge=1e-6, le=360)
+    """Horizontal field of view of the camera, degrees."""
     diameter_m: Meters = DIAMETER_M
+    """Diameter of a lens of the head, m."""
     optics: Optics = Optics(f_number=2.0)
+    """Lens of the camera."""
     crop_px: int = Field(default=24, ge=8, le=48)
+    """Side of an image, pixels; even."""
     places_per_pixel: int = Field(default=2, ge=1, le=4)
+    """Positions of the head along a pixel, over the CFA's tile."""
     seeds: int = Field(default=5, ge=2, le=20)
+    """Seeds; each trains networks of its own."""
     train_images: int = Field(default=2000, ge=50, le=MOST_IMAGES)
+    """Training images of each seed, order of lenses and CFA."""
     check_images: int = Field(default=400, ge=20, le=MOST_IMAGES)
+    """Images for early stopping of each seed, order of lenses and CFA."""
     test_images: int = Field(default=400, ge=20, le=MOST_IMAGES)
+    """Test images of each seed, order of lenses and CFA."""
     epochs: int = Field(default=12, ge=1, le=1000)
+    """Largest number of passes over the training images."""
     unknown_cost: Fraction = 0.2
+    """Cost of the answer "unknown"; a wrong answer costs 1."""
     network: bool = True
+    """`false` leaves the network out; the ideal observer always reads the images."""
     input: Seen = "raw"
+    """Input of the network: `raw` pixels, a plane for each pixel of the tile, or every channel at every pixel,
+    `demosaicked` by a tent as wide as the tile."""
 
     @model_validator(mode="after")
     def _fits(self) -> Vision:

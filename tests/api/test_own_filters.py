@@ -70,7 +70,7 @@ def test_the_limit_holds_for_filters_that_meet_what_it_asks(tiny: sweep.LoadedSt
 
 
 @pytest.mark.parametrize(
-    ("asked", "said"),
+    ("requested", "said"),
     [
         ({"Q": np.zeros(301)}, "no CFA of the study has a channel Q"),
         ({"N": np.full(301, 1.5)}, "a QE above 1"),
@@ -87,9 +87,9 @@ def test_the_limit_holds_for_filters_that_meet_what_it_asks(tiny: sweep.LoadedSt
         ({"cfa": "RGGBB"}, "did you mean 'RGGB'?"),
     ],
 )
-def test_what_cannot_be_judged_is_one_line(tiny: sweep.LoadedStudy, asked: dict[str, object], said: str) -> None:
+def test_what_cannot_be_judged_is_one_line(tiny: sweep.LoadedStudy, requested: dict[str, object], said: str) -> None:
     with one_line(said):
-        tiny.evaluate(**asked)  # type: ignore[arg-type]
+        tiny.evaluate(**requested)  # type: ignore[arg-type]
 
 
 def test_a_constraint_on_what_only_a_family_has_is_not_feasible() -> None:
@@ -107,8 +107,10 @@ def test_a_study_made_in_python_runs_and_is_read_again(tmp_path: Path) -> None:
     study = sweep.make_study("mine", sensor=sensor, cfas=["RYYCy", "RYNCy"])
     run = study.run(tmp_path, jobs=1)
     assert run.folder == tmp_path / "mine"
-    asked = ["name", "csd_yellow_red", "cfa_sensitivity"]
-    pd.testing.assert_frame_equal(run.table[asked].astype({"name": object}), study.evaluate()[asked], check_dtype=False)
+    requested = ["name", "csd_yellow_red", "cfa_sensitivity"]
+    pd.testing.assert_frame_equal(
+        run.table[requested].astype({"name": object}), study.evaluate()[requested], check_dtype=False
+    )
     again = sweep.read_run(run.folder)
     pd.testing.assert_frame_equal(again.study.evaluate(), study.evaluate())
     pd.testing.assert_series_equal(again.curves["sensor"]["N"], study.curve("N"))

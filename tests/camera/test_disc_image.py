@@ -214,7 +214,7 @@ def test_an_image_that_is_too_much_is_named(
     distance_m: float, diameter_m: float, optics: Optics, place: tuple[str, ...] | None
 ) -> None:
     target = Target(distance_m=distance_m, diameter_m=diameter_m, fov_deg=60.0)
-    result = psf.too_much(Scene(target=target, optics=optics), Pixel())
+    result = psf.psf_problem(Scene(target=target, optics=optics), Pixel())
     assert (result if place is None else result and result[0]) == place
 
 

@@ -21,9 +21,9 @@ from sweep.camera.noise import gaussian, moments
 from sweep.camera.phases import lattice_px, scene_phases
 from sweep.camera.pixel import Pixel
 from sweep.camera.readout import draws_dn
-from sweep.camera.scene import Drive, FixedExposure, Scene, Target
+from sweep.camera.scene import FixedExposure, PwmDrive, Scene, Target
 from sweep.spectra.color import luminance_per_photon_radiance
-from sweep.spectra.spectrum import LIGHT_M_S, PLANCK_J_S, WavelengthGrid, hats
+from sweep.spectra.spectrum import LIGHT_M_S, PLANCK_J_S, WavelengthGrid, linear_basis
 
 from ..hard.scenes import F2, FAR, NEAR, TILES, scene, target
 
@@ -97,7 +97,7 @@ def test_images_at_ten_nanometers_tell_those_between(f_number: float, w20_um: fl
         bend = np.abs(np.diff(exact, 2, axis=1)).max() / (fine[1] - fine[0]) ** 2
         knots_nm = psf.psf_knots_nm(fine * 1e3, 10.0)
         at_knots = psf.DiscProfile(radius, 1.6 * radius, knots_nm * 1e-3, f_number, w20_um).at(r_um)
-        error = np.abs(at_knots @ hats(fine * 1e3, knots_nm) - exact).max()
+        error = np.abs(at_knots @ linear_basis(fine * 1e3, knots_nm) - exact).max()
         assert error <= 0.01**2 / 8 * bend * (1 + 1e-6) + 1e-6
         assert error < 5e-3
 
@@ -189,7 +189,7 @@ def test_extinction_leaves_two_percent_at_the_visibility() -> None:
 @settings(max_examples=60, deadline=None)
 @given(st.floats(0.05, 0.95), st.floats(0.05, 5))
 def test_flicker_by_sliding_an_exposure_over_the_pulses(duty: float, periods: float) -> None:
-    drive = Drive(duty=duty, frequency_hz=100.0)
+    drive = PwmDrive(duty=duty, frequency_hz=100.0)
 
     def on_before(t: np.ndarray) -> np.ndarray:
         return np.floor(t) * duty + np.minimum(t - np.floor(t), duty)

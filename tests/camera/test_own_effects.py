@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from sweep.base.errors import StudyError, SweepError
-from sweep.base.own_code import OwnCode
+from sweep.base.user_code import UserCode
 from sweep.camera.irradiance import background_irradiance, scene_irradiance, signal_irradiance
-from sweep.camera.own_effects import OwnEffect
 from sweep.camera.scene import Scene
+from sweep.camera.user_effects import UserEffect
 from sweep.study import load_study
 
 from ..hard.scenes import scene, target
@@ -20,16 +20,16 @@ from ..hard.scenes import scene, target
 LIT = {"target": target(50, 60), "exposure": {"kind": "fixed", "exposure_s": 2e-3}, "background_cd_m2": 300.0}
 
 
-def own_effect(body: str) -> OwnEffect:
+def own_effect(body: str) -> UserEffect:
     source = f"from dataclasses import replace\nimport numpy as np\ndef effect(irradiance, scene):\n    {body}\n"
-    return OwnEffect(OwnCode("my.py:effect", source))
+    return UserEffect(UserCode("my.py:effect", source))
 
 
 def test_effects_are_applied_in_order() -> None:
     setup = scene("lit", "RGGB", LIT).setup
     halved = own_effect("return replace(irradiance, signals=irradiance.signals / 2)")
     added = own_effect("return replace(irradiance, signals=irradiance.signals + irradiance.background)")
-    seen = scene_irradiance(replace(setup, own_effects=(halved, added)))
+    seen = scene_irradiance(replace(setup, user_effects=(halved, added)))
     np.testing.assert_allclose(seen.signals, signal_irradiance(setup) / 2 + background_irradiance(setup), rtol=1e-14)
     np.testing.assert_array_equal(seen.background, background_irradiance(setup))
 
@@ -37,7 +37,7 @@ def test_effects_are_applied_in_order() -> None:
 def test_an_effect_sees_its_scene() -> None:
     setup = scene("lit", "RGGB", LIT).setup
     nearer = own_effect("return replace(irradiance, signals=irradiance.signals * scene.target.distance_m)")
-    seen = signal_irradiance(replace(setup, own_effects=(nearer,)))
+    seen = signal_irradiance(replace(setup, user_effects=(nearer,)))
     np.testing.assert_allclose(seen, 50 * signal_irradiance(setup), rtol=1e-14)
 
 
@@ -53,7 +53,7 @@ def test_an_effect_sees_its_scene() -> None:
     ],
 )
 def test_what_is_no_irradiance_is_one_line(body: str, message: str) -> None:
-    setup = replace(scene("lit", "RGGB", LIT).setup, own_effects=(own_effect(body),))
+    setup = replace(scene("lit", "RGGB", LIT).setup, user_effects=(own_effect(body),))
     with pytest.raises(SweepError, match=message):
         scene_irradiance(setup)
 

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sweep.base.errors import BrokenPromiseError
+from sweep.base.errors import ErrorBoundExceededError
 from sweep.cli import app as cli
 from sweep.cli.audit import Audit, audit_rows, sampled
 from sweep.run import run_study
@@ -42,18 +42,18 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, pd.DataFrame]:
 
 def test_every_csd_is_compared(run: tuple[Study, pd.DataFrame]) -> None:
     study, frame = run
-    assert audit_rows(study, [frame]).faults == []
-    promised = [name for name, quantity in study.quantities.items() if quantity.promised]
-    assert [name for name in promised if name.startswith("worst_")]
+    assert audit_rows(study, [frame]).issues == []
+    has_error_bound = [name for name, quantity in study.quantities.items() if quantity.has_error_bound]
+    assert [name for name in has_error_bound if name.startswith("worst_")]
     row = sampled(frame).index[-1]
-    for name in promised:
+    for name in has_error_bound:
         for wrong in (frame.loc[row, name] + 6, np.nan):
             changed = frame.copy()
             changed.loc[row, name] = wrong
             found = audit_rows(study, [changed])
             assert list(found.broken["design_id"]) == [frame.loc[row, "design_id"]]
             assert list(found.broken["quantity"]) == [name]
-            assert f"design {frame.loc[row, 'design_id']}: {name} is off" in str(found.faults[0])
+            assert f"design {frame.loc[row, 'design_id']}: {name} is off" in str(found.issues[0])
 
 
 def test_progress_counts_all_that_is_recomputed(run: tuple[Study, pd.DataFrame]) -> None:
@@ -80,7 +80,7 @@ def test_an_error_above_the_tolerance_has_an_exit_code_of_its_own(
     monkeypatch.setattr(sys, "argv", ["sweep", "audit", str(tmp_path)])
     with pytest.raises(SystemExit) as left:
         cli.main()
-    assert left.value.code == BrokenPromiseError.exit_code == 5
+    assert left.value.code == ErrorBoundExceededError.exit_code == 5
     said = capsys.readouterr()
     assert "2 errors are larger than allowed" in said.out
     assert said.err == (

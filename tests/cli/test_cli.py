@@ -12,11 +12,11 @@ from sweep.spectra.files import read_curves
 
 from ..build import SCENES, study_file
 from ..commanded import commanded, sweep
-from ..conftest import STUDIES, Finished
+from ..conftest import STUDIES, FinishedJob
 
 
 @pytest.fixture(scope="module")
-def stopband(finished: Finished) -> tuple[Path, list[str]]:
+def stopband(finished: FinishedJob) -> tuple[Path, list[str]]:
     folder = finished("stopband")
     return folder, folder.with_name("stopband.said.txt").read_text().splitlines()
 

@@ -13,7 +13,7 @@ from ruamel.yaml import YAML
 import sweep
 from sweep.run import run_study
 from sweep.study import load_study
-from sweep.study.goals import out_of_reach
+from sweep.study.goals import unreachable_constraints
 from sweep.study.shipped import shipped_folder
 
 from ..build import BASE, load, stopband_study
@@ -126,8 +126,8 @@ def test_nothing_of_a_box_is_beyond_what_is_said_to_be_out_of_reach(tmp_path: Pa
     study = load(tmp_path, BASE.replace("sensitivity: {min: 0.9}", f"{name}: {{min: 1000}}"))
     assert study.search is not None
     space = study.search.space
-    (fault,) = out_of_reach(study, space, "chart")
-    bound = float(str(fault).rsplit(" ", 1)[1])
+    (issue,) = unreachable_constraints(study, space, "chart")
+    bound = float(str(issue).rsplit(" ", 1)[1])
     rng = np.random.default_rng(1)
     low, high = (np.array([end(axis) for axis in space.axes]) for end in (min, max))
     points = low + rng.random((2000, low.size)) * (high - low)
@@ -138,7 +138,7 @@ def test_nothing_of_a_box_is_beyond_what_is_said_to_be_out_of_reach(tmp_path: Pa
         values = sweep.LoadedStudy(study).evaluate(N=space.curves(points, 301)[:, 0])[name].to_numpy()
     assert values.max() <= bound
     study = load(tmp_path, BASE.replace("sensitivity: {min: 0.9}", f"{name}: {{min: {values.max()}}}"))
-    assert out_of_reach(study, space, "chart") == []
+    assert unreachable_constraints(study, space, "chart") == []
 
 
 def test_a_run_from_python_refuses_it_too(tmp_path: Path) -> None:

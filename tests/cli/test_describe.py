@@ -14,7 +14,7 @@ from scipy.io import savemat
 from sweep.base.errors import DataError, OutputError
 from sweep.cli.describe import described
 from sweep.cli.new import write_schema
-from sweep.spectra.facts import condensed, facts_of
+from sweep.spectra.facts import facts_of, merge_equal_issues
 from sweep.spectra.files import scan_curves
 from sweep.spectra.signal_color import VISIBLE, dominant_ranges_nm, light_color, outline
 from sweep.study.editors import schema_text
@@ -29,8 +29,8 @@ def is_png(path: Path) -> bool:
     return path.read_bytes().startswith(b"\x89PNG") and len(path.read_bytes()) > 5000
 
 
-def faults(path: Path) -> list[str]:
-    return [str(fault) for fault in condensed(list(chain.from_iterable(scan_curves(path).faults)))]
+def issues(path: Path) -> list[str]:
+    return [str(issue) for issue in merge_equal_issues(list(chain.from_iterable(scan_curves(path).issues)))]
 
 
 def test_qe_is_guessed_and_its_peak_named(tmp_path: Path) -> None:
@@ -42,7 +42,7 @@ def test_qe_is_guessed_and_its_peak_named(tmp_path: Path) -> None:
     assert "A guess: QE of a sensor" in text
     assert "G  largest 0.7       at 540 nm" in text
     assert "xy" not in text
-    assert found.faults == ()
+    assert found.issues == ()
     assert found.lines[-1] == f"Picture: {tmp_path / 'curves.png'}"
     assert is_png(tmp_path / "curves.png")
 
@@ -136,7 +136,7 @@ def test_distance_is_to_the_nearest_point_of_a_region() -> None:
 def test_every_fault_is_one_line_and_the_rest_is_described(tmp_path: Path, text: str, words: list[str]) -> None:
     path = tmp_path / "wrong.csv"
     path.write_text(text, encoding="utf-8")
-    found = faults(path)
+    found = issues(path)
     assert len(found) == len(words)
     assert all(word in line for word, line in zip(words, found, strict=True)), found
     lines = described(path, tmp_path / "out").lines
@@ -149,7 +149,7 @@ def test_micrometers_and_foreign_texts_are_read_as_meant(tmp_path: Path) -> None
     assert um.curves[0].peak_nm == pytest.approx(600)
     wide = csv(tmp_path, "wavelength_nm,R", WAVE, bell(600, 50), name="wide.csv", encoding="utf-16")
     assert facts_of(scan_curves(wide)).curves[0].peak_nm == 600
-    assert faults(wide) == []
+    assert issues(wide) == []
     (tmp_path / "semi.csv").write_text("wavelength_nm;R\n400;0,5\n700;0,25\n")
     np.testing.assert_array_equal(scan_curves(tmp_path / "semi.csv").values[:, 0], [0.5, 0.25])
 
@@ -177,7 +177,7 @@ def test_odd_files_are_described(tmp_path: Path) -> None:
     for text in ("", "wavelength_nm\n400\n", "wavelength_nm,R\n", "wavelength_nm,R\n400,nan\n"):
         (tmp_path / "none.csv").write_text(text)
         if text:
-            assert described(tmp_path / "none.csv", tmp_path).faults
+            assert described(tmp_path / "none.csv", tmp_path).issues
             continue
         with pytest.raises(DataError, match="empty"):
             described(tmp_path / "none.csv", tmp_path)
@@ -187,7 +187,7 @@ def test_mat_of_isetcam_is_described(tmp_path: Path) -> None:
     savemat(tmp_path / "q.mat", {"wavelength": WAVE, "data": np.where(WAVE == 500, np.nan, bell(600, 50))})
     found = described(tmp_path / "q.mat", tmp_path)
     assert "1 curve: curve_1" in found.lines[0]
-    assert "500 nm is not a finite number" in str(found.faults[0])
+    assert "500 nm is not a finite number" in str(found.issues[0])
 
 
 def test_the_command_ends_with_the_picture_or_exit_2(tmp_path: Path) -> None:
@@ -211,7 +211,7 @@ def test_the_command_ends_with_the_picture_or_exit_2(tmp_path: Path) -> None:
 def test_measured_files_are_taken_for_what_they_are(tmp_path: Path, file: Path, guess: str) -> None:
     found = described(file, tmp_path)
     assert any(f"A guess: {guess}" in line for line in found.lines)
-    assert not found.faults
+    assert not found.issues
 
 
 def test_names_that_look_the_same_keep_their_colors(tmp_path: Path) -> None:
@@ -239,9 +239,9 @@ def test_what_other_programs_save_is_named(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="must be real numbers"):
         scan_curves(tmp_path / "c.mat")
     (tmp_path / "d.csv").write_text('wavelength_nm,a\n400,"0,01"\n500,1\n')
-    assert "a decimal comma? use a point" in faults(tmp_path / "d.csv")[0]
+    assert "a decimal comma? use a point" in issues(tmp_path / "d.csv")[0]
     (tmp_path / "u.csv").write_text("wavelength_nm,a\n400,1\n500,1\n", encoding="utf-16-le")  # without its mark
-    assert "UTF-16? save as UTF-8" in faults(tmp_path / "u.csv")[0]
+    assert "UTF-16? save as UTF-8" in issues(tmp_path / "u.csv")[0]
 
 
 def test_a_schema_replaces_only_a_schema(tmp_path: Path) -> None:

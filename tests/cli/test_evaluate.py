@@ -14,7 +14,7 @@ import sweep
 
 from ..build import study_file
 from ..commanded import commanded
-from ..conftest import Finished
+from ..conftest import FinishedJob
 from ..curve_texts import WAVE, bell, csv
 
 
@@ -78,8 +78,8 @@ def test_own_sensor_and_lights(tmp_path: Path, own: Path) -> None:
         name="qe.csv",
     )
     leds = csv(tmp_path, "wavelength_nm,a,b,c", WAVE, *(bell(c, 12) for c in (505, 592, 636)), name="leds.csv")
-    asked = ("evaluate", own, "--transmission", "--sensor", qe, "--lights", leds)
-    code, said, err = commanded(*asked)
+    requested = ("evaluate", own, "--transmission", "--sensor", qe, "--lights", leds)
+    code, said, err = commanded(*requested)
     assert (code, err) == (0, "")
     assert "times W; values in percent; it is N of RGBN, in place of W" in said
     assert list(rows(said)) == ["RGGB", "RGBW", "RGBN"]
@@ -137,7 +137,7 @@ def test_a_design_of_a_run_has_its_own_numbers_again_and_others_under_other_ligh
 
 
 @pytest.mark.parametrize(
-    ("asked", "said"),
+    ("requested", "said"),
     [
         (["nowhere.csv"], "nowhere.csv: cannot be read"),
         (["filter.csv", "--channel", "Q"], "--channel: no such channel of RYNCy (got 'Q'); allowed: R, Y, N, Cy"),
@@ -154,18 +154,18 @@ def test_a_design_of_a_run_has_its_own_numbers_again_and_others_under_other_ligh
         (["short.csv"], "the curve is truncated"),
     ],
 )
-def test_faults_are_lines(own: Path, monkeypatch: pytest.MonkeyPatch, asked: list[str], said: str) -> None:
+def test_faults_are_lines(own: Path, monkeypatch: pytest.MonkeyPatch, requested: list[str], said: str) -> None:
     monkeypatch.chdir(own.parent)
     csv(own.parent, "wavelength_nm,T", WAVE, np.full(WAVE.size, 1.5), name="above.csv")
     csv(own.parent, "wavelength_nm,T", WAVE[5:], np.full(WAVE.size - 5, 0.5), name="short.csv")
-    code, out, err = commanded("evaluate", *asked)
+    code, out, err = commanded("evaluate", *requested)
     assert (code, out) == (2, "")
     assert said in err
     assert len(err.splitlines()) == 1
 
 
 @pytest.mark.slow
-def test_a_design_of_a_run_moves_as_it_did_there(finished: Finished) -> None:
+def test_a_design_of_a_run_moves_as_it_did_there(finished: FinishedJob) -> None:
     folder = finished("angle")
     table = pd.read_parquet(folder / "results.parquet")
     best = table[table["kind"] == "search"].iloc[0]
@@ -174,9 +174,9 @@ def test_a_design_of_a_run_moves_as_it_did_there(finished: Finished) -> None:
     assert "that works by interference (effective index 1.8)" in str(found)
 
 
-def loaded_by(*asked: object) -> tuple[str, set[str]]:
+def loaded_by(*requested: object) -> tuple[str, set[str]]:
     """What the command says of these arguments, and all modules that it loads."""
-    code = f"import sys; from sweep.cli.app import app\ntry: app({[*map(str, asked)]!r})\n"
+    code = f"import sys; from sweep.cli.app import app\ntry: app({[*map(str, requested)]!r})\n"
     code += "except SystemExit: pass\nprint(*sys.modules, file=sys.stderr)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     return done.stdout, set(done.stderr.split())

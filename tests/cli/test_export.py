@@ -13,7 +13,7 @@ from scipy.spatial.distance import cdist
 from sweep.base.errors import OutputError, SweepError
 from sweep.cli.audit import audit_output
 from sweep.cli.export import export_design, relative_transmission
-from sweep.cli.options import Also
+from sweep.cli.options import ExportFormat
 from sweep.spectra.builtin.surrogate import surrogate_parameters
 from sweep.spectra.files import read_curves
 from sweep.spectra.filter_files import HINTS, color_hints, csv_text, isetcam_mat, unique_names
@@ -156,7 +156,7 @@ def test_speos_and_rgb_weights_come_back_as_they_left(tiny: Path, tmp_path: Path
 
 def test_rgb_weights_need_the_sensor_s_rgb(from_files: Path, tmp_path: Path) -> None:
     with pytest.raises(SweepError, match=r"no such curve .got 'B'"):
-        export_design(from_files, "best", None, tmp_path / "to", [Also.RGB])
+        export_design(from_files, "best", None, tmp_path / "to", [ExportFormat.RGB])
     assert not (tmp_path / "to").exists()
 
 
@@ -233,7 +233,7 @@ def test_unknown_keys_are_one_line(tiny: Path, tmp_path: Path) -> None:
     ):
         with pytest.raises(SweepError) as caught:
             export_design(tiny, key, None, tmp_path)
-        assert len(caught.value.faults) == 1
+        assert len(caught.value.issues) == 1
         assert words in str(caught.value)
         assert caught.value.exit_code == 2
     for folder, to in ((tmp_path, None), (tiny, tiny / "run.json")):

@@ -1,4 +1,4 @@
-"""`--json`: one object on stdout, everything else on stderr; `--quiet`: nothing but faults."""
+"""`--json`: one object on stdout, everything else on stderr; `--quiet`: errors alone."""
 
 from __future__ import annotations
 
@@ -61,4 +61,4 @@ def test_a_run_that_fails_is_an_object_with_its_faults(tmp_path: Path) -> None:
     (run,) = json.loads(out)["runs"]
     assert (code, run["exit_code"]) == (2, 2)
     assert run["faults"]
-    assert all(fault in said.replace("sweep: ", "") for fault in run["faults"])
+    assert all(issue in said.replace("sweep: ", "") for issue in run["faults"])

@@ -176,7 +176,7 @@ def test_what_is_next_can_be_pasted(tmp_path: Path) -> None:
 def test_a_bad_name_is_refused(tmp_path: Path, name: str) -> None:
     with pytest.raises(StudyError) as caught:
         made(tmp_path, name)
-    assert len(caught.value.faults) == 1
+    assert len(caught.value.issues) == 1
     assert list(tmp_path.iterdir()) == []
 
 
@@ -253,11 +253,11 @@ def test_a_study_begins_with_a_shipped_one(tmp_path: Path, monkeypatch: pytest.M
     made = load_study(tmp_path / "studies" / "mine.yaml")
     assert made.name == "mine"
     assert "# full factorial" in (tmp_path / "studies" / "mine.yaml").read_text()
-    for asked, expected in (
+    for requested, expected in (
         (("mine", "--from", "stopband"), "stays as it is"),
         (("x", "--from", "stopbnd"), "did you mean"),
     ):
-        code, _, err = commanded("new", *asked)
+        code, _, err = commanded("new", *requested)
         assert (code, expected in err) == (2, True)
 
 

@@ -19,7 +19,7 @@ from sweep.camera.linear import linear_model
 from sweep.camera.setup import Setup
 from sweep.metrics.discrimination import error_bounds
 from sweep.metrics.evaluate import evaluate, family_quantities
-from sweep.metrics.quantity import WORST_CASE, Asked, Quantity
+from sweep.metrics.quantity import WORST_CASE, Quantity, RequestedQuantities
 from sweep.metrics.registry import quantities_of
 from sweep.metrics.smooth import Rows, SmoothDesign
 
@@ -206,7 +206,7 @@ MADE = {
     "noise": Made(scene("noise", "RYNCy", NOISY).setup, ("yellow", "red")),
     "dithered": Made(scene("dithered", "RYNCy", DIM, DIM_PIXEL).setup, ("yellow", "red")),
 }
-ASKED = Asked(MADE["noise"].setup.lights.classes, ("yellow", "red"), any_place=True, probabilities=True)
+ASKED = RequestedQuantities(MADE["noise"].setup.lights.classes, ("yellow", "red"), any_place=True, probabilities=True)
 QUANTITIES = quantities_of(ASKED)
 NAMES = [name for name in QUANTITIES if "green" not in name and "orange" not in name]
 
@@ -258,15 +258,17 @@ def test_smooth_rows_under_noise_are_the_quantity(name: str) -> None:
 @pytest.mark.parametrize("name", [name for name in NAMES if QUANTITIES[name].smooth is not None])
 def test_smooth_rows_are_the_quantity_with_its_derivative(name: str) -> None:
     quantity, setup = QUANTITIES[name], DITHERED if name in OF_NOISE else MADE["lattice"].setup
-    straight = linear_model(setup)
+    linear_moments = linear_model(setup)
 
     def rows(x: np.ndarray) -> Rows:
         assert quantity.smooth is not None
-        return quantity.smooth(SmoothDesign(straight, FAMILY, x, FREE, SPAN))
+        return quantity.smooth(SmoothDesign(linear_moments, FAMILY, x, FREE, SPAN))
 
     for x in X:
         if name not in OF_NOISE:
-            found = evaluate(ForwardModel(straight.setup), FAMILY.curves(x[None])) | family_quantities(FAMILY, x[None])
+            found = evaluate(ForwardModel(linear_moments.setup), FAMILY.curves(x[None])) | family_quantities(
+                FAMILY, x[None]
+            )
             assert quantity.value(rows(x)) == pytest.approx(found[name][0], rel=1e-12)
         for at, span in enumerate(SPAN):
             step = np.eye(5)[at] * span * 1e-5

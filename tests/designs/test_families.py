@@ -18,7 +18,7 @@ from sweep.designs.families.stopband import MultiStopband, Stopband
 from sweep.designs.family import Family, MovedFamily
 from sweep.designs.registry import FAMILIES as REGISTERED
 from sweep.designs.registry import FamilyOptions, build_family
-from sweep.designs.tolerance import Off
+from sweep.designs.tolerance import ProductionError
 
 from ..cases import thinned
 
@@ -126,17 +126,21 @@ def test_a_shifted_family_moves_every_edge(name: str) -> None:
     moved = x.copy()
     moved[0::5] += 3.0
     moved[2::5] += 3.0
-    np.testing.assert_allclose(family.produced(Off(3.0)).curves(x[None]), family.curves(moved[None]), rtol=1e-13)
-    np.testing.assert_allclose(family.produced(Off(3.0)).gradient(x), family.gradient(moved), rtol=1e-10, atol=1e-15)
+    np.testing.assert_allclose(
+        family.perturbed(ProductionError(3.0)).curves(x[None]), family.curves(moved[None]), rtol=1e-13
+    )
+    np.testing.assert_allclose(
+        family.perturbed(ProductionError(3.0)).gradient(x), family.gradient(moved), rtol=1e-10, atol=1e-15
+    )
 
 
 @pytest.mark.parametrize("name", ["stopband", "multi_stopband", "free_form"])
 def test_production_moves_the_shape_that_a_family_names(name: str) -> None:
     family, x = FAMILIES[name]
     assert isinstance(family, MovedFamily)
-    fixed, carrier = family.moved
-    shape = (family.curves(x[None])[0, 0] - fixed) / carrier
-    came_out = (family.produced(Off(-4.0)).curves(x[None])[0, 0] - fixed) / carrier
+    fixed, base_transmission = family.moved
+    shape = (family.curves(x[None])[0, 0] - fixed) / base_transmission
+    came_out = (family.perturbed(ProductionError(-4.0)).curves(x[None])[0, 0] - fixed) / base_transmission
     np.testing.assert_allclose(came_out[:-4], shape[4:], rtol=1e-12, atol=1e-14)
 
 
@@ -148,7 +152,7 @@ def test_films_that_are_too_thick_stretch_every_edge(name: str) -> None:
     moved = np.where(lengths, 1.01 * x, x)
     moved[0::5] += 3.0
     moved[2::5] += 3.0
-    off = family.produced(Off(3.0, 0.01))
+    off = family.perturbed(ProductionError(3.0, 0.01))
     np.testing.assert_allclose(off.curves(x[None]), family.curves(moved[None]), rtol=1e-12)
     by_length = np.where(lengths, 1.01, 1.0)[:, None, None]
     np.testing.assert_allclose(off.gradient(x), by_length * family.gradient(moved), rtol=1e-9, atol=1e-14)
@@ -156,7 +160,7 @@ def test_films_that_are_too_thick_stretch_every_edge(name: str) -> None:
 
 def test_a_shifted_free_form_moves_its_transmission() -> None:
     family, x = FAMILIES["free_form"]
-    ratio = family.produced(Off(5.0)).curves(x[None])[0, 0] / BASE
+    ratio = family.perturbed(ProductionError(5.0)).curves(x[None])[0, 0] / BASE
     np.testing.assert_allclose(ratio[155:296], np.interp(WAVE[155:296] - 5, [550, 600, 613.5, 690], x), rtol=1e-14)
     assert (ratio[:155] == 1).all()
 
@@ -272,7 +276,7 @@ def test_no_filter_of_a_box_exceeds_its_upper_curve(name: str) -> None:
 def test_every_filter_of_a_box_lies_in_its_hull(name: str, shift_nm: float) -> None:
     """Also where edges come out of order; and of a box of one design the hull is its filter."""
     family, x = FAMILIES[name]
-    family = family.produced(Off(shift_nm))
+    family = family.perturbed(ProductionError(shift_nm))
     rng = np.random.default_rng(4)
     disordered = 0
     for _ in range(20):

@@ -19,7 +19,7 @@ from sweep.run.search import run_search
 from sweep.search.gradients import BACK_OFF
 from sweep.search.limit import limit_of
 from sweep.search.problem import Problem, starting_points
-from sweep.search.solver import best_reachable
+from sweep.search.solver import extreme_value
 from sweep.study import load_study
 
 from ..build import stopband_study
@@ -170,7 +170,7 @@ def best_values() -> Result:
         ("min_transmission", Bound(min=0.9), 0.7),
     ):
         problem = replace(shallow, constraints={name: bound})
-        found = best_reachable(problem, name, starting_points(problem, 4, 1), 200)
+        found = extreme_value(problem, name, starting_points(problem, 4, 1), 200)
         assert best_of(problem, 4, 100) is None
         results.append((abs(found / exact - 1), 2 * X_TOLERANCE + 16 * EPS))
     return worst(results)

@@ -20,7 +20,7 @@ from sweep.designs.families.dual import Dual
 from sweep.designs.families.stopband import MultiStopband
 from sweep.designs.family import Family
 from sweep.designs.technology import Technology
-from sweep.designs.tolerance import SHIFTS, Off
+from sweep.designs.tolerance import SHIFTS, ProductionError
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.quantity import WORST
 from sweep.metrics.separation import csd_name
@@ -210,7 +210,7 @@ def _designs(rng: np.random.Generator, n_modified: int) -> tuple[tuple[np.ndarra
     family: Family = _DUAL if n_modified == 2 else _TWO_BANDS if _now(rng, 0.2) else FAMILY
     wide, moved = _now(rng, 0.4), _now(rng, 0.25)
     shifts = [0.0, *(_SHIFT_NM * s for s in SHIFTS if s)] if moved else [0.0]
-    families = [family.produced(Off(shift)) if shift else family for shift in shifts]
+    families = [family.perturbed(ProductionError(shift)) if shift else family for shift in shifts]
     while True:
         low, high = _box(rng, len(family.parameters) // 5, wide=wide)
         share = rng.uniform(size=(_DESIGNS if wide else 1, low.size))

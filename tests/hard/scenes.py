@@ -20,7 +20,7 @@ from sweep.camera.setup import Setup
 from sweep.designs.families.stopband import Stopband
 from sweep.designs.technology import Interference, Technology
 from sweep.metrics.evaluate import evaluate
-from sweep.metrics.quantity import Asked
+from sweep.metrics.quantity import RequestedQuantities
 from sweep.metrics.registry import quantities_of
 from sweep.spectra.builtin.registry import BUILT_IN_LIGHTS
 from sweep.spectra.lights import Lights
@@ -220,5 +220,5 @@ def columns(made: DesignScene, left_out: frozenset[str] = frozenset(), accuracy:
 
 def csd_columns(setup: Setup) -> list[str]:
     """Columns of CSDs, of which a plan and an accuracy bound the error."""
-    asked = Asked(setup.lights.classes, any_place=setup.all_phases)
-    return [name for name, quantity in quantities_of(asked).items() if quantity.promised]
+    requested = RequestedQuantities(setup.lights.classes, any_place=setup.all_phases)
+    return [name for name, quantity in quantities_of(requested).items() if quantity.has_error_bound]

@@ -210,7 +210,7 @@ def test_faults(tmp_path: Path, old: str, new: str, said: str) -> None:
     path.write_text(STUDY.replace(old, new))
     with pytest.raises(StudyError) as error:
         load_study(path)
-    assert said in "\n".join(str(fault) for fault in error.value.faults)
+    assert said in "\n".join(str(issue) for issue in error.value.issues)
 
 
 def test_columns_of_noise_must_differ(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from sweep.camera.setup import Setup
 from sweep.designs.block import CurveBlock
 from sweep.metrics.discrimination import detectability, pairwise_error
 from sweep.metrics.evaluate import designed_quantities
-from sweep.metrics.quantity import Asked, Quantity
+from sweep.metrics.quantity import Quantity, RequestedQuantities
 from sweep.metrics.registry import quantities_of
 from sweep.metrics.smooth import SmoothDesign
 from sweep.metrics.smooth_noise import margin
@@ -34,7 +34,7 @@ from sweep.metrics.tasks.color import (
     vora,
 )
 from sweep.metrics.tasks.colorimetry import delta_e_2000, lab
-from sweep.metrics.tasks.judge import pair_errors
+from sweep.metrics.tasks.evaluation import pair_errors
 from sweep.spectra.builtin.task_sets import group, separation_task, shipped
 from sweep.spectra.tasks import SHIPPED, Conditions, StudyTasks
 from sweep.study.load import study_of_keys
@@ -69,7 +69,7 @@ def scene() -> tuple[Setup, object]:
 def quantities() -> dict[str, Quantity]:
     setup, _ = scene()
     assert setup.tasks is not None
-    found = quantities_of(Asked(setup.lights.classes, tasks=setup.tasks.keys))
+    found = quantities_of(RequestedQuantities(setup.lights.classes, tasks=setup.tasks.keys))
     return {name: quantity for name, quantity in found.items() if quantity.metric.startswith("task_")}
 
 

@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sweep.base.own_code import OwnCode
+from sweep.base.user_code import UserCode
 from sweep.camera.accuracy import Accuracy
 from sweep.camera.forward import ForwardModel
 from sweep.designs.block import CurveBlock, EdgeBlock, edges_of
 from sweep.metrics import evaluate as route
 from sweep.metrics import registry
 from sweep.metrics.evaluate import evaluate
-from sweep.metrics.own import OwnMetric
-from sweep.metrics.quantity import Asked, Columns, Quantity, ReadoutMetric
+from sweep.metrics.quantity import Columns, Quantity, ReadoutMetric, RequestedQuantities
+from sweep.metrics.user_metrics import UserMetric
 
 from ..blocks import SPACE, VIEWS
 
@@ -37,7 +37,7 @@ def absent(readings):
 
 brightest.wanted, CALLS = "less", []
 """
-BRIGHTEST, ABSENT = (OwnMetric(OwnCode(f"mine.py:{name}", CODE)) for name in ("brightest", "absent"))
+BRIGHTEST, ABSENT = (UserMetric(UserCode(f"mine.py:{name}", CODE)) for name in ("brightest", "absent"))
 
 
 class Darkest(ReadoutMetric):
@@ -45,7 +45,7 @@ class Darkest(ReadoutMetric):
 
     order = 10
 
-    def quantities(self, asked: Asked) -> tuple[Quantity, ...]:  # noqa: ARG002
+    def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:  # noqa: ARG002
         """Its column."""
         return (Quantity("darkest_dn", "darkest_dn", "the weakest signal", "DN", wanted="more", ends=("min",)),)
 

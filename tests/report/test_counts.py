@@ -21,7 +21,7 @@ from sweep.results.output import Output
 from sweep.study import load_study
 
 from ..build import ran
-from ..conftest import STUDIES, Finished
+from ..conftest import STUDIES, FinishedJob
 
 UNKNOWN = """\
 study: unknown
@@ -98,7 +98,7 @@ def test_one_number_of_filters_in_terminal_picture_and_page(scenes: Output) -> N
             assert counts["front"] == (rows["feasible"] & rows["pareto"]).sum()
 
 
-def test_the_terminal_and_the_picture_of_stopband_count_alike(finished: Finished) -> None:
+def test_the_terminal_and_the_picture_of_stopband_count_alike(finished: FinishedJob) -> None:
     output = read_output(finished("stopband"))
     counts = pareto_figure(output, "chart", "RYNCy").counts
     feasible, front = map(int, re.findall(r"([\d,]+) (?:feasible|on the Pareto)", counts_line(output).replace(",", "")))

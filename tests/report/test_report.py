@@ -25,7 +25,7 @@ from sweep.run.rows import Job, jobs_of, rules_of, run_job
 from sweep.study import Study, load_study
 
 from ..build import large, ran, study_file
-from ..conftest import Finished
+from ..conftest import FinishedJob
 from ..tampering import listed_anew
 
 
@@ -94,7 +94,7 @@ def test_what_keeps_the_objective_is_around_the_best_value() -> None:
     assert profile.drop == 90.0
 
 
-def test_effects_that_are_left_out_are_not_told_as_simulated(finished: Finished) -> None:
+def test_effects_that_are_left_out_are_not_told_as_simulated(finished: FinishedJob) -> None:
     output = read_output(finished("stopband"))
     line = next(line for line in summary_lines(output) if line.startswith("Simulated: "))
     check = output.provenance.check
@@ -102,7 +102,7 @@ def test_effects_that_are_left_out_are_not_told_as_simulated(finished: Finished)
     assert line == f"Simulated: quantization; no other effect changes a CSD. {check.sentence}"
 
 
-def test_the_check_of_a_run_is_told_with_its_largest_difference(finished: Finished) -> None:
+def test_the_check_of_a_run_is_told_with_its_largest_difference(finished: FinishedJob) -> None:
     output = read_output(finished("stopband"))
     kept = output.provenance.plans["chart"]
     check = CheckFacts(rows=3, design_id=7, scenario="far", quantity="csd_yellow_red", largest_dn=0.3, allowed_dn=0.1)
@@ -118,7 +118,7 @@ def test_the_check_of_a_run_is_told_with_its_largest_difference(finished: Finish
 
 
 @pytest.mark.slow
-def test_of_a_series_the_terminal_lists_the_two_ends(finished: Finished) -> None:
+def test_of_a_series_the_terminal_lists_the_two_ends(finished: FinishedJob) -> None:
     lines = summary_lines(read_output(finished("fog")))
     assert [line.split(":")[0] for line in lines if line.startswith("day ")] == [
         "day visibility_m=50",
@@ -127,7 +127,7 @@ def test_of_a_series_the_terminal_lists_the_two_ends(finished: Finished) -> None
     assert "(1 more scenario in the report.)" in lines
 
 
-def test_the_history_ends_at_the_answer(finished: Finished) -> None:
+def test_the_history_ends_at_the_answer(finished: FinishedJob) -> None:
     folder = finished("stopband")
     output = read_output(folder)
     history = history_of(output)
@@ -151,7 +151,7 @@ def test_the_history_ends_at_the_answer(finished: Finished) -> None:
 
 
 @pytest.mark.slow
-def test_every_scene_is_told_once_with_its_largest_bound(finished: Finished) -> None:
+def test_every_scene_is_told_once_with_its_largest_bound(finished: FinishedJob) -> None:
     output = read_output(finished("fog"))
     groups = scene_groups(output)
     assert sorted(name for group in groups for name in group.scenarios) == sorted(output.scenarios)

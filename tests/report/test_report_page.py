@@ -16,7 +16,7 @@ from sweep.report import make_report, read_output
 from sweep.study import load_study
 
 from ..build import ran
-from ..conftest import Finished, draw_nothing
+from ..conftest import FinishedJob, draw_nothing
 from .pages import Opened, needs_browser, through
 
 pytestmark = needs_browser
@@ -46,7 +46,7 @@ LONGER = (("stopband", 1280), ("stopband", 400), ("fog", 1280), ("fog", 400), ("
     ],
 )
 def test_a_report_opens_without_an_error_or_a_request(
-    finished: Finished, opened: Any, standing: Any, name: str, width: int
+    finished: FinishedJob, opened: Any, standing: Any, name: str, width: int
 ) -> None:
     seen = (opened if width == 400 else standing)(finished(name), width)
     through(seen)
@@ -61,7 +61,7 @@ def test_a_report_opens_without_an_error_or_a_request(
     [("stopband", "Pareto front"), ("fog", "named designs"), ("paper", "named designs")],
 )
 @pytest.mark.slow
-def test_pointing_and_clicking_tell_of_a_design(finished: Finished, standing: Any, name: str, trace: str) -> None:
+def test_pointing_and_clicking_tell_of_a_design(finished: FinishedJob, standing: Any, name: str, trace: str) -> None:
     seen = standing(finished(name), 1280)
     table = pd.read_parquet(finished(name) / "results.parquet").set_index("design_id")
     x, y, row = seen.point_at(trace)
@@ -91,7 +91,7 @@ def test_pointing_and_clicking_tell_of_a_design(finished: Finished, standing: An
     assert chosen.name == pointed_at.name or (chosen["kind"] != "sweep" and near)
 
 
-def test_the_page_holds_the_limiting_lights_of_every_design(finished: Finished, standing: Any) -> None:
+def test_the_page_holds_the_limiting_lights_of_every_design(finished: FinishedJob, standing: Any) -> None:
     folder = finished("stopband")
     limited = pd.read_parquet(folder / "limited_by.parquet").set_index("design_id")
     seen = standing(folder)
@@ -105,7 +105,7 @@ def test_the_page_holds_the_limiting_lights_of_every_design(finished: Finished, 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("trace", ["not feasible", "feasible", "Pareto front", "best of the search"])
-def test_pointing_at_any_design_tells_its_limiting_lights(finished: Finished, opened: Any, trace: str) -> None:
+def test_pointing_at_any_design_tells_its_limiting_lights(finished: FinishedJob, opened: Any, trace: str) -> None:
     folder = finished("stopband")
     limited = pd.read_parquet(folder / "limited_by.parquet").set_index("design_id")
     seen = opened(folder)
@@ -121,7 +121,7 @@ def test_pointing_at_any_design_tells_its_limiting_lights(finished: Finished, op
         assert pointed[at + 1] == f"{pair.replace('_', '/')} CSD limited by: {lights}"
 
 
-def test_the_box_leaves_out_what_is_not_feasible(finished: Finished, standing: Any) -> None:
+def test_the_box_leaves_out_what_is_not_feasible(finished: FinishedJob, standing: Any) -> None:
     seen = standing(finished("stopband"))
     before = seen.number_of_points()
     seen.page.uncheck("#infeasible")
@@ -133,7 +133,7 @@ def test_the_box_leaves_out_what_is_not_feasible(finished: Finished, standing: A
     assert seen.number_of_points() == before
 
 
-def test_the_best_design_is_that_of_the_table(finished: Finished, standing: Any) -> None:
+def test_the_best_design_is_that_of_the_table(finished: FinishedJob, standing: Any) -> None:
     folder = finished("stopband")
     table = pd.read_parquet(folder / "results.parquet")
     best = table[table["feasible"] & table["kind"].isin(["sweep", "search"])].sort_values("csd_yellow_red").iloc[-1]
@@ -151,7 +151,7 @@ def test_the_best_design_is_that_of_the_table(finished: Finished, standing: Any)
     assert {"left_nm", "right_width_nm", "sensitivity", "yellow/red CSD"} <= set(said)
 
 
-def test_the_saved_front_has_every_digit(finished: Finished, standing: Any) -> None:
+def test_the_saved_front_has_every_digit(finished: FinishedJob, standing: Any) -> None:
     folder = finished("stopband")
     seen = standing(folder)
     with seen.page.expect_download() as waiting:
@@ -167,7 +167,7 @@ def test_the_saved_front_has_every_digit(finished: Finished, standing: Any) -> N
 
 
 @pytest.mark.slow
-def test_brushing_an_axis_counts_what_is_left(finished: Finished, standing: Any) -> None:
+def test_brushing_an_axis_counts_what_is_left(finished: FinishedJob, standing: Any) -> None:
     seen = standing(finished("stopband"), 1280)
     through(seen)
     before = seen.page.inner_text("#brushed")
@@ -180,7 +180,7 @@ def test_brushing_an_axis_counts_what_is_left(finished: Finished, standing: Any)
 
 
 @pytest.mark.slow
-def test_another_scenario_is_drawn_when_it_is_chosen(finished: Finished, standing: Any) -> None:
+def test_another_scenario_is_drawn_when_it_is_chosen(finished: FinishedJob, standing: Any) -> None:
     folder = finished("fog")
     seen = standing(folder, 1280)
     table = pd.read_parquet(folder / "results.parquet")

@@ -14,7 +14,7 @@ from sweep.report.colors import error_curves, noise_optimal, renderings
 from sweep.report.scorecard import ScoreRow, _row, scorecard
 
 from ..commanded import commanded
-from ..conftest import Finished
+from ..conftest import FinishedJob
 
 TINY = """
 study: tiny
@@ -116,7 +116,7 @@ def test_without_tasks_there_is_nothing_of_them(tiny: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_scorecard_of_the_project(finished: Finished) -> None:
+def test_the_scorecard_of_the_project(finished: FinishedJob) -> None:
     """The stopbands cost no more than RYYCy does: in no figure are they the worst, in most they are better."""
     folder = finished("scorecard")
     card = scorecard(read_output(folder))
@@ -137,7 +137,7 @@ def test_the_scorecard_of_the_project(finished: Finished) -> None:
 
 
 @pytest.mark.slow
-def test_a_balanced_stopband_keeps_its_bounds(finished: Finished) -> None:
+def test_a_balanced_stopband_keeps_its_bounds(finished: FinishedJob) -> None:
     """The bounds of the study are 1.1 times the figures of its own RYYCy."""
     output = read_output(finished("balanced"))
     ryycy = output.few.set_index("name").loc["RYYCy"]

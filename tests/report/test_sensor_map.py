@@ -10,7 +10,7 @@ import pytest
 
 from sweep.metrics.smooth import smooth_csd
 from sweep.report import read_output
-from sweep.report.sensor_map import map_drawings, sensor_figures, told_map
+from sweep.report.sensor_map import map_caption, map_drawings, sensor_figures
 from sweep.study import load_study
 
 from ..commanded import commanded
@@ -69,11 +69,11 @@ def test_the_report_draws_the_nominal_design_beside_the_robust_one(tiny: Path) -
     assert figure.level[0] == "RGGB"
     nominal, robust = (each.dn for each in figure.maps)
     assert nominal.min() < 0.5 * robust.min()
-    assert "Computed at 41 image heights, linear in between" in told_map(figure)
+    assert "Computed at 41 image heights, linear in between" in map_caption(figure)
     assert all((tiny / name).is_file() for name in OF_MAPS)
     page = (tiny / "report.html").read_text()
     assert "<h2>Over the sensor</h2>" in page
-    assert told_map(figure) in page
+    assert map_caption(figure) in page
     lens = read_output(tiny).few.set_index(["scenario", "name"]).loc[("lens", "nominal")]
     # The row is refined between the heights of the map.
     assert -1 < lens["csd_yellow_red"] - nominal.min() <= 1e-9

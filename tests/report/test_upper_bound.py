@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sweep.base.errors import BrokenProofError
+from sweep.base.errors import UpperBoundExceededError
 from sweep.report import read_output, summary_lines
-from sweep.report.answer import answer_sentences, large_numbers
+from sweep.report.answer import answer_sentences, headline_numbers
 from sweep.report.leaders import leaders_of, upper_bound_beside
 from sweep.report.page_data import payload
 from sweep.results.output import Output
@@ -75,7 +75,7 @@ def check_shown_bounds(output: Output) -> int:
             assert (leaders.chosen["cfa"], leaders.chosen["scenario"]) == (match["cfa"], own)
             assert leaders.chosen[goal] <= float(match["value"])
             shown += 1
-    for value, name, comparison in large_numbers(output):
+    for value, name, comparison in headline_numbers(output):
         if (match := LARGE.search(name)) is not None:
             assert leaders.chosen is not None
             assert (leaders.chosen["cfa"], leaders.chosen["scenario"]) == (match["cfa"], search.scenario)
@@ -136,7 +136,7 @@ def test_a_value_above_its_own_bound_is_an_error(tmp_path: Path) -> None:
     assert proven is not None
     assert upper_bound_beside(output, row) is not None
     assert upper_bound_beside(output, row | {output.goal.name: proven + 0.5}) is None  # its rounding
-    with pytest.raises(BrokenProofError, match="upper bound is"):
+    with pytest.raises(UpperBoundExceededError, match="upper bound is"):
         upper_bound_beside(output, row | {output.goal.name: proven + 3})
 
 

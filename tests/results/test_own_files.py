@@ -19,13 +19,13 @@ from sweep.report import make_report, read_output
 from sweep.results.inventory import Inventory
 from sweep.results.lock import LOCK, locked
 from sweep.results.parts import PARTS, ROWS, Parts
-from sweep.results.tables import RUN, is_drawn, is_own
+from sweep.results.tables import RUN, is_drawn, is_user_code
 from sweep.run import output_folder, run_study
 from sweep.study import Study, load_study
 
 from ..build import ran, study_file
 from ..cases import thinned
-from ..conftest import Finished
+from ..conftest import FinishedJob
 from ..mischief import rows
 
 NAMES = (
@@ -60,7 +60,7 @@ def test_a_file_that_was_there_before_is_told_and_stays(few: Study, tmp_path: Pa
 
     with pytest.raises(OutputError, match=f"{name}: is not of this run") as caught:
         run_study(few, base, 1, computed)
-    assert len(caught.value.faults) == 1
+    assert len(caught.value.issues) == 1
     assert (base / name).read_text() == "mine"
     folder, note = output_folder(base, few)  # the command goes beside it, and says why
     assert folder == tmp_path / "tiny-2"
@@ -137,7 +137,7 @@ def test_links_in_the_place_of_files_are_replaced_not_followed(
         (folder / name).unlink()
         (folder / name).symlink_to(target / "precious.txt")
     ran(few, folder, 1)
-    make_report(read_output(folder), mend=True)
+    make_report(read_output(folder), repair=True)
     assert (target / "precious.txt").read_text() == "precious"
     assert not any(path.is_symlink() for path in folder.rglob("*"))
     pd.testing.assert_frame_equal(rows(folder), expected)
@@ -152,13 +152,13 @@ def test_the_folder_itself_may_be_a_link(few: Study, expected: pd.DataFrame, tmp
 
 
 @pytest.mark.parametrize("study", ["stopband", pytest.param("fog", marks=pytest.mark.slow)])
-def test_names_that_reports_give_are_known(finished: Finished, study: str) -> None:
+def test_names_that_reports_give_are_known(finished: FinishedJob, study: str) -> None:
     """A picture of a new name is to be added to the names of a run's files."""
     folder = finished(study)
     drawn = [path for path in folder.rglob("*") if path.suffix in (".png", ".svg", ".html")]
     assert len(drawn) > 10
     assert all(is_drawn(path.relative_to(folder).as_posix()) for path in drawn)
-    assert all(map(is_own, Inventory(folder).files.keys() - {RUN}))
+    assert all(map(is_user_code, Inventory(folder).files.keys() - {RUN}))
 
 
 @pytest.mark.usefixtures("plain_pictures")
@@ -173,17 +173,17 @@ def test_a_report_in_use_is_one_line(few: Study, tmp_path: Path) -> None:
 
 def refusing(monkeypatch: pytest.MonkeyPatch, at: int, number: int) -> list[str]:
     """From the `at`-th on, no file takes its name; says which ones asked."""
-    asked: list[str] = []
+    requested: list[str] = []
     replaced: Callable[[Path, Path], Path] = Path.replace
 
     def replace_or_refuse(hidden: Path, path: Path) -> Path:
-        asked.append(path.name)
-        if len(asked) > at:
+        requested.append(path.name)
+        if len(requested) > at:
             raise OSError(number, os.strerror(number))
         return replaced(hidden, path)
 
     monkeypatch.setattr(Path, "replace", replace_or_refuse)
-    return asked
+    return requested
 
 
 @pytest.mark.parametrize("step", thinned([9, 1]))
@@ -202,7 +202,7 @@ def test_wherever_the_disk_refuses_nothing_finished_is_lost(
             refusing(patch, at, (errno.ENOSPC, errno.EROFS)[at % 2])
             with pytest.raises(OutputError, match="cannot be written") as caught:
                 ran(study, folder, 1)
-        assert len(caught.value.faults) == 1
+        assert len(caught.value.issues) == 1
         assert not list(folder.rglob(".tmp-*"))
         kept = sum(pq.read_metadata(path).num_rows for path in Parts(folder).paths(ROWS))
         seen = ran(study, folder, 1)
@@ -228,9 +228,9 @@ def test_a_report_that_the_disk_refuses_loses_no_result(
     with monkeypatch.context() as patch:
         refusing(patch, 0, errno.ENOSPC)
         with pytest.raises(OutputError, match="cannot be written: No space left"):
-            make_report(read_output(tmp_path), mend=True)
+            make_report(read_output(tmp_path), repair=True)
     pd.testing.assert_frame_equal(rows(tmp_path), expected)
     with pytest.raises(OutputError, match=r"report\.html: is missing"):
         status_of(tmp_path)
-    make_report(read_output(tmp_path), mend=True)
+    make_report(read_output(tmp_path), repair=True)
     assert status_of(tmp_path, verify=True).lines[-1].startswith("ok")

@@ -12,7 +12,7 @@ from sweep.report import make_report, read_output, summary_lines
 from sweep.results.tables import REGIONS_MAP
 from sweep.study import load_study
 
-from ..build import faults, ran
+from ..build import issues, ran
 
 ASKED = "regions: {wanted_dn: 150, peak_nm: [585, 645], peak_step_nm: 5, fwhm_nm: [12, 24], fwhm_step_nm: 6}"
 TEXT = f"""\
@@ -79,7 +79,7 @@ def test_a_map_is_told_and_drawn(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("asked", "said"),
+    ("requested", "said"),
     [
         ("regions: {}", "wanted_dn"),
         ("regions: {wanted_dn: 100, norms: [en_12369]}", "en_12368"),
@@ -93,13 +93,13 @@ def test_a_map_is_told_and_drawn(tmp_path: Path) -> None:
         ("wavelengths: {step_nm: 20}\nregions: {wanted_dn: 100}", "narrower than a step"),
         (
             "scenarios: {far: {target: {distance_m: 50, fov_deg: 60, phase_px: any}}}\nregions: {wanted_dn: 100}",
-            "needs a light at a named place",
+            "needs a named sampling phase",
         ),
     ],
 )
-def test_a_wrong_map_is_one_line(tmp_path: Path, asked: str, said: str) -> None:
-    found = faults(tmp_path, TEXT.replace(ASKED, asked))
-    assert any(said in fault for fault in found), found
+def test_a_wrong_map_is_one_line(tmp_path: Path, requested: str, said: str) -> None:
+    found = issues(tmp_path, TEXT.replace(ASKED, requested))
+    assert any(said in issue for issue in found), found
 
 
 def test_a_study_without_regions_makes_no_map(tmp_path: Path) -> None:

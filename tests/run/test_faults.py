@@ -17,7 +17,7 @@ from sweep.report import make_report, read_output
 from sweep.results.identity import CHUNK
 from sweep.results.lock import locked
 from sweep.results.parts import ANSWER, PARTS, ROWS, Parts
-from sweep.run import RunOptions, output_folder, run_study, to_do, to_do_lines
+from sweep.run import RunOptions, output_folder, remaining_work, remaining_work_lines, run_study
 from sweep.run.sweep import KILLED
 from sweep.run.workers import Workers, workers
 from sweep.study import Study, load_study
@@ -135,15 +135,15 @@ def test_status_of_a_run(plain: Study, tmp_path: Path) -> None:
 
 
 def test_dry_run_counts_what_is_finished(plain: Study, tmp_path: Path) -> None:
-    found = to_do(plain, tmp_path / "out", 1)
+    found = remaining_work(plain, tmp_path / "out", 1)
     assert found.finished == 0
     assert not (tmp_path / "out").exists()
     kept = kept_rows(half_done(plain, tmp_path / "out"))
-    found = to_do(plain, tmp_path / "out", 2)
+    found = remaining_work(plain, tmp_path / "out", 2)
     assert found.finished == kept
-    assert f": {kept:,} finished, {plain.n_designs - kept:,} in " in next(to_do_lines(found, tmp_path))
+    assert f": {kept:,} finished, {plain.n_designs - kept:,} in " in next(remaining_work_lines(found, tmp_path))
     ran(plain, tmp_path / "out", 1)
-    first, *_, last = to_do_lines(to_do(plain, tmp_path / "out", 1), tmp_path)
+    first, *_, last = remaining_work_lines(remaining_work(plain, tmp_path / "out", 1), tmp_path)
     assert first.endswith(f"{plain.n_designs:,} rows: {plain.n_designs:,} finished, 0 in 0 chunks to compute.")
     assert last.endswith("nothing was computed or written.")
 
@@ -152,12 +152,12 @@ def test_a_dry_run_says_what_is_searched_and_computed_and_computes_no_design(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = study_file(tmp_path, 2)
-    asked = "starts: 4, max_evaluations: 40, front: {min: 0.8, max: 0.9, count: 3}"
-    path.write_text(path.read_text().replace("starts: 4, max_evaluations: 200", asked))
+    requested = "starts: 4, max_evaluations: 40, front: {min: 0.8, max: 0.9, count: 3}"
+    path.write_text(path.read_text().replace("starts: 4, max_evaluations: 200", requested))
     monkeypatch.setattr("sweep.run.sweep.run_job", None)
     study = load_study(path)
-    found = to_do(study, tmp_path / "out", 1)
-    _, search, front, *effects, _ = to_do_lines(found, tmp_path / "out")
+    found = remaining_work(study, tmp_path / "out", 1)
+    _, search, front, *effects, _ = remaining_work_lines(found, tmp_path / "out")
     assert search == "Search: 4 starts, 40 evaluations at most."
     assert front == "Its front: 3 levels, 100 evaluations at most."  # two starts each, and one from each neighbor
     told = {line.partition(": ")[2] for line in effects}

@@ -17,7 +17,7 @@ from sweep.results.identity import fingerprint
 from sweep.run import held_out, run_study
 from sweep.study import load_study
 
-from ..build import faults, load, ran
+from ..build import issues, load, ran
 from ..mischief import StoppedError
 from .lamps import lights
 
@@ -80,8 +80,8 @@ def test_a_search_without_a_light_finds_no_less(folder: Path, monkeypatch: pytes
 
     A kill among them loses none.
     """
-    asked = "search: {starts: 4, max_evaluations: 400}\nvalidate: {leave_one_out: true}\n"
-    study = load(folder, text("one", "own", after=asked))
+    requested = "search: {starts: 4, max_evaluations: 400}\nvalidate: {leave_one_out: true}\n"
+    study = load(folder, text("one", "own", after=requested))
 
     def stop(phase: str, done: int, _total: int) -> None:
         if phase == "lights left out" and done == 1:
@@ -147,8 +147,8 @@ def test_another_light_changes_no_reading_of_a_resolved_study(folder: Path) -> N
     ],
 )
 def test_a_wrong_validation_is_one_line(folder: Path, after: str, said: str) -> None:
-    found = faults(folder, text("one", "own", after=after))
-    assert any(said in fault for fault in found), found
+    found = issues(folder, text("one", "own", after=after))
+    assert any(said in issue for issue in found), found
 
 
 def test_a_file_alone_is_told_apart_by_its_colors(folder: Path) -> None:

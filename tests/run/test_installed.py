@@ -62,7 +62,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     (found / "METADATA").write_text("Metadata-Version: 2.1\nName: cfa-extras\nVersion: 1.2\n")
     (found / "entry_points.txt").write_text(OFFERS)
     monkeypatch.syspath_prepend(str(root))
-    monkeypatch.setattr("sweep.base.own_code._begun", {})
+    monkeypatch.setattr("sweep.base.user_code._begun", {})
     monkeypatch.setenv("PYTHONPATH", str(root))  # for worker processes, which are started anew
     get_reusable_executor().shutdown()
     yield own
@@ -106,7 +106,7 @@ def test_a_family_and_a_metric_of_a_package_are_like_those_of_files(package: Pat
 def test_nothing_of_a_package_runs_unasked(tmp_path: Path) -> None:
     with pytest.raises(StudyError, match="what an installed package offers, whose code would run") as caught:
         study(tmp_path, allow=False)
-    assert len(caught.value.faults) == 2  # the family and the metric
+    assert len(caught.value.issues) == 2  # the family and the metric
     assert commanded("run", tmp_path / "named.yaml")[0] == 2
     assert not (tmp_path / "ran").exists()
     with pytest.raises(StudyError, match=r"unknown family \(got 'bands'\).*stopband, band; did you mean 'band'"):

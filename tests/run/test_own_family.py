@@ -67,7 +67,7 @@ def test_code_runs_only_when_it_is_allowed(tmp_path: Path) -> None:
     code = f"open({str(tmp_path / 'ran')!r}, 'w')\n{STOPBAND}"
     with pytest.raises(SweepError, match=r"names a Python file, whose code would run.*--allow-code") as caught:
         study(tmp_path, code=code, allow=False)
-    assert all("own.yaml:" in str(fault) for fault in caught.value.faults)
+    assert all("own.yaml:" in str(issue) for issue in caught.value.issues)
     for command in (("check",), ("plan",), ("run",), ("run", "--dry-run")):
         assert commanded(*command, tmp_path / "own.yaml")[0] == 2
     assert commanded("list", tmp_path)[0] == 0

@@ -13,7 +13,7 @@ from scipy.spatial.distance import cdist
 
 import sweep
 from sweep.base.errors import InterruptedRunError, StudyError, SweepError
-from sweep.base.own_code import OwnCode
+from sweep.base.user_code import UserCode
 from sweep.camera.linear import linear_model
 from sweep.metrics.smooth import SmoothDesign
 from sweep.report import make_report, read_output
@@ -246,5 +246,5 @@ def test_a_file_may_have_dataclasses_and_types(tmp_path: Path) -> None:
     )
     assert "mine.py:Spread" in study(tmp_path, code=typed).section.metrics
     plain = typed.replace("from __future__ import annotations\n", "")
-    made = OwnCode("mine.py:apart", plain.replace("def apart(readings)", "def apart(readings: np.ndarray)")).loaded
+    made = UserCode("mine.py:apart", plain.replace("def apart(readings)", "def apart(readings: np.ndarray)")).loaded
     assert made.__annotations__ == {"readings": np.ndarray}

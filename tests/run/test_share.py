@@ -13,7 +13,7 @@ import pytest
 from scipy.stats import binom
 
 from sweep.camera.linear import LinearModel
-from sweep.designs.tolerance import Off
+from sweep.designs.tolerance import ProductionError
 from sweep.metrics import drawn as drawn_module
 from sweep.metrics.bound import Bound
 from sweep.metrics.drawn import LampsAndCameras, rank_below
@@ -26,7 +26,7 @@ from sweep.results.tables import RESULTS
 from sweep.run.robustness import Candidate, drawn_dn
 from sweep.run.rows import jobs_of
 from sweep.search.gradients import Model
-from sweep.search.limit import limit_of, why_not
+from sweep.search.limit import limit_of, reason_without_bound
 from sweep.search.problem import Problem, SearchRun, best_feasible, starting_points
 from sweep.search.solver import search_from
 from sweep.study import Search, Study, load_study
@@ -112,7 +112,7 @@ def test_many_designs_are_made_in_blocks_and_read_out_once_for_all_pairs_within_
     smooth = LinearModel.smooth
     monkeypatch.setattr(LinearModel, "smooth", lambda self, curves: read.append(len(curves)) or smooth(self, curves))
 
-    def come_out(off: Off, some: slice) -> np.ndarray:
+    def come_out(off: ProductionError, some: slice) -> np.ndarray:
         made.append(len(points[some]))
         return search.space.curves(points[some], size, off)
 
@@ -149,8 +149,12 @@ def share_with(x: np.ndarray, wanted_dn: float, draws: int = 200_000) -> tuple[f
 def test_the_best_by_yield_has_the_share_and_no_other_optimum_has_a_larger_one() -> None:
     found = {}
     for name in ("yield_csd_yellow_red", "worst_csd_yellow_red", "csd_yellow_red"):
-        asked = problem(name)
-        log = [e for i, u in enumerate(starting_points(asked, 2, 1)) for e in search_from(asked, i, u, "SLSQP", 80).log]
+        requested = problem(name)
+        log = [
+            e
+            for i, u in enumerate(starting_points(requested, 2, 1))
+            for e in search_from(requested, i, u, "SLSQP", 80).log
+        ]
         best = best_feasible(log)
         assert best is not None
         found[name] = best
@@ -183,7 +187,7 @@ def test_as_column_and_constraint_any_number_of_workers_gives_the_same(tmp_path:
     assert re.search(
         r"separates yellow from red by 190 DN for 99 % of drawn lamps and cameras at 0\.\d+ of a clear", said
     )
-    assert why_not(problem()) == "yield_csd_yellow_red is not linear in the filter"
+    assert reason_without_bound(problem()) == "yield_csd_yellow_red is not linear in the filter"
 
 
 @pytest.mark.parametrize(
@@ -209,7 +213,7 @@ def test_what_does_not_fit_is_told(tmp_path: Path, old: str, new: str, told: str
 def test_the_limit_leaves_a_constraint_on_it_out_and_says_so() -> None:
     """Few lamps are the nearest: what 99 % have says nothing of the smallest CSD, by which filters must not be bound."""
     plain = replace(problem("csd_yellow_red"), constraints={"sensitivity": Bound(min=0.9)})
-    asked = replace(plain, constraints=plain.constraints | {"yield_csd_yellow_red": Bound(min=400)})
-    without, found = limit_of(plain), limit_of(asked)
+    requested = replace(plain, constraints=plain.constraints | {"yield_csd_yellow_red": Bound(min=400)})
+    without, found = limit_of(plain), limit_of(requested)
     assert found.left_out == ("yield_csd_yellow_red",)
     assert found.proven == without.proven > 0

@@ -141,12 +141,12 @@ def later(seconds: float, number: int) -> int:
 
 
 def test_results_come_as_they_finish_and_in_order_where_that_is_asked() -> None:
-    with workers(2, "threading") as crew:
+    with workers(2, "threading") as pool:
         calls = [joblib.delayed(later)(0.2 if number == 0 else 0.0, number) for number in range(6)]
-        finished = list(crew.unordered(calls))
+        finished = list(pool.unordered(calls))
         assert sorted(finished) == [(number, number) for number in range(6)]
         assert finished[0][0] != 0  # the slow one does not hold up what is finished beside it
-        assert list(crew(calls)) == list(range(6))
+        assert list(pool(calls)) == list(range(6))
 
 
 def workers_of(mark: str) -> list[psutil.Process]:

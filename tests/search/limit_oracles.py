@@ -113,8 +113,8 @@ def milp_limit(problem: Problem, t: float) -> float:
     """
     pairs, base = pairs_of(problem), problem.setup.camera.base_qe[0]
     needed = np.sqrt(np.maximum(np.maximum(pairs.least, t * pairs.rate) ** 2 - pairs.squared, 0))
-    asked = needed > 0
-    apart, needed, rate = pairs.apart[asked], needed[asked], pairs.rate[asked, None]
+    requested = needed > 0
+    apart, needed, rate = pairs.apart[requested], needed[requested], pairs.rate[requested, None]
     size, n = base.size, len(apart)
     # Variables N, a binary per pair, the margin. Above: apart @ N >= needed + rate margin - (1 - z) big; else below.
     most = needed + rate[:, 0] * (t + 1)

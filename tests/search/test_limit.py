@@ -22,7 +22,7 @@ from sweep.metrics.smooth import smooth_response
 from sweep.report.summary import _limit_line
 from sweep.results.facts import SearchFacts
 from sweep.search.gradients import Model
-from sweep.search.limit import _relaxed, limit_of, why_not
+from sweep.search.limit import _relaxed, limit_of, reason_without_bound
 from sweep.search.problem import Problem, SearchRun, starting_points
 from sweep.search.trade_off import check_proof
 from sweep.spectra.lights import Lights
@@ -97,10 +97,10 @@ def test_a_tighter_study_has_a_lower_limit() -> None:
 
 def test_no_limit_is_claimed_where_the_program_is_not_linear() -> None:
     other = replace(PROBLEM, objective=Objective(sum={"csd_green_red": 1.0, "csd_yellow_red": 2.0}))
-    assert why_not(other) == "the objective is a sum"
+    assert reason_without_bound(other) == "the objective is a sum"
     with pytest.raises(SweepError, match="no limit: the objective is a sum"):
         limit_of(other)
-    assert why_not(problem_of("dual")) == "more than one modified channel"
+    assert reason_without_bound(problem_of("dual")) == "more than one modified channel"
 
 
 def test_least_loss_of_sensitivity_is_the_inverse_of_the_largest_separation() -> None:
@@ -152,11 +152,13 @@ def test_no_limit_is_claimed_where_it_would_not_hold() -> None:
     qe = SETUP.camera.qe.copy()
     qe[SETUP.camera.modified[0]] = cyan
     above = replace(PROBLEM, family=Stopband(wave, cyan, green), setup=SETUP.with_camera(qe=qe))
-    assert why_not(above) == "filters of the box may exceed the curve that they replace"
+    assert reason_without_bound(above) == "filters of the box may exceed the curve that they replace"
     below = replace(PROBLEM, family=Stopband(wave, BASE, -0.1 * green))
-    assert why_not(below) == "filters of the box may be below 0"
+    assert reason_without_bound(below) == "filters of the box may be below 0"
     bright = replace(SETUP, scene=Scene(exposure=FixedExposure(exposure_s=1000.0)))
-    assert why_not(replace(PROBLEM, setup=bright)) == "signals exceed the full well or the range of the ADC"
+    assert (
+        reason_without_bound(replace(PROBLEM, setup=bright)) == "signals exceed the full well or the range of the ADC"
+    )
 
 
 def test_words_say_what_is_proven() -> None:
@@ -237,10 +239,10 @@ def values(problem: Problem, names: list[str]) -> list[dict[str, float]]:
 @pytest.mark.parametrize("made", thinned([noisy, half_yield_problem]))
 def test_what_meets_a_bound_of_the_study_meets_those_of_the_limit(made: Callable[[], Problem]) -> None:
     problem = made()
-    asked = {name: quantity for name, quantity in problem.quantities.items() if quantity.ends and quantity.smooth}
+    requested = {name: quantity for name, quantity in problem.quantities.items() if quantity.ends and quantity.smooth}
     known = 0
-    for design in values(problem, list(asked)):
-        for name, quantity in asked.items():
+    for design in values(problem, list(requested)):
+        for name, quantity in requested.items():
             for end in quantity.ends:
                 bound = Bound.model_construct(**({"min": None, "max": None} | {end: design[name]}))
                 relaxed, left_out = _relaxed(replace(problem, constraints={name: bound}))
@@ -256,12 +258,12 @@ def test_a_bound_on_what_a_share_has_is_left_out_of_the_limit() -> None:
     lights = replace(
         half_yield_problem().setup.lights, population=Population.model_validate({"wanted_yield": 0.5, "draws": 1000})
     )
-    asked = {"sensitivity": Bound(min=0.9), "yield_csd_yellow_red": Bound(min=285)}
+    requested = {"sensitivity": Bound(min=0.9), "yield_csd_yellow_red": Bound(min=285)}
     problem = replace(
         half_yield_problem(),
         setup=replace(half_yield_problem().setup, lights=lights),
         edge_shift_nm=0.0,
-        constraints=asked,
+        constraints=requested,
     )
     found = best_of(problem, 1, 60)
     limit = limit_of(problem)
@@ -278,6 +280,6 @@ def test_no_limit_is_claimed_where_a_filter_comes_out_above_the_curve_that_it_re
     problem = replace(
         half_yield_problem(), family=Stopband(wave, BASE, target), low=low, high=high, objective=objective
     )
-    assert why_not(problem) == "filters of the box may exceed the curve that they replace"
-    assert why_not(replace(problem, edge_shift_nm=0.0)) is None
-    assert why_not(replace(problem, objective=Objective(minimum={"csd_yellow_red": 1.0}))) is None
+    assert reason_without_bound(problem) == "filters of the box may exceed the curve that they replace"
+    assert reason_without_bound(replace(problem, edge_shift_nm=0.0)) is None
+    assert reason_without_bound(replace(problem, objective=Objective(minimum={"csd_yellow_red": 1.0}))) is None

@@ -15,7 +15,7 @@ from sweep.metrics.bound import Bound
 from sweep.metrics.objective import Objective
 from sweep.metrics.smooth_noise import smooth_detectability
 from sweep.search.least_noise import least_variance
-from sweep.search.limit import limit_of, why_not
+from sweep.search.limit import limit_of, reason_without_bound
 from sweep.search.problem import Problem
 
 from .problems import YELLOW_RED, best_of, noisy_problem
@@ -61,12 +61,12 @@ def test_of_each_error_without_a_limit_it_is_said_why() -> None:
     assert {q.metric for q in without} == {"cnr", "error", "error_bound", "state_error", "state_error_bound"}
     for quantity in without:
         rule = "least" if quantity.wanted == "less" else "minimum"
-        asked = replace(problem, objective=Objective.model_validate({rule: {quantity.name: 1.0}}))
+        requested = replace(problem, objective=Objective.model_validate({rule: {quantity.name: 1.0}}))
         why = "is not convex in the filter: its noise grows with the light; d' has a limit"
-        assert why_not(asked) == f"{quantity.name} {why}"
+        assert reason_without_bound(requested) == f"{quantity.name} {why}"
         with pytest.raises(SweepError, match="no limit: "):
-            limit_of(asked)
-    assert why_not(problem) is None
+            limit_of(requested)
+    assert reason_without_bound(problem) is None
 
 
 @pytest.mark.parametrize("scene", SCENES)

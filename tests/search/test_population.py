@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from sweep.api.user_filters import evaluate_curves
-from sweep.designs.tolerance import Off
+from sweep.designs.tolerance import ProductionError
 from sweep.metrics.members import population_imager
 from sweep.metrics.objective import Objective
 from sweep.metrics.smooth import smooth_csd
 from sweep.search.gradients import Model
-from sweep.search.limit import Limit, limit_of, why_not
+from sweep.search.limit import Limit, limit_of, reason_without_bound
 from sweep.search.problem import Problem, SearchRun, starting_points
 from sweep.spectra.population import Population
 from sweep.study import load_study
@@ -60,7 +60,7 @@ def test_a_point_that_is_no_number_has_as_many_rows_and_is_never_feasible() -> N
 
 @cache
 def limit() -> Limit:
-    assert why_not(problem(binning_nm=1)) is None
+    assert reason_without_bound(problem(binning_nm=1)) is None
     return limit_of(problem(binning_nm=1))
 
 
@@ -99,7 +99,7 @@ def test_the_table_of_the_documentation() -> None:
     for at, space in enumerate(study.spaces[:4]):
         shifts = (0.0,) if space.filter is None else (-2.0, -1.0, 0.0, 1.0, 2.0)
         point, setup = space.points(0, 1), study.setup(space, "f/2")
-        curves = [space.curves(point, study.grid.size, Off(shift)) for shift in shifts]
+        curves = [space.curves(point, study.grid.size, ProductionError(shift)) for shift in shifts]
         over = population_imager(setup).worst(np.concatenate(curves))["csd_yellow_red"].min()
         warm = population_imager(alone.setup(alone.spaces[at], "f/2")).worst(space.curves(point, study.grid.size))
         values = (

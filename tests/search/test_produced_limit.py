@@ -8,14 +8,14 @@ from functools import cache
 import numpy as np
 import pytest
 
-from sweep.designs.tolerance import Off
+from sweep.designs.tolerance import ProductionError
 from sweep.metrics.bound import Bound
 from sweep.metrics.members import population_imager
 from sweep.metrics.objective import Objective
 from sweep.metrics.smooth import smooth_csd
-from sweep.search.limit import Limit, limit_of, why_not
+from sweep.search.limit import Limit, limit_of, reason_without_bound
+from sweep.search.perturbed import all_ways, perturbed_filters
 from sweep.search.problem import starting_points
-from sweep.search.produced import all_ways, ways_of
 from sweep.study import load_study
 
 from ..conftest import STUDIES
@@ -43,8 +43,8 @@ def test_a_bound_on_sensitivity_is_none_of_what_comes_out() -> None:
     qe[MOVED.setup.camera.mosaic.channels.index("Y")] *= 0.95
     setup = MOVED.setup.with_camera(qe=qe)
     moved = replace(MOVED, setup=setup, constraints={"sensitivity": Bound(max=0.9)})
-    assert why_not(moved) == "the modified channel could set the exposure"
-    assert why_not(replace(moved, objective=Objective(minimum={"csd_yellow_red": 1.0}))) is None
+    assert reason_without_bound(moved) == "the modified channel could set the exposure"
+    assert reason_without_bound(replace(moved, objective=Objective(minimum={"csd_yellow_red": 1.0}))) is None
 
 
 def test_a_way_is_the_family_as_production_has_it() -> None:
@@ -53,10 +53,10 @@ def test_a_way_is_the_family_as_production_has_it() -> None:
     points = MOVED.from_unit(starting_points(MOVED, 64, 1))
     curves = family.curves(points)[:, 0]
     apart = rng.normal(size=(7, BASE.size))
-    ways = ways_of(MOVED)
+    ways = perturbed_filters(MOVED)
     assert all_ways(MOVED)
     for way, shift in zip(ways, (0, -2, -1, 1, 2), strict=True):
-        came_out = family.produced(Off(shift)).curves(points)[:, 0]
+        came_out = family.perturbed(ProductionError(shift)).curves(points)[:, 0]
         assert way.known.sum() >= 295
         rows, added = way.rows(apart)
         for curve, out in zip(curves, came_out, strict=True):
@@ -68,7 +68,7 @@ def test_a_way_is_the_family_as_production_has_it() -> None:
 def test_what_no_row_can_say_is_left_out_and_told() -> None:
     """Moves by part of a step, films that are too thick, a field of all places."""
     assert not all_ways(replace(MOVED, edge_shift_nm=1.5))
-    assert len(ways_of(replace(MOVED, edge_shift_nm=1.5))) == 1
+    assert len(perturbed_filters(replace(MOVED, edge_shift_nm=1.5))) == 1
     found = limit_of(replace(MOVED, edge_shift_nm=1.0))
     assert found.left_out == ("some edge shifts",)  # half a nanometer is no whole step
     assert found.proven > limit().proven
@@ -108,10 +108,10 @@ def test_its_filter_has_it_however_it_comes_out() -> None:
 def test_its_filter_keeps_the_bounds_of_the_study_on_worst_cases() -> None:
     """A program that knows some members of a worst case has filters that lack a little of it."""
     bounds = {**MOVED.constraints, "worst_csd_yellow_red": Bound(min=256)}
-    asked = replace(MOVED, constraints=bounds, objective=Objective(minimum={"csd_yellow_red": 1.0}))
-    found = limit_of(asked)
-    came_out = np.stack([way.curve(found.curve) for way in ways_of(asked)])[:, None]
-    each = smooth_csd(asked.setup, came_out, YELLOW_RED)
+    requested = replace(MOVED, constraints=bounds, objective=Objective(minimum={"csd_yellow_red": 1.0}))
+    found = limit_of(requested)
+    came_out = np.stack([way.curve(found.curve) for way in perturbed_filters(requested)])[:, None]
+    each = smooth_csd(requested.setup, came_out, YELLOW_RED)
     assert each.min() >= 256 * (1 - 1e-9)
     assert each[0] == pytest.approx(found.attained, rel=1e-12)
     assert 0 <= found.proven - found.attained <= 0.02
@@ -142,7 +142,7 @@ def test_free_form_filters_come_near_the_limit_over_lamps_and_edges() -> None:
     study = load_study(STUDIES / "robust.yaml", changes={"boxes.edges": FREE_FORM})
     searched = study.problem(study.search)
     best = best_of(searched, 1, 100)
-    came_out = [searched.family.produced(Off(shift)).curves(best.x[None]) for shift in SHIFTS]
+    came_out = [searched.family.perturbed(ProductionError(shift)).curves(best.x[None]) for shift in SHIFTS]
     worst = population_imager(searched.setup).worst(np.concatenate(came_out))["csd_yellow_red"].min()
     assert worst == pytest.approx(best.objective, rel=1e-9)
     proven = limit_of(searched).proven

@@ -15,7 +15,7 @@ from sweep.camera.linear import LinearModel, linear_model
 from sweep.camera.sensor_field import SensorField
 from sweep.camera.setup import Setup
 from sweep.metrics.smooth import smooth_csd, smooth_response
-from sweep.search.limit import Limit, limit_of, why_not
+from sweep.search.limit import Limit, limit_of, reason_without_bound
 from sweep.search.problem import Problem
 from sweep.study import load_study
 
@@ -54,7 +54,7 @@ def smallest_csd_at(setup: Setup, angles_deg: Iterable[float], curve: np.ndarray
 
 @cache
 def limit() -> Limit:
-    assert why_not(problem()) is None
+    assert reason_without_bound(problem()) is None
     return limit_of(problem())
 
 

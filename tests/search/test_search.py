@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sweep.base.errors import BrokenProofError
+from sweep.base.errors import UpperBoundExceededError
 from sweep.cli.app import main
 from sweep.designs.families.free_form import FreeForm
 from sweep.metrics.bound import FEASIBLE, Bound, total_violation
@@ -239,7 +239,7 @@ def test_a_limit_below_what_the_search_found_stops_the_run(
     with monkeypatch.context() as wrong:
         for module in (searching, trade_off):
             wrong.setattr(module, "limit_of", planted)
-        assert ended() == BrokenProofError.exit_code == 5
+        assert ended() == UpperBoundExceededError.exit_code == 5
         said = capsys.readouterr().err.splitlines()
         assert len(said) == 1
         assert where in said[0]

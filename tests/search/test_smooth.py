@@ -15,9 +15,9 @@ from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.objective import Objective
 from sweep.metrics.smooth import smooth_csd
 from sweep.search.gradients import Model
-from sweep.search.limit import limit_of, why_not
+from sweep.search.limit import limit_of, reason_without_bound
 from sweep.search.problem import Problem, SearchRun, starting_points
-from sweep.search.solver import best_reachable
+from sweep.search.solver import extreme_value
 
 from ..cases import thinned
 from .problems import PROBLEM, best_of, best_random, csd_of, problem_of
@@ -96,7 +96,7 @@ def test_a_search_in_a_far_scene_stays_below_its_limit() -> None:
     assert 0.7 * limit.proven < best_of(problem, 4, 125).objective <= limit.proven
     assert limit.proven < limit_of(PROBLEM).proven  # blur takes separation away from every filter
     mixed = replace(problem, setup=setup.with_camera(pixel=Pixel(crosstalk=0.01)))
-    assert why_not(mixed) == "crosstalk mixes the modified channel into others"
+    assert reason_without_bound(mixed) == "crosstalk mixes the modified channel into others"
 
 
 def test_worst_case_is_the_smallest_over_the_shifts() -> None:
@@ -132,7 +132,7 @@ def test_best_reachable_is_the_extreme_of_a_quantity_alone() -> None:
         "csd_yellow_red": Bound(min=4000.0),
     }
     problem = replace(PROBLEM, constraints=impossible)
-    found = {name: best_reachable(problem, name, starts, 200) for name in impossible}
+    found = {name: extreme_value(problem, name, starts, 200) for name in impossible}
     base = PROBLEM.setup.camera.base_qe
     u = np.random.default_rng(5).uniform(size=(20_000, problem.free.size))
     x = problem.from_unit(u)

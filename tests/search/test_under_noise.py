@@ -23,11 +23,11 @@ from sweep.metrics.bound import Bound
 from sweep.metrics.discrimination import pairwise_error
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.objective import Objective
-from sweep.metrics.quantity import Asked
+from sweep.metrics.quantity import RequestedQuantities
 from sweep.metrics.registry import quantities_of
 from sweep.metrics.smooth import Rows, SmoothDesign
 from sweep.search.problem import Problem, starting_points
-from sweep.search.solver import best_reachable, smooth_objective
+from sweep.search.solver import extreme_value, smooth_objective
 from sweep.study import load_study
 
 from ..conftest import STUDIES
@@ -41,7 +41,7 @@ FAMILIES: tuple[Family, ...] = (
     FreeForm(GRID.nodes_nm, SENSOR.qe["Y"], np.array([500.0, 560.0, 600.0, 620.0, 650.0, 690.0])),
     Dual(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["C"]),
 )
-NOISY = [q for q in quantities_of(Asked(STATES, STATES)).values() if q.states]
+NOISY = [q for q in quantities_of(RequestedQuantities(STATES, STATES)).values() if q.states]
 
 
 def family_of(seed: int, n_modified: int) -> tuple[Family, np.ndarray, np.ndarray]:
@@ -145,7 +145,7 @@ def test_bounds_on_errors_are_kept_and_their_reach_is_told() -> None:
     assert found["dprime_yellow_red"][0] == pytest.approx(5.0, rel=2e-3)  # light is bought with distance
     assert found["error_green_red"][0] <= 1e-4
     alone = {"error_yellow_red": Bound(max=1e-12)}
-    reached = best_reachable(
+    reached = extreme_value(
         replace(problem, constraints=alone), "error_yellow_red", starting_points(problem, 4, 1), 150
     )
     free = replace(problem, constraints={}, objective=Objective(least={"error_yellow_red": 1.0}))
@@ -153,7 +153,7 @@ def test_bounds_on_errors_are_kept_and_their_reach_is_told() -> None:
 
 
 @pytest.mark.parametrize(
-    ("told", "fault"),
+    ("told", "issue"),
     [
         (
             "objective: error_yellow_red",
@@ -167,13 +167,13 @@ def test_bounds_on_errors_are_kept_and_their_reach_is_told() -> None:
         ("constraints: {cnr_yellow_red: {max: 2}}", "cnr_yellow_red has no `max`"),
     ],
 )
-def test_what_cannot_be_asked_of_errors_is_a_line(told: str, fault: str, tmp_path: Path) -> None:
+def test_what_cannot_be_asked_of_errors_is_a_line(told: str, issue: str, tmp_path: Path) -> None:
     start = "study: x\nsensor: ar0820\nlights: tl16\ncfas: [RGGB]\nscenarios: {s: {noise: true}}\nrecognition: {}\n"
     file = tmp_path / "x.yaml"
     file.write_text(f"{start}{told}\n")
     with pytest.raises(StudyError) as error:
         load_study(file)
-    assert fault in str(error.value)
+    assert issue in str(error.value)
     file.write_text(f"{start}{told}\n".replace("recognition: {}\n", ""))
     with pytest.raises(StudyError) as error:
         load_study(file)
@@ -235,7 +235,7 @@ def test_the_filter_of_the_noise_study_is_what_a_search_finds() -> None:
 
 
 def test_a_search_refuses_what_has_no_smooth_rows(tmp_path: Path) -> None:
-    every = quantities_of(Asked(STATES, STATES, probabilities=True, vision=True))
+    every = quantities_of(RequestedQuantities(STATES, STATES, probabilities=True, vision=True))
     without = [q.name for q in every.values() if q.ends and q.smooth is None]
     assert {q.metric for q in map(every.get, without) if q is not None} == {"cdp"}
     text = (STUDIES / "stopband.yaml").read_text().replace("search:", "recognition: {probabilities: true}\nsearch:", 1)
@@ -245,7 +245,7 @@ def test_a_search_refuses_what_has_no_smooth_rows(tmp_path: Path) -> None:
         path.write_text(constrained.replace("level: 0.95}", "level: 0.95}\n    noise: true", 1))
         with pytest.raises(StudyError) as caught:
             load_study(path)
-        (fault,) = caught.value.faults
-        assert str(fault).endswith(
+        (issue,) = caught.value.issues
+        assert str(issue).endswith(
             f"constraints.{name}: the search does not know {name}; allowed: a study without `search`"
         )

@@ -63,5 +63,5 @@ def test_a_search_by_gradients_is_refused(change: dict[str, Any]) -> None:
         StudyError, match=r"vision_error has no derivatives, which SLSQP needs; allowed: .*COBYLA"
     ) as found:
         study_of_keys(keys, Path())
-    assert len(found.value.faults) == 1
+    assert len(found.value.issues) == 1
     assert study_of_keys({**keys, "search": KEYS["search"]}, Path()).search is not None

@@ -16,10 +16,10 @@ def written(tmp_path: Path, text: str, name: str = "curves.csv") -> Path:
     return path
 
 
-def faults(path: Path) -> list[str]:
+def issues(path: Path) -> list[str]:
     with pytest.raises(DataError) as caught:
         read_curves(path)
-    return [str(fault).replace(str(path), "FILE") for fault in caught.value.faults]
+    return [str(issue).replace(str(path), "FILE") for issue in caught.value.issues]
 
 
 def test_csv(tmp_path: Path) -> None:
@@ -51,13 +51,13 @@ def test_csv(tmp_path: Path) -> None:
     ],
 )
 def test_a_fault_of_a_csv_names_file_line_column_value(tmp_path: Path, text: str, words: list[str]) -> None:
-    found = faults(written(tmp_path, text))
+    found = issues(written(tmp_path, text))
     assert len(found) == 1
     assert all(word in found[0] for word in words), found
 
 
 def test_every_fault_of_a_csv_is_named(tmp_path: Path) -> None:
-    assert len(faults(written(tmp_path, "wavelength_nm,R,G\n400,a,1\n410,1,-1\n405,nan,1\n"))) == 4
+    assert len(issues(written(tmp_path, "wavelength_nm,R,G\n400,a,1\n410,1,-1\n405,nan,1\n"))) == 4
 
 
 def test_mat_of_isetcam(tmp_path: Path) -> None:
@@ -89,7 +89,7 @@ def test_mat_of_one_spectrum(tmp_path: Path) -> None:
 def test_a_wrong_mat_is_one_line(tmp_path: Path, fields: dict[str, object], word: str) -> None:
     path = tmp_path / "wrong.mat"
     savemat(path, fields)
-    found = faults(path)
+    found = issues(path)
     assert len(found) == 1
     assert word in found[0]
 
@@ -98,11 +98,11 @@ def test_damaged_files_are_faults(tmp_path: Path) -> None:
     for content in (b"", b"not a mat file", b"\x89HDF\r\n\x1a\n" + bytes(200), b"MATLAB 7.3 MAT-file" + bytes(400)):
         path = tmp_path / "damaged.mat"
         path.write_bytes(content)
-        assert len(faults(path)) == 1
+        assert len(issues(path)) == 1
     (tmp_path / "latin.csv").write_bytes(b"wavelength_nm,\xe9\n400,1\n700,1\n")
     assert read_curves(tmp_path / "latin.csv").notes == ("the text is not UTF-8, and was read as Latin-1",)
-    assert "cannot be read" in faults(tmp_path / "absent.csv")[0]
-    assert ".csv, .tsv, .txt, .dat, .mat" in faults(written(tmp_path, "x", "curves.xls"))[0]
+    assert "cannot be read" in issues(tmp_path / "absent.csv")[0]
+    assert ".csv, .tsv, .txt, .dat, .mat" in issues(written(tmp_path, "x", "curves.xls"))[0]
 
 
 def test_digest_is_sha256_of_the_bytes(tmp_path: Path) -> None:
@@ -111,11 +111,11 @@ def test_digest_is_sha256_of_the_bytes(tmp_path: Path) -> None:
 
 
 def test_one_bad_cell_is_one_fault_and_old_line_ends_are_read(tmp_path: Path) -> None:
-    assert len(faults(written(tmp_path, "wavelength_nm,a\n400,1\nx,1\n700,2\n"))) == 1
+    assert len(issues(written(tmp_path, "wavelength_nm,a\n400,1\nx,1\n700,2\n"))) == 1
     path = tmp_path / "mac.csv"
     path.write_bytes(b"wavelength_nm,a\r400,1\r700,2\r")
     assert list(read_curves(path).values["a"]) == [1, 2]
-    assert "CSV" in faults(written(tmp_path, 'wavelength_nm,a\n400,"' + "1" * 200_000 + "\n"))[0]
+    assert "CSV" in issues(written(tmp_path, 'wavelength_nm,a\n400,"' + "1" * 200_000 + "\n"))[0]
     savemat(
         tmp_path / "names.mat",
         {"wavelength": [400.0, 700.0], "data": np.ones((2, 2)), "filterNames": np.array(["", ""], dtype=object)},

@@ -38,7 +38,7 @@ def refused(path: Path, content: bytes) -> str:
     path.write_bytes(content)
     with pytest.raises(DataError) as caught, within(HANG_S):
         read_curves(path)
-    assert len(caught.value.faults) == 1, str(caught.value)
+    assert len(caught.value.issues) == 1, str(caught.value)
     return str(caught.value).replace(str(path), "FILE")
 
 
@@ -147,7 +147,7 @@ def test_of_many_faults_reading_stops(tmp_path: Path) -> None:
     )
     with within(HANG_S):
         scan = scan_curves(path)
-    assert str(scan.faults[0][-1]) == f"{path}:12: too many faults; what follows was not read"
+    assert str(scan.issues[0][-1]) == f"{path}:12: too many errors; the rest was not read"
 
 
 @pytest.mark.parametrize(

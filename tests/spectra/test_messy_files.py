@@ -185,7 +185,7 @@ def test_a_text_in_utf_16_is_text(tmp_path: Path, encoding: str) -> None:
     path.write_text(text(), encoding)
     scan = scan_curves(path)
     np.testing.assert_allclose(scan.values, QE, rtol=1e-5)
-    assert ["NUL characters" in str(fault) for fault in chain(*scan.faults)] == ([] if encoding == "utf-16" else [True])
+    assert ["NUL characters" in str(issue) for issue in chain(*scan.issues)] == ([] if encoding == "utf-16" else [True])
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
@@ -256,7 +256,7 @@ def test_of_mutated_files_none_is_a_wrong_curve(tmp_path: Path) -> None:
 def test_what_no_rule_mends_is_not_cleaned(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text(text().replace(f"600,{QE[22, 0]:g}", "600,-0.3", 1))
-    assert scan_curves(path).faults
+    assert scan_curves(path).issues
     code, _, err = commanded("describe", path, "--clean", tmp_path / "b.csv")
     assert code == 2
     assert "negative value at 600 nm" in err

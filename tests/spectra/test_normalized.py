@@ -33,22 +33,24 @@ def qe_file(folder: Path, top: float) -> Path:
     return folder / "qe.csv"
 
 
-@pytest.mark.parametrize(("top", "looks"), [(1.0, True), (0.8, False), (0.999, False)])
-def test_a_file_with_a_maximum_of_one_is_said_to_look_normalized(tmp_path: Path, top: float, looks: bool) -> None:
+@pytest.mark.parametrize(("top", "normalized"), [(1.0, True), (0.8, False), (0.999, False)])
+def test_a_file_with_a_maximum_of_one_is_said_to_look_normalized(tmp_path: Path, top: float, normalized: bool) -> None:
     qe = qe_file(tmp_path, top)
-    assert (f"Note: {NORMALIZED}." in described(qe, tmp_path).lines) == looks
-    assert (f"Note: qe.csv: {NORMALIZED}." in new_study("mine", tmp_path, qe, None, "energy")) == looks
+    assert (f"Note: {NORMALIZED}." in described(qe, tmp_path).lines) == normalized
+    assert (f"Note: qe.csv: {NORMALIZED}." in new_study("mine", tmp_path, qe, None, "energy")) == normalized
 
 
 @pytest.mark.parametrize(
-    ("top", "scale", "looks"),
+    ("top", "scale", "normalized"),
     [(1.0, "scale: 1", True), (1.0, "scale: 0.6", False), (100.0, "scale: 0.01", True), (0.8, "scale: 1", False)],
 )
-def test_a_study_says_so_by_what_its_scale_makes_of_it(tmp_path: Path, top: float, scale: str, looks: bool) -> None:
+def test_a_study_says_so_by_what_its_scale_makes_of_it(
+    tmp_path: Path, top: float, scale: str, normalized: bool
+) -> None:
     qe_file(tmp_path, top)
     (tmp_path / "tiny.yaml").write_text(STUDY.replace("SCALE", scale))
     study = load_study(tmp_path / "tiny.yaml")
-    assert study.warnings == ((f"qe.csv: {NORMALIZED}",) if looks else ())
+    assert study.warnings == ((f"qe.csv: {NORMALIZED}",) if normalized else ())
 
 
 def test_a_transmission_of_one_is_no_relative_response(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import pytest
 from colour import MSDS_CMFS
 
 from sweep.spectra.color import SIGNAL_REGIONS
-from sweep.spectra.single_leds import Norm, RegionMap, SingleLeds, every_led
+from sweep.spectra.single_leds import Norm, RegionMap, SingleLeds, all_leds
 from sweep.spectra.spectrum import WavelengthGrid
 
 SAE_J578 = {
@@ -41,8 +41,8 @@ CONDITIONS = {
 @pytest.mark.parametrize("norm", ["en_12368", "ite"])
 @pytest.mark.parametrize("kind", ["yellow", "red"])
 def test_a_norm_allows_what_its_conditions_say(norm: Norm, kind: str) -> None:
-    asked = RegionMap(wanted_dn=1, peak_nm=(578.0, 664.0), peak_step_nm=2, fwhm_nm=(12.0, 36.0), fwhm_step_nm=12)
-    found = every_led(asked).allowed(norm, kind)
+    requested = RegionMap(wanted_dn=1, peak_nm=(578.0, 664.0), peak_step_nm=2, fwhm_nm=(12.0, 36.0), fwhm_step_nm=12)
+    found = all_leds(requested).allowed(norm, kind)
     allowed = {*zip(found.peak_nm, found.fwhm_nm, strict=True)}
     assert 5 < len(allowed) < 100
     functions = MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]

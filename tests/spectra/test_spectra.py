@@ -12,7 +12,7 @@ from sweep.spectra.spectrum import (
     check_samples,
     energy_from_photons,
     equal_photons,
-    hats,
+    linear_basis,
     photons_from_energy,
     resample,
 )
@@ -114,4 +114,4 @@ def test_hats_interpolate_as_lines_do() -> None:
     for n in (1, 2, 7, 40):
         knots, values = np.cumsum(rng.uniform(0.1, 2, n)), rng.uniform(-1, 1, n)
         at = np.concatenate([rng.uniform(knots[0] - 1, knots[-1] + 1, 50), knots])
-        np.testing.assert_allclose(values @ hats(at, knots), np.interp(at, knots, values), rtol=0, atol=1e-14)
+        np.testing.assert_allclose(values @ linear_basis(at, knots), np.interp(at, knots, values), rtol=0, atol=1e-14)

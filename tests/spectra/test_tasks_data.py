@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from sweep.spectra.builtin import spectra, stand_ins, task_sets
+from sweep.spectra.builtin import spectra, surrogate_spectra, task_sets
 from sweep.spectra.color import chromaticity, corners
 from sweep.spectra.spectrum import WavelengthGrid
 from sweep.spectra.tasks import SHIPPED
@@ -37,7 +37,9 @@ def test_every_set_has_the_digest_that_its_card_was_written_with() -> None:
     assert sum(cards["earthlib"].groups.values()) <= 300
     assert cards["cie_test_colors"].groups == {"cie_test_colors": 99}
     assert cards["training_reflectances"].groups == {"training_reflectances": 190}
-    assert all(card.source and card.license and card.credit for card in (*cards.values(), *stand_ins.surrogate_cards()))
+    assert all(
+        card.source and card.license and card.credit for card in (*cards.values(), *surrogate_spectra.surrogate_cards())
+    )
     changed = spectra.shipped_groups()["colorchecker"]
     assert spectra.numbers_digest(changed[:-1]) != cards["colorchecker"].sha256
 
@@ -49,11 +51,11 @@ def test_measured_reflectances_are_shares() -> None:
         assert (values <= 1).all()
 
 
-@pytest.mark.parametrize("group", list(stand_ins.STAND_INS))
+@pytest.mark.parametrize("group", list(surrogate_spectra.SURROGATES))
 def test_a_surrogate_lies_inside_its_color_region(group: str) -> None:
-    light = task_sets.illuminant(GRID, "d65") if stand_ins.is_sheeting(group) else 1.0
+    light = task_sets.illuminant(GRID, "d65") if surrogate_spectra.is_sheeting(group) else 1.0
     xy = chromaticity(GRID, task_sets.group(GRID, group) * light)
-    assert (stand_ins.region(group).violation(xy) <= 0).all()
+    assert (surrogate_spectra.region(group).violation(xy) <= 0).all()
 
 
 def test_corners_bound_their_polygon() -> None:
@@ -66,7 +68,7 @@ def test_corners_bound_their_polygon() -> None:
 
 def test_white_lamps_of_the_task_are_white() -> None:
     """LED-B1 and the filament lie in the regulation's white, a sodium lamp does not."""
-    own = stand_ins.LAMP_REGIONS["white"]
+    own = surrogate_spectra.LAMP_REGIONS["white"]
     lamps = [spectra.gridded(GRID, spectra.spectrum_of("cie_illuminants", name)) for name in ("A", "LED-B1", "HP1")]
     assert (own.violation(chromaticity(GRID, np.stack(lamps))) <= 0).tolist() == [True, True, False]
 

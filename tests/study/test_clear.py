@@ -9,7 +9,7 @@ import pytest
 
 import sweep
 from sweep.camera.sensor import make_sensor
-from sweep.report.answer import answer_sentences, large_numbers
+from sweep.report.answer import answer_sentences, headline_numbers
 from sweep.report.compare_tables import curve_notes
 from sweep.report.summary import summary_lines
 from sweep.report.trade_off import around_designs
@@ -50,7 +50,7 @@ def texts_of(output: Output) -> list[str]:
     return [
         *answer_sentences(output)[:1],
         next(line for line in summary_lines(output) if "and their share" in line),
-        large_numbers(output)[1][1],
+        headline_numbers(output)[1][1],
         around_designs(output, "chart").x_label,
         output.columns["cfa_sensitivity"].meaning,
     ]

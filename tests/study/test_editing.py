@@ -159,8 +159,8 @@ def test_the_shell_completes_studies_and_runs(tmp_path: Path, monkeypatch: pytes
     assert study_files("studies/[") == ["studies/[x].yaml"]
     assert study_files("nothing") == []
     assert run_folders("") == run_folders("outputs/") == ["outputs/one"]
-    asked = {"_SWEEP_COMPLETE": "complete_bash", "COMP_WORDS": "sweep run studies/t", "COMP_CWORD": "2"}
-    assert shell(asked).splitlines() == ["studies/two.yml"]
+    requested = {"_SWEEP_COMPLETE": "complete_bash", "COMP_WORDS": "sweep run studies/t", "COMP_CWORD": "2"}
+    assert shell(requested).splitlines() == ["studies/two.yml"]
 
 
 def shell(environment: dict[str, str]) -> str:

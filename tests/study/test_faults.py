@@ -9,7 +9,7 @@ import pytest
 from sweep.base.errors import StudyError
 from sweep.study import Study, load_study
 
-from ..build import BASE, faults, one_line
+from ..build import BASE, issues, one_line
 from ..commanded import commanded
 from ..conftest import STUDIES
 
@@ -19,7 +19,7 @@ NOISY = "recognition: {}\nscenarios: {chart: {noise: true}}\n"
 
 def lines(tmp_path: Path, text: str) -> list[str]:
     """The line and the key of each fault."""
-    return ["".join(fault.split(":")[1:3]) for fault in faults(tmp_path, text)]
+    return ["".join(issue.split(":")[1:3]) for issue in issues(tmp_path, text)]
 
 
 @pytest.mark.parametrize(
@@ -76,19 +76,19 @@ def test_no_fault_follows_from_another(tmp_path: Path, old: str, new: str, expec
     ],
 )
 def test_the_name_of_a_pair_in_the_other_order_is_proposed(tmp_path: Path, text: str, meant: str) -> None:
-    assert faults(tmp_path, BASE + text)[0].endswith(f"did you mean {meant!r}?")
+    assert issues(tmp_path, BASE + text)[0].endswith(f"did you mean {meant!r}?")
     name = text.partition("objective: ")[2].strip()
     if name:
         text = BASE.replace("sensitivity:", f"{name}:") + text.partition("objective:")[0]
-        assert faults(tmp_path, text)[0].endswith(f"did you mean {meant!r}?")
+        assert issues(tmp_path, text)[0].endswith(f"did you mean {meant!r}?")
 
 
 @pytest.mark.parametrize(("said", "meant"), [("yes", "true"), ("On", "true"), ("no", "false"), ("off", "false")])
 def test_a_boolean_of_another_yaml_is_told_as_it_is_written(tmp_path: Path, said: str, meant: str) -> None:
     expected = f"true or false expected: write {meant} (got {said!r})"
     for section in ("scenarios: {chart: {noise: BOOLEAN}}\n", "validate: {leave_one_out: BOOLEAN}\n"):
-        assert faults(tmp_path, BASE + section.replace("BOOLEAN", said))[0].endswith(expected)
-    other = faults(tmp_path, BASE + "scenarios: {chart: {noise: loud}}\n")[0]
+        assert issues(tmp_path, BASE + section.replace("BOOLEAN", said))[0].endswith(expected)
+    other = issues(tmp_path, BASE + "scenarios: {chart: {noise: loud}}\n")[0]
     assert other.endswith("not allowed (got 'loud'); allowed: true, false or a mapping")
 
 
@@ -118,7 +118,7 @@ def test_faults_of_the_file_beside_those_of_an_option_have_their_lines(tmp_path:
     path.write_text(MEANING)
     with pytest.raises(StudyError) as caught:
         load_study(path, changes={"search.space": "edgs", "cfas.0": "RGB"})
-    places = [(fault.file, fault.line, fault.key) for fault in caught.value.faults]
+    places = [(issue.file, issue.line, issue.key) for issue in caught.value.issues]
     assert places == [
         (str(path), 9, "sweeps.edges.cfa"),
         (str(path), 19, "constraints.sensitivty"),

@@ -129,7 +129,7 @@ def test_the_study_says_every_number_that_the_schema_knows(tmp_path: Path) -> No
         "ScenarioTemplate",
         "Target",
         "Geometry",
-        "Drive",
+        "PwmDrive",
         "Noise",
         "FixedExposure",
         "WhitePatchExposure",
@@ -147,7 +147,7 @@ def test_the_study_says_every_number_that_the_schema_knows(tmp_path: Path) -> No
 def test_every_physical_figure_has_limits_that_editors_know() -> None:
     """All of pixel, optics, scene and exposure; an upper limit at least, and a lower one above 0 where 0 divides."""
     schema = study_schema()["$defs"]
-    for name in ("Pixel", "Optics", "ScenarioTemplate", "Target", "Geometry", "Drive", "Noise", "FixedExposure"):
+    for name in ("Pixel", "Optics", "ScenarioTemplate", "Target", "Geometry", "PwmDrive", "Noise", "FixedExposure"):
         for key, prop in schema[name]["properties"].items():
             for part in [prop, *prop.get("anyOf", [])]:
                 if part.get("type") in ("number", "integer") and key != "offset_dn":  # which full scale limits
@@ -278,8 +278,8 @@ def test_negative_zero_is_zero(tmp_path: Path) -> None:
         ("scenarios: {a: {each: {x: {min: -1.0e+308, max: 1.0e+308, count: 3}}}}", "a number, a list of numbers"),
         ("scenarios: {a: {each: {off_axis_deg: [1, 2], x: [true]}}}", "a number, a list of numbers"),
         ("scenarios: {" + ", ".join(f"s{i}: {{}}" for i in range(2001)) + "}", "more than 2000 scenarios"),
-        ("scenarios: {a: {target: {distance_m: 9, fov_deg: 9, phase_px: [true, 1]}}}", "a place is `any`"),
-        ("scenarios: {a: {target: {distance_m: 9, fov_deg: 9, phase_px: [1.0e+10, 1]}}}", "a place is `any`"),
+        ("scenarios: {a: {target: {distance_m: 9, fov_deg: 9, phase_px: [true, 1]}}}", "a sampling phase is `any`"),
+        ("scenarios: {a: {target: {distance_m: 9, fov_deg: 9, phase_px: [1.0e+10, 1]}}}", "a sampling phase is `any`"),
         ("constraints: {sensitivity: {min: 5.0e-324}}", "too near to 0"),
         ("recognition: {states: [" + ", ".join(f"s{i}" for i in range(41)) + "]}", "at most 40 items"),
     ],

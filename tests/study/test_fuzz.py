@@ -15,7 +15,7 @@ import pytest
 from ruamel.yaml import YAML
 from scipy.io import loadmat, savemat
 
-from sweep.base.errors import MOST_FAULTS, SweepError
+from sweep.base.errors import MOST_ISSUES, SweepError
 from sweep.cli.describe import described
 from sweep.run.rows import rules_of, run_job
 from sweep.run.sweep import Sweep
@@ -61,7 +61,7 @@ def studies(tmp_path: Path) -> list[dict[str, Any]]:
 def told(error: SweepError) -> None:
     """Its lines are what the command prints."""
     lines = str(error).splitlines()
-    assert 1 <= len(lines) <= MOST_FAULTS
+    assert 1 <= len(lines) <= MOST_ISSUES
     assert all(line.strip() and line.isprintable() and len(line) < 20_000 for line in lines)
     str(error).encode()
 

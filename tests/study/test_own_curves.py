@@ -10,7 +10,7 @@ import pytest
 from sweep.study import load_study
 from sweep.study.model import Study
 
-from ..build import faults
+from ..build import issues
 
 STUDY = """\
 study: tiny
@@ -61,7 +61,7 @@ def test_an_own_curve_takes_the_place_of_the_built_in_one_in_every_cfa(tmp_path:
 )
 def test_faults_name_the_place(tmp_path: Path, columns: str, rest: str, said: str) -> None:
     (tmp_path / "own.csv").write_text("wavelength_nm,mine\n390,40\n710,40\n")
-    found = faults(tmp_path, STUDY.replace("COLUMNS", columns).replace("REST", rest))
+    found = issues(tmp_path, STUDY.replace("COLUMNS", columns).replace("REST", rest))
     assert len(found) == 1
     assert found[0].startswith("tiny.yaml:2: sensor.files[0]")
     assert said in found[0]
@@ -69,4 +69,4 @@ def test_faults_name_the_place(tmp_path: Path, columns: str, rest: str, said: st
 
 def test_a_built_in_sensor_alone_has_its_own_name(tmp_path: Path) -> None:
     text = STUDY.replace(", files: [{file: own.csv, columns: {COLUMNS}REST}]", ", name: mine")
-    assert "leave these out, or add `files`" in faults(tmp_path, text)[0]
+    assert "leave these out, or add `files`" in issues(tmp_path, text)[0]

@@ -10,7 +10,7 @@ from sweep.results.identity import fingerprint
 from sweep.run.provenance import resolved_yaml
 from sweep.study import folder_name, load_study
 
-from ..build import BASE, faults, load, one_line
+from ..build import BASE, issues, load, one_line
 from ..conftest import STUDIES
 
 SENSOR_FILE = "sensor:\n  files:\n    - {file: qe.csv, columns: {R: R, C: C}}\n"
@@ -211,7 +211,7 @@ def test_every_fault_is_named_at_once(tmp_path: Path) -> None:
     text = (
         BASE.replace("base: Y\n", "base: Q\n").replace("sensitivity:", "sens:").replace("space: edges", "space: edge")
     )
-    assert [line.split(":")[1] for line in faults(tmp_path, text)] == ["11", "19", "21"]
+    assert [line.split(":")[1] for line in issues(tmp_path, text)] == ["11", "19", "21"]
 
 
 @pytest.mark.parametrize(
@@ -243,7 +243,7 @@ def test_lights_from_files(tmp_path: Path) -> None:
     red = study.lights.photons[0]
     assert red[235] / red[240] == pytest.approx(35 / 40 * 635 / 640, rel=1e-3)
     (tmp_path / "led.csv").write_text("wavelength_nm,r,g\n400,0,1\n700,0,0\n")
-    assert "no photons" in faults(tmp_path, text)[0]
+    assert "no photons" in issues(tmp_path, text)[0]
 
 
 def test_resolved_study_is_a_study_with_the_same_rows(tmp_path: Path) -> None:
@@ -274,11 +274,11 @@ def test_columns_of_signal_types_must_differ(tmp_path: Path) -> None:
     text = BASE.replace(
         "lights: tl16\n", f"lights:\n  files:\n    - {{file: led.csv, quantity: energy, signals: {types}}}\n"
     )
-    found = faults(tmp_path, text.replace("constraints:\n", "objective: csd_a_b\nconstraints:\n"))
+    found = issues(tmp_path, text.replace("constraints:\n", "objective: csd_a_b\nconstraints:\n"))
     assert "the pairs a/b_b and a_b/b share the column csd_a_b_b" in found[0]
 
 
 def test_a_study_needs_designs(tmp_path: Path) -> None:
     text = "study: tiny\nsensor: ar0820\nlights: tl16\ncfas: [RYNCy]\nboxes: {x: {cfa: RYNCy, channel: N, base: Y, to: G}}\n"
-    assert "cfas: no designs" in faults(tmp_path, text)[0]
+    assert "cfas: no designs" in issues(tmp_path, text)[0]
     assert load(tmp_path, text + "search: {starts: 2, max_evaluations: 10}\n").n_designs == 0

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from sweep.base.errors import MOST_FAULTS, Fault, StudyError, SweepError, nearest
+from sweep.base.errors import MOST_ISSUES, StudyError, SweepError, ValidationIssue, nearest
 from sweep.cli.listing import list_lines, studies_of
 from sweep.results.tables import RESOLVED
 from sweep.spectra.text_tables import MOST_BYTES, MOST_CURVES, MOST_SAMPLES, MOST_VALUES
@@ -107,7 +107,7 @@ LONGER = ("a shorter list", "an endless quote")
 def refused(path: Path) -> list[str]:
     with pytest.raises(StudyError) as caught, within(HANG_S):
         load_study(path)
-    return [str(fault).replace(str(path), "FILE") for fault in caught.value.faults]
+    return [str(issue).replace(str(path), "FILE") for issue in caught.value.issues]
 
 
 @pytest.mark.parametrize(
@@ -122,7 +122,7 @@ def test_too_much_is_one_line(tmp_path: Path, name: str) -> None:
     found = refused(path)
     assert found[0].startswith("FILE:"), found
     assert expected in found[0], found
-    assert len(found) <= MOST_FAULTS
+    assert len(found) <= MOST_ISSUES
     assert all(len(line) < 10_000 and line.isprintable() for line in found)
 
 
@@ -131,14 +131,16 @@ def test_many_faults_say_how_many_more(tmp_path: Path) -> None:
     path = tmp_path / "a.yaml"
     path.write_text(SMALL + "".join(f"k{i}: 1\n" for i in range(20_000)))
     found = refused(path)
-    assert len(found) == MOST_FAULTS
-    assert "more faults" in found[-1]
-    assert str(SweepError([Fault(f"f{i}") for i in range(1000)])).endswith(f"and {1000 - MOST_FAULTS + 1} more faults")
-    assert len(str(SweepError([Fault(f"f{i}") for i in range(MOST_FAULTS)])).splitlines()) == MOST_FAULTS
+    assert len(found) == MOST_ISSUES
+    assert "more errors" in found[-1]
+    assert str(SweepError([ValidationIssue(f"f{i}") for i in range(1000)])).endswith(
+        f"and {1000 - MOST_ISSUES + 1} more errors"
+    )
+    assert len(str(SweepError([ValidationIssue(f"f{i}") for i in range(MOST_ISSUES)])).splitlines()) == MOST_ISSUES
 
 
 def test_names_steer_no_terminal_and_are_cut() -> None:
-    line = str(Fault("unknown\x1b[2J", "a\ud800.yaml", 3, "k" * 10**6, "v" * 10**6, "a, " * 10**6))
+    line = str(ValidationIssue("unknown\x1b[2J", "a\ud800.yaml", 3, "k" * 10**6, "v" * 10**6, "a, " * 10**6))
     assert line.isprintable()
     assert len(line) < 10_000
     assert nearest("x" * 10**6, ["x" * 10**6]) is None

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from ..build import BASE, faults, load
+from ..build import BASE, issues, load
 
 
 @pytest.mark.parametrize(
@@ -61,7 +61,7 @@ from ..build import BASE, faults, load
     ],
 )
 def test_a_fault_of_a_scene_is_one_line(tmp_path: Path, scene: str, expected: str) -> None:
-    found = faults(tmp_path, BASE.replace("lights: tl16\n", f"lights: tl16\nscenarios:\n  {scene}\n"))
+    found = issues(tmp_path, BASE.replace("lights: tl16\n", f"lights: tl16\nscenarios:\n  {scene}\n"))
     assert len(found) == 1, found
     assert expected in found[0]
 

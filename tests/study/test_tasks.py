@@ -56,7 +56,7 @@ def test_a_fault_of_tasks_is_a_line(keys: dict[str, Any], said: str) -> None:
     with pytest.raises(StudyError) as found:
         study_of_keys({**KEYS, **keys}, Path())
     assert said in str(found.value)
-    assert all("\n" not in str(fault) for fault in found.value.faults)
+    assert all("\n" not in str(issue) for issue in found.value.issues)
 
 
 def test_tasks_end_with_their_spectra() -> None:
@@ -142,7 +142,7 @@ def with_paints(folder: Path, entry: Any, under: str = "d65") -> dict[str, Any]:
 def test_a_fault_of_a_file_is_a_line(tmp_path: Path, change: dict[str, Any], said: str) -> None:
     with pytest.raises(StudyError) as found:
         study_of_keys(with_paints(tmp_path, {**OWN, "columns": ["white"], **change}), tmp_path)
-    assert len(found.value.faults) == 1
+    assert len(found.value.issues) == 1
     assert said in str(found.value)
     assert "tasks.own.paint.classes" in str(found.value)
 
@@ -207,5 +207,5 @@ def test_a_run_keeps_the_spectra_of_its_own_tasks(tmp_path: Path) -> None:
     assert again is not None
     np.testing.assert_array_equal(first.tasks[0].photons, again.tasks[0].photons)
     (tmp_path / "paints.csv").write_text(PAINTS.replace("0.5", "0.4"))
-    with pytest.raises(OutputError, match=r"these are not what the run has: .*paints.csv:yellow"):
+    with pytest.raises(OutputError, match=r"these differ from the run: .*paints.csv:yellow"):
         study_of(output, tmp_path)

@@ -9,7 +9,7 @@ import pytest
 from sweep.designs.technology import Interference, Technology
 from sweep.run.provenance import resolved_yaml
 
-from ..build import BASE, faults, load, one_line
+from ..build import BASE, issues, load, one_line
 
 LAYERS = "technology: {interference: {effective_index: 1.8}}"
 SENSOR = "sensor: {builtin: ar0820, technology: {G: pigment, R: {interference: {effective_index: 1.6}}}}"
@@ -96,7 +96,7 @@ def test_what_does_not_fit_is_a_fault(tmp_path: Path, old: str, new: str, expect
         text += "scenarios: {chart: {optics: {f_number: 0.8, cra_deg: 60}}}\n"
     if "too thick" in expected:
         text += "production: {thickness: 0.01}\n"
-    assert any(fault.startswith(expected) for fault in faults(tmp_path, text)), faults(tmp_path, text)
+    assert any(issue.startswith(expected) for issue in issues(tmp_path, text)), issues(tmp_path, text)
 
 
 @pytest.mark.parametrize(
@@ -111,7 +111,7 @@ def test_what_does_not_fit_is_a_fault(tmp_path: Path, old: str, new: str, expect
         ),
         (
             "{field: {cra_max_deg: 9, places: 1}}",
-            "tiny.yaml:22: scenarios.a.field.places: places are `any`, or a whole",
+            "tiny.yaml:22: scenarios.a.field.places: field positions are `any`, or a whole",
         ),
         (
             "{field: {cra_max_deg: 9, heights: [0, 1]}}",
@@ -121,16 +121,16 @@ def test_what_does_not_fit_is_a_fault(tmp_path: Path, old: str, new: str, expect
         ("{field: {cra_max_deg: 70}}", "tiny.yaml:22: scenarios.a.field.cra_max_deg: not allowed (got 70)"),
         (
             "{field: {cra_max_deg: 9}, optics: {cra_deg: 3}}",
-            "tiny.yaml:22: scenarios.a: `field` says the chief ray angle of each place: leave out optics.cra_deg",
+            "tiny.yaml:22: scenarios.a: `field` says the chief ray angle of each field position: leave out optics.cra_deg",
         ),
         (
             "{field: {cra_max_deg: 9}, target: {distance_m: 99, fov_deg: 60, phase_px: any}}",
-            "tiny.yaml:22: scenarios.a: `field` needs a light at a named place of the mosaic",
+            "tiny.yaml:22: scenarios.a: `field` needs a named sampling phase",
         ),
     ],
 )
 def test_a_field_says_one_profile(tmp_path: Path, scene: str, expected: str) -> None:
-    assert any(fault.startswith(expected) for fault in faults(tmp_path, BASE + f"scenarios: {{a: {scene}}}\n"))
+    assert any(issue.startswith(expected) for issue in issues(tmp_path, BASE + f"scenarios: {{a: {scene}}}\n"))
 
 
 def test_a_field_grows_linearly_or_as_listed(tmp_path: Path) -> None:
@@ -138,7 +138,7 @@ def test_a_field_grows_linearly_or_as_listed(tmp_path: Path) -> None:
     scenes += "c: {field: {cra_deg: [0, 18, 20], places: 5}}, d: {field: {cra_deg: [0, 8, 9], heights: [0, 0.8, 1]}}}\n"
     study = load(tmp_path, BASE + scenes)
     fields = {name: scenario.field for name, scenario in study.scenarios.items()}
-    assert {name: field and tuple(map(field.cra_at, field.seen_heights)) for name, field in fields.items()} == {
+    assert {name: field and tuple(map(field.cra_at, field.counted_heights)) for name, field in fields.items()} == {
         "a": (0.0, 10.0, 20.0, 30.0),
         "b": (0.0, 18.0, 20.0),
         "c": (0.0, 9.0, 18.0, 19.0, 20.0),
@@ -210,7 +210,7 @@ def test_a_bad_lens_file_is_one_line(tmp_path: Path, table: str, field: str, exp
 
 def test_a_lens_file_that_is_not_there_has_a_near_name(tmp_path: Path) -> None:
     (tmp_path / "lens.csv").write_text(LENS)
-    found = faults(tmp_path, BASE + "scenarios: {a: {field: {profile: lends.csv}}}\n")
+    found = issues(tmp_path, BASE + "scenarios: {a: {field: {profile: lends.csv}}}\n")
     assert len(found) == 1
     assert found[0].startswith("tiny.yaml:22: scenarios.a.field.profile: no such file (got 'lends.csv')")
     assert found[0].endswith("did you mean 'lens.csv'?")

@@ -39,10 +39,10 @@ FOUR = ["red", "orange", "yellow", "green"]
 def test_a_lamp_is_what_the_product_reads(cfa: str, place: int) -> None:
     """The mean over the middle lens to 1e-4, and so every CSD within a tolerance of 0.1 DN, at places between pixels."""
     candelas, tolerance_dn = 200.0, 0.1
-    asked, setup = vision(distances_m=[100.0]), head_setup(cfa)
-    camera = HeadCamera(setup, NO_FILTERS, asked)
-    center = head_places_px(asked, setup.camera.mosaic)[place]
-    there = setup_at(setup, asked, 100.0, camera.levels[0])
+    requested, setup = vision(distances_m=[100.0]), head_setup(cfa)
+    camera = HeadCamera(setup, NO_FILTERS, requested)
+    center = head_places_px(requested, setup.camera.mosaic)[place]
+    there = setup_at(setup, requested, 100.0, camera.levels[0])
     target = there.scene.target.model_copy(update={"phase_px": (float(center[0]), float(center[1]))})
     scenario = there.scene.model_copy(update={"target": target, "intensity_cd": candelas})
     wanted = (
@@ -51,7 +51,7 @@ def test_a_lamp_is_what_the_product_reads(cfa: str, place: int) -> None:
     )
     heads = camera.electrons(0, 0)
     lamps = heads.lamps[place, 1] * heads.time_s * candelas * setup.camera.pixel.dn_per_e
-    across = np.arange(asked.crop_px)
+    across = np.arange(requested.crop_px)
     tile = setup.camera.mosaic.indices[np.ix_(across % 2, across % 2)].ravel()
     # The share of each pixel that the disc covers, from 200 x 200 points of it.
     fine = (np.arange(200) + 0.5) / 200 - 0.5
@@ -66,33 +66,33 @@ def test_a_lamp_is_what_the_product_reads(cfa: str, place: int) -> None:
         )
 
 
-def brute_force(asked: Vision, scenes: Scenes, at: int) -> np.ndarray:
+def brute_force(requested: Vision, scenes: Scenes, at: int) -> np.ndarray:
     """Expected electrons of a scene: radiance on a fine grid, a discrete Fourier transform, pixels, neighbors."""
-    setup, tall = head_setup(), 1.5 * (len(asked.lenses) - 1)
+    setup, tall = head_setup(), 1.5 * (len(requested.lenses) - 1)
     grid, fine, finer, size = setup.camera.grid, 8, 8, 48
-    level = list(asked.levels.values())[scenes.level[at]]
-    distance_m = asked.distances_m[scenes.distance[at]]
-    across = setup_at(setup, asked, distance_m, level).scene.target.object_resolution_px  # type: ignore[union-attr]
-    center = head_places_px(asked, setup.camera.mosaic)[int(scenes.place[at] * 16)]
-    start = -(size - asked.crop_px) // 2
+    level = list(requested.levels.values())[scenes.level[at]]
+    distance_m = requested.distances_m[scenes.distance[at]]
+    across = setup_at(setup, requested, distance_m, level).scene.target.object_resolution_px  # type: ignore[union-attr]
+    center = head_places_px(requested, setup.camera.mosaic)[int(scenes.place[at] * 16)]
+    start = -(size - requested.crop_px) // 2
     points = start - 0.5 + (np.arange(size * fine * finer) + 0.5) / (fine * finer)
     x, y = points[None, :] - center[0], points[:, None] - center[1]
     ambient = ambient_light(grid, level.light)
     luminance = luminance_per_photon_radiance(grid, ambient[None])[0]
     arriving = ambient * level.illuminance_lx / math.pi / luminance
     black, dark = (arriving * reflectance(grid, of) for of in ("black", "dark gray"))  # type: ignore[arg-type]
-    ground = arriving * reflectance(grid, asked.backgrounds[scenes.background[at]])
+    ground = arriving * reflectance(grid, requested.backgrounds[scenes.background[at]])
     area = math.pi * 0.1**2
     lit = scenes.state[at] - 1
     lenses = []
-    for kind in list(permutations(range(len(asked.lenses))))[scenes.order[at]]:
+    for kind in list(permutations(range(len(requested.lenses))))[scenes.order[at]]:
         seen = black.copy()
         if scenes.phantom[at]:
-            sun = phantom(grid, asked.lenses[kind])
+            sun = phantom(grid, requested.lenses[kind])
             seen += sun * level.phantom_cd / area / luminance_per_photon_radiance(grid, sun[None])[0]
         if kind == lit:
             lamp = setup.lights.photons[scenes.lamp[at]]
-            candelas = asked.intensities_cd[scenes.intensity[at]]
+            candelas = requested.intensities_cd[scenes.intensity[at]]
             seen += lamp * candelas / area / luminance_per_photon_radiance(grid, lamp[None])[0]
         lenses.append(seen)
     frequency = np.hypot(*np.meshgrid(*[np.fft.fftfreq(size * fine, 2.1 / fine)] * 2))
@@ -114,7 +114,7 @@ def brute_force(asked: Vision, scenes: Scenes, at: int) -> np.ndarray:
         electrons += pixels * setup.camera.qe[tile, w] * grid.step_nm * math.pi / 17 * (2.1e-6) ** 2 * level.exposure_s
     around = sum(np.roll(electrons, shift, axis) for shift in (-1, 1) for axis in (0, 1))
     mixed = 0.99 * electrons + 0.0025 * around
-    inner = slice(-start, -start + asked.crop_px)
+    inner = slice(-start, -start + requested.crop_px)
     return np.asarray(mixed[inner, inner])
 
 
@@ -122,11 +122,11 @@ def brute_force(asked: Vision, scenes: Scenes, at: int) -> np.ndarray:
 @pytest.mark.parametrize(("lenses", "count"), [(["red", "yellow", "green"], 10), (["red", "orange"], 2), (FOUR, 3)])
 def test_scenes_are_those_of_a_brute_force_simulation(lenses: list[str], count: int) -> None:
     """Within 1 % of the brightest pixel: shapes are made of 64 points along a pixel, light of 8."""
-    asked, setup = vision(lenses=lenses), head_setup()
-    scenes = draw_scenes(asked, split_lamps(setup.lights, asked, (1, 0))[TEST], SHUFFLED, count, (3,))
-    found = HeadCamera(setup, NO_FILTERS, asked).expected(scenes)
+    requested, setup = vision(lenses=lenses), head_setup()
+    scenes = draw_scenes(requested, split_lamps(setup.lights, requested, (1, 0))[TEST], SHUFFLED, count, (3,))
+    found = HeadCamera(setup, NO_FILTERS, requested).expected(scenes)
     for at in range(count):
-        wanted = brute_force(asked, scenes, at)
+        wanted = brute_force(requested, scenes, at)
         np.testing.assert_allclose(found[at].reshape(wanted.shape), wanted, atol=0.01 * wanted.max())
 
 
@@ -156,10 +156,10 @@ def test_the_table_is_the_product_s_noise() -> None:
 
 
 def test_drawn_images_are_as_noisy_as_the_product_draws_them() -> None:
-    asked, setup = vision(), head_setup()
-    camera = HeadCamera(setup, NO_FILTERS, asked)
-    lamps = split_lamps(setup.lights, asked, (1, 0))[TEST]
-    one = draw_scenes(asked, lamps, SHUFFLED, 1, (5,))
+    requested, setup = vision(), head_setup()
+    camera = HeadCamera(setup, NO_FILTERS, requested)
+    lamps = split_lamps(setup.lights, requested, (1, 0))[TEST]
+    one = draw_scenes(requested, lamps, SHUFFLED, 1, (5,))
     many = one.some(np.zeros(2000, dtype=np.intp))
     many = replace(many, key=np.arange(2000))
     drawn = camera.images(many).reshape(2000, -1)

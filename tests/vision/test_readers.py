@@ -22,7 +22,7 @@ from sweep.vision.readers import planes_of, read_images
 from sweep.vision.scenes import FIXED, ORDERS, SHUFFLED, draw_scenes
 from sweep.vision.scores import confusion_matrix, costs, macro_f1, mean_of, nested_weights
 
-from ..build import BASE, faults, load
+from ..build import BASE, issues, load
 from ..cases import thinned
 from .heads import NO_FILTERS, head_setup, vision
 
@@ -75,10 +75,10 @@ def test_the_network_errs_as_two_gaussians_do() -> None:
 )
 def test_the_observer_is_as_often_wrong_as_it_says(order: str, lenses: list[str]) -> None:
     """A likelihood that left something random out, or counted it wrongly, would be too sure, or not sure enough."""
-    asked = vision(distances_m=[500.0], intensities_cd=[3.0, 10.0], lenses=lenses)
+    requested = vision(distances_m=[500.0], intensities_cd=[3.0, 10.0], lenses=lenses)
     setup = head_setup("RCCC")
-    camera, lamps = HeadCamera(setup, NO_FILTERS, asked), split_lamps(setup.lights, asked, (1, 0))[TEST]
-    scenes = draw_scenes(asked, lamps, order, 600, (8, ORDERS.index(order)))
+    camera, lamps = HeadCamera(setup, NO_FILTERS, requested), split_lamps(setup.lights, requested, (1, 0))[TEST]
+    scenes = draw_scenes(requested, lamps, order, 600, (8, ORDERS.index(order)))
     found = posteriors(camera, scenes, camera.images(scenes), lamps, order)
     wrong = (found.argmax(axis=1) != scenes.state).astype(float)
     doubt = 1 - found.max(axis=1)
@@ -91,12 +91,12 @@ def test_the_observer_is_as_often_wrong_as_it_says(order: str, lenses: list[str]
 
 def test_an_observer_of_other_lenses_is_worse() -> None:
     """It does not take the order of the lenses from the scene: in the street's order it would know the color."""
-    asked, setup = (
+    requested, setup = (
         vision(distances_m=[400.0], levels={"day": {"illuminance_lx": 4e4, "exposure_s": 5e-5}}),
         head_setup(),
     )
-    camera, lamps = HeadCamera(setup, NO_FILTERS, asked), split_lamps(setup.lights, asked, (1, 0))[TEST]
-    scenes = draw_scenes(asked, lamps, SHUFFLED, 200, (9,))
+    camera, lamps = HeadCamera(setup, NO_FILTERS, requested), split_lamps(setup.lights, requested, (1, 0))[TEST]
+    scenes = draw_scenes(requested, lamps, SHUFFLED, 200, (9,))
     images = camera.images(scenes)
     right = [(posteriors(camera, scenes, images, lamps, o).argmax(axis=1) == scenes.state).mean() for o in ORDERS]
     assert right[ORDERS.index(SHUFFLED)] > right[ORDERS.index(FIXED)] + 0.1
@@ -129,27 +129,29 @@ def test_lamps_of_one_spectrum_stay_together() -> None:
 @pytest.mark.slow
 def test_scenes_are_the_same_for_all_cfas() -> None:
     """The brightest pixels of one channel that two CFAs share, at the same place of the tile, are the same numbers."""
-    asked = vision()
+    requested = vision()
     seen = []
     for cfa in ("RCCB", "RCCC"):
         setup = head_setup(cfa, crosstalk=0.0)
-        lamps = split_lamps(setup.lights, asked, (1, 0))[TEST]
-        scenes = draw_scenes(asked, lamps, SHUFFLED, 8, (2,))
-        seen.append(HeadCamera(setup, NO_FILTERS, asked).images(scenes)[:, 0::2, 1::2])
+        lamps = split_lamps(setup.lights, requested, (1, 0))[TEST]
+        scenes = draw_scenes(requested, lamps, SHUFFLED, 8, (2,))
+        seen.append(HeadCamera(setup, NO_FILTERS, requested).images(scenes)[:, 0::2, 1::2])
     np.testing.assert_array_equal(*seen)
 
 
 @pytest.mark.slow
 def test_a_network_reads_demosaicked_images() -> None:
     """A plane for each channel, the same scenes and photons for the observer; with some training it is no guess."""
-    asked = vision(distances_m=[100.0], input="demosaicked", train_images=600, test_images=100, epochs=8, crop_px=16)
+    requested = vision(
+        distances_m=[100.0], input="demosaicked", train_images=600, test_images=100, epochs=8, crop_px=16
+    )
     setup = head_setup("RCCC")
-    camera = HeadCamera(setup, NO_FILTERS, asked)
-    lamps = split_lamps(setup.lights, asked, (1, 0))[TEST]
-    images = camera.images(draw_scenes(asked, lamps, SHUFFLED, 3, (1,)))
+    camera = HeadCamera(setup, NO_FILTERS, requested)
+    lamps = split_lamps(setup.lights, requested, (1, 0))[TEST]
+    images = camera.images(draw_scenes(requested, lamps, SHUFFLED, 3, (1,)))
     assert planes_of(camera, images).shape == (3, 16, 16, len(setup.camera.qe))
-    told = read_images(setup, NO_FILTERS, asked, (1, 0)).unseen[SHUFFLED]
-    raw = read_images(setup, NO_FILTERS, asked.model_copy(update={"input": "raw", "network": False}), (1, 0))
+    told = read_images(setup, NO_FILTERS, requested, (1, 0)).unseen[SHUFFLED]
+    raw = read_images(setup, NO_FILTERS, requested.model_copy(update={"input": "raw", "network": False}), (1, 0))
     np.testing.assert_array_equal(told.observer, raw.unseen[SHUFFLED].observer)
     assert (told.network.argmax(axis=1) == told.scenes.state).mean() > 0.45
 
@@ -182,23 +184,23 @@ def test_a_missing_library_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_what_a_study_of_vision_cannot_be(tmp_path: Path) -> None:
-    asked = (
+    requested = (
         "vision: {distances_m: [100], lenses: [red, yelow, green], levels: {day: {illuminance_lx: 1, exposure_s: 1}}"
     )
-    (found,) = faults(tmp_path, f"{BASE}{asked}}}\n")
+    (found,) = issues(tmp_path, f"{BASE}{requested}}}\n")
     assert "vision.lenses" in found
     assert "did you mean 'yellow'" in found
-    (found,) = faults(tmp_path, f"{BASE}{asked.replace('yelow', 'yellow')}, crop_px: 25}}\n")
+    (found,) = issues(tmp_path, f"{BASE}{requested.replace('yelow', 'yellow')}, crop_px: 25}}\n")
     assert "crop_px 25 must be even" in found
     odd = "cfas: {RGGB: , RYNCy: , wide: {tile: [[R, G, B, R, G]]}}"
     text = BASE.replace("cfas: [RGGB, RYNCy]", odd)
-    (found,) = faults(tmp_path, f"{text}{asked.replace('yelow', 'yellow')}}}\n")
+    (found,) = issues(tmp_path, f"{text}{requested.replace('yelow', 'yellow')}}}\n")
     assert "the tile of wide (1 x 5) does not divide the images" in found
-    (found,) = faults(tmp_path, f"{BASE}pixel: {{bits: 14}}\n{asked.replace('yelow', 'yellow')}}}\n")
+    (found,) = issues(tmp_path, f"{BASE}pixel: {{bits: 14}}\n{requested.replace('yelow', 'yellow')}}}\n")
     assert "pixel.bits" in found
     assert "at most 12" in found
-    many = f"{asked.replace('yelow', 'yellow')}, crop_px: 48, places_per_pixel: 1, train_images: 30000"
-    (found,) = faults(tmp_path, f"{BASE}{many}, input: demosaicked}}\n")
+    many = f"{requested.replace('yelow', 'yellow')}, crop_px: 48, places_per_pixel: 1, train_images: 30000"
+    (found,) = issues(tmp_path, f"{BASE}{many}, input: demosaicked}}\n")
     assert "images take too much memory (CFA RGGB)" in found
     assert "4.6 GiB" in found  # 30,000 images of 48 x 48 pixels, 3 channels of 8 bytes, held three times
     load(tmp_path, f"{BASE}{many}}}\n")

@@ -95,7 +95,7 @@ def poisson_shares(electrons: float, start: int, rare: float, shares: FloatArray
 
 
 @njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
-def _sum_off(shares: FloatArray, values: FloatArray, about: float) -> float:
+def _sum_squared_deviation(shares: FloatArray, values: FloatArray, about: float) -> float:
     """Sum of values less one of them, by their shares."""
     total = 0.0
     for k in range(shares.size):
@@ -136,15 +136,15 @@ def poisson_moments(
     shares = np.empty(counts)
     for i in range(electrons.size):
         low, high = poisson_shares(electrons[i], start, _RARE, shares)
-        own = shares[low:high]
-        weight = own.sum()
+        in_range = shares[low:high]
+        weight = in_range.sum()
         at = min(int(electrons[i]) - start, counts - 1)
         for q in range(quantities):
             # About the value at the most frequent count, so that no digits are lost.
-            out[q, i] = values[q, at] + _sum_off(own, values[q, low:high], values[q, at]) / weight
+            out[q, i] = values[q, at] + _sum_squared_deviation(in_range, values[q, low:high], values[q, at]) / weight
         if variance.size:
             last = values[quantities - 1, low:high]
-            out[quantities, i] = _sum_square(own, last, out[quantities - 1, i], variance[low:high]) / weight
+            out[quantities, i] = _sum_square(in_range, last, out[quantities - 1, i], variance[low:high]) / weight
 
 
 @njit(cache=True, nogil=True)
@@ -263,5 +263,5 @@ def cubic_of_electrons(
             continue
         k = piece[min(int(at / step), piece.size - 1)]
         k += at >= nodes[k + 1] and k + 2 < nodes.size
-        s, own = at - nodes[k], coefficients[k]
-        out[i] = ((own[0] * s + own[1]) * s + own[2]) * s + own[3]
+        s, cubic = at - nodes[k], coefficients[k]
+        out[i] = ((cubic[0] * s + cubic[1]) * s + cubic[2]) * s + cubic[3]

@@ -35,7 +35,7 @@ _PER_DEVIATION = 1.3
 _FAR_ROOT = 16.0
 
 
-def straight(electrons: FloatArray, pixel: Pixel) -> FloatArray:
+def linear_moments(electrons: FloatArray, pixel: Pixel) -> FloatArray:
     """Return the moments of a linear readout whose Gaussian noise dithers the steps.
 
     Parameters
@@ -79,7 +79,7 @@ def of_count(electrons: FloatArray, pixel: Pixel) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class Ends:
+class LinearRange:
     """Electrons at which a pixel's readout stops to be linear.
 
     Parameters
@@ -100,7 +100,7 @@ class Ends:
     last_e: float
 
     @classmethod
-    def of(cls, pixel: Pixel) -> Ends:
+    def of(cls, pixel: Pixel) -> LinearRange:
         """Return the ends of a pixel.
 
         Parameters
@@ -110,7 +110,7 @@ class Ends:
 
         Returns
         -------
-        Ends
+        LinearRange
             Its ends.
         """
         reach_e = _REACH * pixel.read_noise_e
@@ -127,12 +127,12 @@ def _least_exceeding(electrons: float) -> float:
 
 def _felt(electrons: FloatArray, pixel: Pixel) -> BoolArray:
     """Return where counts of Poisson electrons reach an end or show steps of rounding."""
-    ends = Ends.of(pixel)
+    ends = LinearRange.of(pixel)
     sigma = _REACH * np.sqrt(electrons)
-    found = (electrons - sigma < ends.low_e) | (electrons + sigma + _REACH**2 > ends.high_e)
+    nonlinear = (electrons - sigma < ends.low_e) | (electrons + sigma + _REACH**2 > ends.high_e)
     if pixel.dn_per_e * pixel.read_noise_e < gaussian.SMOOTH_DN:
-        found |= electrons <= COUNTED_E
-    return np.asarray(found, dtype=bool)
+        nonlinear |= electrons <= COUNTED_E
+    return np.asarray(nonlinear, dtype=bool)
 
 
 def without_prnu(pixel: Pixel) -> Pixel:
@@ -168,10 +168,10 @@ def counted(electrons: FloatArray, pixel: Pixel) -> FloatArray:
     """
     from .compiled import poisson_means  # noqa: PLC0415  (compiled: kept off the start-up path)
 
-    found = straight(electrons, pixel)
-    for run, first, each in runs(electrons, pixel):
-        found[:, run] = poisson_means(electrons[run], first, each[:2], each[2])
-    return found
+    result = linear_moments(electrons, pixel)
+    for run, first, counts in runs(electrons, pixel):
+        result[:, run] = poisson_means(electrons[run], first, counts[:2], counts[2])
+    return result
 
 
 def runs(electrons: FloatArray, pixel: Pixel) -> Iterator[tuple[slice, int, FloatArray]]:
@@ -213,7 +213,7 @@ def counts_of(electrons: FloatArray, pixel: Pixel) -> tuple[int, int]:
     """
     low, high = electrons[0], electrons[-1]
     first = max(0, math.floor(low - (_REACH + 1) * math.sqrt(low)))
-    full = math.ceil(Ends.of(pixel).full_e)
+    full = math.ceil(LinearRange.of(pixel).full_e)
     most = math.ceil(high + (_REACH + 1) * math.sqrt(high) + (_REACH + 1) ** 2)
     return min(first, full), max(min(most, full), min(first, full))
 
@@ -231,7 +231,7 @@ def table_nodes(pixel: Pixel) -> FloatArray:
     ndarray of shape (n_nodes,)
         Roots, ascending from 0.
     """
-    ends = Ends.of(pixel)
+    ends = LinearRange.of(pixel)
     last = math.sqrt(_least_exceeding(ends.full_e))
     every = np.arange(0, last + 2 * STEP, STEP)
     # A straight readout is a parabola in the root, which a cubic meets with few nodes.
@@ -287,15 +287,15 @@ def with_prnu(electrons: FloatArray, pixel: Pixel) -> FloatArray:
 
     even = without_prnu(pixel)
     table = table_without_prnu(even)
-    found = straight(electrons, pixel)
+    result = linear_moments(electrons, pixel)
     spread = 1 + DRAWN * pixel.prnu
-    ends = Ends.of(pixel)
+    ends = LinearRange.of(pixel)
     felt = _felt(electrons * spread, even) | _felt(electrons * (2 - spread), even)
     some = np.flatnonzero(felt & (electrons <= ends.last_e * 2))
     averaged = np.empty((3, some.size))
     means_over_gains(electrons[some], pixel.prnu, DRAWN, _PER_DEVIATION, table.x, table.c, averaged)
-    found[:, some] = averaged
-    return found
+    result[:, some] = averaged
+    return result
 
 
 def moments(electrons: FloatArray, pixel: Pixel) -> FloatArray:

@@ -112,11 +112,11 @@ def unclipped_e(pixel: Pixel) -> tuple[float, float]:
 def _looked_up(electrons: FloatArray, pixel: Pixel, row: int) -> FloatArray:
     from .compiled import cubic_of_electrons  # noqa: PLC0415  (compiled: kept off the start-up path)
 
-    table, found = tables(pixel), np.empty(electrons.shape)
+    table, values = tables(pixel), np.empty(electrons.shape)
     of = table.nodes, table.coefficients[row], table.piece
-    last_e = moments.Ends.of(pixel).last_e
-    cubic_of_electrons(np.ascontiguousarray(electrons, dtype=float).ravel(), last_e, *of, moments.STEP, found.ravel())
-    return found
+    last_e = moments.LinearRange.of(pixel).last_e
+    cubic_of_electrons(np.ascontiguousarray(electrons, dtype=float).ravel(), last_e, *of, moments.STEP, values.ravel())
+    return values
 
 
 @lru_cache(maxsize=8)
@@ -140,7 +140,7 @@ def tables(pixel: Pixel) -> MomentTable:
 
     if pixel.prnu:
         prnu = max(pixel.prnu, _LEAST_PRNU)
-        last = np.arcsinh(prnu * np.sqrt(moments.Ends.of(pixel).last_e)) / prnu
+        last = np.arcsinh(prnu * np.sqrt(moments.LinearRange.of(pixel).last_e)) / prnu
         nodes = np.sinh(prnu * np.arange(0, last + 2 * moments.STEP, moments.STEP)) / prnu
         whole = CubicSpline(nodes, moments.moments(nodes**2, pixel), axis=1)
     else:

@@ -10,7 +10,7 @@ import typer
 from ...base.errors import DataError
 from ...spectra import LightUnit
 from ..options import OF_CURVES, AllowCode, DataFolder
-from ..output import Json, Quiet, say
+from ..output import Json, Quiet, print_result
 
 PANEL = OF_CURVES
 
@@ -24,30 +24,30 @@ def describe(
     ] = None,
     clean: Annotated[
         Path | None,
-        typer.Option(help="Write clean CSV here; it says what was changed.", show_default=False),
+        typer.Option(help="Write clean CSV here; changes are listed.", show_default=False),
     ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Plot and check a file of curves: what it holds, what is wrong with it, which colors its lights have."""
+    """Plot and check a file of curves: contents, issues, colors of its lights."""
     facts: dict[str, Any] = {"file": str(file)}
     if file.suffix.casefold() == ".xml" and clean is None and quantity is None:
         from ..emva1288 import pixel_lines
 
         lines = pixel_lines(file)
-        say(lines, facts | {"lines": lines}, as_json=as_json, quiet=quiet)
+        print_result(lines, facts | {"lines": lines}, as_json=as_json, quiet=quiet)
         return
-    from ..describe import cleaned, described
+    from ..describe import clean_file, described
 
     if clean is not None:
-        lines = cleaned(file, clean)
-        say(lines, facts | {"clean": str(clean), "lines": lines}, as_json=as_json, quiet=quiet)
+        lines = clean_file(file, clean)
+        print_result(lines, facts | {"clean": str(clean), "lines": lines}, as_json=as_json, quiet=quiet)
         return
     description = described(file, output, quantity)
-    facts |= {**description.facts, "faults": [str(fault) for fault in description.faults]}
-    say(description.lines, facts, as_json=as_json, quiet=quiet)
-    if description.faults:
-        raise DataError(description.faults)
+    facts |= {**description.facts, "faults": [str(issue) for issue in description.issues]}
+    print_result(description.lines, facts, as_json=as_json, quiet=quiet)
+    if description.issues:
+        raise DataError(description.issues)
 
 
 def evaluate_(
@@ -58,7 +58,7 @@ def evaluate_(
         str | None, typer.Option(help="Channel of the filter.", show_default="the one without a curve")
     ] = None,
     cfa: Annotated[
-        str | None, typer.Option(help="CFA by its name.", show_default="RYNCy, or what the sensor allows")
+        str | None, typer.Option(help="CFA by its name.", show_default="RYNCy, or one that the sensor allows")
     ] = None,
     base: Annotated[
         str | None, typer.Option(help="Curve that it replaces.", show_default="that diagonal to it")
@@ -70,7 +70,7 @@ def evaluate_(
     lights: Annotated[
         str | None, typer.Option(help="tl16, or a file of spectra.", show_default="tl16, or the run's")
     ] = None,
-    quantity: Annotated[LightUnit, typer.Option(help="What the numbers of the lights are.")] = "energy",
+    quantity: Annotated[LightUnit, typer.Option(help="Unit of the numbers of the lights.")] = "energy",
     transmission: Annotated[
         bool,
         typer.Option(
@@ -114,4 +114,4 @@ def evaluate_(
         "no_limit": evaluation.no_limit,
         "notes": evaluation.notes,
     }
-    say([str(evaluation)], facts, as_json=as_json, quiet=quiet)
+    print_result([str(evaluation)], facts, as_json=as_json, quiet=quiet)

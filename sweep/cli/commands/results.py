@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from ...base.errors import BrokenPromiseError
-from ..options import OF_RESULTS, AllowCode, Also, DataFolder, RunFolder, run_folders
-from ..output import Json, ProgressDisplay, Quiet, say
+from ...base.errors import ErrorBoundExceededError
+from ..options import OF_RESULTS, AllowCode, DataFolder, ExportFormat, RunFolder, run_folders
+from ..output import Json, ProgressDisplay, Quiet, print_result
 
 PANEL = OF_RESULTS
 
@@ -31,9 +31,9 @@ def audit(
     with ProgressDisplay(quiet=quiet) as display:
         result = audit_output(folder, data, display.update, allow_code=allow_code)
     facts = {"folder": str(folder), "designs": result.n_designs, "rows": result.rows.to_dict("records")}
-    say([*result.lines, f"Files: {folder}/: {AUDIT}."], facts, as_json=as_json, quiet=quiet)
-    if result.faults:
-        raise BrokenPromiseError(result.faults)
+    print_result([*result.lines, f"Files: {folder}/: {AUDIT}."], facts, as_json=as_json, quiet=quiet)
+    if result.issues:
+        raise ErrorBoundExceededError(result.issues)
 
 
 def compare(
@@ -47,13 +47,13 @@ def compare(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Compare finished runs: what their studies ask, best designs, fronts, versions."""
+    """Compare finished runs: studies, best designs, fronts, versions."""
     from ...report.compare import compare_runs
 
     compared = compare_runs(folders, output)
     tables = {name: table.to_dict("records") for name, table in compared.tables.items()} if as_json else {}
     facts = {"folder": str(compared.folder), **tables, "notes": compared.notes}
-    say(compared.lines, facts, as_json=as_json, quiet=quiet)
+    print_result(compared.lines, facts, as_json=as_json, quiet=quiet)
 
 
 def export(
@@ -63,7 +63,7 @@ def export(
         Path | None, typer.Option(help="Folder with the run's curve files, which are then read again and compared.")
     ] = None,
     also: Annotated[
-        list[Also] | None,
+        list[ExportFormat] | None,
         typer.Option(help="Another file, too: .spectrum of Speos, or weights of the sensor's R, G and B."),
     ] = None,
     to: Annotated[Path | None, typer.Option(help="Folder for the files.", show_default="FOLDER/export")] = None,
@@ -93,4 +93,4 @@ def status(
     from ..status import status_of
 
     status = status_of(folder, verify=verify)
-    say(status.lines, status.facts, as_json=as_json, quiet=quiet)
+    print_result(status.lines, status.facts, as_json=as_json, quiet=quiet)

@@ -10,11 +10,11 @@ from typing import Annotated, Any
 
 import typer
 
-from ...base.errors import Fault, InterruptedRunError, StudyError, SweepError
+from ...base.errors import InterruptedRunError, StudyError, SweepError, ValidationIssue
 from ...spectra import LightUnit
-from ..endings import say_faults
+from ..endings import print_issues
 from ..options import OF_STUDIES, AllowCode, Changes, DataFolder, Outputs, StudyPath, StudyPaths, changes_of
-from ..output import Json, Quiet, say
+from ..output import Json, Quiet, print_result
 
 PANEL = OF_STUDIES
 
@@ -22,12 +22,14 @@ PANEL = OF_STUDIES
 def check(study: StudyPath, data: DataFolder = None, changes: Changes = None, allow_code: AllowCode = False) -> None:
     """Check a study file and count its designs, without running it."""
     from ...study import load_study
-    from ...study.goals import likely_percents, out_of_reach
+    from ...study.goals import bounds_like_percentages, unreachable_constraints
 
     loaded = load_study(study, data, changes=changes_of(changes), allow_code=allow_code)
     typer.echo(f"{study}: {loaded.n_designs:,} designs on {', '.join(loaded.mosaics)}; nothing wrong found.")
-    reach = [] if loaded.search is None else out_of_reach(loaded, loaded.search.space, loaded.search.scenario)
-    for warning in (*loaded.warnings, *likely_percents(loaded), *reach):
+    reach = (
+        [] if loaded.search is None else unreachable_constraints(loaded, loaded.search.space, loaded.search.scenario)
+    )
+    for warning in (*loaded.warnings, *bounds_like_percentages(loaded), *reach):
         typer.echo(f"Note: {warning}.")
 
 
@@ -47,10 +49,10 @@ def list_(
     from ..listing import data_facts, data_lines, list_facts, list_lines, studies_of
 
     if folder == "data":
-        say(data_lines(), data_facts(), as_json=as_json, quiet=quiet)
+        print_result(data_lines(), data_facts(), as_json=as_json, quiet=quiet)
     else:
         studies = studies_of(Path(folder), output, data)
-        say(list_lines(Path(folder), studies), list_facts(studies), as_json=as_json, quiet=quiet)
+        print_result(list_lines(Path(folder), studies), list_facts(studies), as_json=as_json, quiet=quiet)
 
 
 def new(
@@ -60,7 +62,7 @@ def new(
     pixel: Annotated[
         Path | None, typer.Option(help="EMVA 1288 results (XML) of the sensor's pixel.", show_default=False)
     ] = None,
-    quantity: Annotated[LightUnit, typer.Option(help="What the lights' numbers are.")] = "energy",
+    quantity: Annotated[LightUnit, typer.Option(help="Unit of the lights' numbers.")] = "energy",
     folder: Annotated[Path, typer.Option(help="Folder of the studies.")] = Path("studies"),
     source: Annotated[
         str | None, typer.Option("--from", help="A study, or the name of one, to begin with.", show_default=False)
@@ -75,7 +77,9 @@ def new(
 
     if source is not None:
         if qe or lights or pixel:
-            raise StudyError(Fault("a study that is copied has its own curves and pixel", key="--from", value=source))
+            raise StudyError(
+                ValidationIssue("a study that is copied has its own curves and pixel", key="--from", value=source)
+            )
         begun = study_path(Path(source))
         with copied((begun.parent / file, folder / file) for file in (curve_files_of(begun) if copy else ())):
             lines = study_from(name, folder, begun)
@@ -107,7 +111,7 @@ def plan(
     loaded = load_study(study, data, changes=changes_of(changes), allow_code=allow_code)
     planned = loaded.with_plans(tolerance)
     notes = [f"Note: {warning}." for warning in loaded.warnings]
-    say([*notes, *plan_lines(planned)], plan_facts(planned), as_json=as_json, quiet=quiet)
+    print_result([*notes, *plan_lines(planned)], plan_facts(planned), as_json=as_json, quiet=quiet)
 
 
 def run(
@@ -118,7 +122,7 @@ def run(
     jobs: Annotated[int | None, typer.Option(min=1, help="Workers.", show_default="all cores")] = None,
     backend: Annotated[str, typer.Option(help="loky (processes), threading, or dask (a cluster).")] = "loky",
     scheduler: Annotated[str | None, typer.Option(help="Of Dask: tcp://HOST:PORT.", show_default=False)] = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what is to do, and do nothing.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Print the work to do, and do nothing.")] = False,
     fail_fast: Annotated[bool, typer.Option("--fail-fast", help="Stop at the first design that fails.")] = False,
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Compute failed designs again.")] = False,
     changes: Changes = None,
@@ -161,11 +165,11 @@ def run(
         except InterruptedRunError:
             raise
         except SweepError as error:  # the others are run all the same
-            say_faults(error.faults)
+            print_issues(error.issues)
             code = max(code, error.exit_code)
-            facts = {"faults": [str(fault) for fault in error.faults], "exit_code": error.exit_code}
+            facts = {"faults": [str(issue) for issue in error.issues], "exit_code": error.exit_code}
         runs.append({"study": str(path), "exit_code": 0} | facts)
         began_s = time.monotonic()
     if as_json:
-        say((), {"runs": runs}, as_json=True)
+        print_result((), {"runs": runs}, as_json=True)
     return code

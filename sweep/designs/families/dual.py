@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.errors import Fault, SweepError
+from ...base.errors import SweepError, ValidationIssue
 from ...base.types import FloatArray, Section
 from ..bands import Banded
 
@@ -63,7 +63,7 @@ class Dual(Banded):
         assert target is not None
         assert not options.model_fields_set
         if not (target > base).any():
-            raise SweepError(Fault("dual needs a ceiling `to` above its base: there is no room to swing"))
+            raise SweepError(ValidationIssue("dual needs a ceiling `to` above its base: there is no room to swing"))
         return Dual(wavelength_nm, base, target)
 
     def curves(self, x: FloatArray) -> FloatArray:

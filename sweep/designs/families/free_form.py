@@ -7,12 +7,12 @@ from collections.abc import Mapping
 import numpy as np
 from pydantic import model_validator
 
-from ...base.errors import Fault, SweepError
+from ...base.errors import SweepError, ValidationIssue
 from ...base.types import FloatArray, Positive, Section
-from ...spectra.spectrum import hats
+from ...spectra.spectrum import linear_basis
 from ..family import Parameter
 from ..products import row_products
-from ..tolerance import AS_DESIGNED, Off
+from ..tolerance import AS_DESIGNED, ProductionError
 
 _MOST_NODES = 500
 
@@ -21,8 +21,11 @@ class Nodes(Section):
     """Equidistant nodes of a free-form filter."""
 
     start_nm: Positive
+    """First node, nm."""
     stop_nm: Positive
+    """Last node, nm."""
     step_nm: Positive
+    """Distance of nodes, nm."""
 
     @model_validator(mode="after")
     def _whole_steps(self) -> Nodes:
@@ -50,7 +53,7 @@ class FreeForm:
         QE of the replaced curve.
     nodes_nm : ndarray of shape (n_nodes,)
         Nodes, nm.
-    off : Off
+    off : ProductionError
         Production error.
     """
 
@@ -63,17 +66,18 @@ class FreeForm:
         """Options: nodes of the transmission."""
 
         nodes: Nodes
+        """Nodes of the transmission."""
 
     def __init__(
-        self, wavelength_nm: FloatArray, base: FloatArray, nodes_nm: FloatArray, off: Off = AS_DESIGNED
+        self, wavelength_nm: FloatArray, base: FloatArray, nodes_nm: FloatArray, off: ProductionError = AS_DESIGNED
     ) -> None:
         if nodes_nm.size < 2:
-            raise SweepError(Fault("a free-form filter needs two nodes or more", value=nodes_nm.tolist()))
+            raise SweepError(ValidationIssue("a free-form filter needs two nodes or more", value=nodes_nm.tolist()))
         self.nodes_nm = nodes_nm
         self._made_of = wavelength_nm, base
         nominal_nm = off.nominal_nm(wavelength_nm)
         inside = (nominal_nm >= nodes_nm[0]) & (nominal_nm <= nodes_nm[-1])
-        self._hats = hats(nominal_nm, nodes_nm) * (base * inside)
+        self._linear_basis = linear_basis(nominal_nm, nodes_nm) * (base * inside)
         self._fixed = np.where(inside, 0.0, base)
 
     @classmethod
@@ -107,9 +111,9 @@ class FreeForm:
         assert isinstance(options, FreeForm.Options)
         nodes = options.nodes
         if nodes.start_nm < wavelength_nm[0] or nodes.stop_nm > wavelength_nm[-1]:
-            place = f"{nodes.start_nm:g} to {nodes.stop_nm:g} nm"
+            nodes_range = f"{nodes.start_nm:g} to {nodes.stop_nm:g} nm"
             allowed = f"{wavelength_nm[0]:g} to {wavelength_nm[-1]:g} nm"
-            raise SweepError(Fault("nodes outside the wavelength grid", value=place, allowed=allowed))
+            raise SweepError(ValidationIssue("nodes outside the wavelength grid", value=nodes_range, allowed=allowed))
         count = round((nodes.stop_nm - nodes.start_nm) / nodes.step_nm) + 1
         return FreeForm(wavelength_nm, base, nodes.start_nm + nodes.step_nm * np.arange(count, dtype=float))
 
@@ -120,7 +124,7 @@ class FreeForm:
 
     def curves(self, x: FloatArray) -> FloatArray:
         """Return the QE of the modified channel."""
-        return np.asarray((self._fixed + row_products(x, self._hats))[:, None, :], dtype=float)
+        return np.asarray((self._fixed + row_products(x, self._linear_basis))[:, None, :], dtype=float)
 
     def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
         """Return the curve with every transmission at its largest."""
@@ -140,19 +144,19 @@ class FreeForm:
     def gradient(self, x: FloatArray) -> FloatArray:
         """Return the derivative of `curves`, which is constant."""
         assert x.shape == self.nodes_nm.shape
-        return np.asarray(self._hats[:, None, :], dtype=float)
+        return np.asarray(self._linear_basis[:, None, :], dtype=float)
 
     @property
     def dimensions(self) -> Mapping[str, FloatArray]:
         """None, since it has no bands."""
         return {}
 
-    def produced(self, off: Off) -> FreeForm:
+    def perturbed(self, off: ProductionError) -> FreeForm:
         """Return the family with its transmission moved.
 
         Parameters
         ----------
-        off : Off
+        off : ProductionError
             Production error.
 
         Returns

@@ -36,6 +36,7 @@ class MultiStopband(Banded):
         """Options: number of bands."""
 
         bands: int = Field(ge=1, le=8)
+        """Number of bands."""
 
     def __init__(self, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray, bands: int) -> None:
         super().__init__(wavelength_nm, bands)

@@ -8,7 +8,7 @@ from functools import partial
 
 from ...base.types import FloatArray, IndexArray
 from ...spectra.lights import class_pairs
-from ..quantity import BEST_PLACE, DN, Asked, Columns, Quantity, ReadoutMetric
+from ..quantity import BEST_PLACE, DN, Columns, Quantity, ReadoutMetric, RequestedQuantities
 from ..separation import csd_name, separations
 from ..smooth import SmoothDesign
 
@@ -21,7 +21,7 @@ class ColorSeparation(ReadoutMetric):
 
     order = 0
 
-    def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
+    def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
         nearest = [
             Quantity(
                 name=csd_name(pair),
@@ -35,7 +35,7 @@ class ColorSeparation(ReadoutMetric):
                 role="separation",
                 ends=("min",),
                 goal=True,
-                promised=True,
+                has_error_bound=True,
                 pair=pair,
                 rows="squares",
                 apart="DN",
@@ -43,19 +43,19 @@ class ColorSeparation(ReadoutMetric):
                 smooth_members=partial(SmoothDesign.squared_distances_of_members, pair=pair),
                 smooth_drawn=partial(SmoothDesign.distance_of_a_share, pair=pair),
             )
-            for pair in class_pairs(asked.classes)
+            for pair in class_pairs(requested.classes)
         ]
         best = [
             replace(
-                each,
-                name=BEST_PLACE + each.name,
+                csd,
+                name=BEST_PLACE + csd.name,
                 metric="best_place_csd",
-                meaning="where a scene asks for `any` place of the light on the mosaic: the largest CSD over all real "
-                "places, and over those of a `field`, each at its worst moment of a pulsed light; `csd_<a>_<b>` is "
-                "then the smallest",
-                label=f"{each.words} at its best place",
+                meaning="where a scene asks for `any` sampling phase: the largest CSD over all real "
+                "sampling phases, and over the positions of a `field`, each at its worst moment of a pulsed light; "
+                "`csd_<a>_<b>` is then the smallest",
+                label=f"{csd.words} at its best sampling phase",
                 extreme="best place",
-                of=each.name,
+                of=csd.name,
                 ends=(),
                 goal=False,
                 rows="values",
@@ -64,9 +64,9 @@ class ColorSeparation(ReadoutMetric):
                 smooth_members=None,
                 smooth_drawn=None,
             )
-            for each in nearest
+            for csd in nearest
         ]
-        return (*nearest, *best) if asked.any_place else tuple(nearest)
+        return (*nearest, *best) if requested.any_place else tuple(nearest)
 
     def of_readout(self, response: FloatArray, members: Mapping[str, IndexArray]) -> Columns:
         """Compute the columns; see `separation.separations`."""

@@ -13,7 +13,7 @@ from ...camera.readout import NoisyReadout
 from ...spectra.lights import Pair, class_pairs, pair_name
 from .. import confusion
 from ..discrimination import NoiseShape, contrast_to_noise, detectability, error_bounds, pairwise_error
-from ..quantity import Asked, Columns, NoiseMetric, Quantity
+from ..quantity import Columns, NoiseMetric, Quantity, RequestedQuantities
 from ..smooth_noise import bound_rows, error_decades, pair_rows, squared_contrast, squared_detectability
 
 CNR, D_PRIME, ERROR, ERROR_BOUND = "cnr", "dprime", "error", "error_bound"
@@ -37,15 +37,18 @@ class Confusion(NoiseMetric):
 
     order = 5
 
-    def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
-        if not asked.states:
+    def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
+        if not requested.states:
             return ()
-        each = [
+        pairwise = [
             _quantity(metric, pair_name(metric, pair), pair)
-            for pair in class_pairs(asked.states)
+            for pair in class_pairs(requested.states)
             for metric in (CNR, D_PRIME, ERROR, ERROR_BOUND)
         ]
-        return (*each, *(_quantity(metric, metric, asked.states) for metric in (STATE_ERROR, STATE_ERROR_BOUND)))
+        return (
+            *pairwise,
+            *(_quantity(metric, metric, requested.states) for metric in (STATE_ERROR, STATE_ERROR_BOUND)),
+        )
 
     def of_noise(
         self, imager: ForwardModel, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
@@ -53,17 +56,17 @@ class Confusion(NoiseMetric):
         """Compute exact sums over the digital numbers of a few pixels, else Gaussian errors or bounds."""
         mean, variance, _ = NoiseShape.of_cases(read)
         error, bound, state_bound = _errors(imager, curves, read, members)
-        found: Columns = {}
+        columns: Columns = {}
         for pair in class_pairs(list(members)):
-            both = members[pair[0]], members[pair[1]]
+            pair_members = members[pair[0]], members[pair[1]]
             for metric, quantity in ((CNR, contrast_to_noise), (D_PRIME, detectability)):
-                each = quantity(mean, variance, *both)
-                found[pair_name(metric, pair)] = each.reshape(read.mean.shape[:2]).min(axis=1)
-            found[pair_name(ERROR, pair)] = error[pair]
-            found[pair_name(ERROR_BOUND, pair)] = bound[pair]
-        found[STATE_ERROR] = np.max(list(error.values()), axis=0)
-        found[STATE_ERROR_BOUND] = state_bound
-        return found
+                values = quantity(mean, variance, *pair_members)
+                columns[pair_name(metric, pair)] = values.reshape(read.mean.shape[:2]).min(axis=1)
+            columns[pair_name(ERROR, pair)] = error[pair]
+            columns[pair_name(ERROR_BOUND, pair)] = bound[pair]
+        columns[STATE_ERROR] = np.max(list(error.values()), axis=0)
+        columns[STATE_ERROR_BOUND] = state_bound
+        return columns
 
 
 def _quantity(metric: str, name: str, types: tuple[str, ...]) -> Quantity:
@@ -84,7 +87,7 @@ def _quantity(metric: str, name: str, types: tuple[str, ...]) -> Quantity:
         ends=("max",) if less else ("min",),
         goal=True,
         nominal=True,  # each shift would take an evaluation with noise
-        infinite=True,  # a signal without noise is told apart for certain
+        infinite=True,  # signals without noise are separated with certainty
         rows="decades" if less else "squares",
         apart="noise" if metric == D_PRIME else "",
         smooth=smooth,
@@ -143,12 +146,12 @@ def _errors(
     exact, pairs = _exact(imager, curves, members), class_pairs(list(members))
     if exact is not None:
         return (
-            {pair: np.max([each.error[pair] for each in exact], axis=0) for pair in pairs},
-            {pair: np.max([each.bound[pair] for each in exact], axis=0) for pair in pairs},
-            np.max([each.state_bound for each in exact], axis=0),
+            {pair: np.max([errors.error[pair] for errors in exact], axis=0) for pair in pairs},
+            {pair: np.max([errors.bound[pair] for errors in exact], axis=0) for pair in pairs},
+            np.max([errors.state_bound for errors in exact], axis=0),
         )
     mean, variance, shape = NoiseShape.of_cases(read)
     bounds, state_bound = error_bounds(mean, variance, members, shape)
     cases = read.mean.shape[:2]
-    bound = {pair: own.reshape(cases).max(axis=1) for pair, own in bounds.items()}
+    bound = {pair: values.reshape(cases).max(axis=1) for pair, values in bounds.items()}
     return _gaussian(read, members), bound, state_bound.reshape(cases).max(axis=1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..quantity import Asked, Metric, Quantity
+from ..quantity import Metric, Quantity, RequestedQuantities
 
 EXPOSURE = "exposure_s"
 
@@ -12,5 +12,5 @@ class Exposure(Metric):
 
     order = 3
 
-    def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
+    def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
         return (Quantity(EXPOSURE, EXPOSURE, "exposure time, the same for all channels", unit="s", digits=6),)

@@ -9,7 +9,7 @@ import numpy as np
 from ...base.types import FloatArray
 from ...designs.family import Family
 from ...designs.products import row_products
-from ..quantity import Asked, Columns, FamilyMetric, Quantity
+from ..quantity import Columns, FamilyMetric, Quantity, RequestedQuantities
 from ..smooth import Rows, SmoothDesign
 
 _MEANINGS = {
@@ -18,12 +18,12 @@ _MEANINGS = {
 }
 
 
-class Lengths(FamilyMetric):
+class SmallestWidths(FamilyMetric):
     """Narrowest edge and band."""
 
     order = 4
 
-    def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
+    def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
         return tuple(
             Quantity(
                 name=name,

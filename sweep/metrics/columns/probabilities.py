@@ -19,7 +19,7 @@ from ...camera.noise.gaussian import share_below
 from ...camera.readout import NoisyReadout
 from ...spectra.lights import class_pairs, pair_name
 from ..discrimination import NoiseShape
-from ..quantity import Asked, Columns, NoiseMetric, Quantity
+from ..quantity import Columns, NoiseMetric, Quantity, RequestedQuantities
 
 CDP = "cdp"
 _MOST = 1e12
@@ -38,8 +38,8 @@ class Probabilities(NoiseMetric):
     order = 6
     extra = True
 
-    def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
-        if not asked.probabilities:
+    def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
+        if not requested.probabilities:
             return ()
         return tuple(
             Quantity(
@@ -51,20 +51,20 @@ class Probabilities(NoiseMetric):
                 ends=("min",),
                 most=1.0,
             )
-            for pair in class_pairs(asked.states)
+            for pair in class_pairs(requested.states)
         )
 
     def of_noise(
         self, imager: ForwardModel, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
     ) -> Columns:
         """Compute the columns from mean and variance of the digital numbers."""
-        found: Columns = {}
+        columns: Columns = {}
         mean, variance, _ = NoiseShape.of_cases(read)
         for pair in class_pairs(list(members)):
-            both = members[pair[0]], members[pair[1]]
-            detected = detection(mean - imager.readout.pixel.offset_dn, variance, *both)
-            found[pair_name(CDP, pair)] = detected.reshape(read.mean.shape[:2]).min(axis=1)
-        return found
+            pair_members = members[pair[0]], members[pair[1]]
+            detected = detection(mean - imager.readout.pixel.offset_dn, variance, *pair_members)
+            columns[pair_name(CDP, pair)] = detected.reshape(read.mean.shape[:2]).min(axis=1)
+        return columns
 
 
 def detection(mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
@@ -88,10 +88,10 @@ def detection(mean: FloatArray, variance: FloatArray, first: IndexArray, second:
     least = np.ones(len(mean))
     for signal in first:
         one, others = mean[:, signal, None], mean[:, second]
-        own, other = variance[:, signal, None], variance[:, second]
+        variance_one, other = variance[:, signal, None], variance[:, second]
         bright, dark = np.maximum(one, others), np.minimum(one, others)
-        bright_noise = np.where(one >= others, own, other)
-        dark_noise = np.where(one >= others, other, own)
+        bright_noise = np.where(one >= others, variance_one, other)
+        dark_noise = np.where(one >= others, other, variance_one)
         apart = bright - dark
         contrast = np.divide(apart, dark, out=np.full(apart.shape, _MOST), where=dark > 0)
         ratios = [1 + contrast * (1 + side * _SHARE) for side in (1, -1)]

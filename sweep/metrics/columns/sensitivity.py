@@ -9,7 +9,7 @@ import numpy as np
 from ...base.types import FloatArray
 from ...camera.setup import Setup
 from ...designs.block import Block, CurveBlock
-from ..quantity import Asked, Columns, DesignMetric, LinearRows, Quantity
+from ..quantity import Columns, DesignMetric, LinearRows, Quantity, RequestedQuantities
 from ..separation import cfa_sensitivity
 from ..smooth import Rows, SmoothDesign
 
@@ -38,8 +38,8 @@ class Sensitivity(DesignMetric):
 
     order = 1
 
-    def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
-        own = Quantity(
+    def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
+        of_filter = Quantity(
             name=SENSITIVITY,
             metric=SENSITIVITY,
             meaning="sensitivity of the modified channel (1 = the channel it replaces)",
@@ -50,12 +50,12 @@ class Sensitivity(DesignMetric):
             needs="modified",
             most=1.0,
             smooth=partial(_row, name=SENSITIVITY),
-            linear=_own_share,
+            linear=_modified_share,
         )
         whole = Quantity(
             name=CFA_SENSITIVITY,
             metric=CFA_SENSITIVITY,
-            meaning=f"sensitivity of the CFA: the light of the whole tile (1 = {reference_of(asked.brightest)})",
+            meaning=f"sensitivity of the CFA: the light of the whole tile (1 = {reference_of(requested.brightest)})",
             label="CFA sensitivity",
             wanted="more",
             role="light",
@@ -64,21 +64,21 @@ class Sensitivity(DesignMetric):
             smooth=partial(_row, name=CFA_SENSITIVITY),
             linear=_whole_share,
         )
-        return own, whole
+        return of_filter, whole
 
     def of_designs(self, setup: Setup, block: Block) -> Columns:
         """Compute the sensitivity of N relative to Y, NaN without a modified channel, and that of the CFA."""
         modified, counts = list(setup.camera.modified), setup.camera.mosaic.counts
-        each = np.repeat(
+        indicators = np.repeat(
             np.eye(len(modified)), setup.camera.grid.size, axis=0
         )  # the sum over wavelengths of each channel
-        totals = block.product(each, np.arange(setup.camera.grid.size)) if modified else np.empty((len(block), 0))
+        totals = block.product(indicators, np.arange(setup.camera.grid.size)) if modified else np.empty((len(block), 0))
         every = np.empty((len(block), len(counts)))
         every[:] = setup.camera.qe.sum(axis=1, dtype=float)
         every[:, modified] = totals
         base_qe = np.asarray(setup.camera.base_qe, dtype=float)
-        own = totals.sum(axis=1) / base_qe.sum() if modified else np.full(len(block), np.nan)
-        return {SENSITIVITY: own, CFA_SENSITIVITY: cfa_sensitivity(every, counts, setup.camera.clear_qe)}
+        sensitivity = totals.sum(axis=1) / base_qe.sum() if modified else np.full(len(block), np.nan)
+        return {SENSITIVITY: sensitivity, CFA_SENSITIVITY: cfa_sensitivity(every, counts, setup.camera.clear_qe)}
 
 
 def sensitivities_gradient(setup: Setup, curves_gradient: FloatArray) -> Columns:
@@ -147,7 +147,7 @@ def _row(design: SmoothDesign, *, name: str) -> Rows:
     return Rows(light_of(design)[name], slopes[name][None])
 
 
-def _own_share(setup: Setup) -> LinearRows:
+def _modified_share(setup: Setup) -> LinearRows:
     """Return the linear rows of the sensitivity of the only modified channel."""
     base = setup.camera.base_qe[0]
     return _one_row(np.full(base.size, 1 / base.sum()))

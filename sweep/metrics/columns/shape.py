@@ -6,7 +6,7 @@ import numpy as np
 
 from ...camera.setup import Setup
 from ...designs.block import Block
-from ..quantity import Asked, Columns, DesignMetric, LinearRows, Quantity
+from ..quantity import Columns, DesignMetric, LinearRows, Quantity, RequestedQuantities
 from ..smooth import Rows, SmoothDesign
 
 _SLOPE, _LEAST = "slope_per_nm", "min_transmission"
@@ -17,7 +17,7 @@ class Shape(DesignMetric):
 
     order = 2
 
-    def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
+    def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
         slope = Quantity(
             name=_SLOPE,
             metric=_SLOPE,

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 from ...camera.setup import Setup
 from ...designs.block import Block
 from ...spectra.tasks import Case
-from ..quantity import Asked, Columns, DesignMetric, Quantity
+from ..quantity import Columns, DesignMetric, Quantity, RequestedQuantities
 from ..smooth import Rows, SmoothDesign
 
 if TYPE_CHECKING:
-    from ..tasks.judge import JudgedTask
+    from ..tasks.evaluation import TaskEvaluation
 
 PREFIX = "task_"
 """How the metrics of tasks begin."""
@@ -23,8 +23,8 @@ class TaskFigures(DesignMetric):
 
     order = 6
 
-    def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
-        if not asked.tasks:
+    def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
+        if not requested.tasks:
             return ()
         from ..tasks.figures import figures_of
 
@@ -42,15 +42,15 @@ class TaskFigures(DesignMetric):
                 signed=figure.signed,
                 smooth=partial(_rows, task=task.name, what=figure.what, case=case),
             )
-            for task in asked.tasks
+            for task in requested.tasks
             for name, figure, case in figures_of(task)
         )
 
     def of_designs(self, setup: Setup, block: Block) -> Columns:
-        """Compute the columns; see `judge.task_columns`."""
+        """Compute the columns; see `main_reader.task_columns`."""
         if setup.tasks is None:
             return {}
-        from ..tasks.judge import task_columns
+        from ..tasks.evaluation import task_columns
 
         return task_columns(setup, block)
 
@@ -59,14 +59,16 @@ def _rows(design: SmoothDesign, *, task: str, what: str, case: Case) -> Rows:
     """Return a figure's rows with derivatives; figures of a task share common parts."""
     from ..tasks.colorimetry import COMPLEX_STEP
 
-    rows = design.once(task, partial(_judged, design, task)).rows(what, case)
+    rows = design.once(task, partial(_evaluation, design, task)).rows(what, case)
     return Rows(rows.real[0], rows.imag.T / COMPLEX_STEP)
 
 
-def _judged(design: SmoothDesign, task: str) -> JudgedTask:
-    from ..tasks.color import Looks
-    from ..tasks.judge import JudgedTask
+def _evaluation(design: SmoothDesign, task: str) -> TaskEvaluation:
+    from ..tasks.color import PatchCamera
+    from ..tasks.evaluation import TaskEvaluation
 
     tasks = design.setup.tasks
     assert tasks is not None
-    return JudgedTask(tasks.by_name[task], Looks.along(design.setup, design.curves, design.by_u), tasks.conditions)
+    return TaskEvaluation(
+        tasks.by_name[task], PatchCamera.along(design.setup, design.curves, design.by_u), tasks.conditions
+    )

@@ -7,7 +7,7 @@ import numpy as np
 from ...base.types import FloatArray
 from ...camera.setup import Setup
 from ...vision.section import Vision
-from ..quantity import Asked, Columns, Quantity, VisionMetric
+from ..quantity import Columns, Quantity, RequestedQuantities, VisionMetric
 from ..smooth import Rows, SmoothDesign
 
 VISION_ERROR = "vision_error"
@@ -18,12 +18,12 @@ class ImageReading(VisionMetric):
 
     order = 8
 
-    def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
+    def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
         meaning = (
             "expected share of images of signal heads that the ideal observer reads wrongly, where a study has "
             "`vision`: over all its distances and levels, the lenses in any order, unseen lamps of the first seed"
         )
-        found = Quantity(
+        error = Quantity(
             VISION_ERROR,
             VISION_ERROR,
             meaning,
@@ -34,17 +34,17 @@ class ImageReading(VisionMetric):
             smooth=_rows,
             slopes=False,
         )
-        return (found,) if asked.vision else ()
+        return (error,) if requested.vision else ()
 
     def of_images(self, setup: Setup, curves: FloatArray, vision: Vision, seed: int) -> Columns:
         """Compute the mean over the images of one less the probability of the most probable state."""
         from ...vision.readers import observer_error  # noqa: PLC0415  (only where a study asks for images)
 
-        return {VISION_ERROR: np.array([observer_error(setup, each, vision, (seed, 0)) for each in curves])}
+        return {VISION_ERROR: np.array([observer_error(setup, curve, vision, (seed, 0)) for curve in curves])}
 
 
 def _rows(design: SmoothDesign) -> Rows:
     """Return its value, for the same scenes and random numbers of all designs."""
     assert design.images is not None
-    found = ImageReading().of_images(design.setup, design.curves[None], *design.images)[VISION_ERROR]
-    return Rows(found, np.zeros((1, len(design.by_u))))
+    error = ImageReading().of_images(design.setup, design.curves[None], *design.images)[VISION_ERROR]
+    return Rows(error, np.zeros((1, len(design.by_u))))

@@ -73,7 +73,7 @@ class ChannelNoise:
 
 
 @dataclass(frozen=True)
-class Looks:
+class PatchCamera:
     """Designs before patches that fill the field, on axis, in clear air.
 
     Parameters
@@ -88,7 +88,7 @@ class Looks:
     modified: Smooth
 
     @classmethod
-    def along(cls, setup: Setup, curves: FloatArray, by_u: FloatArray) -> Looks:
+    def along(cls, setup: Setup, curves: FloatArray, by_u: FloatArray) -> PatchCamera:
         """Return one design once per free parameter, with its derivative by that parameter.
 
         Parameters
@@ -102,7 +102,7 @@ class Looks:
 
         Returns
         -------
-        Looks
+        PatchCamera
             Designs.
         """
         return cls(setup, curves + 1j * COMPLEX_STEP * by_u)
@@ -265,9 +265,9 @@ def vora(responses: Smooth, matching: FloatArray) -> Smooth:
     """
     basis = np.linalg.qr(matching.T)[0]
     scaled = responses / np.sqrt((responses.real**2).sum(axis=-1, keepdims=True) + _LEAST)
-    own = np.einsum("ncl,ndl->ncd", scaled, scaled) + _DAMPING * np.eye(responses.shape[1])
+    gram = np.einsum("ncl,ndl->ncd", scaled, scaled) + _DAMPING * np.eye(responses.shape[1])
     cross = scaled @ basis
-    return np.asarray(np.einsum("nck,nck->n", cross, np.linalg.solve(own, cross)) / basis.shape[1])
+    return np.asarray(np.einsum("nck,nck->n", cross, np.linalg.solve(gram, cross)) / basis.shape[1])
 
 
 def metamerism_index(electrons: Smooth, xyz: FloatArray, white: FloatArray) -> Smooth:
@@ -292,22 +292,22 @@ def metamerism_index(electrons: Smooth, xyz: FloatArray, white: FloatArray) -> S
     """
     target = lab(xyz / white, np.ones(3))
     scale = electrons.real.mean(axis=(1, 2), keepdims=True)
-    seen = electrons / scale
+    response = electrons / scale
     free = ChannelNoise(np.full(electrons.shape[-1], 1.0), 0.0)
-    matrix = color_matrix(seen, xyz, white, free, _DAMPING)
+    matrix = color_matrix(response, xyz, white, free, _DAMPING)
     for _ in range(_SMI_STEPS):
-        matrix = matrix + _step(seen, matrix, target)
-    return np.asarray(100 - 5.5 * delta_e(lab(seen @ matrix, np.ones(3)), target).mean(axis=-1))
+        matrix = matrix + _step(response, matrix, target)
+    return np.asarray(100 - 5.5 * delta_e(lab(response @ matrix, np.ones(3)), target).mean(axis=-1))
 
 
-def _step(seen: Smooth, matrix: Smooth, target: FloatArray) -> Smooth:
+def _step(response: Smooth, matrix: Smooth, target: FloatArray) -> Smooth:
     """Return the matrix after a Gauss-Newton step toward the least sum of distances."""
-    n, patches, channels = seen.shape
-    ratio = seen @ matrix
+    n, patches, channels = response.shape
+    ratio = response @ matrix
     colors = lab(ratio, np.ones(3))
     left = colors - target
     weights = 1 / (delta_e(colors, target) + _LEAST)
-    jacobian = (seen[:, :, None, :, None] * lab_slope(ratio)[:, :, :, None, :]).reshape(n, patches, 3, channels * 3)
+    jacobian = (response[:, :, None, :, None] * lab_slope(ratio)[:, :, :, None, :]).reshape(n, patches, 3, channels * 3)
     normal = np.einsum("npki,np,npkj->nij", jacobian, weights, jacobian)
     trace = np.einsum("nii->n", normal.real)[:, None, None] / normal.shape[-1]
     normal = normal + _DAMPING * trace * np.eye(normal.shape[-1])

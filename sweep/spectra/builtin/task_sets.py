@@ -10,7 +10,7 @@ from ...base.types import FloatArray
 from ..color import color_matching, luminance_per_photon_radiance
 from ..spectrum import WavelengthGrid, energy_from_photons, equal_photons
 from ..tasks import ILLUMINANTS, Chart, GriddedTask, TaskName
-from . import spectra, stand_ins
+from . import spectra, surrogate_spectra
 from .data_sets.tl16 import lights
 
 _WHITE_LED = [f"LED-{kind}" for kind in ("B1", "B2", "B3", "B4", "B5", "BH1", "V1", "V2")]
@@ -48,7 +48,7 @@ def task_groups() -> dict[str, int]:
         Number of spectra by group.
     """
     shipped = {name: len(members) for name, members in spectra.shipped_groups().items()}
-    return shipped | {name: len(shapes) for name, shapes in stand_ins.STAND_INS.items()}
+    return shipped | {name: len(shapes) for name, shapes in surrogate_spectra.SURROGATES.items()}
 
 
 def is_surface(group: str) -> bool:
@@ -64,8 +64,8 @@ def is_surface(group: str) -> bool:
     bool
         False for lamps.
     """
-    if group in stand_ins.STAND_INS:
-        return stand_ins.is_sheeting(group)
+    if group in surrogate_spectra.SURROGATES:
+        return surrogate_spectra.is_sheeting(group)
     return spectra.shipped_groups()[group][0].kind == "reflectance"
 
 
@@ -86,8 +86,8 @@ def group(grid: WavelengthGrid, name: str, most: int | None = None) -> FloatArra
     ndarray of shape (n, n_wavelengths)
         Spectra.
     """
-    if name in stand_ins.STAND_INS:
-        return np.stack([shape.on(grid) for shape in stand_ins.STAND_INS[name]])
+    if name in surrogate_spectra.SURROGATES:
+        return np.stack([shape.on(grid) for shape in surrogate_spectra.SURROGATES[name]])
     members = spectra.shipped_groups()[name]
     count = len(members) if most is None else min(most, len(members))
     chosen = np.unique(np.linspace(0, len(members) - 1, count).round().astype(int))
@@ -116,12 +116,12 @@ def chart(grid: WavelengthGrid, reflectances: FloatArray, lights: Sequence[str])
     for name in lights:
         light = equal_photons(grid, illuminant(grid, name)[None])[0]
         of_white = light / (np.pi * luminance_per_photon_radiance(grid, light[None])[0])  # 1 lx: a luminance of 1 / pi
-        seen = np.concatenate([reflectances, np.ones((1, grid.size))]) * of_white
-        seen_xyz = energy_from_photons(grid.nodes_nm, seen) @ matching.T
-        photons.append(seen[:-1])
+        patch_photons = np.concatenate([reflectances, np.ones((1, grid.size))]) * of_white
+        patch_xyz = energy_from_photons(grid.nodes_nm, patch_photons) @ matching.T
+        photons.append(patch_photons[:-1])
         gray.append(_GRAY * of_white)
-        xyz.append(seen_xyz[:-1] / seen_xyz[-1, 1])
-        white.append(seen_xyz[-1] / seen_xyz[-1, 1])
+        xyz.append(patch_xyz[:-1] / patch_xyz[-1, 1])
+        white.append(patch_xyz[-1] / patch_xyz[-1, 1])
     return Chart(np.stack(photons), np.stack(gray), np.stack(xyz), np.stack(white))
 
 
@@ -191,7 +191,7 @@ def shipped(grid: WavelengthGrid, name: str) -> GriddedTask:
         case "road_marking":
             classes, cases = groups("white marking", "yellow marking"), (*_STREET, "lps")
         case "traffic_signs":
-            classes, cases = groups(*filter(stand_ins.is_sheeting, stand_ins.STAND_INS)), _STREET
+            classes, cases = groups(*filter(surrogate_spectra.is_sheeting, surrogate_spectra.SURROGATES)), _STREET
         case "vegetation":
             signals = lights(grid)
             leaves = group(grid, "canopy", _MOST) * illuminant(grid, "d65")

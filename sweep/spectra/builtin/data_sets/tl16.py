@@ -38,8 +38,8 @@ def tl16(grid: WavelengthGrid, parameters: SurrogateParameters) -> Lights:
     for color in SIGNAL_TYPES:
         for region, lamps in (ORANGE_LAMPS if color == "orange" else LAMPS).items():
             led = parameters.lights[region][color]
-            for lamp, place in enumerate(np.linspace(-1.0, 1.0, lamps)):
-                spectrum = led_photons(wave, led.peak_nm + place * led.spread_nm, led.blue_nm, led.red_nm)
+            for lamp, offset in enumerate(np.linspace(-1.0, 1.0, lamps)):
+                spectrum = led_photons(wave, led.peak_nm + offset * led.spread_nm, led.blue_nm, led.red_nm)
                 signals.append((f"{region}_{lamp + 1:02d}_{color}", color, spectrum))
     return make_lights(
         grid, "tl16", signals, "built-in surrogate tl16", photon_ratio=parameters.photon_ratio, surrogate=True

@@ -19,7 +19,7 @@ from ...spectra.tasks import Case, Chart, Conditions, GriddedTask
 from ..quantity import Columns
 from ..smooth_noise import margin, squared_detectability
 from . import color
-from .color import Looks
+from .color import PatchCamera
 from .colorimetry import Smooth, delta_e_2000, lab, root
 from .figures import CSD, D_PRIME, ERROR, LUX, MEAN, MOST, MOST_95, SMI, SNR, SNR_AT_1_LX, VORA, figures_of
 
@@ -32,12 +32,12 @@ _MOST_DISTANCES = 2_000_000
 """Designs that are judged at once, and their pairs of spectra, so that arrays stay small."""
 
 
-class JudgedTask:
+class TaskEvaluation:
     """Task for some designs; common parts of several figures are computed once."""
 
-    def __init__(self, task: GriddedTask, looks: Looks, conditions: Conditions) -> None:
-        self._task, self._looks, self._conditions = task, looks, conditions
-        self._noise = looks.noise(conditions.read_noise_e)
+    def __init__(self, task: GriddedTask, patch_camera: PatchCamera, conditions: Conditions) -> None:
+        self._task, self._patch_camera, self._conditions = task, patch_camera, conditions
+        self._noise = patch_camera.noise(conditions.read_noise_e)
         self._made: dict[tuple[str, Case], Smooth] = {}
         self._rows: dict[str, Callable[[Case], Smooth]] = {
             CSD: self._csd,
@@ -81,8 +81,8 @@ class JudgedTask:
     def _signals(self, case: Case) -> Smooth:
         """Return electrons of each spectrum of a separation, with the photons of the study's lights."""
         assert self._task.photons is not None
-        photons = self._task.photons[self._at(case)] * self._looks.setup.scene.photon_radiance
-        return self._once("signals", case, lambda: self._looks.electrons(photons, self._conditions.exposure_s))
+        photons = self._task.photons[self._at(case)] * self._patch_camera.setup.scene.photon_radiance
+        return self._once("signals", case, lambda: self._patch_camera.electrons(photons, self._conditions.exposure_s))
 
     def _apart(self, case: Case) -> tuple[Smooth, Smooth, Smooth]:
         """Return differences of the pairs of spectra of two classes, and both variances, [n, n_pairs, n_channels]."""
@@ -91,7 +91,7 @@ class JudgedTask:
         return signals[:, one] - signals[:, other], variance[:, one], variance[:, other]
 
     def _csd(self, case: Case) -> Smooth:
-        return root(((self._looks.setup.camera.pixel.dn_per_e * self._apart(case)[0]) ** 2).sum(axis=-1))
+        return root(((self._patch_camera.setup.camera.pixel.dn_per_e * self._apart(case)[0]) ** 2).sum(axis=-1))
 
     @property
     def _chart(self) -> Chart:
@@ -100,11 +100,11 @@ class JudgedTask:
 
     def _patches(self, case: Case) -> Smooth:
         photons = self._chart.photons[self._at(case)] * self._conditions.illuminance_lx
-        return self._once("patches", case, lambda: self._looks.electrons(photons, self._conditions.exposure_s))
+        return self._once("patches", case, lambda: self._patch_camera.electrons(photons, self._conditions.exposure_s))
 
     def _gray(self, case: Case) -> Smooth:
         """Return electrons of 18 % gray per lx, ndarray of shape (n, n_channels)."""
-        return self._looks.electrons(self._chart.gray[self._at(case)], self._conditions.exposure_s)
+        return self._patch_camera.electrons(self._chart.gray[self._at(case)], self._conditions.exposure_s)
 
     def _matrix(self, case: Case) -> Smooth:
         """Return the noise-optimal color matrix at the conditions' illuminance."""
@@ -125,13 +125,13 @@ class JudgedTask:
         return least_lux[:, None]
 
     def _vora(self, _: Case) -> Smooth:
-        grid = self._looks.setup.camera.grid
-        return color.vora(self._looks.qe * grid.nodes_nm, color_matching(grid))[:, None]
+        grid = self._patch_camera.setup.camera.grid
+        return color.vora(self._patch_camera.qe * grid.nodes_nm, color_matching(grid))[:, None]
 
     def _metamerism(self, _: Case) -> Smooth:
         chart = self._task.index
         assert chart is not None
-        electrons = self._looks.electrons(chart.photons[0], self._conditions.exposure_s)
+        electrons = self._patch_camera.electrons(chart.photons[0], self._conditions.exposure_s)
         return color.metamerism_index(electrons, chart.xyz[0], chart.white[0])[:, None]
 
 
@@ -207,23 +207,25 @@ def task_columns(setup: Setup, block: Block) -> Columns:
     pairs = max((len(task.pairs[0]) for task in tasks.tasks if task.photons is not None), default=1)
     size = max(1, min(_BLOCK, _MOST_DISTANCES // pairs))
     for start in range(0, len(curves), size):
-        looks = Looks(setup, curves[start : start + size])
+        patch_camera = PatchCamera(setup, curves[start : start + size])
         figures: dict[str, FloatArray] = {}
         for task in tasks.tasks:
-            judged = JudgedTask(task, looks, tasks.conditions)
+            evaluation = TaskEvaluation(task, patch_camera, tasks.conditions)
             for name, figure, case in figures_of(task.key):
-                rows = judged.rows(figure.what, case)
+                rows = evaluation.rows(figure.what, case)
                 figures[name] = rows.max(axis=1) if figure.wanted == "less" else rows.min(axis=1)
         parts.append(figures)
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
-def traded(looks: Looks, chart: Chart, case: int, conditions: Conditions) -> tuple[FloatArray, FloatArray]:
+def error_against_noise(
+    patch_camera: PatchCamera, chart: Chart, case: int, conditions: Conditions
+) -> tuple[FloatArray, FloatArray]:
     """Return color error against noise of one design under one light, for each of `REGULARIZATIONS`.
 
     Parameters
     ----------
-    looks : Looks
+    patch_camera : PatchCamera
         Designs before patches.
     chart : Chart
         Patches and lights.
@@ -237,9 +239,9 @@ def traded(looks: Looks, chart: Chart, case: int, conditions: Conditions) -> tup
     delta_e, snr : ndarray of shape (n,)
         Mean CIEDE2000 of the chart, and luminance SNR of 18 % gray.
     """
-    noise = looks.noise(conditions.read_noise_e)
-    patches = looks.electrons(chart.photons[case] * conditions.illuminance_lx, conditions.exposure_s)
-    gray = looks.electrons(chart.gray[case] * conditions.illuminance_lx, conditions.exposure_s)
+    noise = patch_camera.noise(conditions.read_noise_e)
+    patches = patch_camera.electrons(chart.photons[case] * conditions.illuminance_lx, conditions.exposure_s)
+    gray = patch_camera.electrons(chart.gray[case] * conditions.illuminance_lx, conditions.exposure_s)
     points = []
     for regularization in REGULARIZATIONS:
         matrix = color.color_matrix(patches, chart.xyz[case], chart.white[case], noise, float(regularization))
@@ -250,13 +252,13 @@ def traded(looks: Looks, chart: Chart, case: int, conditions: Conditions) -> tup
 
 
 def rendered_areas(
-    looks: Looks, chart: Chart, case: int, photons: FloatArray, conditions: Conditions
+    patch_camera: PatchCamera, chart: Chart, case: int, photons: FloatArray, conditions: Conditions
 ) -> tuple[FloatArray, FloatArray]:
     """Return the areas of a picture through the noise-optimal matrix, with the noise of four pixels.
 
     Parameters
     ----------
-    looks : Looks
+    patch_camera : PatchCamera
         Designs before patches.
     chart : Chart
         Patches and lights.
@@ -274,8 +276,8 @@ def rendered_areas(
     covariance : ndarray of shape (n_areas, 3, 3)
         Covariances.
     """
-    noise = looks.noise(conditions.read_noise_e)
-    patches = looks.electrons(chart.photons[case] * conditions.illuminance_lx, conditions.exposure_s)
+    noise = patch_camera.noise(conditions.read_noise_e)
+    patches = patch_camera.electrons(chart.photons[case] * conditions.illuminance_lx, conditions.exposure_s)
     matrix = color.color_matrix(patches, chart.xyz[case], chart.white[case], noise)[0]
-    electrons = looks.electrons(photons, conditions.exposure_s)[0]
+    electrons = patch_camera.electrons(photons, conditions.exposure_s)[0]
     return electrons @ matrix, np.einsum("ck,ac,cj->akj", matrix, noise.of(electrons), matrix)

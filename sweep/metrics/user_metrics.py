@@ -10,9 +10,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..base.errors import Fault, SweepError
-from ..base.own_code import OwnCode, own_name
+from ..base.errors import SweepError, ValidationIssue
 from ..base.types import FloatArray
+from ..base.user_code import UserCode, name_in_file
 from ..camera.setup import Setup
 
 _NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,39}")
@@ -75,11 +75,11 @@ class Readings:
         ndarray of shape (n_designs, n_of_the_type, n_channels)
             Digital numbers, DN.
         """
-        return self.dn[:, [own == kind for own in self.types]]
+        return self.dn[:, [of_type == kind for of_type in self.types]]
 
 
 @dataclass(frozen=True)
-class OwnMetric:
+class UserMetric:
     """Metric of user code: a function of `Readings`, or a class with a method `of`, constructed without arguments.
 
     It returns ndarray of shape (n_designs,); or (n_designs, n), of which the worst counts, so that a search sees each
@@ -87,10 +87,10 @@ class OwnMetric:
     `name`, `unit`, `label`, `digits` and `wanted` (`more` or `less`).
     """
 
-    code: OwnCode
+    code: UserCode
 
-    def __reduce__(self) -> tuple[type[OwnMetric], tuple[OwnCode]]:
-        return OwnMetric, (self.code,)
+    def __reduce__(self) -> tuple[type[UserMetric], tuple[UserCode]]:
+        return UserMetric, (self.code,)
 
     @cached_property
     def _made(self) -> Any:
@@ -100,12 +100,12 @@ class OwnMetric:
     @property
     def name(self) -> str:
         """Column name; raises SweepError for an invalid one."""
-        usual = own_name(self.code.name)
-        found = self._said("name", usual)
-        if not _NAME.fullmatch(found):
+        usual = name_in_file(self.code.name)
+        name = self._said("name", usual)
+        if not _NAME.fullmatch(name):
             allowed = "at most 40 letters, digits and `_`, a letter first"
-            raise SweepError(Fault(f"{self.code.name}: no usable `name`", value=found, allowed=allowed))
-        return found
+            raise SweepError(ValidationIssue(f"{self.code.name}: no usable `name`", value=name, allowed=allowed))
+        return name
 
     @property
     def unit(self) -> str:
@@ -120,25 +120,25 @@ class OwnMetric:
     @property
     def wanted(self) -> Literal["more", "less"]:
         """`more` or `less`; raises SweepError for anything else."""
-        found = self._said("wanted", "more")
-        if found not in ("more", "less"):
-            raise SweepError(Fault(f"{self.code.name}: no such `wanted`", value=found, allowed="more, less"))
-        return found  # type: ignore[return-value]  # one of both
+        wanted = self._said("wanted", "more")
+        if wanted not in ("more", "less"):
+            raise SweepError(ValidationIssue(f"{self.code.name}: no such `wanted`", value=wanted, allowed="more, less"))
+        return wanted  # type: ignore[return-value]  # one of both
 
     @property
     def digits(self) -> int:
         """Digits after the point; raises SweepError for anything else."""
-        found = self.code.called(getattr, self._made, "digits", 4)
-        if isinstance(found, bool) or not isinstance(found, int) or not 0 <= found <= _MOST_DIGITS:
+        digits = self.code.called(getattr, self._made, "digits", 4)
+        if isinstance(digits, bool) or not isinstance(digits, int) or not 0 <= digits <= _MOST_DIGITS:
             allowed = f"a whole number, 0 to {_MOST_DIGITS}"
-            raise SweepError(Fault(f"{self.code.name}: no such `digits`", value=found, allowed=allowed))
-        return found
+            raise SweepError(ValidationIssue(f"{self.code.name}: no such `digits`", value=digits, allowed=allowed))
+        return digits
 
     def _said(self, what: str, usual: str) -> str:
-        found = self.code.called(getattr, self._made, what, usual)
-        if not isinstance(found, str) or len(found) > 100 or not found.isprintable():
-            raise SweepError(Fault(f"{self.code.name}: `{what}` is no short text", value=found))
-        return found
+        text = self.code.called(getattr, self._made, what, usual)
+        if not isinstance(text, str) or len(text) > 100 or not text.isprintable():
+            raise SweepError(ValidationIssue(f"{self.code.name}: `{what}` is no short text", value=text))
+        return text
 
     def parts(self, readings: Readings, *, finite: bool = True) -> FloatArray | None:
         """Call the metric.
@@ -162,18 +162,20 @@ class OwnMetric:
         """
         made, n = self._made, len(readings.dn)
         with np.errstate(all="ignore"):
-            found = self.code.called(self.code.called(getattr, made, "of", made), readings)
-        if found is None:
+            result = self.code.called(self.code.called(getattr, made, "of", made), readings)
+        if result is None:
             return None
-        values = self.code.called(np.asarray, found)
+        values = self.code.called(np.asarray, result)
         if values.dtype.kind not in "biuf":
-            raise SweepError(Fault(f"{self.code.name} gives no numbers", value=found, allowed="a number per design"))
+            raise SweepError(
+                ValidationIssue(f"{self.code.name} gives no numbers", value=result, allowed="a number per design")
+            )
         if values.ndim not in (1, 2) or len(values) != n or values.size == 0:
             problem = f"{self.code.name} gives another shape"
-            raise SweepError(Fault(problem, value=values.shape, allowed=f"({n},) or ({n}, n)"))
+            raise SweepError(ValidationIssue(problem, value=values.shape, allowed=f"({n},) or ({n}, n)"))
         if finite and not np.isfinite(values).all():
             other = float(values[~np.isfinite(values)][0])
-            raise SweepError(Fault(f"{self.code.name} is not finite", value=other))
+            raise SweepError(ValidationIssue(f"{self.code.name} is not finite", value=other))
         return np.asarray(values.reshape(n, -1), dtype=float)
 
     def of_cases(self, setup: Setup, response: FloatArray) -> FloatArray:
@@ -191,20 +193,20 @@ class OwnMetric:
         ndarray of shape (n_designs,)
             Values; NaN if the CFA has none.
         """
-        each = [self.parts(Readings.of_setup(setup, response[:, case])) for case in range(response.shape[1])]
-        some = [values for values in each if values is not None]
-        if len(some) < len(each):
+        by_case = [self.parts(Readings.of_setup(setup, response[:, case])) for case in range(response.shape[1])]
+        some = [values for values in by_case if values is not None]
+        if len(some) < len(by_case):
             return np.full(len(response), np.nan)
         joined = np.concatenate(some, axis=1)
         return np.asarray(joined.min(axis=1) if self.wanted == "more" else joined.max(axis=1), dtype=float)
 
 
-def own_quantities(own: Sequence[OwnMetric], setup: Setup, response: FloatArray) -> dict[str, FloatArray]:
+def user_quantities(metrics: Sequence[UserMetric], setup: Setup, response: FloatArray) -> dict[str, FloatArray]:
     """Return the column of each metric of user code.
 
     Parameters
     ----------
-    own : sequence of OwnMetric
+    own : sequence of UserMetric
         Metrics.
     setup : Setup
         Scene and camera.
@@ -216,4 +218,4 @@ def own_quantities(own: Sequence[OwnMetric], setup: Setup, response: FloatArray)
     dict of str to ndarray of shape (n_designs,)
         Columns.
     """
-    return {metric.name: metric.of_cases(setup, response) for metric in own}
+    return {metric.name: metric.of_cases(setup, response) for metric in metrics}

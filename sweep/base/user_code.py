@@ -14,10 +14,10 @@ from types import ModuleType
 from typing import Any, Literal
 
 from .disk import read_input
-from .errors import Fault, SweepError
+from .errors import SweepError, ValidationIssue
 
 Offered = Literal["sweep.families", "sweep.metrics", "sweep.effects", "sweep.sensors", "sweep.lights"]
-"""Groups of entry points, by which an installed package offers what a study can name."""
+"""Groups of entry points of plugins that a study can name."""
 CODE_OF = "code of "
 """How the digest of an installed package's code is named among those of a study's files."""
 _SEPARATOR = ".py:"
@@ -59,7 +59,7 @@ def file_of(name: str) -> str:
     return f"{name.partition(_SEPARATOR)[0]}.py"
 
 
-def own_name(name: str) -> str:
+def name_in_file(name: str) -> str:
     """Return the name part of `FILE.py:NAME`.
 
     Parameters
@@ -88,7 +88,7 @@ def kind_in_words(name: str) -> str:
     str
         Name with spaces; for a class in a Python file, the class.
     """
-    return own_name(name) if is_in_file(name) else name.replace("_", " ")
+    return name_in_file(name) if is_in_file(name) else name.replace("_", " ")
 
 
 def is_code(digested: str) -> bool:
@@ -108,7 +108,7 @@ def is_code(digested: str) -> bool:
 
 
 @dataclass(frozen=True)
-class OwnCode:
+class UserCode:
     """Code that a study names, as a worker process gets it: its name, and the text of its file or its group.
 
     `digest`: that of an installed package, which a worker must have, too. Nothing runs before `loaded` is asked for.
@@ -145,7 +145,7 @@ class OwnCode:
         try:
             return function(*arguments)
         except (Exception, SystemExit) as error:  # it may raise anything
-            raise SweepError(Fault(f"{self.name}: {_told(error)}")) from None
+            raise SweepError(ValidationIssue(f"{self.name}: {_told(error)}")) from None
 
 
 def _told(error: BaseException) -> str:
@@ -153,38 +153,44 @@ def _told(error: BaseException) -> str:
 
 
 @lru_cache(maxsize=64)
-def _loaded(code: OwnCode) -> Any:
+def _loaded(code: UserCode) -> Any:
     if code.source is not None:
         return _of_file(code.name, code.source)
     assert code.group is not None
     offer = installed(code.group, code.name)
     if offer is None:
-        raise SweepError(Fault("no installed package offers it", value=code.name, allowed=f"one with `{code.group}`"))
+        raise SweepError(
+            ValidationIssue("no installed package offers it", value=code.name, allowed=f"one with `{code.group}`")
+        )
     if offer.digest != code.digest or _begun.setdefault(offer.package, code.digest) != code.digest:
         problem = f"the code of {offer.told} is not that with which the study was loaded"
-        raise SweepError(Fault(problem, value=code.name, allowed="the same package everywhere, and a new process"))
+        raise SweepError(
+            ValidationIssue(problem, value=code.name, allowed="the same package everywhere, and a new process")
+        )
     try:
         return offer.entry.load()
     except (Exception, SystemExit) as error:
-        raise SweepError(Fault(f"{code.name} cannot be loaded: {_told(error)}", offer.entry.value)) from None
+        raise SweepError(ValidationIssue(f"{code.name} cannot be loaded: {_told(error)}", offer.entry.value)) from None
 
 
 def _of_file(name: str, source: str) -> Any:
-    """Run the text of a file, and return what is named in it."""
-    file, own = file_of(name), own_name(name)
+    """Run the text of a file, and return the named object."""
+    file, name_inside = file_of(name), name_in_file(name)
     module = ModuleType(f"sweep_own_{hashlib.sha256(source.encode()).hexdigest()[:16]}")
     sys.modules[module.__name__] = module  # a dataclass looks there for the types that its fields name
     try:
-        exec(compile(source, file, "exec", dont_inherit=True), module.__dict__)  # what `--allow-code` allows
+        exec(compile(source, file, "exec", dont_inherit=True), module.__dict__)  # allowed by `--allow-code`
     except (Exception, SystemExit) as error:
         sys.modules.pop(module.__name__, None)  # the code may have taken it away
-        raise SweepError(Fault(f"the code cannot be run: {_told(error)}", file)) from None
-    found = getattr(module, own, None)
-    if not callable(found):
+        raise SweepError(ValidationIssue(f"the code cannot be run: {_told(error)}", file)) from None
+    member = getattr(module, name_inside, None)
+    if not callable(member):
         made = [key for key, value in vars(module).items() if getattr(value, "__module__", None) == module.__name__]
         known = ", ".join(made) or "a class or function"
-        raise SweepError(Fault("no such class or function in the file", file, value=own, allowed=known))
-    return found
+        raise SweepError(
+            ValidationIssue("no such class or function in the file", file, value=name_inside, allowed=known)
+        )
+    return member
 
 
 def read_code(path: Path) -> tuple[str, str]:
@@ -209,7 +215,7 @@ def read_code(path: Path) -> tuple[str, str]:
     try:
         return content.decode("utf-8-sig"), hashlib.sha256(content).hexdigest()
     except UnicodeDecodeError:
-        raise SweepError(Fault("not UTF-8 text", str(path))) from None
+        raise SweepError(ValidationIssue("not UTF-8 text", str(path))) from None
 
 
 @dataclass(frozen=True)
@@ -243,7 +249,7 @@ class Installed:
         if spec is not None and not self.folders and spec.origin is not None:
             files = [(Path(Path(spec.origin).name), Path(spec.origin))]
         if not files:
-            raise SweepError(Fault("no such package, though it is installed", self.told, value=self.package))
+            raise SweepError(ValidationIssue("no such package, though it is installed", self.told, value=self.package))
         digest = hashlib.sha256(self.told.encode())
         for name, path in files:
             digest.update(name.as_posix().encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
@@ -286,8 +292,8 @@ def installed(group: Offered, name: str) -> Installed | None:
     SweepError
         If several packages provide it.
     """
-    found = {entry.value: entry for entry in entry_points(group=group) if entry.name == name}
-    if len(found) > 1:
-        several = " and ".join(sorted(Installed(entry).told for entry in found.values()))
-        raise SweepError(Fault(f"{several} both offer it", value=name, allowed="one of them installed"))
-    return Installed(next(iter(found.values()))) if found else None
+    entries = {entry.value: entry for entry in entry_points(group=group) if entry.name == name}
+    if len(entries) > 1:
+        several = " and ".join(sorted(Installed(entry).told for entry in entries.values()))
+        raise SweepError(ValidationIssue(f"{several} both offer it", value=name, allowed="one of them installed"))
+    return Installed(next(iter(entries.values()))) if entries else None

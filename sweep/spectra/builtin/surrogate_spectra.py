@@ -109,7 +109,7 @@ def _behind(grid: WavelengthGrid, curve: FloatArray, *, lit: bool) -> FloatArray
 
 
 StandIn = LedShape | EdgeShape | BandShape
-STAND_INS: Mapping[str, tuple[StandIn, ...]] = {
+SURROGATES: Mapping[str, tuple[StandIn, ...]] = {
     "brake red": (
         LedShape(620, 8, 6),
         LedShape(630, 8, 6),
@@ -133,7 +133,7 @@ STAND_INS: Mapping[str, tuple[StandIn, ...]] = {
     "green sheeting": (BandShape(0.02, 0.22, 505, 60), BandShape(0.03, 0.2, 510, 70)),
     "blue sheeting": (BandShape(0.01, 0.2, 455, 70), BandShape(0.02, 0.25, 460, 70)),
 }
-"""Every group of surrogates, from the limits of what is on the road to its middle."""
+"""Every group of surrogates, from the limits of lamps on the road to their middle."""
 
 
 def region(group: str) -> ColorRegion:
@@ -189,7 +189,7 @@ def surrogate_cards() -> list[Card]:
         ("sheeting_surrogates", "reflectance", "modeled: a band or an edge, inside the color region of 23 CFR 655"),
     ):
         of_kind = {
-            group: shapes for group, shapes in STAND_INS.items() if is_sheeting(group) == (kind == "reflectance")
+            group: shapes for group, shapes in SURROGATES.items() if is_sheeting(group) == (kind == "reflectance")
         }
         sizes = {group: len(shapes) for group, shapes in of_kind.items()}
         stated = hashlib.sha256(repr(of_kind).encode()).hexdigest()

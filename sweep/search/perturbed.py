@@ -1,11 +1,11 @@
-"""Filters as production makes them, in the linear programs of the upper bound: shapes moved by whole steps of the grid.
+"""Filters with production errors in the linear programs of the upper bound: shapes moved by whole steps of the grid.
 
-A filter N = fixed + carrier times shape, of which production moves the shape by whole steps, has the shape s(l - d) at
-the wavelength l: it comes out as fixed(l) + carrier(l) (N - fixed)(l - d) / carrier(l - d), which is linear in N.
-Production is therefore more rows of the same program. Moves by part of a step and thickness errors are left out, since
-the shape is known at the nodes of the grid alone; a worst case over fewer moves is no smaller. Where N does not
-determine what moves in (beyond the ends of the grid, and where the carrier is next to nothing), it may take any value
-of the family's box.
+A filter N = fixed + base transmission times shape, of which production moves the shape by whole steps, has the shape
+s(l - d) at the wavelength l. With the base transmission b it becomes fixed(l) + b(l) (N - fixed)(l - d) / b(l - d),
+which is linear in N. Production is therefore more rows of the same program. Moves by part of a step and thickness
+errors are left out, since the shape is known at the nodes of the grid alone; a worst case over fewer moves is no
+smaller. Where N does not determine the moved shape (beyond the ends of the grid, and where the base transmission is
+close to 0), it may take any value of the family's box.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ..designs.family import Family, MovedFamily
 from ..designs.tolerance import AS_DESIGNED
 from .problem import Problem
 
-_LEAST_CARRIER = 1e-3
+_LEAST_BASE_TRANSMISSION = 1e-3
 """Of the base curve: a shape on less is not known from N."""
 _WHOLE = 1e-9
 """Moves are known to this share of a step: rounding."""
@@ -63,7 +63,7 @@ class Distances:
 
 
 @dataclass(frozen=True)
-class Produced:
+class PerturbedFilter:
     """Filter as produced: scale times N[source] + constant where it is `known`, else between `low` and `high`.
 
     Parameters
@@ -122,7 +122,7 @@ class Produced:
         return rows, np.stack([ends[0] + fixed, ends[1] - fixed], axis=1)
 
 
-def ways_of(problem: Problem) -> tuple[Produced, ...]:
+def perturbed_filters(problem: Problem) -> tuple[PerturbedFilter, ...]:
     """Return the filters as produced that a program knows: as designed, and moved by whole steps.
 
     Parameters
@@ -152,32 +152,34 @@ def all_ways(problem: Problem) -> bool:
     bool
         True if they are.
     """
-    return len(ways_of(problem)) == len({AS_DESIGNED, *problem.tolerance.places})
+    return len(perturbed_filters(problem)) == len({AS_DESIGNED, *problem.tolerance.places})
 
 
-def _as_designed(base: FloatArray) -> Produced:
+def _as_designed(base: FloatArray) -> PerturbedFilter:
     nothing = np.zeros_like(base)
-    return Produced(np.arange(base.size), np.ones(base.size, dtype=bool), np.ones_like(base), nothing, nothing, nothing)
+    return PerturbedFilter(
+        np.arange(base.size), np.ones(base.size, dtype=bool), np.ones_like(base), nothing, nothing, nothing
+    )
 
 
-def _moves(problem: Problem) -> Iterator[Produced]:
+def _moves(problem: Problem) -> Iterator[PerturbedFilter]:
     family, step_nm = problem.family, problem.setup.camera.grid.step_nm
     if not isinstance(family, MovedFamily):
         return
     for off in problem.tolerance.places:
         steps = round(off.shift_nm / step_nm)
         if any(off) and not off.thickness and abs(off.shift_nm / step_nm - steps) < _WHOLE:
-            own: Family = family.produced(off)
-            ends = (end(problem.low, problem.high)[0] for end in (own.lower, own.upper))
+            perturbed: Family = family.perturbed(off)
+            ends = (end(problem.low, problem.high)[0] for end in (perturbed.lower, perturbed.upper))
             yield _moved(problem.setup.camera.base_qe[0], *family.moved, steps, *ends)
 
 
 def _moved(
-    base: FloatArray, fixed: FloatArray, carrier: FloatArray, steps: int, low: FloatArray, high: FloatArray
-) -> Produced:
+    base: FloatArray, fixed: FloatArray, base_transmission: FloatArray, steps: int, low: FloatArray, high: FloatArray
+) -> PerturbedFilter:
     source = np.arange(base.size) - steps
     inside = (source >= 0) & (source < base.size)
     source = np.where(inside, source, 0)
-    known = inside & (np.abs(carrier[source]) > _LEAST_CARRIER * base.max())
-    scale = np.divide(carrier, carrier[source], out=np.zeros_like(carrier), where=known)
-    return Produced(source, known, scale, np.where(known, fixed - scale * fixed[source], 0.0), low, high)
+    known = inside & (np.abs(base_transmission[source]) > _LEAST_BASE_TRANSMISSION * base.max())
+    scale = np.divide(base_transmission, base_transmission[source], out=np.zeros_like(base_transmission), where=known)
+    return PerturbedFilter(source, known, scale, np.where(known, fixed - scale * fixed[source], 0.0), low, high)

@@ -6,22 +6,22 @@ from functools import partial
 
 import numpy as np
 
-from ...base.errors import Fault, SweepError
+from ...base.errors import SweepError, ValidationIssue
 from ...base.types import FloatArray
-from ..own import OwnMetric, Readings
-from ..quantity import Asked, Metric, Quantity
+from ..quantity import Metric, Quantity, RequestedQuantities
 from ..smooth import Rows, SmoothDesign
+from ..user_metrics import Readings, UserMetric
 
 _STEP = 1e-5
 """Half of a central difference, in units of the box."""
 
 
-class OwnColumns(Metric):
-    """Columns that `own_quantities` computes with the readout."""
+class UserColumns(Metric):
+    """Columns that `user_quantities` computes with the readout."""
 
     order = 9
 
-    def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
+    def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
         return tuple(
             Quantity(
                 name=metric.name,
@@ -37,11 +37,11 @@ class OwnColumns(Metric):
                 signed=True,
                 smooth=partial(_rows, metric=metric),
             )
-            for metric in asked.own
+            for metric in requested.own
         )
 
 
-def _rows(design: SmoothDesign, *, metric: OwnMetric) -> Rows:
+def _rows(design: SmoothDesign, *, metric: UserMetric) -> Rows:
     """Return a row for each of its numbers in every case, with derivatives by differences along the response's."""
     response, by_u = design.response, design.response_by_u
     moved = np.concatenate([response[None], response + _STEP * by_u, response - _STEP * by_u])
@@ -51,10 +51,12 @@ def _rows(design: SmoothDesign, *, metric: OwnMetric) -> Rows:
     return Rows(values[0], (values[1 : n + 1] - values[n + 1 :]).T / (2 * _STEP))
 
 
-def _parts(metric: OwnMetric, design: SmoothDesign, dn: FloatArray) -> FloatArray:
-    found = metric.parts(Readings.of_setup(design.setup, dn), finite=False)  # a design without light is not feasible
-    if found is None:
+def _parts(metric: UserMetric, design: SmoothDesign, dn: FloatArray) -> FloatArray:
+    parts = metric.parts(Readings.of_setup(design.setup, dn), finite=False)  # a design without light is not feasible
+    if parts is None:
         raise SweepError(
-            Fault(f"{metric.code.name} gives None for the searched CFA", value=design.setup.camera.mosaic.name)
+            ValidationIssue(
+                f"{metric.code.name} gives None for the searched CFA", value=design.setup.camera.mosaic.name
+            )
         )
-    return found
+    return parts

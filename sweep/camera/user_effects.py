@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.errors import Fault, SweepError
-from ..base.own_code import OwnCode, own_name
+from ..base.errors import SweepError, ValidationIssue
 from ..base.types import FloatArray
+from ..base.user_code import UserCode, name_in_file
 
 
 @dataclass(frozen=True)
@@ -31,18 +31,18 @@ class Irradiance:
 
 
 @dataclass(frozen=True)
-class OwnEffect:
+class UserEffect:
     """Function of an `Irradiance` and its `Scene` that returns an `Irradiance`.
 
     It is always computed, since it has no bound, and must depend on nothing else.
     """
 
-    code: OwnCode
+    code: UserCode
 
     @property
     def name(self) -> str:
         """Name in plans and provenance."""
-        return own_name(self.code.name)
+        return name_in_file(self.code.name)
 
     def applied(self, irradiance: Irradiance, scene: object) -> tuple[FloatArray, FloatArray]:
         """Return the irradiance of signals and background behind the effect.
@@ -71,10 +71,10 @@ class OwnEffect:
             values = self.code.called(np.asarray, self.code.called(getattr, result, part), float)
             if values.shape != before.shape:
                 problem = f"{self.code.name} gives another shape of `{part}`"
-                raise SweepError(Fault(problem, value=values.shape, allowed=f"{before.shape}"))
+                raise SweepError(ValidationIssue(problem, value=values.shape, allowed=f"{before.shape}"))
             wrong = values[~(np.isfinite(values) & (values >= 0))]
             if wrong.size:
                 problem = f"{self.code.name} gives no irradiance in `{part}`"
-                raise SweepError(Fault(problem, value=float(wrong[0]), allowed="finite numbers, 0 or more"))
+                raise SweepError(ValidationIssue(problem, value=float(wrong[0]), allowed="finite numbers, 0 or more"))
             behind.append(values)
         return behind[0], behind[1]
