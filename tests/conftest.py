@@ -56,7 +56,7 @@ FEWER = {
 """Scenes, starts or levels of a study of the project, and those of them that its finished run has: all take minutes."""
 LOOKED_AT = ("stopband", "fog", "dual", "paper", "noise", "distance")
 """Studies whose reports tests open. The figures of the others are drawn, but no pictures made of them, which takes longer."""
-FinishedJob = Callable[[str], Path]
+FinishedFolder = Callable[[str], Path]
 """Name of a study of the project -> folder of its finished run."""
 ROWS = pytest.StashKey[list[dict[str, Any]]]()
 
@@ -91,7 +91,7 @@ def hard_case_rows(request: pytest.FixtureRequest) -> list[dict[str, Any]]:
 
 
 @pytest.fixture(scope="session")
-def finished(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> FinishedJob:
+def finished(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> FinishedFolder:
     """Runs of the project's studies by the command, each once; what it said is in `said.txt` beside the folder.
 
     Processes that test side by side share the runs.

@@ -14,7 +14,7 @@ from sweep.cli.accuracy import measure_accuracy
 from sweep.metrics.share import format_share
 from sweep.study import load_study
 
-from .conftest import ROOT, STUDIES, FinishedJob
+from .conftest import ROOT, STUDIES, FinishedFolder
 from .printed import PRINTED, with_printed
 
 README = (ROOT / "README.md").read_text()
@@ -58,14 +58,14 @@ FINDINGS = dict(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in FINDINGS if name != "stopband"])
-def test_figures_of_a_finding_are_in_the_output_of_its_study(finished: FinishedJob, name: str) -> None:
+def test_figures_of_a_finding_are_in_the_output_of_its_study(finished: FinishedFolder, name: str) -> None:
     folder = finished(name)
     output = folder.with_name(f"{name}.said.txt").read_text()
     for figure in re.findall(r"\d[\d.]*(?: (?:DN|m|e|times))?(?= |,|\.|;)", FINDINGS[name]):
         assert figure in output, figure
 
 
-def stopband(finished: FinishedJob) -> dict[str, pd.Series]:
+def stopband(finished: FinishedFolder) -> dict[str, pd.Series]:
     """Rows of the finished study by their names."""
     table = pd.read_parquet(finished("stopband") / "results.parquet")
     return {row["name"]: row for _, row in table[table["kind"] != "sweep"].iterrows()}
@@ -112,12 +112,12 @@ def test_every_figure_of_the_readme_has_its_command() -> None:
 
 
 @pytest.mark.parametrize("said", list(FIGURES))
-def test_a_figure_of_the_readme_is_that_of_its_command(finished: FinishedJob, said: str) -> None:
+def test_a_figure_of_the_readme_is_that_of_its_command(finished: FinishedFolder, said: str) -> None:
     assert FIGURES[said](stopband(finished)) == said
 
 
 @pytest.mark.slow
-def test_the_figures_at_an_angle_are_those_of_their_command(finished: FinishedJob) -> None:
+def test_the_figures_at_an_angle_are_those_of_their_command(finished: FinishedFolder) -> None:
     scene = load_study(STUDIES / "angle.yaml").scenarios["field"]
     assert scene.optics.f_number == 1.6
     assert scene.field is not None
@@ -141,23 +141,22 @@ def test_the_figures_of_accuracy_are_those_of_their_command(tmp_path: Path) -> N
 
 
 @pytest.mark.slow
-def test_the_table_of_the_readme_is_that_of_its_command(finished: FinishedJob) -> None:
+def test_the_table_of_the_readme_is_that_of_its_command(finished: FinishedFolder) -> None:
     folder = finished("robust")
     rows = pd.read_parquet(folder / "results.parquet").merge(
         pd.read_parquet(folder / "robustness.parquet"), on="design_id"
     )
     rows = rows.set_index("name")
-    names = ("RGGB", "RYYCy", "N_4", "nominal", "best stopband")
+    names = ("RGGB", "RYYCy", "RYN4Cy", "best at f/2", "robust to lamps")
     lines = [line for line in README.splitlines() if line.endswith(" % |")]
     assert len(lines) == len(names)
     cells = pd.read_parquet(folder / "regions.parquet").groupby(["norm", "design_id"])[["separated", "pairs"]].sum()
     told_apart = cells["separated"] / cells["pairs"]
     at_angles = pd.read_parquet(finished("angle") / "results.parquet")
     over_places = at_angles[at_angles["scenario"] == "field"].set_index("name")
-    others = {"nominal": "best at f/2", "best stopband": "best for all lamps"}
-    for name, other in others.items():  # the same filters in both studies
+    for name in ("best at f/2", "robust to lamps"):  # the same filters in both studies
         for parameter in ("left_nm", "left_width_nm", "right_nm", "right_width_nm"):
-            assert rows.loc[name, parameter] == pytest.approx(over_places.loc[other, parameter], abs=0.02)
+            assert rows.loc[name, parameter] == pytest.approx(over_places.loc[name, parameter], abs=0.02)
     for line, name in zip(lines, names, strict=True):
         row = rows.loc[name]
         shares = [told_apart[norm, row["design_id"]] for norm in ("en_12368", "ite")]
@@ -166,7 +165,7 @@ def test_the_table_of_the_readme_is_that_of_its_command(finished: FinishedJob) -
         values = (
             row["csd_yellow_red"],
             row["worst_csd_yellow_red"],
-            over_places.loc[others.get(name, name)]["csd_yellow_red"],
+            over_places.loc[name]["csd_yellow_red"],
         )
         own = f"{' | '.join(f'{value:.0f} DN' for value in values)} | {kept} |"
         assert own in line, name

@@ -156,7 +156,7 @@ class FilterEvaluation:
             return
         gap = "" if self.gap is None else f", {100 * self.gap:.1f} % below"
         bound, has = self.goal.format_bound(self.limit), self.goal.amount(self.before_quantization_dn, 1)
-        alike = "" if self.technology is None else f" that works by {self.technology.told}"
+        alike = "" if self.technology is None else f" that works by {self.technology.description}"
         where = f" in {scenes[0]}" if len(scenes) > 1 else ""
         yield (
             f"{self.goal.words[:1].upper()}{self.goal.words[1:]} before quantization{where}: no filter between 0 and "

@@ -288,7 +288,7 @@ def lights(
     if _is_table(source):
         if signals is None:
             raise DataError(
-                ValidationIssue("signal types of a table must be said", key="types", allowed="{type: [column, ...]}")
+                ValidationIssue("signal types of a table are missing", key="types", allowed="{type: [column, ...]}")
             )
         entry = {"file": "lights given", "quantity": quantity, "signals": signals}
         return CurveSource({"files": [entry]}, {"lights given": table_to_curves(source)})

@@ -120,7 +120,7 @@ def user_filter_setup(study: Study, cfa: str, scenario: str, bases: Mapping[str,
     filters = [s.filter for s in study.spaces if s.filter is not None and s.cfa == cfa]
     stated = {repr(f.technology): f.technology for f in filters if bases.keys() & set(f.channels)}
     if len(stated) > 1:
-        several = ", ".join("none" if made is None else made.told for made in stated.values())
+        several = ", ".join("none" if made is None else made.description for made in stated.values())
         raise DataError(
             ValidationIssue(f"several technologies are stated for {' and '.join(bases)} of {cfa}", value=several)
         )

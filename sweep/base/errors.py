@@ -99,7 +99,7 @@ class SweepError(Exception):
             issues = (ValidationIssue(issues),)
         elif isinstance(issues, ValidationIssue):
             issues = (issues,)
-        self.issues = _told(issues)
+        self.issues = _capped(issues)
         super().__init__("\n".join(str(issue) for issue in self.issues))
 
 
@@ -145,7 +145,7 @@ class InterruptedRunError(SweepError):
     exit_code = 130
 
 
-def _told(issues: Sequence[ValidationIssue]) -> tuple[ValidationIssue, ...]:
+def _capped(issues: Sequence[ValidationIssue]) -> tuple[ValidationIssue, ...]:
     if len(issues) <= MOST_ISSUES:
         return tuple(issues)
     more = len(issues) - MOST_ISSUES + 1

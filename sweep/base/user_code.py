@@ -145,10 +145,10 @@ class UserCode:
         try:
             return function(*arguments)
         except (Exception, SystemExit) as error:  # it may raise anything
-            raise SweepError(ValidationIssue(f"{self.name}: {_told(error)}")) from None
+            raise SweepError(ValidationIssue(f"{self.name}: {_error_text(error)}")) from None
 
 
-def _told(error: BaseException) -> str:
+def _error_text(error: BaseException) -> str:
     return " ".join(f"{type(error).__name__}: {error}".split())[:_MOST_LETTERS]
 
 
@@ -163,14 +163,16 @@ def _loaded(code: UserCode) -> Any:
             ValidationIssue("no installed package offers it", value=code.name, allowed=f"one with `{code.group}`")
         )
     if offer.digest != code.digest or _begun.setdefault(offer.package, code.digest) != code.digest:
-        problem = f"the code of {offer.told} is not that with which the study was loaded"
+        problem = f"the code of {offer.description} is not that with which the study was loaded"
         raise SweepError(
             ValidationIssue(problem, value=code.name, allowed="the same package everywhere, and a new process")
         )
     try:
         return offer.entry.load()
     except (Exception, SystemExit) as error:
-        raise SweepError(ValidationIssue(f"{code.name} cannot be loaded: {_told(error)}", offer.entry.value)) from None
+        raise SweepError(
+            ValidationIssue(f"{code.name} cannot be loaded: {_error_text(error)}", offer.entry.value)
+        ) from None
 
 
 def _of_file(name: str, source: str) -> Any:
@@ -182,7 +184,7 @@ def _of_file(name: str, source: str) -> Any:
         exec(compile(source, file, "exec", dont_inherit=True), module.__dict__)  # allowed by `--allow-code`
     except (Exception, SystemExit) as error:
         sys.modules.pop(module.__name__, None)  # the code may have taken it away
-        raise SweepError(ValidationIssue(f"the code cannot be run: {_told(error)}", file)) from None
+        raise SweepError(ValidationIssue(f"the code cannot be run: {_error_text(error)}", file)) from None
     member = getattr(module, name_inside, None)
     if not callable(member):
         made = [key for key, value in vars(module).items() if getattr(value, "__module__", None) == module.__name__]
@@ -225,7 +227,7 @@ class Installed:
     entry: EntryPoint
 
     @property
-    def told(self) -> str:
+    def description(self) -> str:
         """The package, with its version."""
         dist = self.entry.dist
         return "a package without a name" if dist is None else f"{dist.name} {dist.version}"
@@ -249,8 +251,10 @@ class Installed:
         if spec is not None and not self.folders and spec.origin is not None:
             files = [(Path(Path(spec.origin).name), Path(spec.origin))]
         if not files:
-            raise SweepError(ValidationIssue("no such package, though it is installed", self.told, value=self.package))
-        digest = hashlib.sha256(self.told.encode())
+            raise SweepError(
+                ValidationIssue("no such package, though it is installed", self.description, value=self.package)
+            )
+        digest = hashlib.sha256(self.description.encode())
         for name, path in files:
             digest.update(name.as_posix().encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
         return digest.hexdigest()
@@ -294,6 +298,6 @@ def installed(group: Offered, name: str) -> Installed | None:
     """
     entries = {entry.value: entry for entry in entry_points(group=group) if entry.name == name}
     if len(entries) > 1:
-        several = " and ".join(sorted(Installed(entry).told for entry in entries.values()))
+        several = " and ".join(sorted(Installed(entry).description for entry in entries.values()))
         raise SweepError(ValidationIssue(f"{several} both offer it", value=name, allowed="one of them installed"))
     return Installed(next(iter(entries.values()))) if entries else None

@@ -149,10 +149,10 @@ class PluginFamily:
         return points
 
 
-def _parameters(kind: str, said: Any) -> tuple[Parameter, ...]:
+def _parameters(kind: str, stated: Any) -> tuple[Parameter, ...]:
     """Check and return the parameters of a class."""
     try:
-        parameters = tuple(Parameter(str(name), *map(float, numbers)) for name, *numbers in said)
+        parameters = tuple(Parameter(str(name), *map(float, numbers)) for name, *numbers in stated)
     except (TypeError, ValueError):
         parameters = ()
     names = [parameter.name for parameter in parameters]

@@ -36,7 +36,7 @@ class FamilyOptions(create_model("_FamilyOptions", __base__=Section, **_optional
     """Options of the family; each family has options of its own."""
 
 
-def told() -> str:
+def described_families() -> str:
     """Return the families with their options, for messages.
 
     Returns

@@ -31,7 +31,7 @@ class Technology(Section):
         return math.inf if self.interference is None else self.interference.effective_index
 
     @property
-    def told(self) -> str:
+    def description(self) -> str:
         """Text for messages."""
         return PIGMENT if self.interference is None else f"interference (effective index {self.index:g})"
 

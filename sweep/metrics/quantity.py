@@ -113,7 +113,7 @@ class Column:
         places = self.digits if digits is None else digits
         return f"{value:.{places}f} {self.unit}" if self.unit else f"{value:.{self.digits}f}"
 
-    def told(self, value: float) -> str:
+    def formatted(self, value: float) -> str:
         """Format a value for sentences and plots: in DN whole from 10 on.
 
         Parameters

@@ -115,7 +115,7 @@ def recognize(
     n_pixels = electrons.shape[2]
     chosen_pixels = np.sort(rng.permutation(n_pixels)[:_MOST_PIXELS])
     drawn = np.empty((*place.shape, chosen_pixels.size), dtype=np.float32)  # [patches, n_signals, pixels that are seen]
-    said = np.empty(place.shape, dtype=state.dtype)
+    answered = np.empty(place.shape, dtype=state.dtype)
     read = imager.read_with_noise(curves)
     mean = read.mean[0][:, signals]  # [n_places, n_signals, n_channels]
     variance = np.maximum(read.variance[0][:, signals], _LEAST_VARIANCE)
@@ -126,8 +126,8 @@ def recognize(
         for at in np.unique(place[block]):
             here = place[block] == at
             values = imager.channels_of(whole[here], int(at) * imager.n_cases // len(mean))  # [n, n_channels]
-            said[block][here] = state[_likeliest(values, mean[at], variance[at])]
-    accuracy = dict(_accuracy(MOST_LIKELY, truth, said))
+            answered[block][here] = state[_likeliest(values, mean[at], variance[at])]
+    accuracy = dict(_accuracy(MOST_LIKELY, truth, answered))
     half = patches // 2
     train, test = (part.reshape(-1, part.shape[-1]) for part in (drawn[:half], drawn[half:]))
     for name, classifier in CLASSIFIERS.items():
@@ -147,8 +147,8 @@ def _likeliest(values: FloatArray, mean: FloatArray, variance: FloatArray) -> In
     return np.asarray(unlike.argmin(axis=1))
 
 
-def _accuracy(rule: str, truth: IndexArray, said: IndexArray) -> Iterator[tuple[str, float]]:
-    right = np.asarray(truth == said)
+def _accuracy(rule: str, truth: IndexArray, answered: IndexArray) -> Iterator[tuple[str, float]]:
+    right = np.asarray(truth == answered)
     worst = min(float(right[truth == state].mean()) for state in np.unique(truth))
     values = (float(right.mean()), *share_interval(int(right.sum()), right.size), worst)
     yield from zip(_columns_of(rule), values, strict=True)

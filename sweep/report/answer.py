@@ -85,7 +85,7 @@ def _of_designs(output: Output) -> list[str]:
 def _format_separation(output: Output, row: Row) -> str:
     """Return the separation of a row and its light in words."""
     separation = output.trade_off[0]
-    amount = separation.told(row[separation.name])
+    amount = separation.formatted(row[separation.name])
     light = f"at {row[CFA_SENSITIVITY]:.3f} {of_reference(output)}"
     if separation.pair is None or separation.metric in _BY_NOISE:
         return f"reaches {separation.words} {amount} {light}"
@@ -111,7 +111,7 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
             yield f"In {leaders.scenario}, no design meets every constraint."
         return
     under, stated = format_constraints(output), technology_of(output, best)
-    who = full_name(best) + ("" if stated is None else f" ({stated.told})")
+    who = full_name(best) + ("" if stated is None else f" ({stated.description})")
     if best["kind"] in (PLAIN, NAMED):
         who = f"the best {'CFA' if best['kind'] == PLAIN else 'design'} of this study, {who},"
     text = f"With {under}, {who}" if under else capital(who)
@@ -120,7 +120,7 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
     text += f" {_format_separation(output, best)}"
     held_out = float(best.get(HELD_OUT + (separation.of or separation.name), np.nan))
     if np.isfinite(held_out):
-        text += f" ({separation.told(held_out)} on lights that it has not seen)"
+        text += f" ({separation.formatted(held_out)} on lights that it has not seen)"
     yield f"{text}{_in(output, leaders.scenario)}{_times(output, best, plain)}."
     if output.objective.rule.wanted != "more":  # decades of what is to be the least, in its own unit
         for name in output.objective.weights:
@@ -128,8 +128,8 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
             values = [f"{float(row[name]):.3g} {output.columns[name].unit}".rstrip() for row in rows]
             beside = f" ({plain['name']} {values[1]})" if plain is not None else ""
             yield f"Its {output.words(name)} is {values[0]}{beside}."
-    if filter_told := assumed_technology(output, best):
-        yield filter_told
+    if assumption := assumed_technology(output, best):
+        yield assumption
     if limits := _limits(output, best):
         yield limits
     yield from unseen_lines(output)
@@ -197,13 +197,13 @@ def _times(output: Output, best: Row, plain: Row | None) -> str:
     separation = output.trade_off[0]
     of, light, name = float(plain[separation.name]), float(plain[CFA_SENSITIVITY]), plain["name"]
     if not of > 0:
-        return f" ({name} by {separation.told(of)} at {light:.3f})"
+        return f" ({name} by {separation.formatted(of)} at {light:.3f})"
     times = f"{best[CFA_SENSITIVITY] / light:.2f} times its light ({light:.3f})"
     if separation.unit == DECADES:  # a ratio of logarithms says nothing
-        more = separation.told(best[separation.name] - of)
-        return f": {more} beyond {name} ({separation.told(of)}), and {times}"
+        more = separation.formatted(best[separation.name] - of)
+        return f": {more} beyond {name} ({separation.formatted(of)}), and {times}"
     what = "that" if separation.metric in _BY_NOISE else "the separation"
-    return f": {best[separation.name] / of:.2f} times {what} of {name} ({separation.told(of)}) and {times}"
+    return f": {best[separation.name] / of:.2f} times {what} of {name} ({separation.formatted(of)}) and {times}"
 
 
 def largest_separation_elsewhere(output: Output) -> list[str]:
@@ -229,7 +229,7 @@ def largest_separation_elsewhere(output: Output) -> list[str]:
     if best is not None and not most[separation.name] > best[separation.name]:
         leads = most["design_id"] == best["design_id"] and best["kind"] in (SWEPT, FOUND)
         return [f"Nothing else in this run {more}{where}."] if leads else []
-    figures = f"{separation.told(most[separation.name])} at {most[CFA_SENSITIVITY]:.3f} {of_reference(output)}"
+    figures = f"{separation.formatted(most[separation.name])} at {most[CFA_SENSITIVITY]:.3f} {of_reference(output)}"
     missed = "" if most["kind"] == PLAIN else format_missed_constraints(output, most)  # nothing is asked of a plain CFA
     ending = f", but {missed}" if missed else ""
     return [f"{capital(full_name(most))} {verb} of all{where}: {figures}{_format_limit(output, most)}{ending}."]
@@ -258,12 +258,13 @@ def unseen_lines(output: Output) -> Iterator[str]:
         quantity = output.columns[str(objective)]
         of = f" of the {quantity.words}" if several else ""
         worst = rows.nlargest(1, "fall").iloc[0]
-        yield f"Left out of the search, {worst['signal']} costs its optimum{of} most: {quantity.told(worst['fall'])}."
+        fall = quantity.formatted(worst["fall"])
+        yield f"Left out of the search, {worst['signal']} costs its optimum{of} most: {fall}."
         falls = rows["fall"].to_numpy()
         if falls.size > 1:
             mean, low, high = generalization_gap(falls, output.study.seed)
-            ends = f"95 % interval {quantity.told(low)} to {quantity.told(high)}"
-            yield f"A light that the search{of} has not seen costs {quantity.told(mean)} on average ({ends})."
+            ends = f"95 % interval {quantity.formatted(low)} to {quantity.formatted(high)}"
+            yield f"A light that the search{of} has not seen costs {quantity.formatted(mean)} on average ({ends})."
 
 
 def generalization_gap(falls: FloatArray, seed: int) -> tuple[float, float, float]:
@@ -320,14 +321,14 @@ def headline_numbers(output: Output) -> list[tuple[str, str, str]]:
 
     value, measure = float(best[separation.name]), per_exposure(separation.name)
     numbers = [
-        (separation.told(value), separation.words, beside(separation.name, separation.told)),
+        (separation.formatted(value), separation.words, beside(separation.name, separation.formatted)),
         (f"{best[CFA_SENSITIVITY]:.3f}", of_reference(output), beside(CFA_SENSITIVITY, "{:.3f}".format)),
     ]
     bound, search = upper_bound_beside(output, best), output.provenance.search
     if bound is not None and search is not None:
         shown = f"{separation.format_bound(bound)}: proven under the same constraints, before quantization"
         name = f"below the upper bound for any filter in {search.channel} of {search.cfa}"
-        numbers.append((separation.told(bound - value), name, shown))
+        numbers.append((separation.formatted(bound - value), name, shown))
     elif best[measure] == best[measure] and separation.unit != DECADES and separation.metric not in (D_PRIME, CNR):
         rate = f"{_rate(float(best[measure]))} {separation.unit}"
         numbers.append((rate, "per ms of exposure", beside(measure, _rate)))

@@ -78,7 +78,7 @@ def robustness_lines(output: Output, best: Row | None) -> Iterator[str]:
             name = "the search's answer" if row["kind"] == FOUND else row["name"]
             shares.append(f"{name} {share} ({low} to {high})")
     if shares:
-        wanted = output.trade_off[0].told(output.study.population.wanted_dn or 0.0)
+        wanted = output.trade_off[0].formatted(output.study.population.wanted_dn or 0.0)
         yield f"Share of random lamps and cameras with {wanted} or more (95 % interval): {', '.join(shares)}."
 
 
@@ -91,9 +91,9 @@ def _price(output: Output, best: Row, named: list[Row]) -> Iterator[str]:
         rival = max(rivals, key=lambda row: float(row[nominal.name]))
         lost, gained = 1 - best[nominal.name] / rival[nominal.name], best[worst.name] / rival[worst.name]
         yield (
-            f"Its worst case costs {lost:.1%} of the nominal separation ({nominal.told(best[nominal.name])}, "
-            f"{rival['name']} {nominal.told(rival[nominal.name])}) and gains {gained:.2f} times the worst case of "
-            f"{rival['name']} ({worst.told(rival[worst.name])})."
+            f"Its worst case costs {lost:.1%} of the nominal separation ({nominal.formatted(best[nominal.name])}, "
+            f"{rival['name']} {nominal.formatted(rival[nominal.name])}) and gains {gained:.2f} times the worst case of "
+            f"{rival['name']} ({worst.formatted(rival[worst.name])})."
         )
 
 
@@ -114,7 +114,7 @@ def _breaks(output: Output, row: Row, plain: list[Row]) -> str:
         text += f", films {row['breaks_thickness']:+.2%}"
     return (
         f"{who} falls below {rival['name']} at {row['breaks_at']:.2f} times the stated range of lamps and "
-        f"production: {text}, {separation.told(row['breaks_dn'])}."
+        f"production: {text}, {separation.formatted(row['breaks_dn'])}."
     )
 
 

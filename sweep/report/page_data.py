@@ -27,8 +27,8 @@ _OF_PARAMETERS, _OF_OTHERS = 2, 4
 """Digits of columns that are no quantities."""
 _PLACES = 80
 GROUPS = ("infeasible", "feasible", "front", "named", "best", "plain")
-_PUBLISHED = "RYN_4Cy"
-_PUBLISHED_LABEL = "our counterpart of the paper's N_4"
+_PUBLISHED = "RYN4Cy"
+_PUBLISHED_LABEL = "model of the paper's RYN4Cy"
 
 
 def payload(output: Output) -> dict[str, Any]:

@@ -205,7 +205,7 @@ def lead_sentence(series: SeriesFigure) -> str:
     what, _, unit = series.y_label.partition(" / ")
     values, leads = series.values, leads_of(series)
 
-    def told(design: str, place: int) -> str:
+    def formatted(design: str, place: int) -> str:
         value = values[design][place]
         return f"{value:.{0 if abs(value) >= 10 else 1}f} {unit}".rstrip()
 
@@ -224,8 +224,8 @@ def lead_sentence(series: SeriesFigure) -> str:
         others = sorted((d for d in values if d != leader), key=lambda d: -values[d][stop])
         rival = (None if last else leads[number + 1][0]) or next(iter(others), None)
         where = "" if start == stop else f" at {series.at(stop)}"
-        beside = f", {rival} {told(rival, stop)}" if rival else ""
-        parts.append(f"{leader} leads {span} ({told(leader, stop)}{where}{beside})")
+        beside = f", {rival} {formatted(rival, stop)}" if rival else ""
+        parts.append(f"{leader} leads {span} ({formatted(leader, stop)}{where}{beside})")
     among = f", {series.among}" if series.among else ""
     return f"{capital(what)} over {quantity_of(series.key)[0]}{among}: {'; '.join(parts)}."
 

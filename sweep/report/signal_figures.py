@@ -100,7 +100,7 @@ def nearest_lights(output: Output, row: Mapping[Any, Any]) -> Nearest | None:
     if text not in named:
         return None
     a, b = named[str(text)]
-    return (one, a), (other, b), separation.told(row[separation.of or separation.name])
+    return (one, a), (other, b), separation.formatted(row[separation.of or separation.name])
 
 
 def draw_clouds(designs: Sequence[Cloud], title: str, top_dn: float) -> Figure:

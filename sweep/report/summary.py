@@ -31,7 +31,7 @@ def _scene_lines(output: Output) -> list[str]:
     rows = output.named[output.named[shown.name].notna()]
     for name in names:
         designs = [
-            f"{row['name']} {shown.told(row[shown.name])}" + (f" at {row[CFA_SENSITIVITY]:.3f}" if single else "")
+            f"{row['name']} {shown.formatted(row[shown.name])}" + (f" at {row[CFA_SENSITIVITY]:.3f}" if single else "")
             for row in rows[rows["scenario"] == name].to_dict("records")
         ]
         if designs:
@@ -156,7 +156,7 @@ def _limit_line(output: Output, search: SearchFacts) -> str:
         proof += f", but it may not be the least one: {parts} parts are open after {programs} linear programs"
     levels = search.front_limits_open
     technology = (output.study.sweeps | output.study.boxes)[search.space].technology
-    moved = "" if technology is None else f", as {technology.told}"
+    moved = "" if technology is None else f", as {technology.description}"
     if output.goal.extreme and output.study.production.tolerance and "edge shifts" not in search.limit_left_out:
         moved += ", whose whole shape production moves"
     where = f"{search.channel} of {search.cfa}{f' in {search.scenario}' if len(output.scenarios) > 1 else ''}"

@@ -130,7 +130,7 @@ def pareto_figure(output: Output, scenario: str, cfa: str) -> TradeOff:
         "feasible": _points(output, swept[swept["feasible"] & ~front], sensitivity.name),
         "front": _points(output, swept[front], sensitivity.name),
         "named": _points(output, named, sensitivity.name, list(named["name"])),
-        "best": _points(output, best, sensitivity.name, [separation.told(v) for v in best[separation.name]]),
+        "best": _points(output, best, sensitivity.name, [separation.formatted(v) for v in best[separation.name]]),
     }
     bound = output.constraints.get(sensitivity.name)
     least = None if bound is None else bound.min
@@ -179,7 +179,7 @@ def overview_figure(output: Output, scenario: str) -> TradeOff:
     groups = {}
     for name, kind in {"plain": PLAIN, "named": NAMED, "best": FOUND}.items():
         rows = table[table["kind"] == kind]
-        texts = [f"{label(row)} {separation.told(row[separation.name])}" for row in rows.to_dict("records")]
+        texts = [f"{label(row)} {separation.formatted(row[separation.name])}" for row in rows.to_dict("records")]
         groups[name] = _points(output, rows, CFA_SENSITIVITY, texts)
     groups["front"] = _points(output, swept[swept["feasible"]], CFA_SENSITIVITY)
     groups["outside"] = _points(output, swept[~swept["feasible"]], CFA_SENSITIVITY)

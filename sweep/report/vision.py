@@ -144,7 +144,7 @@ class Benchmark:
         rows = self._answers(order, lamps)
         return rows[rows["name"] == self.designs[0]].sort_values(["seed", "image"])
 
-    def said(self, design: str, reader: str, order: str) -> pd.DataFrame:
+    def answers(self, design: str, reader: str, order: str) -> pd.DataFrame:
         """Return the answers on unseen lamps: columns state, said, p.
 
         Parameters
@@ -174,9 +174,9 @@ class Benchmark:
         pandas.DataFrame
             Table.
         """
-        states, rows = list(states_of(self.vision)), self.said(design, reader, order)
-        truth, said = (np.array([states.index(value) for value in rows[column]]) for column in ("state", "said"))
-        return pd.DataFrame(confusion_matrix(truth, said, len(states)), states, states)
+        states, rows = list(states_of(self.vision)), self.answers(design, reader, order)
+        truth, answered = (np.array([states.index(value) for value in rows[column]]) for column in ("state", "said"))
+        return pd.DataFrame(confusion_matrix(truth, answered, len(states)), states, states)
 
 
 def benchmark_of(output: Output) -> Benchmark:

@@ -120,7 +120,7 @@ def _vision_table(benchmark: Benchmark) -> pd.DataFrame:
 
 def _unknown(benchmark: Benchmark, design: str, reader: str) -> str:
     """Return the mean cost of an answer with "unknown", and its frequency."""
-    rows, cost = benchmark.said(design, reader, SHUFFLED), benchmark.vision.unknown_cost
+    rows, cost = benchmark.answers(design, reader, SHUFFLED), benchmark.vision.unknown_cost
     wrong = (rows["said"] != rows["state"]).to_numpy(dtype=bool)
     cost_of, unknown = costs(wrong, rows["p"].to_numpy(dtype=float), cost)
     return f"{cost_of.mean():.3f} ({format_share(float(unknown.mean()), 0)})"

@@ -11,7 +11,6 @@ import pyarrow as pa
 
 from ..base.errors import InfeasibleError, ValidationIssue
 from ..base.types import FloatArray, Parallel, Progress, delayed
-from ..base.user_code import kind_in_words
 from ..designs.space import Space
 from ..metrics.bound import FEASIBLE
 from ..metrics.columns.sensitivity import cfa_sensitivity_at
@@ -146,9 +145,9 @@ def answer_row(study: Study, answer: SearchAnswer, rules: Rules, parallel: Paral
         One row.
     """
     space = answer.search.space
-    assert space.filter is not None
-    name = f"best {kind_in_words(space.filter.family.kind)}"
-    best = Space("search", name, space.cfa, space.filter, tuple((float(value),) for value in answer.best.x))
+    best = Space(
+        "search", answer.search.name, space.cfa, space.filter, tuple((float(value),) for value in answer.best.x)
+    )
     job = Job(best, answer.search.scenario, 0, 1, study.n_designs, study.n_filters)
     # Workers have loaded what this takes, and this process has not.
     (row,) = parallel([delayed(run_job, job, study.setup(best, job.scenario), rules)])

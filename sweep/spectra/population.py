@@ -112,7 +112,7 @@ class Population(Section):
         return {key: set(getattr(self, key)) - {_ALL} for key in ("drift_nm_per_k", "binning_nm", "ageing_nm")}
 
     @property
-    def told(self) -> str:
+    def description(self) -> str:
         """Differences from a single lamp, in words."""
         given = self.model_dump(mode="json", exclude_defaults=True)
         return f"lamps of {given}"

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.errors import ValidationIssue
+from ..base.user_code import kind_in_words
 from ..camera.scene import WhitePatchExposure
 from ..designs.space import Space
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY, SENSITIVITY
@@ -61,7 +62,7 @@ def check_goals(section: StudySection, sources: Sources, requested: RequestedQua
                 right = " or ".join(f"`{other}`" for other in ends)
                 sources.add((*path, end), f"{name} has no `{end}`", value, right)
         if known[name].rows == "decades" and bound.max is not None and not _LEAST_ERROR <= bound.max <= 1:
-            sources.add((*path, "max"), "no such error is told", bound.max, f"{_LEAST_ERROR:g} to 1")
+            sources.add((*path, "max"), "no such error is computed", bound.max, f"{_LEAST_ERROR:g} to 1")
 
 
 def _check_slopes(path: KeyPath, quantity: Quantity, section: StudySection, sources: Sources) -> None:
@@ -144,8 +145,14 @@ def search_of(section: StudySection, spaces: Sequence[Space], sources: Sources) 
     scene = section.scenarios[scenario]
     if scene.drive is not None and isinstance(scene.exposure, WhitePatchExposure):
         sources.add(("search", "scenario"), "a search under a pulsed light needs a fixed exposure", scenario)
+    space, others = boxes[chosen], {space.name for space in spaces if space.kind in ("reference", "design")}
+    assert space.filter is not None
+    if requested.name in others:
+        sources.add(("search", "name"), "a CFA or design has that name", requested.name, "another name")
+    name = requested.name or f"best {kind_in_words(space.filter.family.kind)}"
+    name += " (search)" if name in others else ""
     effort = requested.algorithm, requested.starts, requested.max_evaluations
-    return Search(boxes[chosen], scenario, *effort, levels)
+    return Search(name, space, scenario, *effort, levels)
 
 
 def check_searched(section: StudySection, space: Space, known: Mapping[str, Quantity], sources: Sources) -> None:

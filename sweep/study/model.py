@@ -37,6 +37,7 @@ from .schema import StudySection
 class Search:
     """A search inside the box of a sweep."""
 
+    name: str
     space: Space
     scenario: str
     algorithm: str

@@ -11,7 +11,7 @@ from ..camera.accuracy import STANDARD, AccuracySection
 from ..camera.pixel import Pixel
 from ..camera.scene import Geometry, Scene
 from ..camera.sensor import BUILT_IN_SENSORS
-from ..designs.registry import FamilyOptions, told
+from ..designs.registry import FamilyOptions, described_families
 from ..designs.technology import Stated
 from ..designs.tolerance import Tolerance
 from ..metrics.bound import Bound
@@ -64,7 +64,7 @@ class Modification(Section):
     family: Annotated[
         Name,
         Field(
-            description=f"One of {told()}; or your own: FILE.py:CLASS, or the name by which "
+            description=f"One of {described_families()}; or your own: FILE.py:CLASS, or the name by which "
             "an installed package offers it.",
         ),
     ] = "stopband"
@@ -195,6 +195,8 @@ class Levels(Section):
 class SearchSection(Section):
     """Search in a box, or in that of a sweep (from the smallest to the largest value of each parameter)."""
 
+    name: Name | None = None
+    """Name of the best design in tables and report; left out, `best` and the family."""
     space: Name | None = None
     """The sweep or box to search; may be left out where there is one."""
     front: Levels | None = None

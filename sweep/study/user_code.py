@@ -107,7 +107,7 @@ def code_of(sources: Sources, name: str, group: Offered) -> UserCode:
         offer = installed(group, name)
         if offer is None:
             raise SweepError(ValidationIssue("no installed package offers it", value=name))
-        _digested(sources, f"{CODE_OF}{offer.told} ({group}: {name})", offer.digest)
+        _digested(sources, f"{CODE_OF}{offer.description} ({group}: {name})", offer.digest)
         return UserCode(name, None, group, offer.digest)
     file = file_of(name)
     place = next((folder / file for folder in sources.folders if is_file(folder / file)), None)

@@ -158,12 +158,12 @@ class HeadCamera:
         return self._heads[distance, level]
 
     def _made(self, distance: int, level: int) -> HeadElectrons:
-        setup, said = self._setups[distance][level], self.levels[level]
+        setup, level_settings = self._setups[distance][level], self.levels[level]
         maps = head_maps(setup, self.vision)
-        time_s = said.exposure_s
+        time_s = level_settings.exposure_s
         grid, factor = setup.camera.grid, irradiance_factor(self.vision.optics)
-        ambient = ambient_light(grid, said.light)
-        radiance = said.illuminance_lx / math.pi / luminance_per_photon_radiance(grid, ambient[None])[0]
+        ambient = ambient_light(grid, level_settings.light)
+        radiance = level_settings.illuminance_lx / math.pi / luminance_per_photon_radiance(grid, ambient[None])[0]
         arriving = ambient * (radiance * factor)
         housing, plate, glass = (arriving * reflectance(grid, of) for of in ("dark gray", "black", "black"))
         around = np.stack([arriving * reflectance(grid, background) for background in self.vision.backgrounds])
@@ -173,7 +173,7 @@ class HeadCamera:
         unlit += self._electrons(maps, maps.lenses.sum(axis=1), (glass - housing)[None])
         return HeadElectrons(
             np.maximum(unlit, 0.0) * time_s + self.pixel.dark_e_per_s * time_s,
-            self._phantoms(maps, setup, said) * time_s,
+            self._phantoms(maps, setup, level_settings) * time_s,
             self._lamp_rates(distance, maps, setup),
             time_s,
         )

@@ -85,7 +85,7 @@ def _steps(weights: _Weights, state: Any, x: Any, y: Any) -> tuple[_Weights, Any
 
 
 _checked = jax.jit(_loss)
-_told: Callable[..., Any] = jax.jit(lambda weights, x: jax.nn.softmax(_logits(weights, x)))
+_softmax: Callable[..., Any] = jax.jit(lambda weights, x: jax.nn.softmax(_logits(weights, x)))
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ class Network:
         ndarray of shape (n, n_states)
             Probabilities.
         """
-        probabilities = _told(self.weights, _scaled(planes, self.mean, self.deviation))
+        probabilities = _softmax(self.weights, _scaled(planes, self.mean, self.deviation))
         values = np.asarray(probabilities, dtype=float)
         return np.asarray(values / values.sum(axis=1, keepdims=True), dtype=float)
 

@@ -121,12 +121,12 @@ def mean_of(values: FloatArray | BoolArray, weights: FloatArray) -> Interval:
     return interval(float(numbers.mean()), weights @ numbers)
 
 
-def confusion_matrix(truth: IndexArray, said: IndexArray, n_states: int) -> IndexArray:
+def confusion_matrix(truth: IndexArray, answered: IndexArray, n_states: int) -> IndexArray:
     """Return the number of answers by true state (row) and answer (column).
 
     Parameters
     ----------
-    truth, said : ndarray of int, shape (n,)
+    truth, answered : ndarray of int, shape (n,)
         True states and answers.
     n_states : int
         Number of states.
@@ -137,7 +137,7 @@ def confusion_matrix(truth: IndexArray, said: IndexArray, n_states: int) -> Inde
         Counts.
     """
     counts = np.zeros((n_states, n_states), dtype=np.intp)
-    np.add.at(counts, (truth, said), 1)
+    np.add.at(counts, (truth, answered), 1)
     return counts
 
 

@@ -34,7 +34,7 @@ def test_an_unknown_name_is_no_attribute() -> None:
         sweep.load_studies  # noqa: B018
 
 
-def test_types_are_told_of_the_very_names() -> None:
+def test_stub_file_types_the_public_names() -> None:
     """The stub imports each name from where the package takes it."""
     stub = ast.parse((ROOT / "sweep" / "__init__.pyi").read_text())
     told = {

@@ -59,7 +59,7 @@ def test_forms_of_a_curve_are_one(tiny: sweep.LoadedStudy, tmp_path: Path) -> No
     assert tables[0].attrs["units"]["csd_yellow_red"] == "DN"
 
 
-def test_the_limit_holds_for_filters_that_meet_what_it_asks(tiny: sweep.LoadedStudy) -> None:
+def test_upper_bound_holds_for_filters_that_meet_its_constraints(tiny: sweep.LoadedStudy) -> None:
     limit = tiny.limit(sensitivity=0.92)
     assert limit.curve is not None
     attained = tiny.evaluate(N=limit.curve, scenario="chart")
@@ -87,12 +87,12 @@ def test_the_limit_holds_for_filters_that_meet_what_it_asks(tiny: sweep.LoadedSt
         ({"cfa": "RGGBB"}, "did you mean 'RGGB'?"),
     ],
 )
-def test_what_cannot_be_judged_is_one_line(tiny: sweep.LoadedStudy, requested: dict[str, object], said: str) -> None:
+def test_invalid_evaluation_is_one_line(tiny: sweep.LoadedStudy, requested: dict[str, object], said: str) -> None:
     with one_line(said):
         tiny.evaluate(**requested)  # type: ignore[arg-type]
 
 
-def test_a_constraint_on_what_only_a_family_has_is_not_feasible() -> None:
+def test_a_constraint_on_a_family_quantity_is_not_feasible_for_other_filters() -> None:
     box = {"cfa": "RYNCy", "channel": "N", "base": "Y", "to": "G"}
     study = sweep.make_study(cfas=["RYYCy", "RYNCy"], boxes={"any": box}, constraints={"edge_width_nm": {"min": 5}})
     table = study.evaluate(N=study.curve("Y"))
@@ -120,8 +120,8 @@ def test_an_own_filter_moves_as_the_study_says_of_its_own() -> None:
     study = sweep.load_study("angle")
     named = study.evaluate(scenario="f/1.6 cra_deg=20")
     family = sweep.Stopband(study.wavelength_nm, study.curve("Y").to_numpy(), study.curve("G").to_numpy())
-    own = study.evaluate(N=family.curves(np.array([[613.0, 6, 651.2, 6.3, 1]]))[0, 0], scenario="f/1.6 cra_deg=20")
-    assert own.csd_yellow_red.item() == named.csd_yellow_red[named.name == "nominal"].item()
+    own = study.evaluate(N=family.curves(np.array([[612.89, 5.92, 651.18, 6.25, 1]]))[0, 0], scenario="f/1.6 cra_deg=20")
+    assert own.csd_yellow_red.item() == named.csd_yellow_red[named.name == "best stopband"].item()
 
 
 def test_a_table_is_a_sensor_as_its_columns_are() -> None:
@@ -134,6 +134,6 @@ def test_a_table_is_a_sensor_as_its_columns_are() -> None:
 
 
 @pytest.mark.parametrize("made", [sweep.sensor, sweep.lights])
-def test_what_is_no_source_is_one_line(made: type) -> None:
+def test_invalid_curve_source_is_one_line(made: type) -> None:
     with pytest.raises(SweepError, match=r"no (sensor|lights) \(got 'list'\)"):
         made(["R", "G"])

@@ -130,7 +130,7 @@ def test_digital_numbers_are_means_over_rays(given: dict[str, Any], count: int) 
 
 
 @pytest.mark.parametrize("given", GIVEN.values(), ids=GIVEN)
-def test_derivatives_see_what_the_rays_see(given: dict[str, Any]) -> None:
+def test_derivatives_agree_with_the_angular_response(given: dict[str, Any]) -> None:
     """The response is affine in N: its derivative, and the weights of each wavelength, give it again."""
     made = moved(given | {"exposure": {"kind": "fixed", "exposure_s": 1e-3}})
     model, channel = linear_model(made.setup), made.setup.camera.modified[0]
@@ -142,7 +142,7 @@ def test_derivatives_see_what_the_rays_see(given: dict[str, Any]) -> None:
     np.testing.assert_allclose(by_wavelength, (own - zero)[..., channel], atol=1e-12 * scale)
 
 
-def test_only_what_is_said_to_be_of_interference_moves() -> None:
+def test_only_interference_filters_move_with_the_angle() -> None:
     made = moved({})
     pigment = made.setup.with_camera(technologies=(Technology(),) * len(made.setup.camera.mosaic.channels))
     unsaid, reasons = made.setup.with_camera(technologies=()), []

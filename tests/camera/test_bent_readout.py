@@ -35,7 +35,7 @@ def saturated(place: list[float] | str, readout: str, level: float) -> DesignSce
 
 @pytest.mark.parametrize("place", [[1.0, 1.0], [1.5, 1.5], "any"], ids=["pixel", "corner", "any"])
 @pytest.mark.parametrize(("readout", "level"), [("mean", 3.0), ("mean", 10.0), ("center", 10.0)])
-def test_what_cancels_between_pixels_counts_where_they_clip(
+def test_differences_that_cancel_between_pixels_count_where_pixels_clip(
     place: list[float] | str, readout: str, level: float
 ) -> None:
     made = saturated(place, readout, level)

@@ -54,7 +54,7 @@ def test_the_values_that_were_used_last_are_kept() -> None:
     assert len(cache) == 2
 
 
-def test_what_fails_is_made_again() -> None:
+def test_failed_cache_entries_are_made_again() -> None:
     cache: Cache[str, float] = Cache(2)
     with pytest.raises(ZeroDivisionError):
         cache.get("a", lambda: 1 / 0)

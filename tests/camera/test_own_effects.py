@@ -52,7 +52,7 @@ def test_an_effect_sees_its_scene() -> None:
         ("return replace(irradiance, signals='bright')", "ValueError"),
     ],
 )
-def test_what_is_no_irradiance_is_one_line(body: str, message: str) -> None:
+def test_invalid_irradiance_of_a_user_effect_is_one_line(body: str, message: str) -> None:
     setup = replace(scene("lit", "RGGB", LIT).setup, user_effects=(own_effect(body),))
     with pytest.raises(SweepError, match=message):
         scene_irradiance(setup)

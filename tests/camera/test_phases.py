@@ -125,7 +125,7 @@ MIRRORED = {"RGGB": 15, "RYNCy": 25, "1x3": 36, "3x3": 78}
 
 @pytest.mark.parametrize("readout", ["mean", "center"])
 @pytest.mark.parametrize("name", list(MIRRORED))
-def test_a_phase_reads_what_its_mirror_images_read(name: str, readout: str) -> None:
+def test_mirrored_phases_have_equal_readouts(name: str, readout: str) -> None:
     given = {"target": FAR | {"phase_px": "any", "readout": readout}, "optics": F2, "noise": True}
     made = scene("mirrored", name, given, DARK | {"crosstalk": 0.05})
     every = scene_phases(made.setup)

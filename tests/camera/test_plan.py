@@ -74,7 +74,7 @@ def test_errors_under_noise_need_all_of_the_readout(made: DesignScene) -> None:
 
 
 @pytest.mark.parametrize("made", HARD + ALONE, ids=lambda made: made.name)
-def test_what_a_plan_leaves_out_changes_no_csd_by_more_than_its_bound(made: DesignScene) -> None:
+def test_omitted_effects_change_no_csd_by_more_than_the_bound(made: DesignScene) -> None:
     exact, done = columns(made, accuracy=LATTICE), set()
     for tolerance_dn in TOLERANCES_DN:
         plan = planned(made, tolerance_dn)
@@ -162,7 +162,7 @@ def raising(*_: object, **__: object) -> None:
 
 
 @pytest.mark.parametrize("name", list(STAGES))
-def test_what_is_left_out_is_not_computed(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_omitted_effects_are_not_computed(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     left_out, owner, functions = STAGES[name]
     setup = NO_NOISE if name in ("quantization", "saturation") else ALL_ON.setup
     for function in functions:

@@ -88,7 +88,7 @@ def test_single_electrons_are_seen_as_steps() -> None:
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_what_rounding_changes_under_noise_is_within_its_bound_and_its_steepness(seed: int) -> None:
+def test_rounding_under_noise_is_within_its_bound(seed: int) -> None:
     pixel, _ = random_pixel(seed + 300)
     brightest = 1.2 * moments.LinearRange.of(pixel).full_e + 50
     electrons = np.linspace(0, np.sqrt(brightest), 7001) ** 2

@@ -54,7 +54,7 @@ def of_each_polarization(
     return found
 
 
-def test_characteristic_matrices_transmit_what_tmm_says() -> None:
+def test_characteristic_matrices_agree_with_tmm() -> None:
     wave = np.array([420.0, 600.0, 633.0, 700.0])
     for seed in range(3):
         stack = layers(np.random.default_rng(seed))
@@ -84,7 +84,7 @@ def missed(seed: int) -> tuple[float, float, float]:
 
 
 @pytest.mark.slow
-def test_what_one_effective_index_misses() -> None:
+def test_error_of_one_effective_index() -> None:
     """As `studies/guide/06-lamps-angles-tolerances.md` says: medians and 95 % of 200 stacks at f/1.6 and a chief ray angle of 20 degrees."""
     found = np.array([missed(seed) for seed in range(_STACKS)])
     off, moved = (np.abs(found[:, at] - found[:, 0]) for at in (1, 2))

@@ -12,11 +12,11 @@ from sweep.spectra.files import read_curves
 
 from ..build import SCENES, study_file
 from ..commanded import commanded, sweep
-from ..conftest import STUDIES, FinishedJob
+from ..conftest import STUDIES, FinishedFolder
 
 
 @pytest.fixture(scope="module")
-def stopband(finished: FinishedJob) -> tuple[Path, list[str]]:
+def stopband(finished: FinishedFolder) -> tuple[Path, list[str]]:
     folder = finished("stopband")
     return folder, folder.with_name("stopband.said.txt").read_text().splitlines()
 
@@ -64,7 +64,7 @@ def test_report_stands_alone(stopband: tuple[Path, list[str]]) -> None:
     assert "http://" not in own
     assert "https://" not in own
     assert "surrogate" in page
-    assert "RYN_4Cy" in page
+    assert "RYN4Cy" in page
 
 
 @pytest.mark.slow
@@ -108,7 +108,7 @@ def test_check_counts_designs() -> None:
     assert "116,286 designs" in out
 
 
-def test_plan_says_what_a_scene_calls_for(tmp_path: Path) -> None:
+def test_plan_lists_the_effects_of_a_scene(tmp_path: Path) -> None:
     path = tmp_path / "scenes.yaml"
     path.write_text(SCENES.replace("[150, 250]", "[280, 300]"))
     code, out, said = commanded("plan", path, "--tolerance", "50")

@@ -107,7 +107,7 @@ def test_several_studies_in_one_call(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert resolved["seed"] == 5
 
 
-def test_what_looks_like_percent_and_what_the_box_cannot_reach_is_told(tmp_path: Path) -> None:
+def test_percentages_and_unreachable_constraints_are_reported(tmp_path: Path) -> None:
     path = tmp_path / "a.yaml"
     path.write_text(BASE.replace("sensitivity: {min: 0.9}", "sensitivity: {min: 90}"))
     code, said, _ = commanded("check", path)
@@ -121,7 +121,7 @@ def test_what_looks_like_percent_and_what_the_box_cannot_reach_is_told(tmp_path:
 
 
 @pytest.mark.parametrize("name", ["sensitivity", "cfa_sensitivity", "edge_width_nm", "band_width_nm"])
-def test_nothing_of_a_box_is_beyond_what_is_said_to_be_out_of_reach(tmp_path: Path, name: str) -> None:
+def test_no_design_of_a_box_exceeds_its_reported_maximum(tmp_path: Path, name: str) -> None:
     """Of 2,000 designs drawn from the box, none has more than the bound; just below its best one nothing is refused."""
     study = load(tmp_path, BASE.replace("sensitivity: {min: 0.9}", f"{name}: {{min: 1000}}"))
     assert study.search is not None

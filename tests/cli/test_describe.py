@@ -47,7 +47,7 @@ def test_qe_is_guessed_and_its_peak_named(tmp_path: Path) -> None:
     assert is_png(tmp_path / "curves.png")
 
 
-def test_percent_is_told_with_its_scale(tmp_path: Path) -> None:
+def test_percent_is_reported_with_its_scale(tmp_path: Path) -> None:
     path = csv(tmp_path, "wavelength_nm,G", WAVE, 70 * bell(540, 50))
     assert any("scale: 0.01" in line for line in described(path, tmp_path).lines)
 
@@ -208,7 +208,7 @@ def test_the_command_ends_with_the_picture_or_exit_2(tmp_path: Path) -> None:
         pytest.param(SHARED / "data" / "traffic_lica.csv", "light", marks=needs_measured),
     ],
 )
-def test_measured_files_are_taken_for_what_they_are(tmp_path: Path, file: Path, guess: str) -> None:
+def test_measured_files_are_recognized(tmp_path: Path, file: Path, guess: str) -> None:
     found = described(file, tmp_path)
     assert any(f"A guess: {guess}" in line for line in found.lines)
     assert not found.issues
@@ -234,7 +234,7 @@ def test_a_picture_of_another_stays(tmp_path: Path) -> None:
     assert picture.read_bytes() == b"mine"
 
 
-def test_what_other_programs_save_is_named(tmp_path: Path) -> None:
+def test_files_of_other_programs_are_named(tmp_path: Path) -> None:
     savemat(tmp_path / "c.mat", {"wavelength": WAVE, "data": np.ones((WAVE.size, 1)) * 1j})
     with pytest.raises(DataError, match="must be real numbers"):
         scan_curves(tmp_path / "c.mat")

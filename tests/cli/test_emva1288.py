@@ -67,7 +67,7 @@ def test_a_new_study_has_the_pixel(tmp_path: Path) -> None:
         ({"PRNU1288": ("75", "\\%")}, "prnu: not a pixel's figure (got 0.75)"),
     ],
 )
-def test_what_is_no_pixel_is_one_line(tmp_path: Path, change: dict[str, tuple[str, str]], words: str) -> None:
+def test_invalid_pixel_is_one_line(tmp_path: Path, change: dict[str, tuple[str, str]], words: str) -> None:
     given = [(part, name, *change.get(name, (value, unit))) for part, name, value, unit in GIVEN]
     code, _, said = commanded("describe", written(tmp_path, given))
     assert (code, len(said.splitlines())) == (2, 1), said

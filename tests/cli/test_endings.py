@@ -101,7 +101,7 @@ def _of_session(session: int) -> list[int]:
         (InfeasibleError("out of\nreach"), 3, "out of reach"),
     ],
 )
-def test_what_a_machine_refuses_is_one_line(
+def test_machine_errors_are_one_line(
     error: BaseException, code: int, expected: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
     def command() -> None:

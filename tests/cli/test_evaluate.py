@@ -14,7 +14,7 @@ import sweep
 
 from ..build import study_file
 from ..commanded import commanded
-from ..conftest import FinishedJob
+from ..conftest import FinishedFolder
 from ..curve_texts import WAVE, bell, csv
 
 
@@ -165,7 +165,7 @@ def test_faults_are_lines(own: Path, monkeypatch: pytest.MonkeyPatch, requested:
 
 
 @pytest.mark.slow
-def test_a_design_of_a_run_moves_as_it_did_there(finished: FinishedJob) -> None:
+def test_a_design_of_a_run_moves_as_it_did_there(finished: FinishedFolder) -> None:
     folder = finished("angle")
     table = pd.read_parquet(folder / "results.parquet")
     best = table[table["kind"] == "search"].iloc[0]
@@ -182,7 +182,7 @@ def loaded_by(*requested: object) -> tuple[str, set[str]]:
     return done.stdout, set(done.stderr.split())
 
 
-def test_what_an_answer_does_not_need_is_not_loaded(own: Path, tmp_path: Path) -> None:
+def test_evaluate_loads_no_unneeded_modules(own: Path, tmp_path: Path) -> None:
     """Most of the time that the command takes is that of loading; tables, figures, workers and compiled code are not for
     it, and linear programs only where there is a limit.
     """

@@ -195,10 +195,10 @@ def test_other_curves_than_those_of_the_run_are_refused(from_files: Path, tmp_pa
     lines = (data / "qe.csv").read_text().splitlines()
     at = next(number for number, line in enumerate(lines) if line.startswith("650.0,"))
     (data / "qe.csv").write_text("\n".join([*lines[:at], "650.0,0.5,0.1,0.5,0.1", *lines[at + 1 :]]))
-    with pytest.raises(OutputError, match=r"not what the run has: R"):
+    with pytest.raises(OutputError, match=r"differ from the run: R"):
         export_design(from_files, "3", data, tmp_path / "to")
     assert not (tmp_path / "to").exists()
-    with pytest.raises(OutputError, match=r"not what the run has: R"):
+    with pytest.raises(OutputError, match=r"differ from the run: R"):
         audit_output(from_files, data)
     assert not (from_files / "audit.parquet").exists()
     audit_output(from_files, None)  # with the curves that the run kept
@@ -217,7 +217,7 @@ def test_a_row_that_was_tampered_with_is_refused(tiny: Path, tmp_path: Path) -> 
     frame["status"] = status.astype("category")
     frame.to_parquet(tmp_path / "run" / "results.parquet", index=False)
     listed_anew(tmp_path / "run")
-    with pytest.raises(OutputError, match="not what the run has: sensitivity"):
+    with pytest.raises(OutputError, match="differ from the run: sensitivity"):
         export_design(tmp_path / "run", "30", None, None)
     with pytest.raises(SweepError, match=r"the design failed .got 'error: KeyError: x'"):
         export_design(tmp_path / "run", "31", None, None)

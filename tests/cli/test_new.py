@@ -35,7 +35,7 @@ def leds(tmp_path: Path) -> Path:
     return csv(tmp_path, 'wavelength_nm,"royal, blue",gn,"yes",or,"rd: 1",dark', WAVE, *columns, name="leds.csv")
 
 
-def test_a_study_of_the_built_in_curves_loads_and_says_what_is_next(tmp_path: Path) -> None:
+def test_a_new_study_of_built_in_curves_loads_and_names_the_next_command(tmp_path: Path) -> None:
     lines = new_study("123", tmp_path, None, None, "energy")
     study = load_study(tmp_path / "123.yaml")
     assert study.name == "123"
@@ -47,7 +47,7 @@ def test_a_study_of_the_built_in_curves_loads_and_says_what_is_next(tmp_path: Pa
     assert (tmp_path / "study.schema.json").is_file()
 
 
-def test_what_is_commented_out_works_too(tmp_path: Path) -> None:
+def test_commented_keys_of_a_new_study_work(tmp_path: Path) -> None:
     path = made(tmp_path)
     text = path.read_text()
     opened, count = re.subn(r"^(  )# (?=road|  target|  optics|  noise|slope|csd)", r"\1", text, flags=re.MULTILINE)
@@ -88,7 +88,7 @@ def test_a_column_says_its_channel(column: str, channel: str | None) -> None:
     assert channel_of(column) == channel
 
 
-def test_what_an_export_holds_is_taken_for_what_it_is(tmp_path: Path) -> None:
+def test_exported_files_are_recognized(tmp_path: Path) -> None:
     header = "wavelength_nm,QE Cy,N_over_Y,N,rR,cCy,yY,wC,xN,gG"
     qe = csv(tmp_path, header, WAVE, *[0.5 * bell(460 + 20 * at, 45) for at in range(9)])
     lines = new_study("mine", tmp_path, qe, None, "energy")
@@ -167,7 +167,7 @@ def test_names_that_look_the_same_are_two_lights(tmp_path: Path) -> None:
     assert section.signals == {"green": ["r\x07"], "red": ["r\\x07"]}
 
 
-def test_what_is_next_can_be_pasted(tmp_path: Path) -> None:
+def test_the_next_command_can_be_pasted(tmp_path: Path) -> None:
     lines = new_study("mine", tmp_path / "my studies", None, None, "energy")
     assert lines[-1] == f"Next: sweep run '{tmp_path / 'my studies' / 'mine.yaml'}'"
 

@@ -7,9 +7,7 @@ import pytest
 from sweep.cli import output
 
 
-def test_no_time_left_is_told_before_something_is_known(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_no_eta_before_the_first_result(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     clock = iter([0.0, 11.0, 22.0, 33.0])
     monkeypatch.setattr(output.time, "monotonic", lambda: next(clock))
     display = output.ProgressDisplay()

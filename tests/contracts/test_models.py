@@ -98,7 +98,7 @@ def test_non_dominated_is_the_definition(seed: int, n: int) -> None:
 
 @pytest.mark.parametrize("scale", [1.0, 1e-310, 5e306])
 @pytest.mark.parametrize("kind", ["continuous", "ties", "one value", "line"])
-def test_non_dominated_of_many_rows_is_what_a_sweep_over_them_finds(kind: str, scale: float) -> None:
+def test_non_dominated_of_many_rows_equals_a_line_sweep(kind: str, scale: float) -> None:
     """From the largest first objective on, a row is on the front where it has the most of the second so far."""
     rng = np.random.default_rng(4)
     values = rng.normal(size=(20_000, 2))

@@ -226,7 +226,7 @@ def test_a_quantity_without_a_definition_is_found() -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_quantity_is_what_it_says(name: str) -> None:
+def test_a_quantity_equals_its_definition(name: str) -> None:
     quantity = QUANTITIES[name]
     definition, allowed = DEFINITIONS[quantity.metric]
     seen = [made for where, made in MADE.items() if name in made.found and where in ONLY.get(quantity.metric, MADE)]
@@ -286,7 +286,7 @@ def test_linear_rows_are_the_quantity(name: str) -> None:
         assert (rows.max() if quantity.wanted == "less" else rows.min()) == pytest.approx(value, rel=1e-12)
 
 
-def test_what_a_search_may_maximize_has_a_worst_case() -> None:
+def test_searchable_quantities_have_a_worst_case() -> None:
     shifted = quantities_of(replace(ASKED, edge_shift=True))
     goals = {name for name, quantity in QUANTITIES.items() if quantity.goal}
     worst = {quantity.of for quantity in shifted.values() if quantity.extreme == WORST_CASE}

@@ -113,7 +113,7 @@ def test_designs_that_set_the_exposure_take_the_dense_route() -> None:
     assert every is None
 
 
-def test_the_separable_route_refuses_what_is_not_separable(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_separable_route_refuses_inseparable_curves(monkeypatch: pytest.MonkeyPatch) -> None:
     two = MultiStopband(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["G"], bands=2)
     free = FreeForm(GRID.nodes_nm, SENSOR.qe["Y"], np.array([500.0, 600.0]))
     for family, axes in ((two, AXES + AXES), (free, ((0.5,), (0.5,)))):

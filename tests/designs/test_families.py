@@ -207,7 +207,7 @@ def test_free_form_starts_are_smooth_and_inside() -> None:
     assert np.abs(np.diff(x, axis=1)).max() < 0.2
 
 
-def test_a_family_refuses_what_does_not_fit() -> None:
+def test_a_family_refuses_unsuitable_options() -> None:
     options = FamilyOptions(bands=2)
     for name, target, given_options in (
         ("stopband", None, FamilyOptions()),

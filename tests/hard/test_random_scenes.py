@@ -92,7 +92,7 @@ def test_standard_is_mostly_as_exact_as_a_readout(all_compared: list[Compared]) 
 
 
 @pytest.mark.slow
-def test_what_a_plan_leaves_out_changes_no_csd_of_a_random_scene_by_more_than_its_bound(
+def test_omitted_effects_change_no_csd_of_random_scenes_by_more_than_the_bound(
     all_compared: list[Compared],
 ) -> None:
     for each in all_compared:

@@ -130,7 +130,7 @@ recognition: {{states: [green, yellow, red]}}
         *(pytest.param(*own, marks=pytest.mark.slow) for own in ((8, 10_000.0, 0.10), (10, 1e5, 0.05), (8, 1e5, 0.03))),
     ],
 )
-def test_coarse_digital_numbers_are_not_told_apart_better_than_they_can_be(
+def test_error_of_coarse_digital_numbers_is_not_below_the_exact_one(
     tmp_path: Path, bits: int, well: float, level: float
 ) -> None:
     path = tmp_path / "coarse.yaml"
@@ -201,7 +201,7 @@ def test_gaussian_errors_are_within_a_factor_of_the_exact_ones_where_they_are_us
         assert found >= exact(ours, theirs, pixel) / _FACTOR
 
 
-def test_what_is_not_a_number_stays_alone() -> None:
+def test_nan_of_one_design_leaves_others_unchanged() -> None:
     electrons = np.array([[[5.0], [50.0]], [[np.nan], [50.0]], [[5.0], [np.inf]]])
     found = confusion.errors(electrons, [np.array([0])], Pixel(read_noise_e=2.0), {"a": ONE, "b": OTHER})
     assert np.isnan(found.error["a", "b"]).tolist() == [False, True, False]

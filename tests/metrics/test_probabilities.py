@@ -19,7 +19,7 @@ TWO = np.array([[612.89, 5.92, 651.18, 6.25, 1.0], [600.0, 20.0, 660.0, 20.0, 0.
 """A stopband that separates well, and one of about half its d'."""
 
 
-def test_what_it_does_not_see_d_prime_does() -> None:
+def test_cdp_is_near_one_where_d_prime_still_differs() -> None:
     """In a bright scene it is near 1 for filters whose d' differs by more than 1.8 times."""
     study = load_study(STUDIES / "stopband.yaml")
     assert study.search is not None

@@ -115,7 +115,7 @@ def test_other_metrics_switch_no_fast_route_off(name: str, way: str, n: int, mon
     assert (len(fast), len(slow)) == (1, 0)
 
 
-def test_a_cfa_that_lacks_an_own_metric_says_so_of_one_design() -> None:
+def test_a_cfa_without_a_user_metric_is_reported_once() -> None:
     calls = ABSENT.code.loaded.__globals__["CALLS"]
     calls.clear()
     for block in (edges_of(SPACE, 0, SPACE.size), CurveBlock(SPACE.curves(SPACE.points(0, 9), 301))):

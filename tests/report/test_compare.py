@@ -200,7 +200,7 @@ def test_files_of_others_stay(runs: dict[str, Path], tmp_path: Path, name: str) 
 
 
 @pytest.mark.usefixtures("plain_fronts")
-def test_no_feasible_design_and_other_constraints_are_said(runs: dict[str, Path], tmp_path: Path) -> None:
+def test_comparison_reports_infeasible_runs_and_different_constraints(runs: dict[str, Path], tmp_path: Path) -> None:
     said, _ = compared([runs["infeasible"], runs["chart"]], tmp_path)
     assert "A infeasible has no feasible design." in said
     assert "different constraints (A infeasible: sensitivity at least 1.9; B chart: sensitivity at least 0.9)" in said
@@ -217,7 +217,7 @@ def test_hostile_names_are_text(runs: dict[str, Path], tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("plain_fronts")
-def test_other_curves_are_said(runs: dict[str, Path], tmp_path: Path) -> None:
+def test_comparison_reports_different_curves(runs: dict[str, Path], tmp_path: Path) -> None:
     copytree(runs["chart"], tmp_path / "other")
     curves = pd.read_parquet(tmp_path / "other" / "curves.parquet")
     curves.loc[(curves["curve"] == "R") & (curves["wavelength_nm"] == 500), "value"] += 1e-9
@@ -253,7 +253,7 @@ def test_differences_are_shown_where_they_begin(runs: dict[str, Path]) -> None:
 
 
 @pytest.mark.usefixtures("plain_fronts")
-def test_what_cannot_be_compared_is_one_line(runs: dict[str, Path], tmp_path: Path) -> None:
+def test_invalid_comparison_is_one_line(runs: dict[str, Path], tmp_path: Path) -> None:
     for folders in ([runs["chart"]], [runs["chart"]] * 27, [runs["chart"], tmp_path]):
         with pytest.raises(SweepError) as caught:
             compare_runs(folders, tmp_path / "to")

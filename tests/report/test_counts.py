@@ -21,7 +21,7 @@ from sweep.results.output import Output
 from sweep.study import load_study
 
 from ..build import ran
-from ..conftest import STUDIES, FinishedJob
+from ..conftest import STUDIES, FinishedFolder
 
 UNKNOWN = """\
 study: unknown
@@ -98,7 +98,7 @@ def test_one_number_of_filters_in_terminal_picture_and_page(scenes: Output) -> N
             assert counts["front"] == (rows["feasible"] & rows["pareto"]).sum()
 
 
-def test_the_terminal_and_the_picture_of_stopband_count_alike(finished: FinishedJob) -> None:
+def test_the_terminal_and_the_picture_of_stopband_count_alike(finished: FinishedFolder) -> None:
     output = read_output(finished("stopband"))
     counts = pareto_figure(output, "chart", "RYNCy").counts
     feasible, front = map(int, re.findall(r"([\d,]+) (?:feasible|on the Pareto)", counts_line(output).replace(",", "")))
@@ -149,7 +149,7 @@ def test_the_answer_names_the_best_of_every_scenario(scenes: Output) -> None:
     assert "27 rows" in (scenes.folder / "report.html").read_text()
 
 
-def test_a_leading_scenario_without_a_feasible_design_is_said(tmp_path: Path) -> None:
+def test_a_leading_scenario_without_a_feasible_design_is_reported(tmp_path: Path) -> None:
     text = SCENES.replace("{sensitivity: {min: 0.9}}", "{csd_yellow_red: {min: 100}}").split("search:")[0]
     (tmp_path / "scenes.yaml").write_text(text)
     ran(load_study(tmp_path / "scenes.yaml"), tmp_path / "out", 1)

@@ -7,13 +7,13 @@ import pytest
 from sweep.report import read_output
 from sweep.report.page import _drawings, _vision_drawings
 
-from ..conftest import FinishedJob
+from ..conftest import FinishedFolder
 from ..plain_values import MOST_BYTES, pickled_size
 from .shipped import EVERY
 
 
 @pytest.mark.parametrize("name", EVERY)
-def test_every_drawing_of_a_report_is_a_plain_value(finished: FinishedJob, name: str) -> None:
+def test_every_drawing_of_a_report_is_a_plain_value(finished: FinishedFolder, name: str) -> None:
     output = read_output(finished(name))
     drawings = [*_drawings(output), *_vision_drawings(output)]
     assert len(drawings) > 4
@@ -21,7 +21,7 @@ def test_every_drawing_of_a_report_is_a_plain_value(finished: FinishedJob, name:
         assert pickled_size(draw) < MOST_BYTES, file
 
 
-def test_a_drawing_that_holds_a_run_is_refused(finished: FinishedJob) -> None:
+def test_a_drawing_that_holds_a_run_is_refused(finished: FinishedFolder) -> None:
     output = read_output(finished("stopband"))
     with pytest.raises(AssertionError, match="whole run"):
         pickled_size({"figure": output})

@@ -15,7 +15,7 @@ from sweep.report import make_report, read_output
 from sweep.study import load_study
 
 from ..build import ran
-from ..conftest import FinishedJob, draw_nothing
+from ..conftest import FinishedFolder, draw_nothing
 from .pages import needs_browser
 
 pytestmark = needs_browser
@@ -93,7 +93,7 @@ def fits(page: Any, width: int) -> None:
 
 @pytest.mark.parametrize(("name", "width"), SCREENS)
 def test_the_answer_three_numbers_and_the_plot_are_on_one_screen(
-    finished: FinishedJob, standing: Any, name: str, width: int
+    finished: FinishedFolder, standing: Any, name: str, width: int
 ) -> None:
     page = standing(finished(name), width).page
     fits(page, width)
@@ -103,7 +103,7 @@ def test_the_answer_three_numbers_and_the_plot_are_on_one_screen(
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow) for name in ("fog", "dual", "paper")])
 def test_nothing_is_drawn_as_a_trade_off_where_nothing_trades_off(
-    finished: FinishedJob, standing: Any, name: str
+    finished: FinishedFolder, standing: Any, name: str
 ) -> None:
     assert standing(finished(name)).page.locator("#pareto").count() == 0
     assert not (finished(name) / "pareto.png").exists()
@@ -118,7 +118,7 @@ def test_a_study_of_plain_cfas_has_the_same_screen(plain_cfas: Path, opened: Any
     assert page.locator("#pareto").count() == 0  # nothing trades off
 
 
-def test_the_first_plot_has_every_cfa_at_its_light(finished: FinishedJob, standing: Any) -> None:
+def test_the_first_plot_has_every_cfa_at_its_light(finished: FinishedFolder, standing: Any) -> None:
     folder = finished("stopband")
     seen, table = standing(folder), pd.read_parquet(folder / "results.parquet")
     traces = seen.page.evaluate(
@@ -141,7 +141,7 @@ def test_the_first_plot_has_every_cfa_at_its_light(finished: FinishedJob, standi
 
 
 @pytest.mark.slow
-def test_a_plain_cfa_is_chosen_by_a_click(finished: FinishedJob, opened: Any) -> None:
+def test_a_plain_cfa_is_chosen_by_a_click(finished: FinishedFolder, opened: Any) -> None:
     seen = opened(finished("dual"))
     place = seen.page.evaluate(
         """() => {
@@ -159,7 +159,7 @@ def test_a_plain_cfa_is_chosen_by_a_click(finished: FinishedJob, opened: Any) ->
     assert {"R", "G", "B"} <= set(names)
 
 
-def test_the_limiting_lights_stand_in_hover_details_and_clouds(finished: FinishedJob, standing: Any) -> None:
+def test_the_limiting_lights_stand_in_hover_details_and_clouds(finished: FinishedFolder, standing: Any) -> None:
     folder = finished("stopband")
     seen = standing(folder)
     design = int(seen.page.get_attribute("#details", "data-design"))
@@ -180,7 +180,7 @@ def test_the_limiting_lights_stand_in_hover_details_and_clouds(finished: Finishe
             assert v == pytest.approx(own.loc[light, channel], rel=1e-6)
 
 
-def test_the_lights_stand_shaded_behind_the_qe(finished: FinishedJob, standing: Any) -> None:
+def test_the_lights_stand_shaded_behind_the_qe(finished: FinishedFolder, standing: Any) -> None:
     seen = standing(finished("stopband"))
     shades = seen.page.evaluate(
         "document.getElementById('curves').data.filter((t) => t.fill === 'tozeroy').map((t) => t.name)"
@@ -189,7 +189,7 @@ def test_the_lights_stand_shaded_behind_the_qe(finished: FinishedJob, standing: 
 
 
 @pytest.mark.parametrize("name", ["stopband", pytest.param("paper", marks=pytest.mark.slow)])
-def test_no_table_is_cut_off(finished: FinishedJob, standing: Any, name: str) -> None:
+def test_no_table_is_cut_off(finished: FinishedFolder, standing: Any, name: str) -> None:
     seen = standing(finished(name))
     cut = seen.page.evaluate(
         "[...document.querySelectorAll('.scroll')].filter((e) => e.offsetParent && e.querySelector('table')"
@@ -198,7 +198,7 @@ def test_no_table_is_cut_off(finished: FinishedJob, standing: Any, name: str) ->
     assert cut == []
 
 
-def test_no_figure_is_shown_twice(finished: FinishedJob, standing: Any) -> None:
+def test_no_figure_is_shown_twice(finished: FinishedFolder, standing: Any) -> None:
     seen = standing(finished("stopband"))
     pictures = seen.page.evaluate("[...document.querySelectorAll('figure figcaption')].map((e) => e.textContent)")
     assert len(pictures) == 4
@@ -208,7 +208,7 @@ def test_no_figure_is_shown_twice(finished: FinishedJob, standing: Any) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["stopband", "distance", "noise", "dual"])
 def test_on_paper_the_first_figure_stands_below_the_answer_and_no_legend_is_cut(
-    finished: FinishedJob, opened: Any, name: str
+    finished: FinishedFolder, opened: Any, name: str
 ) -> None:
     page = opened(finished(name), 1032).page  # A4 landscape less its margins, 96 pixels to the inch
     page.emulate_media(media="print")
@@ -228,7 +228,7 @@ def test_on_paper_the_first_figure_stands_below_the_answer_and_no_legend_is_cut(
 
 
 @pytest.mark.slow
-def test_a_printed_report_has_every_figure(finished: FinishedJob, opened: Any, tmp_path: Path) -> None:
+def test_a_printed_report_has_every_figure(finished: FinishedFolder, opened: Any, tmp_path: Path) -> None:
     seen = opened(finished("stopband"))
     seen.page.pdf(path=tmp_path / "report.pdf", prefer_css_page_size=True)
     empty = seen.page.evaluate(
@@ -239,7 +239,7 @@ def test_a_printed_report_has_every_figure(finished: FinishedJob, opened: Any, t
 
 
 @pytest.mark.slow
-def test_the_noise_report_begins_with_the_error(finished: FinishedJob, opened: Any) -> None:
+def test_the_noise_report_begins_with_the_error(finished: FinishedFolder, opened: Any) -> None:
     seen = opened(finished("noise"))
     axis = seen.page.evaluate("document.getElementById('series-0').layout.yaxis")
     assert axis["title"]["text"] == "error of the worst pair of states (1e-12: or less)"

@@ -25,7 +25,7 @@ from sweep.run.rows import Job, jobs_of, rules_of, run_job
 from sweep.study import Study, load_study
 
 from ..build import large, ran, study_file
-from ..conftest import FinishedJob
+from ..conftest import FinishedFolder
 from ..tampering import listed_anew
 
 
@@ -87,14 +87,14 @@ def test_many_values_keep_their_best_ones() -> None:
     assert profile.values[profile.best.argmax()] == pytest.approx(0.61)
 
 
-def test_what_keeps_the_objective_is_around_the_best_value() -> None:
+def test_the_range_that_keeps_the_objective_contains_the_best_value() -> None:
     values = np.arange(7.0)
     profile = ParameterProfile("x", values, np.array([96.0, 10.0, 97.0, 100.0, 95.0, 94.0, 99.0]))
     assert profile.keeps == (2.0, 4.0)
     assert profile.drop == 90.0
 
 
-def test_effects_that_are_left_out_are_not_told_as_simulated(finished: FinishedJob) -> None:
+def test_omitted_effects_are_not_reported_as_simulated(finished: FinishedFolder) -> None:
     output = read_output(finished("stopband"))
     line = next(line for line in summary_lines(output) if line.startswith("Simulated: "))
     check = output.provenance.check
@@ -102,7 +102,7 @@ def test_effects_that_are_left_out_are_not_told_as_simulated(finished: FinishedJ
     assert line == f"Simulated: quantization; no other effect changes a CSD. {check.sentence}"
 
 
-def test_the_check_of_a_run_is_told_with_its_largest_difference(finished: FinishedJob) -> None:
+def test_report_states_the_largest_difference_of_the_check(finished: FinishedFolder) -> None:
     output = read_output(finished("stopband"))
     kept = output.provenance.plans["chart"]
     check = CheckFacts(rows=3, design_id=7, scenario="far", quantity="csd_yellow_red", largest_dn=0.3, allowed_dn=0.1)
@@ -118,7 +118,7 @@ def test_the_check_of_a_run_is_told_with_its_largest_difference(finished: Finish
 
 
 @pytest.mark.slow
-def test_of_a_series_the_terminal_lists_the_two_ends(finished: FinishedJob) -> None:
+def test_of_a_series_the_terminal_lists_the_two_ends(finished: FinishedFolder) -> None:
     lines = summary_lines(read_output(finished("fog")))
     assert [line.split(":")[0] for line in lines if line.startswith("day ")] == [
         "day visibility_m=50",
@@ -127,7 +127,7 @@ def test_of_a_series_the_terminal_lists_the_two_ends(finished: FinishedJob) -> N
     assert "(1 more scenario in the report.)" in lines
 
 
-def test_the_history_ends_at_the_answer(finished: FinishedJob) -> None:
+def test_the_history_ends_at_the_answer(finished: FinishedFolder) -> None:
     folder = finished("stopband")
     output = read_output(folder)
     history = history_of(output)
@@ -151,7 +151,7 @@ def test_the_history_ends_at_the_answer(finished: FinishedJob) -> None:
 
 
 @pytest.mark.slow
-def test_every_scene_is_told_once_with_its_largest_bound(finished: FinishedJob) -> None:
+def test_every_scene_is_listed_once_with_its_largest_bound(finished: FinishedFolder) -> None:
     output = read_output(finished("fog"))
     groups = scene_groups(output)
     assert sorted(name for group in groups for name in group.scenarios) == sorted(output.scenarios)

@@ -16,7 +16,7 @@ from sweep.report import make_report, read_output
 from sweep.study import load_study
 
 from ..build import ran
-from ..conftest import FinishedJob, draw_nothing
+from ..conftest import FinishedFolder, draw_nothing
 from .pages import Opened, needs_browser, through
 
 pytestmark = needs_browser
@@ -46,7 +46,7 @@ LONGER = (("stopband", 1280), ("stopband", 400), ("fog", 1280), ("fog", 400), ("
     ],
 )
 def test_a_report_opens_without_an_error_or_a_request(
-    finished: FinishedJob, opened: Any, standing: Any, name: str, width: int
+    finished: FinishedFolder, opened: Any, standing: Any, name: str, width: int
 ) -> None:
     seen = (opened if width == 400 else standing)(finished(name), width)
     through(seen)
@@ -61,7 +61,7 @@ def test_a_report_opens_without_an_error_or_a_request(
     [("stopband", "Pareto front"), ("fog", "named designs"), ("paper", "named designs")],
 )
 @pytest.mark.slow
-def test_pointing_and_clicking_tell_of_a_design(finished: FinishedJob, standing: Any, name: str, trace: str) -> None:
+def test_pointing_and_clicking_tell_of_a_design(finished: FinishedFolder, standing: Any, name: str, trace: str) -> None:
     seen = standing(finished(name), 1280)
     table = pd.read_parquet(finished(name) / "results.parquet").set_index("design_id")
     x, y, row = seen.point_at(trace)
@@ -91,7 +91,7 @@ def test_pointing_and_clicking_tell_of_a_design(finished: FinishedJob, standing:
     assert chosen.name == pointed_at.name or (chosen["kind"] != "sweep" and near)
 
 
-def test_the_page_holds_the_limiting_lights_of_every_design(finished: FinishedJob, standing: Any) -> None:
+def test_the_page_holds_the_limiting_lights_of_every_design(finished: FinishedFolder, standing: Any) -> None:
     folder = finished("stopband")
     limited = pd.read_parquet(folder / "limited_by.parquet").set_index("design_id")
     seen = standing(folder)
@@ -105,7 +105,7 @@ def test_the_page_holds_the_limiting_lights_of_every_design(finished: FinishedJo
 
 @pytest.mark.slow
 @pytest.mark.parametrize("trace", ["not feasible", "feasible", "Pareto front", "best of the search"])
-def test_pointing_at_any_design_tells_its_limiting_lights(finished: FinishedJob, opened: Any, trace: str) -> None:
+def test_pointing_at_any_design_tells_its_limiting_lights(finished: FinishedFolder, opened: Any, trace: str) -> None:
     folder = finished("stopband")
     limited = pd.read_parquet(folder / "limited_by.parquet").set_index("design_id")
     seen = opened(folder)
@@ -121,7 +121,7 @@ def test_pointing_at_any_design_tells_its_limiting_lights(finished: FinishedJob,
         assert pointed[at + 1] == f"{pair.replace('_', '/')} CSD limited by: {lights}"
 
 
-def test_the_box_leaves_out_what_is_not_feasible(finished: FinishedJob, standing: Any) -> None:
+def test_the_parallel_plot_leaves_out_infeasible_designs(finished: FinishedFolder, standing: Any) -> None:
     seen = standing(finished("stopband"))
     before = seen.number_of_points()
     seen.page.uncheck("#infeasible")
@@ -133,7 +133,7 @@ def test_the_box_leaves_out_what_is_not_feasible(finished: FinishedJob, standing
     assert seen.number_of_points() == before
 
 
-def test_the_best_design_is_that_of_the_table(finished: FinishedJob, standing: Any) -> None:
+def test_the_best_design_is_that_of_the_table(finished: FinishedFolder, standing: Any) -> None:
     folder = finished("stopband")
     table = pd.read_parquet(folder / "results.parquet")
     best = table[table["feasible"] & table["kind"].isin(["sweep", "search"])].sort_values("csd_yellow_red").iloc[-1]
@@ -151,7 +151,7 @@ def test_the_best_design_is_that_of_the_table(finished: FinishedJob, standing: A
     assert {"left_nm", "right_width_nm", "sensitivity", "yellow/red CSD"} <= set(said)
 
 
-def test_the_saved_front_has_every_digit(finished: FinishedJob, standing: Any) -> None:
+def test_the_saved_front_has_every_digit(finished: FinishedFolder, standing: Any) -> None:
     folder = finished("stopband")
     seen = standing(folder)
     with seen.page.expect_download() as waiting:
@@ -167,7 +167,7 @@ def test_the_saved_front_has_every_digit(finished: FinishedJob, standing: Any) -
 
 
 @pytest.mark.slow
-def test_brushing_an_axis_counts_what_is_left(finished: FinishedJob, standing: Any) -> None:
+def test_brushing_an_axis_counts_the_selected_designs(finished: FinishedFolder, standing: Any) -> None:
     seen = standing(finished("stopband"), 1280)
     through(seen)
     before = seen.page.inner_text("#brushed")
@@ -180,13 +180,13 @@ def test_brushing_an_axis_counts_what_is_left(finished: FinishedJob, standing: A
 
 
 @pytest.mark.slow
-def test_another_scenario_is_drawn_when_it_is_chosen(finished: FinishedJob, standing: Any) -> None:
+def test_another_scenario_is_drawn_when_it_is_chosen(finished: FinishedFolder, standing: Any) -> None:
     folder = finished("fog")
     seen = standing(folder, 1280)
     table = pd.read_parquet(folder / "results.parquet")
     last = list(dict.fromkeys(table["scenario"]))[-1]
     seen.page.select_option("#scenario", last)
-    rows = table[(table["scenario"] == last) & (table["kind"] == "design") & (table["name"] == "RYN_4Cy")]
+    rows = table[(table["scenario"] == last) & (table["kind"] == "design") & (table["name"] == "RYN4Cy")]
     drawn = seen.page.evaluate("document.getElementById('cfas').data.find((t) => t.name === 'named designs').y[0]")
     assert drawn == pytest.approx(rows["csd_yellow_red"].iloc[0], rel=1e-6)
     assert seen.errors == []

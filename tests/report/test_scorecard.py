@@ -14,7 +14,7 @@ from sweep.report.colors import error_curves, noise_optimal, renderings
 from sweep.report.scorecard import ScoreRow, _row, scorecard
 
 from ..commanded import commanded
-from ..conftest import FinishedJob
+from ..conftest import FinishedFolder
 
 TINY = """
 study: tiny
@@ -116,12 +116,12 @@ def test_without_tasks_there_is_nothing_of_them(tiny: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_scorecard_of_the_project(finished: FinishedJob) -> None:
+def test_the_scorecard_of_the_project(finished: FinishedFolder) -> None:
     """The stopbands cost no more than RYYCy does: in no figure are they the worst, in most they are better."""
     folder = finished("scorecard")
     card = scorecard(read_output(folder))
     assert card is not None
-    assert card.names[3:] == ("RYYCy", "N_4", "optimum", "robust to lamps", "robust to angles")
+    assert card.names[3:] == ("RYYCy", "RYN4Cy", "best stopband", "robust to lamps", "robust to angles")
     assert not any({4, 5, 6, 7} & each.worst for each in card.rows)
     rows = [each for each in card.rows if each.best]
     factors = np.array([each.values[4:] / each.values[3] for each in rows])
@@ -137,7 +137,7 @@ def test_the_scorecard_of_the_project(finished: FinishedJob) -> None:
 
 
 @pytest.mark.slow
-def test_a_balanced_stopband_keeps_its_bounds(finished: FinishedJob) -> None:
+def test_a_balanced_stopband_keeps_its_bounds(finished: FinishedFolder) -> None:
     """The bounds of the study are 1.1 times the figures of its own RYYCy."""
     output = read_output(finished("balanced"))
     ryycy = output.few.set_index("name").loc["RYYCy"]

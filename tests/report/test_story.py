@@ -21,7 +21,7 @@ from sweep.results.tables import REPORT
 from sweep.study import load_study
 
 from ..build import ran
-from ..conftest import STUDIES, FinishedJob
+from ..conftest import STUDIES, FinishedFolder
 from .shipped import EVERY
 
 
@@ -32,7 +32,7 @@ def whole(folder: Path) -> pd.DataFrame:
 
 
 @pytest.mark.parametrize("name", EVERY)
-def test_the_headline_names_the_best_of_all_rows(finished: FinishedJob, name: str) -> None:
+def test_the_headline_names_the_best_of_all_rows(finished: FinishedFolder, name: str) -> None:
     folder = finished(name)
     output, table = read_output(folder), whole(folder)
     leaders, separation = leaders_of(output), output.trade_off[0].name
@@ -45,11 +45,11 @@ def test_the_headline_names_the_best_of_all_rows(finished: FinishedJob, name: st
     assert leaders.separates[separation] == rows[separation].max()
     text = " ".join(answer_sentences(output))
     if " leads" not in text:
-        assert output.trade_off[0].told(leaders.chosen[separation]) in text
+        assert output.trade_off[0].formatted(leaders.chosen[separation]) in text
 
 
 @pytest.mark.parametrize("name", EVERY)
-def test_nobody_beats_the_best_without_being_named(finished: FinishedJob, name: str) -> None:
+def test_designs_beyond_the_best_one_are_named(finished: FinishedFolder, name: str) -> None:
     """Every plain CFA or named design that separates more than the best one is beaten by one that the answer names."""
     folder = finished(name)
     output, table = read_output(folder), whole(folder)
@@ -64,7 +64,7 @@ def test_nobody_beats_the_best_without_being_named(finished: FinishedJob, name: 
         assert any(name in text for name in names)
 
 
-def test_the_large_numbers_compare_with_the_plain_cfa_that_separates_most(finished: FinishedJob) -> None:
+def test_the_large_numbers_compare_with_the_plain_cfa_that_separates_most(finished: FinishedFolder) -> None:
     folder = finished("stopband")
     table = whole(folder)
     best = table[table["kind"] == "search"].iloc[0]
@@ -79,7 +79,7 @@ def test_the_large_numbers_compare_with_the_plain_cfa_that_separates_most(finish
     assert numbers[2][0] == f"{best['limit'] - best['csd_yellow_red']:.0f} DN"
 
 
-def test_the_light_of_a_cfa_is_that_of_its_pixels(finished: FinishedJob) -> None:
+def test_the_light_of_a_cfa_is_that_of_its_pixels(finished: FinishedFolder) -> None:
     study = load_study(STUDIES / "stopband.yaml")
     qe = {name: curve.sum() for name, curve in study.sensor.qe.items()}
     table = whole(finished("stopband")).set_index("name")
@@ -88,7 +88,7 @@ def test_the_light_of_a_cfa_is_that_of_its_pixels(finished: FinishedJob) -> None
         assert table.loc[name, "cfa_sensitivity"] == pytest.approx(light, rel=1e-12)
 
 
-def test_a_level_of_the_pixel_is_a_level_of_the_cfa(finished: FinishedJob) -> None:
+def test_a_level_of_the_pixel_is_a_level_of_the_cfa(finished: FinishedFolder) -> None:
     study = load_study(STUDIES / "stopband.yaml")
     assert study.search is not None
     setup = study.setup(study.search.space, study.search.scenario)
@@ -98,7 +98,7 @@ def test_a_level_of_the_pixel_is_a_level_of_the_cfa(finished: FinishedJob) -> No
         assert cfa_sensitivity_at(setup, own) == pytest.approx(light, rel=1e-12)
 
 
-def test_the_limiting_lights_are_as_far_apart_as_the_csd(finished: FinishedJob) -> None:
+def test_the_limiting_lights_are_as_far_apart_as_the_csd(finished: FinishedFolder) -> None:
     folder = finished("stopband")
     table, points = whole(folder).set_index("design_id"), pd.read_parquet(folder / "points.parquet")
     limited = pd.read_parquet(folder / "limited_by.parquet").set_index("design_id")
@@ -111,7 +111,7 @@ def test_the_limiting_lights_are_as_far_apart_as_the_csd(finished: FinishedJob) 
             assert apart == pytest.approx(table.loc[design, f"csd_{pair}"], rel=1e-12)
 
 
-def test_each_swept_design_of_the_page_is_limited_by_its_nearest_lights(finished: FinishedJob) -> None:
+def test_each_swept_design_of_the_page_is_limited_by_its_nearest_lights(finished: FinishedFolder) -> None:
     folder = finished("stopband")
     study, output = load_study(STUDIES / "stopband.yaml"), read_output(folder)
     rows = output.table.set_index("design_id").loc[output.swept_points]
@@ -135,7 +135,7 @@ def test_each_swept_design_of_the_page_is_limited_by_its_nearest_lights(finished
             np.testing.assert_allclose(apart[np.arange(len(some)), named], apart.min(axis=1), rtol=1e-12)
 
 
-def test_who_separates_most_names_its_lights_whatever_the_constraints(finished: FinishedJob) -> None:
+def test_who_separates_most_names_its_lights_whatever_the_constraints(finished: FinishedFolder) -> None:
     folder = finished("stopband")
     limited, table = pd.read_parquet(folder / "limited_by.parquet").set_index("design_id"), whole(folder)
     most = table.loc[table["csd_yellow_red"].idxmax()]

@@ -19,5 +19,5 @@ def test_the_readme_has_the_table_of_files() -> None:
     assert set(FILES) >= MADE_BY_RUN
 
 
-def test_every_column_of_a_row_is_told() -> None:
+def test_every_column_of_a_row_is_documented() -> None:
     assert {*ROW_COLUMNS} <= {*KEYS}

@@ -25,7 +25,7 @@ from sweep.study import Study, load_study
 
 from ..build import ran, study_file
 from ..cases import thinned
-from ..conftest import FinishedJob
+from ..conftest import FinishedFolder
 from ..mischief import rows
 
 NAMES = (
@@ -50,7 +50,7 @@ def expected(few: Study, tmp_path_factory: pytest.TempPathFactory) -> pd.DataFra
 
 
 @pytest.mark.parametrize("name", thinned(NAMES, 4))
-def test_a_file_that_was_there_before_is_told_and_stays(few: Study, tmp_path: Path, name: str) -> None:
+def test_a_foreign_file_is_reported_and_stays(few: Study, tmp_path: Path, name: str) -> None:
     base = tmp_path / "tiny"
     (base / name).parent.mkdir(parents=True, exist_ok=True)
     (base / name).write_text("mine")
@@ -98,7 +98,7 @@ def outside(tmp_path: Path) -> Path:
 
 @pytest.mark.usefixtures("plain_pictures")
 @pytest.mark.parametrize("name", [LOCK, PARTS, "figures"])
-def test_a_link_in_the_place_of_an_own_folder_is_told(few: Study, tmp_path: Path, name: str) -> None:
+def test_a_link_in_the_place_of_a_run_folder_is_reported(few: Study, tmp_path: Path, name: str) -> None:
     target, folder = outside(tmp_path), tmp_path / "out"
     folder.mkdir()
     (folder / name).symlink_to(target / "precious.txt" if name == LOCK else target)
@@ -152,7 +152,7 @@ def test_the_folder_itself_may_be_a_link(few: Study, expected: pd.DataFrame, tmp
 
 
 @pytest.mark.parametrize("study", ["stopband", pytest.param("fog", marks=pytest.mark.slow)])
-def test_names_that_reports_give_are_known(finished: FinishedJob, study: str) -> None:
+def test_names_that_reports_give_are_known(finished: FinishedFolder, study: str) -> None:
     """A picture of a new name is to be added to the names of a run's files."""
     folder = finished(study)
     drawn = [path for path in folder.rglob("*") if path.suffix in (".png", ".svg", ".html")]

@@ -72,7 +72,7 @@ def test_a_limit_comes_back_whatever_its_fields() -> None:
 
 
 @pytest.mark.parametrize("value", [object(), np.array([object()]), {3}, b"bytes", lambda: None])
-def test_what_is_no_data_is_not_kept(value: object) -> None:
+def test_objects_other_than_data_are_not_kept(value: object) -> None:
     with pytest.raises(TypeError, match="cannot be kept"):
         to_json(value)
 

@@ -60,7 +60,7 @@ def test_a_map_is_that_of_every_pair_read_out(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_map_is_told_and_drawn(tmp_path: Path) -> None:
+def test_a_region_map_is_described_and_drawn(tmp_path: Path) -> None:
     path = tmp_path / "allowed.yaml"
     path.write_text(TEXT)
     ran(load_study(path), tmp_path / "out", 1)

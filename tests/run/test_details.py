@@ -23,7 +23,7 @@ scenarios:
   far: {target: {distance_m: 300, fov_deg: 60}, optics: {f_number: 2}, noise: true}
 cfas: [RGGB, RYNCy]
 designs:
-  RYN_4Cy: {cfa: RYNCy, channel: N, base: Y, to: G, at: RYN_4Cy}
+  RYN4Cy: {cfa: RYNCy, channel: N, base: Y, to: G, at: RYN4Cy}
 recognition: {states: [yellow, red], patches: 20}
 """
 TABLES = (LIMITED_BY, POINTS, RECOGNITION)
@@ -41,7 +41,7 @@ def ran(folder: Path, jobs: int = 1) -> dict[str, list[object]]:
 
 
 @pytest.mark.parametrize("jobs", thinned([1, 2]))
-def test_what_is_looked_at_later_or_elsewhere_is_the_same(folder: Path, jobs: int) -> None:
+def test_deleted_tables_are_computed_again_with_equal_values(folder: Path, jobs: int) -> None:
     before = ran(folder)
     for name in TABLES:
         (folder / "out1" / name).unlink()

@@ -134,7 +134,7 @@ def test_status_of_a_run(plain: Study, tmp_path: Path) -> None:
     assert status_of(tmp_path).lines[0].startswith(f"finished: {plain.n_designs:,} designs in ")
 
 
-def test_dry_run_counts_what_is_finished(plain: Study, tmp_path: Path) -> None:
+def test_dry_run_counts_finished_designs(plain: Study, tmp_path: Path) -> None:
     found = remaining_work(plain, tmp_path / "out", 1)
     assert found.finished == 0
     assert not (tmp_path / "out").exists()
@@ -148,9 +148,7 @@ def test_dry_run_counts_what_is_finished(plain: Study, tmp_path: Path) -> None:
     assert last.endswith("nothing was computed or written.")
 
 
-def test_a_dry_run_says_what_is_searched_and_computed_and_computes_no_design(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_dry_run_lists_the_work_and_computes_no_design(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = study_file(tmp_path, 2)
     requested = "starts: 4, max_evaluations: 40, front: {min: 0.8, max: 0.9, count: 3}"
     path.write_text(path.read_text().replace("starts: 4, max_evaluations: 200", requested))

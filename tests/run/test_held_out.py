@@ -68,7 +68,7 @@ def test_other_lights_read_as_in_a_study_of_their_own(folder: Path) -> None:
     output = read_output(folder / "one")
     make_report(output)
     best = output.best.iloc[0]
-    said = output.trade_off[0].told(own.loc[best["design_id"], "csd_yellow_red"])
+    said = output.trade_off[0].formatted(own.loc[best["design_id"], "csd_yellow_red"])
     assert f"({said} on lights that it has not seen)" in "\n".join(summary_lines(output))
     assert "yellow/<wbr>red CSD, other lights" in (folder / "one" / "report.html").read_text()
 
@@ -151,7 +151,7 @@ def test_a_wrong_validation_is_one_line(folder: Path, after: str, said: str) -> 
     assert any(said in issue for issue in found), found
 
 
-def test_a_file_alone_is_told_apart_by_its_colors(folder: Path) -> None:
+def test_signal_types_of_a_file_follow_from_its_colors(folder: Path) -> None:
     """The same reading as with its columns named, told to the user, and kept in the resolved study."""
     lights(folder, "third", 590, 634)
     named = load(

@@ -103,8 +103,8 @@ def test_a_family_and_a_metric_of_a_package_are_like_those_of_files(package: Pat
 
 
 @pytest.mark.usefixtures("package")
-def test_nothing_of_a_package_runs_unasked(tmp_path: Path) -> None:
-    with pytest.raises(StudyError, match="what an installed package offers, whose code would run") as caught:
+def test_no_code_of_a_package_runs_without_allow_code(tmp_path: Path) -> None:
+    with pytest.raises(StudyError, match="a plugin of an installed package, whose code would run") as caught:
         study(tmp_path, allow=False)
     assert len(caught.value.issues) == 2  # the family and the metric
     assert commanded("run", tmp_path / "named.yaml")[0] == 2
@@ -130,7 +130,7 @@ def test_faults_of_a_package_are_lines(package: Path, tmp_path: Path, file: str,
         study(tmp_path)
 
 
-def test_code_that_changed_since_it_was_loaded_is_told(package: Path, tmp_path: Path) -> None:
+def test_code_changed_after_loading_is_reported(package: Path, tmp_path: Path) -> None:
     study(tmp_path)
     (package / "metrics.py").write_text(CODE + "# other\n")
     with pytest.raises(StudyError, match=r"the code of cfa-extras 1.2 is not that with which .* a new process"):
@@ -146,7 +146,7 @@ cfas: [RGGB, RYYB]
 
 
 def test_curves_of_a_package_are_those_of_its_files(package: Path, tmp_path: Path) -> None:
-    with pytest.raises(StudyError, match="what an installed package offers, whose code would run"):
+    with pytest.raises(StudyError, match="a plugin of an installed package, whose code would run"):
         study(tmp_path, PACKED, allow=False)
     assert not (tmp_path / "ran").exists()
     made = study(tmp_path, PACKED)
@@ -185,7 +185,7 @@ def test_faults_of_curves_of_a_package_are_lines(package: Path, tmp_path: Path, 
         study(tmp_path, PACKED)
 
 
-def test_two_packages_with_one_name_are_told(package: Path, tmp_path: Path) -> None:
+def test_two_packages_with_one_plugin_name_are_reported(package: Path, tmp_path: Path) -> None:
     other = package.parent / "other-3.0.dist-info"
     other.mkdir()
     (other / "METADATA").write_text("Metadata-Version: 2.1\nName: other\nVersion: 3.0\n")

@@ -48,7 +48,7 @@ def test_a_stopband_written_again_gives_the_same_rows_and_the_same_optimum(tmp_p
     assert any("gradients are differences" in warning for warning in output.provenance.warnings)
 
 
-def test_a_run_is_exported_audited_and_evaluated_with_its_own_code_alone(tmp_path: Path) -> None:
+def test_a_run_is_exported_audited_and_evaluated_with_its_stored_code(tmp_path: Path) -> None:
     ran(study(tmp_path), tmp_path / "out", 1)
     for verb in (("audit",), ("evaluate",), ("export", "--design", "best")):
         command = (*verb, str(tmp_path / "out"), "--data", str(tmp_path))
@@ -119,7 +119,7 @@ def test_bounds_and_gradients_hold(tmp_path: Path) -> None:
         np.testing.assert_allclose(mine, theirs, atol=2e-4 * abs(theirs).max())
 
 
-def test_edges_of_a_family_of_ones_own_are_not_shifted(tmp_path: Path) -> None:
+def test_edges_of_a_user_family_are_not_shifted(tmp_path: Path) -> None:
     with pytest.raises(SweepError, match="has no edges that production could shift"):
         study(tmp_path, OWN_FAMILY + "production: {edge_shift_nm: 2}\n")
 

@@ -66,7 +66,7 @@ def test_a_csd_written_again_has_the_same_numbers_and_the_same_optimum(tmp_path:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("plain_pictures")
-def test_it_is_told_like_any_other_and_nothing_runs_for_that(tmp_path: Path) -> None:
+def test_report_and_comparison_show_a_user_metric_without_running_it(tmp_path: Path) -> None:
     ran(study(tmp_path), tmp_path / "own", 1)
     ran(study(tmp_path, PLAIN), tmp_path / "plain", 1)
     (tmp_path / "mine.py").unlink()
@@ -135,7 +135,7 @@ def test_a_run_that_is_stopped_goes_on_and_other_code_is_another_study(tmp_path:
         run_study(study(tmp_path, code=CODE + "# changed\n"), tmp_path / "whole", 1, lambda *_: None)
 
 
-def test_own_filters_and_plain_cfas_have_it_in_python(tmp_path: Path) -> None:
+def test_user_metric_of_user_filters_and_plain_cfas_in_python(tmp_path: Path) -> None:
     study(tmp_path, OWN_METRIC.replace("mine.py:apart,", "mine.py:apart, mine.py:only_n,"))
     made = sweep.load_study(tmp_path / "own.yaml", allow_code=True)
     table = made.evaluate(N=0.9 * made.curve("Y"))
@@ -205,7 +205,7 @@ def test_faults_of_a_metric_are_one_line_before_any_work(tmp_path: Path, old: st
         (OWN_METRIC.replace("mine.py:Spread", "other.py:Spread"), "no such file (got 'other.py')"),
     ],
 )
-def test_what_a_study_says_of_it_is_checked(tmp_path: Path, text: str, said: str) -> None:
+def test_invalid_user_metrics_of_a_study_are_refused(tmp_path: Path, text: str, said: str) -> None:
     with one_line(said):
         study(tmp_path, text)
 

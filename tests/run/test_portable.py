@@ -54,7 +54,7 @@ def test_a_run_is_interrupted_and_continued(tmp_path: Path) -> None:
     pd.testing.assert_frame_equal(*both)
 
 
-def test_no_module_imports_what_unix_alone_has() -> None:
+def test_no_module_imports_unix_only_modules() -> None:
     for path in (ROOT / "sweep").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []

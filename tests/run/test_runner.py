@@ -64,7 +64,7 @@ def test_rows_stand_in_order_with_their_columns(output: Path) -> None:
     assert frame["sensitivity"].isna().sum() == 4  # two plain CFAs in two scenarios
 
 
-def test_a_row_is_what_its_parameters_say(study: Study, output: Path) -> None:
+def test_a_row_follows_from_its_parameters(study: Study, output: Path) -> None:
     frame = pd.read_parquet(output / "results.parquet")
     sweep = study.spaces[-1]
     for scenario in ("chart", "dim"):

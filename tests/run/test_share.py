@@ -80,7 +80,7 @@ def problem(objective: str = "yield_csd_yellow_red") -> Problem:
 @pytest.mark.parametrize(
     ("draws", "share"), [(1000, 0.99), (4000, 0.99), (20, 0.5), (100_000, 0.99), (10_000_000, 0.5)]
 )
-def test_what_is_told_of_a_share_is_more_than_it_has_in_a_twentieth_of_all_cases(draws: int, share: float) -> None:
+def test_yield_exceeds_the_true_value_in_at_most_a_twentieth_of_cases(draws: int, share: float) -> None:
     """The draw of that rank is above what the share has where fewer draws than its rank are below that."""
     rank = rank_below(draws, share)
     assert rank >= 5
@@ -203,7 +203,7 @@ def test_as_column_and_constraint_any_number_of_workers_gives_the_same(tmp_path:
         ("wanted_yield: 0.99", "wanted_yield: 99", "population.wanted_yield"),
     ],
 )
-def test_what_does_not_fit_is_told(tmp_path: Path, old: str, new: str, told: str) -> None:
+def test_inconsistent_population_is_refused(tmp_path: Path, old: str, new: str, told: str) -> None:
     path = tmp_path / "share.yaml"
     path.write_text(TEXT.replace(old, new))
     with one_line(told):

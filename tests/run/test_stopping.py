@@ -140,7 +140,7 @@ def later(seconds: float, number: int) -> int:
     return number
 
 
-def test_results_come_as_they_finish_and_in_order_where_that_is_asked() -> None:
+def test_results_come_as_finished_or_in_order() -> None:
     with workers(2, "threading") as pool:
         calls = [joblib.delayed(later)(0.2 if number == 0 else 0.0, number) for number in range(6)]
         finished = list(pool.unordered(calls))

@@ -133,7 +133,7 @@ def test_the_limit_of_the_smallest_of_several_distances() -> None:
     assert limit_of(constrained(csd_orange_red=Bound(min=float(orange) * 1.02))).proven < LIMIT.proven
 
 
-def test_the_limit_leaves_out_what_only_edges_have() -> None:
+def test_upper_bound_leaves_out_constraints_of_edges() -> None:
     found = limit_of(
         replace(constrained(edge_width_nm=Bound(min=20.0), worst_sensitivity=Bound(min=0.93)), edge_shift_nm=2.0)
     )
@@ -161,7 +161,7 @@ def test_no_limit_is_claimed_where_it_would_not_hold() -> None:
     )
 
 
-def test_words_say_what_is_proven() -> None:
+def test_report_words_match_the_proof() -> None:
     """A finished proof, one that was cut short, and levels that were."""
     output: Any = SimpleNamespace(
         goal=PROBLEM.quantities["csd_yellow_red"], study=STUDY.section, scenarios=list(STUDY.scenarios)
@@ -237,7 +237,7 @@ def values(problem: Problem, names: list[str]) -> list[dict[str, float]]:
 
 
 @pytest.mark.parametrize("made", thinned([noisy, half_yield_problem]))
-def test_what_meets_a_bound_of_the_study_meets_those_of_the_limit(made: Callable[[], Problem]) -> None:
+def test_filters_that_meet_the_study_meet_the_constraints_of_the_bound(made: Callable[[], Problem]) -> None:
     problem = made()
     requested = {name: quantity for name, quantity in problem.quantities.items() if quantity.ends and quantity.smooth}
     known = 0
@@ -253,7 +253,7 @@ def test_what_meets_a_bound_of_the_study_meets_those_of_the_limit(made: Callable
     assert known > 20
 
 
-def test_a_bound_on_what_a_share_has_is_left_out_of_the_limit() -> None:
+def test_yield_constraint_is_left_out_of_the_upper_bound() -> None:
     """It lies above what the nearest lights of the study have: to ask that of these would be more than the study does."""
     lights = replace(
         half_yield_problem().setup.lights, population=Population.model_validate({"wanted_yield": 0.5, "draws": 1000})

@@ -100,7 +100,7 @@ def test_every_place_of_a_light_has_sides_of_its_own(coarse: Problem, tmp_path: 
     assert limit.proven <= limit_of(coarse).proven * 1.001
 
 
-def test_a_proof_that_is_cut_short_says_what_it_has(coarse: Problem) -> None:
+def test_an_interrupted_proof_returns_its_bound(coarse: Problem) -> None:
     problem = random_problem(coarse, 9)
     whole = limit_checked_by_milp(problem)
     ends = []

@@ -55,7 +55,7 @@ def filters(problem: Problem, n: int) -> np.ndarray:
     return np.array(found)
 
 
-def test_of_each_error_without_a_limit_it_is_said_why() -> None:
+def test_each_error_without_upper_bound_has_a_reason() -> None:
     problem = problem_in("chart")
     without = [q for q in problem.quantities.values() if q.states and q.goal and not q.has_limit]
     assert {q.metric for q in without} == {"cnr", "error", "error_bound", "state_error", "state_error_bound"}
@@ -104,7 +104,7 @@ def test_the_least_light_is_that_of_a_linear_program() -> None:
         assert least[signal] == pytest.approx(expected, rel=1e-9)
 
 
-def test_between_levels_a_bound_is_told_only_where_its_noise_holds() -> None:
+def test_bound_between_levels_is_given_only_for_valid_noise() -> None:
     limit = limit_of(problem_in("chart"), sensitivities=(0.85, 0.9, 0.95))
     below, here, above = limit.elsewhere
     assert below == np.inf

@@ -37,7 +37,7 @@ def limit() -> Limit:
     return limit_of(MOVED)
 
 
-def test_a_bound_on_sensitivity_is_none_of_what_comes_out() -> None:
+def test_a_bound_on_the_designed_sensitivity_does_not_hold_for_perturbed_filters() -> None:
     """Beside a darker Y a filter of at most 0.9 leaves the exposure to others; one that production moves may not."""
     qe = MOVED.setup.camera.qe.copy()
     qe[MOVED.setup.camera.mosaic.channels.index("Y")] *= 0.95
@@ -65,7 +65,7 @@ def test_a_way_is_the_family_as_production_has_it() -> None:
             assert (-(apart @ out) <= -(rows @ curve) + added[:, 1] + 1e-9).all()
 
 
-def test_what_no_row_can_say_is_left_out_and_told() -> None:
+def test_nonlinear_constraints_are_left_out_and_reported() -> None:
     """Moves by part of a step, films that are too thick, a field of all places."""
     assert not all_ways(replace(MOVED, edge_shift_nm=1.5))
     assert len(perturbed_filters(replace(MOVED, edge_shift_nm=1.5))) == 1

@@ -164,7 +164,7 @@ def test_a_filter_without_light_does_not_end_the_search() -> None:
     ("name", "bound"),
     [("slope_per_nm", Bound(max=0.0)), ("min_transmission", Bound(min=1.0)), ("sensitivity", Bound(min=1.0))],
 )
-def test_a_bound_at_the_end_of_what_can_be_is_met(name: str, bound: Bound) -> None:
+def test_a_constraint_at_the_end_of_a_quantity_is_met(name: str, bound: Bound) -> None:
     """Flat filters under a flat curve, or the flat curve alone: nothing lies inside such a bound."""
     qe = SETUP.camera.qe.copy()
     qe[SETUP.camera.modified[0]] = base = np.full(STUDY.grid.size, 0.3)
@@ -212,7 +212,7 @@ TINY = stopband_study(
     ("tolerance_dn", "where"),
     [pytest.param(1e-3, "broken proof: ", marks=pytest.mark.slow), (0.02, "broken proof at a sensitivity")],
 )
-def test_a_limit_below_what_the_search_found_stops_the_run(
+def test_an_upper_bound_below_the_search_result_stops_the_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tolerance_dn: float, where: str
 ) -> None:
     """One line, an exit code of its own, no results; and what was searched is not searched again."""

@@ -134,7 +134,7 @@ def test_the_objective_is_met_by_the_readout() -> None:
     assert problem.objective.of(found)[0] == pytest.approx(best.objective, abs=0.02)
 
 
-def test_bounds_on_errors_are_kept_and_their_reach_is_told() -> None:
+def test_error_constraints_are_met_and_their_reach_is_reported() -> None:
     bounds = {"error_green_red": Bound(max=1e-4), "dprime_yellow_red": Bound(min=5.0), "sensitivity": Bound(min=0.8)}
     problem = replace(
         noisy_problem("stopband", 30, 0.3, Objective(minimum={"cfa_sensitivity": 1.0})), constraints=bounds
@@ -163,11 +163,11 @@ def test_bounds_on_errors_are_kept_and_their_reach_is_told() -> None:
             "objective: {least: {dprime_yellow_red: 1}}",
             "more of dprime_yellow_red is better; allowed: `minimum` or `sum`",
         ),
-        ("constraints: {state_error: {max: 0}}", "no such error is told (got 0.0); allowed: 1e-12 to 1"),
+        ("constraints: {state_error: {max: 0}}", "no such error is computed (got 0.0); allowed: 1e-12 to 1"),
         ("constraints: {cnr_yellow_red: {max: 2}}", "cnr_yellow_red has no `max`"),
     ],
 )
-def test_what_cannot_be_asked_of_errors_is_a_line(told: str, issue: str, tmp_path: Path) -> None:
+def test_invalid_error_constraint_is_one_line(told: str, issue: str, tmp_path: Path) -> None:
     start = "study: x\nsensor: ar0820\nlights: tl16\ncfas: [RGGB]\nscenarios: {s: {noise: true}}\nrecognition: {}\n"
     file = tmp_path / "x.yaml"
     file.write_text(f"{start}{told}\n")
@@ -200,7 +200,7 @@ def drawn_error(problem: Problem, x: np.ndarray, rng: np.random.Generator, draws
 @pytest.mark.parametrize(
     ("name", "read_noise_e", "level", "matters"), [("stopband", 30, 0.3, False), ("rccb", 2, 0.05, True)]
 )
-def test_what_the_optimum_by_error_gains_on_drawn_patches(
+def test_optimum_by_error_has_fewer_errors_on_drawn_patches(
     name: str, read_noise_e: float, level: float, matters: bool
 ) -> None:
     """With 30 e of read noise a nanometer less of the band gains nothing that 20 x 400,000 patches show; where photon
@@ -226,7 +226,7 @@ def test_what_the_optimum_by_error_gains_on_drawn_patches(
         assert half < 0.03
 
 
-def test_the_filter_of_the_noise_study_is_what_a_search_finds() -> None:
+def test_the_filter_of_the_noise_study_equals_the_search_result() -> None:
     study = load_study(STUDIES / "noise.yaml")
     own = study.section.designs["fewest errors"].at
     assert not isinstance(own, str)
@@ -234,7 +234,7 @@ def test_the_filter_of_the_noise_study_is_what_a_search_finds() -> None:
     np.testing.assert_allclose(best.x[:4], list(own.values()), atol=0.006)
 
 
-def test_a_search_refuses_what_has_no_smooth_rows(tmp_path: Path) -> None:
+def test_search_refuses_quantities_without_smooth_rows(tmp_path: Path) -> None:
     every = quantities_of(RequestedQuantities(STATES, STATES, probabilities=True, vision=True))
     without = [q.name for q in every.values() if q.ends and q.smooth is None]
     assert {q.metric for q in map(every.get, without) if q is not None} == {"cdp"}

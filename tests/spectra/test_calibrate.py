@@ -70,7 +70,7 @@ def test_all_48_csds_are_within_3_percent_or_2_dn(comparison: pd.DataFrame) -> N
 
 def test_sensitivity_of_n4(comparison: pd.DataFrame) -> None:
     row = comparison[comparison["quantity"] == "sensitivity"].iloc[0]
-    assert (row["cfa"], row["paper"]) == ("RYN_4Cy", 0.902)
+    assert (row["cfa"], row["paper"]) == ("RYN4Cy", 0.902)
     assert abs(row["ours_exact"] - 0.902) <= SCRIPT.allowed("sensitivity", 0.902)
 
 
@@ -128,7 +128,7 @@ def test_the_four_filters_are_different_and_well_formed(objective: SimpleNamespa
     assert (parts["color"] <= 0.001 / 0.001).all()  # perhaps within the margin, but inside the region
 
 
-def test_figures_are_what_the_evaluation_gives(paper: Path) -> None:
+def test_figures_equal_those_of_the_evaluation(paper: Path) -> None:
     frame = pd.read_parquet(paper / "results.parquet").set_index("name")
     for row, values in SCRIPT.figures(surrogate_parameters(), list(SCRIPT.PRINTED)).items():
         for quantity, value in values.items():
@@ -160,18 +160,18 @@ def test_a_fit_recovers_parameters_that_it_was_given(photon_ratio: float | None,
 
 def test_free_parameters_round_trip() -> None:
     before = copy.deepcopy(SCRIPT.PRIOR)
-    free = SCRIPT.free_parameters(["RGGB", "RYN_1Cy", "RYN_2Cy"])
+    free = SCRIPT.free_parameters(["RGGB", "RYN1Cy", "RYN2Cy"])
     paths = [f.path for f in free]
     assert len(set(paths)) == len(paths)
     assert [path[1:] for path in paths if path[0] == "stopbands"] == [
-        *(("RYN_1Cy", edge) for edge in ("left_nm", "left_width_nm", "right_nm", "right_width_nm")),
-        ("RYN_2Cy", "right_nm"),
+        *(("RYN1Cy", edge) for edge in ("left_nm", "left_width_nm", "right_nm", "right_width_nm")),
+        ("RYN2Cy", "right_nm"),
     ]
     assert all(f.low < f.mean < f.high or f.mean in (f.low, f.high) for f in free)
     assert SCRIPT.with_values(free, np.array([f.mean for f in free])) == before
     shifted = SCRIPT.with_values(free, np.array([f.mean + 0.01 for f in free]))
-    assert shifted["stopbands"]["RYN_2Cy"]["left_nm"] == pytest.approx(600.01)
-    assert shifted["stopbands"]["RYN_4Cy"]["left_nm"] == 600
+    assert shifted["stopbands"]["RYN2Cy"]["left_nm"] == pytest.approx(600.01)
+    assert shifted["stopbands"]["RYN4Cy"]["left_nm"] == 600
     assert before == SCRIPT.PRIOR
 
 

@@ -95,7 +95,7 @@ VARIANTS: dict[str, tuple[str, str, str]] = {
 
 @pytest.mark.usefixtures("plain_pictures")
 @pytest.mark.parametrize("name", thinned(VARIANTS, 3))
-def test_a_variant_reaches_a_study_or_ends_with_what_helps(tmp_path: Path, name: str) -> None:
+def test_a_file_variant_is_read_or_refused_with_advice(tmp_path: Path, name: str) -> None:
     file, content, said = VARIANTS[name]
     path = tmp_path / file
     path.write_text(content, encoding="latin-1" if "\u00e4" in content else "utf-8")
@@ -135,7 +135,7 @@ def test_a_variant_reaches_a_study_or_ends_with_what_helps(tmp_path: Path, name:
         ("a.spectrum", "x", "unknown kind of curve file"),
     ],
 )
-def test_what_two_readers_could_read_in_two_ways_is_refused(tmp_path: Path, file: str, content: str, said: str) -> None:
+def test_ambiguous_numbers_are_refused(tmp_path: Path, file: str, content: str, said: str) -> None:
     path = tmp_path / file
     path.write_text(content)
     with one_line(said):
@@ -159,9 +159,7 @@ NO_TEXTS: dict[str, Callable[[], bytes]] = {
 
 
 @pytest.mark.parametrize("kind", NO_TEXTS)
-def test_what_is_no_text_is_refused_before_its_lines_are_looked_at(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
-) -> None:
+def test_binary_files_are_refused_before_parsing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
     path, study = tmp_path / "a.csv", tmp_path / "x.yaml"
     path.write_bytes(NO_TEXTS[kind]())
     sections = [
@@ -253,7 +251,7 @@ def test_of_mutated_files_none_is_a_wrong_curve(tmp_path: Path) -> None:
     assert taken > 150
 
 
-def test_what_no_rule_mends_is_not_cleaned(tmp_path: Path) -> None:
+def test_curves_without_a_repair_rule_are_not_cleaned(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text(text().replace(f"600,{QE[22, 0]:g}", "600,-0.3", 1))
     assert scan_curves(path).issues

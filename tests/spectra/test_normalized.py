@@ -34,7 +34,9 @@ def qe_file(folder: Path, top: float) -> Path:
 
 
 @pytest.mark.parametrize(("top", "normalized"), [(1.0, True), (0.8, False), (0.999, False)])
-def test_a_file_with_a_maximum_of_one_is_said_to_look_normalized(tmp_path: Path, top: float, normalized: bool) -> None:
+def test_a_file_with_a_maximum_of_one_gets_a_note_on_normalization(
+    tmp_path: Path, top: float, normalized: bool
+) -> None:
     qe = qe_file(tmp_path, top)
     assert (f"Note: {NORMALIZED}." in described(qe, tmp_path).lines) == normalized
     assert (f"Note: qe.csv: {NORMALIZED}." in new_study("mine", tmp_path, qe, None, "energy")) == normalized
@@ -44,7 +46,7 @@ def test_a_file_with_a_maximum_of_one_is_said_to_look_normalized(tmp_path: Path,
     ("top", "scale", "normalized"),
     [(1.0, "scale: 1", True), (1.0, "scale: 0.6", False), (100.0, "scale: 0.01", True), (0.8, "scale: 1", False)],
 )
-def test_a_study_says_so_by_what_its_scale_makes_of_it(
+def test_a_study_warns_of_normalized_curves_after_scaling(
     tmp_path: Path, top: float, scale: str, normalized: bool
 ) -> None:
     qe_file(tmp_path, top)

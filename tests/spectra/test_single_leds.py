@@ -40,7 +40,7 @@ CONDITIONS = {
 
 @pytest.mark.parametrize("norm", ["en_12368", "ite"])
 @pytest.mark.parametrize("kind", ["yellow", "red"])
-def test_a_norm_allows_what_its_conditions_say(norm: Norm, kind: str) -> None:
+def test_norm_allows_colors_within_its_boundaries(norm: Norm, kind: str) -> None:
     requested = RegionMap(wanted_dn=1, peak_nm=(578.0, 664.0), peak_step_nm=2, fwhm_nm=(12.0, 36.0), fwhm_step_nm=12)
     found = all_leds(requested).allowed(norm, kind)
     allowed = {*zip(found.peak_nm, found.fwhm_nm, strict=True)}

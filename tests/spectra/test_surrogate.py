@@ -67,7 +67,7 @@ def test_channels_are_in_a_plausible_order(wavelength_nm: int, strong: tuple[str
     assert min(SENSOR.qe[name][at] for name in strong) > max(SENSOR.qe[name][at] for name in weak)
 
 
-def test_rccx_uses_its_own_red() -> None:
+def test_rccx_uses_the_red_curve_of_the_sensor() -> None:
     assert SENSOR.curve_name("RCCC", "R") == "Rx"
     assert SENSOR.curve_name("RCCB", "R") == "Rx"
     assert SENSOR.curve_name("RGGB", "R") == "R"

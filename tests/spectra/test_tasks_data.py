@@ -20,7 +20,7 @@ from ..make_spectra import OUT, made
 GRID = WavelengthGrid()
 
 
-def test_the_file_is_what_its_script_makes() -> None:
+def test_the_data_file_equals_the_output_of_its_script() -> None:
     found = importlib.util.find_spec("earthlib")
     if found is None or found.origin is None:
         pytest.skip("earthlib is not installed: pip install --no-deps earthlib==1.1.0")

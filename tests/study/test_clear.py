@@ -56,7 +56,7 @@ def texts_of(output: Output) -> list[str]:
     ]
 
 
-def test_every_text_says_whose_light_is_one(tmp_path: Path) -> None:
+def test_every_text_names_the_sensitivity_reference(tmp_path: Path) -> None:
     alone, stated = output_of(tmp_path / "alone"), output_of(tmp_path / "stated", ", clear: G")
     assert (alone.provenance.sensor.reference, alone.provenance.sensor.has_clear) == ("G", False)
     assert (stated.provenance.sensor.reference, stated.provenance.sensor.has_clear) == ("G", True)
@@ -76,7 +76,7 @@ def test_a_pixel_is_clear_by_its_name(name: str, clear: bool) -> None:
     assert (sensor.clear, sensor.has_clear, sensor.brightest) == (name, clear, "" if clear else name)
 
 
-def test_a_verdict_says_whose_light_is_one(tmp_path: Path) -> None:
+def test_an_evaluation_names_the_sensitivity_reference(tmp_path: Path) -> None:
     qe, own = qe_file(tmp_path), tmp_path / "own.csv"
     own.write_text("wavelength_nm,N\n390,0.1\n540,0.3\n710,0.1\n")
     code, out, err = commanded("evaluate", own, "--sensor", qe, "--relative-to", "G")

@@ -37,7 +37,7 @@ def errors(data: Any) -> list[str]:
     return [error.message for error in validator().iter_errors(data)]
 
 
-def test_the_schema_beside_the_studies_is_what_the_command_makes(tmp_path: Path) -> None:
+def test_the_shipped_schema_equals_the_output_of_the_command(tmp_path: Path) -> None:
     assert commanded("schema", "--output", tmp_path / SCHEMA_FILE)[0] == 0
     assert (tmp_path / SCHEMA_FILE).read_text(encoding="utf-8") == (STUDIES / SCHEMA_FILE).read_text(encoding="utf-8")
     assert json.loads(schema_text()) == study_schema()
@@ -106,7 +106,7 @@ def test_short_forms_fit_the_schema(more: dict[str, Any]) -> None:
         {"objective": {"minimun": {"csd_yellow_red": 1}}},
     ],
 )
-def test_what_is_misspelled_does_not_fit(more: dict[str, Any]) -> None:
+def test_misspelled_keys_do_not_match_the_schema(more: dict[str, Any]) -> None:
     assert errors(SMALL | more)
 
 
@@ -123,12 +123,12 @@ def test_studies_are_listed_with_the_broken_ones(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def test_a_missing_or_empty_folder_is_told(tmp_path: Path) -> None:
+def test_a_missing_or_empty_folder_is_reported(tmp_path: Path) -> None:
     assert commanded("list", tmp_path / "none")[0] == 2
     assert "No studies" in list_lines(tmp_path, studies_of(tmp_path, tmp_path))[0]
 
 
-def test_an_interrupted_and_a_changed_run_are_told(tmp_path: Path) -> None:
+def test_an_interrupted_and_a_changed_run_are_reported(tmp_path: Path) -> None:
     from sweep.results.folder import begin
     from sweep.study import load_study
 

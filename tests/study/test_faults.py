@@ -38,9 +38,7 @@ def lines(tmp_path: Path, text: str) -> list[str]:
         (MEANING + "metrics: nothing.py:NAME\n", ["9 sweeps.edges.cfa", "22 metrics"]),
     ],
 )
-def test_faults_of_the_schema_are_told_at_once_and_then_those_of_meaning(
-    tmp_path: Path, text: str, expected: list[str]
-) -> None:
+def test_schema_errors_are_reported_before_errors_of_meaning(tmp_path: Path, text: str, expected: list[str]) -> None:
     assert lines(tmp_path, text) == expected
 
 
@@ -84,7 +82,7 @@ def test_the_name_of_a_pair_in_the_other_order_is_proposed(tmp_path: Path, text:
 
 
 @pytest.mark.parametrize(("said", "meant"), [("yes", "true"), ("On", "true"), ("no", "false"), ("off", "false")])
-def test_a_boolean_of_another_yaml_is_told_as_it_is_written(tmp_path: Path, said: str, meant: str) -> None:
+def test_yaml_1_1_booleans_are_reported_as_written(tmp_path: Path, said: str, meant: str) -> None:
     expected = f"true or false expected: write {meant} (got {said!r})"
     for section in ("scenarios: {chart: {noise: BOOLEAN}}\n", "validate: {leave_one_out: BOOLEAN}\n"):
         assert issues(tmp_path, BASE + section.replace("BOOLEAN", said))[0].endswith(expected)
@@ -142,7 +140,7 @@ def test_published_names_are_checked(tmp_path: Path) -> None:
         ("    RGGB: {csd", "    RGBG: {csd", "did you mean 'RGGB'"),
         ("RGGB: {csd_green_yellow", "RGGB: {csd_green_yelow", "did you mean 'csd_green_yellow'"),
         ("urban: {object_resolution_px", "urban: {sensitivity", "allowed: object_resolution_px"),
-        ("at: RYN_2Cy", "at: RYN_5Cy", "unknown built-in filter"),
+        ("at: RYN2Cy", "at: RYN5Cy", "unknown built-in filter"),
     ):
         with pytest.raises(StudyError, match=word):
             loaded(old, new)

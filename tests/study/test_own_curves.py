@@ -43,7 +43,7 @@ def test_a_transmission_is_multiplied_by_its_curve(tmp_path: Path) -> None:
     np.testing.assert_allclose(study.sensor.curve("N"), 0.4 * study.sensor.curve("Y"), rtol=1e-12)
 
 
-def test_an_own_curve_takes_the_place_of_the_built_in_one_in_every_cfa(tmp_path: Path) -> None:
+def test_a_user_curve_replaces_the_built_in_one_in_every_cfa(tmp_path: Path) -> None:
     study = own(tmp_path, "R: mine, N: mine", mine=np.full(NM.size, 0.25))
     for cfa in ("RGGB", "RCCB"):
         space = next(space for space in study.spaces if space.name == cfa)

@@ -122,6 +122,6 @@ def test_a_run_of_drawn_designs_that_is_broken_off_is_continued(tmp_path: Path, 
         ("sobol: 4\n    box: {left_nm: {min: 3, max: 4}}", "yaml:13: sweeps.edges.box.left_nm: out of range (got 3.0)"),
     ],
 )
-def test_what_is_no_sweep_is_one_line(tmp_path: Path, keys: str, said: str) -> None:
+def test_invalid_sweep_is_one_line(tmp_path: Path, keys: str, said: str) -> None:
     with one_line(said, alone=False):
         load_study(written(tmp_path, keys))

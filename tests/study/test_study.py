@@ -254,7 +254,7 @@ def test_resolved_study_is_a_study_with_the_same_rows(tmp_path: Path) -> None:
     assert fingerprint(again) == fingerprint(study)
 
 
-def test_fingerprint_changes_with_what_rows_depend_on(tmp_path: Path) -> None:
+def test_fingerprint_changes_with_every_input_of_a_row(tmp_path: Path) -> None:
     first = fingerprint(load(tmp_path, BASE))
     assert fingerprint(load(tmp_path, BASE + "question: else\n")) == first
     assert fingerprint(load(tmp_path, BASE.replace("min: 0.9", "min: 0.8"))) != first

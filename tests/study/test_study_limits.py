@@ -146,7 +146,7 @@ def test_names_steer_no_terminal_and_are_cut() -> None:
     assert nearest("x" * 10**6, ["x" * 10**6]) is None
 
 
-def test_what_a_study_may_say_is_read_as_before(tmp_path: Path) -> None:
+def test_valid_yaml_is_read_as_by_the_library(tmp_path: Path) -> None:
     text = (
         (
             "%YAML 1.2\n---\nbase: &base {a: 1, b: [x, 'y', \"z\\n\"]}\n"
@@ -206,7 +206,7 @@ def has_words_for_keys(value: object) -> bool:
 @given(values)
 @example({"": None, ":0": None})
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-def test_what_the_library_writes_is_read_as_it_reads_it(value: object) -> None:
+def test_yaml_written_by_the_library_is_read_equally(value: object) -> None:
     yaml, text = YAML(typ="safe", pure=True), StringIO()
     yaml.dump({"top": value}, text)
     try:

@@ -82,7 +82,7 @@ def test_tasks_need_filters_that_do_not_move() -> None:
         "to": "G",
         "technology": {"interference": {"effective_index": 1.8}},
     }
-    keys = {**KEYS, "cfas": ["RYNCy"], "designs": {"film": {**film, "at": "RYN_4Cy"}}, "tasks": ["color"]}
+    keys = {**KEYS, "cfas": ["RYNCy"], "designs": {"film": {**film, "at": "RYN4Cy"}}, "tasks": ["color"]}
     with pytest.raises(StudyError, match="do not move with the angle"):
         study_of_keys(keys, Path())
 
@@ -186,7 +186,7 @@ def test_spectra_of_a_file_are_judged_as_those_of_a_group(tmp_path: Path) -> Non
 
 
 @pytest.mark.usefixtures("plain_pictures")
-def test_a_run_keeps_the_spectra_of_its_own_tasks(tmp_path: Path) -> None:
+def test_a_run_keeps_the_spectra_of_user_tasks(tmp_path: Path) -> None:
     """It is made again without the file; with another file of that name it is refused."""
     study = {
         **with_paints(tmp_path, {**OWN, "columns": ["white", "yellow"]}),

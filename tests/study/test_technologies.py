@@ -35,7 +35,7 @@ def test_each_channel_has_the_technology_of_its_curve(tmp_path: Path) -> None:
     assert {plain.setup(space, "chart").camera.technologies for space in plain.spaces} == {()}
 
 
-def test_a_run_keeps_what_is_stated(tmp_path: Path) -> None:
+def test_a_run_keeps_stated_technologies(tmp_path: Path) -> None:
     study = load(tmp_path, STATED)
     again = load(tmp_path, resolved_yaml(study))
     assert again.section == study.section
@@ -90,7 +90,7 @@ WORDS = "a technology is `pigment`, or `interference: {effective_index: 1.8}`"
         ),
     ],
 )
-def test_what_does_not_fit_is_a_fault(tmp_path: Path, old: str, new: str, expected: str) -> None:
+def test_inconsistent_technologies_are_refused(tmp_path: Path, old: str, new: str, expected: str) -> None:
     text = BASE.replace(old, new, 1)
     if "grazes" in expected:
         text += "scenarios: {chart: {optics: {f_number: 0.8, cra_deg: 60}}}\n"

@@ -36,7 +36,7 @@ FOUR = ["red", "orange", "yellow", "green"]
 
 
 @pytest.mark.parametrize(("cfa", "place"), thinned([("RGGB", 7), ("RCCB", 12)]))
-def test_a_lamp_is_what_the_product_reads(cfa: str, place: int) -> None:
+def test_lamp_image_equals_the_camera_model(cfa: str, place: int) -> None:
     """The mean over the middle lens to 1e-4, and so every CSD within a tolerance of 0.1 DN, at places between pixels."""
     candelas, tolerance_dn = 200.0, 0.1
     requested, setup = vision(distances_m=[100.0]), head_setup(cfa)
@@ -178,7 +178,7 @@ def test_planes_of_a_tile() -> None:
     np.testing.assert_array_equal(planes[1, 2, 3], image[1, 4:6, 9:12].ravel())
 
 
-def test_a_demosaicked_plane_keeps_a_line_and_what_was_measured() -> None:
+def test_demosaicking_keeps_linear_images_and_measured_pixels() -> None:
     """Bilinear for a Bayer tile: exact for light that changes evenly, away from the border."""
     mosaic = Mosaic.from_name("RGGB")
     rows, columns = np.mgrid[0:12, 0:12].astype(float)

@@ -183,7 +183,7 @@ def test_a_missing_library_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
         require_network()
 
 
-def test_what_a_study_of_vision_cannot_be(tmp_path: Path) -> None:
+def test_invalid_vision_section_is_refused(tmp_path: Path) -> None:
     requested = (
         "vision: {distances_m: [100], lenses: [red, yelow, green], levels: {day: {illuminance_lx: 1, exposure_s: 1}}"
     )

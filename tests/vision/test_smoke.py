@@ -87,7 +87,7 @@ def test_the_network_is_never_better_than_the_observer(output: Output, order: st
     for design in benchmark.designs:
         more = benchmark.wrong(NETWORK, order)[design] - benchmark.wrong(OBSERVER, order)[design]
         assert mean_of(more.to_numpy(), benchmark.weights(order)).high >= 0
-        said = benchmark.said(design, OBSERVER, order)
+        said = benchmark.answers(design, OBSERVER, order)
         wrong = (said["said"] != said["state"]).to_numpy(dtype=float)
         off = wrong - (1 - said["p"].to_numpy())
         assert abs(off.mean()) <= 4 * off.std() / np.sqrt(off.size) + 1e-9

@@ -58,7 +58,7 @@ def compare(
 
 def export(
     folder: RunFolder,
-    design: Annotated[str, typer.Option(help="A design_id, a name (RYN_4Cy, RGGB), or best.", show_default=False)],
+    design: Annotated[str, typer.Option(help="A design_id, a name (RYN4Cy, RGGB), or best.", show_default=False)],
     data: Annotated[
         Path | None, typer.Option(help="Folder with the run's curve files, which are then read again and compared.")
     ] = None,
