@@ -5,7 +5,7 @@
 # make oldest                run the tests with the oldest versions that pyproject.toml allows, in .venv-oldest
 # make check                 ruff, mypy --strict
 # make accuracy              run the hard cases, measure what accuracy costs in time, outputs/accuracy/accuracy.html
-# make documents           print the tables of studies/guide/reference.md and outputs/README.md anew
+# make tables              print the tables of studies/guide/reference.md and outputs/README.md anew
 # make docs                  build guide and API reference as HTML, outputs/docs/studies/guide/index.html
 # make bench                 measure speed, JSON in outputs/bench
 PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
@@ -23,7 +23,7 @@ unexport PYTHONDONTWRITEBYTECODE
 TESTS := $(ONE_THREAD) $(BIN)/python -m pytest -n logical --dist worksteal
 KERNELS := sweep/base/machine_code.py $(shell grep -rl --include=*.py "machine_code import" sweep)
 
-.PHONY: study report test slow oldest accuracy check documents docs bench clean
+.PHONY: study report test slow oldest accuracy check tables docs bench clean
 .DELETE_ON_ERROR:
 
 study: $(VENV)/.ready$(EXTRA)
@@ -50,7 +50,7 @@ check: $(VENV)/.ready-dev
 	$(BIN)/ruff format --check sweep tests
 	$(BIN)/mypy
 
-documents: $(VENV)/.ready-dev
+tables: $(VENV)/.ready-dev
 	$(BIN)/python -m tests.printed
 
 docs: $(VENV)/.ready-docs

@@ -1,4 +1,4 @@
-"""The parts of the documentation that the program prints: `make documents` writes them anew."""
+"""The parts of the documentation that the program prints: `make tables` writes them anew."""
 
 from __future__ import annotations
 

@@ -193,13 +193,13 @@ def filter_of_run(folder: Path, design: str | None, options: EvaluateOptions) ->
     SweepError
         If the design is unknown or a plain CFA, or the folder holds no finished run.
     """
-    from ..results.designs import BEST, find_row, row_curves, study_of
+    from ..results.designs import BEST, find_design_row, row_curves, study_of
     from ..results.output import read_output
 
     output = read_output(folder)
     data = None if options.data is None else Path(options.data)
     study = study_of(output, data, allow_code=options.allow_code)
-    row = find_row(output, design or BEST)
+    row = find_design_row(output, design or BEST)
     space, curves = row_curves(study, row)
     if space.filter is None:
         raise DataError(ValidationIssue("a plain CFA has no filter to judge", str(folder), None, "--design", design))

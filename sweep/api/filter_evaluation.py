@@ -25,7 +25,7 @@ from .loading import CurveSource, make_study
 from .user_filters import (
     any_filter_problem,
     evaluate_curves,
-    results_table,
+    table_of_results,
     upper_bound_or_reason,
     with_exposure_unchanged,
     with_lower_bound,
@@ -131,7 +131,7 @@ class FilterEvaluation:
     def table(self) -> pd.DataFrame:
         """Quantities with one row per scenario and CFA; units and meanings are in ``attrs``."""
         study = self.study
-        return results_table(study, [(cfa, cfa, scene, columns) for scene, cfa, columns in self.rows])
+        return table_of_results(study, [(cfa, cfa, scene, columns) for scene, cfa, columns in self.rows])
 
     @property
     def gap(self) -> float | None:

@@ -109,7 +109,7 @@ def to_curves(name: str, curve: CurveLike) -> Curves:
 
 
 def table_to_curves(table: pd.DataFrame) -> Curves:
-    """Convert a table with one column per curve and nm as its index.
+    """Return the columns of a table, indexed by nm, as `Curves`.
 
     Parameters
     ----------

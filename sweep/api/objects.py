@@ -22,7 +22,7 @@ from .user_filters import (
     evaluate_curves,
     find_cfa,
     replaced_curves,
-    results_table,
+    table_of_results,
     upper_bound_or_reason,
     user_filter_setup,
     with_lower_bound,
@@ -165,7 +165,7 @@ class LoadedStudy:
         curves = np.stack([*rows.values()], axis=1)
         setups = {name: user_filter_setup(study, chosen, name, bases) for name in scenarios}
         columns = {name: evaluate_curves(study, setup, curves) for name, setup in setups.items()}
-        return results_table(study, [("own", chosen, name, values) for name, values in columns.items()])
+        return table_of_results(study, [("own", chosen, name, values) for name, values in columns.items()])
 
     def _plain_and_named(self, cfa: str | None, scenarios: list[str]) -> pd.DataFrame:
         from ..results.tables import NAMED, PLAIN
@@ -190,7 +190,7 @@ class LoadedStudy:
                 worst = total_violation(values, study.constraints, space.violation(points))
                 columns = {quantity: values[quantity] for quantity in study.quantities}
                 rows.append((space.name, space.cfa, name, columns | {"violation": worst}))
-        return results_table(study, rows)
+        return table_of_results(study, rows)
 
     def limit(
         self,

@@ -213,8 +213,8 @@ def evaluate_curves(study: Study, setup: Setup, curves: FloatArray) -> Columns:
     return columns | {"violation": total_violation(columns, study.constraints, np.zeros(len(curves)))}
 
 
-def results_table(study: Study, rows: Sequence[tuple[str, str, str, Columns]]) -> pd.DataFrame:
-    """Return a table with one row per design.
+def table_of_results(study: Study, rows: Sequence[tuple[str, str, str, Columns]]) -> pd.DataFrame:
+    """Return the quantities of evaluated designs as a table, one row per design.
 
     Parameters
     ----------

@@ -76,7 +76,7 @@ class Plan:
 def plan_scene(
     scenario: str, boxes: Sequence[Box], tolerance_dn: float, accuracy: Accuracy, *, for_noise: bool = False
 ) -> Plan:
-    """Choose the effects of a scene, for all its boxes of designs.
+    """Choose the effects that a scene must compute to stay within a tolerance, DN.
 
     Active effects with the smallest bounds are left out first. Effects of the readout come before the optics, whose
     bounds depend on them.

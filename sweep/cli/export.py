@@ -12,7 +12,7 @@ from ..base.errors import OutputError, ValidationIssue
 from ..base.types import FloatArray
 from ..report import Output, check_kept, read_output, study_of
 from ..results.atomic import write_bytes
-from ..results.designs import find_row, row_curves
+from ..results.designs import find_design_row, row_curves
 from ..spectra.filter_files import (
     color_hints,
     csv_text,
@@ -73,7 +73,7 @@ def export_design(
         content would be overwritten.
     """
     output = read_output(folder)
-    row = find_row(output, key)
+    row = find_design_row(output, key)
     study = study_of(output, data, allow_code=allow_code)
     space, modified = row_curves(study, row)
     camera = study.setup(space, row["scenario"]).camera
@@ -148,7 +148,7 @@ def _verify(output: Output, row: Row, modified: Mapping[str, FloatArray], base_q
     if modified:
         ratio = sum(values.sum() for values in modified.values()) / sum(base.sum() for base in base_qe.values())
         if not abs(ratio - row["sensitivity"]) <= _ROUNDING * max(1.0, ratio):
-            problem = "computed again, this is not what the run has: sensitivity"
+            problem = "computed again, the sensitivity differs from the run"
             raise OutputError(ValidationIssue(problem, str(output.folder), allowed="the version of that run"))
 
 

@@ -78,7 +78,7 @@ class SampledDesigns:
     seed: int
 
     def points(self, axes: Axes, start: int, stop: int) -> FloatArray:
-        """Return the parameters of consecutive designs; all are drawn, once."""
+        """Return the parameters of sampled designs; the whole sample is drawn at the first call and kept."""
         shares = _drawn.get((self, len(axes)), lambda: self._shares(len(axes)))[start:stop]
         low, high = (np.array([end(axis) for axis in axes], dtype=float) for end in (min, max))
         return np.asarray(np.minimum(low + shares * (high - low), high), dtype=float)

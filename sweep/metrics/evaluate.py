@@ -61,7 +61,7 @@ def designed_quantities(setup: Setup, designs: FloatArray | Block) -> Columns:
     Returns
     -------
     dict of str to ndarray of shape (n_designs,)
-        Columns.
+        Column name -> values.
     """
     block = _block(designs)
     return _joined([metric.of_designs(setup, block) for metric in METRICS if isinstance(metric, DesignMetric)])
@@ -80,7 +80,7 @@ def family_quantities(family: Family | None, points: FloatArray) -> Columns:
     Returns
     -------
     dict of str to ndarray of shape (n_designs,)
-        Columns.
+        Column name -> values.
     """
     return _joined([metric.of_parameters(family, points) for metric in METRICS if isinstance(metric, FamilyMetric)])
 
@@ -102,7 +102,7 @@ def image_quantities(setup: Setup, curves: FloatArray, vision: Vision | None, se
     Returns
     -------
     dict of str to ndarray of shape (n_designs,)
-        Columns.
+        Column name -> values.
     """
     if vision is None:
         return {}
@@ -283,7 +283,7 @@ def over_cases(imager: ForwardModel, cases: Columns) -> Columns:
     Returns
     -------
     dict of str to ndarray of shape (n_designs,)
-        Columns.
+        Column name -> values.
     """
     quantities = quantities_of(RequestedQuantities(imager.setup.lights.classes, any_place=True))
     best = {quantity.of: name for name, quantity in quantities.items() if quantity.extreme == "best place"}
@@ -329,7 +329,7 @@ def evaluate(
     Returns
     -------
     dict of str to ndarray of shape (n_designs,)
-        Columns.
+        Column name -> values.
     """
     block, extra, setup = _block(designs), partial(_whole_readout, model, own), model.setup
     changing = None if states else model.read_changing(block)

@@ -393,7 +393,7 @@ class DesignMetric(Metric):
         Returns
         -------
         dict of str to ndarray of shape (n_designs,)
-            Columns.
+            Column name -> values.
         """
 
 
@@ -414,7 +414,7 @@ class ReadoutMetric(Metric):
         Returns
         -------
         dict of str to ndarray of shape (n_designs,)
-            Columns.
+            Column name -> values.
         """
 
 
@@ -443,7 +443,7 @@ class NoiseMetric(Metric):
         Returns
         -------
         dict of str to ndarray of shape (n_designs,)
-            Columns.
+            Column name -> values.
         """
 
 
@@ -468,7 +468,7 @@ class VisionMetric(Metric):
         Returns
         -------
         dict of str to ndarray of shape (n_designs,)
-            Columns.
+            Column name -> values.
         """
 
 
@@ -489,5 +489,5 @@ class FamilyMetric(Metric):
         Returns
         -------
         dict of str to ndarray of shape (n_designs,)
-            Columns.
+            Column name -> values.
         """

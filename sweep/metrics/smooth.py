@@ -52,7 +52,7 @@ class Rows:
         Returns
         -------
         Rows
-            Rows.
+            Values and derivatives.
         """
         return Rows(factor * self.values + offset, factor * self.by_u)
 
@@ -62,7 +62,7 @@ class Rows:
         Returns
         -------
         Rows
-            Rows.
+            Values and derivatives.
         """
         return Rows(self.values**2, 2 * self.values[:, None] * self.by_u)
 
@@ -72,7 +72,7 @@ class Rows:
         Returns
         -------
         Rows
-            Rows.
+            Values and derivatives.
         """
         values = np.sqrt(np.maximum(self.values, 0.0))
         per = np.divide(0.5, values, out=np.zeros_like(values), where=values > 0)
@@ -84,7 +84,7 @@ class Rows:
         Returns
         -------
         Rows
-            Rows.
+            Values and derivatives.
         """
         values = np.maximum(self.values, _SMALLEST)
         per = np.where(self.values > _SMALLEST, -1 / (np.log(10) * values), 0.0)
@@ -102,7 +102,7 @@ class Rows:
         Returns
         -------
         Rows
-            Rows.
+            Values and derivatives.
         """
         return Rows(np.concatenate([p.values for p in parts]), np.concatenate([p.by_u for p in parts]))
 
@@ -111,13 +111,13 @@ class Rows:
         """True if all values and derivatives are finite."""
         return bool(np.isfinite(self.values).all() and np.isfinite(self.by_u).all())
 
-    def clean_file(self) -> Rows:
+    def without_nan(self) -> Rows:
         """Return the rows with zeros for NaN and infinity.
 
         Returns
         -------
         Rows
-            Rows.
+            Values and derivatives.
         """
         return Rows(*(np.nan_to_num(v, posinf=0, neginf=0) for v in (self.values, self.by_u)))
 
@@ -201,12 +201,12 @@ class SmoothDesign:
         Returns
         -------
         Rows
-            Rows.
+            Values and derivatives.
         """
         return Rows(matrix @ self.x, matrix[:, self._free] * self._span)
 
     def squared_distances(self, pair: Pair) -> Rows:
-        """Return squared distances of all pairs of signals of two types, in every case, DN^2.
+        """Return squared distances of all pairs of signals of two types in every case, DN^2, with derivatives.
 
         Parameters
         ----------
@@ -216,7 +216,7 @@ class SmoothDesign:
         Returns
         -------
         Rows
-            Rows.
+            Values and derivatives.
         """
         first, second = (self._imager.members[name] for name in pair)
         response, by_u = self._response
@@ -237,7 +237,7 @@ class SmoothDesign:
         Returns
         -------
         Rows
-            Rows.
+            Values and derivatives.
         """
         assert self._members is not None
         response, by_u = self._response_of_members
@@ -264,7 +264,7 @@ class SmoothDesign:
         Returns
         -------
         Rows
-            Rows.
+            Values and derivatives.
         """
         assert self._drawn is not None
         draws, imager = self._drawn.draws(pair), self._drawn.population_imager.imager

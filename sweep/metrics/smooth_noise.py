@@ -143,7 +143,7 @@ def pair_rows(design: SmoothDesign, *, of: _OfPairs, pairs: Sequence[Pair]) -> R
     Returns
     -------
     Rows
-        Rows.
+        Values and derivatives.
     """
     return Rows.joined([_between(design, pair, of) for pair in pairs])
 
@@ -161,7 +161,7 @@ def bound_rows(design: SmoothDesign, *, types: Sequence[str]) -> Rows:
     Returns
     -------
     Rows
-        Rows.
+        Values and derivatives.
     """
     sums: dict[str, list[Rows]] = {name: [] for name in types}  # [n_cases x n_own x n_others] of each other type
     n_cases, sizes = len(design.response), {name: len(index) for name, index in design.setup.members.items()}

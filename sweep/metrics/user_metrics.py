@@ -216,6 +216,6 @@ def user_quantities(metrics: Sequence[UserMetric], setup: Setup, response: Float
     Returns
     -------
     dict of str to ndarray of shape (n_designs,)
-        Columns.
+        Column name -> values.
     """
     return {metric.name: metric.of_cases(setup, response) for metric in metrics}

@@ -77,8 +77,8 @@ def on_the_same_axes(runs: Mapping[str, Output]) -> tuple[dict[str, Output], lis
     return chosen, [f"The fronts have different axes ({axes}); compared are those of {' and '.join(chosen)}."]
 
 
-def dn_of(output: Output) -> str:
-    """Return full scale and pedestal of a run, without which its DN cannot be compared.
+def dn_scale_label(output: Output) -> str:
+    """Return a text with bit depth and black level of a run.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def _meaning(output: Output) -> tuple[str, ...]:
         text = str(output.objective) if combined else axis.words
         off = axis.extreme == WORST_CASE or (combined and shifted)
         dependent = f" ({', '.join(over)})" if off else ""
-        words.append(f"{text}{dependent}" + (f" in {dn_of(output)}" if axis.unit == DN or combined else ""))
+        words.append(f"{text}{dependent}" + (f" in {dn_scale_label(output)}" if axis.unit == DN or combined else ""))
     return tuple(words)
 
 

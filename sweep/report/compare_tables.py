@@ -14,7 +14,7 @@ from ..metrics.quantity import DN, Column
 from ..results.curves import KeptCurves
 from ..results.output import Output
 from ..results.tables import FOUND, SWEPT
-from .compare_fronts import dn_of
+from .compare_fronts import dn_scale_label
 from .leaders import label, of_reference
 
 _SAME = 1e-9
@@ -175,7 +175,9 @@ def ranking(runs: Mapping[str, Output]) -> list[str]:
 def _maximized(output: Output) -> tuple[str, str]:
     """Return the objective in words, and the meaning of its DN, if it has any."""
     text = str(output.objective) if output.goal.name == COMBINED else output.goal.words
-    return text, dn_of(output) if any(output.columns[name].unit == DN for name in output.objective.weights) else ""
+    return text, dn_scale_label(output) if any(
+        output.columns[name].unit == DN for name in output.objective.weights
+    ) else ""
 
 
 def study_differences(runs: Mapping[str, Output]) -> pd.DataFrame:

@@ -27,6 +27,8 @@ _LEAST_RANGE = 1e-3
 _DRAWN_POINTS = 10_000
 _TRACED_NAME = "found by the search"
 _LABEL_BOX = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.0}
+_HEADROOM = 0.15
+"""Share of the axis above a point that names need."""
 _LABELS = {
     "infeasible": "does not meet the constraints",
     "feasible": "feasible",
@@ -252,17 +254,17 @@ def traded_cfas(output: Output) -> list[str]:
     Returns
     -------
     list of str
-        Lines.
+        Names.
     """
-    rows, error_against_noise = output.kind(SWEPT), []
+    rows, cfas = output.kind(SWEPT), []
     for cfa in dict.fromkeys(m.cfa for m in modifications(output)):
         swept = rows[(rows["cfa"] == cfa) & (rows["status"] == "ok")]["sensitivity"].to_numpy(dtype=float)
         traced = _trade_offs(output, output.scenarios[0], cfa)[0]
         x = swept if traced is None else np.concatenate([swept, traced.x])
         x = x[np.isfinite(x)]
         if x.size and np.ptp(x) > _LEAST_RANGE:
-            error_against_noise.append(cfa)
-    return error_against_noise
+            cfas.append(cfa)
+    return cfas
 
 
 def draw_trade_off(figure: TradeOff) -> Figure:
@@ -321,10 +323,12 @@ def _level_labels(heights: Sequence[tuple[str, float]], limits: tuple[float, flo
 
 
 def _annotate(axes: Axes, groups: Iterable[Points]) -> None:
-    """Draw names beside points; one that would overlap another goes above it."""
+    """Draw names beside points; names of close points stand above each other, below the point near the upper end."""
     labeled = sorted(item for points in groups for item in zip(points.x, points.y, points.labels, strict=False))
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     for number, (x, y, text) in enumerate(labeled):
         placed = [(u, v) for u, v, _ in labeled[:number]]
         near = sum(abs(x - u) < 0.15 * (right - left) and abs(y - v) < 0.05 * (top - bottom) for u, v in placed)
-        axes.annotate(text, (x, y), textcoords="offset points", xytext=(7, 4 + 11 * near), fontsize=9, zorder=7)
+        up = y + _HEADROOM * (top - bottom) < top
+        offset = (7, 4 + 11 * near if up else -4 - 11 * near)
+        axes.annotate(text, (x, y), textcoords="offset points", xytext=offset, fontsize=9, zorder=7)

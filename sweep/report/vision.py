@@ -14,7 +14,7 @@ from ..metrics.share import format_share
 from ..results.output import Output
 from ..results.tables import VISION, VISION_CONDITIONS
 from ..vision.scenes import SHUFFLED, UNSEEN, states_of
-from ..vision.scores import Interval, confusion_matrix, interval_around, mean_of, nested_weights
+from ..vision.scores import Interval, cluster_bootstrap_weights, confusion_matrix, interval_around, mean_of
 from ..vision.section import Vision
 
 OBSERVER, NETWORK, HALF = "observer", "network", "half"
@@ -95,7 +95,7 @@ class Benchmark:
             Weights.
         """
         seeds = self.scenes(order, lamps)["seed"].to_numpy()
-        return nested_weights(seeds, np.random.default_rng((self.seed, 99)))
+        return cluster_bootstrap_weights(seeds, np.random.default_rng((self.seed, 99)))
 
     def error(self, design: str, reader: str, order: str, lamps: str = UNSEEN) -> Interval:
         """Return the share of images that were read wrongly.
@@ -269,16 +269,16 @@ def ranks_of(benchmark: Benchmark) -> Ranks:
     errors = {reader: _by_condition(benchmark.wrong(reader, SHUFFLED), here, weights) for reader in readers}
     table = benchmark.conditions.set_index(["name", "distance_m", "level"])
     known = {n: np.array([[table[n][d, *at] for at in where] for d in benchmark.designs]) for n in list(PREDICTORS)[:3]}
-    evaluation = errors[benchmark.main_reader]
+    wrong_shares = errors[benchmark.main_reader]
     everywhere, between = {}, {}
     for name in PREDICTORS:
-        given = errors[name] if name in errors else np.broadcast_to(known[name], evaluation.shape)
+        given = errors[name] if name in errors else np.broadcast_to(known[name], wrong_shares.shape)
         if benchmark.main_reader == name:
             continue
         sign = -1.0 if name in _FALLS else 1.0
-        flat = _spearman(sign * given.reshape(len(given), -1), evaluation.reshape(len(evaluation), -1))
+        flat = _spearman(sign * given.reshape(len(given), -1), wrong_shares.reshape(len(wrong_shares), -1))
         everywhere[name] = interval_around(float(flat[0]), flat[1:])
-        at_each = np.stack([_spearman(sign * given[:, :, at], evaluation[:, :, at]) for at in range(len(where))])
+        at_each = np.stack([_spearman(sign * given[:, :, at], wrong_shares[:, :, at]) for at in range(len(where))])
         mean = np.ma.masked_invalid(at_each).mean(axis=0).filled(np.nan)
         between[name] = interval_around(float(mean[0]), mean[1:])
     conditions = pd.DataFrame(
@@ -286,7 +286,7 @@ def ranks_of(benchmark: Benchmark) -> Ranks:
     )
     for name in everywhere:
         conditions[name] = (errors[name][0] if name in errors else known[name]).ravel()
-    conditions["error"] = evaluation[0].ravel()
+    conditions["error"] = wrong_shares[0].ravel()
     return Ranks(everywhere, between, conditions)
 
 

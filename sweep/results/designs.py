@@ -110,8 +110,8 @@ def few_rows(table: pd.DataFrame) -> list[dict[Any, Any]]:
     return computed_rows(table[table["kind"].isin(FEW)])
 
 
-def find_row(output: Output, key: str) -> Mapping[Any, Any]:
-    """Return the row of a design; if it occurs in several scenarios, the first.
+def find_design_row(output: Output, key: str) -> Mapping[Any, Any]:
+    """Return the row of a run's design by name, design_id or `best`.
 
     Parameters
     ----------

@@ -123,7 +123,7 @@ FILES = {
     files.RESULTS: "a row per design and scenario; its columns are below",
     files.LIMITED_BY: "the two lights that limit each CSD, of plain CFAs, named designs, answers of the search, and "
     "of the swept designs that the report draws: the best of each CFA, those that lead, the feasible front, and up to "
-    f"{MOST_POINTS:,} other feasible and as many infeasible ones, evenly: `design_id`, `limited_by_<a>_<b>` (of a "
+    f"{MOST_POINTS:,} other feasible and as many infeasible ones, evenly: `design_id`, `limited_by_<a>_<b>` (for "
     "any sampling phase, at the worst one of the lattice that was computed)",
     files.VALIDATED: "where a study validates on other lights: `design_id` and `held_out_csd_<a>_<b>`, their CSDs, DN",
     files.ROBUSTNESS: "where the lights have a population, for each plain CFA, named design and answer of the search: "

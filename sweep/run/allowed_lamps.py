@@ -17,7 +17,7 @@ from ..results.designs import few_rows, row_curves
 from ..spectra.lights import Lights
 from ..spectra.single_leds import Norm, SingleLeds, all_leds
 from ..study import Study
-from .workers import with_progress
+from .workers import run_with_progress
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -66,7 +66,7 @@ def regions_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
         space, curves = row_curves(study, row)
         setup = study.setup(space, row["scenario"]).with_all_effects
         calls.append(delayed(_cells, setup, curves, allowed, regions.wanted_dn))
-    answers = zip(few, with_progress(parallel, calls, "color regions", progress), strict=True)
+    answers = zip(few, run_with_progress(parallel, calls, "color regions", progress), strict=True)
     cells = [{"design_id": row["design_id"], **cell} for row, made in answers for cell in made]
     return pa.Table.from_pylist(cells, schema=_SCHEMA)
 

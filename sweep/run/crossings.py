@@ -20,7 +20,7 @@ from ..metrics.columns.confusion import STATE_ERROR, state_errors
 from ..results.designs import few_rows, row_curves
 from ..study import Study
 from ..study.axes import series_of
-from .workers import with_progress
+from .workers import run_with_progress
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -75,7 +75,7 @@ def crossings_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progre
                 calls.append(delayed(_crossing, between, curves, study.states, numbers, errors, allowed))
                 design = {"design_id": row["design_id"], "name": row["name"], "series": series, "key": key}
                 made.append(design | {"low": numbers[0], "high": numbers[1]})
-    answers = with_progress(parallel, calls, "where designs stop being usable", progress)
+    answers = run_with_progress(parallel, calls, "where designs stop being usable", progress)
     return pa.Table.from_pylist([row | at for row, at in zip(made, answers, strict=True)], schema=_SCHEMA)
 
 

@@ -23,7 +23,7 @@ from ..results.designs import computed_rows, few_rows, row_curves
 from ..results.tables import FEW, FOUND, LIMITED_BY, POINTS, RECOGNITION
 from ..spectra.lights import Pair
 from ..study import Study
-from .workers import with_progress
+from .workers import run_with_progress
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -106,7 +106,7 @@ def design_details(
         for start in range(0, len(designs), _AT_ONCE)
     ]
     result: dict[int, Details] = {}
-    for details in with_progress(parallel, calls, "lights and patches", progress):
+    for details in run_with_progress(parallel, calls, "lights and patches", progress):
         result |= details
     return result
 
@@ -196,7 +196,7 @@ def limited_by_table(
             numbers = number[part] - (ends[space_index] - space.size)
             calls.append(delayed(_limits, study.setup(space, scenarios[scene_index]), space, numbers))
             parts.append(ids[part].tolist())
-    for part, lights in zip(parts, with_progress(parallel, calls, "limiting lights", progress), strict=True):
+    for part, lights in zip(parts, run_with_progress(parallel, calls, "limiting lights", progress), strict=True):
         names |= {one: {pair: lights[pair][index] for pair in lights} for index, one in enumerate(part)}
     shown = sorted(names)
     limits = {
@@ -245,7 +245,7 @@ def sensor_map_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progr
             space, curves = row_curves(study, row)
             setup = study.setup(space, row["scenario"])
             calls.append(delayed(_over_heights, setup, int(row["design_id"]), np.asarray(curves, dtype=float)))
-    maps = [row for answer in with_progress(parallel, calls, "field positions", progress) for row in answer]
+    maps = [row for answer in run_with_progress(parallel, calls, "field positions", progress) for row in answer]
     names = ("height", "cra_deg", *(csd_name(pair) for pair in study.pairs))
     schema = pa.schema([("design_id", pa.int64()), *((name, pa.float64()) for name in names)])
     return pa.Table.from_pylist(maps, schema=schema).sort_by([("design_id", "ascending"), ("height", "ascending")])

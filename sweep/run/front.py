@@ -27,7 +27,7 @@ _Group = tuple[str, str]
 
 
 def report_rows(table: pa.Table, rules: Rules) -> pa.Table:
-    """Return the rows of a table that a report may need: front, best and leading rows of each CFA and scenario.
+    """Select the rows that a report may need: front, best and leading rows of each CFA and scenario.
 
     Plain CFAs, named designs and answers are all kept. `pareto` marks the front of any part of a run's rows, so that
     the function may be applied again to concatenated results.

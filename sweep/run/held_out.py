@@ -21,7 +21,7 @@ from ..search.problem import Evaluation, Problem, best_feasible, starting_points
 from ..search.solver import search_from, smooth_objective
 from ..spectra.lights import class_pairs
 from ..study import Search, Study
-from .workers import with_progress
+from .workers import run_with_progress
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -61,7 +61,7 @@ def held_out_table(
     for row in shown:
         space, curves = row_curves(study, row)
         calls.append(delayed(_on_lights, replace(study.setup(space, row["scenario"]), lights=lights), curves))
-    csds = with_progress(parallel, calls, "held-out lights", progress)
+    csds = run_with_progress(parallel, calls, "held-out lights", progress)
     names = [HELD_OUT + csd_name(pair) for pair in class_pairs(lights.classes)]
     schema = pa.schema([("design_id", pa.int64()), *((name, pa.float64()) for name in names)])
     held_out = [{"design_id": row["design_id"], **csd} for row, csd in zip(shown, csds, strict=True)]
@@ -118,7 +118,7 @@ def left_out_table(study: Study, search: Search, best: Evaluation, parallel: Par
             rows.append(
                 dict(zip(_NAMES, (requested.objective.column, lights.types[at], lights.names[at]), strict=True))
             )
-    answers = with_progress(parallel, calls, "lights left out", progress)
+    answers = run_with_progress(parallel, calls, "lights left out", progress)
     figures = [dict(zip(_FIGURES, answer or (None,) * 3, strict=True)) for answer in answers]
     schema = pa.schema([*((name, pa.string()) for name in _NAMES), *((name, pa.float64()) for name in _FIGURES)])
     return pa.Table.from_pylist([row | values for row, values in zip(rows, figures, strict=True)], schema=schema)

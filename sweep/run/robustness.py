@@ -21,7 +21,7 @@ from ..results.designs import few_rows, row_space
 from ..results.tables import PLAIN
 from ..spectra.lights import Pair
 from ..study import Study
-from .workers import with_progress
+from .workers import run_with_progress
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -135,7 +135,7 @@ def robustness_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progr
         best = max(plain, key=lambda one: one[f"worst_{csd_name(pair)}"], default=row)
         rival = None if best["design_id"] == row["design_id"] else _design(study, best)
         calls.append(delayed(_robustness, _design(study, row), rival, pair, study.section.seed))
-    answers = zip(few, with_progress(parallel, calls, "robustness", progress), strict=True)
+    answers = zip(few, run_with_progress(parallel, calls, "robustness", progress), strict=True)
     made = [{"design_id": row["design_id"], **numbers, **lights} for row, (numbers, lights) in answers]
     return pa.Table.from_pylist(made, schema=pa.schema(_FIELDS))
 

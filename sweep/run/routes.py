@@ -219,11 +219,11 @@ def _not_finite(columns: Columns, setup: Setup, rules: Rules) -> dict[int, str]:
     Quantities of a family and metrics of user code may be missing; for a plain CFA, those of a modified channel.
     """
     needs = ("family", "own") if setup.camera.modified else ("family", "own", "modified")
-    missing_keys = {name for name, quantity in rules.quantities.items() if quantity.needs in needs}
-    if missing_keys & set(rules.objective.weights):
-        missing_keys.add(COMBINED)
+    inapplicable = {name for name, quantity in rules.quantities.items() if quantity.needs in needs}
+    if inapplicable & set(rules.objective.weights):
+        inapplicable.add(COMBINED)
     faulty = np.zeros(len(next(iter(columns.values()))), dtype=bool)
-    for name in columns.keys() - missing_keys:
+    for name in columns.keys() - inapplicable:
         infinite = rules.quantities[name].infinite
         faulty |= ~(np.isfinite(columns[name]) | ((columns[name] == np.inf) & infinite))
     return dict.fromkeys(np.flatnonzero(faulty).tolist(), "not finite")

@@ -24,7 +24,7 @@ from ..vision.images import setup_at
 from ..vision.readers import Answers, SeedReading, read_images
 from ..vision.scenes import ORDERS, SEEN, UNSEEN, states_of
 from ..vision.section import Vision
-from .workers import with_progress
+from .workers import run_with_progress
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -83,7 +83,7 @@ def vision_tables(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
     calls = [delayed(read_images, *setups[at], vision, (study.section.seed, seed)) for at, seed in pairs]
     images: list[dict[str, Any]] = []
     pictures: list[dict[str, Any]] = []
-    readings = with_progress(parallel, calls, "images read (designs x seeds)", progress)
+    readings = run_with_progress(parallel, calls, "images read (designs x seeds)", progress)
     for (at, seed), reading in zip(pairs, readings, strict=True):
         design = {name: designs[at][name] for name, _ in _DESIGN}
         images += _image_rows(study, vision, design | {"seed": seed}, reading)

@@ -191,8 +191,8 @@ def workers(n_jobs: int, backend: str = "loky", scheduler: str | None = None) ->
         yield Workers(n_jobs, backend)
 
 
-def with_progress(parallel: Parallel, calls: Sequence[Call], phase: str, progress: Progress) -> Iterator[Any]:
-    """Yield the answers of calls in order, with the progress of a phase.
+def run_with_progress(parallel: Parallel, calls: Sequence[Call], phase: str, progress: Progress) -> Iterator[Any]:
+    """Run calls on the cores and yield their answers in order, with the progress of a phase.
 
     Parameters
     ----------

@@ -97,9 +97,9 @@ def _finite(point: Point) -> Point:
     return replace(
         point,
         evaluation=replace(point.evaluation, violation=np.inf),
-        terms=point.terms.clean_file(),
-        conditions=point.conditions.clean_file(),
-        quantities={name: rows.clean_file() for name, rows in point.quantities.items()},
+        terms=point.terms.without_nan(),
+        conditions=point.conditions.without_nan(),
+        quantities={name: rows.without_nan() for name, rows in point.quantities.items()},
     )
 
 

@@ -228,12 +228,12 @@ def _attaining(
         attained = _attained(problem, curve, worst)
         if attained > -np.inf:
             return attained, curve, solved
-        missing_keys = {n: b.min - worst[n] for n, b in problem.constraints.items() if n in worst and b.min is not None}
-        missing_keys = {name: lack for name, lack in missing_keys.items() if lack > 0}
-        if not missing_keys:
+        shortfall = {n: b.min - worst[n] for n, b in problem.constraints.items() if n in worst and b.min is not None}
+        shortfall = {name: lack for name, lack in shortfall.items() if lack > 0}
+        if not shortfall:
             break
         bounds = requested.constraints
-        raised = {n: Bound.model_construct(min=(bounds[n].min or 0.0) + 2 * lack) for n, lack in missing_keys.items()}
+        raised = {n: Bound.model_construct(min=(bounds[n].min or 0.0) + 2 * lack) for n, lack in shortfall.items()}
         requested = replace(requested, constraints={**bounds, **raised})
         program, solution = _proof(requested, members, tolerance, _ATTEMPT_PROGRAMS)
         solved += program.solved

@@ -135,7 +135,7 @@ class StudyTasks:
 
     @property
     def keys(self) -> tuple[TaskName, ...]:
-        """Names of their columns."""
+        """Names of the tasks, as in column names."""
         return tuple(task.key for task in self.tasks)
 
     @property

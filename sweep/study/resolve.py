@@ -63,7 +63,7 @@ def resolve(section: StudySection, sources: Sources) -> Study:
         lights = with_population(lights, section, sources)
     tasks, spaces = None, []
     if section.tasks is not None:
-        from .tasks import check_task_scenes, tasks_of  # noqa: PLC0415  (few studies have tasks)
+        from .tasks import check_tasks_in_scenes, tasks_of  # noqa: PLC0415  (few studies have tasks)
 
         tasks = tasks_of(section.tasks, sources)
     metrics = attempt(lambda: user_metrics(section, sources))
@@ -73,7 +73,7 @@ def resolve(section: StudySection, sources: Sources) -> Study:
         spaces = SpaceBuilder(section, sources, sensor, mosaics).spaces()
         check_lenses(section, sensor, spaces, sources)
         if tasks is not None:
-            check_task_scenes(tasks, section, sensor, spaces, sources)
+            check_tasks_in_scenes(tasks, section, sensor, spaces, sources)
     checks.check_scenes(section, sources)
     search = search_of(section, spaces, sources)
     if lights is not None:

@@ -11,7 +11,7 @@ from ..camera.pixel import Pixel, irradiance_factor
 from ..camera.scene import Scene
 from ..camera.sensor import SensorCurves
 from ..designs.space import Space
-from ..spectra.builtin.task_sets import group, is_surface, separation_task, shipped, task_groups
+from ..spectra.builtin.task_sets import is_surface, separation_task, shipped, spectra_of_group, task_groups
 from ..spectra.files import is_curve_file
 from ..spectra.tasks import ILLUMINANTS, SHIPPED, Conditions, GriddedTask, StudyTasks
 from .document import KeyPath
@@ -77,7 +77,7 @@ def _user_task(
         for index, entry in enumerate(entries):
             path = (*at, "classes", kind, index)
             if isinstance(entry, str):
-                spectra += list(group(sources.grid, entry))
+                spectra += list(spectra_of_group(sources.grid, entry))
             elif entry.file in files:
                 sources.add((*path, "file"), "the class has this file already", entry.file)
             else:
@@ -157,10 +157,10 @@ def _read(path: KeyPath, entry: TaskFile, sources: Sources) -> dict[str, FloatAr
     return spectra
 
 
-def check_task_scenes(
+def check_tasks_in_scenes(
     tasks: StudyTasks, section: StudySection, sensor: SensorCurves, spaces: Sequence[Space], sources: Sources
 ) -> None:
-    """Check that no filter of a task depends on the angle and that no patch saturates a pixel.
+    """Add issues for a task whose filter depends on the angle, or whose patches saturate a pixel.
 
     Parameters
     ----------

@@ -339,15 +339,15 @@ def try_metrics(study: Study, sources: Sources) -> None:
     setups = {space.cfa: study.setup(space, next(iter(study.scenarios))) for space in study.spaces} if study.own else {}
     searched = None if study.search is None else study.search.space.cfa
     wanted = {*study.objective.weights, *study.constraints}
-    missing_keys: dict[str, list[str]] = {metric.name: [] for metric in study.own}
+    without_metric: dict[str, list[str]] = {metric.name: [] for metric in study.own}
     for metric in study.own:
         for cfa, setup in setups.items():
             try:
-                missing_keys[metric.name] += [] if _tried(metric, setup) else [cfa]
+                without_metric[metric.name] += [] if _tried(metric, setup) else [cfa]
             except SweepError as error:
                 sources.add_error(("metrics",), error)
                 break  # it fails on the others, too
-        if searched in missing_keys[metric.name] and {metric.name, WORST + metric.name} & wanted:
+        if searched in without_metric[metric.name] and {metric.name, WORST + metric.name} & wanted:
             sources.add(("metrics",), f"{metric.code.name} gives None for {searched}, which is searched", metric.name)
     if sources.issues:
         raise sources.error

@@ -102,7 +102,7 @@ def log_likelihoods(
     table: NDArray[np.float32],
     out: NDArray[np.float64],
 ) -> None:
-    """Compute the log-likelihood of each case for each image, up to a constant of the image.
+    """Write the log-likelihood of each case given each image into `out`, from tabulated probabilities.
 
     Parameters
     ----------

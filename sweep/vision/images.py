@@ -141,7 +141,7 @@ class HeadCamera:
         self._heads: dict[tuple[int, int], HeadElectrons] = {}
 
     def electrons(self, distance: int, level: int) -> HeadElectrons:
-        """Return the electrons at one distance and level; cached.
+        """Return expected electrons of the parts of a head at a distance and a light level, by their indices.
 
         Parameters
         ----------

@@ -12,7 +12,7 @@ from functools import cache
 import numpy as np
 
 from ..base.types import FloatArray
-from ..spectra.builtin.task_sets import group
+from ..spectra.builtin.task_sets import spectra_of_group
 from ..spectra.spectrum import WavelengthGrid
 from .section import Illuminant, Material
 
@@ -78,7 +78,7 @@ def reflectance(grid: WavelengthGrid, name: Material) -> FloatArray:
         0 to 1.
     """
     if name not in _PATCHES:
-        return np.asarray(group(grid, name).mean(axis=0), dtype=float)
+        return np.asarray(spectra_of_group(grid, name).mean(axis=0), dtype=float)
     from colour import SDS_COLOURCHECKERS  # noqa: PLC0415  (more than a second to import)
 
     held = SDS_COLOURCHECKERS["ColorChecker N Ohta"][_PATCHES[name]]

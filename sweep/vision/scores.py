@@ -26,8 +26,8 @@ class Interval:
         return self.low > 0 or self.high < 0
 
 
-def nested_weights(groups: IndexArray, rng: np.random.Generator, draws: int = DRAWS) -> FloatArray:
-    """Return weights of scenes in bootstrap samples: seeds drawn with replacement, then scenes within each.
+def cluster_bootstrap_weights(groups: IndexArray, rng: np.random.Generator, draws: int = DRAWS) -> FloatArray:
+    """Return weights of scenes in a two-stage bootstrap (seeds, then scenes within), each draw with a sum of 1.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def mean_of(values: FloatArray | BoolArray, weights: FloatArray) -> Interval:
     values : ndarray of shape (n,)
         Values.
     weights : ndarray of shape (draws, n)
-        Result of `nested_weights`.
+        Result of `cluster_bootstrap_weights`.
 
     Returns
     -------

@@ -120,7 +120,9 @@ def test_an_own_filter_moves_as_the_study_says_of_its_own() -> None:
     study = sweep.load_study("angle")
     named = study.evaluate(scenario="f/1.6 cra_deg=20")
     family = sweep.Stopband(study.wavelength_nm, study.curve("Y").to_numpy(), study.curve("G").to_numpy())
-    own = study.evaluate(N=family.curves(np.array([[612.89, 5.92, 651.18, 6.25, 1]]))[0, 0], scenario="f/1.6 cra_deg=20")
+    own = study.evaluate(
+        N=family.curves(np.array([[612.89, 5.93, 651.17, 6.26, 1]]))[0, 0], scenario="f/1.6 cra_deg=20"
+    )
     assert own.csd_yellow_red.item() == named.csd_yellow_red[named.name == "best stopband"].item()
 
 

@@ -69,15 +69,15 @@ def missed(seed: int) -> tuple[float, float, float]:
     sine_squared, weights = gauss_rays(cone_of(made.setup.scene), 4)
     stack, wave, base = layers(np.random.default_rng([seed, 5])), GRID.nodes_nm, made.setup.camera.base_qe[0]
     fine = np.arange(GRID.start_nm, 800.0, GRID.step_nm)
-    linear_moments = transmitted(stack, 0.0, fine)
+    missed_straight = transmitted(stack, 0.0, fine)
     tilted = np.array([transmitted(stack, float(np.arcsin(s**0.5)), wave) for s in sine_squared])
 
     def moved(index: float) -> np.ndarray:
-        return np.array([np.interp(wave / np.sqrt(1 - s / index**2), fine, linear_moments) for s in sine_squared])
+        return np.array([np.interp(wave / np.sqrt(1 - s / index**2), fine, missed_straight) for s in sine_squared])
 
     index = minimize_scalar(lambda n: float(((moved(n) - tilted) ** 2).sum()), bounds=(1.2, 3.0), method="bounded").x
     still = made.setup.with_camera(technologies=())
-    curves = np.stack([weights @ tilted, weights @ moved(index), np.interp(wave, fine, linear_moments)]) * base
+    curves = np.stack([weights @ tilted, weights @ moved(index), np.interp(wave, fine, missed_straight)]) * base
     response = linear_model(still).smooth(curves[:, None])[:, 0]
     exact, model, on_axis = separation(response, made.setup.members["yellow"], made.setup.members["red"])
     return float(exact), float(model), float(on_axis)

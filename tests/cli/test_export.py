@@ -217,7 +217,7 @@ def test_a_row_that_was_tampered_with_is_refused(tiny: Path, tmp_path: Path) -> 
     frame["status"] = status.astype("category")
     frame.to_parquet(tmp_path / "run" / "results.parquet", index=False)
     listed_anew(tmp_path / "run")
-    with pytest.raises(OutputError, match="differ from the run: sensitivity"):
+    with pytest.raises(OutputError, match="the sensitivity differs from the run"):
         export_design(tmp_path / "run", "30", None, None)
     with pytest.raises(SweepError, match=r"the design failed .got 'error: KeyError: x'"):
         export_design(tmp_path / "run", "31", None, None)

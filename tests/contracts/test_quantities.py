@@ -258,17 +258,15 @@ def test_smooth_rows_under_noise_are_the_quantity(name: str) -> None:
 @pytest.mark.parametrize("name", [name for name in NAMES if QUANTITIES[name].smooth is not None])
 def test_smooth_rows_are_the_quantity_with_its_derivative(name: str) -> None:
     quantity, setup = QUANTITIES[name], DITHERED if name in OF_NOISE else MADE["lattice"].setup
-    linear_moments = linear_model(setup)
+    linear = linear_model(setup)
 
     def rows(x: np.ndarray) -> Rows:
         assert quantity.smooth is not None
-        return quantity.smooth(SmoothDesign(linear_moments, FAMILY, x, FREE, SPAN))
+        return quantity.smooth(SmoothDesign(linear, FAMILY, x, FREE, SPAN))
 
     for x in X:
         if name not in OF_NOISE:
-            found = evaluate(ForwardModel(linear_moments.setup), FAMILY.curves(x[None])) | family_quantities(
-                FAMILY, x[None]
-            )
+            found = evaluate(ForwardModel(linear.setup), FAMILY.curves(x[None])) | family_quantities(FAMILY, x[None])
             assert quantity.value(rows(x)) == pytest.approx(found[name][0], rel=1e-12)
         for at, span in enumerate(SPAN):
             step = np.eye(5)[at] * span * 1e-5

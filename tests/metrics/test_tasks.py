@@ -35,7 +35,7 @@ from sweep.metrics.tasks.color import (
 )
 from sweep.metrics.tasks.colorimetry import delta_e_2000, lab
 from sweep.metrics.tasks.evaluation import pair_errors
-from sweep.spectra.builtin.task_sets import group, separation_task, shipped
+from sweep.spectra.builtin.task_sets import separation_task, shipped, spectra_of_group
 from sweep.spectra.tasks import SHIPPED, Conditions, StudyTasks
 from sweep.study.load import study_of_keys
 
@@ -61,7 +61,12 @@ def scene() -> tuple[Setup, object]:
     assert space.filter is not None
     made = (
         *(shipped(study.grid, name) for name in SHIPPED),
-        separation_task(study.grid, "own", {"a": group(study.grid, "soil"), "b": group(study.grid, "canopy")}, ["d65"]),
+        separation_task(
+            study.grid,
+            "own",
+            {"a": spectra_of_group(study.grid, "soil"), "b": spectra_of_group(study.grid, "canopy")},
+            ["d65"],
+        ),
     )
     return replace(study.setup(space, "chart"), tasks=StudyTasks(CONDITIONS, made)), space.filter.family
 

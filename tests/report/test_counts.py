@@ -16,7 +16,7 @@ from sweep.report.answer import answer_sentences
 from sweep.report.page_data import payload
 from sweep.report.summary import counts_line
 from sweep.report.trade_off import pareto_figure, traded_cfas
-from sweep.results.designs import find_row
+from sweep.results.designs import find_design_row
 from sweep.results.output import Output
 from sweep.study import load_study
 
@@ -123,7 +123,7 @@ def test_a_filter_has_one_number_in_every_scenario_and_table(scenes: Output) -> 
         if "design_id" in rows:
             rows = rows.dropna(subset=["design_id"])
             assert (rows["filter_id"].to_numpy() == known.loc[rows["design_id"]].to_numpy()).all(), path.name
-    assert find_row(scenes, "5")["filter_id"] == 5
+    assert find_design_row(scenes, "5")["filter_id"] == 5
 
 
 def test_pandas_alone_reads_units_and_meanings(scenes: Output) -> None:

@@ -46,7 +46,7 @@ def test_every_set_has_the_digest_that_its_card_was_written_with() -> None:
 
 def test_measured_reflectances_are_shares() -> None:
     for name in spectra.cards()[0].groups:
-        values = task_sets.group(GRID, name)
+        values = task_sets.spectra_of_group(GRID, name)
         assert (values >= 0).all()
         assert (values <= 1).all()
 
@@ -54,7 +54,7 @@ def test_measured_reflectances_are_shares() -> None:
 @pytest.mark.parametrize("group", list(surrogate_spectra.SURROGATES))
 def test_a_surrogate_lies_inside_its_color_region(group: str) -> None:
     light = task_sets.illuminant(GRID, "d65") if surrogate_spectra.is_sheeting(group) else 1.0
-    xy = chromaticity(GRID, task_sets.group(GRID, group) * light)
+    xy = chromaticity(GRID, task_sets.spectra_of_group(GRID, group) * light)
     assert (surrogate_spectra.region(group).violation(xy) <= 0).all()
 
 

@@ -159,8 +159,8 @@ def test_a_file_needs_its_quantity_and_is_named_once(tmp_path: Path) -> None:
 def test_spectra_of_a_file_are_judged_as_those_of_a_group(tmp_path: Path) -> None:
     """A group written to a file, in percent, is that group; a lamp's energy are its photons times 1 / wavelength."""
     grid = WavelengthGrid()
-    road = task_sets.group(grid, "asphalt")
-    lamps = task_sets.group(grid, "brake red") * 1e3
+    road = task_sets.spectra_of_group(grid, "asphalt")
+    lamps = task_sets.spectra_of_group(grid, "brake red") * 1e3
     for name, spectra in (("road", road * 100), ("lamps", lamps / grid.nodes_nm)):
         table = np.column_stack([grid.nodes_nm, spectra.T])
         header = ",".join(["nm", *(f"s{at}" for at in range(len(spectra)))])

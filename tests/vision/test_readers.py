@@ -20,7 +20,7 @@ from sweep.vision.observer import posteriors
 from sweep.vision.pixel_table import pixel_table
 from sweep.vision.readers import planes_of, read_images
 from sweep.vision.scenes import FIXED, ORDERS, SHUFFLED, draw_scenes
-from sweep.vision.scores import confusion_matrix, costs, macro_f1, mean_of, nested_weights
+from sweep.vision.scores import cluster_bootstrap_weights, confusion_matrix, costs, macro_f1, mean_of
 
 from ..build import BASE, issues, load
 from ..cases import thinned
@@ -172,7 +172,7 @@ def test_an_interval_holds_its_share() -> None:
     held = 0
     for _ in range(60):
         level = np.repeat(0.3 + 0.05 * rng.standard_normal(8), 40)
-        found = mean_of(rng.random(320) < level, nested_weights(np.repeat(np.arange(8), 40), rng, 300))
+        found = mean_of(rng.random(320) < level, cluster_bootstrap_weights(np.repeat(np.arange(8), 40), rng, 300))
         held += found.low <= 0.3 <= found.high
     assert held >= 50
 

@@ -40,7 +40,7 @@ class SmallestWidths(FamilyMetric):
         )
 
     def of_parameters(self, family: Family | None, points: FloatArray) -> Columns:
-        """Return widths, nm; NaN where the family has none."""
+        """Return the columns of the narrowest edge and band of each design, nm; NaN where the family has none."""
         rows = {} if family is None else family.dimensions
         nothing = np.full((len(points), 1), np.nan)
         lengths = {name: row_products(points, rows[name].T) if name in rows else nothing for name in _MEANINGS}

@@ -47,7 +47,7 @@ class TaskFigures(DesignMetric):
         )
 
     def of_designs(self, setup: Setup, block: Block) -> Columns:
-        """Compute the columns; see `main_reader.task_columns`."""
+        """Compute the columns; see `evaluation.task_columns`."""
         if setup.tasks is None:
             return {}
         from ..tasks.evaluation import task_columns

@@ -198,7 +198,7 @@ def task_columns(setup: Setup, block: Block) -> Columns:
     Returns
     -------
     dict of str to ndarray of shape (n_designs,)
-        Columns.
+        Column name -> values.
     """
     tasks = setup.tasks
     assert tasks is not None

@@ -51,12 +51,12 @@ def task_groups() -> dict[str, int]:
     return shipped | {name: len(shapes) for name, shapes in surrogate_spectra.SURROGATES.items()}
 
 
-def is_surface(group: str) -> bool:
+def is_surface(spectra_of_group: str) -> bool:
     """Return whether a group has surfaces.
 
     Parameters
     ----------
-    group : str
+    spectra_of_group : str
         Group.
 
     Returns
@@ -64,13 +64,13 @@ def is_surface(group: str) -> bool:
     bool
         False for lamps.
     """
-    if group in surrogate_spectra.SURROGATES:
-        return surrogate_spectra.is_sheeting(group)
-    return spectra.shipped_groups()[group][0].kind == "reflectance"
+    if spectra_of_group in surrogate_spectra.SURROGATES:
+        return surrogate_spectra.is_sheeting(spectra_of_group)
+    return spectra.shipped_groups()[spectra_of_group][0].kind == "reflectance"
 
 
-def group(grid: WavelengthGrid, name: str, most: int | None = None) -> FloatArray:
-    """Return the spectra of a group.
+def spectra_of_group(grid: WavelengthGrid, name: str, most: int | None = None) -> FloatArray:
+    """Return the spectra of a named group on a grid, one per row.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ def shipped(grid: WavelengthGrid, name: str) -> GriddedTask:
     """
 
     def groups(*names: str) -> dict[str, FloatArray]:
-        return {name: group(grid, name, _MOST) for name in names}
+        return {name: spectra_of_group(grid, name, _MOST) for name in names}
 
     def white(*names: str) -> list[FloatArray]:
         return [spectra.gridded(grid, spectra.spectrum_of("cie_illuminants", name)) for name in names]
@@ -180,8 +180,8 @@ def shipped(grid: WavelengthGrid, name: str) -> GriddedTask:
     match name:
         case "color" | "low_light":
             cases = _STREET if name == "color" else ("a", "led", "hps")
-            index = chart(grid, group(grid, "iso_17321")[:18], ["d50"]) if name == "color" else None
-            patches = chart(grid, group(grid, "colorchecker"), cases)
+            index = chart(grid, spectra_of_group(grid, "iso_17321")[:18], ["d50"]) if name == "color" else None
+            patches = chart(grid, spectra_of_group(grid, "colorchecker"), cases)
             return GriddedTask(TaskName(name, name, cases), chart=patches, index=index)
         case "vehicle_lamps":
             reversing = np.stack([illuminant(grid, "a"), *white(*_WHITE_LED)])
@@ -194,7 +194,7 @@ def shipped(grid: WavelengthGrid, name: str) -> GriddedTask:
             classes, cases = groups(*filter(surrogate_spectra.is_sheeting, surrogate_spectra.SURROGATES)), _STREET
         case "vegetation":
             signals = lights(grid)
-            leaves = group(grid, "canopy", _MOST) * illuminant(grid, "d65")
+            leaves = spectra_of_group(grid, "canopy", _MOST) * illuminant(grid, "d65")
             classes = {"vegetation": leaves, "green": signals.photons[signals.members["green"]]}
         case "unseen_lamps":
             classes = groups("unseen green", "unseen yellow", "unseen red")
@@ -241,9 +241,9 @@ def night_scene(grid: WavelengthGrid) -> dict[str, FloatArray]:
     light = equal_photons(grid, illuminant(grid, NIGHT_LIGHT)[None])[0]
     white = light * (NIGHT_LX / np.pi / luminance_per_photon_radiance(grid, light[None])[0])
     radiance = {"sky": 0.01 * white}
-    radiance |= {area: group(grid, name).mean(axis=0) * white for area, name in _NIGHT_SURFACES.items()}
+    radiance |= {area: spectra_of_group(grid, name).mean(axis=0) * white for area, name in _NIGHT_SURFACES.items()}
     of_white = energy_from_photons(grid.nodes_nm, white) @ color_matching(grid).T
     for area, name in _NIGHT_LAMPS.items():
-        lamp = group(grid, name)[0]
+        lamp = spectra_of_group(grid, name)[0]
         radiance[area] = lamp / (energy_from_photons(grid.nodes_nm, lamp) @ color_matching(grid).T / of_white).max()
     return radiance
