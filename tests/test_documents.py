@@ -91,7 +91,7 @@ FIGURES: dict[str, Callable[[dict[str, pd.Series]], str]] = {
     ),
 }
 """Figures of the README -> the same from a run of `make study NAME=stopband`."""
-FIGURES_AT_AN_ANGLE: dict[str, tuple[str, str]] = {"keeps 182 DN": ("robust", "keeps {:.0f} DN")}
+FIGURES_AT_AN_ANGLE: dict[str, tuple[str, str]] = {"keeps 182 DN": ("robust to angles", "keeps {:.0f} DN")}
 """Figures of the README -> the filter of `make study NAME=angle` that has them at the worst of all places."""
 FIGURES_OF_ACCURACY: dict[str, tuple[str, int, str]] = {
     "farther than 0.04 DN from `reference`": ("standard", 2, "farther than {:.2f} DN from `reference`"),

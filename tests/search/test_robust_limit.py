@@ -186,7 +186,7 @@ def test_free_form_filters_come_near_the_limit_over_the_whole_sensor() -> None:
 
 def test_responses_of_filters_that_move_are_their_own() -> None:
     """Those of a still filter in the same scene are of fewer field positions."""
-    (space,) = [each for each in STUDY.spaces if each.name == "robust"]
+    (space,) = [each for each in STUDY.spaces if each.name == "robust to angles"]
     setup, curves = STUDY.setup(space, "field"), space.curves(space.points(0, 1), STUDY.grid.size)
     still, moving = linear_model(setup.with_camera(technologies=())), linear_model(setup)
     assert still.n_cases == 1 < moving.n_cases
