@@ -109,17 +109,19 @@ class LightsSection(Section):
     """
 
     builtin: str | None = None
-    """A built-in data set."""
+    """A built-in data set; excludes `files`."""
     name: Name | None = None
     """Name of the lights in the report."""
     files: list[LightFile] = []
-    """Files of spectra."""
+    """Files of spectra; exclude `builtin`."""
     photon_ratio: Ratio | None = None
     """K: photons of a signal patch over those of the white patch; from the spectra where it is left out."""
 
     @model_validator(mode="after")
     def _one_source(self) -> LightsSection:
-        if (self.builtin is None) == (not self.files):
+        if self.builtin is not None and self.files:
+            raise ValueError("`builtin` and `files` exclude each other here; give one")
+        if self.builtin is None and not self.files:
             raise ValueError("lights are the name of a built-in data set, a file, or a mapping with `files`")
         return self
 
