@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
 
-from ..base.types import BoolArray, FloatArray, IndexArray
+from ..base.types import BoolArray, FloatArray
 from ..camera.electrons import Changing
 from ..camera.field import field_heights, refined_heights, setup_at
 from ..camera.forward import ForwardModel, forward_model
@@ -236,21 +236,21 @@ def _whole_readout(
         step, parts = max(1, _READ_AT_ONCE // values_per_design), []
         for start in range(0, n, step):
             response = whole(slice(start, start + step))
-            others = over_cases(model, by_case(response, setup.members, OTHERS)) if OTHERS else {}
+            others = over_cases(model, by_case(setup, response, OTHERS)) if OTHERS else {}
             parts.append(others | user_quantities(present, setup, response))
         columns |= {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     return columns
 
 
-def by_case(response: FloatArray, members: Mapping[str, IndexArray], metrics: Sequence[ReadoutMetric]) -> Columns:
+def by_case(setup: Setup, response: FloatArray, metrics: Sequence[ReadoutMetric]) -> Columns:
     """Evaluate metrics of the readout in each case, in blocks of the size of a cache.
 
     Parameters
     ----------
+    setup : Setup
+        Scene and camera.
     response : ndarray of shape (n_designs, n_cases, n_signals, n_channels)
         Readout, DN.
-    members : mapping of str to ndarray of int
-        Signals of each type.
     metrics : sequence of ReadoutMetric
         Metrics.
 
@@ -265,7 +265,7 @@ def by_case(response: FloatArray, members: Mapping[str, IndexArray], metrics: Se
         cases = np.swapaxes(response[:, start : start + step], 0, 1)
         readouts, columns = cases.reshape(-1, *cases.shape[2:]), Columns()
         for metric in metrics:
-            columns |= metric.of_readout(readouts, members)
+            columns |= metric.of_readout(setup, readouts)
         parts.append(columns)
     return {name: np.concatenate([part[name] for part in parts]).reshape(n_cases, n_designs) for name in parts[0]}
 
@@ -391,5 +391,5 @@ def _read(
     else:
         response, exposure_s = model.read(curves)
     apart |= extra(len(curves), response.__getitem__)
-    cases = by_case(response, members, _CSD)
+    cases = by_case(model.setup, response, _CSD)
     return cases, over_cases(model, cases) | apart | {EXPOSURE: exposure_s}

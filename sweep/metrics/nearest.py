@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base.machine_code import njit
 from ..base.types import FloatArray, IndexArray
-from ..designs.vectorized import smaller
+from ..designs.vectorized import larger, smaller
 
 _NUMBERS = {"nnan", "nsz"}
 """Lets the compiler compare several numbers at once; the result for NaN is undefined."""
@@ -29,7 +29,7 @@ def nearest_squared(response: FloatArray, bounds: IndexArray, out: FloatArray) -
     bounds : ndarray of int, shape (n_classes + 1,)
         Start of each class.
     out : ndarray of shape (n_designs, n_pairs)
-        Squared distances, in the order of `curves.lights.class_pairs`.
+        Squared distances, in the order of `spectra.lights.class_pairs`.
     """
     for d in range(response.shape[0]):
         values = response[d]
@@ -49,6 +49,44 @@ def nearest_squared(response: FloatArray, bounds: IndexArray, out: FloatArray) -
                 pair += 1
 
 
+@njit(cache=True, nogil=True, fastmath=_NUMBERS)
+def nearest_chromatic_squared(response: FloatArray, bounds: IndexArray, out: FloatArray) -> None:
+    """Compute the smallest squared chromatic distance of each pair of classes (see `chromatic.squared_distance`).
+
+    Parameters
+    ----------
+    response : ndarray of shape (n_designs, 4, n_signals)
+        Less the black level, C-ordered and finite, one class after the other; missing channels are 0.
+    bounds : ndarray of int, shape (n_classes + 1,)
+        Start of each class.
+    out : ndarray of shape (n_designs, n_pairs)
+        Squared distances, in the order of `spectra.lights.class_pairs`.
+    """
+    for d in range(response.shape[0]):
+        values = response[d]
+        lengths = values[0] * values[0] + values[1] * values[1] + values[2] * values[2] + values[3] * values[3]
+        pair = 0
+        for a in range(bounds.size - 1):
+            for b in range(a + 1, bounds.size - 1):
+                best = np.inf
+                for i in range(bounds[a], bounds[a + 1]):
+                    m0, m1, m2, m3, length = values[0, i], values[1, i], values[2, i], values[3, i], lengths[i]
+                    nearest = np.inf
+                    for j in range(bounds[b], bounds[b + 1]):
+                        x0, x1, x2, x3 = values[0, j], values[1, j], values[2, j], values[3, j]
+                        a01, a02, a03 = m0 * x1 - m1 * x0, m0 * x2 - m2 * x0, m0 * x3 - m3 * x0
+                        a12, a13, a23 = m1 * x2 - m2 * x1, m1 * x3 - m3 * x1, m2 * x3 - m3 * x2
+                        area = a01 * a01 + a02 * a02 + a03 * a03 + a12 * a12 + a13 * a13 + a23 * a23
+                        larger_length = larger(length, lengths[j])
+                        squared = area / larger_length if larger_length > 0.0 else 0.0
+                        if m0 * x0 + m1 * x1 + m2 * x2 + m3 * x3 <= 0.0:
+                            squared = smaller(length, lengths[j])
+                        nearest = smaller(nearest, squared)
+                    best = smaller(best, nearest)
+                out[d, pair] = best
+                pair += 1
+
+
 @njit(cache=True, nogil=True)
 def nearest_pairs(response: FloatArray, order: IndexArray, bounds: IndexArray, out: IndexArray) -> None:
     """Find the two nearest signals of each pair of classes over all cases; of equally near ones the first.
@@ -62,7 +100,7 @@ def nearest_pairs(response: FloatArray, order: IndexArray, bounds: IndexArray, o
     bounds : ndarray of int, shape (n_classes + 1,)
         Start of each class in `order`.
     out : ndarray of int, shape (n_designs, n_pairs, 2)
-        Signals, in the order of `curves.lights.class_pairs`; -1 where a distance is not finite.
+        Signals, in the order of `spectra.lights.class_pairs`; -1 where a distance is not finite.
     """
     for d in range(response.shape[0]):
         pair = 0

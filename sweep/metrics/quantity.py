@@ -184,8 +184,8 @@ class Quantity(Column):
         It has no worst case.
     rows : {'values', 'squares', 'decades'}
         Form of its smooth rows.
-    apart : {'', 'DN', 'noise'}
-        Smallest distance of two signals in this unit.
+    apart : {'', 'DN', 'noise', 'chromatic'}
+        Smallest distance of two signals: in DN, in units of the noise, or over all brightnesses in DN.
     most : float
         Upper bound on any filter.
     share : bool
@@ -208,7 +208,7 @@ class Quantity(Column):
     has_error_bound: bool = False
     nominal: bool = False
     rows: Literal["values", "squares", "decades"] = "values"
-    apart: Literal["", "DN", "noise"] = ""
+    apart: Literal["", "DN", "noise", "chromatic"] = ""
     most: float = np.inf
     share: bool = False
     states: tuple[str, ...] = ()
@@ -401,15 +401,15 @@ class ReadoutMetric(Metric):
     """Metric of the digital numbers of a scene."""
 
     @abstractmethod
-    def of_readout(self, response: FloatArray, members: Mapping[str, IndexArray]) -> Columns:
+    def of_readout(self, setup: Setup, response: FloatArray) -> Columns:
         """Compute the columns at one sampling phase and moment; the worst of all counts.
 
         Parameters
         ----------
+        setup : Setup
+            Scene and camera.
         response : ndarray of shape (n_designs, n_signals, n_channels)
             Readout, DN.
-        members : mapping of str to ndarray of int
-            Signals of each type.
 
         Returns
         -------

@@ -142,7 +142,7 @@ def _rows(design):
 class RedShare(DesignMetric):
     order = 9
 
-    def quantities(self, asked):
+    def quantities(self, requested):
         return (
             Quantity(
                 NAME,
@@ -172,10 +172,10 @@ from sweep.metrics.quantity import Quantity, ReadoutMetric
 class Darkest(ReadoutMetric):
     order = 10
 
-    def quantities(self, asked):
+    def quantities(self, requested):
         return (Quantity("darkest_dn", "darkest_dn", "weakest signal in its best channel", "DN", wanted="more", ends=("min",)),)
 
-    def of_readout(self, response, members):
+    def of_readout(self, setup, response):
         return {"darkest_dn": response.max(axis=2).min(axis=1)}
 '''
 WITH_METRICS = """\

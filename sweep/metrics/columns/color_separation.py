@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
-from ...base.types import FloatArray, IndexArray
+from ...base.types import FloatArray
+from ...camera.setup import Setup
 from ...spectra.lights import class_pairs
 from ..quantity import BEST_PLACE, DN, Columns, Quantity, ReadoutMetric, RequestedQuantities
 from ..separation import csd_name, separations
@@ -68,6 +68,6 @@ class ColorSeparation(ReadoutMetric):
         ]
         return (*nearest, *best) if requested.any_place else tuple(nearest)
 
-    def of_readout(self, response: FloatArray, members: Mapping[str, IndexArray]) -> Columns:
+    def of_readout(self, setup: Setup, response: FloatArray) -> Columns:
         """Compute the columns; see `separation.separations`."""
-        return {csd_name(pair): distances for pair, distances in separations(response, members).items()}
+        return {csd_name(pair): distances for pair, distances in separations(response, setup.members).items()}
