@@ -1,4 +1,4 @@
-"""Compiled inner loop: the nearest two members of a population, over the shifts of two lights that occur together."""
+"""Compiled inner loop: the nearest members of each two lights, over all shifts that occur together."""
 
 from __future__ import annotations
 
@@ -7,140 +7,160 @@ import numpy as np
 from ..base.machine_code import njit
 from ..base.types import FloatArray, IndexArray
 
-_FLAT = 1e-12
-"""A triangle whose squared area is a smaller share of its sides' is taken for its sides."""
+_DEGENERATE = 1e-12
+"""Relative Gram determinant, sin^2 of the angle between two edges, up to which a triangle counts as its edges alone."""
 
 
 @njit(cache=True, nogil=True)
-def _on_side(start: FloatArray, end: FloatArray) -> tuple[float, float]:
-    """Return the squared distance of a line segment from the origin, and the position, 0 at `start` to 1."""
-    slope, along = 0.0, 0.0
-    for c in range(start.size):
-        step = end[c] - start[c]
-        slope += step * start[c]
-        along += step * step
-    at = 0.0 if along == 0.0 else min(max(-slope / along, 0.0), 1.0)
+def _nearest_on_segment(start: FloatArray, end: FloatArray) -> tuple[float, float]:
+    """Return the squared distance from the origin to a segment, and the nearest position, 0 (start) to 1 (end)."""
+    projection, length_squared = 0.0, 0.0
+    for channel in range(start.size):
+        step = end[channel] - start[channel]
+        projection += step * start[channel]
+        length_squared += step * step
+    position = 0.0 if length_squared == 0.0 else min(max(-projection / length_squared, 0.0), 1.0)
     squared = 0.0
-    for c in range(start.size):
-        value = start[c] + at * (end[c] - start[c])
+    for channel in range(start.size):
+        value = start[channel] + position * (end[channel] - start[channel])
         squared += value * value
-    return squared, at
+    return squared, position
 
 
 @njit(cache=True, nogil=True)
-def _on_triangle(corners: FloatArray, weights: FloatArray) -> float:
-    """Return the squared distance of a triangle from the origin; `weights` takes those of the nearest point."""
+def _nearest_on_triangle(corners: FloatArray, weights: FloatArray) -> float:
+    """Return the squared distance from the origin to a triangle.
+
+    The barycentric coordinates of the nearest point are written to `weights`. `corners`: (3, n_channels).
+    """
     best = np.inf
-    for one in range(3):
-        other = (one + 1) % 3
-        squared, at = _on_side(corners[one], corners[other])
+    for start in range(3):
+        end = (start + 1) % 3
+        squared, position = _nearest_on_segment(corners[start], corners[end])
         if squared < best:
             best = squared
             weights[:] = 0.0
-            weights[one] = 1 - at
-            weights[other] += at
-    a, b, c, p, q = 0.0, 0.0, 0.0, 0.0, 0.0
+            weights[start] = 1 - position
+            weights[end] += position
+    # Least squares in the plane of the triangle: minimize |corner 0 + s u + t v|, with the edges u and v.
+    uu, uv, vv, u_rhs, v_rhs = 0.0, 0.0, 0.0, 0.0, 0.0
     for channel in range(corners.shape[1]):
-        start = corners[0, channel]
-        u, v = corners[1, channel] - start, corners[2, channel] - start
-        a += u * u
-        b += u * v
-        c += v * v
-        p -= u * start
-        q -= v * start
-    area = a * c - b * b
-    if area <= _FLAT * a * c:
+        origin = corners[0, channel]
+        u, v = corners[1, channel] - origin, corners[2, channel] - origin
+        uu += u * u
+        uv += u * v
+        vv += v * v
+        u_rhs -= u * origin
+        v_rhs -= v * origin
+    determinant = uu * vv - uv * uv
+    if determinant <= _DEGENERATE * uu * vv:
         return best
-    s, t = (p * c - q * b) / area, (q * a - p * b) / area
+    s, t = (u_rhs * vv - v_rhs * uv) / determinant, (v_rhs * uu - u_rhs * uv) / determinant
     if s <= 0.0 or t <= 0.0 or s + t >= 1.0:
         return best
-    inside = 0.0
+    interior = 0.0
     for channel in range(corners.shape[1]):
-        start = corners[0, channel]
-        value = start + s * (corners[1, channel] - start) + t * (corners[2, channel] - start)
-        inside += value * value
-    if inside < best:
-        best = inside
+        origin = corners[0, channel]
+        value = origin + s * (corners[1, channel] - origin) + t * (corners[2, channel] - origin)
+        interior += value * value
+    if interior < best:
+        best = interior
         weights[0], weights[1], weights[2] = 1 - s - t, s, t
     return best
 
 
 @njit(cache=True, nogil=True)
-def _corner(response: FloatArray, one: int, other: int, share: FloatArray, corner: FloatArray) -> float:
-    """Put the difference of two members into `corner`, and return its squared length."""
+def _member_difference(
+    response: FloatArray, first_row: int, second_row: int, shares: FloatArray, difference: FloatArray
+) -> float:
+    """Write the response of one member minus that of the other to `difference`, and return its squared norm.
+
+    A member lies between a row of `response` and the next row, at its share of the step: `shares` has shape (2,).
+    """
     squared = 0.0
-    for c in range(corner.size):
-        x = response[one, c] + share[0] * (response[one + 1, c] - response[one, c])
-        y = response[other, c] + share[1] * (response[other + 1, c] - response[other, c])
-        corner[c] = x - y
-        squared += corner[c] ** 2
+    for channel in range(difference.size):
+        x = response[first_row, channel]
+        x += shares[0] * (response[first_row + 1, channel] - response[first_row, channel])
+        y = response[second_row, channel]
+        y += shares[1] * (response[second_row + 1, channel] - response[second_row, channel])
+        difference[channel] = x - y
+        squared += difference[channel] ** 2
     return squared
 
 
 @njit(cache=True, nogil=True)
 def nearest_members(
     response: FloatArray,
-    first: IndexArray,
-    second: IndexArray,
-    which: IndexArray,
-    starts: IndexArray,
+    first_rows: IndexArray,
+    second_rows: IndexArray,
+    region_of_pair: IndexArray,
+    region_starts: IndexArray,
     cells: IndexArray,
     shares: FloatArray,
-    part: IndexArray,
-    alone: bool,
-    out: FloatArray,
-    at: IndexArray,
-    where: FloatArray,
+    parts: IndexArray,
+    smallest_only: bool,
+    out_squared: FloatArray,
+    out_steps: IndexArray,
+    out_shares: FloatArray,
 ) -> None:
     """Compute the squared distance of the nearest members of each two lights, in each part of their region.
+
+    A light is a signal of one spectral width. A member is this light at one shift of its spectrum; its response is
+    interpolated between two whole steps of the wavelength grid. A region holds the pairs of shifts that two lights
+    can have together, cut into triangles; the parts of a region divide it along its length.
 
     Parameters
     ----------
     response : ndarray of shape (n_spectra, n_channels)
-        Response to each spectrum.
-    first, second : ndarray of int
-        First spectrum of each light.
-    which : ndarray of int, shape (n_first, n_second)
-        Region of each two lights.
-    starts : ndarray of int
-        First triangle of each region, and the end.
-    cells, shares, part : ndarray
-        Triangles of the regions (see `ShiftRegion`), and the part of each.
-    alone : bool
-        Only the smallest of all distances is requested; others may be too large.
-    out : ndarray of shape (n_first, n_second, n_parts)
-        Squared distances; infinite where there are none.
-    at, where : ndarray of shape (..., 2)
-        Whole steps and shares of the two nearest members.
+        Response to each spectrum, DN; consecutive rows of a light are one step apart.
+    first_rows, second_rows : ndarray of int, shapes (n_first,) and (n_second,)
+        Row of `response` at the first step of each light.
+    region_of_pair : ndarray of int, shape (n_first, n_second)
+        Index of the region of each two lights.
+    region_starts : ndarray of int, shape (n_regions + 1,)
+        Index of the first triangle of each region, then the number of triangles.
+    cells : ndarray of int, shape (n_triangles, 2)
+        Whole steps of both lights below each triangle (see `ShiftRegion`).
+    shares : ndarray of shape (n_triangles, 3, 2)
+        Corners of each triangle above these steps, 0 to 1.
+    parts : ndarray of int, shape (n_triangles,)
+        Part of the region that each triangle belongs to.
+    smallest_only : bool
+        Skip triangles that cannot hold the smallest of all distances; other results may then be too large.
+    out_squared : ndarray of shape (n_first, n_second, n_parts)
+        Output: squared distances, DN^2; infinite where a part has no triangle or all of its triangles were skipped.
+    out_steps, out_shares : ndarray of shape (n_first, n_second, n_parts, 2)
+        Output: whole steps and shares of the two nearest members.
     """
     corners, weights = np.empty((3, response.shape[1])), np.empty(3)
-    steps = np.empty(response.shape[0] - 1)
-    for row in range(steps.size):
+    step_lengths = np.empty(response.shape[0] - 1)
+    for row in range(step_lengths.size):
         squared = 0.0
-        for c in range(response.shape[1]):
-            squared += (response[row + 1, c] - response[row, c]) ** 2
-        steps[row] = np.sqrt(squared)
-    out[:] = np.inf
-    least = np.inf
-    for i in range(first.size):
-        for j in range(second.size):
-            region = which[i, j]
-            for triangle in range(starts[region], starts[region + 1]):
-                one, other = first[i] + cells[triangle, 0], second[j] + cells[triangle, 1]
-                p = part[triangle]
-                squared = _corner(response, one, other, shares[triangle, 0], corners[0])
-                # No other point of the triangle is further from this corner than a step of each.
-                left = np.sqrt(squared) - (steps[one] + steps[other])
-                if left > 0.0 and left * left > (least if alone else out[i, j, p]):
+        for channel in range(response.shape[1]):
+            squared += (response[row + 1, channel] - response[row, channel]) ** 2
+        step_lengths[row] = np.sqrt(squared)
+    out_squared[:] = np.inf
+    smallest = np.inf
+    for i in range(first_rows.size):
+        for j in range(second_rows.size):
+            region = region_of_pair[i, j]
+            for triangle in range(region_starts[region], region_starts[region + 1]):
+                first_row, second_row = first_rows[i] + cells[triangle, 0], second_rows[j] + cells[triangle, 1]
+                part = parts[triangle]
+                squared = _member_difference(response, first_row, second_row, shares[triangle, 0], corners[0])
+                # Within a triangle each member moves by at most one step, so this bounds all distances from below.
+                lower_bound = np.sqrt(squared) - (step_lengths[first_row] + step_lengths[second_row])
+                best = smallest if smallest_only else out_squared[i, j, part]
+                if lower_bound > 0.0 and lower_bound * lower_bound > best:
                     continue
                 for corner in range(1, 3):
-                    _corner(response, one, other, shares[triangle, corner], corners[corner])
-                nearest = _on_triangle(corners, weights)
-                if nearest < out[i, j, p]:
-                    out[i, j, p] = nearest
-                    least = min(least, nearest)
-                    for k in range(2):
-                        at[i, j, p, k] = cells[triangle, k]
-                        where[i, j, p, k] = 0.0
+                    _member_difference(response, first_row, second_row, shares[triangle, corner], corners[corner])
+                squared = _nearest_on_triangle(corners, weights)
+                if squared < out_squared[i, j, part]:
+                    out_squared[i, j, part] = squared
+                    smallest = min(smallest, squared)
+                    for side in range(2):
+                        out_steps[i, j, part, side] = cells[triangle, side]
+                        out_shares[i, j, part, side] = 0.0
                         for corner in range(3):
-                            where[i, j, p, k] += weights[corner] * shares[triangle, corner, k]
+                            out_shares[i, j, part, side] += weights[corner] * shares[triangle, corner, side]

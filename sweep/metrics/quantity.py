@@ -17,7 +17,7 @@ from ..camera.setup import Setup
 from ..designs.block import Block
 from ..designs.family import Family
 from ..spectra.lights import Pair
-from ..spectra.tasks import TaskName
+from ..spectra.tasks import TaskColumns
 from ..vision.section import Vision
 from .smooth import Rows, SmoothDesign
 from .user_metrics import UserMetric
@@ -332,7 +332,7 @@ class RequestedQuantities:
         Best sampling phase, worst case over edges, worst case over lamps.
     wanted_yield : float
         Share of random lamps and cameras; 0: none.
-    tasks : tuple of TaskName
+    tasks : tuple of TaskColumns
         Tasks.
     probabilities, vision : bool
         Contrast detection probability; benchmark of vision.
@@ -348,7 +348,7 @@ class RequestedQuantities:
     edge_shift: bool = False
     population: bool = False
     wanted_yield: float = 0.0
-    tasks: tuple[TaskName, ...] = ()
+    tasks: tuple[TaskColumns, ...] = ()
     probabilities: bool = False
     vision: bool = False
     own: tuple[UserMetric, ...] = ()

@@ -20,7 +20,7 @@ from .leaders import Leaders, Row, capital, full_name, label, leaders_of, of_ref
 from .noise import usable_lines
 from .series import lead_sentence, leads_of, series_figures
 from .terms import (
-    assumed_technology,
+    angle_note,
     format_constraints,
     format_missed_constraints,
     is_angle_dependent,
@@ -128,7 +128,7 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
             values = [f"{float(row[name]):.3g} {output.columns[name].unit}".rstrip() for row in rows]
             beside = f" ({plain['name']} {values[1]})" if plain is not None else ""
             yield f"Its {output.words(name)} is {values[0]}{beside}."
-    if assumption := assumed_technology(output, best):
+    if assumption := angle_note(output, best):
         yield assumption
     if limits := _limits(output, best):
         yield limits

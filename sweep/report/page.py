@@ -34,7 +34,7 @@ from .sensor_map import map_drawings
 from .series import draw_series
 from .summary import counts_line, summary_lines
 from .tables import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
-from .terms import format_constraints, terms_of
+from .terms import format_constraints, term_definitions
 from .trade_off import draw_trade_off, overview_figure, pareto_figure, traded_cfas
 
 _FIRST_LINES, _FIRST_LEADS = 1, 2
@@ -134,7 +134,7 @@ def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
         "geometry": rows(tables.geometry_table(output)),
         "published": rows(published),
         "constraints": format_constraints(output),
-        "terms": terms_of(output),
+        "terms": term_definitions(output),
         "summary": summary_lines(output),
         "provenance": output.provenance.model_dump(mode="json"),
     }

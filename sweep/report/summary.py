@@ -11,7 +11,7 @@ from .answer import answer_sentences
 from .leaders import capital, of_reference
 from .scorecard import score_lines, scorecard
 from .tables import comparison_lines, comparison_with_published
-from .terms import assumed_technology_line
+from .terms import assumptions_line
 from .values import drawn_rows
 
 _MOST_PARAMETERS = 10
@@ -85,7 +85,7 @@ def summary_lines(output: Output, took_s: float | None = None) -> list[str]:
         lines.append(
             f"A light has {ratio:.4g} of the photons of the white patch (photon_ratio in study.resolved.yaml)."
         )
-    if note := assumed_technology_line(output):
+    if note := assumptions_line(output):
         lines.append(note)
     computed = f"{facts.duration_s:.1f} s by {_count(facts.workers, 'worker')}"
     lines.append(f"Computed in {computed}." if took_s is None else f"Took {took_s:.1f} s; computed in {computed}.")

@@ -1,4 +1,4 @@
-"""Tables of the report, as plain values."""
+"""Tables of the report, as data frames."""
 
 from __future__ import annotations
 
@@ -11,13 +11,15 @@ from ..metrics.quantity import HELD_OUT
 from ..results.output import Output
 from .pages import aligned
 
-_MOST_PARAMETERS = 7
+PUBLISHED_CSV, PUBLISHED_PARQUET = "paper_comparison.csv", "paper_comparison.parquet"
+_MAX_PARAMETERS = 7
+"""Columns of design parameters that a table shows."""
 _DIGITS = 4
-"""Digits of columns that are no quantities."""
+"""Decimal places of columns that have no `Column`: design parameters."""
 
 
 def comparison_table(output: Output) -> pd.DataFrame:
-    """Return plain CFAs, named designs and the answer with CSDs, sensitivities and limiting lights.
+    """Return the table that compares plain CFAs, named designs and the answer of the search.
 
     Parameters
     ----------
@@ -27,72 +29,79 @@ def comparison_table(output: Output) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        Table.
+        One row per design and scenario: name, CSDs, sensitivities, limiting lights, feasibility.
     """
     rest = [*output.light, *output.further, *output.distances]
     return _shown(output, output.few, ["name", "scenario"], [*rest, "feasible"])
 
 
-def best_table(output: Output, most: int = 12) -> pd.DataFrame:
-    """Return the best feasible designs with their parameters; over several scenarios the best of each CFA.
+def best_table(output: Output, max_rows: int = 12) -> pd.DataFrame:
+    """Return the table of the best feasible designs, best first.
 
     Parameters
     ----------
     output : Output
         Finished run.
-    most : int
-        Rows at most.
+    max_rows : int
+        Largest number of rows if the study has one scenario.
 
     Returns
     -------
     pandas.DataFrame
-        Table.
+        Ids, parameters, CSDs and sensitivities. With several scenarios: one row, the best design, per scenario
+        and CFA.
     """
-    ranked = output.best.head(most)
+    ranked = output.best.head(max_rows)
     if len(output.scenarios) > 1:
         ranked = output.best.groupby(["scenario", "cfa"], sort=False, observed=True).head(1)
-    used = [name for name in output.parameters if ranked[name].nunique() > 1 or len(ranked) == 1]
-    rest = [*used[:_MOST_PARAMETERS], *output.light, *output.further, "pareto"]
+    # A parameter that all designs share is no news; a single design shows all of its parameters.
+    varied = [name for name in output.parameters if len(ranked) == 1 or ranked[name].nunique() > 1]
+    rest = [*varied[:_MAX_PARAMETERS], *output.light, *output.further, "pareto"]
     return _shown(output, ranked, ["filter_id", "kind", "cfa", "scenario"], rest)
 
 
 def _shown(output: Output, rows: pd.DataFrame, keys: list[str], rest: list[str]) -> pd.DataFrame:
-    """Return keys, separation and light of the trade-off, other CSDs, further columns, and limiting lights."""
+    """Return rows of the result table for display: columns selected, rounded and renamed.
+
+    Order of the columns: `keys`, both axes of the trade-off, CSDs on the held-out lights, `rest` without the former,
+    limiting lights of the separation.
+    """
     separation = output.trade_off[0]
-    first = [separation.name, CFA_SENSITIVITY]
+    axes = [separation.name, CFA_SENSITIVITY]
     held_out = [name for distance in output.distances if (name := HELD_OUT + distance) in output.table]
     limits = [] if separation.pair is None else [limited_by_name(separation.pair)]
-    columns = [*keys, *first, *held_out, *(name for name in rest if name not in first), *limits]
+    columns = [*keys, *axes, *held_out, *(name for name in rest if name not in axes), *limits]
     shown = rows[columns].copy()
     for column in shown.select_dtypes("float64"):
         quantity = output.columns.get(str(column))
         shown[column] = shown[column].round(_DIGITS if quantity is None else quantity.digits)
     if rows["scenario"].nunique() <= 1:
         shown = shown.drop(columns="scenario")
-    words = {name: output.words(name).replace("_", " ") for name in columns}
-    words |= dict.fromkeys(limits, f"{separation.words} limited by")
-    words |= {name: f"{output.words(name.removeprefix(HELD_OUT))}, other lights" for name in held_out}
-    return shown.rename(columns=words)
+    titles = {name: output.words(name).replace("_", " ") for name in columns}
+    titles |= dict.fromkeys(limits, f"{separation.words} limited by")
+    titles |= {name: f"{output.words(name.removeprefix(HELD_OUT))}, other lights" for name in held_out}
+    return shown.rename(columns=titles)
 
 
-def costliest_omission(output: Output, most: int = 10) -> pd.DataFrame:
-    """Return the lights whose absence from the search costs most.
+def costliest_omission(output: Output, max_rows: int = 10) -> pd.DataFrame:
+    """Return the lights whose omission from the search lowers the objective most.
 
     Parameters
     ----------
     output : Output
         Finished run.
-    most : int
-        Rows at most.
+    max_rows : int
+        Largest number of rows.
 
     Returns
     -------
     pandas.DataFrame
-        Table.
+        One row per objective and left-out light, with `seen`, `with_it` and `fall` as in `left_out_table`, in the
+        unit of the objective; empty if the run left out no light.
     """
     if output.left_out is None:
         return pd.DataFrame()
-    worst = output.left_out.nlargest(most, "fall").round(1)
+    worst = output.left_out.nlargest(max_rows, "fall").round(1)
     return worst.assign(objective=[output.words(name) for name in worst["objective"]])
 
 
@@ -107,30 +116,23 @@ def geometry_table(output: Output) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        Table.
+        One row per distance scenario: scenario, distance_m, fov_deg (degrees), object_resolution_px (pixels across
+        the light).
     """
     rows = [
         {
             "scenario": name,
-            "distance_m": g.distance_m,
-            "fov_deg": g.fov_deg,
-            "object_resolution_px": round(g.object_resolution_px, 1),
+            "distance_m": geometry.distance_m,
+            "fov_deg": geometry.fov_deg,
+            "object_resolution_px": round(geometry.object_resolution_px, 1),
         }
-        for name, g in output.study.geometry.items()
+        for name, geometry in output.study.geometry.items()
     ]
     return pd.DataFrame(rows)
 
 
-PUBLISHED_CSV, PUBLISHED_PARQUET = "paper_comparison.csv", "paper_comparison.parquet"
-
-
 def comparison_with_published(output: Output) -> pd.DataFrame:
-    """Return one row per published figure, with ours and the error.
-
-    Columns: table, cfa (or geometry), quantity, paper, ours, error, relative_error, ours_exact.
-
-    `ours` is rounded to the printed digits, and `error` is its difference; `ours_exact` is not rounded. Values are of
-    the first scenario.
+    """Compare each published value with the value of this run in the first scenario.
 
     Parameters
     ----------
@@ -140,7 +142,9 @@ def comparison_with_published(output: Output) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        Table.
+        One row per published value: table, cfa (for the object resolution, the distance scenario), quantity, paper
+        (published value), ours (rounded to the decimal places printed in the paper), error (ours - paper),
+        relative_error (error / paper; None if paper is 0), ours_exact (not rounded).
     """
     named = output.named[output.named["scenario"] == output.scenarios[0]].set_index("name")
     rows = []
@@ -151,16 +155,16 @@ def comparison_with_published(output: Output) -> pd.DataFrame:
                     exact = output.study.geometry[name].object_resolution_px
                 else:
                     exact = float(named[quantity][name])
-                printed = len(f"{paper:g}".partition(".")[2])
-                ours = round(exact, printed)
-                error = round(ours - paper, 12)
+                printed_digits = len(f"{paper:g}".partition(".")[2])
+                ours = round(exact, printed_digits)
+                error = round(ours - paper, 12)  # 12 decimal places remove the rounding of binary floats
                 rows.append((table, name, quantity, paper, ours, error, error / paper if paper else None, exact))
     columns = ["table", "cfa", "quantity", "paper", "ours", "error", "relative_error", "ours_exact"]
     return pd.DataFrame(rows, columns=columns)
 
 
 def comparison_lines(comparison: pd.DataFrame) -> list[str]:
-    """Return the comparison as text: our figures, with the printed ones in brackets.
+    """Format the comparison as text: our values, with the published values in parentheses.
 
     Parameters
     ----------
@@ -170,7 +174,7 @@ def comparison_lines(comparison: pd.DataFrame) -> list[str]:
     Returns
     -------
     list of str
-        Lines.
+        Lines: for each published table a title, then quantities as rows and CFAs as columns.
     """
     lines = []
     for name, rows in comparison.groupby("table", sort=False):

@@ -1,4 +1,4 @@
-"""Constraints in words, and the terms of the first screen."""
+"""Text of the report on constraints, defined terms and filter technologies."""
 
 from __future__ import annotations
 
@@ -14,9 +14,12 @@ from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
 from .leaders import Row, capital
 from .values import modifications
 
+_NO_TECHNOLOGY = "Filters without a stated technology are evaluated at normal incidence."
+"""Note on filters without a technology, whose transmission is that at normal incidence."""
+
 
 def format_constraint(output: Output, name: str, bound: Bound) -> str:
-    """Return a constraint in words: `slope at most 0.06 per nm`.
+    """Format a constraint, for example `slope at most 0.06 per nm`.
 
     Parameters
     ----------
@@ -25,7 +28,7 @@ def format_constraint(output: Output, name: str, bound: Bound) -> str:
     name : str
         Column name.
     bound : Bound
-        Constraint.
+        Allowed range, in the unit of the column.
 
     Returns
     -------
@@ -34,16 +37,22 @@ def format_constraint(output: Output, name: str, bound: Bound) -> str:
     """
     words, column = output.words(name), output.columns.get(name)
     if bound.max is None:
-        return f"{words} at least {_amount(column, bound.min)}"
+        return f"{words} at least {_with_unit(column, bound.min)}"
     if bound.min is None:
-        return f"{words} at most {_amount(column, bound.max)}"
+        return f"{words} at most {_with_unit(column, bound.max)}"
     if bound.min == bound.max:
-        return f"{words} of {_amount(column, bound.min)}"
-    return f"{words} from {bound.min:g} to {_amount(column, bound.max)}"
+        return f"{words} of {_with_unit(column, bound.min)}"
+    return f"{words} from {bound.min:g} to {_with_unit(column, bound.max)}"
+
+
+def _with_unit(column: Column | None, limit: float | None) -> str:
+    """Format one end of a bound with the unit of its column: `0.06 per nm` for the unit `1/nm`."""
+    unit = "" if column is None else column.unit
+    return f"{limit:g} {unit.replace('1/', 'per ', 1)}".rstrip()
 
 
 def format_constraints(output: Output) -> str:
-    """Return all constraints in words; empty if there are none.
+    """Format all constraints of the study, joined by `and`.
 
     Parameters
     ----------
@@ -53,13 +62,13 @@ def format_constraints(output: Output) -> str:
     Returns
     -------
     str
-        Text.
+        Text; empty without constraints.
     """
     return " and ".join(format_constraint(output, name, bound) for name, bound in output.constraints.items())
 
 
 def format_missed_constraints(output: Output, row: Row) -> str:
-    """Return the violated constraints of a row: `its sensitivity is below 0.9`.
+    """Format the constraints that a row violates, for example `its sensitivity is below 0.9`.
 
     Parameters
     ----------
@@ -71,22 +80,23 @@ def format_missed_constraints(output: Output, row: Row) -> str:
     Returns
     -------
     str
-        Text; empty if it meets all.
+        Text; empty if the row meets every constraint.
     """
     parts = list[str]()
     for name, bound in output.constraints.items():
         value = float(row[name])
         if math.isnan(value):
-            parts.append(f"its {output.words(name)} {'' if parts else 'is '}unknown")
-        for side, end, past in (("below", bound.min, -1), ("above", bound.max, 1)):
-            if end is not None and past * (value - end) / bound.scale > FEASIBLE:
+            verb = "" if parts else "is "
+            parts.append(f"its {output.words(name)} {verb}unknown")
+        for side, limit, sign in (("below", bound.min, -1), ("above", bound.max, 1)):
+            if limit is not None and sign * (value - limit) / bound.scale > FEASIBLE:
                 verb = "" if parts else "is "
-                parts.append(f"its {output.words(name)} {verb}{side} {_amount(output.columns.get(name), end)}")
+                parts.append(f"its {output.words(name)} {verb}{side} {_with_unit(output.columns.get(name), limit)}")
     return " and ".join(parts)
 
 
 def unknown_lines(output: Output) -> Iterator[str]:
-    """Yield constrained quantities that designs lack; unknown is not feasible.
+    """Yield a sentence for each constrained quantity that is unknown (NaN) for some designs.
 
     Parameters
     ----------
@@ -96,7 +106,7 @@ def unknown_lines(output: Output) -> Iterator[str]:
     Yields
     ------
     str
-        Sentences.
+        Sentence that names the filter families; a design with an unknown constrained quantity is infeasible.
     """
     rows = output.kind(NAMED, SWEPT, FOUND)
     rows = rows[rows["status"] == "ok"]
@@ -107,14 +117,8 @@ def unknown_lines(output: Output) -> Iterator[str]:
             yield f"Designs of {families} have no {output.words(name)}: unknown is not feasible."
 
 
-def _amount(column: Column | None, value: float | None) -> str:
-    """Return a bound with the unit of its column."""
-    unit = "" if column is None else column.unit
-    return f"{value:g} {unit.replace('1/', 'per ', 1)}".rstrip()
-
-
-def terms_of(output: Output) -> list[str]:
-    """Return the meaning of the separation and of the bounded quantities, and the modified pixels.
+def term_definitions(output: Output) -> list[str]:
+    """Define the separation, the constrained quantities, and the modified channels of each CFA.
 
     Parameters
     ----------
@@ -124,29 +128,29 @@ def terms_of(output: Output) -> list[str]:
     Returns
     -------
     list of str
-        Lines.
+        One sentence per term, then one per CFA with modified channels.
     """
-    requested = (output.trade_off[0].name, *output.constraints)
-    columns = [output.columns[name] for name in requested if name in output.columns]
+    names = (output.trade_off[0].name, *output.constraints)
+    columns = [output.columns[name] for name in names if name in output.columns]
     lines = []
+    # A worst case is explained by the quantity that it is of; duplicates are dropped.
     for name in dict.fromkeys(column.of if column.extreme else column.name for column in columns):
         column = output.columns[name]
         unit = ", in digital numbers (DN)" if column.unit == DN else ""
         lines.append(f"{capital(column.words)}: {column.meaning}{unit}.")
-    changed = {(entry.cfa, *entry.channel): entry.base for entry in modifications(output) if entry.channel}
-    for (cfa, *channels), base in changed.items():
-        if base:
-            several = f"are {base} pixels whose filters change"
-            what = several if len(channels) > 1 else f"is a {base} pixel whose filter changes"
-            lines.append(f"In {cfa}, {' and '.join(channels)} {what}.")
+    base_filters = {(entry.cfa, *entry.channel): entry.base for entry in modifications(output) if entry.channel}
+    for (cfa, *channels), base in base_filters.items():
+        if not base:
+            continue
+        if len(channels) > 1:
+            lines.append(f"In {cfa}, {' and '.join(channels)} are {base} pixels whose filters change.")
+        else:
+            lines.append(f"In {cfa}, {channels[0]} is a {base} pixel whose filter changes.")
     return lines
 
 
-_NOT_STATED = "No technology is stated of the filters: they are taken as on axis, in parallel rays."
-
-
 def _technologies(output: Output, row: Row) -> list[Technology | None]:
-    """Return the technologies that a row's filter may have."""
+    """Return the possible technologies of a row's filter: several for swept rows, none for a plain CFA."""
     study, search = output.study, output.provenance.search
     if row["kind"] == PLAIN:
         return []
@@ -154,7 +158,8 @@ def _technologies(output: Output, row: Row) -> list[Technology | None]:
         return [study.designs[row["name"]].technology]
     if row["kind"] == FOUND and search is not None:
         return [(study.sweeps | study.boxes)[search.space].technology]
-    return list({repr(made.technology): made.technology for made in study.sweeps.values()}.values())
+    technologies = [sweep.technology for sweep in study.sweeps.values()]
+    return list({repr(technology): technology for technology in technologies}.values())  # distinct ones, in order
 
 
 def technology_of(output: Output, row: Row) -> Technology | None:
@@ -172,12 +177,12 @@ def technology_of(output: Output, row: Row) -> Technology | None:
     Technology or None
         None if it is not stated or not unique.
     """
-    stated = _technologies(output, row)
-    return stated[0] if len(stated) == 1 else None
+    candidates = _technologies(output, row)
+    return candidates[0] if len(candidates) == 1 else None
 
 
-def assumed_technology(output: Output, row: Row) -> str:
-    """Return a note on the angle of the light for a row's filter; empty if no technology is stated.
+def angle_note(output: Output, row: Row) -> str:
+    """Return a sentence on the angle dependence of a row's filter.
 
     Parameters
     ----------
@@ -189,19 +194,19 @@ def assumed_technology(output: Output, row: Row) -> str:
     Returns
     -------
     str
-        Text.
+        Sentence; empty if no technology is stated or it is not unique.
     """
-    stated = technology_of(output, row)
-    if stated is None:
+    technology = technology_of(output, row)
+    if technology is None:
         return ""
-    if stated.interference is None:
-        return "A pigment does not move with the angle of the light."
-    rays = _format_light(output.study.scenarios[row["scenario"]])
-    return f"Such a filter moves with the angle of the light; the figures are {rays}."
+    if technology.interference is None:
+        return "The transmission of a pigment filter does not depend on the angle of incidence."
+    incidence = _format_incidence(output.study.scenarios[row["scenario"]])
+    return f"The band of an interference filter shifts with the angle of incidence; the values are {incidence}."
 
 
 def is_angle_dependent(output: Output, row: Row) -> bool:
-    """Return whether a row's filter moves with the angle of the light.
+    """Return whether the transmission of a row's filter may depend on the angle of incidence.
 
     Parameters
     ----------
@@ -213,24 +218,24 @@ def is_angle_dependent(output: Output, row: Row) -> bool:
     Returns
     -------
     bool
-        True if it does.
+        True if any possible technology is an interference filter.
     """
     return any(t is not None and t.interference is not None for t in _technologies(output, row))
 
 
-def _format_light(scene: Scene) -> str:
-    """Return the rays of a scene in words."""
+def _format_incidence(scene: Scene) -> str:
+    """Format the f-number and the chief ray angles, in degrees, under which light reaches the pixels."""
     lens = f"behind f/{scene.optics.f_number:g}"
     if scene.field is None:
         return f"{lens} at a chief ray angle of {scene.optics.cra_deg:g} degrees"
-    angles = scene.field.knots[1]
-    ends = f"{min(angles):g} to {max(angles):g}"
-    places = "all" if scene.field.everywhere else f"{len(scene.field.counted_heights)}"
-    return f"{lens} at chief ray angles of {ends} degrees, the worst of {places} field positions"
+    angles_deg = scene.field.knots[1]
+    angle_range = f"{min(angles_deg):g} to {max(angles_deg):g}"
+    positions = "all" if scene.field.everywhere else f"{len(scene.field.counted_heights)}"
+    return f"{lens} at chief ray angles of {angle_range} degrees, the worst of {positions} field positions"
 
 
-def assumed_technology_line(output: Output) -> str:
-    """Return a note on surrogate curves and on filters without a technology; else empty.
+def assumptions_line(output: Output) -> str:
+    """Return a note on what the run assumes: surrogate curves, and filters without a stated technology.
 
     Parameters
     ----------
@@ -240,11 +245,11 @@ def assumed_technology_line(output: Output) -> str:
     Returns
     -------
     str
-        Text.
+        Text; empty if neither applies.
     """
     notes = []
     if output.provenance.sensor.surrogate or output.provenance.lights.surrogate:
         notes.append("Built-in curves are surrogates, modeled from stated parameters, not measured.")
     if any(modification.technology is None for modification in modifications(output)):
-        notes.append(_NOT_STATED)
+        notes.append(_NO_TECHNOLOGY)
     return f"Note: {' '.join(notes)}" if notes else ""

@@ -11,7 +11,7 @@ import pyarrow as pa
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY, reference_of
 from ..metrics.quantity import DN, Column, RequestedQuantities
 from ..metrics.registry import listed
-from ..spectra.tasks import Measure, TaskName
+from ..spectra.tasks import TaskColumns, TaskMetric
 from . import tables as files
 from .curves import SCHEMA
 from .thinning import MOST_POINTS
@@ -107,7 +107,7 @@ def columns_table() -> list[str]:
     """
     types = ("<a>", "<b>")
     rows = [_row(names, "", meaning) for names, meaning in _KEYS.items()]
-    tasks = tuple(TaskName("<task>", metric, ("<light>",)) for metric in get_args(Measure))
+    tasks = tuple(TaskColumns("<task>", metric, ("<light>",)) for metric in get_args(TaskMetric))
     requested = RequestedQuantities(types, types, any_place=True, probabilities=True, tasks=tasks, vision=True)
     for quantity in listed(requested):
         more = _WITHOUT_CLEAR if quantity.name == CFA_SENSITIVITY else ""

@@ -41,7 +41,7 @@ def _shown(study: Study, highlights: pd.DataFrame) -> Iterator[tuple[dict[str, A
 def _chart_of(tasks: StudyTasks) -> tuple[tuple[str, ...], Chart]:
     task = tasks.by_name["color"]
     assert task.chart is not None
-    return task.key.cases, task.chart
+    return task.columns.lights, task.chart
 
 
 def error_against_noise_table(study: Study, highlights: pd.DataFrame) -> pa.Table:

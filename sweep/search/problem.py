@@ -64,7 +64,7 @@ class Problem:
     @property
     def quantities(self) -> Mapping[str, Quantity]:
         """Quantities that objective and constraints may name."""
-        tasks = () if self.setup.tasks is None else self.setup.tasks.keys
+        tasks = () if self.setup.tasks is None else self.setup.tasks.columns
         requested = RequestedQuantities(
             self.setup.lights.classes, self.states, edge_shift=True, tasks=tasks, own=self.own
         )

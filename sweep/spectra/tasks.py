@@ -1,4 +1,4 @@
-"""Tasks beside traffic lights: spectra on the wavelength grid, and names of their columns."""
+"""Tasks beyond traffic lights, such as color and vehicle lamps: their spectra, conditions and column names."""
 
 from __future__ import annotations
 
@@ -10,21 +10,23 @@ import numpy as np
 
 from ..base.types import FloatArray, IndexArray
 
-Measure = Literal["color", "low_light", "separation"]
-Case = str
-"""The light of a task: an illuminant's name, as columns write it; empty for a task of lamps alone."""
+TaskMetric = Literal["color", "low_light", "separation"]
+"""Kind of a task, which sets its figures: color reproduction, noise in low light, or separation of classes."""
+LightName = str
+"""Key of `ILLUMINANTS`; empty for a task whose spectra are lamps themselves."""
 
 SHIPPED: Mapping[str, str] = {
-    "color": "colors of 24 patches after a color matrix, under daylight, a filament, a white LED and a sodium lamp",
-    "low_light": "how little light is enough for a clean gray",
+    "color": "color error of 24 chart patches after a color matrix, under daylight, CIE A, a white LED and sodium",
+    "low_light": "illuminance at which gray reaches a luminance SNR of 10",
     "vehicle_lamps": "brake red, turn amber and reversing white",
     "emergency": "emergency blue and white headlamps",
     "road_marking": "white and yellow road markings",
     "traffic_signs": "six colors of traffic signs",
-    "vegetation": "leaves by day and green signals",
-    "unseen_lamps": "green, yellow and red lamps that no search has seen",
+    "vegetation": "leaves in daylight and green signals",
+    "unseen_lamps": "green, yellow and red lamps that no search uses",
 }
-"""Subject of every task that the package ships."""
+"""Subject of each built-in task, by the name of the task."""
+
 ILLUMINANTS: Mapping[str, tuple[str, str]] = {
     "d65": ("cie_illuminants", "D65"),
     "d50": ("cie_illuminants", "D50"),
@@ -33,50 +35,60 @@ ILLUMINANTS: Mapping[str, tuple[str, str]] = {
     "hps": ("cie_illuminants", "HP1"),
     "lps": ("light_sources", "LPS"),
 }
-"""Lights by the names that columns give them, as group and spectrum: daylight, a filament, a white LED, sodium lamps of
-high and low pressure."""
+"""Illuminants by their names in columns, as (group, spectrum) of `builtin.spectra`: CIE daylight D65 and D50, CIE A
+(incandescent), a white LED, and high- and low-pressure sodium lamps."""
 
 
 @dataclass(frozen=True)
-class TaskName:
-    """Name, metric and lights of a task's columns."""
+class TaskColumns:
+    """Columns of a task in the result table.
+
+    Parameters
+    ----------
+    name : str
+        Name of the task, with which its columns begin.
+    metric : TaskMetric
+        Metric, which sets the figures.
+    lights : tuple of LightName
+        Lights under which the figures are computed; `("",)` for a task of lamps.
+    """
 
     name: str
-    metric: Measure
-    cases: tuple[Case, ...]
+    metric: TaskMetric
+    lights: tuple[LightName, ...]
 
-    def column(self, what: str, case: Case = "") -> str:
-        """Return a column name: `<task>_<what>`, and the light if there are several.
+    def column(self, figure: str, light: LightName = "") -> str:
+        """Return the name of a column: `<task>_<figure>_<light>`, or `<task>_<figure>` without a light.
 
         Parameters
         ----------
-        what : str
-            Figure.
-        case : str
-            Light.
+        figure : str
+            Key of a figure, such as `csd`.
+        light : LightName
+            Light; empty for a figure that depends on none.
 
         Returns
         -------
         str
-            Text.
+            Column name.
         """
-        return "_".join(part for part in (self.name, what, case) if part)
+        return "_".join(part for part in (self.name, figure, light) if part)
 
 
 @dataclass(frozen=True)
 class Chart:
-    """Patches of a chart under several lights.
+    """Patches of a chart under each light.
 
     Parameters
     ----------
-    photons : ndarray of shape (n_cases, n_patches, n_wavelengths)
-        Photon radiance at 1 lx, per nm.
-    gray : ndarray of shape (n_cases, n_wavelengths)
-        The same of 18 % gray.
-    xyz : ndarray of shape (n_cases, n_patches, 3)
-        CIE 1931.
-    white : ndarray of shape (n_cases, 3)
-        CIE 1931 of a perfect reflector, Y = 1.
+    photons : ndarray of shape (n_lights, n_patches, n_wavelengths)
+        Photon radiance of the patches at an illuminance of 1 lx, photons/s/sr/m2/nm.
+    gray : ndarray of shape (n_lights, n_wavelengths)
+        Photon radiance of an 18 % gray patch at 1 lx, photons/s/sr/m2/nm.
+    xyz : ndarray of shape (n_lights, n_patches, 3)
+        CIE 1931 tristimulus values of the patches, relative to Y = 1 of the perfect reflecting diffuser.
+    white : ndarray of shape (n_lights, 3)
+        CIE 1931 tristimulus values of the perfect reflecting diffuser, Y = 1.
     """
 
     photons: FloatArray
@@ -87,38 +99,52 @@ class Chart:
 
 @dataclass(frozen=True)
 class GriddedTask:
-    """Task on the wavelength grid.
+    """Task with its spectra on the wavelength grid.
+
+    A separation has `types` and `photons`; the other metrics have a `chart`.
 
     Parameters
     ----------
-    key : TaskName
-        Names.
+    columns : TaskColumns
+        Columns of the task.
     types : tuple of str
-        Class of each spectrum of a separation.
-    photons : ndarray of shape (n_cases, n_spectra, n_wavelengths), optional
-        Spectra that integrate to one photon.
-    chart, index : Chart, optional
-        Charts of a task of color, and of its metamerism index.
+        Class of each spectrum, n_spectra.
+    photons : ndarray of shape (n_lights, n_spectra, n_wavelengths), optional
+        Photon spectra, each scaled to an integral of 1 over the grid, 1/nm.
+    chart : Chart, optional
+        Test chart.
+    metamerism_chart : Chart, optional
+        Patches of ISO 17321-1 under D50, for the sensitivity metamerism index of a color task.
     """
 
-    key: TaskName
+    columns: TaskColumns
     types: tuple[str, ...] = ()
     photons: FloatArray | None = None
     chart: Chart | None = None
-    index: Chart | None = None
+    metamerism_chart: Chart | None = None
 
     @property
     def pairs(self) -> tuple[IndexArray, IndexArray]:
-        """Both spectra of every pair of two classes."""
-        kinds = np.asarray(self.types)
-        first, second = np.triu_indices(len(kinds), 1)
-        apart = kinds[first] != kinds[second]
-        return first[apart], second[apart]
+        """Indices (first, second) of all pairs of spectra of different classes, each of shape (n_pairs,)."""
+        types = np.asarray(self.types)
+        first, second = np.triu_indices(len(types), 1)
+        differ = types[first] != types[second]
+        return first[differ], second[differ]
 
 
 @dataclass(frozen=True)
 class Conditions:
-    """Conditions of all tasks: exposure, read noise, and illuminance of charts."""
+    """Conditions of all tasks.
+
+    Parameters
+    ----------
+    exposure_s : float
+        Exposure time, s.
+    read_noise_e : float
+        Read noise, electrons.
+    illuminance_lx : float
+        Illuminance on the charts, lx.
+    """
 
     exposure_s: float
     read_noise_e: float
@@ -127,18 +153,29 @@ class Conditions:
 
 @dataclass(frozen=True)
 class StudyTasks:
-    """Tasks of a study, their conditions, and spectra from its files."""
+    """Tasks of a study.
+
+    Parameters
+    ----------
+    conditions : Conditions
+        Conditions of all tasks.
+    tasks : tuple of GriddedTask
+        Built-in tasks, then the study's own.
+    from_files : mapping of (str, str) to ndarray of shape (n_wavelengths,)
+        Spectra read from the study's files, by (`<task> <class>`, `<file>:<column>`): reflectance, or relative
+        photons.
+    """
 
     conditions: Conditions
     tasks: tuple[GriddedTask, ...]
     from_files: Mapping[tuple[str, str], FloatArray] = field(default_factory=dict)
 
     @property
-    def keys(self) -> tuple[TaskName, ...]:
-        """Names of the tasks, as in column names."""
-        return tuple(task.key for task in self.tasks)
+    def columns(self) -> tuple[TaskColumns, ...]:
+        """Columns of each task."""
+        return tuple(task.columns for task in self.tasks)
 
     @property
     def by_name(self) -> Mapping[str, GriddedTask]:
         """Tasks by name."""
-        return {task.key.name: task for task in self.tasks}
+        return {task.columns.name: task for task in self.tasks}

@@ -363,7 +363,7 @@ def requested_quantities(
         probabilities=recognition is not None and recognition.probabilities,
         population=section.population is not None,
         wanted_yield=section.wanted_yield,
-        tasks=() if tasks is None else tasks.keys,
+        tasks=() if tasks is None else tasks.columns,
         vision=section.vision is not None,
         own=own,
     )

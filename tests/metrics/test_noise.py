@@ -16,7 +16,7 @@ from sweep.camera.forward import AllPhases, ForwardModel
 from sweep.camera.readout import draws_dn
 from sweep.metrics.columns.confusion import D_PRIME, ERROR, STATE_ERROR
 from sweep.metrics.evaluate import evaluate
-from sweep.metrics.recognition import DECIDERS, MOST_LIKELY, recognize
+from sweep.metrics.recognition import CLASSIFIER_NAMES, MOST_LIKELY, recognize
 from sweep.report import make_report, read_output, summary_lines
 from sweep.run import run_study
 from sweep.spectra.lights import Lights
@@ -167,9 +167,9 @@ def test_a_noisy_study_from_file_to_report(tmp_path: Path) -> None:
     assert (results["error_yellow_red"] <= results["error_bound_yellow_red"]).all()
     assert results.loc[results["scenario"] == "dim level=0.02", STATE_ERROR].min() > 1e-3
     assert len(recognition) == 2  # RGGB in both scenes; RYNCy has no curve of its own for N
-    assert {f"{rule}_accuracy" for rule in DECIDERS} <= set(recognition.columns)
+    assert {f"{rule}_accuracy" for rule in CLASSIFIER_NAMES} <= set(recognition.columns)
     bright, dim = (recognition[recognition["scenario"] == f"dim level={level}"].iloc[0] for level in (0.5, 0.02))
-    for rule in DECIDERS:
+    for rule in CLASSIFIER_NAMES:
         assert bright[f"{rule}_accuracy"] > dim[f"{rule}_accuracy"]
         assert dim[f"{rule}_accuracy_low"] < dim[f"{rule}_accuracy"] < dim[f"{rule}_accuracy_high"]
     output = read_output(tmp_path / "1")

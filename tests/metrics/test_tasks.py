@@ -74,7 +74,7 @@ def scene() -> tuple[Setup, object]:
 def quantities() -> dict[str, Quantity]:
     setup, _ = scene()
     assert setup.tasks is not None
-    found = quantities_of(RequestedQuantities(setup.lights.classes, tasks=setup.tasks.keys))
+    found = quantities_of(RequestedQuantities(setup.lights.classes, tasks=setup.tasks.columns))
     return {name: quantity for name, quantity in found.items() if quantity.metric.startswith("task_")}
 
 
@@ -103,10 +103,10 @@ def shares() -> np.ndarray:
 
 
 SEPARATIONS = [
-    (task.key.name, at, case)
+    (task.columns.name, at, case)
     for task in (scene()[0].tasks or StudyTasks(CONDITIONS, ())).tasks
-    if task.key.metric == "separation"
-    for at, case in enumerate(task.key.cases)
+    if task.columns.metric == "separation"
+    for at, case in enumerate(task.columns.lights)
 ]
 
 
@@ -218,7 +218,7 @@ def test_the_metamerism_index_has_the_least_mean_difference() -> None:
     """By a minimization of another kind, with the differences of colour-science; the eye's own curves have 100."""
     setup, _ = scene()
     assert setup.tasks is not None
-    index = setup.tasks.by_name["color"].index
+    index = setup.tasks.by_name["color"].metamerism_chart
     assert index is not None
     xyz, white = index.xyz[0], index.white[0]
     electrons = index.photons[0] @ camera().T * 1e-15

@@ -76,10 +76,10 @@ def test_white_lamps_of_the_task_are_white() -> None:
 @pytest.mark.parametrize("name", list(SHIPPED))
 def test_a_task_has_equal_photons_or_one_lux(name: str) -> None:
     task = task_sets.shipped(GRID, name)
-    assert task.key.name == name
+    assert task.columns.name == name
     if task.photons is not None:
         np.testing.assert_allclose(GRID.integrate(task.photons), 1, rtol=1e-12)
-        assert len(task.photons) == len(task.key.cases)
+        assert len(task.photons) == len(task.columns.lights)
         one, other = task.pairs
         kinds = np.asarray(task.types)
         sizes = np.unique(kinds, return_counts=True)[1]

@@ -97,7 +97,7 @@ def test_a_study_names_its_tasks() -> None:
     own = study_of_keys({**KEYS, "tasks": {"shipped": [], "own": {"leaf": LEAF}}}, Path())
     assert "leaf_dprime_d65" in own.quantities
     assert own.tasks is not None
-    assert [task.key.name for task in own.tasks.tasks] == ["leaf"]
+    assert [task.columns.name for task in own.tasks.tasks] == ["leaf"]
 
 
 @pytest.mark.slow

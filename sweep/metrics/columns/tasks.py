@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ...camera.setup import Setup
 from ...designs.block import Block
-from ...spectra.tasks import Case
+from ...spectra.tasks import LightName
 from ..quantity import Columns, DesignMetric, Quantity, RequestedQuantities
 from ..smooth import Rows, SmoothDesign
 
@@ -55,7 +55,7 @@ class TaskFigures(DesignMetric):
         return task_columns(setup, block)
 
 
-def _rows(design: SmoothDesign, *, task: str, what: str, case: Case) -> Rows:
+def _rows(design: SmoothDesign, *, task: str, what: str, case: LightName) -> Rows:
     """Return a figure's rows with derivatives; figures of a task share common parts."""
     from ..tasks.colorimetry import COMPLEX_STEP
 

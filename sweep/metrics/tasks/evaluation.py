@@ -15,7 +15,7 @@ from ...camera.noise.gaussian import share_below
 from ...camera.setup import Setup
 from ...designs.block import Block
 from ...spectra.color import color_matching
-from ...spectra.tasks import Case, Chart, Conditions, GriddedTask
+from ...spectra.tasks import Chart, Conditions, GriddedTask, LightName
 from ..quantity import Columns
 from ..smooth_noise import margin, squared_detectability
 from . import color
@@ -38,8 +38,8 @@ class TaskEvaluation:
     def __init__(self, task: GriddedTask, patch_camera: PatchCamera, conditions: Conditions) -> None:
         self._task, self._patch_camera, self._conditions = task, patch_camera, conditions
         self._noise = patch_camera.noise(conditions.read_noise_e)
-        self._made: dict[tuple[str, Case], Smooth] = {}
-        self._rows: dict[str, Callable[[Case], Smooth]] = {
+        self._made: dict[tuple[str, LightName], Smooth] = {}
+        self._rows: dict[str, Callable[[LightName], Smooth]] = {
             CSD: self._csd,
             D_PRIME: lambda case: root(squared_detectability(*self._apart(case))),
             ERROR: lambda case: pair_errors(margin(*self._apart(case))),
@@ -53,14 +53,14 @@ class TaskEvaluation:
             SNR_AT_1_LX: lambda case: self._luminance_noise(case, 1.0),
         }
 
-    def rows(self, what: str, case: Case) -> Smooth:
+    def rows(self, what: str, case: LightName) -> Smooth:
         """Return the rows of a figure.
 
         Parameters
         ----------
         what : str
             Key of the figure.
-        case : Case
+        case : LightName
             Light.
 
         Returns
@@ -70,27 +70,27 @@ class TaskEvaluation:
         """
         return self._rows[what](case)
 
-    def _once(self, key: str, case: Case, make: Callable[[], Smooth]) -> Smooth:
+    def _once(self, key: str, case: LightName, make: Callable[[], Smooth]) -> Smooth:
         if (key, case) not in self._made:
             self._made[key, case] = make()
         return self._made[key, case]
 
-    def _at(self, case: Case) -> int:
-        return self._task.key.cases.index(case)
+    def _at(self, case: LightName) -> int:
+        return self._task.columns.lights.index(case)
 
-    def _signals(self, case: Case) -> Smooth:
+    def _signals(self, case: LightName) -> Smooth:
         """Return electrons of each spectrum of a separation, with the photons of the study's lights."""
         assert self._task.photons is not None
         photons = self._task.photons[self._at(case)] * self._patch_camera.setup.scene.photon_radiance
         return self._once("signals", case, lambda: self._patch_camera.electrons(photons, self._conditions.exposure_s))
 
-    def _apart(self, case: Case) -> tuple[Smooth, Smooth, Smooth]:
+    def _apart(self, case: LightName) -> tuple[Smooth, Smooth, Smooth]:
         """Return differences of the pairs of spectra of two classes, and both variances, [n, n_pairs, n_channels]."""
         signals, (one, other) = self._signals(case), self._task.pairs
         variance = self._noise.of(signals)
         return signals[:, one] - signals[:, other], variance[:, one], variance[:, other]
 
-    def _csd(self, case: Case) -> Smooth:
+    def _csd(self, case: LightName) -> Smooth:
         return root(((self._patch_camera.setup.camera.pixel.dn_per_e * self._apart(case)[0]) ** 2).sum(axis=-1))
 
     @property
@@ -98,38 +98,38 @@ class TaskEvaluation:
         assert self._task.chart is not None
         return self._task.chart
 
-    def _patches(self, case: Case) -> Smooth:
+    def _patches(self, case: LightName) -> Smooth:
         photons = self._chart.photons[self._at(case)] * self._conditions.illuminance_lx
         return self._once("patches", case, lambda: self._patch_camera.electrons(photons, self._conditions.exposure_s))
 
-    def _gray(self, case: Case) -> Smooth:
+    def _gray(self, case: LightName) -> Smooth:
         """Return electrons of 18 % gray per lx, ndarray of shape (n, n_channels)."""
         return self._patch_camera.electrons(self._chart.gray[self._at(case)], self._conditions.exposure_s)
 
-    def _matrix(self, case: Case) -> Smooth:
+    def _matrix(self, case: LightName) -> Smooth:
         """Return the noise-optimal color matrix at the conditions' illuminance."""
         xyz, white = self._chart.xyz[self._at(case)], self._chart.white[self._at(case)]
         return self._once("matrix", case, lambda: color.color_matrix(self._patches(case), xyz, white, self._noise))
 
-    def _color_errors(self, case: Case) -> Smooth:
+    def _color_errors(self, case: LightName) -> Smooth:
         return self._once(
             "errors", case, lambda: color_errors(self._patches(case), self._matrix(case), self._chart, self._at(case))
         )
 
-    def _luminance_noise(self, case: Case, illuminance_lx: float) -> Smooth:
+    def _luminance_noise(self, case: LightName, illuminance_lx: float) -> Smooth:
         gray = self._gray(case) * illuminance_lx
         return color.luminance_noise(self._matrix(case), gray, self._noise)[:, None]
 
-    def _least_lux(self, case: Case) -> Smooth:
+    def _least_lux(self, case: LightName) -> Smooth:
         least_lux = color.least_illuminance(self._matrix(case), self._gray(case), self._noise, LUMINANCE_RATIO)
         return least_lux[:, None]
 
-    def _vora(self, _: Case) -> Smooth:
+    def _vora(self, _: LightName) -> Smooth:
         grid = self._patch_camera.setup.camera.grid
         return color.vora(self._patch_camera.qe * grid.nodes_nm, color_matching(grid))[:, None]
 
-    def _metamerism(self, _: Case) -> Smooth:
-        chart = self._task.index
+    def _metamerism(self, _: LightName) -> Smooth:
+        chart = self._task.metamerism_chart
         assert chart is not None
         electrons = self._patch_camera.electrons(chart.photons[0], self._conditions.exposure_s)
         return color.metamerism_index(electrons, chart.xyz[0], chart.white[0])[:, None]
@@ -211,7 +211,7 @@ def task_columns(setup: Setup, block: Block) -> Columns:
         figures: dict[str, FloatArray] = {}
         for task in tasks.tasks:
             evaluation = TaskEvaluation(task, patch_camera, tasks.conditions)
-            for name, figure, case in figures_of(task.key):
+            for name, figure, case in figures_of(task.columns):
                 rows = evaluation.rows(figure.what, case)
                 figures[name] = rows.max(axis=1) if figure.wanted == "less" else rows.min(axis=1)
         parts.append(figures)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from ...spectra.tasks import Case, Measure, TaskName
+from ...spectra.tasks import LightName, TaskColumns, TaskMetric
 
 CSD, D_PRIME, ERROR = "csd", "dprime", "error"
 MEAN, MOST_95, MOST, SNR = "delta_e_mean", "delta_e_95", "delta_e_max", "snr"
@@ -49,7 +49,7 @@ class Figure:
     signed: bool = False
 
 
-FIGURES: dict[Measure, tuple[Figure, ...]] = {
+FIGURES: dict[TaskMetric, tuple[Figure, ...]] = {
     "separation": (
         Figure(
             CSD,
@@ -131,19 +131,19 @@ FIGURES: dict[Measure, tuple[Figure, ...]] = {
 """The figures of each metric, in order."""
 
 
-def figures_of(task: TaskName) -> Iterator[tuple[str, Figure, Case]]:
+def figures_of(task: TaskColumns) -> Iterator[tuple[str, Figure, LightName]]:
     """Yield all figures of a task.
 
     Parameters
     ----------
-    task : TaskName
+    task : TaskColumns
         Task.
 
     Yields
     ------
-    column, figure, case : str, Figure, Case
+    column, figure, case : str, Figure, LightName
         Column name, figure and light.
     """
     for figure in FIGURES[task.metric]:
-        for case in task.cases if figure.each else ("",):
+        for case in task.lights if figure.each else ("",):
             yield task.column(figure.what, case), figure, case

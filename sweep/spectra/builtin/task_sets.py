@@ -9,7 +9,7 @@ import numpy as np
 from ...base.types import FloatArray
 from ..color import color_matching, luminance_per_photon_radiance
 from ..spectrum import WavelengthGrid, energy_from_photons, equal_photons
-from ..tasks import ILLUMINANTS, Chart, GriddedTask, TaskName
+from ..tasks import ILLUMINANTS, Chart, GriddedTask, TaskColumns
 from . import spectra, surrogate_spectra
 from .data_sets.tl16 import lights
 
@@ -150,7 +150,7 @@ def separation_task(
     lit = [stacked * illuminant(grid, light) for light in lights] or [stacked]
     types = tuple(kind for kind, spectra_of_class in classes.items() for _ in spectra_of_class)
     photons = np.stack([equal_photons(grid, spectra_of_class) for spectra_of_class in lit])
-    return GriddedTask(TaskName(name, "separation", tuple(lights) or ("",)), types, photons)
+    return GriddedTask(TaskColumns(name, "separation", tuple(lights) or ("",)), types, photons)
 
 
 def shipped(grid: WavelengthGrid, name: str) -> GriddedTask:
@@ -180,9 +180,9 @@ def shipped(grid: WavelengthGrid, name: str) -> GriddedTask:
     match name:
         case "color" | "low_light":
             cases = _STREET if name == "color" else ("a", "led", "hps")
-            index = chart(grid, spectra_of_group(grid, "iso_17321")[:18], ["d50"]) if name == "color" else None
+            iso_patches = chart(grid, spectra_of_group(grid, "iso_17321")[:18], ["d50"]) if name == "color" else None
             patches = chart(grid, spectra_of_group(grid, "colorchecker"), cases)
-            return GriddedTask(TaskName(name, name, cases), chart=patches, index=index)
+            return GriddedTask(TaskColumns(name, name, cases), chart=patches, metamerism_chart=iso_patches)
         case "vehicle_lamps":
             reversing = np.stack([illuminant(grid, "a"), *white(*_WHITE_LED)])
             classes = {**groups("brake red", "turn amber"), "reversing white": reversing}
