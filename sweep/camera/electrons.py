@@ -43,6 +43,8 @@ class Changing:
         Exposure time of all of them, s.
     which : ndarray of bool, shape (n_designs,)
         Designs of the batch that these are.
+    unlit : callable
+        From a slice of the designs to all channels without the lamps, ndarray of shape (n, n_cases, n_channels).
     """
 
     fixed: FloatArray
@@ -50,6 +52,7 @@ class Changing:
     make: Callable[[slice], FloatArray]
     exposure_s: float
     which: BoolArray
+    unlit: Callable[[slice], FloatArray]
 
     @cached_property
     def values(self) -> FloatArray:
@@ -240,9 +243,7 @@ class Electrons:
         ndarray of shape (n_designs, n_cases * n_scales, n_signals, n_elements)
             Electrons.
         """
-        uniform = self._fixed_uniform + self.through_filters(self.of_background(curves))
-        uniform = uniform + self.setup.camera.pixel.dark_e_per_s
-        rates = self.rates(curves)
+        uniform, rates = self.unlit(curves), self.rates(curves)
         if scales.shape[1] > 1:
             rates = np.repeat(rates, scales.shape[1], axis=1)
             uniform = np.repeat(uniform, scales.shape[1], axis=1)
@@ -251,6 +252,22 @@ class Electrons:
         rates += uniform[:, :, None, :]
         rates *= exposure_s[:, None, None, None]
         return rates
+
+    def unlit(self, curves: FloatArray) -> FloatArray:
+        """Return electrons/s of the elements without the lamps: of the background, and dark current.
+
+        Parameters
+        ----------
+        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE of the modified channels.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n_cases, n_elements)
+            Electrons/s.
+        """
+        uniform = self._fixed_uniform + self.through_filters(self.of_background(curves))
+        return np.asarray(uniform + self.setup.camera.pixel.dark_e_per_s, dtype=float)
 
     def of_background(self, curves: FloatArray) -> FloatArray:
         """Return electrons/s of the background in the modified channels.
@@ -331,4 +348,11 @@ class Electrons:
             _expose(values, fixed, uniform[part], float(time_s[0]))
             return values
 
-        return Changing(rest * time_s[0], unit, make, float(time_s[0]), which)
+        dark = self._fixed_uniform + setup.camera.pixel.dark_e_per_s
+
+        def unlit(part: slice) -> FloatArray:
+            electrons = np.repeat(dark[None], len(uniform[part]), axis=0)
+            electrons[..., unit] = uniform[part]
+            return np.asarray(electrons * time_s[0], dtype=float)
+
+        return Changing(rest * time_s[0], unit, make, float(time_s[0]), which, unlit)

@@ -25,6 +25,7 @@ from .exposure import SceneLight
 from .field import over_field
 from .memory import blocks
 from .phases import Phases, different_phases, scene_phases
+from .pixel import unquantized
 from .pixel_response import ChannelResponses, PixelResponse, channel_responses, kept_response, pixel_response
 from .readout import NoisyReadout, Readout
 from .setup import Setup
@@ -167,7 +168,31 @@ class ForwardModel:
         def make(part: slice) -> FloatArray:
             return transfer(electrons.make(part))
 
-        return replace(electrons, fixed=transfer(electrons.fixed), make=make)
+        def unlit(part: slice) -> FloatArray:
+            return unquantized(electrons.unlit(part), self.readout.pixel)
+
+        return replace(electrons, fixed=transfer(electrons.fixed), make=make, unlit=unlit)
+
+    def unlit(self, curves: FloatArray, exposure_s: FloatArray) -> FloatArray:
+        """Return the response without the lamps: black level, dark current and background, unquantized.
+
+        Parameters
+        ----------
+        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE of the modified channels.
+        exposure_s : ndarray of shape (n_designs,)
+            Exposure time, s.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n_cases, n_channels)
+            Response in each case, DN.
+        """
+        if self._in_parts:
+            return np.concatenate([part.unlit(curves, exposure_s) for part in self._parts()], axis=1)
+        electrons = self.electrons.unlit(curves) * exposure_s[:, None, None]
+        dn = self.readout.folded(unquantized(electrons, self.readout.pixel)[:, :, None])[:, :, 0]
+        return np.repeat(dn, self.light.scales(exposure_s).shape[1], axis=1)
 
     def read(self, curves: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Read out a batch of designs.

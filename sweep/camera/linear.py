@@ -84,6 +84,27 @@ class LinearModel(ForwardModel):
         response = self.readout.folded(unquantized(whole, self.readout.pixel))
         return response, self.readout.folded(slope * self.setup.camera.pixel.dn_per_e)
 
+    def lamps_with_gradient(self, curves: FloatArray, curves_gradient: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the response to the lamps alone, without black level, dark current and background.
+
+        Parameters
+        ----------
+        curves : ndarray of shape (n_modified, n_wavelengths)
+            QE of the modified channels.
+        curves_gradient : ndarray of shape (n_parameters, n_modified, n_wavelengths)
+            Derivative of the QE.
+
+        Returns
+        -------
+        response : ndarray of shape (n_cases, n_signals, n_channels)
+            Response, DN.
+        gradient : ndarray of shape (n_parameters, n_cases, n_signals, n_channels)
+            DN per unit of parameter.
+        """
+        whole, slope = self._with_slope(curves, curves_gradient, lamps_only=True)
+        dn_per_e = self.readout.pixel.dn_per_e
+        return self.readout.folded(whole * dn_per_e), self.readout.folded(slope * dn_per_e)
+
     def variance(self, curves: FloatArray) -> FloatArray:
         """Return the variance of the noise.
 
@@ -169,20 +190,25 @@ class LinearModel(ForwardModel):
         exposure_s = self.light.exposure_s(curves)
         return self.electrons.expected(curves, self.light.scales(exposure_s), exposure_s)
 
-    def _with_slope(self, curves: FloatArray, curves_gradient: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _with_slope(
+        self, curves: FloatArray, curves_gradient: FloatArray, *, lamps_only: bool = False
+    ) -> tuple[FloatArray, FloatArray]:
         """Return expected electrons and their derivative."""
         electrons, n = self.electrons, len(curves_gradient)
         one = curves[None]
         exposure_s = self.light.exposure_s(one)
         scales = self.light.scales(exposure_s)
         whole = electrons.expected(one, scales, exposure_s)[0]
+        if lamps_only:
+            whole = whole - np.repeat(electrons.unlit(one)[0], scales.shape[1], axis=0)[:, None] * exposure_s
         light = (electrons.rates(curves_gradient) - electrons.fixed)[:, :, None] * scales[0][None, None, :, None, None]
         uniform = electrons.through_filters(electrons.of_background(curves_gradient))
+        uniform = np.zeros_like(uniform) if lamps_only else uniform
         slope = (light + uniform[:, :, None, None, :]).reshape(n, *whole.shape) * exposure_s
         relative = relative_slope(self.setup, self.light.white, curves, curves_gradient)
         return whole, np.asarray(slope + relative[:, None, None, None] * whole, dtype=float)
 
-    def per_qe(self, modified: int, curves: FloatArray) -> FloatArray:
+    def per_qe(self, modified: int, curves: FloatArray, *, lamps_only: bool = False) -> FloatArray:
         """Return the response per unit of QE of one modified channel at every wavelength.
 
         The smooth response is linear in it if the channel does not set the exposure.
@@ -193,6 +219,8 @@ class LinearModel(ForwardModel):
             Index among the modified channels.
         curves : ndarray of shape (n_modified, n_wavelengths)
             QE of the design whose exposure is used.
+        lamps_only : bool
+            Leave out the background.
 
         Returns
         -------
@@ -200,7 +228,8 @@ class LinearModel(ForwardModel):
             DN per unit of QE.
         """
         response, channel = self.electrons.response, self.setup.camera.modified[modified]
-        rates = self._per_qe(modified, curves, response.light[:, :, channel], response.uniform[:, :, channel])
+        uniform = response.uniform[:, :, channel] * (not lamps_only)
+        rates = self._per_qe(modified, curves, response.light[:, :, channel], uniform)
         return rates * self.setup.camera.pixel.dn_per_e
 
     def spread_per_qe(self, modified: int, curves: FloatArray) -> FloatArray:

@@ -195,6 +195,11 @@ class Scene(Section):
     noise: Annotated[Noise | None, BeforeValidator(_noise, json_schema_input_type=bool | Noise | None)] = None
     """Photon, read and dark noise and PRNU, before the mean is taken: true, or figures of its own."""
 
+    @property
+    def equal_photons(self) -> bool:
+        """True if all signals send the same number of photons, so that a CSD does not count how bright a lamp is."""
+        return self.intensity_cd is None and self.drive is None
+
     @model_validator(mode="after")
     def _goes_together(self) -> Scene:
         if self.intensity_cd is not None and isinstance(self.exposure, WhitePatchExposure):

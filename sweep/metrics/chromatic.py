@@ -1,14 +1,14 @@
 """Chromatic distance of two signals: the distance that is left when either lamp may have any brightness.
 
-For responses y1 and y2 less the black level it is the smaller of min |y1 - a y2| and min |a y1 - y2| over a > 0. At an
-angle t of less than 90 degrees that is min(|y1|, |y2|) sin t, otherwise min(|y1|, |y2|). The parallelogram
-|y1|^2 |y2|^2 sin^2 t is summed from the 2 x 2 determinants of the channels (Lagrange's identity), so that nearly
-parallel responses lose no digits.
+For responses y1 and y2 to the lamps alone (less black level, dark current and background) it is the smaller of
+min |y1 - a y2| and min |a y1 - y2| over a > 0. At an angle t of less than 90 degrees that is min(|y1|, |y2|) sin t,
+otherwise min(|y1|, |y2|). The parallelogram |y1|^2 |y2|^2 sin^2 t is summed from the 2 x 2 determinants of the
+channels (Lagrange's identity), so that nearly parallel responses lose no digits.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -52,7 +52,7 @@ def squared_distance(first: FloatArray, second: FloatArray) -> FloatArray:
     Parameters
     ----------
     first, second : ndarray of shape (..., n_channels)
-        Responses less the black level.
+        Responses less those without lamps.
 
     Returns
     -------
@@ -80,7 +80,7 @@ def chromatic_separation(response: FloatArray, first: IndexArray, second: IndexA
     Parameters
     ----------
     response : ndarray of shape (n_designs, n_signals, n_channels)
-        Readout less the black level, DN.
+        Readout less that without lamps, DN.
     first, second : ndarray of int
         Signals of each type.
 
@@ -95,22 +95,21 @@ def chromatic_separation(response: FloatArray, first: IndexArray, second: IndexA
     return np.sqrt(smallest)
 
 
-def chromatic_separations(setup: Setup, response: FloatArray) -> dict[Pair, FloatArray]:
+def chromatic_separations(response: FloatArray, members: Mapping[str, IndexArray]) -> dict[Pair, FloatArray]:
     """Compute the smallest chromatic distance of every pair of signal types.
 
     Parameters
     ----------
-    setup : Setup
-        Scene and camera.
     response : ndarray of shape (n_designs, n_signals, n_channels)
-        Readout, DN.
+        Readout less that without lamps, DN.
+    members : mapping of str to ndarray of int
+        Signals of each type.
 
     Returns
     -------
     dict of pair to ndarray of shape (n_designs,)
         Distance, DN.
     """
-    members, response = setup.members, response - setup.camera.pixel.offset_dn
     pairs = class_pairs(list(members))
     if len(response) < _MANY or response.shape[2] > _MOST_CHANNELS or not np.isfinite(response).all():
         return {(a, b): chromatic_separation(response, members[a], members[b]) for a, b in pairs}
@@ -132,7 +131,7 @@ def noise_referred(mean: FloatArray, variance: FloatArray, first: IndexArray, se
     Parameters
     ----------
     mean, variance : ndarray of shape (n_designs, n_signals, n_channels)
-        Mean less the black level, DN, and variance, DN^2.
+        Mean less the response without lamps, DN, and variance, DN^2.
     first, second : ndarray of int
         Signals of each type.
 
@@ -174,7 +173,7 @@ def chromatic_rows(design: SmoothDesign, *, pairs: Sequence[Pair], noise: bool) 
     Rows
         Values and derivatives.
     """
-    members, offset_dn = design.setup.members, design.setup.camera.pixel.offset_dn
+    members = design.setup.members
 
     def of(response: Smooth, variance: Smooth | None) -> Smooth:
         parts = []
@@ -192,9 +191,9 @@ def chromatic_rows(design: SmoothDesign, *, pairs: Sequence[Pair], noise: bool) 
                 parts.append(ratio.reshape(*ratio.shape[:-3], -1))
         return np.concatenate(parts, axis=-1)
 
-    response = design.response - offset_dn
+    response, by_u = design.lamps
     along = of(
-        response + 1j * COMPLEX_STEP * design.response_by_u,
+        response + 1j * COMPLEX_STEP * by_u,
         design.variance + 1j * COMPLEX_STEP * design.variance_by_u if noise else None,
     )
     return Rows(of(response, design.variance if noise else None), along.imag.T / COMPLEX_STEP)
@@ -217,7 +216,8 @@ def smooth_chromatic(setup: Setup, curves: FloatArray, pair: Pair) -> FloatArray
     ndarray of shape (n_designs,)
         Distance, DN.
     """
-    response = linear_model(setup).smooth(curves) - setup.camera.pixel.offset_dn
+    model = linear_model(setup)
+    response = model.smooth(curves) - model.unlit(curves, model.light.exposure_s(curves))[:, :, None]
     first, second = (setup.members[name] for name in pair)
     over = [chromatic_separation(response[:, case], first, second) for case in range(response.shape[1])]
     return np.asarray(np.min(over, axis=0), dtype=float)

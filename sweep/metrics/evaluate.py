@@ -43,8 +43,9 @@ _COMPARED_AT_ONCE = 1024
 """Readouts of a design in a case that are compared at once."""
 _READ_AT_ONCE = 2**19
 """Digital numbers that other metrics are given at once: 4 MiB, so that they stay in the cache."""
-_Extra = Callable[[int, Callable[[slice], FloatArray]], Columns]
-"""Columns of n designs from the whole readout of parts of them."""
+_Part = Callable[[slice], FloatArray]
+_Extra = Callable[[int, _Part, _Part], Columns]
+"""Columns of n designs from the whole readout of parts of them, and from the response without lamps."""
 _CSD = [metric for metric in METRICS if isinstance(metric, ColorSeparation)]
 
 
@@ -220,10 +221,11 @@ def _refine_heights(model: ForwardModel, block: Block, cases: Columns, columns: 
             columns[name][design] = least
 
 
-def _whole_readout(
-    model: ForwardModel, own: Sequence[UserMetric], n: int, whole: Callable[[slice], FloatArray]
-) -> Columns:
-    """Columns of n designs by own metrics and those of `OTHERS`; `whole`: the readout of a part of the designs."""
+def _whole_readout(model: ForwardModel, own: Sequence[UserMetric], n: int, whole: _Part, unlit: _Part) -> Columns:
+    """Return columns of n designs by user metrics and those of `OTHERS`.
+
+    `whole`, `unlit`: the readout of a part of the designs, and the response without lamps.
+    """
     if not (own or OTHERS):
         return {}
     setup = model.setup
@@ -235,14 +237,17 @@ def _whole_readout(
         values_per_design = model.n_cases * len(setup.lights.names) * len(setup.camera.mosaic.channels)
         step, parts = max(1, _READ_AT_ONCE // values_per_design), []
         for start in range(0, n, step):
-            response = whole(slice(start, start + step))
-            others = over_cases(model, by_case(setup, response, OTHERS)) if OTHERS else {}
+            part = slice(start, start + step)
+            response = whole(part)
+            others = over_cases(model, by_case(setup, response, OTHERS, unlit(part))) if OTHERS else {}
             parts.append(others | user_quantities(present, setup, response))
         columns |= {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     return columns
 
 
-def by_case(setup: Setup, response: FloatArray, metrics: Sequence[ReadoutMetric]) -> Columns:
+def by_case(
+    setup: Setup, response: FloatArray, metrics: Sequence[ReadoutMetric], unlit: FloatArray | None = None
+) -> Columns:
     """Evaluate metrics of the readout in each case, in blocks of the size of a cache.
 
     Parameters
@@ -253,6 +258,8 @@ def by_case(setup: Setup, response: FloatArray, metrics: Sequence[ReadoutMetric]
         Readout, DN.
     metrics : sequence of ReadoutMetric
         Metrics.
+    unlit : ndarray of shape (n_designs, n_cases, n_channels), optional
+        Response without lamps, DN; left out, 0.
 
     Returns
     -------
@@ -264,8 +271,11 @@ def by_case(setup: Setup, response: FloatArray, metrics: Sequence[ReadoutMetric]
     for start in range(0, n_cases, step):
         cases = np.swapaxes(response[:, start : start + step], 0, 1)
         readouts, columns = cases.reshape(-1, *cases.shape[2:]), Columns()
+        dark = np.zeros((len(readouts), readouts.shape[2]))
+        if unlit is not None:
+            dark = np.swapaxes(unlit[:, start : start + step], 0, 1).reshape(dark.shape)
         for metric in metrics:
-            columns |= metric.of_readout(setup, readouts)
+            columns |= metric.of_readout(setup, readouts, dark)
         parts.append(columns)
     return {name: np.concatenate([part[name] for part in parts]).reshape(n_cases, n_designs) for name in parts[0]}
 
@@ -373,8 +383,8 @@ def _distances_along(model: ForwardModel, changing: Changing, extra: _Extra) -> 
             along = separations_along(fixed, changing.channel, values[:, case], model.setup.members)
             for pair, distance in along.items():
                 cases[csd_name(pair)][case, batch] = distance
-    columns = over_cases(model, cases) | {EXPOSURE: np.full(n, changing.exposure_s)}
-    return cases, columns | extra(n, changing.whole_of)
+    columns = over_cases(model, cases) | extra(n, changing.whole_of, changing.unlit)
+    return cases, columns | {EXPOSURE: np.full(n, changing.exposure_s)}
 
 
 def _read(
@@ -390,6 +400,6 @@ def _read(
         apart = _joined([metric.of_noise(model, curves, read, confused) for metric in noisy])
     else:
         response, exposure_s = model.read(curves)
-    apart |= extra(len(curves), response.__getitem__)
+    apart |= extra(len(curves), response.__getitem__, lambda part: model.unlit(curves[part], exposure_s[part]))
     cases = by_case(model.setup, response, _CSD)
     return cases, over_cases(model, cases) | apart | {EXPOSURE: exposure_s}

@@ -56,7 +56,7 @@ def nearest_chromatic_squared(response: FloatArray, bounds: IndexArray, out: Flo
     Parameters
     ----------
     response : ndarray of shape (n_designs, 4, n_signals)
-        Less the black level, C-ordered and finite, one class after the other; missing channels are 0.
+        Less the response without lamps, C-ordered and finite, one class after the other; missing channels are 0.
     bounds : ndarray of int, shape (n_classes + 1,)
         Start of each class.
     out : ndarray of shape (n_designs, n_pairs)

@@ -401,7 +401,7 @@ class ReadoutMetric(Metric):
     """Metric of the digital numbers of a scene."""
 
     @abstractmethod
-    def of_readout(self, setup: Setup, response: FloatArray) -> Columns:
+    def of_readout(self, setup: Setup, response: FloatArray, unlit: FloatArray) -> Columns:
         """Compute the columns at one sampling phase and moment; the worst of all counts.
 
         Parameters
@@ -410,6 +410,8 @@ class ReadoutMetric(Metric):
             Scene and camera.
         response : ndarray of shape (n_designs, n_signals, n_channels)
             Readout, DN.
+        unlit : ndarray of shape (n_designs, n_channels)
+            Response without the lamps, DN.
 
         Returns
         -------

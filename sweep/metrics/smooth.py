@@ -181,6 +181,11 @@ class SmoothDesign:
         return self._response[1]
 
     @cached_property
+    def lamps(self) -> tuple[FloatArray, FloatArray]:
+        """Response to the lamps alone and its derivative, DN, in the shapes of `response` and `response_by_u`."""
+        return self._imager.lamps_with_gradient(self.curves, self.by_u)
+
+    @cached_property
     def variance(self) -> FloatArray:
         """Variance of the noise, DN^2, ndarray of shape (n_cases, n_signals, n_channels)."""
         return np.asarray(self._imager.variance(self.curves[None])[0], dtype=float)

@@ -181,7 +181,7 @@ def _limited(output: Output, row: Row) -> str:
     """Return the two lights that limit a row's separation, if they are lights of the study."""
     separation = output.trade_off[0]
     lights = row.get(limited_by_name(separation.pair)) if separation.pair else None
-    of_two = separation.extreme != OF_A_SHARE and not over_population(output)
+    of_two = separation.role == "separation" and separation.extreme != OF_A_SHARE and not over_population(output)
     return lights if isinstance(lights, str) and of_two else ""
 
 

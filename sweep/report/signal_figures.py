@@ -91,7 +91,7 @@ def nearest_lights(output: Output, row: Mapping[Any, Any]) -> Nearest | None:
         None if they are unknown.
     """
     separation = output.trade_off[0]
-    if separation.pair is None:
+    if separation.pair is None or separation.role != "separation":
         return None
     one, other = separation.pair
     text = row.get(limited_by_name(separation.pair))

@@ -69,7 +69,7 @@ def _shown(output: Output, rows: pd.DataFrame, keys: list[str], rest: list[str])
     separation = output.trade_off[0]
     axes = [separation.name, CFA_SENSITIVITY]
     held_out = [name for distance in output.distances if (name := HELD_OUT + distance) in output.table]
-    limits = [] if separation.pair is None else [limited_by_name(separation.pair)]
+    limits = [limited_by_name(separation.pair)] if separation.pair and separation.role == "separation" else []
     columns = [*keys, *axes, *held_out, *(name for name in rest if name not in axes), *limits]
     shown = rows[columns].copy()
     for column in shown.select_dtypes("float64"):

@@ -29,6 +29,7 @@ from .perturbed import Distances
 from .problem import Problem
 
 if TYPE_CHECKING:
+    from .chromatic_pairs import ChromaticPairs
     from .member_pairs import MemberPairs
 
 _SUM_ROUNDING = 1e-12
@@ -81,11 +82,11 @@ class FilterProgram:
     ----------
     problem : Problem
         Problem with one modified channel.
-    members : MemberPairs, optional
-        Members of worst cases.
+    members : MemberPairs or ChromaticPairs, optional
+        Members of worst cases, or brightnesses of chromatic separations.
     """
 
-    def __init__(self, problem: Problem, members: MemberPairs | None = None) -> None:
+    def __init__(self, problem: Problem, members: MemberPairs | ChromaticPairs | None = None) -> None:
         """Compute the rows of constraints and pairs."""
         self.problem = problem
         self._members = members
@@ -141,6 +142,8 @@ class FilterProgram:
         fixed = np.delete(imager.smooth(self.base[None, None])[0], channel, axis=2)
         noise = self._noise(imager) if self.noisy else None
         for name, (a, b) in self.problem.pairs.items():
+            if self.problem.quantities[name].apart == "chromatic":  # their pairs are members of the program
+                continue
             first, second = setup.members[a], setup.members[b]
             apart = gain[:, first, None] - gain[:, None, second]
             squares = (fixed[:, first, None] - fixed[:, None, second]) ** 2

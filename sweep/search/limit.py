@@ -22,6 +22,7 @@ from ..base.types import FloatArray
 from ..camera.exposure import may_be_brightest
 from ..camera.pixel import unquantized
 from ..metrics.bound import FEASIBLE, Bound
+from ..metrics.chromatic import smooth_chromatic
 from ..metrics.columns.sensitivity import SENSITIVITY
 from ..metrics.evaluate import designed_quantities
 from ..metrics.objective import Objective
@@ -34,6 +35,7 @@ from .problem import Problem
 
 if TYPE_CHECKING:
     from .any_height import AnyHeight
+    from .chromatic_pairs import ChromaticPairs
     from .filter_program import FilterProgram
     from .member_pairs import MemberPairs
     from .sides import Proof
@@ -47,6 +49,10 @@ _PROOF_TOLERANCE = 1e-9
 _NOT_LINEAR = "is not linear in the filter"
 _SHARES = (0.0, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5)
 """How far a solver's filter is moved toward one that is inside, to make up for the solver's tolerance."""
+
+
+_DISTANCES = {DN: smooth_csd, "noise": smooth_detectability, "chromatic": smooth_chromatic}
+"""Smallest distance of the smooth response, by `Quantity.apart`."""
 
 
 @dataclass(frozen=True)
@@ -116,8 +122,7 @@ def limit_of(
     heights = _any_height_of(relaxed) if relaxed.setup.all_heights else None
     distances = any(relaxed.quantities[name].apart for name in relaxed.objective.weights)
     tolerance = tolerance_dn if distances else _SENSITIVITY_TOLERANCE
-    over = [n for n in dict.fromkeys((*relaxed.objective.weights, *relaxed.constraints)) if relaxed.worst_distance(n)]
-    members, solved = _members_of(relaxed, over) if over else None, 0
+    members, solved = _members_of(relaxed), 0
     while True:
         relaxed = relaxed if heights is None else heights.problem
         program, proof = _proof(relaxed, members, tolerance, most_programs - solved)
@@ -185,10 +190,18 @@ def gap_between(value: float, proven: float) -> float:
     return 1 - min(value, proven) / proven
 
 
-def _members_of(problem: Problem, over: Sequence[str]) -> MemberPairs:
-    from .member_pairs import MemberPairs  # noqa: PLC0415  (only where lights have a population)
+def _members_of(problem: Problem) -> MemberPairs | ChromaticPairs | None:
+    """Return the pairs of worst cases or of chromatic separations; None if there are none of them."""
+    names = dict.fromkeys((*problem.objective.weights, *problem.constraints))
+    if chromatic := [name for name in names if problem.quantities[name].apart == "chromatic"]:
+        from .chromatic_pairs import ChromaticPairs  # noqa: PLC0415  (only for chromatic separations)
 
-    return MemberPairs(problem, over)
+        return ChromaticPairs(problem, chromatic)
+    if over := [name for name in names if problem.worst_distance(name)]:
+        from .member_pairs import MemberPairs  # noqa: PLC0415  (only where lights have a population)
+
+        return MemberPairs(problem, over)
+    return None
 
 
 def _any_height_of(problem: Problem) -> AnyHeight:
@@ -198,7 +211,7 @@ def _any_height_of(problem: Problem) -> AnyHeight:
 
 
 def _proof(
-    problem: Problem, members: MemberPairs | None, tolerance: float, most_programs: int
+    problem: Problem, members: MemberPairs | ChromaticPairs | None, tolerance: float, most_programs: int
 ) -> tuple[FilterProgram, Proof]:
     """Return the linear programs of a problem, and the proof of the bound."""
     from .filter_program import FilterProgram  # noqa: PLC0415  (slow to import: kept off the start-up path)
@@ -214,7 +227,11 @@ def _proof(
 
 
 def _attaining(
-    problem: Problem, curve: FloatArray, members: MemberPairs | None, heights: AnyHeight | None, tolerance: float
+    problem: Problem,
+    curve: FloatArray,
+    members: MemberPairs | ChromaticPairs | None,
+    heights: AnyHeight | None,
+    tolerance: float,
 ) -> tuple[float, FloatArray | None, int]:
     """Return the value of a program's filter in all worst cases, the filter, and the number of further programs.
 
@@ -276,6 +293,10 @@ def reason_without_bound(problem: Problem) -> str | None:
             lambda: bool((family.lower(problem.low, problem.high)[0] < -ROUNDING * base).any()),
             "filters of the box may be below 0",
         ),
+        (
+            lambda: _mixes_chromatic(problem),
+            "of a chromatic separation none is known for these worst cases",
+        ),
         (lambda: _clips(problem), "signals exceed the full well or the range of the ADC"),
         (
             lambda: may_be_brightest(problem.setup, _most_sensitive(problem)),
@@ -283,6 +304,13 @@ def reason_without_bound(problem: Problem) -> str | None:
         ),
     )
     return next((reason for refused, reason in reasons if refused()), None)
+
+
+def _mixes_chromatic(problem: Problem) -> bool:
+    """Return whether a chromatic separation stands beside a worst case, or all field positions count."""
+    names = (*problem.objective.weights, *problem.constraints)
+    chromatic = any(problem.quantities[name].apart == "chromatic" for name in names)
+    return chromatic and (problem.setup.all_heights or any(problem.worst_distance(name) for name in names))
 
 
 def _most_sensitive(problem: Problem) -> float:
@@ -355,7 +383,7 @@ def _clips(problem: Problem) -> bool:
 
 
 def _inside(
-    problem: Problem, curve: FloatArray, inside: FloatArray | None, members: MemberPairs | None
+    problem: Problem, curve: FloatArray, inside: FloatArray | None, members: MemberPairs | ChromaticPairs | None
 ) -> tuple[float, FloatArray]:
     """Return the value of a solver's filter, moved by its tolerance toward a feasible one, and the filter.
 
@@ -380,7 +408,10 @@ def _attained(problem: Problem, curve: FloatArray, over: Mapping[str, float]) ->
     curves = curve[None, None]
     columns = designed_quantities(problem.setup, curves) | {name: np.array([value]) for name, value in over.items()}
     for name in {*problem.objective.weights, *problem.constraints} & problem.pairs.keys():
-        of = smooth_csd if problem.quantities[name].apart == DN else smooth_detectability
+        apart = problem.quantities[name].apart
+        if apart == "chromatic" and name in over:  # over the known brightnesses
+            continue
+        of = _DISTANCES[apart]
         columns[name] = np.minimum(of(problem.setup, curves, problem.pairs[name]), over.get(name, np.inf))
     for name, bound in problem.constraints.items():
         if not bound.violation(columns[name])[0] <= FEASIBLE:

@@ -352,7 +352,8 @@ class Document:
             Sorted by line.
         """
         issues: dict[tuple[KeyPath, str], ValidationIssue] = {}
-        items = error.errors(include_url=False)
+        # A default that follows from other keys is no error of its own where these are wrong.
+        items = [item for item in error.errors(include_url=False) if item["type"] != "default_factory_not_called"]
         schema = model.model_json_schema() if any(item["type"] == "extra_forbidden" for item in items) else {}
         meant = set()
         for item in islice(items, _MOST_LOOKED_AT):

@@ -40,6 +40,12 @@ def check_goals(section: StudySection, sources: Sources, requested: RequestedQua
         Quantities of the study, and the states they are computed for.
     """
     known, rule = quantities_of(requested), section.objective.rule
+    counted = [name for name in section.objective.weights if name in known and known[name].role == "separation"]
+    if counted and not all(scene.equal_photons for scene in section.scenarios.values()):
+        sources.warnings.append(
+            f"{counted[0]} counts how bright a lamp is, where signals differ in photons (`intensity_cd`, `drive`): "
+            f"chromatic_{counted[0].removeprefix('worst_')} does not"
+        )
     stated = sources.document.data.get("objective")
     for name in section.objective.weights:
         path: KeyPath = ("objective", rule.name, name) if isinstance(stated, dict) else ("objective",)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, model_validator
@@ -222,6 +223,12 @@ def _cfas(value: Any) -> Any:
     return {name: {} if tile is None else tile for name, tile in value.items()} if isinstance(value, dict) else value
 
 
+def _default_objective(scenarios: Mapping[str, Scene]) -> Objective:
+    """Return the separation of yellow and red; without the part that is brightness where signals differ in photons."""
+    equal = all(scene.equal_photons for scene in scenarios.values())
+    return Objective(minimum={"csd_yellow_red" if equal else "chromatic_csd_yellow_red": 1.0})
+
+
 class StudySection(Section):
     """A whole study file: YAML 1.2 in UTF-8, without tags.
 
@@ -291,9 +298,10 @@ class StudySection(Section):
     """Own metrics: FILE.py:NAME, or names that installed packages offer; each is a column like any other."""
     effects: Annotated[list[Name], Field(max_length=_MOST_OWN)] = []
     """Own effects on the light: FILE.py:NAME, or names that installed packages offer; always computed."""
-    objective: Objective = Objective(minimum={"csd_yellow_red": 1.0})
+    objective: Objective = Field(default_factory=lambda data: _default_objective(data.get("scenarios", {})))
     """Maximized quantity: a CSD or sensitivity, or several: {minimum: {...}} or {sum: {...}} with weights; or, of
-    errors under noise, made small: {least: {...}}."""
+    errors under noise, made small: {least: {...}}. Left out, csd_yellow_red; chromatic_csd_yellow_red where lamps
+    differ in brightness (`intensity_cd`, `drive`)."""
     constraints: dict[Name, Bound] = {}
     """Quantity -> {min: ...}, {max: ...} or both."""
     search: SearchSection | None = None

@@ -16,6 +16,7 @@ from scipy.stats import norm
 from sweep.camera.accuracy import Accuracy
 from sweep.camera.forward import ForwardModel
 from sweep.camera.linear import linear_model
+from sweep.camera.scene import FixedExposure
 from sweep.camera.setup import Setup
 from sweep.metrics.discrimination import error_bounds
 from sweep.metrics.evaluate import evaluate, family_quantities
@@ -57,6 +58,43 @@ def csd(made: Made, quantity: Quantity) -> list[float]:
 def best_place(made: Made, quantity: Quantity) -> list[float]:
     first, second = (made.setup.members[name] for name in quantity.pair or ())
     return [max(cdist(case[first], case[second]).min() for case in design) for design in made.read]
+
+
+def unlit(made: Made, design: int) -> np.ndarray:
+    """Response of a design to lamps of next to no light, [n_channels]."""
+    dark = {"photon_radiance": 1.0, "exposure": FixedExposure(kind="fixed", exposure_s=made.exposure_s[design])}
+    setup = replace(made.setup, scene=made.setup.scene.model_copy(update=dark))
+    return linear_model(setup).smooth(made.curves[design : design + 1])[0, 0, 0]
+
+
+def of_any_brightness(first: np.ndarray, second: np.ndarray) -> float:
+    """Least distance of two points if one of both may be at any multiple, by least squares."""
+    ends = []
+    for a in first:
+        for b in second:
+            for fixed, scaled in ((a, b), (b, a)):
+                factor = max(np.linalg.lstsq(scaled[:, None], fixed)[0][0], 0.0)
+                ends.append(np.linalg.norm(fixed - factor * scaled))
+    return min(ends)
+
+
+def chromatic(made: Made, quantity: Quantity) -> list[float]:
+    first, second = (made.setup.members[name] for name in quantity.pair or ())
+    lamps = [design - unlit(made, at) for at, design in enumerate(made.read)]
+    return [min(of_any_brightness(case[first], case[second]) for case in design) for design in lamps]
+
+
+def chromatic_in_noise(made: Made, quantity: Quantity) -> list[float]:
+    found = []
+    for at, (m, v, n, w) in enumerate(made.pairs(*(quantity.pair or ("", "")))):
+        dark = unlit(made, at)
+        each = [
+            of_any_brightness((a - dark)[None] / np.sqrt((s + t) / 2), (b - dark)[None] / np.sqrt((s + t) / 2))
+            for a, s in zip(m, v, strict=True)
+            for b, t in zip(n, w, strict=True)
+        ]
+        found.append(min(each))
+    return found
 
 
 def sensitivity(made: Made, _: Quantity) -> list[float]:
@@ -175,6 +213,8 @@ def contrast_detected(made: Made, quantity: Quantity) -> list[float]:
 DEFINITIONS: dict[str, tuple[Callable[[Made, Quantity], list[float]], float]] = {
     "csd": (csd, 1e-12),
     "best_place_csd": (best_place, 1e-12),
+    "chromatic_csd": (chromatic, 1e-9),
+    "chromatic_dprime": (chromatic_in_noise, 1e-9),
     "sensitivity": (sensitivity, 1e-12),
     "cfa_sensitivity": (cfa_sensitivity, 1e-12),
     "slope_per_nm": (slope, 1e-12),

@@ -175,7 +175,7 @@ class Darkest(ReadoutMetric):
     def quantities(self, requested):
         return (Quantity("darkest_dn", "darkest_dn", "weakest signal in its best channel", "DN", wanted="more", ends=("min",)),)
 
-    def of_readout(self, setup, response):
+    def of_readout(self, setup, response, unlit):
         return {"darkest_dn": response.max(axis=2).min(axis=1)}
 '''
 WITH_METRICS = """\

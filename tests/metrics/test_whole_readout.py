@@ -49,7 +49,7 @@ class Darkest(ReadoutMetric):
         """Its column."""
         return (Quantity("darkest_dn", "darkest_dn", "the weakest signal", "DN", wanted="more", ends=("min",)),)
 
-    def of_readout(self, setup: Any, response: np.ndarray) -> Columns:  # noqa: ARG002
+    def of_readout(self, setup: Any, response: np.ndarray, unlit: np.ndarray) -> Columns:  # noqa: ARG002
         """The weakest signal in its best channel."""
         return {"darkest_dn": response.max(axis=2).min(axis=1)}
 

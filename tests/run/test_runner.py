@@ -54,6 +54,8 @@ def test_rows_stand_in_order_with_their_columns(output: Path) -> None:
         *("left_nm", "left_width_nm", "right_nm", "right_width_nm", "depth"),
         *("csd_green_yellow", "csd_green_orange", "csd_green_red"),
         *("csd_yellow_orange", "csd_yellow_red", "csd_orange_red"),
+        *(f"chromatic_csd_{pair}" for pair in ("green_yellow", "green_orange", "green_red")),
+        *(f"chromatic_csd_{pair}" for pair in ("yellow_orange", "yellow_red", "orange_red")),
         *("sensitivity", "cfa_sensitivity", "slope_per_nm", "min_transmission", "exposure_s"),
         *("edge_width_nm", "band_width_nm"),
         *("violation", "limit", "gap", "feasible", "pareto", "plan", "promised_dn", "status"),

@@ -118,7 +118,9 @@ def test_the_measured_study_loads() -> None:
             "sensitivity: {min: 0.9}",
             "sensitivty: {min: 0.9}",
             "tiny.yaml:19: constraints.sensitivty: unknown quantity (got 'sensitivty'); allowed: csd_green_yellow, "
-            "csd_green_orange, csd_green_red, csd_yellow_orange, csd_yellow_red, csd_orange_red, sensitivity, cfa_sensitivity, slope_per_nm, min_transmission, "
+            "csd_green_orange, csd_green_red, csd_yellow_orange, csd_yellow_red, csd_orange_red, "
+            "chromatic_csd_green_yellow, chromatic_csd_green_orange, chromatic_csd_green_red, chromatic_csd_yellow_orange, "
+            "chromatic_csd_yellow_red, chromatic_csd_orange_red, sensitivity, cfa_sensitivity, slope_per_nm, min_transmission, "
             "edge_width_nm, band_width_nm; did you mean 'sensitivity'?",
         ),
         (

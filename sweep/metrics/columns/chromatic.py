@@ -27,8 +27,8 @@ class ChromaticSeparation(ReadoutMetric):
                 name=pair_name(CHROMATIC_CSD, pair),
                 metric=CHROMATIC_CSD,
                 meaning="chromatic separation: the distance of the two nearest lights of two types if either may have "
-                "any brightness, min(|y1|, |y2|) sin(angle) of their responses less the black level; light of the "
-                "background counts as theirs",
+                "any brightness, min(|y1|, |y2|) sin(angle) of their responses less those without lamps (black level, "
+                "dark current, background)",
                 unit=DN,
                 label=f"chromatic {pair[0]}/{pair[1]} CSD",
                 digits=1,
@@ -43,9 +43,10 @@ class ChromaticSeparation(ReadoutMetric):
             for pair in class_pairs(requested.classes)
         )
 
-    def of_readout(self, setup: Setup, response: FloatArray) -> Columns:
+    def of_readout(self, setup: Setup, response: FloatArray, unlit: FloatArray) -> Columns:
         """Compute the columns; see `chromatic.chromatic_separations`."""
-        return {pair_name(CHROMATIC_CSD, pair): dn for pair, dn in chromatic_separations(setup, response).items()}
+        distances = chromatic_separations(response - unlit[:, None], setup.members)
+        return {pair_name(CHROMATIC_CSD, pair): distance_dn for pair, distance_dn in distances.items()}
 
 
 class ChromaticDetectability(NoiseMetric):
@@ -78,7 +79,7 @@ class ChromaticDetectability(NoiseMetric):
     ) -> Columns:
         """Compute the columns from mean and variance of the digital numbers."""
         shape = (-1, *read.mean.shape[2:])
-        mean = (read.mean - imager.readout.pixel.offset_dn).reshape(shape)
+        mean = (read.mean - imager.unlit(curves, read.exposure_s)[:, :, None]).reshape(shape)
         variance = read.variance.reshape(shape)
         return {
             pair_name(CHROMATIC_DPRIME, (a, b)): noise_referred(mean, variance, members[a], members[b])

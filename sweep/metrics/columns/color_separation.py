@@ -68,6 +68,6 @@ class ColorSeparation(ReadoutMetric):
         ]
         return (*nearest, *best) if requested.any_place else tuple(nearest)
 
-    def of_readout(self, setup: Setup, response: FloatArray) -> Columns:
+    def of_readout(self, setup: Setup, response: FloatArray, unlit: FloatArray) -> Columns:
         """Compute the columns; see `separation.separations`."""
         return {csd_name(pair): distances for pair, distances in separations(response, setup.members).items()}

@@ -1,0 +1,152 @@
+"""The chromatic separation against brute force over the brightness, and its upper bound against filters."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sweep.camera.forward import ForwardModel
+from sweep.camera.linear import linear_model
+from sweep.metrics.bound import FEASIBLE
+from sweep.metrics.chromatic import chromatic_separation, chromatic_separations, smooth_chromatic, squared_distance
+from sweep.metrics.evaluate import evaluate
+from sweep.metrics.smooth import SmoothDesign
+from sweep.search.limit import limit_of, reason_without_bound
+from sweep.study.load import load_study
+
+from ..hard.scenes import FAMILY, scene
+
+STUDIES = Path(__file__).parents[2] / "studies"
+PAIR = ("yellow", "red")
+
+
+def least_over_brightness(fixed: np.ndarray, scaled: np.ndarray) -> np.ndarray:
+    """Least |fixed - a scaled| over a from 0 to a million, by golden sections of a convex function."""
+    golden = (np.sqrt(5) - 1) / 2
+    low, high = np.zeros(len(fixed)), np.full(len(fixed), 1e6)
+    for _ in range(120):
+        one, other = high - golden * (high - low), low + golden * (high - low)
+        distances = [np.linalg.norm(fixed - a[:, None] * scaled, axis=1) for a in (one, other)]
+        low, high = np.where(distances[0] < distances[1], [low, other], [one, high])
+    return np.linalg.norm(fixed - ((low + high) / 2)[:, None] * scaled, axis=1)
+
+
+@pytest.mark.parametrize("channels", [2, 3, 4])
+def test_distance_equals_brute_force_over_brightness(channels: int) -> None:
+    rng = np.random.default_rng(channels)
+    first, second = (rng.uniform(-100, 4000, (10_000, channels)) for _ in PAIR)
+    second[:3000] = first[:3000] * rng.uniform(0.2, 5, (3000, 1)) + rng.normal(0, 20, (3000, channels))
+    expected = np.minimum(least_over_brightness(first, second), least_over_brightness(second, first))
+    np.testing.assert_allclose(np.sqrt(squared_distance(first, second)), expected, rtol=1e-9, atol=1e-6)
+
+
+def test_compiled_distances_equal_those_of_numpy() -> None:
+    response = np.random.default_rng(5).uniform(0, 4000, (100, 9, 3))
+    response[3, :4] = 0.0
+    members = {"a": np.arange(3), "b": np.arange(3, 7), "c": np.arange(7, 9)}
+    for (a, b), distances in chromatic_separations(response, members).items():
+        np.testing.assert_array_equal(distances, chromatic_separation(response, members[a], members[b]))
+
+
+def test_an_unknown_response_has_an_unknown_distance() -> None:
+    response = np.array([[[1.0, 2.0], [np.nan, 1.0]], [[0.0, 0.0], [1.0, 1.0]]])
+    distances = chromatic_separation(response, np.array([0]), np.array([1]))
+    assert np.isnan(distances[0])
+    assert distances[1] == 0.0
+
+
+def test_background_and_brightness_do_not_count() -> None:
+    """A lamp of another intensity before another background changes no distance but by the dimmer one of both."""
+    keys = {"exposure": {"kind": "fixed", "exposure_s": 1e-4}, "photon_radiance": 1e17}
+    curves = FAMILY.curves(np.array([[612.0, 6.0, 651.0, 6.0, 1.0]]))
+    dark, bright = (scene("chart", "RYNCy", keys | {"background_cd_m2": cd}).setup for cd in (0.0, 300.0))
+    distances = [smooth_chromatic(setup, curves, PAIR)[0] for setup in (dark, bright)]
+    assert distances[0] == pytest.approx(distances[1], rel=1e-9)
+    doubled = replace(dark, scene=dark.scene.model_copy(update={"photon_radiance": 2e17}))
+    assert smooth_chromatic(doubled, curves, PAIR)[0] == pytest.approx(2 * distances[0], rel=1e-12)
+
+
+def test_derivative_equals_that_of_the_rejection_by_complex_step() -> None:
+    """|y1|^2 - (y1 y2)^2 / |y2|^2 of the responses to complex filters; the smaller of both orders."""
+    setup = scene("chart", "RYNCy", {"background_cd_m2": 100.0}).setup
+    model, x, span = (
+        linear_model(setup),
+        np.array([612.0, 8.0, 645.0, 9.0, 0.9]),
+        np.array([30.0, 10.0, 30.0, 10.0, 0.5]),
+    )
+    design = SmoothDesign(model, FAMILY, x, np.arange(5), span)
+    y, by_u = design.lamps
+    members = setup.members
+    from sweep.metrics.chromatic import chromatic_rows
+
+    rows = chromatic_rows(design, pairs=(PAIR,), noise=False)
+    for at in range(5):
+        along = y[0] + 1j * 1e-30 * by_u[at, 0]
+        a, b = along[members["yellow"]][:, None], along[members["red"]][None]
+        dot = (a * b).sum(axis=-1)
+        orders = [((u**2).sum(axis=-1) - dot**2 / (v**2).sum(axis=-1)) for u, v in ((b, a), (a, b))]
+        expected = np.concatenate([order.ravel() for order in orders])
+        np.testing.assert_allclose(rows.values, expected.real, rtol=1e-9)
+        slope = expected.imag / 1e-30
+        np.testing.assert_allclose(rows.by_u[:, at], slope, rtol=1e-7, atol=1e-9 * np.abs(slope).max())
+
+
+def test_values_of_the_shipped_cfas() -> None:
+    """RGGB 138.1, RCCC 28.0, RCCB 28.0, RYYCy 30.9, RYN4Cy 121.8 DN on the chart, computed from its tables."""
+    study = load_study(STUDIES / "stopband.yaml")
+    for name, expected in {"RGGB": 138.1, "RCCC": 28.0, "RCCB": 28.0, "RYYCy": 30.9, "RYN4Cy": 121.8}.items():
+        (space,) = [space for space in study.spaces if space.name == name]
+        setup = study.setup(space, "chart")
+        columns = evaluate(ForwardModel(setup), space.curves(space.points(0, 1), study.grid.size))
+        assert columns["chromatic_csd_yellow_red"][0] == pytest.approx(expected, abs=0.1)
+        assert columns["chromatic_csd_yellow_red"][0] <= columns["csd_yellow_red"][0] + 1.0
+
+
+def test_no_filter_exceeds_the_upper_bound() -> None:
+    study = load_study(STUDIES / "chromatic.yaml")
+    assert study.search is not None
+    problem = study.problem(study.search)
+    limit = limit_of(problem)
+    assert limit.curve is not None
+    assert limit.attained == pytest.approx(limit.proven, abs=0.01)
+    base = problem.setup.camera.base_qe[0]
+    assert smooth_chromatic(problem.setup, limit.curve[None, None], PAIR)[0] == pytest.approx(limit.attained, rel=1e-9)
+    rng = np.random.default_rng(1)
+    for _ in range(200):
+        dip = 1 - rng.uniform(0, 1) * np.exp(
+            -(((study.grid.nodes_nm - rng.uniform(600, 680)) / rng.uniform(10, 40)) ** 2)
+        )
+        curve = base * np.minimum(dip, 1.0)
+        steep = np.abs(np.diff(curve)).max() / study.grid.step_nm
+        if curve.sum() >= 0.9 * base.sum() and steep <= 0.06 + FEASIBLE:
+            assert smooth_chromatic(problem.setup, curve[None, None], PAIR)[0] <= limit.proven
+
+
+def test_a_worst_case_beside_it_has_no_upper_bound() -> None:
+    changes = {"production": {"edge_shift_nm": 2}, "constraints.worst_csd_yellow_red": {"min": 10}}
+    study = load_study(STUDIES / "chromatic.yaml", changes=changes)
+    assert study.search is not None
+    assert "chromatic" in str(reason_without_bound(study.problem(study.search)))
+
+
+@pytest.mark.parametrize(
+    ("keys", "expected", "warned"),
+    [
+        ({}, "csd_yellow_red", False),
+        ({"intensity_cd": 200, "exposure": {"kind": "fixed", "exposure_s": 1e-4}}, "chromatic_csd_yellow_red", False),
+    ],
+)
+def test_lamps_of_different_photons_are_judged_without_brightness(
+    tmp_path: Path, keys: dict[str, object], expected: str, warned: bool
+) -> None:
+    text = "study: a\nsensor: ar0820\nlights: tl16\ncfas: [RGGB]\n"
+    (tmp_path / "a.yaml").write_text(text)
+    changes = {"scenarios": {"a": keys}}
+    study = load_study(tmp_path / "a.yaml", changes=changes)
+    assert study.objective.column == expected
+    assert bool(study.warnings) == warned
+    asked = load_study(tmp_path / "a.yaml", changes=changes | {"objective": "csd_yellow_red"})
+    assert bool(asked.warnings) == bool(keys)
