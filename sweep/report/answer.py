@@ -18,7 +18,8 @@ from ..study.axes import series_of
 from .lamps import lamp_lines, over_population, robustness_lines
 from .leaders import Leaders, Row, capital, full_name, label, leaders_of, of_reference, upper_bound_beside
 from .noise import usable_lines
-from .series import lead_sentence, leads_of, series_figures
+from .scorecard import score_lines, scorecard
+from .series import lead_sentence, leads_of, series_figures, vanishing_line
 from .terms import (
     angle_note,
     format_constraints,
@@ -66,9 +67,13 @@ def _of_designs(output: Output) -> list[str]:
         return [none, *unknown_lines(output), *largest_separation_elsewhere(output)]
     usable = list(usable_lines(output))
     # Where the question is of noise, separations matter where another CFA begins to lead.
-    series = usable + [lead_sentence(s) for s in series_figures(output) if not usable or len(leads_of(s)) > 1]
+    drawn = series_figures(output)
+    vanishing = [line for line in map(vanishing_line, drawn) if line] if not usable else []
+    series = vanishing + usable + [lead_sentence(s) for s in drawn if not usable or len(leads_of(s)) > 1]
     if series and output.best.empty:
         return series
+    if output.best.empty and (scores := score_lines(scorecard(output))):
+        return [*scores, *_best(output, leaders_of(output))]
     leaders = leaders_of(output)
     lamps = robustness_lines(output, leaders.chosen)
     others = _best_of_other_scenarios(output)

@@ -95,7 +95,13 @@ def usable_lines(output: Output) -> Iterator[str]:
             ranges.setdefault(where, []).append(design)
         if ranges:
             usable = "; ".join(f"{', '.join(designs)} {where}" for where, designs in ranges.items())
-            yield f"Over {name}, noise confuses the worst two states at most {allowed:g} of the time: {usable}."
+            yield f"At most {_rate(allowed)} between the worst two states, over {name}: {usable}."
+
+
+def _rate(allowed: float) -> str:
+    """Return an error probability in words: `1 error in 1,000`."""
+    one_in = round(1 / allowed)
+    return f"1 error in {one_in:,}" if math.isclose(one_in * allowed, 1, rel_tol=1e-9) else f"{allowed:g} errors"
 
 
 def _range(x: FloatArray, usable: BoolArray, unit: str, passes: tuple[float, float] | None) -> str:

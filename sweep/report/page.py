@@ -28,6 +28,7 @@ from .leaders import leaders_of
 from .noise import all_series, recognition_table
 from .page_data import payload
 from .pages import inlined, page, rows, script
+from .price import price_table
 from .scenes import effect_table, scene_groups, scene_table
 from .scorecard import draw_scorecard, scorecard
 from .sensor_map import map_drawings
@@ -111,6 +112,7 @@ def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
         "output": output,
         "study": output.study,
         "card": scorecard(output),
+        "card_first": output.best.empty and not series_first and output.study.tasks is not None,
         "groups": [(group, rows(effect_table(group.effects))) for group in groups],
         "objective": _objective(output),
         "numbers_in": "" if len(output.scenarios) == 1 else f"in {leaders_of(output).scenario}",
@@ -119,6 +121,7 @@ def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
         "answer": answer_sentences(output),
         "first_lines": _FIRST_LEADS if series_first and output.study.recognition is None else _FIRST_LINES,
         "numbers": headline_numbers(output),
+        "price": rows(price_table(output)),
         "counts": counts_line(output),
         "interactive": drawn,
         "profiles": {cfa: rows(profile_table(profiles)) for cfa, profiles in output.profiles.items()},

@@ -136,11 +136,14 @@ def score_lines(card: Scorecard | None) -> list[str]:
     if card is None:
         return []
     marked = [row for row in card.rows if row.best]
-    counts = [
-        f"{name} best in {sum(at in row.best for row in marked)}, worst in {sum(at in row.worst for row in marked)}"
-        for at, name in enumerate(card.names)
+    best = [sum(at in row.best for row in marked) for at in range(len(card.names))]
+    worst = [sum(at in row.worst for row in marked) for at in range(len(card.names))]
+    order = sorted(range(len(card.names)), key=lambda at: (-best[at], worst[at]))
+    counts = "; ".join(f"{card.names[at]} {best[at]} and {worst[at]}" for at in order[1:])
+    return [
+        f"{card.names[order[0]]} is best in {best[order[0]]} of {len(marked)} figures of tasks and worst in "
+        f"{worst[order[0]]}; the others, best and worst: {counts}."
     ]
-    return [f"Elsewhere, over {len(marked)} figures of tasks: {'; '.join(counts)}."]
 
 
 def draw_scorecard(card: Scorecard) -> Figure:

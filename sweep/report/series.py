@@ -230,6 +230,44 @@ def lead_sentence(series: SeriesFigure) -> str:
     return f"{capital(what)} over {quantity_of(series.key)[0]}{among}: {'; '.join(parts)}."
 
 
+def vanishing_line(series: SeriesFigure) -> str:
+    """Return between which numbers of a series a separation falls below 1 DN, for each design.
+
+    Parameters
+    ----------
+    series : SeriesFigure
+        Series.
+
+    Returns
+    -------
+    str
+        Sentence; empty if no design does, or a quantity is not in DN.
+    """
+    what, _, unit = series.y_label.partition(" / ")
+    if unit != DN:
+        return ""
+    name, of = quantity_of(series.key)
+    ranges: dict[str, list[str]] = {}
+    for design, y in series.values.items():
+        below = y < _LEAST_LEAD
+        ends = np.flatnonzero(np.diff(below))
+        if below.all():
+            where = "everywhere"
+        elif not below.any():
+            where = "nowhere"
+        else:
+            where = " and ".join(f"between {series.x[at]:g} and {series.x[at + 1]:g} {of}".rstrip() for at in ends)
+        ranges.setdefault(where, []).append(design)
+    if ranges.keys() == {"nowhere"}:
+        return ""
+    parts = [
+        f"{where} for {'every CFA' if len(designs) == len(series.lines) else ', '.join(designs)}"
+        for where, designs in ranges.items()
+    ]
+    among = f", {series.among}" if series.among else ""
+    return f"{capital(what)} falls below {_LEAST_LEAD:g} {DN} over {name}{among} {'; '.join(parts)}."
+
+
 def leads_of(series: SeriesFigure) -> list[tuple[str | None, int, int]]:
     """Return the leader of each range in order; None where no CFA reaches 1 DN.
 

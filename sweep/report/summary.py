@@ -9,6 +9,7 @@ from ..results.tables import PLAIN
 from ..study.axes import series_of
 from .answer import answer_sentences
 from .leaders import capital, of_reference
+from .price import price_line
 from .scorecard import score_lines, scorecard
 from .tables import comparison_lines, comparison_with_published
 from .terms import assumptions_line
@@ -67,7 +68,7 @@ def summary_lines(output: Output, took_s: float | None = None) -> list[str]:
     for name, geometry in output.study.geometry.items():
         pixels = round(geometry.object_resolution_px, 1)
         lines.append(f"{name}: {geometry.distance_m:g} m, {geometry.fov_deg:g} deg: {pixels:g} px across the light.")
-    lines += score_lines(scorecard(output))
+    lines += [line for line in [price_line(output)] if line] or score_lines(scorecard(output))
     lines += comparison_lines(comparison_with_published(output))
     lines += [counts_line(output), _plan_line(output)]
     if facts.search:

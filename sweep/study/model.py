@@ -21,6 +21,7 @@ from ..designs.space import Space
 from ..designs.technology import Technology
 from ..designs.tolerance import Tolerance
 from ..metrics.bound import Bound
+from ..metrics.columns.tasks import PREFIX
 from ..metrics.objective import Objective, columns_of
 from ..metrics.quantity import Quantity, RequestedQuantities
 from ..metrics.separation import csd_name
@@ -160,7 +161,17 @@ class Study:
         """
         bases = {} if space.filter is None else space.filter.bases
         technology = None if space.filter is None else space.filter.technology
-        return self.setup_of(space.cfa, scenario, bases, technology)
+        setup = self.setup_of(space.cfa, scenario, bases, technology)
+        return replace(setup, tasks=None) if space.kind == "sweep" and not self.has_swept_tasks else setup
+
+    @property
+    def has_swept_tasks(self) -> bool:
+        """True if the columns of tasks are computed for swept designs, too."""
+        tasks = self.section.tasks
+        named = {*self.objective.weights, *self.constraints}
+        return tasks is not None and (
+            tasks.swept or any(self.quantities[name].metric.startswith(PREFIX) for name in named)
+        )
 
     def setup_of(
         self, cfa: str, scenario: str, bases: Mapping[str, str], technology: Technology | None = None

@@ -237,6 +237,9 @@ class TasksSection(Section):
     """Read noise of a pixel, electrons."""
     illuminance_lx: Annotated[float, Field(ge=1e-9, le=1e9)] = 1000.0
     """Light on the charts of `color`; the color matrix of `low_light`, too, weighs the noise of that light."""
+    swept: bool = False
+    """Compute the tasks for swept designs, too, which takes about 1 ms for each; otherwise only for plain CFAs, named
+    designs and the answer of the search, unless objective or constraints name a task."""
 
     @model_validator(mode="after")
     def _some(self) -> TasksSection:

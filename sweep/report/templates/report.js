@@ -405,10 +405,20 @@ function drawSeries(series, box) {
   Plotly.react(box, found, {
     title: {text: plain(series.title), font: {size: 14}}, height: narrow() ? 460 : 420, shapes, hovermode: "x unified",
     margin: {l: 60, r: 10, t: 36, b: 50}, legend: narrow() ? {orientation: "h", y: -0.25} : {tracegroupgap: 2},
-    xaxis: Object.assign({title: {text: plain(series.x_label)}, type: series.log_x ? "log" : "linear"}, grid),
+    xaxis: Object.assign({title: {text: plain(series.x_label)}, type: series.log_x ? "log" : "linear"},
+      series.log_x ? logTicks(series.x) : {}, grid),
     yaxis: Object.assign({title: {text: plain(series.y_label)}, type: series.log_y ? "log" : "linear", exponentformat: "power",
       rangemode: series.from_zero && !series.log_y ? "tozero" : "normal"}, grid),
   }, config);
+}
+
+function logTicks(values) {
+  const low = Math.min(...values), high = Math.max(...values), steps = high / low < 1e4 ? [1, 2, 5] : [1], ticks = [];
+  for (let power = Math.floor(Math.log10(low)); power <= Math.log10(high); power++) {
+    for (const step of steps) ticks.push(Number(`${step}e${power}`));
+  }
+  const shown = ticks.filter((tick) => tick > 0.8 * low && tick < 1.25 * high);
+  return {tickmode: "array", tickvals: shown, ticktext: shown.map((tick) => tick.toLocaleString("en-US", {maximumSignificantDigits: 3}))};
 }
 
 function drawHistory() {
