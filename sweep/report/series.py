@@ -251,21 +251,23 @@ def vanishing_line(series: SeriesFigure) -> str:
     for design, y in series.values.items():
         below = y < _LEAST_LEAD
         ends = np.flatnonzero(np.diff(below))
+        between = [f"{series.x[at]:g} and {series.x[at + 1]:g} {of}".rstrip() for at in ends]
         if below.all():
-            where = "everywhere"
-        elif not below.any():
-            where = "nowhere"
+            where = f"at every {name}"
+        elif len(ends) == 1:
+            where = f"up to between {between[0]}" if below[0] else f"from between {between[0]} on"
         else:
-            where = " and ".join(f"between {series.x[at]:g} and {series.x[at + 1]:g} {of}".rstrip() for at in ends)
-        ranges.setdefault(where, []).append(design)
-    if ranges.keys() == {"nowhere"}:
+            where = f"at {', '.join(f'{x:g}' for x in series.x[below])} {of}".rstrip()
+        if below.any():
+            ranges.setdefault(where, []).append(design)
+    if not ranges:
         return ""
     parts = [
         f"{where} for {'every CFA' if len(designs) == len(series.lines) else ', '.join(designs)}"
         for where, designs in ranges.items()
     ]
     among = f", {series.among}" if series.among else ""
-    return f"{capital(what)} falls below {_LEAST_LEAD:g} {DN} over {name}{among} {'; '.join(parts)}."
+    return f"{capital(what)} over {name}{among} is below {_LEAST_LEAD:g} {DN} {'; '.join(parts)}."
 
 
 def leads_of(series: SeriesFigure) -> list[tuple[str | None, int, int]]:

@@ -9,17 +9,19 @@ import numpy as np
 import pandas as pd
 from scipy.stats import rankdata
 
-from ..base.types import BoolArray, FloatArray
+from ..base.types import BoolArray, FloatArray, IndexArray
 from ..metrics.share import format_share
 from ..results.output import Output
 from ..results.tables import VISION, VISION_CONDITIONS
 from ..vision.scenes import SHUFFLED, UNSEEN, states_of
-from ..vision.scores import Interval, cluster_bootstrap_weights, confusion_matrix, interval_around, mean_of
+from ..vision.scores import Interval, confusion_matrix, interval_of_seeds, mean_of
 from ..vision.section import Vision
 
 OBSERVER, NETWORK, HALF = "observer", "network", "half"
 READER_NAMES = {OBSERVER: "ideal observer", NETWORK: "network", HALF: "network, half of the images"}
 _REFERENCE = "RGGB"
+_FEWEST_RANKED = 5
+"""Designs that a rank correlation between designs needs."""
 PREDICTORS = {
     "csd": "CSD",
     "dprime": "d'",
@@ -81,8 +83,8 @@ class Benchmark:
         return rows.pivot(index=["seed", "image"], columns="name", values="wrong")[self.designs]
 
     @lru_cache  # noqa: B019
-    def weights(self, order: str, lamps: str = UNSEEN) -> FloatArray:
-        """Return the bootstrap weights of the scenes of `wrong`, equal for all designs and readers.
+    def seeds(self, order: str, lamps: str = UNSEEN) -> IndexArray:
+        """Return the seed of each scene of `wrong`.
 
         Parameters
         ----------
@@ -91,11 +93,10 @@ class Benchmark:
 
         Returns
         -------
-        ndarray of shape (draws, n_scenes)
-            Weights.
+        ndarray of int, shape (n_scenes,)
+            Seeds.
         """
-        seeds = self.scenes(order, lamps)["seed"].to_numpy()
-        return cluster_bootstrap_weights(seeds, np.random.default_rng((self.seed, 99)))
+        return np.asarray(self.scenes(order, lamps)["seed"].to_numpy(), dtype=np.intp)
 
     def error(self, design: str, reader: str, order: str, lamps: str = UNSEEN) -> Interval:
         """Return the share of images that were read wrongly.
@@ -110,7 +111,7 @@ class Benchmark:
         Interval
             Share.
         """
-        return mean_of(self.wrong(reader, order, lamps)[design].to_numpy(), self.weights(order, lamps))
+        return mean_of(self.wrong(reader, order, lamps)[design].to_numpy(), self.seeds(order, lamps))
 
     def difference(self, design: str, order: str) -> Interval:
         """Return the error of a design less that of the reference, on the same scenes.
@@ -126,7 +127,7 @@ class Benchmark:
             Difference.
         """
         wrong = self.wrong(self.main_reader, order)
-        return mean_of((wrong[design] - wrong[self.reference]).to_numpy(), self.weights(order))
+        return mean_of((wrong[design] - wrong[self.reference]).to_numpy(), self.seeds(order))
 
     def scenes(self, order: str, lamps: str = UNSEEN) -> pd.DataFrame:
         """Return the scenes of `wrong` in the same order.
@@ -248,7 +249,7 @@ class Ranks:
 
 @lru_cache(maxsize=4)
 def ranks_of(benchmark: Benchmark) -> Ranks:
-    """Return the rank correlations, lenses in any order; intervals by a bootstrap of scenes in seeds.
+    """Return the rank correlations, lenses in any order, with intervals over the seeds.
 
     Parameters
     ----------
@@ -260,11 +261,13 @@ def ranks_of(benchmark: Benchmark) -> Ranks:
     Ranks
         Correlations.
     """
-    scenes, weights = benchmark.scenes(SHUFFLED), benchmark.weights(SHUFFLED)
-    weights = np.vstack([np.full(weights.shape[1], 1 / weights.shape[1]), weights])
+    scenes, seeds = benchmark.scenes(SHUFFLED), benchmark.seeds(SHUFFLED)
+    # The first row is of all scenes, then one of each seed.
+    of_seed = seeds == np.unique(seeds)[:, None]
+    weights = np.vstack([np.ones(len(seeds)), of_seed]).astype(float)
     where = list(dict.fromkeys(zip(benchmark.conditions["distance_m"], benchmark.conditions["level"], strict=True)))
     here = np.stack([((scenes["distance_m"] == d) & (scenes["level"] == v)).to_numpy() for d, v in where])
-    # [draws, designs, conditions]; the first draw is the sample itself
+    # [1 + n_seeds, designs, conditions]
     readers = benchmark.readers[:2]
     errors = {reader: _by_condition(benchmark.wrong(reader, SHUFFLED), here, weights) for reader in readers}
     table = benchmark.conditions.set_index(["name", "distance_m", "level"])
@@ -277,10 +280,12 @@ def ranks_of(benchmark: Benchmark) -> Ranks:
             continue
         sign = -1.0 if name in _FALLS else 1.0
         flat = _spearman(sign * given.reshape(len(given), -1), wrong_shares.reshape(len(wrong_shares), -1))
-        everywhere[name] = interval_around(float(flat[0]), flat[1:])
+        everywhere[name] = interval_of_seeds(float(flat[0]), flat[1:])
+        if len(benchmark.designs) < _FEWEST_RANKED:  # chance alone gives large rank correlations of fewer
+            continue
         at_each = np.stack([_spearman(sign * given[:, :, at], wrong_shares[:, :, at]) for at in range(len(where))])
         mean = np.ma.masked_invalid(at_each).mean(axis=0).filled(np.nan)
-        between[name] = interval_around(float(mean[0]), mean[1:])
+        between[name] = interval_of_seeds(float(mean[0]), mean[1:])
     conditions = pd.DataFrame(
         [{"design": d, "distance_m": m, "level": level} for d in benchmark.designs for m, level in where]
     )
@@ -291,7 +296,7 @@ def ranks_of(benchmark: Benchmark) -> Ranks:
 
 
 def _by_condition(wrong: pd.DataFrame, here: BoolArray, weights: FloatArray) -> FloatArray:
-    """Return errors, ndarray of shape (draws, designs, conditions); NaN where a draw has no scene of a condition."""
+    """Return errors, ndarray of shape (n_rows, designs, conditions); NaN where a row has no scene of a condition."""
     values = wrong.to_numpy(dtype=float)
     errors = np.full((len(weights), values.shape[1], len(here)), np.nan)
     for at, scenes in enumerate(here):

@@ -152,7 +152,7 @@ def _ranks_table(ranks: Ranks) -> pd.DataFrame:
         {
             "predictor": PREDICTORS[name],
             "over designs, distances and levels": format_interval(ranks.everywhere[name]),
-            "between designs at one distance and level": format_interval(ranks.between[name]),
+            "between designs at one distance and level": _between(ranks, name),
         }
         for name in ranks.everywhere
     ]
@@ -231,6 +231,11 @@ def _misread(benchmark: Benchmark, pictures: pd.DataFrame) -> list[tuple[str, ND
     ]
 
 
+def _between(ranks: Ranks, name: str) -> str:
+    """Format the rank correlation of a predictor between designs; a dash for too few designs."""
+    return format_interval(ranks.between[name]) if name in ranks.between else "-"
+
+
 def _draw_errors(conditions: pd.DataFrame, levels: Mapping[str, float], main_reader: str) -> Figure:
     """Draw one panel per level: the error with each design; dashed the ideal observer's."""
     figure, panels = canvas_grid(1, len(levels), 4.2 * len(levels), 4.2)
@@ -262,7 +267,7 @@ def _draw_ranks(ranks: Ranks, levels: Sequence[str], who: str) -> Figure:
                 axes.plot(x, 100 * dots["error"], marker, color=color, markersize=4, label=label, alpha=0.8)
         if name != OBSERVER:
             axes.set_xscale("log" if name == "pair_error" else "symlog")
-        between, everywhere = format_interval(ranks.between[name]), format_interval(ranks.everywhere[name])
+        between, everywhere = _between(ranks, name), format_interval(ranks.everywhere[name])
         title = f"{PREDICTORS[name]}\nrank correlation between CFAs {between}\nover everything {everywhere}"
         axes.set_title(title, fontsize=8)
         axes.set_xlabel(_LABELS[name])

@@ -1,4 +1,4 @@
-"""Scores of answers with intervals: bootstrap over scenes nested in seeds, the same scenes for all designs."""
+"""Scores of answers, with Student's t intervals over the seeds; the scenes are the same for all designs."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import numpy as np
 
 from ..base.types import BoolArray, FloatArray, IndexArray
 
-DRAWS = 1000
 _CONFIDENCE = 0.95
 
 
@@ -26,91 +25,41 @@ class Interval:
         return self.low > 0 or self.high < 0
 
 
-def cluster_bootstrap_weights(groups: IndexArray, rng: np.random.Generator, draws: int = DRAWS) -> FloatArray:
-    """Return weights of scenes in a two-stage bootstrap (seeds, then scenes within), each draw with a sum of 1.
+def interval_of_seeds(value: float, by_seed: FloatArray) -> Interval:
+    """Return a value with Student's t interval from its values in each seed.
 
-    Parameters
-    ----------
-    groups : ndarray of int, shape (n,)
-        Seed of each scene.
-    rng : numpy.random.Generator
-        Source of random numbers.
-    draws : int
-        Samples.
-
-    Returns
-    -------
-    ndarray of shape (draws, n)
-        Weights; each row sums to 1.
-    """
-    names, which = np.unique(groups, return_inverse=True)
-    weights = np.zeros((draws, groups.size))
-    taken = rng.multinomial(len(names), np.full(len(names), 1 / len(names)), size=draws)
-    for number in range(len(names)):
-        of_group = np.flatnonzero(which == number)
-        for draw in range(draws):
-            times = int(taken[draw, number])
-            if times:
-                weights[draw, of_group] = rng.multinomial(
-                    times * of_group.size, np.full(of_group.size, 1 / of_group.size)
-                )
-    return np.asarray(weights / weights.sum(axis=1, keepdims=True), dtype=float)
-
-
-def interval(value: float, samples: FloatArray) -> Interval:
-    """Return the percentile interval of bootstrap samples.
+    Seeds are independent: each has scenes, and networks, of its own.
 
     Parameters
     ----------
     value : float
-        Value.
-    samples : ndarray of shape (draws,)
-        Samples; those that are not finite are left out.
+        Value over all seeds.
+    by_seed : ndarray of shape (n_seeds,)
+        Value in each seed; those that are not finite are left out.
 
     Returns
     -------
     Interval
-        Interval.
+        Interval; NaN from fewer than two seeds.
     """
-    known = samples[np.isfinite(samples)]
-    if not known.size:
+    from scipy.special import stdtrit  # noqa: PLC0415  (slow to import)
+
+    known = by_seed[np.isfinite(by_seed)]
+    if known.size < 2:
         return Interval(value, np.nan, np.nan)
-    low, high = np.quantile(known, [(1 - _CONFIDENCE) / 2, (1 + _CONFIDENCE) / 2])
-    return Interval(value, float(low), float(high))
+    reach = stdtrit(known.size - 1, (1 + _CONFIDENCE) / 2) * known.std(ddof=1) / np.sqrt(known.size)
+    return Interval(value, float(value - reach), float(value + reach))
 
 
-def interval_around(value: float, samples: FloatArray) -> Interval:
-    """Return a value and 1.96 standard deviations of its bootstrap samples on either side.
-
-    For rank correlations: scatter in the samples makes these smaller than the value itself, so that their percentiles
-    may lie below it.
-
-    Parameters
-    ----------
-    value : float
-        Value.
-    samples : ndarray of shape (draws,)
-        Samples.
-
-    Returns
-    -------
-    Interval
-        Interval.
-    """
-    known = samples[np.isfinite(samples)]
-    reach = 1.96 * float(known.std()) if known.size else np.nan
-    return Interval(value, max(value - reach, -1.0), min(value + reach, 1.0))
-
-
-def mean_of(values: FloatArray | BoolArray, weights: FloatArray) -> Interval:
+def mean_of(values: FloatArray | BoolArray, seeds: IndexArray) -> Interval:
     """Return the mean of one value per scene.
 
     Parameters
     ----------
     values : ndarray of shape (n,)
         Values.
-    weights : ndarray of shape (draws, n)
-        Result of `cluster_bootstrap_weights`.
+    seeds : ndarray of int, shape (n,)
+        Seed of each scene; all have equally many.
 
     Returns
     -------
@@ -118,7 +67,8 @@ def mean_of(values: FloatArray | BoolArray, weights: FloatArray) -> Interval:
         Mean.
     """
     numbers = np.asarray(values, dtype=float)
-    return interval(float(numbers.mean()), weights @ numbers)
+    by_seed = np.array([numbers[seeds == seed].mean() for seed in np.unique(seeds)])
+    return interval_of_seeds(float(numbers.mean()), by_seed)
 
 
 def confusion_matrix(truth: IndexArray, answered: IndexArray, n_states: int) -> IndexArray:

@@ -228,10 +228,10 @@ DEFINITIONS: dict[str, tuple[Callable[[Made, Quantity], list[float]], float]] = 
     "error_bound": (at_least_its_error, 1e-12),
     "state_error": (largest_error, 1e-12),
     "state_error_bound": (at_least_its_error, 1e-12),
-    "cdp": (contrast_detected, 1e-4),
+    "cta": (contrast_detected, 1e-4),
 }
 """Metric -> what it is, written from its definition; and the relative difference that is allowed."""
-ONLY = {"cdp": ("dithered",)}
+ONLY = {"cta": ("dithered",)}
 """Where a definition holds: a contrast needs readouts above the dark."""
 DIM = {"noise": True, "exposure": {"kind": "white_patch", "level": 0.3}}
 DIM_PIXEL = {"read_noise_e": 12, "offset_dn": 200, "prnu": 0.02}

@@ -1,4 +1,4 @@
-"""CDP: only where a study asks, and what it does not see."""
+"""CTA: only where a study asks, and what it does not see."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ TWO = np.array([[612.89, 5.92, 651.18, 6.25, 1.0], [600.0, 20.0, 660.0, 20.0, 0.
 """A stopband that separates well, and one of about half its d'."""
 
 
-def test_cdp_is_near_one_where_d_prime_still_differs() -> None:
+def test_cta_is_near_one_where_d_prime_still_differs() -> None:
     """In a bright scene it is near 1 for filters whose d' differs by more than 1.8 times."""
     study = load_study(STUDIES / "stopband.yaml")
     assert study.search is not None
@@ -28,11 +28,11 @@ def test_cdp_is_near_one_where_d_prime_still_differs() -> None:
     pixel = Pixel(read_noise_e=10, prnu=0.01, offset_dn=168)
     model = ForwardModel(replace(problem.setup, scene=scenario).with_camera(pixel=pixel))
     curves = problem.family.curves(TWO)
-    assert "cdp_yellow_red" not in evaluate(model, curves, ("yellow", "red"))
+    assert "cta_yellow_red" not in evaluate(model, curves, ("yellow", "red"))
     found = evaluate(model, curves, ("yellow", "red"), probabilities=True)
     good, poor = found["dprime_yellow_red"]
     assert good > 1.8 * poor
-    assert (found["cdp_yellow_red"] > 0.995).all()
+    assert (found["cta_yellow_red"] > 0.995).all()
     assert not any(name.startswith("csp") for name in found)
 
 

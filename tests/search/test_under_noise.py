@@ -237,10 +237,10 @@ def test_the_filter_of_the_noise_study_equals_the_search_result() -> None:
 def test_search_refuses_quantities_without_smooth_rows(tmp_path: Path) -> None:
     every = quantities_of(RequestedQuantities(STATES, STATES, probabilities=True, vision=True))
     without = [q.name for q in every.values() if q.ends and q.smooth is None]
-    assert {q.metric for q in map(every.get, without) if q is not None} == {"cdp"}
+    assert {q.metric for q in map(every.get, without) if q is not None} == {"cta"}
     text = (STUDIES / "stopband.yaml").read_text().replace("search:", "recognition: {probabilities: true}\nsearch:", 1)
     path = tmp_path / "asked.yaml"
-    for name in ("cdp_yellow_red", "cdp_green_red"):
+    for name in ("cta_yellow_red", "cta_green_red"):
         constrained = re.sub(r"^constraints:\n", f"constraints:\n  {name}: {{min: 0.9}}\n", text, flags=re.MULTILINE)
         path.write_text(constrained.replace("level: 0.95}", "level: 0.95}\n    noise: true", 1))
         with pytest.raises(StudyError) as caught:

@@ -86,7 +86,7 @@ def test_the_network_is_never_better_than_the_observer(output: Output, order: st
     benchmark = benchmark_of(output)
     for design in benchmark.designs:
         more = benchmark.wrong(NETWORK, order)[design] - benchmark.wrong(OBSERVER, order)[design]
-        assert mean_of(more.to_numpy(), benchmark.weights(order)).high >= 0
+        assert mean_of(more.to_numpy(), benchmark.seeds(order)).high >= 0
         said = benchmark.answers(design, OBSERVER, order)
         wrong = (said["said"] != said["state"]).to_numpy(dtype=float)
         off = wrong - (1 - said["p"].to_numpy())

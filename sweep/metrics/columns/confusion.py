@@ -20,7 +20,8 @@ CNR, D_PRIME, ERROR, ERROR_BOUND = "cnr", "dprime", "error", "error_bound"
 STATE_ERROR, STATE_ERROR_BOUND = "state_error", "state_error_bound"
 _MEANINGS = {
     CNR: "CSD over the noise along the line of the nearest pair",
-    D_PRIME: "smallest distance in units of the noise (d') over the pairs of two types",
+    D_PRIME: "smallest distance in units of the noise (d') over the pairs of two types: the Mahalanobis distance "
+    "that is discussed for IEEE P2020",
     ERROR: "largest probability that noise turns a signal of one of two types into one of the other, pair by pair",
     ERROR_BOUND: "bound on how often the best rule takes a signal of one of two types for the other, for the worst "
     "signal",

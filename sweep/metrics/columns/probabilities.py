@@ -1,10 +1,10 @@
-"""Contrast detection probability (CDP), discussed for IEEE P2020.
+"""Contrast transfer accuracy (CTA) of IEEE 2020-2024, formerly contrast detection probability (CDP).
 
 The probability that the Weber contrast K of two noisy readouts, bright over dark less 1, is within a share of the
 contrast of their means: P(K (1 - e) <= K measured <= K (1 + e)); Geese, Seger, Paolillo, "Detection probabilities:
 performance prediction for sensors of autonomous vehicles" (Electronic Imaging 2018); Artmann, Geese, Gaede, "Contrast
 detection probability: implementation and use cases" (2019). Here the pedestal is subtracted, noise is Gaussian, e is
-1/2, and the channel with the largest CDP counts.
+1/2, and the channel with the largest CTA counts.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ...spectra.lights import class_pairs, pair_name
 from ..discrimination import NoiseShape
 from ..quantity import Columns, NoiseMetric, Quantity, RequestedQuantities
 
-CDP = "cdp"
+CTA = "cta"
 _MOST = 1e12
 """Contrast to a dark readout of 0."""
 _SHARE = 0.5
@@ -43,8 +43,8 @@ class Probabilities(NoiseMetric):
             return ()
         return tuple(
             Quantity(
-                name=pair_name(CDP, pair),
-                metric=CDP,
+                name=pair_name(CTA, pair),
+                metric=CTA,
                 meaning=_MEANING,
                 pair=pair,
                 wanted="more",
@@ -63,12 +63,12 @@ class Probabilities(NoiseMetric):
         for pair in class_pairs(list(members)):
             pair_members = members[pair[0]], members[pair[1]]
             detected = detection(mean - imager.readout.pixel.offset_dn, variance, *pair_members)
-            columns[pair_name(CDP, pair)] = detected.reshape(read.mean.shape[:2]).min(axis=1)
+            columns[pair_name(CTA, pair)] = detected.reshape(read.mean.shape[:2]).min(axis=1)
         return columns
 
 
 def detection(mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
-    """Return the CDP of the worst two signals of two types in their best channel.
+    """Return the CTA of the worst two signals of two types in their best channel.
 
     If the darker readout is above 0, the contrast of two Gaussians is within its ends if bright - r dark is above 0
     for the lower ratio r and below it for the higher one. Darker readouts below 0 count against it.
