@@ -6,6 +6,7 @@
 # make check                 ruff, mypy --strict
 # make accuracy              run the hard cases, measure what accuracy costs in time, outputs/accuracy/accuracy.html
 # make tables              print the tables of studies/guide/reference.md and outputs/README.md anew
+# make gallery              run every study, draw studies/figures and studies/guide/gallery.md anew (15 minutes)
 # make docs                  build guide and API reference as HTML, outputs/docs/studies/guide/index.html
 # make bench                 measure speed, JSON in outputs/bench
 PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
@@ -23,7 +24,7 @@ unexport PYTHONDONTWRITEBYTECODE
 TESTS := $(ONE_THREAD) $(BIN)/python -m pytest -n logical --dist worksteal
 KERNELS := sweep/base/machine_code.py $(shell grep -rl --include=*.py "machine_code import" sweep)
 
-.PHONY: study report test slow oldest accuracy check tables docs bench clean
+.PHONY: study report test slow oldest accuracy check tables gallery docs bench clean
 .DELETE_ON_ERROR:
 
 study: $(VENV)/.ready$(EXTRA)
@@ -52,6 +53,9 @@ check: $(VENV)/.ready-dev
 
 tables: $(VENV)/.ready-dev
 	$(BIN)/python -m tests.printed
+
+gallery: $(VENV)/.ready-dev
+	$(BIN)/python -m tests.gallery $(ARGS)
 
 docs: $(VENV)/.ready-docs
 	$(BIN)/python -m sphinx -q -W --keep-going -c studies/guide . outputs/docs

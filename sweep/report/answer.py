@@ -19,7 +19,7 @@ from .lamps import lamp_lines, over_population, robustness_lines
 from .leaders import Leaders, Row, capital, full_name, label, leaders_of, of_reference, upper_bound_beside
 from .noise import usable_lines
 from .scorecard import score_lines, scorecard
-from .series import lead_sentence, leads_of, series_figures, vanishing_line
+from .series import lead_sentence, leads_of, series_figures, vanishing_lines
 from .terms import (
     angle_note,
     format_constraints,
@@ -68,7 +68,7 @@ def _of_designs(output: Output) -> list[str]:
     usable = list(usable_lines(output))
     # Where the question is of noise, separations matter where another CFA begins to lead.
     drawn = series_figures(output)
-    vanishing = [line for line in map(vanishing_line, drawn) if line] if not usable else []
+    vanishing = [] if usable else vanishing_lines(drawn)
     series = vanishing + usable + [lead_sentence(s) for s in drawn if not usable or len(leads_of(s)) > 1]
     if series and output.best.empty:
         return series

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -230,44 +230,51 @@ def lead_sentence(series: SeriesFigure) -> str:
     return f"{capital(what)} over {quantity_of(series.key)[0]}{among}: {'; '.join(parts)}."
 
 
-def vanishing_line(series: SeriesFigure) -> str:
-    """Return between which numbers of a series a separation falls below 1 DN, for each design.
+def vanishing_lines(figures: Sequence[SeriesFigure]) -> list[str]:
+    """Return between which numbers separations fall below 1 DN; series in which most designs do come first.
 
     Parameters
     ----------
-    series : SeriesFigure
+    figures : sequence of SeriesFigure
         Series.
 
     Returns
     -------
-    str
-        Sentence; empty if no design does, or a quantity is not in DN.
+    list of str
+        Sentences, only of series in DN in which a design does.
     """
-    what, _, unit = series.y_label.partition(" / ")
-    if unit != DN:
-        return ""
-    name, of = quantity_of(series.key)
+    found = [
+        (sum(map(len, ranges.values())), _vanishing(series, ranges)) for series in figures if (ranges := _below(series))
+    ]
+    return [line for _, line in sorted(found, key=lambda item: -item[0])]
+
+
+def _below(series: SeriesFigure) -> dict[str, list[str]]:
+    """Return designs below 1 DN by the range of numbers, in words."""
     ranges: dict[str, list[str]] = {}
-    for design, y in series.values.items():
+    name, unit = quantity_of(series.key)
+    for design, y in series.values.items() if series.y_label.endswith(f" / {DN}") else ():
         below = y < _LEAST_LEAD
         ends = np.flatnonzero(np.diff(below))
-        between = [f"{series.x[at]:g} and {series.x[at + 1]:g} {of}".rstrip() for at in ends]
+        between = [f"{series.x[at]:g} and {series.x[at + 1]:g} {unit}".rstrip() for at in ends]
         if below.all():
             where = f"at every {name}"
         elif len(ends) == 1:
             where = f"up to between {between[0]}" if below[0] else f"from between {between[0]} on"
         else:
-            where = f"at {', '.join(f'{x:g}' for x in series.x[below])} {of}".rstrip()
+            where = f"at {', '.join(f'{x:g}' for x in series.x[below])} {unit}".rstrip()
         if below.any():
             ranges.setdefault(where, []).append(design)
-    if not ranges:
-        return ""
+    return ranges
+
+
+def _vanishing(series: SeriesFigure, ranges: Mapping[str, list[str]]) -> str:
     parts = [
         f"{where} for {'every CFA' if len(designs) == len(series.lines) else ', '.join(designs)}"
         for where, designs in ranges.items()
     ]
-    among = f", {series.among}" if series.among else ""
-    return f"{capital(what)} over {name}{among} is below {_LEAST_LEAD:g} {DN} {'; '.join(parts)}."
+    what, among = series.y_label.partition(" / ")[0], f", {series.among}," if series.among else ""
+    return f"{capital(what)} over {quantity_of(series.key)[0]}{among} is below {_LEAST_LEAD:g} {DN} {'; '.join(parts)}."
 
 
 def leads_of(series: SeriesFigure) -> list[tuple[str | None, int, int]]:

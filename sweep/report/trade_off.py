@@ -27,6 +27,8 @@ _LEAST_RANGE = 1e-3
 _DRAWN_POINTS = 10_000
 _TRACED_NAME = "found by the search"
 _LABEL_BOX = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.0}
+_MARGIN, _LABEL_ROOM = 0.05, 0.2
+"""Shares of the light's range beside the points, and for names on their right."""
 _HEADROOM = 0.15
 """Share of the axis above a point that names need."""
 _LABELS = {
@@ -86,8 +88,8 @@ class TradeOff:
         Constraint on the sensitivity.
     counts : mapping of str to int
         Size of the groups in the whole table.
-    x_range : tuple of float
-        Range that is always shown.
+    fits : bool
+        Both axes are those of the overview: from 0, with room for names.
     """
 
     title: str
@@ -101,7 +103,7 @@ class TradeOff:
     bound: float | None = None
     bound_text: str = ""
     counts: Mapping[str, int] = field(default_factory=dict)
-    x_range: tuple[float, float] | None = None
+    fits: bool = False
 
 
 def pareto_figure(output: Output, scenario: str, cfa: str) -> TradeOff:
@@ -214,7 +216,7 @@ def around_designs(output: Output, scenario: str) -> TradeOff:
         traced=traced,
         limit=limit,
         limit_name=_limit_name(output),
-        x_range=(0.25, 1.0),
+        fits=True,
     )
 
 
@@ -294,8 +296,8 @@ def draw_trade_off(figure: TradeOff) -> Figure:
         style: dict[str, Any] = {"color": COLORS["limit"], "linestyle": "--", "linewidth": 1.5, "zorder": 4}
         axes.plot(limit.x, limit.y, label=figure.limit_name, drawstyle="steps-post", **style)
     low, high = axes.get_xlim()
-    if figure.x_range is not None:
-        low, high = min(low, figure.x_range[0]), max(high, figure.x_range[1])
+    if figure.fits:
+        low, high = low - _MARGIN * (high - low), high + _LABEL_ROOM * (high - low)
         axes.set_ylim(bottom=0)
     axes.set_xlim(low, high)
     heights = sorted(figure.levels.items(), key=lambda item: item[1])

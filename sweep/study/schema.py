@@ -165,7 +165,7 @@ class Recognition(Section):
     error_max: float = Field(default=1e-3, ge=1e-300, lt=0.5)
     """Largest error probability of two states at which a CFA counts as usable."""
     probabilities: bool = False
-    """Add columns of the contrast transfer accuracy (CTA) of IEEE 2020-2024, formerly contrast detection probability."""
+    """Add columns of the contrast transfer accuracy (CTA) of IEEE 2020-2024 (formerly CDP)."""
 
     @model_validator(mode="after")
     def _enough(self) -> Recognition:

@@ -143,13 +143,17 @@ function drawOverview() {
   add("plain", "plain CFAs", {size: 10, symbol: "square", color: color.reference}, true);
   add("named", "named designs", {size: 10, symbol: "diamond", color: color.named}, true);
   add("best", "best of the search", {size: 17, symbol: "star", color: color.best, line: {color: "#000000", width: 1}}, true);
-  let top = 1, right = 1;
-  for (const i of labeled) { top = Math.max(top, y[i]); right = Math.max(right, light[i]); }
+  let top = 1;
+  const shown = [...labeled, ...rowsOf("front", true)].map((i) => light[i]).filter(Number.isFinite);
+  for (const line of [overview.traced, overview.limit]) if (line) shown.push(...line[0]);
+  for (const i of labeled) top = Math.max(top, y[i]);
+  const margin = 0.1 * (Math.max(...shown) - Math.min(...shown)) || 0.1;
+  const left = Math.min(...shown) - margin, right = Math.max(...shown) + margin;
   for (const line of [overview.traced, overview.limit]) if (line) top = Math.max(top, ...line[1]);
   const width = byId("cfas").clientWidth - (narrow() ? 80 : 270), height = narrow() ? 300 : 350;
-  const notes = beside(labeled, rowsOf("front", true), (row) => [light[row] / (1.03 * right) * width, y[row] / (1.1 * top) * height], width);
+  const notes = beside(labeled, rowsOf("front", true), (row) => [(light[row] - left) / (right - left) * width, y[row] / (1.1 * top) * height], width);
   Plotly.react("cfas", found, {
-    xaxis: Object.assign({title: {text: plain(overview.x_label).replace(": ", narrow() ? ":<br>" : ": ")}, range: [0, 1.03 * right]}, grid),
+    xaxis: Object.assign({title: {text: plain(overview.x_label).replace(": ", narrow() ? ":<br>" : ": ")}, range: [left, right]}, grid),
     yaxis: Object.assign({title: {text: plain(overview.y_label)}, range: [0, 1.1 * top]}, grid),
     height: narrow() ? 460 : 440, margin: {l: 60, r: 10, t: 30, b: 50}, hovermode: "closest", plot_bgcolor: "#fff", annotations: notes,
     legend: narrow() ? {orientation: "h", y: -0.3, font: {size: 11}} : {x: 1.01, y: 1, font: {size: 12}},

@@ -1,0 +1,87 @@
+"""The pictures of the studies: `make gallery` runs every study and writes studies/figures and studies/guide/gallery.md."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from PIL import Image
+
+STUDIES = Path(__file__).parent.parent / "studies"
+
+PICTURES = {
+    "stopband": "cfas",
+    "chromatic": "cfas",
+    "freeform": "cfas",
+    "producible": "cfas",
+    "robust": "figures/regions-1",
+    "angle": "figures/places-1",
+    "dual": "cfas",
+    "rccb": "pareto",
+    "balanced": "figures/scorecard",
+    "measured": "cfas",
+    "paper": "cfas",
+    "scorecard": "figures/scorecard",
+    "distance": "figures/series-1",
+    "exposure": "figures/series-1",
+    "fog": "figures/series-1",
+    "night": "figures/series-2",
+    "noise": "figures/series-1",
+    "vision": "figures/vision-ranks",
+}
+"""Study -> picture of its run."""
+OTHERS = {"tiles": ("stopband", "figures/tiles"), "night-scene": ("scorecard", "figures/rendered-2")}
+"""Further picture of the documentation -> study, and picture of its run."""
+ROW = re.compile(r"^\| `(\w+)` \| (.*) \| !\[(.*)\]\(figures/(\w+)\.png\) \| (.*) \|$", re.MULTILINE)
+
+
+def gallery(rows: str) -> str:
+    """Text of the gallery, from the table of `studies/README.md`."""
+    parts = [
+        "# Gallery",
+        "",
+        "**Question: what do the reports of the studies look like?** Each picture is of one run. `make gallery` makes all of them anew.",
+    ]
+    for study, question, caption, picture, finding in ROW.findall(rows):
+        command = "make accuracy" if study == "accuracy" else f"make study NAME={study}"
+        parts += [
+            "",
+            f"## {study}",
+            "",
+            f"{question} `{command}`",
+            "",
+            f"![{caption}](../figures/{picture}.png)",
+            "",
+            finding,
+        ]
+    return "\n".join(parts) + "\n"
+
+
+def copy_picture(source: Path, target: Path) -> None:
+    """Copy a picture, at most 1,200 pixels wide and in 256 colors, a third of its size."""
+    with Image.open(source) as picture:
+        small = picture.convert("RGB")
+        small.thumbnail((1200, 1200), Image.Resampling.LANCZOS)
+        small.quantize(256, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(target, optimize=True)
+
+
+def main() -> None:
+    """Run the studies that are named, or all, and copy their pictures."""
+    wanted = sys.argv[1:] or list(PICTURES)
+    pictures = {study: (study, picture) for study, picture in PICTURES.items()} | OTHERS
+    with TemporaryDirectory() as folder:
+        for study in wanted:
+            command = [Path(sys.executable).with_name("sweep"), "run", STUDIES / f"{study}.yaml", "--output", folder]
+            subprocess.run([*command, "--quiet"], check=True)
+        for name, (study, picture) in pictures.items():
+            if study in wanted:
+                copy_picture(Path(folder) / study / f"{picture}.png", STUDIES / "figures" / f"{name}.png")
+    text = gallery((STUDIES / "README.md").read_text(encoding="utf-8"))
+    (STUDIES / "guide" / "gallery.md").write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
