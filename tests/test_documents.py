@@ -12,6 +12,8 @@ import pytest
 
 from sweep.cli.accuracy import measure_accuracy
 from sweep.metrics.share import format_share
+from sweep.report.price import price_table
+from sweep.results.output import read_output
 from sweep.study import load_study
 
 from .conftest import ROOT, STUDIES, FinishedFolder
@@ -98,17 +100,49 @@ FIGURES_OF_ACCURACY: dict[str, tuple[str, int, str]] = {
     "it is up to 2 DN": ("fast", 0, "it is up to {:.0f} DN"),
 }
 """Figures of the README -> preset of `make accuracy`, digits and form of its largest error of any CSD, rounded up."""
-NO_RESULTS = ("Python 3.11", "cos^4", "EN 12368")
+CHROMATIC = ("RYN4Cy stays below RGGB (122 DN to 138 DN)", "finds 197 DN", "is 226.0 DN")
+"""Figures of the README that `test_the_chromatic_figures_of_the_readme_are_those_of_their_command` compares."""
+NO_RESULTS = ("Python 3.11", "cos^4", "EN 12368", "RYN4Cy", "(`fast`) to seven (`standard`) to 35 (`reference`)")
 """Numbers of the README's prose that are no results."""
 
 
 def test_every_figure_of_the_readme_has_its_command() -> None:
     text = " ".join(prose(README).split())
-    for known in (*FIGURES, *FIGURES_AT_AN_ANGLE, *FIGURES_OF_ACCURACY):
+    for known in (*FIGURES, *FIGURES_AT_AN_ANGLE, *FIGURES_OF_ACCURACY, *CHROMATIC):
         assert known in text
-    for known in (*FIGURES, *FIGURES_AT_AN_ANGLE, *FIGURES_OF_ACCURACY, *NO_RESULTS):
+    for known in (*FIGURES, *FIGURES_AT_AN_ANGLE, *FIGURES_OF_ACCURACY, *CHROMATIC, *NO_RESULTS):
         text = text.replace(known, "")
     assert re.findall(r"\S*\d\S*", text) == []
+
+
+SCENES = re.findall(r"^\| `(\w+)` \| .* \| (.*\d.*) \|$", README, re.MULTILINE)
+"""Studies of the README's table of scenes, and their findings."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "finding"), SCENES)
+def test_figures_of_the_table_of_scenes_are_in_the_output_of_the_study(
+    finished: FinishedFolder, name: str, finding: str
+) -> None:
+    output = finished(name).with_name(f"{name}.said.txt").read_text()
+    for figure in re.findall(r"\w[\w ]*? \d[\d.]* DN|\d[\d.]* (?:m|e)\b|\d+ of \d+ figures", finding):
+        assert figure in output, figure
+
+
+def test_the_price_in_the_readme_is_that_of_a_run(finished: FinishedFolder) -> None:
+    table = price_table(read_output(finished("stopband")))
+    printed = [f"| {' | '.join(row)} |" for row in table.astype(str).to_numpy().tolist()]
+    assert [line for line in README.splitlines() if line.endswith(("| gain |", "| loss |"))] == printed
+
+
+@pytest.mark.slow
+def test_the_chromatic_figures_of_the_readme_are_those_of_their_command(finished: FinishedFolder) -> None:
+    table = pd.read_parquet(finished("chromatic") / "results.parquet").set_index("name")
+    column, limit = table["chromatic_csd_yellow_red"], table["limit"].max()
+    text = " ".join(README.split())
+    assert f"RYN4Cy stays below RGGB ({column['RYN4Cy']:.0f} DN to {column['RGGB']:.0f} DN)" in text
+    assert f"finds {column['best chromatic stopband']:.0f} DN; " in text
+    assert f"in that pixel is {math.ceil(10 * limit) / 10} DN." in text
 
 
 @pytest.mark.parametrize("said", list(FIGURES))

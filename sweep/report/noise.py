@@ -44,7 +44,8 @@ def all_series(output: Output) -> list[SeriesFigure]:
     list of SeriesFigure
         Figures.
     """
-    return [*_noise_figures(output), *series_figures(output)]
+    figures = [*_noise_figures(output), *series_figures(output)]
+    return sorted(figures, key=lambda figure: figure.note == _COUNTED)  # accuracies of drawn patches last
 
 
 def _noise_figures(output: Output) -> Iterator[SeriesFigure]:

@@ -38,6 +38,8 @@ from .tables import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
 from .terms import format_constraints, term_definitions
 from .trade_off import draw_trade_off, overview_figure, pareto_figure, traded_cfas
 
+_MOST_SERIES = 3
+"""Figures over scenarios that the page shows unfolded."""
 _FIRST_LINES, _FIRST_LEADS = 1, 2
 """Lines of the answer above the first plot, and where that says who leads where; the others stand below it."""
 _SHOWN = {
@@ -117,6 +119,7 @@ def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
         "objective": _objective(output),
         "numbers_in": "" if len(output.scenarios) == 1 else f"in {leaders_of(output).scenario}",
         "series_first": series_first,
+        "most_series": _MOST_SERIES,
         "terms_first": series_first and drawn["series"][0]["y_label"] == output.trade_off[0].axis,
         "answer": answer_sentences(output),
         "first_lines": _FIRST_LEADS if series_first and output.study.recognition is None else _FIRST_LINES,

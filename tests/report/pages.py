@@ -57,6 +57,7 @@ def open_report(browser: Any, folder: Path, width: int) -> Opened:
     page.on("request", lambda request: seen.requests.append(request.url))
     page.goto((folder / "report.html").as_uri())
     page.wait_for_selector("body[data-ready-ms]")
+    page.evaluate("document.querySelectorAll('details.section').forEach((box) => { box.open = true; })")
     if page.locator("#pareto").count():
         page.evaluate("document.getElementById('pareto').scrollIntoView()")
         page.wait_for_function("document.getElementById('pareto').data")

@@ -515,6 +515,24 @@ function listen(id) {
   });
 }
 
+/* Sections below the first screen open at a click on their heading; the plots in them are drawn then. */
+function fold() {
+  for (const heading of document.querySelectorAll("h2")) {
+    if (heading.closest("section.first")) continue;
+    const box = document.createElement("details"), head = document.createElement("summary");
+    box.className = "section";
+    heading.replaceWith(box);
+    head.append(heading);
+    box.append(head);
+    box.addEventListener("toggle", () => {
+      if (box.open && box.contains(byId("cfas"))) drawOverview();
+      if (box.open) box.querySelectorAll(".js-plotly-plot").forEach((plot) => Plotly.Plots.resize(plot));
+    });
+    while (box.nextSibling && !(box.nextSibling.matches && box.nextSibling.matches("h2, :has(> h2)"))) box.append(box.nextSibling);
+  }
+}
+
+fold();
 select("scenario", data.overviews.map((v) => v.scenario), "scenario");
 if (view) {
   select("cfa", [...new Set(data.views.map((v) => v.cfa))], "cfa");
@@ -534,7 +552,10 @@ function printed(box) {
   if (box.id.startsWith("series-")) return {...wide, ...small, height: 270};
   return box.id === "curves" ? {...wide, height: 340} : wide;
 }
+const folded = [];
 function print() {
+  folded.splice(0, folded.length, ...document.querySelectorAll("details:not([open])"));
+  for (const box of folded) box.open = true;
   for (const [box, draw] of drawers) {
     near.unobserve(box);
     draw();
@@ -545,6 +566,7 @@ function print() {
   });
 }
 window.addEventListener("beforeprint", print);
+window.addEventListener("afterprint", () => folded.forEach((box) => { box.open = false; }));
 window.addEventListener("afterprint", () => document.querySelectorAll(".js-plotly-plot").forEach((box) =>
   Plotly.relayout(box, {width: null, height: heights.get(box), autosize: true, "xaxis.title.font.size": null, "yaxis.title.font.size": null})));
 document.body.dataset.readyMs = Math.round(performance.now());
