@@ -139,7 +139,7 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
         yield limits
     yield from unseen_lines(output)
     for row in leaders.others:
-        name = f"the {label(row)} of {row['cfa']}"
+        name = full_name(row)
         if row["kind"] != FOUND:
             same = " that meets the same" if output.constraints else ""
             name = f"the best of {row['cfa']}{same}, {label(row)},"

@@ -124,7 +124,7 @@ def label(row: Row) -> str:
 
 
 def full_name(row: Row) -> str:
-    """Return a design's name for a sentence, with its CFA if it has no name.
+    """Return a design's name for a sentence, with its CFA if the study does not name it.
 
     Parameters
     ----------
@@ -136,9 +136,10 @@ def full_name(row: Row) -> str:
     str
         Text.
     """
-    if row["kind"] in (PLAIN, NAMED):
-        return label(row)
-    return f"the {label(row)} of {row['cfa']}" if row["kind"] == FOUND else f"{label(row)} of {row['cfa']}"
+    name = label(row)
+    if row["kind"] in (PLAIN, NAMED) or (row["kind"] == FOUND and not name.startswith("best ")):
+        return name
+    return f"{'the ' if row['kind'] == FOUND else ''}{name} of {row['cfa']}"
 
 
 def capital(text: str) -> str:

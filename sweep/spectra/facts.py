@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -106,10 +107,12 @@ class Facts:
 
     @property
     def is_likely_qe(self) -> bool:
-        """True if at least half of the curves are as broad as a pixel's, and none exceeds 100 %."""
+        """True if most names say QE, or if half of the curves are as broad as a pixel's and none exceeds 100 %."""
         lit = [curve for curve in self.curves if curve.peak > 0]
         broad = sum(curve.width_nm >= _BROAD_NM for curve in lit)
-        return bool(lit) and 2 * broad >= len(lit) and max(curve.peak for curve in lit) <= _PERCENT
+        named = sum("qe" in re.split(r"[\W_]+", curve.name.casefold()) for curve in lit)
+        fits = 2 * broad >= len(lit) and max((curve.peak for curve in lit), default=0.0) <= _PERCENT
+        return bool(lit) and (2 * named > len(lit) or fits)
 
     def colors(self, quantity: LightUnit) -> Mapping[str, LightColor | None]:
         """Return the color of each curve read as a light.

@@ -199,6 +199,13 @@ def test_the_command_ends_with_the_picture_or_exit_2(tmp_path: Path) -> None:
     assert "negative value, and " in said
 
 
+def test_curves_that_are_called_qe_are_read_as_qe(tmp_path: Path) -> None:
+    """Also with a peak of a little more than 100 %, as calibrations have."""
+    (tmp_path / "camera.csv").write_text("nm,red_qe,green_qe\n400,5,10\n500,10,100.097\n600,90,40\n700,60,10\n")
+    found = described(tmp_path / "camera.csv", tmp_path)
+    assert any("A guess: QE" in line for line in found.lines)
+
+
 @pytest.mark.parametrize(
     ("file", "guess"),
     [
