@@ -18,6 +18,7 @@ from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
 from . import values as content
 from .figures import COLORS, CURVE_COLORS, TYPE_COLORS
+from .leaders import leaders_of
 from .noise import all_series
 from .series import SeriesFigure
 from .signal_figures import nearest_lights, signals_of
@@ -62,6 +63,7 @@ def payload(output: Output) -> dict[str, Any]:
         "overviews": [
             {"scenario": scenario, **_around(around_designs(output, scenario))} for scenario in output.scenarios
         ],
+        "chosen": _chosen(output, rows),
         "views": list(_views(output, rows)),
         "curves": _curves(output),
         "clouds": _clouds(output, rows),
@@ -79,6 +81,13 @@ def payload(output: Output) -> dict[str, Any]:
         "colors": {"groups": COLORS, "curves": CURVE_COLORS, "types": TYPE_COLORS},
         "folder": shlex.quote(output.folder.as_posix()),
     }
+
+
+def _chosen(output: Output, rows: pd.DataFrame) -> dict[str, int]:
+    """Return the row of the best design of each scenario, as the answer names it."""
+    place = {design: at for at, design in enumerate(rows["design_id"].tolist())}
+    best = {scenario: leaders_of(output, scenario).chosen for scenario in output.scenarios}
+    return {scenario: place[row["design_id"]] for scenario, row in best.items() if row and row["design_id"] in place}
 
 
 def _packed(values: Any, kind: str) -> dict[str, str]:

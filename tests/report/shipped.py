@@ -6,7 +6,21 @@ import pytest
 
 FAST = ("stopband",)
 LONG = ("robust", "noise", "angle")
+SEARCHED = (
+    "stopband",
+    "chromatic",
+    "robust",
+    "angle",
+    "dual",
+    "freeform",
+    "producible",
+    "rccb",
+    "balanced",
+    "measured",
+)
+"""Those with a search."""
 SLOW = (
+    "chromatic",
     "fog",
     "dual",
     "paper",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import re
 from pathlib import Path
 
@@ -15,14 +16,16 @@ from sweep.metrics.columns.sensitivity import cfa_sensitivity_at
 from sweep.metrics.limiting import limiting_lights
 from sweep.report import make_report, read_output
 from sweep.report.answer import answer_sentences, headline_numbers
-from sweep.report.leaders import leaders_of
+from sweep.report.leaders import full_name, leaders_of
+from sweep.report.page_data import payload
 from sweep.report.series import Line, SeriesFigure, lead_sentence
+from sweep.report.trade_off import overview_figure
 from sweep.results.tables import REPORT
 from sweep.study import load_study
 
 from ..build import ran
 from ..conftest import STUDIES, FinishedFolder
-from .shipped import EVERY
+from .shipped import EVERY, SEARCHED
 
 
 def whole(folder: Path) -> pd.DataFrame:
@@ -253,3 +256,18 @@ def test_the_best_of_each_other_cfa_is_named(tmp_path: Path) -> None:
     assert f"filter {best['filter_id']} of {best['cfa']} separates yellow from red by" in said[0]
     told = f"The best of {other['cfa']} that meets the same, filter {other['filter_id']}, separates yellow from red by "
     assert [line for line in said if line.startswith(f"{told}{other['csd_yellow_red']:.0f} DN at ")]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SEARCHED)
+def test_headline_star_and_details_name_one_filter(finished: FinishedFolder, name: str) -> None:
+    """The star is of the search's answer; the page opens with the details of the best design."""
+    output = read_output(finished(name))
+    best, data = leaders_of(output).chosen, payload(output)
+    assert best is not None
+    assert full_name(best) in answer_sentences(output)[0]
+    star = overview_figure(output, output.scenario).groups["best"].labels
+    at = data["chosen"][output.scenario]
+    design_id = np.frombuffer(base64.b64decode(data["design_id"]["bdata"]), "<u4")[at]
+    assert design_id == best["design_id"]
+    assert [text.rpartition(" ")[0].rpartition(" ")[0] for text in star] == [best["name"]]

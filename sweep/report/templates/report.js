@@ -496,7 +496,8 @@ function drawAll() {
   if (view) later("pareto", drawPareto);
   const best = [...rowsOf("best", true), ...rowsOf("front", true).sort((a, b) => y[b] - y[a])];
   const other = ["named", "plain", "feasible", "infeasible"].flatMap((name) => rowsOf(name, true)).sort((a, b) => y[b] - y[a]);
-  const first = [...best, ...other].find((row) => Number.isFinite(y[row]));
+  const chosen = data.chosen[overview.scenario] ?? [];
+  const first = [chosen, best, other].flat().find((row) => Number.isFinite(y[row]));
   if (first !== undefined) choose(first);
   if (!view) return;
   later("parallel-section", drawParallel);
