@@ -146,7 +146,14 @@ def _name_points(axes: Axes, corner: Axes, points: Mapping[str, tuple[float, flo
         if _in_corner(x, y):
             at, line = (0.02, 0.05 + 0.065 * rank), {"arrowstyle": "-", "color": "#999999", "linewidth": 0.5}
             text = corner.annotate(
-                _short(name), (x, y), at, textcoords="axes fraction", fontsize=7, va="center", arrowprops=line
+                _short(name),
+                (x, y),
+                at,
+                textcoords="axes fraction",
+                fontsize=7,
+                va="center",
+                arrowprops=line,
+                bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8},  # lines of lower names pass below it
             )
             rank += 1
         else:
