@@ -33,7 +33,7 @@ class Technology(Section):
     @property
     def description(self) -> str:
         """Text for messages."""
-        return PIGMENT if self.interference is None else f"interference (effective index {self.index:g})"
+        return PIGMENT if self.interference is None else f"interference with effective index {self.index:g}"
 
     @model_serializer
     def _as_written(self) -> str | dict[str, dict[str, float]]:

@@ -116,7 +116,8 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
             yield f"In {leaders.scenario}, no design meets every constraint."
         return
     under, stated = format_constraints(output), technology_of(output, best)
-    who = full_name(best) + ("" if stated is None else f" ({stated.description})")
+    notes = [*([edges] if (edges := _edges(best)) else []), *([] if stated is None else [stated.description])]
+    who = full_name(best) + (f" ({'; '.join(notes)})" if notes else "")
     if best["kind"] in (PLAIN, NAMED):
         who = f"the best {'CFA' if best['kind'] == PLAIN else 'design'} of this study, {who},"
     text = f"With {under}, {who}" if under else capital(who)
@@ -146,20 +147,34 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
         yield f"{capital(name)} {_format_separation(output, row)}{_format_limit(output, row)}."
 
 
+def _edges(best: Row) -> str:
+    """Return the edges of a filter that was swept or found, in words; empty without a left and a right one."""
+    left_nm, right_nm = (float(best.get(name, np.nan)) for name in ("left_nm", "right_nm"))
+    if best["kind"] not in (SWEPT, FOUND) or not np.isfinite([left_nm, right_nm]).all():
+        return ""
+    return f"edges at {left_nm:.0f} and {right_nm:.0f} nm"
+
+
+def _constraints_of_bound(output: Output) -> str:
+    """Return the constraints that the upper bound uses, in words."""
+    search = output.provenance.search
+    if not output.constraints or search is None:
+        return "no constraint"
+    without = [output.words(name) for name in search.limit_left_out]
+    return "the same constraints" + (f" except {' and '.join(without)}" if without else "")
+
+
 def _limits(output: Output, best: Row) -> str:
-    """Return edges of the best filter, limiting lights, and the upper bound for any filter."""
+    """Return limiting lights, and the upper bound for any filter."""
     parts = []
-    left_nm, right_nm = (best.get(name, np.nan) for name in ("left_nm", "right_nm"))
-    if best["kind"] in (SWEPT, FOUND) and np.isfinite([left_nm, right_nm]).all():
-        parts.append(f"Its edges are at {left_nm:.0f} and {right_nm:.0f} nm.")
     if lights := _limited(output, best):
         parts.append(f"The two lights that limit it are {lights}.")
     bound, search = upper_bound_beside(output, best), output.provenance.search
     if bound is not None and search is not None:
         alike = " that moves like it" if is_angle_dependent(output, best) else ""
-        same = "the same constraints" if output.constraints else "no constraint"
+        under = _constraints_of_bound(output)
         parts.append(
-            f"Upper bound for any filter{alike} in {search.channel} of {search.cfa} under {same}"
+            f"Upper bound for any filter{alike} in {search.channel} of {search.cfa} under {under}"
             f"{_in(output, search.scenario)}: {output.trade_off[0].format_bound(bound)} "
             "(proven, before quantization)."
         )
@@ -233,7 +248,7 @@ def largest_separation_elsewhere(output: Output) -> list[str]:
         return []
     if best is not None and not most[separation.name] > best[separation.name]:
         leads = most["design_id"] == best["design_id"] and best["kind"] in (SWEPT, FOUND)
-        return [f"Nothing else in this run {more}{where}."] if leads else []
+        return [f"No CFA, named or swept design {more}{where}."] if leads else []
     figures = f"{separation.formatted(most[separation.name])} at {most[CFA_SENSITIVITY]:.3f} {of_reference(output)}"
     missed = "" if most["kind"] == PLAIN else format_missed_constraints(output, most)  # nothing is asked of a plain CFA
     ending = f", but {missed}" if missed else ""
@@ -331,7 +346,7 @@ def headline_numbers(output: Output) -> list[tuple[str, str, str]]:
     ]
     bound, search = upper_bound_beside(output, best), output.provenance.search
     if bound is not None and search is not None:
-        shown = f"{separation.format_bound(bound)}: proven under the same constraints, before quantization"
+        shown = f"{separation.format_bound(bound)}: proven under {_constraints_of_bound(output)}, before quantization"
         name = f"below the upper bound for any filter in {search.channel} of {search.cfa}"
         numbers.append((separation.formatted(bound - value), name, shown))
     elif best[measure] == best[measure] and separation.unit != DECADES and separation.metric not in (D_PRIME, CNR):

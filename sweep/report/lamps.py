@@ -92,7 +92,7 @@ def _price(output: Output, best: Row, named: list[Row]) -> Iterator[str]:
         lost, gained = 1 - best[nominal.name] / rival[nominal.name], best[worst.name] / rival[worst.name]
         yield (
             f"Its worst case costs {lost:.1%} of the nominal separation ({nominal.formatted(best[nominal.name])}, "
-            f"{rival['name']} {nominal.formatted(rival[nominal.name])}) and gains {gained:.2f} times the worst case of "
+            f"{rival['name']} {nominal.formatted(rival[nominal.name])}) and has {gained:.2f} times the worst case of "
             f"{rival['name']} ({worst.formatted(rival[worst.name])})."
         )
 

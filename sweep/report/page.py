@@ -25,7 +25,7 @@ from .colors import color_drawings
 from .figures import Drawing, draw_curves, pictures_of
 from .lamps import lamp_drawings, lamp_table
 from .leaders import leaders_of
-from .noise import all_series, recognition_table
+from .noise import all_series, recognition_table, usable_lines
 from .page_data import payload
 from .pages import inlined, page, rows, script
 from .price import price_table
@@ -122,7 +122,7 @@ def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
         "most_series": _MOST_SERIES,
         "terms_first": series_first and drawn["series"][0]["y_label"] == output.trade_off[0].axis,
         "answer": answer_sentences(output),
-        "first_lines": _FIRST_LEADS if series_first and output.study.recognition is None else _FIRST_LINES,
+        "first_lines": max(len(list(usable_lines(output))), _FIRST_LEADS if series_first else _FIRST_LINES),
         "numbers": headline_numbers(output),
         "price": rows(price_table(output)),
         "counts": counts_line(output),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -140,10 +141,24 @@ def score_lines(card: Scorecard | None) -> list[str]:
     worst = [sum(at in row.worst for row in marked) for at in range(len(card.names))]
     order = sorted(range(len(card.names)), key=lambda at: (-best[at], worst[at]))
     counts = "; ".join(f"{card.names[at]} {best[at]} and {worst[at]}" for at in order[1:])
+    lines = _against(card, marked)
     return [
         f"{card.names[order[0]]} is best in {best[order[0]]} of {len(marked)} figures of tasks and worst in "
-        f"{worst[order[0]]}; the others, best and worst: {counts}."
+        f"{worst[order[0]]}; the others, best and worst: {counts}.",
+        *lines,
     ]
+
+
+def _against(card: Scorecard, rows: Sequence[ScoreRow]) -> list[str]:
+    """Return how often each other design is better and worse than the reference, in one line."""
+    parts = []
+    for at, name in enumerate(card.names):
+        signs = [np.sign(row.values[at] - row.values[card.reference]) for row in rows]
+        gains = sum(sign == (1 if row.column.wanted == "more" else -1) for sign, row in zip(signs, rows, strict=True))
+        losses = sum(bool(sign) for sign in signs if np.isfinite(sign)) - gains
+        if at != card.reference:
+            parts.append(f"{name} in {gains} and {losses}")
+    return [f"Better and worse than {card.names[card.reference]}: {'; '.join(parts)}."]
 
 
 def draw_scorecard(card: Scorecard) -> Figure:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.types import FloatArray
+from ..base.types import FloatArray, IndexArray
 from ..metrics.quantity import DN
 from ..results.output import Output
 from ..study.axes import series_of
@@ -253,19 +253,29 @@ def _below(series: SeriesFigure) -> dict[str, list[str]]:
     """Return designs below 1 DN by the range of numbers, in words."""
     ranges: dict[str, list[str]] = {}
     name, unit = quantity_of(series.key)
+    article = "an" if name[0] in "aeiou" else "a"
     for design, y in series.values.items() if series.y_label.endswith(f" / {DN}") else ():
         below = y < _LEAST_LEAD
         ends = np.flatnonzero(np.diff(below))
-        between = [f"{series.x[at]:g} and {series.x[at + 1]:g} {unit}".rstrip() for at in ends]
         if below.all():
             where = f"at every {name}"
         elif len(ends) == 1:
-            where = f"up to between {between[0]}" if below[0] else f"from between {between[0]} on"
+            between = f"between {series.x[ends[0]]:g} and {series.x[ends[0] + 1]:g} {unit}".rstrip()
+            where = f"up to {article} {name} {between}" if below[0] else f"from {article} {name} {between} on"
         else:
-            where = f"at {', '.join(f'{x:g}' for x in series.x[below])} {unit}".rstrip()
+            runs = np.split(np.arange(below.size), ends + 1)
+            where = " and ".join(_run(series, run) for run in runs if below[run[0]])
         if below.any():
             ranges.setdefault(where, []).append(design)
     return ranges
+
+
+def _run(series: SeriesFigure, run: IndexArray) -> str:
+    """Return a range of neighboring numbers in words."""
+    first, last = series.at(int(run[0])), series.at(int(run[-1]))
+    if run[0] == 0:
+        return f"up to {last}"
+    return f"from {first} on" if run[-1] == series.x.size - 1 else f"from {first} to {last}"
 
 
 def _vanishing(series: SeriesFigure, ranges: Mapping[str, list[str]]) -> str:
@@ -274,7 +284,7 @@ def _vanishing(series: SeriesFigure, ranges: Mapping[str, list[str]]) -> str:
         for where, designs in ranges.items()
     ]
     what, among = series.y_label.partition(" / ")[0], f", {series.among}," if series.among else ""
-    return f"{capital(what)} over {quantity_of(series.key)[0]}{among} is below {_LEAST_LEAD:g} {DN} {'; '.join(parts)}."
+    return f"{capital(what)}{among} is below {_LEAST_LEAD:g} {DN} {'; '.join(parts)}."
 
 
 def leads_of(series: SeriesFigure) -> list[tuple[str | None, int, int]]:

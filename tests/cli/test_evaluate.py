@@ -171,7 +171,7 @@ def test_a_design_of_a_run_moves_as_it_did_there(finished: FinishedFolder) -> No
     best = table[table["kind"] == "search"].iloc[0]
     found = sweep.evaluate(folder)
     assert found.table["csd_yellow_red"].iloc[-1] == pytest.approx(best["csd_yellow_red"], abs=1e-9)
-    assert "that works by interference (effective index 1.8)" in str(found)
+    assert "that works by interference with effective index 1.8" in str(found)
 
 
 def loaded_by(*requested: object) -> tuple[str, set[str]]:

@@ -30,6 +30,7 @@ class SmallestWidths(FamilyMetric):
                 metric=name,
                 meaning=_MEANINGS[name],
                 unit="nm",
+                label=name.removesuffix("_nm").replace("_", " "),
                 digits=2,
                 wanted="more",
                 ends=("min",),
