@@ -280,12 +280,12 @@ def ranks_of(benchmark: Benchmark) -> Ranks:
             continue
         sign = -1.0 if name in _FALLS else 1.0
         flat = _spearman(sign * given.reshape(len(given), -1), wrong_shares.reshape(len(wrong_shares), -1))
-        everywhere[name] = interval_of_seeds(float(flat[0]), flat[1:])
+        everywhere[name] = interval_of_seeds(float(flat[0]), flat[1:]).within(-1.0, 1.0)
         if len(benchmark.designs) < _FEWEST_RANKED:  # chance alone gives large rank correlations of fewer
             continue
         at_each = np.stack([_spearman(sign * given[:, :, at], wrong_shares[:, :, at]) for at in range(len(where))])
         mean = np.ma.masked_invalid(at_each).mean(axis=0).filled(np.nan)
-        between[name] = interval_of_seeds(float(mean[0]), mean[1:])
+        between[name] = interval_of_seeds(float(mean[0]), mean[1:]).within(-1.0, 1.0)
     conditions = pd.DataFrame(
         [{"design": d, "distance_m": m, "level": level} for d in benchmark.designs for m, level in where]
     )

@@ -24,6 +24,22 @@ class Interval:
         """True if the interval is on one side of 0."""
         return self.low > 0 or self.high < 0
 
+    def within(self, least: float, most: float) -> Interval:
+        """Return the interval cut at the ends of a quantity.
+
+        Parameters
+        ----------
+        least, most : float
+            Ends.
+
+        Returns
+        -------
+        Interval
+            Interval; NaN stays NaN.
+        """
+        low, high = (float(np.clip(end, least, most)) for end in (self.low, self.high))
+        return Interval(self.value, low, high)
+
 
 def interval_of_seeds(value: float, by_seed: FloatArray) -> Interval:
     """Return a value with Student's t interval from its values in each seed.

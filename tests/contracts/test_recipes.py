@@ -60,7 +60,7 @@ class Gray:
     def gradient(self, x):
         return self._base[None, None, :].copy()
 
-    def produced(self, off):
+    def perturbed(self, production_error):
         return self
 
     def start(self, points):

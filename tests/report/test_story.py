@@ -253,7 +253,10 @@ def test_the_best_of_each_other_cfa_is_named(tmp_path: Path) -> None:
     assert len(most) == 2
     other, best = most.iloc[0], most.iloc[1]
     said = answer_sentences(read_output(tmp_path / "out"))
-    assert f"filter {best['filter_id']} of {best['cfa']} separates yellow from red by" in said[0]
+    assert re.search(
+        rf"filter {best['filter_id']} of {best['cfa']} \(edges at \d+ and \d+ nm\) separates yellow from red by",
+        said[0],
+    )
     told = f"The best of {other['cfa']} that meets the same, filter {other['filter_id']}, separates yellow from red by "
     assert [line for line in said if line.startswith(f"{told}{other['csd_yellow_red']:.0f} DN at ")]
 

@@ -211,5 +211,5 @@ def test_the_table_of_the_documentation() -> None:
             found[space.name].append(f"{worst_of_all_places_dn(setups[2], curves[0]):.0f}")
     still = STUDY.problem(STUDY.search)
     limits = limit_of(replace(still, setup=still.setup.with_camera(technologies=()))), limit_of(still)
-    found["limit"] = [f"{limits[0].proven:.0f}", "", f"{limits[1].proven:.0f}"]
+    found["upper bound"] = [f"{limits[0].proven:.0f}", "", f"{limits[1].proven:.0f}"]
     assert printed == found

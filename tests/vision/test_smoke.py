@@ -29,7 +29,7 @@ study: smoke
 sensor: ar0820
 lights: tl16
 pixel: {read_noise_e: 2, offset_dn: 168, well_e: 4000}
-cfas: [RGGB, RCCC]
+cfas: {RGGB: , RCCC: , RCCB: , RYYCy: , BGGR: {tile: [[B, G], [G, R]]}}
 vision:
   fov_deg: 120
   distances_m: [150, 500]
