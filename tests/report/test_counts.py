@@ -77,7 +77,7 @@ def test_a_design_without_a_constrained_figure_is_not_feasible_and_the_figure_is
     assert output.table["violation"].isna().all()
     said = answer_sentences(output)
     assert said[0] == "No design meets every constraint: band width at least 10 nm."
-    assert said[1] == "Designs of free_form have no band_width_nm: unknown is not feasible."
+    assert said[1] == "Designs of free_form have no band width: unknown is not feasible."
     assert ", 0 feasible (every constraint is met)" in counts_line(output)
 
 
