@@ -268,7 +268,7 @@ def test_headline_star_and_details_name_one_filter(finished: FinishedFolder, nam
     output = read_output(finished(name))
     best, data = leaders_of(output).chosen, payload(output)
     assert best is not None
-    assert full_name(best) in answer_sentences(output)[0]
+    assert full_name(best).lower() in answer_sentences(output)[0].lower()
     star = overview_figure(output, output.scenario).groups["best"].labels
     at = data["chosen"][output.scenario]
     design_id = np.frombuffer(base64.b64decode(data["design_id"]["bdata"]), "<u4")[at]
