@@ -192,7 +192,11 @@ def evaluate_curves(study: Study, setup: Setup, curves: FloatArray) -> Columns:
         raise DataError(ValidationIssue("a QE above 1", value=round(float(curves.max()), 6), allowed=allowed))
     requested = study.requested
     values = evaluate(
-        forward_model(setup), curves, requested.states, probabilities=requested.probabilities, own=requested.own
+        forward_model(setup),
+        curves,
+        requested.states,
+        probabilities=requested.probabilities,
+        user_metrics=requested.user_metrics,
     )
     if setup.lights.population is not None and not study.tolerance:
         from ..metrics.members import population_imager  # noqa: PLC0415  (only where lights have a population)
@@ -266,7 +270,7 @@ def any_filter_problem(study: Study, setup: Setup) -> Problem:
         edge_shift_nm=study.tolerance.edge_shift_nm,
         states=study.states,
         thickness=study.tolerance.thickness,
-        own=study.own,
+        user_metrics=study.user_metrics,
         vision=study.images,
     )
 

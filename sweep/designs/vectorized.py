@@ -25,8 +25,8 @@ else:
         def typed(_context: Any, one: Any, other: Any) -> tuple[Any, Any]:
             def code(_target: Any, builder: Any, _signature: Any, args: Any) -> Any:
                 kind = ir.FunctionType(args[0].type, [args[0].type] * 2)
-                own = builder.module.declare_intrinsic(name, [args[0].type], kind)
-                return builder.call(own, args, fastmath=("nnan", "nsz"))
+                intrinsic = builder.module.declare_intrinsic(name, [args[0].type], kind)
+                return builder.call(intrinsic, args, fastmath=("nnan", "nsz"))
 
             both = types.float32 if one == other == types.float32 else types.float64
             return both(both, both), code

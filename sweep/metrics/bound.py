@@ -65,7 +65,10 @@ class Bound(Section):
 
 
 def total_violation(
-    columns: Mapping[str, FloatArray], constraints: Mapping[str, Bound], own: FloatArray, leave_out: Iterable[str] = ()
+    columns: Mapping[str, FloatArray],
+    constraints: Mapping[str, Bound],
+    family_violation: FloatArray,
+    leave_out: Iterable[str] = (),
 ) -> FloatArray:
     """Return the largest violation of each design.
 
@@ -75,7 +78,7 @@ def total_violation(
         Quantities.
     constraints : mapping of str to Bound
         Constraints of the study.
-    own : ndarray of shape (n_designs,)
+    family_violation : ndarray of shape (n_designs,)
         Violation of the family's conditions.
     leave_out : iterable of str
         Quantities that are ignored.
@@ -85,7 +88,7 @@ def total_violation(
     ndarray of shape (n_designs,)
         Relative violation: 0 is feasible; NaN, where a quantity is unknown, is not.
     """
-    worst = own
+    worst = family_violation
     for quantity, bound in constraints.items():
         if quantity not in leave_out:
             worst = np.maximum(worst, bound.violation(columns[quantity]))

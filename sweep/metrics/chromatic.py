@@ -16,12 +16,10 @@ from ..base.types import FloatArray, IndexArray
 from ..camera.linear import linear_model
 from ..camera.setup import Setup
 from ..spectra.lights import Pair, class_pairs
-from .separation import pair_blocks
+from .separation import packed_response, pair_blocks
 from .smooth import Rows, SmoothDesign
 from .tasks.colorimetry import COMPLEX_STEP, Smooth
 
-_MANY, _MOST_CHANNELS = 64, 4
-"""From so many designs of so few channels on, the compiled pass saves more time than it takes to load."""
 _LEAST_VARIANCE = 1e-12
 """Smallest variance that counts, DN^2: a channel without noise fixes the relative brightness."""
 
@@ -111,15 +109,13 @@ def chromatic_separations(response: FloatArray, members: Mapping[str, IndexArray
         Distance, DN.
     """
     pairs = class_pairs(list(members))
-    if len(response) < _MANY or response.shape[2] > _MOST_CHANNELS or not np.isfinite(response).all():
+    packed = packed_response(response, members)
+    if packed is None:
         return {(a, b): chromatic_separation(response, members[a], members[b]) for a, b in pairs}
     from .nearest import nearest_chromatic_squared  # noqa: PLC0415  (compiled: kept off the start-up path)
 
-    order = np.concatenate(list(members.values()))
-    filled = np.zeros((len(response), _MOST_CHANNELS, order.size))
-    filled[:, : response.shape[2]] = np.moveaxis(response[:, order], 1, 2)
     squared = np.empty((len(response), len(pairs)))
-    nearest_chromatic_squared(filled, np.cumsum([0, *map(len, members.values())]), squared)
+    nearest_chromatic_squared(*packed, squared)
     return dict(zip(pairs, np.sqrt(squared.T), strict=True))
 
 

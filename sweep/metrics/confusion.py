@@ -29,7 +29,7 @@ _AT_ONCE = 4096
 _MOST_SUMS = 3e8
 """Additions that a signal's digital numbers may take: a fifth of a second. Sensors of 16 bit and 10^6 e stay below."""
 _MOST_BINS = 1_000_000
-"""Of one pixel: those of 51 signals in four channels take 1.6 GiB."""
+"""Bins of one pixel; those of 51 signals in four channels take 1.6 GiB."""
 
 
 @dataclass(frozen=True)

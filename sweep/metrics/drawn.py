@@ -25,7 +25,7 @@ from .separation import csd_name
 _PARTS, _PARTS_OF_BOTH = 101, 25
 """Equal parts of the range of a tolerance, and of each where there are two; draws are middles of parts."""
 _NEAR = 0.1
-"""Of the draws that may have less: the share of them whose mean is taken."""
+"""Share of the draws that may have less over which the mean is taken."""
 _MISTAKEN = 0.05
 """The chance that fewer than the wanted share of all lamps and cameras reach the stated value of a design."""
 _HELD = 4_000_000

@@ -221,18 +221,20 @@ def _refine_heights(model: ForwardModel, block: Block, cases: Columns, columns: 
             columns[name][design] = least
 
 
-def _whole_readout(model: ForwardModel, own: Sequence[UserMetric], n: int, whole: _Part, unlit: _Part) -> Columns:
+def _whole_readout(
+    model: ForwardModel, user_metrics: Sequence[UserMetric], n: int, whole: _Part, unlit: _Part
+) -> Columns:
     """Return columns of n designs by user metrics and those of `OTHERS`.
 
     `whole`, `unlit`: the readout of a part of the designs, and the response without lamps.
     """
-    if not (own or OTHERS):
+    if not (user_metrics or OTHERS):
         return {}
     setup = model.setup
     # A CFA of which an own metric says nothing says so of one design, and no more are read for it.
-    first = user_quantities(own, setup, whole(slice(0, 1))) if own else {}
+    first = user_quantities(user_metrics, setup, whole(slice(0, 1))) if user_metrics else {}
     columns = {name: np.full(n, values[0]) for name, values in first.items()}
-    present = [metric for metric in own if np.isfinite(first[metric.name][0])]
+    present = [metric for metric in user_metrics if np.isfinite(first[metric.name][0])]
     if present or OTHERS:
         values_per_design = model.n_cases * len(setup.lights.names) * len(setup.camera.mosaic.channels)
         step, parts = max(1, _READ_AT_ONCE // values_per_design), []
@@ -315,7 +317,7 @@ def evaluate(
     states: Sequence[str] = (),
     *,
     probabilities: bool = False,
-    own: Sequence[UserMetric] = (),
+    user_metrics: Sequence[UserMetric] = (),
 ) -> Columns:
     """Evaluate a batch of designs as the camera reads them out.
 
@@ -333,7 +335,7 @@ def evaluate(
         Signal types that noise may confuse.
     probabilities : bool
         Compute their contrast detection probability.
-    own : sequence of UserMetric
+    user_metrics : sequence of UserMetric
         Metrics of user code.
 
     Returns
@@ -341,7 +343,7 @@ def evaluate(
     dict of str to ndarray of shape (n_designs,)
         Column name -> values.
     """
-    block, extra, setup = _block(designs), partial(_whole_readout, model, own), model.setup
+    block, extra, setup = _block(designs), partial(_whole_readout, model, user_metrics), model.setup
     changing = None if states else model.read_changing(block)
     if changing is None:
         cases, columns = _read(model, block, extra, states, probabilities=probabilities)

@@ -15,7 +15,7 @@ from ..spectra.lights import Pair, class_pairs, pair_name
 
 BETWEEN = " / "
 LimitingLights = Mapping[Pair, NDArray[np.object_]]
-"""Of each pair of signal types the two lights that limit its CSD, `one / other`, for each design; None: no distance."""
+"""The two lights `one / other` that limit the CSD of each pair of signal types, for each design; None: no distance."""
 
 
 def limited_by_name(pair: Pair) -> str:

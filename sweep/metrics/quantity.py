@@ -336,7 +336,7 @@ class RequestedQuantities:
         Tasks.
     probabilities, vision : bool
         Contrast detection probability; benchmark of vision.
-    own : tuple of UserMetric
+    user_metrics : tuple of UserMetric
         Metrics of user code.
     brightest : str
         Curve whose light is 1, if there is no clear pixel.
@@ -351,7 +351,7 @@ class RequestedQuantities:
     tasks: tuple[TaskColumns, ...] = ()
     probabilities: bool = False
     vision: bool = False
-    own: tuple[UserMetric, ...] = ()
+    user_metrics: tuple[UserMetric, ...] = ()
     brightest: str = ""
 
 

@@ -111,18 +111,41 @@ def separations(response: FloatArray, members: Mapping[str, IndexArray]) -> dict
     dict of pair to ndarray of shape (n_designs,)
         CSD, DN.
     """
-    n_designs, _, n_channels = response.shape
-    pairs = class_pairs(list(members))
-    if n_designs < _MANY or n_channels > _MOST_CHANNELS or not np.isfinite(response).all():
+    n_designs, pairs = len(response), class_pairs(list(members))
+    packed = packed_response(response, members)
+    if packed is None:
         return {(a, b): separation(response, members[a], members[b]) for a, b in pairs}
     from .nearest import nearest_squared  # noqa: PLC0415  (compiled: kept off the start-up path)
 
-    order = np.concatenate(list(members.values()))
-    filled = np.zeros((n_designs, _MOST_CHANNELS, order.size))
-    filled[:, :n_channels] = np.moveaxis(response[:, order], 1, 2)
     squared = np.empty((n_designs, len(pairs)))
-    nearest_squared(filled, np.cumsum([0, *map(len, members.values())]), squared)
+    nearest_squared(*packed, squared)
     return _distances(squared.T, np.zeros(n_designs, dtype=bool), members, lambda some: response[some])
+
+
+def packed_response(response: FloatArray, members: Mapping[str, IndexArray]) -> tuple[FloatArray, IndexArray] | None:
+    """Return a response in the layout of the compiled kernels.
+
+    Parameters
+    ----------
+    response : ndarray of shape (n_designs, n_signals, n_channels)
+        Readout, DN.
+    members : mapping of str to ndarray of int
+        Signals of each type.
+
+    Returns
+    -------
+    response : ndarray of shape (n_designs, 4, n_signals)
+        One type after the other; missing channels are 0.
+    bounds : ndarray of int, shape (n_types + 1,)
+        Start of each type. None in place of both for few designs, more channels, or values that are not finite.
+    """
+    n_designs, _, n_channels = response.shape
+    if n_designs < _MANY or n_channels > _MOST_CHANNELS or not np.isfinite(response).all():
+        return None
+    order = np.concatenate(list(members.values()))
+    packed = np.zeros((n_designs, _MOST_CHANNELS, order.size))
+    packed[:, :n_channels] = np.moveaxis(response[:, order], 1, 2)
+    return packed, np.cumsum([0, *map(len, members.values())])
 
 
 def separations_along(

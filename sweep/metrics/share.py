@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 _Z = 1.959963984540054
-"""Of a two-sided 95 % interval of a normal distribution."""
+"""Standard deviations to either end of a 95 % interval of a normal distribution."""
 
 _MOST_DIGITS = 10
 _ROUNDING = 1e-12

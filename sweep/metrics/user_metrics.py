@@ -206,7 +206,7 @@ def user_quantities(metrics: Sequence[UserMetric], setup: Setup, response: Float
 
     Parameters
     ----------
-    own : sequence of UserMetric
+    metrics : sequence of UserMetric
         Metrics.
     setup : Setup
         Scene and camera.

@@ -55,8 +55,8 @@ def _row(column: Column, plain: float, best: float) -> tuple[str, str, str, str,
     better = best > plain if column.wanted == "more" else best < plain
     effect = "same" if abs(best / plain - 1) < _SAME else "gain" if better else "loss"
     unit = f" {column.unit}" if column.unit and column.unit != "1" else ""
-    texts = (f"{value:.{_digits(value)}f}{unit}" for value in (plain, best))
-    return (column.words, *texts, f"{best / plain:.2f}", effect)  # type: ignore[return-value]  # two texts
+    one, other = (f"{value:.{_digits(value)}f}{unit}" for value in (plain, best))
+    return column.words, one, other, f"{best / plain:.2f}", effect
 
 
 def _digits(value: float) -> int:

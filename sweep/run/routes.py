@@ -151,12 +151,14 @@ def _columns(space: Space, start: int, setup: Setup, points: FloatArray, rules: 
     model = forward_model(setup, AllPhases if rules.drawn and space.kind in FEW else ForwardModel)
     edges = edges_of(space, start, start + len(points))
     designs = CurveBlock(space.curves(points, size)) if edges is None else edges
-    columns = evaluate(model, designs, requested.states, probabilities=requested.probabilities, own=requested.own)
+    columns = evaluate(
+        model, designs, requested.states, probabilities=requested.probabilities, user_metrics=requested.user_metrics
+    )
     columns |= family_quantities(None if space.filter is None else space.filter.family, points)
     if rules.vision is not None:
         columns |= image_quantities(setup, space.curves(points, size), rules.vision, rules.seed)
     if rules.worst:
-        columns |= worst_cases(space, model, points, columns, rules.worst, rules.tolerance, requested.own)
+        columns |= worst_cases(space, model, points, columns, rules.worst, rules.tolerance, requested.user_metrics)
     if requested.wanted_yield:
         columns |= _of_a_share(space, setup, points, rules)
     if rules.objective.column == COMBINED:
@@ -171,7 +173,7 @@ def worst_cases(
     nominal: Columns,
     worst: Sequence[Quantity],
     tolerance: Tolerance,
-    own: Sequence[UserMetric] = (),
+    user_metrics: Sequence[UserMetric] = (),
 ) -> Columns:
     """Return worst cases over production errors, and of CSDs over the population of the lights, ndarray[n_designs].
 
@@ -186,13 +188,13 @@ def worst_cases(
         Worst cases to compute.
     tolerance : Tolerance
         Production errors.
-    own : sequence of UserMetric
+    user_metrics : sequence of UserMetric
         See `evaluate`.
     """
     setup = model.setup
     errors = [off for off in tolerance.places if any(off)] if space.filter is not None else []
     curves = [space.curves(points, setup.camera.grid.size, off) for off in (AS_DESIGNED, *errors)]
-    cases = [nominal, *(evaluate(model, shifted, own=own) for shifted in curves[1:])]
+    cases = [nominal, *(evaluate(model, shifted, user_metrics=user_metrics) for shifted in curves[1:])]
     if setup.lights.population is not None:
         from ..metrics.members import population_imager  # noqa: PLC0415  (only where lights have a population)
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..base.types import FloatArray, IndexArray
 from ..camera.linear import linear_model
+from .member_pairs import KnownPairs
 from .perturbed import Distances
 from .problem import Problem
 
@@ -22,22 +23,13 @@ _NEARER_DN = 0.001
 
 
 @dataclass(frozen=True)
-class _Known:
+class _Known(KnownPairs):
     """Pairs with a brightness each: case, first and second signal, factors of both responses."""
 
     case: IndexArray
     first: IndexArray
     second: IndexArray
     factors: FloatArray
-
-    def joined(self, others: _Known, some: IndexArray) -> _Known:
-        """Return these and some other pairs."""
-        return _Known(
-            np.concatenate([self.case, others.case[some]]),
-            np.concatenate([self.first, others.first[some]]),
-            np.concatenate([self.second, others.second[some]]),
-            np.concatenate([self.factors, others.factors[some]]),
-        )
 
     def difference(self, values: FloatArray) -> FloatArray:
         """Return first minus second signal, each times its factor, ndarray of shape (n_known, n).
@@ -137,8 +129,8 @@ class ChromaticPairs:
         added = False
         for name in self.names:
             pairs, distance_dn = self._nearest(name, curve)
-            nearer = np.flatnonzero(distance_dn < self.counted(name, curve) - _NEARER_DN)
-            if nearer.size:
+            nearer = distance_dn < self.counted(name, curve) - _NEARER_DN
+            if nearer.any():
                 added, self._known[name] = True, self._known[name].joined(pairs, nearer)
         return added
 

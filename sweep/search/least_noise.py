@@ -18,7 +18,7 @@ from ..base.types import FloatArray
 from ..camera.linear import LinearModel
 
 _ROUNDING = 1e-12
-"""Of the sums over wavelengths, relative."""
+"""Relative rounding error of the sums over wavelengths."""
 
 
 def least_variance(

@@ -8,7 +8,8 @@ determines the members to add: the nearest ones, found exactly, until they are n
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import Self
 
 import numpy as np
 
@@ -23,7 +24,30 @@ _NEARER_DN = 0.01
 
 
 @dataclass(frozen=True)
-class _Known:
+class KnownPairs:
+    """Pairs of lights that the programs know; every field has one row per pair."""
+
+    def joined(self, others: Self, some: BoolArray) -> Self:
+        """Return these and some other pairs.
+
+        Parameters
+        ----------
+        others : KnownPairs
+            Further pairs.
+        some : ndarray of bool
+            Pairs that are added.
+
+        Returns
+        -------
+        KnownPairs
+            All of them.
+        """
+        columns = ((getattr(self, field.name), getattr(others, field.name)) for field in fields(self))
+        return type(self)(*(np.concatenate([known, new[some]]) for known, new in columns))
+
+
+@dataclass(frozen=True)
+class _Known(KnownPairs):
     """Known pairs of members.
 
     Parameters
@@ -42,28 +66,6 @@ class _Known:
     case: IndexArray
     below: IndexArray
     share: FloatArray
-
-    def joined(self, others: _Known, some: BoolArray) -> _Known:
-        """Return these and some other pairs.
-
-        Parameters
-        ----------
-        others : _Known
-            Further pairs.
-        some : ndarray of bool
-            Pairs that are added.
-
-        Returns
-        -------
-        _Known
-            All of them.
-        """
-        return _Known(
-            np.concatenate([self.way, others.way[some]]),
-            np.concatenate([self.case, others.case[some]]),
-            np.concatenate([self.below, others.below[some]]),
-            np.concatenate([self.share, others.share[some]]),
-        )
 
     def difference(self, values: FloatArray) -> FloatArray:
         """Return first minus second member.

@@ -21,7 +21,7 @@ from ..designs.tolerance import AS_DESIGNED
 from .problem import Problem
 
 _LEAST_BASE_TRANSMISSION = 1e-3
-"""Of the base curve: a shape on less is not known from N."""
+"""Smallest transmission of the base curve from which the shape on it is known."""
 _WHOLE = 1e-9
 """Moves are known to this share of a step: rounding."""
 

@@ -40,7 +40,7 @@ class Problem:
         Production tolerances of worst cases.
     states : tuple of str
         Signal types that noise may confuse.
-    own : tuple of UserMetric
+    user_metrics : tuple of UserMetric
         Metrics of user code.
     seed : int
         Seed of random lamps and cameras.
@@ -57,7 +57,7 @@ class Problem:
     edge_shift_nm: float = 0.0
     states: tuple[str, ...] = ()
     thickness: float = 0.0
-    own: tuple[UserMetric, ...] = ()
+    user_metrics: tuple[UserMetric, ...] = ()
     seed: int = 0
     vision: SeededVision | None = None
 
@@ -66,7 +66,7 @@ class Problem:
         """Quantities that objective and constraints may name."""
         tasks = () if self.setup.tasks is None else self.setup.tasks.columns
         requested = RequestedQuantities(
-            self.setup.lights.classes, self.states, edge_shift=True, tasks=tasks, own=self.own
+            self.setup.lights.classes, self.states, edge_shift=True, tasks=tasks, user_metrics=self.user_metrics
         )
         population = self.setup.lights.population
         wanted = 0.0 if population is None else population.wanted_yield or 0.0

@@ -68,7 +68,7 @@ class Study:
     warnings: tuple[str, ...]
     held_out: Lights | None = None
     tasks: StudyTasks | None = None
-    own: tuple[UserMetric, ...] = ()
+    user_metrics: tuple[UserMetric, ...] = ()
     user_effects: tuple[UserEffect, ...] = ()
     plans: Mapping[str, Plan] = field(default_factory=dict)
 
@@ -101,7 +101,7 @@ class Study:
     @property
     def requested(self) -> RequestedQuantities:
         """Quantities that the study asks for of its designs."""
-        made = requested_quantities(self.section, self.lights, self.tasks, self.own)
+        made = requested_quantities(self.section, self.lights, self.tasks, self.user_metrics)
         return replace(made, any_place=self.any_place, brightest=self.sensor.brightest)
 
     @property
@@ -333,7 +333,7 @@ class Study:
             edge_shift_nm=self.tolerance.edge_shift_nm,
             states=self.states,
             thickness=self.tolerance.thickness,
-            own=self.own,
+            user_metrics=self.user_metrics,
             seed=self.section.seed,
             vision=self.images,
         )
@@ -346,7 +346,7 @@ class Study:
 
 
 def requested_quantities(
-    section: StudySection, lights: Lights, tasks: StudyTasks | None, own: tuple[UserMetric, ...]
+    section: StudySection, lights: Lights, tasks: StudyTasks | None, user_metrics: tuple[UserMetric, ...]
 ) -> RequestedQuantities:
     """Return the quantities that a study computes, as far as its lights and tasks determine them.
 
@@ -358,7 +358,7 @@ def requested_quantities(
         Lights of the study.
     tasks : StudyTasks or None
         Tasks of the study.
-    own : tuple of UserMetric
+    user_metrics : tuple of UserMetric
         Metrics of the user.
 
     Returns
@@ -376,7 +376,7 @@ def requested_quantities(
         wanted_yield=section.wanted_yield,
         tasks=() if tasks is None else tasks.columns,
         vision=section.vision is not None,
-        own=own,
+        user_metrics=user_metrics,
     )
 
 

@@ -105,7 +105,7 @@ def resolve(section: StudySection, sources: Sources) -> Study:
         warnings=tuple(sources.warnings),
         held_out=held_out,
         tasks=tasks,
-        own=metrics or (),
+        user_metrics=metrics or (),
         user_effects=effects or (),
     )
     for check in (checks.check_size, try_effects, try_metrics, check_range, checks.check_count):

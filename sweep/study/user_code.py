@@ -194,7 +194,7 @@ def user_metrics(section: StudySection, sources: Sources) -> tuple[UserMetric, .
 
     Returns
     -------
-    tuple of OwnMetric
+    tuple of UserMetric
         The metrics.
 
     Raises
@@ -231,7 +231,7 @@ def user_effects(section: StudySection, sources: Sources) -> tuple[UserEffect, .
 
     Returns
     -------
-    tuple of OwnEffect
+    tuple of UserEffect
         The effects.
 
     Raises
@@ -287,13 +287,13 @@ def try_effects(study: Study, sources: Sources) -> None:
 
 
 def check_names(
-    own: Sequence[UserMetric], requested: RequestedQuantities, spaces: Sequence[Space], sources: Sources
+    user_metrics: Sequence[UserMetric], requested: RequestedQuantities, spaces: Sequence[Space], sources: Sources
 ) -> bool:
     """Return True if every column has a single meaning; add an issue otherwise.
 
     Parameters
     ----------
-    own : sequence of UserMetric
+    user_metrics : sequence of UserMetric
         Metrics of the user.
     requested : RequestedQuantities
         Quantities of the study.
@@ -307,12 +307,14 @@ def check_names(
     bool
         True if no name clashes.
     """
-    if not own:
+    if not user_metrics:
         return True
-    widest = replace(requested, own=(), states=requested.classes, any_place=True, edge_shift=True, population=True)
+    widest = replace(
+        requested, user_metrics=(), states=requested.classes, any_place=True, edge_shift=True, population=True
+    )
     taken = {*quantities_of(replace(widest, probabilities=True, vision=True)), *RESERVED}
     taken |= {name for space in spaces for name in space.parameters}
-    for metric in own:
+    for metric in user_metrics:
         if metric.name in taken:
             problem = "another column has this name; the metric can say `name`"
             sources.add(("metrics",), problem, metric.name, "another name")
@@ -336,11 +338,15 @@ def try_metrics(study: Study, sources: Sources) -> None:
     StudyError
         If one fails.
     """
-    setups = {space.cfa: study.setup(space, next(iter(study.scenarios))) for space in study.spaces} if study.own else {}
+    setups = (
+        {space.cfa: study.setup(space, next(iter(study.scenarios))) for space in study.spaces}
+        if study.user_metrics
+        else {}
+    )
     searched = None if study.search is None else study.search.space.cfa
     wanted = {*study.objective.weights, *study.constraints}
-    without_metric: dict[str, list[str]] = {metric.name: [] for metric in study.own}
-    for metric in study.own:
+    without_metric: dict[str, list[str]] = {metric.name: [] for metric in study.user_metrics}
+    for metric in study.user_metrics:
         for cfa, setup in setups.items():
             try:
                 without_metric[metric.name] += [] if _tried(metric, setup) else [cfa]

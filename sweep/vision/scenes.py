@@ -16,9 +16,9 @@ from .section import Vision
 OFF = "off"
 FIXED, SHUFFLED = "fixed", "shuffled"
 ORDERS = (FIXED, SHUFFLED)
-"""Whether the lenses stand as in the street, so that the place of the lit one says its color, or in any order."""
+"""Order of the lenses: as in the street, so that the place of the lit one says its color, or any."""
 SEEN, UNSEEN = "seen", "unseen"
-"""Whether the network has learned from the lamps of an image; never from the image itself."""
+"""Lamps of an image: used in the training of the network or not; the image itself never is."""
 PHANTOM_SHARE = 0.5
 
 

@@ -17,7 +17,7 @@ _Intensity = Annotated[float, Field(ge=1e-3, le=1e6)]
 _Text = Annotated[str, Field(min_length=1, max_length=100)]
 MOST_IMAGES = 100_000
 FEWEST_LAMPS = 3
-"""Of each lens: one to train, one to check, one to test."""
+"""Fewest lamps of each lens: one to train, one to check, one to test."""
 MOST_BITS, MOST_WELL_E, MOST_READ_NOISE_DN = 12, 30_000.0, 100.0
 """Tables of larger pixels would not fit into a worker's memory."""
 

@@ -93,7 +93,7 @@ def test_csds_are_those_without_other_metrics_and_these_are_of_the_whole_readout
     monkeypatch.setattr(route, "_READ_AT_ONCE", at_once)
     block = edges_of(SPACE, 3, 9 if name == "refined" else 69)
     assert block is not None
-    columns = evaluate(ForwardModel(SCENES[name]), block, own=[BRIGHTEST])
+    columns = evaluate(ForwardModel(SCENES[name]), block, user_metrics=[BRIGHTEST])
     monkeypatch.setattr(route, "OTHERS", [])
     alone = evaluate(ForwardModel(SCENES[name]), block)
     assert {*columns} == {*alone, "darkest_dn", "brightest"}
@@ -111,7 +111,7 @@ def test_other_metrics_switch_no_fast_route_off(name: str, way: str, n: int, mon
     fast, slow = counted(monkeypatch, way), counted(monkeypatch, "_read")
     block = edges_of(SPACE, 0, n)
     assert block is not None
-    evaluate(ForwardModel(SCENES[name]), block, own=[BRIGHTEST])
+    evaluate(ForwardModel(SCENES[name]), block, user_metrics=[BRIGHTEST])
     assert (len(fast), len(slow)) == (1, 0)
 
 
@@ -120,7 +120,7 @@ def test_a_cfa_without_a_user_metric_is_reported_once() -> None:
     calls.clear()
     for block in (edges_of(SPACE, 0, SPACE.size), CurveBlock(SPACE.curves(SPACE.points(0, 9), 301))):
         assert block is not None
-        columns = evaluate(ForwardModel(VIEWS["rounded"]), block, own=[ABSENT, BRIGHTEST])
+        columns = evaluate(ForwardModel(VIEWS["rounded"]), block, user_metrics=[ABSENT, BRIGHTEST])
         assert np.isnan(columns["absent"]).all()
         assert np.isfinite(columns["brightest"]).all()
     assert calls == [1, 1]

@@ -16,7 +16,7 @@ from sweep.metrics.columns.sensitivity import cfa_sensitivity_at
 from sweep.metrics.limiting import limiting_lights
 from sweep.report import make_report, read_output
 from sweep.report.answer import answer_sentences, headline_numbers
-from sweep.report.leaders import full_name, leaders_of
+from sweep.report.leaders import capital, full_name, leaders_of
 from sweep.report.page_data import payload
 from sweep.report.series import Line, SeriesFigure, lead_sentence
 from sweep.report.trade_off import overview_figure
@@ -268,7 +268,7 @@ def test_headline_star_and_details_name_one_filter(finished: FinishedFolder, nam
     output = read_output(finished(name))
     best, data = leaders_of(output).chosen, payload(output)
     assert best is not None
-    assert full_name(best).lower() in answer_sentences(output)[0].lower()
+    assert answer_sentences(output)[0].startswith(capital(full_name(best)))
     star = overview_figure(output, output.scenario).groups["best"].labels
     at = data["chosen"][output.scenario]
     design_id = np.frombuffer(base64.b64decode(data["design_id"]["bdata"]), "<u4")[at]

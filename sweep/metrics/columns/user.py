@@ -37,7 +37,7 @@ class UserColumns(Metric):
                 signed=True,
                 smooth=partial(_rows, metric=metric),
             )
-            for metric in requested.own
+            for metric in requested.user_metrics
         )
 
 

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 Smooth = NDArray[Any]
 """Real values, or values with a derivative as their imaginary part."""
 COMPLEX_STEP = 1e-30
-"""Of a derivative by complex steps: nothing is subtracted, so it may be so small that its square vanishes."""
+"""Step of a complex-step derivative: nothing is subtracted, so it may be so small that its square vanishes."""
 _EPSILON, _KAPPA = 216 / 24389, 24389 / 27
-"""Of CIE 15: where the cube root begins, and the slope of lightness below it."""
+"""Constants of CIE 15: where the cube root begins, and the slope of lightness below it."""
 _25_7 = 25.0**7
 
 
