@@ -268,7 +268,8 @@ def test_headline_star_and_details_name_one_filter(finished: FinishedFolder, nam
     output = read_output(finished(name))
     best, data = leaders_of(output).chosen, payload(output)
     assert best is not None
-    assert answer_sentences(output)[0].startswith(capital(full_name(best)))
+    sentence = answer_sentences(output)[0]
+    assert full_name(best) in sentence or sentence.startswith(capital(full_name(best)))
     star = overview_figure(output, output.scenario).groups["best"].labels
     at = data["chosen"][output.scenario]
     design_id = np.frombuffer(base64.b64decode(data["design_id"]["bdata"]), "<u4")[at]
