@@ -18,7 +18,7 @@ from ..results.output import Output, read_output
 from ..results.tables import write_csv
 from ..study import folder_name
 from .answer import largest_separation_elsewhere
-from .compare_fronts import draw_fronts, fronts_in, hypervolumes, on_the_same_axes
+from .compare_fronts import draw_fronts, fronts_in, hypervolumes, on_the_same_axes, scene_names
 from .compare_tables import (
     best_of_runs,
     curve_notes,
@@ -42,7 +42,7 @@ _MARK_WITHIN = 1024
 _LETTERS = string.ascii_uppercase
 _MOST_LETTERS = 100
 _MOST_SCENARIOS = 4
-"""Scenarios whose hypervolumes are printed; the page has all."""
+"""Scenes whose hypervolumes are printed; the page has all."""
 
 
 @dataclass(frozen=True)
@@ -121,17 +121,17 @@ def compare_runs(folders: Sequence[Path], to: Path | None) -> Comparison:
     for name in list(areas)[:_MOST_SCENARIOS]:
         lines += ["", titles[name], *aligned(areas[name][1])]
     if len(areas) > _MOST_SCENARIOS:
-        lines.append(f"({len(areas) - _MOST_SCENARIOS} more scenarios in {PAGE}.)")
+        lines.append(f"({len(areas) - _MOST_SCENARIOS} more scenes in {PAGE}.)")
     lines += ["", *answer, *(f"Note: {note}" for note in notes)]
     lines.append(f"Files: {target}/: {', '.join([PAGE, TABLE, *(f'{PICTURE}.{kind}' for kind in drawn)])}.")
-    of_all = [table.assign(scenario=name) for name, (_, table) in areas.items()]
+    of_all = [table.assign(scene=name) for name, (_, table) in areas.items()]
     tables = {"best": best, "plain": plain, "studies": studies, "origins": origins}
     tables["hypervolumes"] = pd.concat(of_all, ignore_index=True) if of_all else pd.DataFrame()
     return Comparison(target, lines, tables, notes)
 
 
 def compare_fronts(runs: Mapping[str, Output]) -> tuple[dict[str, Areas], Drawing | None, list[str]]:
-    """Compare the fronts of runs with the same axes.
+    """Compare the fronts of runs with the same axes, in equal scenes.
 
     Parameters
     ----------
@@ -141,43 +141,47 @@ def compare_fronts(runs: Mapping[str, Output]) -> tuple[dict[str, Areas], Drawin
     Returns
     -------
     areas : dict of str
-        Hypervolumes by scenario.
+        Hypervolumes by scene.
     drawing : Drawing or None
-        Plot of the first scenario.
+        Plot of the first scene.
     notes : list of str
         Notes.
     """
     group, notes = on_the_same_axes(runs)
-    every = {name for output in group.values() for name in output.scenarios}
-    scenarios = [n for n in next(iter(runs.values())).scenarios if all(n in o.scenarios for o in group.values())]
+    places: dict[str, dict[str, tuple[Output, str]]] = {}
+    for run, scenarios in scene_names(group).items():
+        for scenario, scene in scenarios.items():
+            places.setdefault(scene, {})[run] = group[run], scenario
+    shared = [scene for scene, there in places.items() if len(there) > 1]
     if not group:
         return {}, None, notes
-    if not scenarios:
-        return {}, None, [*notes, "The runs have no scenario of the same name, so no fronts are compared."]
-    if len(every) > len(scenarios):
-        notes.append(f"Fronts are compared in the scenarios that all have: {', '.join(scenarios)}.")
-    fronts = {name: those for name in scenarios if (those := fronts_in(group, name))}
-    areas = {name: hypervolumes(those) for name, those in fronts.items()}
+    if not shared:
+        return {}, None, [*notes, "The runs have no equal scene, so no fronts are compared."]
+    if len(places) > len(shared) or any(len(places[scene]) < len(group) for scene in shared):
+        within = f"{', '.join(shared)}" if len(shared) <= _MOST_SCENARIOS else f"{len(shared)} of {len(places)}"
+        notes.append(f"Fronts are compared in the scenes that two runs or more have: {within}.")
+    fronts = {scene: those for scene in shared if (those := fronts_in(places[scene]))}
+    areas = {scene: hypervolumes(those) for scene, those in fronts.items()}
     if not fronts:
         return {}, None, notes
-    scenario, shown = next(iter(fronts.items()))
+    scene, shown = next(iter(fronts.items()))
     separation, sensitivity = next(iter(group.values())).trade_off
     marks = []
-    for run, output in group.items():
+    for run, (output, scenario) in places[scene].items():
         for row in output.best[output.best["scenario"] == scenario].head(1).to_dict("records"):
             marks.append((run, float(row[sensitivity.name]), float(row[separation.name])))
-    of = ", ".join(group) if len(group) <= 3 else f"{len(group)} runs"
+    of = ", ".join(places[scene]) if len(places[scene]) <= 3 else f"{len(places[scene])} runs"
     labels = sensitivity.words, separation.axis
-    return areas, partial(draw_fronts, f"{of}: fronts in {scenario}", labels, list(runs), shown, marks), notes
+    return areas, partial(draw_fronts, f"{of}: fronts in {scene}", labels, list(runs), shown, marks), notes
 
 
 def _largest(areas: Mapping[str, Areas]) -> list[str]:
     """Return the front with the largest hypervolume, if there are several to compare."""
-    for scenario, (_, table) in list(areas.items())[:1]:
+    for scene, (_, table) in list(areas.items())[:1]:
         if table["run"].nunique() > 1:
             most = table.nlargest(1, "hypervolume").iloc[0]
             share = f"{most['hypervolume']:.4g} DN x sensitivity, {most['of the box']} of the box"
-            return [f"Largest hypervolume in {scenario}: {most['run']}, {most['CFA']} ({most['front']}): {share}."]
+            return [f"Largest hypervolume in {scene}: {most['run']}, {most['CFA']} ({most['front']}): {share}."]
     return []
 
 

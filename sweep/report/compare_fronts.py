@@ -50,6 +50,31 @@ class ComparedFront:
     points: FloatArray
 
 
+def scene_names(runs: Mapping[str, Output]) -> dict[str, dict[str, str]]:
+    """Return a name for each scene: scenarios of several runs share one only if their scenes are equal.
+
+    Parameters
+    ----------
+    runs : mapping of str to Output
+        Runs by name.
+
+    Returns
+    -------
+    dict of str to dict of str to str
+        Name of the scene, by run and scenario.
+    """
+    names: dict[str, str] = {}
+    shared = {}
+    for run, output in runs.items():
+        shared[run] = dict[str, str]()
+        for scenario, scene in output.study.scenarios.items():
+            content = scene.model_dump_json()
+            if content not in names:
+                names[content] = f"{scenario} of {run}" if scenario in names.values() else scenario
+            shared[run][scenario] = names[content] if names[content] not in shared[run].values() else scenario
+    return shared
+
+
 def on_the_same_axes(runs: Mapping[str, Output]) -> tuple[dict[str, Output], list[str]]:
     """Return the largest group of runs whose fronts have the same meaning.
 
@@ -111,15 +136,13 @@ def _meaning(output: Output) -> tuple[str, ...]:
     return tuple(words)
 
 
-def fronts_in(runs: Mapping[str, Output], scenario: str) -> list[ComparedFront]:
-    """Return all fronts of a scenario: of designs that meet every constraint but those on the axes, and of the search.
+def fronts_in(runs: Mapping[str, tuple[Output, str]]) -> list[ComparedFront]:
+    """Return all fronts of a scene: of designs that meet every constraint but those on the axes, and of the search.
 
     Parameters
     ----------
-    runs : mapping of str to Output
-        Runs by name.
-    scenario : str
-        Scenario.
+    runs : mapping of str to (Output, str)
+        Runs by name, each with its scenario of the scene.
 
     Returns
     -------
@@ -127,7 +150,7 @@ def fronts_in(runs: Mapping[str, Output], scenario: str) -> list[ComparedFront]:
         Fronts.
     """
     fronts = []
-    for label, output in runs.items():
+    for label, (output, scenario) in runs.items():
         rows = output.table[output.table["pareto"] & (output.table["scenario"] == scenario)]
         for cfa, designs in rows.groupby("cfa", observed=True, sort=False):
             points = _sorted(designs[list(output.provenance.trade_off)])

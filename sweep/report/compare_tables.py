@@ -14,7 +14,7 @@ from ..metrics.quantity import DN, Column
 from ..results.curves import KeptCurves
 from ..results.output import Output
 from ..results.tables import FOUND, SWEPT
-from .compare_fronts import dn_scale_label
+from .compare_fronts import dn_scale_label, scene_names
 from .leaders import label, of_reference
 
 _SAME = 1e-9
@@ -38,7 +38,7 @@ def best_of_runs(runs: Mapping[str, Output]) -> pd.DataFrame:
     pandas.DataFrame
         Table.
     """
-    rows = []
+    rows, scenes = [], scene_names(runs)
     for name, output in runs.items():
         row: dict[str, Any] = {
             "run": name,
@@ -49,6 +49,7 @@ def best_of_runs(runs: Mapping[str, Output]) -> pd.DataFrame:
         if not output.best.empty:
             best = output.best.iloc[0].to_dict()
             row |= {"quantity": output.goal.name, "value": best[output.goal.name], "design": label(best)}
+            row |= {"scene": scenes[name][str(best["scenario"])]}
             shown = (*output.distances, *output.light, *output.further, *output.parameters)
             row |= {key: best[key] for key in ("design_id", "kind", "cfa", "family", "scenario", *shown)}
         rows.append(row)
@@ -56,7 +57,7 @@ def best_of_runs(runs: Mapping[str, Output]) -> pd.DataFrame:
 
 
 def side_by_side(best: pd.DataFrame, runs: Mapping[str, Output]) -> tuple[pd.DataFrame, int]:
-    """Return the best designs as one column each, in words.
+    """Return the best designs as one column each, in words; figures of different scenes never share a row.
 
     Parameters
     ----------
@@ -75,12 +76,17 @@ def side_by_side(best: pd.DataFrame, runs: Mapping[str, Output]) -> tuple[pd.Dat
     columns = {name: column for output in runs.values() for name, column in output.columns.items()}
     parameters = dict.fromkeys(name for output in runs.values() for name in output.parameters)
     left_out = [n for n in parameters if n in best and best[n].notna().any()][_MOST_PARAMETERS:]
-    skipped = {"run", "study", "folder", "quantity", *left_out}
-    shown = [str(name) for name in best.dropna(axis="columns", how="all") if name not in skipped]
-    table = {
-        columns[name].words if name in columns else name: [_cell(name, row, columns) for row in best.to_dict("records")]
-        for name in shown
-    }
+    skipped = {"run", "study", "folder", "quantity", "scene", *left_out}
+    scenes = list(dict.fromkeys(best["scene"].dropna())) if "scene" in best else []
+    table = {}
+    for name in (str(n) for n in best.dropna(axis="columns", how="all") if n not in skipped):
+        words = columns[name].words if name in columns else name
+        if len(scenes) > 1 and (name == "value" or (name in columns and name not in parameters)):
+            for scene in scenes:
+                there = best.where(best["scene"] == scene).to_dict("records")
+                table[f"{words} in {scene}"] = [_cell(name, row, columns) for row in there]
+        else:
+            table[words] = [_cell(name, row, columns) for row in best.to_dict("records")]
     return pd.DataFrame.from_dict(table, orient="index", columns=list(runs)).reset_index(names=""), len(left_out)
 
 
@@ -111,26 +117,25 @@ def plain_differences(runs: Mapping[str, Output]) -> tuple[pd.DataFrame, str]:
     note : str
         Sentence.
     """
-    parts = []
-    for run, output in runs.items():
-        named = output.named[["name", "scenario", *output.distances]].astype({"name": str, "scenario": str})
-        words = named.rename(columns=output.words)
-        parts.append(
-            words.melt(["name", "scenario"], var_name="CSD", value_name=run).set_index(["name", "scenario", "CSD"])
-        )
+    parts, keys = [], ["name", "scene", "CSD"]
+    for run, scenes in scene_names(runs).items():
+        named = runs[run].named[["name", "scenario", *runs[run].distances]].astype({"name": str, "scenario": str})
+        named.insert(1, "scene", named.pop("scenario").map(scenes))
+        words = named.rename(columns=runs[run].words)
+        parts.append(words.melt(keys[:2], var_name="CSD", value_name=run).set_index(keys))
     table = pd.concat(parts, axis="columns")
     shared = table[table.notna().sum(axis="columns") > 1]
     differing = shared[~np.isclose(shared.min(axis="columns"), shared.max(axis="columns"), rtol=_SAME, atol=0.0)]
     names, of_shared, of_differing = (part.index.unique("name") for part in (table, shared, differing))
     same, single = [n for n in of_shared if n not in of_differing], [n for n in names if n not in of_shared]
     sentences = [f"Equal in every CSD: {', '.join(same)}."] if same else []
-    sentences += [f"In one run only: {', '.join(single)}."] if single else []
+    sentences += [f"Not in the same scene of two runs: {', '.join(single)}."] if single else []
     shown = differing.map(lambda value: "-" if np.isnan(value) else f"{value:.1f} DN")
     return shown.reset_index(), " ".join(sentences)
 
 
 def ranking(runs: Mapping[str, Output]) -> list[str]:
-    """Return the best run and its lead, among runs with equal objectives in equal DN, and runs without a best design.
+    """Return the best run and its lead, among runs with equal objective, DN and scene, and runs without a best design.
 
     Parameters
     ----------
@@ -142,33 +147,35 @@ def ranking(runs: Mapping[str, Output]) -> list[str]:
     list of str
         Lines.
     """
-    lines, groups = [], dict[tuple[str, str], dict[str, float]]()
+    lines, groups = [], dict[tuple[str, str, str], dict[str, float]]()
+    scene_of = scene_names(runs)
     for run, output in runs.items():
         if output.best.empty:
             requested = len(output.kind(SWEPT, FOUND)) > 0
             lines.append(f"{run} has no {'feasible design' if requested else 'design that was swept or searched'}.")
         else:
-            groups.setdefault(_maximized(output), {})[run] = float(output.best.iloc[0][output.goal.name])
+            best = output.best.iloc[0]
+            group = *_maximized(output), scene_of[run][str(best["scenario"])]
+            groups.setdefault(group, {})[run] = float(best[output.goal.name])
     ranked = []
-    several = len({dn for _, dn in groups}) > 1
-    for (objective, dn), values in groups.items():
+    parts = zip(("objectives", "meanings of DN", "scenes"), zip(*groups, strict=True), strict=False)
+    differing = [part for part, values in parts if len(set(values)) > 1]
+    for (objective, dn, scene), values in groups.items():
         (first, most), *others = sorted(values.items(), key=lambda item: -item[1])
         column = runs[first].goal
-        scenes = {run: " ".join(str(runs[run].best.iloc[0]["scenario"]).split()) for run in values}
-        place = {run: f" in {scene}" if len(set(scenes.values())) > 1 else "" for run, scene in scenes.items()}
         under = " under the constraints" if any(runs[run].constraints for run in values) else ""
-        text = f"Best {objective}{f' in {dn}' if several and dn else ''}{under}: {first}"
-        text += f" with {column.amount(most)}{place[first]}"
+        scale = f" in {dn}" if dn and "meanings of DN" in differing else ""
+        place = f" in {scene}" if "scenes" in differing else ""
+        text = f"Best {objective}{scale}{place}{under}: {first} with {column.amount(most)}"
         for run, value in others:
             if most - value <= _SAME * abs(most):
-                text += f"; {run} is equal{place[run]}"
+                text += f"; {run} is equal"
             else:
-                text += f"; {run} has {column.amount(value)}{place[run]}, {column.amount(most - value)}"
+                text += f"; {run} has {column.amount(value)}, {column.amount(most - value)}"
                 text += f" ({(most - value) / most:.1%}) less" if most > 0 else " less"
         ranked.append(f"{text}.")
-    if len(groups) > 1:
-        what = "different objectives" if len({objective for objective, _ in groups}) > 1 else "DN of different meaning"
-        ranked.append(f"These are {what}, which are not ranked against each other.")
+    if differing:
+        ranked.append(f"Runs with different {' and '.join(differing)} are not ranked against each other.")
     return ranked + lines
 
 

@@ -43,6 +43,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     studies = {
         "tiny": STUDY.replace("COUNT", "3").replace("200}", "200, front: {min: 0.9, max: 0.98, count: 3}}"),
         "chart": CHART.replace("study: tiny", "study: chart"),
+        "sparse": CHART.replace("study: tiny", "study: sparse").replace("count: 3", "count: 2"),
         "brighter": CHART.replace("study: tiny", "study: brighter").replace("white_patch}", "white_patch, level: 0.8}"),
         "plain": PLAIN.replace("study: tiny", "study: plain"),
         "orange": CHART.replace("study: tiny", "study: orange") + "objective: csd_orange_red\n",
@@ -87,23 +88,23 @@ def test_a_point_on_a_hundredth_counts() -> None:
 
 @pytest.mark.slow
 def test_two_runs_say_who_is_best_and_by_how_much(runs: dict[str, Path], tmp_path: Path) -> None:
-    said, page = compared([runs["chart"], runs["brighter"]], tmp_path / "to")
+    said, page = compared([runs["chart"], runs["sparse"]], tmp_path / "to")
     best = {}
-    for name in ("chart", "brighter"):
+    for name in ("chart", "sparse"):
         frame = pd.read_parquet(runs[name] / "results.parquet")
         best[name] = frame[frame["feasible"] & (frame["kind"] == "sweep")]["csd_yellow_red"].max()
-    less = best["chart"] - best["brighter"]
+    less = best["chart"] - best["sparse"]
     assert less > 0
     assert (
-        f"Best yellow/red CSD under the constraints: A chart with {best['chart']:.1f} DN; B brighter has {best['brighter']:.1f} DN, "
+        f"Best yellow/red CSD under the constraints: A chart with {best['chart']:.1f} DN; B sparse has {best['sparse']:.1f} DN, "
         f"{less:.1f} DN ({less / best['chart']:.1%}) less." in said
     )
-    assert "scenarios.chart.exposure.level  0.95     0.8" in said
+    assert "sweeps.edges.grid.left_nm" in said
     assert "constraints" not in said.split("What differs in how")[0]
     assert "used other curves" not in said
-    assert next(line.split() for line in said.splitlines() if line.startswith("RGGB"))[2] == "green/yellow"
+    assert "Equal in every CSD: RGGB, RYYCy, mine." in said
     table = pd.read_csv(tmp_path / "to" / "compare.csv")
-    np.testing.assert_allclose(table["value"], [best["chart"], best["brighter"]], rtol=1e-12)
+    np.testing.assert_allclose(table["value"], [best["chart"], best["sparse"]], rtol=1e-12)
     assert {"csd_green_red", "left_nm", "sensitivity", "design_id"} <= set(table.columns)
     assert {path.name for path in (tmp_path / "to").iterdir()} == {
         "compare.html",
@@ -118,6 +119,33 @@ def test_two_runs_say_who_is_best_and_by_how_much(runs: dict[str, Path], tmp_pat
 
 
 @pytest.mark.usefixtures("plain_fronts")
+def test_figures_of_different_scenes_are_not_compared(runs: dict[str, Path], tmp_path: Path) -> None:
+    found = compare_runs([runs["chart"], runs["brighter"]], tmp_path)
+    said = "\n".join(found.lines)
+    assert "Best yellow/red CSD in chart under the constraints: A chart with" in said
+    assert "Best yellow/red CSD in chart of B brighter under the constraints: B brighter with" in said
+    assert "Runs with different scenes are not ranked against each other." in said
+    assert "less" not in said.split("Best yellow/red CSD", 1)[1]
+    assert "The runs have no equal scene, so no fronts are compared." in found.notes
+    assert found.tables["plain"].empty
+    assert ["scenarios.chart.exposure.level", "0.95", "0.8"] in [line.split() for line in said.splitlines()]
+    figures = [line for line in said.splitlines() if line.startswith("yellow/red CSD in chart")]
+    assert len(figures) == 2
+    assert all(line.split().count("-") == 1 for line in figures)
+
+
+@pytest.mark.usefixtures("plain_fronts")
+def test_equal_scenes_are_compared_whatever_their_names(runs: dict[str, Path], tmp_path: Path) -> None:
+    found = compare_runs([runs["chart"], runs["brighter"], runs["sparse"]], tmp_path)
+    said = "\n".join(found.lines)
+    assert "Fronts in chart, " in said
+    assert set(found.tables["hypervolumes"]["run"]) == {"A chart", "C sparse"}
+    assert any(
+        note.startswith("Fronts are compared in the scenes that two runs or more have: chart.") for note in found.notes
+    )
+
+
+@pytest.mark.usefixtures("plain_fronts")
 def test_the_same_folder_twice_is_equal(runs: dict[str, Path], tmp_path: Path) -> None:
     said, page = compared([runs["tiny"], runs["tiny"]], tmp_path)
     assert "A tiny and B tiny are the same folder." in said
@@ -128,9 +156,9 @@ def test_the_same_folder_twice_is_equal(runs: dict[str, Path], tmp_path: Path) -
 
 
 @pytest.mark.usefixtures("plain_fronts")
-def test_scenarios_and_fronts_that_all_have_are_compared(runs: dict[str, Path], tmp_path: Path) -> None:
-    said, _ = compared([runs["tiny"], runs["chart"], runs["brighter"]], tmp_path)
-    assert "Fronts are compared in the scenarios that all have: chart." in said
+def test_fronts_of_shared_scenes_are_compared(runs: dict[str, Path], tmp_path: Path) -> None:
+    said, _ = compared([runs["tiny"], runs["chart"], runs["sparse"]], tmp_path)
+    assert "Fronts are compared in the scenes that two runs or more have: chart." in said
     assert "above the reference of 0 DN at a sensitivity of" in said
     assert "Fronts in dim" not in said
     assert "traced by the search" in said
@@ -154,11 +182,11 @@ def test_plain_cfas_alone_are_compared(runs: dict[str, Path], tmp_path: Path) ->
 @pytest.mark.usefixtures("plain_fronts")
 def test_other_objectives_and_axes_are_not_mixed(runs: dict[str, Path], tmp_path: Path) -> None:
     said, _ = compared([runs["chart"], runs["orange"]], tmp_path)
-    assert "different objectives" in said
+    assert "Runs with different objectives are not ranked against each other." in said
     assert "so none are compared" in said
     assert "Best orange/red CSD under the constraints: B orange with" in said
-    said, _ = compared([runs["orange"], runs["chart"], runs["brighter"]], tmp_path)
-    assert "compared are those of B chart and C brighter." in said
+    said, _ = compared([runs["orange"], runs["chart"], runs["sparse"]], tmp_path)
+    assert "compared are those of B chart and C sparse." in said
 
 
 @pytest.mark.usefixtures("plain_fronts")
@@ -168,7 +196,7 @@ def test_a_combined_objective_has_its_own_words(runs: dict[str, Path], tmp_path:
 
 
 @pytest.mark.usefixtures("plain_fronts")
-def test_best_designs_of_different_scenarios_name_them(runs: dict[str, Path], tmp_path: Path) -> None:
+def test_a_scene_of_another_name_is_the_same(runs: dict[str, Path], tmp_path: Path) -> None:
     copytree(runs["chart"], tmp_path / "other")
     path = tmp_path / "other" / "results.parquet"
     table = pq.read_table(path)
@@ -179,14 +207,14 @@ def test_best_designs_of_different_scenarios_name_them(runs: dict[str, Path], tm
     study.write_text(re.sub(r"^  chart:", "  dusk:", study.read_text(), flags=re.MULTILINE))
     listed_anew(tmp_path / "other")
     said, _ = compared([runs["chart"], tmp_path / "other"], tmp_path / "to")
-    assert re.search(r"A chart with [0-9.]+ DN in chart; B chart is equal in dusk", said)
+    assert re.search(r"A chart with [0-9.]+ DN; B chart is equal\.", said)
 
 
 @pytest.mark.usefixtures("plain_fronts")
 def test_dn_of_other_meaning_are_not_ranked(runs: dict[str, Path], tmp_path: Path) -> None:
     said, _ = compared([runs["chart"], runs["deep"]], tmp_path)
     assert "Best yellow/red CSD in DN of 20 bits under the constraints: B deep with" in said
-    assert "These are DN of different meaning, which are not ranked" in said
+    assert "Runs with different meanings of DN are not ranked against each other." in said
     assert "so none are compared" in said
     assert ["pixel.bits", "12", "20"] in [line.split() for line in said.splitlines()]
 
