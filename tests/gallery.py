@@ -28,7 +28,7 @@ PICTURES = {
     "distance": "figures/series-1",
     "exposure": "figures/series-1",
     "fog": "figures/series-1",
-    "night": "figures/series-2",
+    "night": "figures/series-1",
     "noise": "figures/series-1",
     "vision": "figures/vision-ranks",
 }

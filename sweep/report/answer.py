@@ -15,11 +15,11 @@ from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
 from ..results.thinning import per_exposure
 from ..study.axes import series_of
-from .lamps import lamp_lines, over_population, robustness_lines
+from .lamps import cost_of_worst_case, lamp_lines, over_population, robustness_lines
 from .leaders import Leaders, Row, capital, full_name, label, leaders_of, of_reference, upper_bound_beside
 from .noise import usable_lines
 from .scorecard import score_lines, scorecard
-from .series import lead_sentence, leads_of, series_figures, vanishing_lines
+from .series import lead_sentence, leads_of, series_figures, vanishing_line
 from .terms import (
     angle_note,
     format_constraints,
@@ -29,6 +29,8 @@ from .terms import (
     unknown_lines,
 )
 
+_MOST_ANSWERS = 2
+"""Lines above the first plot where scenarios that differ in one number are compared."""
 _MOST_SCENARIOS = 6
 """Scenarios beside the leading one whose best design the answer names."""
 _BY_NOISE = (D_PRIME, CNR)
@@ -36,7 +38,7 @@ _BY_NOISE = (D_PRIME, CNR)
 
 
 def answer_sentences(output: Output) -> list[str]:
-    """Return results on images first; then the leaders over scenarios that differ in one number, else the best design.
+    """Return the answer to the study's question, and then what else was found.
 
     Parameters
     ----------
@@ -48,41 +50,62 @@ def answer_sentences(output: Output) -> list[str]:
     list of str
         Lines.
     """
-    images: list[str] = []
-    if output.study.vision is not None:
-        from .vision_report import vision_sentences  # noqa: PLC0415  (only where a study asks for images)
-
-        images = list(vision_sentences(output))
-    return images + _of_designs(output)
+    answer, further = answer_parts(output)
+    return answer + further
 
 
-def _of_designs(output: Output) -> list[str]:
+def answer_parts(output: Output) -> tuple[list[str], list[str]]:
+    """Return the answer to the study's question, which stands above the first plot, and what else was found.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    answer : list of str
+        Results on images; else leaders over scenarios that differ in one number, tasks, or the best design.
+    further : list of str
+        Other lines.
+    """
+    answer, further = _of_designs(output)
+    if output.study.vision is None:
+        return answer, further
+    from .vision_report import vision_sentences  # noqa: PLC0415  (only where a study asks for images)
+
+    return list(vision_sentences(output)), answer + further
+
+
+def _of_designs(output: Output) -> tuple[list[str], list[str]]:
     searched = output.kind(SWEPT, FOUND)
     if len(searched) and output.best.empty:
         failed = searched[searched["status"] != "ok"]
         if len(failed) == len(searched):
-            return [f"Every design failed: {failed['status'].iloc[0]}."]
+            return [f"Every design failed: {failed['status'].iloc[0]}."], []
         under = format_constraints(output)
         none = f"No design meets every constraint{f': {under}' if under else ''}."
-        return [none, *unknown_lines(output), *largest_separation_elsewhere(output)]
+        return [none], [*unknown_lines(output), *largest_separation_elsewhere(output)]
     usable = list(usable_lines(output))
-    # Where the question is of noise, separations matter where another CFA begins to lead.
-    drawn = series_figures(output)
-    vanishing = [] if usable else vanishing_lines(drawn)
-    series = vanishing + usable + [lead_sentence(s) for s in drawn if not usable or len(leads_of(s)) > 1]
-    if series and output.best.empty:
-        return series
-    if output.best.empty and (scores := score_lines(scorecard(output))):
-        return [*scores, *_best(output, leaders_of(output))]
+    if usable:  # where the question is of noise, separations matter where another CFA begins to lead
+        series = [lead_sentence(drawn) for drawn in series_figures(output) if len(leads_of(drawn)) > 1]
+    else:
+        series = [line for drawn in series_figures(output) for line in (*vanishing_line(drawn), lead_sentence(drawn))]
+    if output.best.empty and usable:
+        return usable, series
+    if output.best.empty and series:
+        return series[:_MOST_ANSWERS], series[_MOST_ANSWERS:]
     leaders = leaders_of(output)
-    lamps = robustness_lines(output, leaders.chosen)
-    others = _best_of_other_scenarios(output)
-    return [
-        *_best(output, leaders),
-        *others,
-        *lamps,
+    if output.best.empty and (scores := score_lines(scorecard(output))):
+        return scores, list(_best(output, leaders))
+    best = list(_best(output, leaders))
+    return [*best[:1], *cost_of_worst_case(output, leaders.chosen), *_named_over_field(output, leaders)], [
+        *best[1:],
+        *_best_of_other_scenarios(output),
+        *robustness_lines(output, leaders.chosen),
         *lamp_lines(output),
         *largest_separation_elsewhere(output),
+        *usable,
         *series,
     ]
 
@@ -127,7 +150,7 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
     held_out = float(best.get(HELD_OUT + (separation.of or separation.name), np.nan))
     if np.isfinite(held_out):
         text += f" ({separation.formatted(held_out)} on lights that it has not seen)"
-    yield f"{text}{_in(output, leaders.scenario)}{_times(output, best, plain)}."
+    yield f"{text}{_in(output, leaders.scenario)}{_times(output, best, plain)}.{_equal(output, best)}"
     if output.objective.rule.wanted != "more":  # decades of what is to be the least, in its own unit
         for name in output.objective.weights:
             rows = [row for row in (best, plain) if row is not None]
@@ -145,6 +168,17 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
             same = " that meets the same" if output.constraints else ""
             name = f"the best of {row['cfa']}{same}, {label(row)},"
         yield f"{capital(name)} {_format_separation(output, row)}{_format_limit(output, row)}."
+
+
+def _equal(output: Output, best: Row) -> str:
+    """Return a sentence on CFAs and named designs whose separation is the best one's in all digits that are shown."""
+    if best["kind"] not in (PLAIN, NAMED):
+        return ""
+    separation = output.trade_off[0]
+    rows = output.few[(output.few["scenario"] == best["scenario"]) & (output.few["design_id"] != best["design_id"])]
+    shown = separation.formatted(best[separation.name])
+    names = [label(row) for row in rows.to_dict("records") if separation.formatted(row[separation.name]) == shown]
+    return f" {' and '.join(names)} {'has' if len(names) == 1 else 'have'} {shown}, too." if names else ""
 
 
 def _edges(best: Row) -> str:
@@ -179,6 +213,20 @@ def _limits(output: Output, best: Row) -> str:
             "(proven, before quantization)."
         )
     return " ".join(parts)
+
+
+def _named_over_field(output: Output, leaders: Leaders) -> Iterator[str]:
+    """Yield the separations of named designs, if the scenario is of several field positions."""
+    if leaders.chosen is not None and output.study.scenarios[leaders.scenario].field is not None:
+        separation = output.trade_off[0]
+        named = output.kind(NAMED)
+        named = named[(named["scenario"] == leaders.scenario) & (named["status"] == "ok")]
+        others = named[named["design_id"] != leaders.chosen["design_id"]].sort_values(separation.name, ascending=False)
+        texts = [
+            f"{name} {separation.formatted(value)}" for name, value in others[["name", separation.name]].to_numpy()
+        ]
+        if texts:
+            yield f"The worst field position leaves of the other designs: {', '.join(texts)}."
 
 
 def _best_of_other_scenarios(output: Output) -> Iterator[str]:

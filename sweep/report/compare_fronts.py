@@ -18,7 +18,7 @@ from ..metrics.quantity import DN, WORST_CASE
 from ..metrics.share import format_share
 from ..results.output import Output
 from ..results.tables import FOUND
-from .figures import CURVE_CYCLE, canvas, legend_beside
+from .figures import CURVE_CYCLE, DASHES, canvas, legend_beside
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 _STEP = 0.01
 _BELOW = 1e-9
 _MARKERS = "osD^vPX<>hp"
-_DASHES = ("-", (0, (6, 2)), (0, (1, 1.5)), (0, (6, 2, 1, 2)))
 _MARKS_PER_LINE = 12
 
 
@@ -266,7 +265,7 @@ def draw_fronts(
             front.points[:, 1],
             front.points[:, 0],
             color=color,
-            linestyle="none" if front.traced else _DASHES[run % len(_DASHES)],
+            linestyle="none" if front.traced else DASHES[run % len(DASHES)],
             linewidth=1.4,
             marker=marker,
             markersize=6,

@@ -38,6 +38,8 @@ BOUND_FILTER_NAME = "filter at the upper bound"
 """Legend entry: the curve of the filter that attains the bound of the search."""
 TYPE_COLORS = {"green": "#009e73", "yellow": "#c9a800", "orange": "#e66100", "red": "#b2182b"}
 CURVE_CYCLE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
+DASHES = ("-", (0, (6, 2)), (0, (1, 1.5)), (0, (6, 2, 1, 2)))
+"""Dashes of lines, by which equal ones are both seen."""
 _DPI = 160
 _COMPRESSION = 3
 """Compression level of a PNG: at its usual 6 a file is a tenth smaller and takes twice as long."""

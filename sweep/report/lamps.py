@@ -44,7 +44,7 @@ def over_population(output: Output) -> bool:
 
 
 def robustness_lines(output: Output, best: Row | None) -> Iterator[str]:
-    """Yield cost of the worst case, causes of failure, and yields; nothing without a population of lights.
+    """Yield causes of failure, and yields; nothing without a population of lights.
 
     Parameters
     ----------
@@ -62,8 +62,6 @@ def robustness_lines(output: Output, best: Row | None) -> Iterator[str]:
         return
     scenario = output.scenarios[0] if best is None else best["scenario"]
     rows: list[Row] = list(output.few[output.few["scenario"] == scenario].to_dict("records"))
-    if best is not None and over_population(output):
-        yield from _price(output, best, [row for row in rows if row["kind"] == NAMED])
     plain = [row for row in rows if row["kind"] == PLAIN]
     for row in rows:
         if row["kind"] in (NAMED, FOUND) and np.isfinite(row.get("breaks_at", np.nan)):
@@ -82,8 +80,25 @@ def robustness_lines(output: Output, best: Row | None) -> Iterator[str]:
         yield f"Share of random lamps and cameras with {wanted} or more (95 % interval): {', '.join(shares)}."
 
 
-def _price(output: Output, best: Row, named: list[Row]) -> Iterator[str]:
-    """Yield the best design beside the named design with the largest nominal separation."""
+def cost_of_worst_case(output: Output, best: Row | None) -> Iterator[str]:
+    """Yield the best design of a worst case beside the named design with the largest nominal separation.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+    best : mapping or None
+        Best design.
+
+    Yields
+    ------
+    str
+        Sentence, if the separation is a worst case over a population of lights.
+    """
+    if best is None or not over_population(output):
+        return
+    named = output.kind(NAMED)
+    named = named[named["scenario"] == best["scenario"]].to_dict("records")
     worst = output.trade_off[0]
     nominal = output.columns[worst.of]
     rivals = [row for row in named if row[nominal.name] > best[nominal.name] and row[worst.name] > 0]

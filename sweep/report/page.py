@@ -20,12 +20,12 @@ from ..results.tables import FIGURES, FOUND, NAMED, PLAIN, REPORT, VISION_FIGURE
 from . import signal_figures as signals
 from . import tables
 from . import values as content
-from .answer import answer_sentences, headline_numbers
+from .answer import answer_parts, headline_numbers
 from .colors import color_drawings
 from .figures import Drawing, draw_curves, pictures_of
 from .lamps import lamp_drawings, lamp_table
 from .leaders import leaders_of
-from .noise import all_series, recognition_table, usable_lines
+from .noise import all_series, recognition_table
 from .page_data import payload
 from .pages import inlined, page, rows, script
 from .price import price_table
@@ -40,8 +40,6 @@ from .trade_off import draw_trade_off, overview_figure, pareto_figure, traded_cf
 
 _MOST_SERIES = 3
 """Figures over scenarios that the page shows unfolded."""
-_FIRST_LINES, _FIRST_LEADS = 1, 2
-"""Lines of the answer above the first plot, and where that says who leads where; the others stand below it."""
 _SHOWN = {
     "images": ("tiles", "sensor", "signals", "chart"),
     "lamp_images": ("regions",),
@@ -109,6 +107,7 @@ def _contents(output: Output, some: Iterable[str] | None, parallel: Parallel) ->
 def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
     """Return the content of the page without its pictures."""
     drawn, groups = payload(output), scene_groups(output)
+    answer, further = answer_parts(output)
     series_first = bool(drawn["series"]) and output.best.empty
     return {
         "output": output,
@@ -121,8 +120,8 @@ def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
         "series_first": series_first,
         "most_series": _MOST_SERIES,
         "terms_first": series_first and drawn["series"][0]["y_label"] == output.trade_off[0].axis,
-        "answer": answer_sentences(output),
-        "first_lines": max(len(list(usable_lines(output))), _FIRST_LEADS if series_first else _FIRST_LINES),
+        "answer": answer,
+        "further": further,
         "numbers": headline_numbers(output),
         "price": rows(price_table(output)),
         "counts": counts_line(output),
@@ -146,13 +145,13 @@ def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
     }
 
 
-def _vision(output: Output) -> dict[str, list[list[str]]]:
-    """Return tables of the benchmark of vision; none if the study has none."""
+def _vision(output: Output) -> list[tuple[str, list[list[str]]]]:
+    """Return title and rows of each table of the benchmark of vision; none if the study has none."""
     if output.study.vision is None:
-        return {}
+        return []
     from .vision_report import vision_parts  # noqa: PLC0415  (only where a study asks for images)
 
-    return {title: rows(table) for title, table in vision_parts(output).items()}
+    return [(title, rows(table)) for title, table in vision_parts(output).items()]
 
 
 def _vision_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
@@ -191,7 +190,7 @@ def _drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
         yield f"series-{number}", series.title, partial(draw_series, series)
     card = scorecard(output)
     if card is not None:
-        yield "scorecard", f"Every figure relative to {card.names[card.reference]}", partial(draw_scorecard, card)
+        yield "scorecard", f"Every figure relative to {card.names[0]}", partial(draw_scorecard, card)
     yield from map_drawings(output)
     yield from color_drawings(output)
     yield from lamp_drawings(output)

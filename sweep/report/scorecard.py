@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
 from ..base.types import FloatArray
 from ..metrics.columns.tasks import PREFIX
@@ -55,20 +56,10 @@ class ScoreRow:
             for at, value in enumerate(self.values)
         ]
 
-    def factors(self, reference: int) -> FloatArray:
-        """Return factors by which designs are better than one of them.
-
-        Parameters
-        ----------
-        reference : int
-            Index of that design.
-
-        Returns
-        -------
-        ndarray of shape (n_designs,)
-            Factors; NaN where they are undefined.
-        """
-        of = self.values[reference]
+    @property
+    def factors(self) -> FloatArray:
+        """Factors by which designs are better than the first; NaN where they are undefined."""
+        of = self.values[0]
         ratio = np.full(self.values.shape, np.nan)
         some = (self.values > 0) & (of > 0) & bool(self.best)
         np.divide(self.values, of, out=ratio, where=some)
@@ -77,11 +68,10 @@ class ScoreRow:
 
 @dataclass(frozen=True)
 class Scorecard:
-    """All rows of a scorecard, names of the designs, and the plain CFA that factors are relative to."""
+    """All rows of a scorecard, and names of the designs; the first is the plain CFA that factors are relative to."""
 
     names: tuple[str, ...]
     rows: tuple[ScoreRow, ...]
-    reference: int
 
 
 def scorecard(output: Output) -> Scorecard | None:
@@ -106,10 +96,11 @@ def scorecard(output: Output) -> Scorecard | None:
     rows = output.few[(output.few["scenario"] == output.scenarios[0]) & (output.few["status"] == "ok")]
     if not columns or rows.empty:
         return None
+    # The reference, the designs that are judged, and the other plain CFAs.
+    plain = rows["kind"] == PLAIN
+    rows = pd.concat([rows[plain].head(1), rows[~plain], rows[plain].iloc[1:]])
     names = tuple(label(row) for row in rows.to_dict("records"))
-    scores = tuple(_row(column, rows[column.name].to_numpy(dtype=float)) for column in columns)
-    plain = np.flatnonzero(rows["kind"] == PLAIN)
-    return Scorecard(names, scores, int(plain[0]) if plain.size else 0)
+    return Scorecard(names, tuple(_row(column, rows[column.name].to_numpy(dtype=float)) for column in columns))
 
 
 def _row(column: Column, values: FloatArray) -> ScoreRow:
@@ -152,13 +143,13 @@ def score_lines(card: Scorecard | None) -> list[str]:
 def _against(card: Scorecard, rows: Sequence[ScoreRow]) -> list[str]:
     """Return how often each other design is better and worse than the reference, in one line."""
     parts = []
-    for at, name in enumerate(card.names):
-        signs = [np.sign(row.values[at] - row.values[card.reference]) for row in rows]
+    reference, *others = card.names
+    for at, name in enumerate(others, 1):
+        signs = [np.sign(row.values[at] - row.values[0]) for row in rows]
         gains = sum(sign == (1 if row.column.wanted == "more" else -1) for sign, row in zip(signs, rows, strict=True))
         losses = sum(bool(sign) for sign in signs if np.isfinite(sign)) - gains
-        if at != card.reference:
-            parts.append(f"{name} in {gains} and {losses}")
-    return [f"Better and worse than {card.names[card.reference]}: {'; '.join(parts)}."]
+        parts.append(f"{name} in {gains} and {losses}")
+    return [f"Better and worse than {reference}: {'; '.join(parts)}."]
 
 
 def draw_scorecard(card: Scorecard) -> Figure:
@@ -174,7 +165,7 @@ def draw_scorecard(card: Scorecard) -> Figure:
     matplotlib.figure.Figure
         Figure.
     """
-    drawn = [(row.column.words, row.factors(card.reference)) for row in card.rows]
+    drawn = [(row.column.words, row.factors) for row in card.rows]
     drawn = [(words, factors) for words, factors in drawn if np.isfinite(factors).sum() > 1]
     figure, axes = canvas(9.0, 1.4 + 0.27 * len(drawn))
     for at, name in enumerate(card.names):
@@ -187,6 +178,6 @@ def draw_scorecard(card: Scorecard) -> Figure:
     axes.set_yticks(np.arange(len(drawn)), [words for words, _ in drawn], fontsize=8)
     axes.invert_yaxis()
     axes.grid(axis="y", color="#eeeeee")
-    axes.set_xlabel(f"times better than {card.names[card.reference]} (beyond {_MOST_FACTOR:g} times: at the edge)")
+    axes.set_xlabel(f"times better than {card.names[0]} (beyond {_MOST_FACTOR:g} times: at the edge)")
     legend_beside(axes)
     return figure

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +12,7 @@ from ..base.types import FloatArray, IndexArray
 from ..metrics.quantity import DN
 from ..results.output import Output
 from ..study.axes import series_of
-from .figures import CURVE_CYCLE, canvas, legend_beside
+from .figures import CURVE_CYCLE, DASHES, canvas, legend_beside
 from .leaders import capital
 
 if TYPE_CHECKING:
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 _WIDE = 15.0
 _LEAST_LEAD = 1.0
 """DN; who separates less is not said to lead."""
+_LEAST_DRAWN = 0.3
+_VANISHES = f"The dashed line is {_LEAST_LEAD:g} {DN}; {_LEAST_DRAWN:g} {DN} or less is drawn at {_LEAST_DRAWN:g} {DN}."
 _LABELS = {
     "distance_m": "distance / m",
     "exposure_s": "exposure / s",
@@ -162,6 +164,8 @@ def over_series(rows: pd.DataFrame, scenarios: Mapping[str, float], column: str)
 def series_figures(output: Output) -> list[SeriesFigure]:
     """Return the separation of every named design over each set of scenarios that differ in one number.
 
+    Where separations fall below 1 DN, the axis is logarithmic; the series with most such designs comes first.
+
     Parameters
     ----------
     output : Output
@@ -185,8 +189,15 @@ def series_figures(output: Output) -> list[SeriesFigure]:
             title = f"{output.study.study}, {base}: {separation.words}"
             x = np.array(list(scenarios.values()))
             among = base if [other for _, other in series].count(key) > 1 else ""
-            figures.append(SeriesFigure(title, key, separation.axis, x, lines, band, among=among))
-    return figures
+            figure = SeriesFigure(title, key, separation.axis, x, lines, band, among=among)
+            figures.append(_over_decades(figure) if _below(figure) else figure)
+    return sorted(figures, key=lambda figure: -sum(map(len, _below(figure).values())))
+
+
+def _over_decades(figure: SeriesFigure) -> SeriesFigure:
+    """Return a figure of separations on a logarithmic axis, with 1 DN marked."""
+    lines = {name: replace(line, y=np.maximum(line.y, _LEAST_DRAWN)) for name, line in figure.lines.items()}
+    return replace(figure, lines=lines, log_y=True, level=_LEAST_LEAD, note=_VANISHES)
 
 
 def lead_sentence(series: SeriesFigure) -> str:
@@ -230,23 +241,28 @@ def lead_sentence(series: SeriesFigure) -> str:
     return f"{capital(what)} over {quantity_of(series.key)[0]}{among}: {'; '.join(parts)}."
 
 
-def vanishing_lines(figures: Sequence[SeriesFigure]) -> list[str]:
-    """Return between which numbers separations fall below 1 DN; series in which most designs do come first.
+def vanishing_line(series: SeriesFigure) -> list[str]:
+    """Return between which numbers separations fall below 1 DN.
 
     Parameters
     ----------
-    figures : sequence of SeriesFigure
+    series : SeriesFigure
         Series.
 
     Returns
     -------
     list of str
-        Sentences, only of series in DN in which a design does.
+        Sentence, if a design does.
     """
-    found = [
-        (sum(map(len, ranges.values())), _vanishing(series, ranges)) for series in figures if (ranges := _below(series))
+    ranges = _below(series)
+    if not ranges:
+        return []
+    parts = [
+        f"{where} for {'every CFA' if len(designs) == len(series.lines) else ', '.join(designs)}"
+        for where, designs in ranges.items()
     ]
-    return [line for _, line in sorted(found, key=lambda item: -item[0])]
+    what, among = series.y_label.partition(" / ")[0], f", {series.among}," if series.among else ""
+    return [f"{capital(what)}{among} is below {_LEAST_LEAD:g} {DN} {'; '.join(parts)}."]
 
 
 def _below(series: SeriesFigure) -> dict[str, list[str]]:
@@ -276,15 +292,6 @@ def _run(series: SeriesFigure, run: IndexArray) -> str:
     if run[0] == 0:
         return f"up to {last}"
     return f"from {first} on" if run[-1] == series.x.size - 1 else f"from {first} to {last}"
-
-
-def _vanishing(series: SeriesFigure, ranges: Mapping[str, list[str]]) -> str:
-    parts = [
-        f"{where} for {'every CFA' if len(designs) == len(series.lines) else ', '.join(designs)}"
-        for where, designs in ranges.items()
-    ]
-    what, among = series.y_label.partition(" / ")[0], f", {series.among}," if series.among else ""
-    return f"{capital(what)}{among} is below {_LEAST_LEAD:g} {DN} {'; '.join(parts)}."
 
 
 def leads_of(series: SeriesFigure) -> list[tuple[str | None, int, int]]:
@@ -333,18 +340,21 @@ def draw_series(series: SeriesFigure) -> Figure:
         Figure.
     """
     figure, axes = canvas(8.0, 4.8)
-    for (name, line), color in zip(series.lines.items(), CURVE_CYCLE * 4, strict=False):
-        axes.plot(*line.over(series.x), "-", color=color, linewidth=1.5)
+    for (name, line), color, dash in zip(series.lines.items(), CURVE_CYCLE * 4, DASHES * 7, strict=False):
+        axes.plot(*line.over(series.x), linestyle=dash, color=color, linewidth=1.5)
         axes.plot(series.x, line.y, "o", color=color, markersize=3.5)
-        axes.plot([], [], "o-", color=color, label=name, linewidth=1.5, markersize=3.5)
+        axes.plot([], [], "o", linestyle=dash, color=color, label=name, linewidth=1.5, markersize=3.5)
         if line.passes is not None:
             axes.plot(*line.passes, "o", markerfacecolor="none", markeredgecolor=color, markersize=9)
         if line.upper is not None:
             axes.fill_between(series.x, line.y, line.upper, color=color, alpha=0.2, linewidth=0)
     if series.log_x:
         axes.set_xscale("log")
+        axes.xaxis.set_major_formatter("{x:g}")
     if series.log_y:
         axes.set_yscale("log")
+        if series.y_label.endswith(f" / {DN}"):
+            axes.yaxis.set_major_formatter("{x:g}")
     elif series.from_zero:
         axes.set_ylim(bottom=0)
     if series.level is not None:

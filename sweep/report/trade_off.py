@@ -47,7 +47,14 @@ _STYLES: dict[str, dict[str, Any]] = {
     "front": {"color": COLORS["front"], "marker": "o", "s": 14, "zorder": 3},
     "plain": {"marker": "s", "s": 44, "color": COLORS["reference"], "zorder": 5},
     "named": {"color": COLORS["named"], "marker": "D", "s": 42, "zorder": 5},
-    "best": {"color": COLORS["best"], "marker": "*", "s": 220, "edgecolors": "black", "linewidths": 0.8, "zorder": 6},
+    "best": {
+        "marker": "*",
+        "s": 260,
+        "facecolors": "none",
+        "edgecolors": COLORS["best"],
+        "linewidths": 1.8,
+        "zorder": 6,
+    },
 }
 
 

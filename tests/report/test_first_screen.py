@@ -26,7 +26,7 @@ SCREENS = [
     *(
         pytest.param(name, width, marks=pytest.mark.slow)
         for width in (400, 1440)
-        for name in ("noise", "distance", "dual", "fog")
+        for name in ("noise", "distance", "dual", "fog", "night", "robust", "angle")
     ),
 ]
 PLAIN = "study: plain\nsensor: ar0820\nlights: tl16\ncfas: [RGGB, RCCC, RYYCy]\n"
@@ -64,23 +64,22 @@ def apart(page: Any, selector: str) -> bool:
 
 def speaks_plainly(page: Any) -> None:
     """Answer and numbers have no name of a column, no sign for a bound, and each number a comparison."""
-    said = page.inner_text(".answer") + page.inner_text(".numbers")
+    said = " ".join(page.locator(".answer, .numbers").all_inner_texts())
     assert not re.search("[<>]=|_per_nm|csd_", said)
     compared = page.locator(".numbers > div small").all_inner_texts()
-    assert len(compared) == 3
+    assert len(compared) == page.locator(".numbers b").count()
     assert all(any(letter.isdigit() for letter in text) for text in compared)
     assert "the distance of the two nearest lights" in page.inner_text(".terms")
 
 
 def fits(page: Any, width: int) -> None:
-    """Answer, three numbers and the first plot lie on the screen, and nothing is wider than it."""
+    """Answer, three numbers, if it is of one design, and the first plot lie on the screen; nothing is wider than it."""
     page.evaluate("window.scrollTo(0, 0)")
-    first = page.locator(".screen .plot").first.get_attribute("id")
+    first = page.locator(".first .plot").first.get_attribute("id")
     page.wait_for_function("(id) => document.getElementById(id).data", arg=first)
     assert page.evaluate("document.documentElement.scrollWidth") == width
-    assert page.locator(".numbers b").count() == 3
-    answer, numbers = box(page, ".answer"), box(page, ".numbers")
-    assert answer["y"] < numbers["y"]
+    assert page.locator(".numbers b").count() == (3 if first == "cfas" else 0)
+    assert box(page, ".answer")["y"] < box(page, f"#{first}")["y"]
     for value in page.locator(".numbers b").all():
         shown = value.bounding_box()
         clipped = value.evaluate("(e) => e.scrollWidth > e.clientWidth")
@@ -99,6 +98,28 @@ def test_the_answer_three_numbers_and_the_plot_are_on_one_screen(
     fits(page, width)
     speaks_plainly(page)
     assert apart(page, "#cfas .annotation")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("width", "most"), [(1440, 900), (400, 1100)])
+def test_gains_and_losses_are_on_the_first_screen(
+    finished: FinishedFolder, standing: Any, width: int, most: float
+) -> None:
+    """On a telephone they follow the plot."""
+    page = standing(finished("stopband"), width).page
+    page.evaluate("window.scrollTo(0, 0)")
+    assert box(page, ".first table")["y"] < most
+    if width == 1440:
+        assert box(page, ".first table tr:last-child >> nth=-1")["y"] < most - 20
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [400, 1440])
+def test_the_noise_report_is_three_screens_long(finished: FinishedFolder, opened: Any, width: int) -> None:
+    page = opened(finished("noise"), width).page
+    page.evaluate("document.querySelectorAll('details.section').forEach((box) => { box.open = false; })")
+    page.wait_for_function("document.getElementById('series-2').data || window.scrollTo(0, 1e6)")
+    assert page.evaluate("document.documentElement.scrollHeight") <= 3 * {400: 800, 1440: 900}[width] + 20
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow) for name in ("fog", "dual", "paper")])
@@ -215,7 +236,7 @@ def test_on_paper_the_first_figure_stands_below_the_answer_and_no_legend_is_cut(
     page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
     page.wait_for_function("[...document.querySelectorAll('.plot')].every((e) => e.hidden || e.data)")
     page.wait_for_timeout(500)
-    plot = box(page, ".screen .plot")
+    plot = box(page, ".first .plot")
     assert plot["y"] + plot["height"] <= 703
     assert plot["x"] + plot["width"] <= 1032
     assert apart(page, "#curves .legend, #curves .xtitle")
@@ -224,7 +245,7 @@ def test_on_paper_the_first_figure_stands_below_the_answer_and_no_legend_is_cut(
     )
     assert page.evaluate(f"{scrolled}.length") == 0
     page.evaluate("window.dispatchEvent(new Event('afterprint'))")
-    assert page.evaluate("document.querySelector('.screen .plot').layout.height") > plot["height"]
+    assert page.evaluate("document.querySelector('.first .plot').layout.height") > plot["height"]
 
 
 @pytest.mark.slow

@@ -188,7 +188,7 @@ def test_another_scenario_is_drawn_when_it_is_chosen(finished: FinishedFolder, s
     seen.page.select_option("#scenario", last)
     rows = table[(table["scenario"] == last) & (table["kind"] == "design") & (table["name"] == "RYN4Cy")]
     drawn = seen.page.evaluate("document.getElementById('cfas').data.find((t) => t.name === 'named designs').y[0]")
-    assert drawn == pytest.approx(rows["csd_yellow_red"].iloc[0], rel=1e-6)
+    assert drawn == pytest.approx(rows["chromatic_csd_yellow_red"].iloc[0], rel=1e-6)
     assert seen.errors == []
 
 

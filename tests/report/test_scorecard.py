@@ -41,10 +41,10 @@ def test_best_and_worst_of_a_row() -> None:
 
 
 def test_factors_say_how_many_times_better() -> None:
-    np.testing.assert_allclose(row(MORE, 2, 6, 1).factors(0), [1, 3, 0.5])
-    np.testing.assert_allclose(row(LESS, 2, 6, 1).factors(0), [1, 1 / 3, 2])
-    assert np.isnan(row(MORE, 2, -6, 1).factors(0)).tolist() == [False, True, False]
-    assert np.isnan(row(MORE, -2, 6, 1).factors(0)).all()
+    np.testing.assert_allclose(row(MORE, 2, 6, 1).factors, [1, 3, 0.5])
+    np.testing.assert_allclose(row(LESS, 2, 6, 1).factors, [1, 1 / 3, 2])
+    assert np.isnan(row(MORE, 2, -6, 1).factors).tolist() == [False, True, False]
+    assert np.isnan(row(MORE, -2, 6, 1).factors).all()
 
 
 @pytest.fixture(scope="module")
@@ -121,10 +121,11 @@ def test_the_scorecard_of_the_project(finished: FinishedFolder) -> None:
     folder = finished("scorecard")
     card = scorecard(read_output(folder))
     assert card is not None
-    assert card.names[3:] == ("RYYCy", "RYN4Cy", "best stopband", "robust to lamps", "robust to angles")
-    assert not any({4, 5, 6, 7} & each.worst for each in card.rows)
+    stopbands = ("RYN4Cy", "best stopband", "robust to lamps", "robust to angles")
+    assert card.names == ("RGGB", *stopbands, "RCCC", "RCCB", "RYYCy")
+    assert not any({1, 2, 3, 4} & each.worst for each in card.rows)
     rows = [each for each in card.rows if each.best]
-    factors = np.array([each.values[4:] / each.values[3] for each in rows])
+    factors = np.array([each.values[1:5] / each.values[7] for each in rows])
     signs = np.sign(factors - 1) * [[1 if each.column.wanted == "more" else -1] for each in rows]
     assert (signs > 0).sum(axis=0).tolist() == [22, 22, 20, 22]
     assert (signs < 0).sum(axis=0).tolist() == [3, 3, 5, 3]

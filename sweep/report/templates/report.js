@@ -6,6 +6,7 @@ const kinds = {u1: Uint8Array, u2: Uint16Array, u4: Uint32Array, f4: Float32Arra
 const config = {responsive: true, displaylogo: false, modeBarButtonsToRemove: ["lasso2d", "select2d"]};
 const grid = {gridcolor: "#e4e4e4", zeroline: false, automargin: true};
 const cycle = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"];
+const dashes = ["solid", "dash", "dot", "dashdot"];
 const byId = (id) => document.getElementById(id);
 /* One kind for all: what WebGL draws lies above what is drawn without it. */
 const drawnBy = document.createElement("canvas").getContext("webgl") ? "scattergl" : "scatter";
@@ -108,20 +109,20 @@ function levelTraces(drawn) {
   return found;
 }
 
-/* Names of designs, each where it lies on no marker and no other name, as far as there is room; `at`: pixels. */
+/* Names of designs, each where it lies on no marker and no other name, as far as there is room; in pixels. */
 function beside(labeled, others, at, width) {
-  const boxOf = (row, r) => { const [u, v] = at(row); return [u - r, v - r, u + r, v + r]; };
-  const markers = [...labeled.map((row) => boxOf(row, 8)), ...others.map((row) => boxOf(row, 3))], placed = [];
+  const boxOf = ([u, v], r) => [u - r, v - r, u + r, v + r];
+  const markers = [...labeled.map((row) => boxOf(at(row), 8)), ...others.map((place) => boxOf(place, 3))], placed = [];
   const meets = (a, b) => a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];
   return labeled.sort((a, b) => y[b] - y[a]).map((row) => {
     const name = data.names[row] ? data.names[row].short : cfaOf(row), [u, v] = at(row);
     const text = `${name} ${y[row] < 10 ? y[row].toFixed(1) : y[row].toFixed(0)}`, long = 6.6 * text.length;
-    const places = [9, -9, 22, -22, 35, 48].flatMap((up) => [["left", 10, up], ["right", -10, up], ["center", 0, 1.8 * up]]);
+    const places = [9, 0, -9, 22, -22, 35, 48].flatMap((up) => [["left", 10, up], ["right", -10, up], ["center", 0, 1.8 * up]]);
     const rated = places.map(([anchor, right, up]) => {
       const start = u + right - {left: 0, center: long / 2, right: long}[anchor];
       const box = [start, v + up - 8, start + long, v + up + 8];
       const over = markers.filter((marker) => meets(box, marker)).length + 20 * placed.filter((other) => meets(box, other)).length;
-      return {anchor, right, up, box, over: over + (box[0] < 0 || box[2] > width || box[1] < 0 ? 50 : 0)};
+      return {anchor, right, up, box, over: over + (box[0] < 0 || box[2] > width || box[1] < -8 ? 50 : 0)};
     });
     const best = rated.reduce((least, place) => place.over < least.over ? place : least);
     placed.push(best.box);
@@ -138,24 +139,28 @@ function drawOverview() {
     if (write) labeled.push(...rows);
     found.push(points(rows, text, marker, {x: rows.map((i) => light[i])}));
   };
+  /* The star lies below all others, so that it hides none. */
+  add("best", "best of the search", {size: 19, symbol: "star", color: color.best, line: {color: "#000000", width: 1}}, true);
   add("front", "swept front", {size: 6, color: color.front});
   found.push(...levelTraces(overview));
   add("plain", "plain CFAs", {size: 10, symbol: "square", color: color.reference}, true);
   add("named", "named designs", {size: 10, symbol: "diamond", color: color.named}, true);
-  add("best", "best of the search", {size: 17, symbol: "star", color: color.best, line: {color: "#000000", width: 1}}, true);
   let top = 1;
   const shown = [...labeled, ...rowsOf("front", true)].map((i) => light[i]).filter(Number.isFinite);
   for (const line of [overview.traced, overview.limit]) if (line) shown.push(...line[0]);
   for (const i of labeled) top = Math.max(top, y[i]);
   const margin = 0.1 * (Math.max(...shown) - Math.min(...shown)) || 0.1;
-  const left = Math.min(...shown) - margin, right = Math.max(...shown) + margin;
+  const left = Math.min(...shown) - margin, right = Math.max(...shown) + 2 * margin;
   for (const line of [overview.traced, overview.limit]) if (line) top = Math.max(top, ...line[1]);
-  const width = byId("cfas").clientWidth - (narrow() ? 80 : 270), height = narrow() ? 300 : 350;
-  const notes = beside(labeled, rowsOf("front", true), (row) => [(light[row] - left) / (right - left) * width, y[row] / (1.1 * top) * height], width);
+  const width = byId("cfas").clientWidth - (narrow() ? 80 : 270), height = narrow() ? 300 : 280;
+  const at = (u, v) => [(u - left) / (right - left) * width, v / (1.1 * top) * height];
+  const drawn = rowsOf("front", true).map((i) => at(light[i], y[i]));
+  for (const line of [overview.traced, overview.limit]) if (line) drawn.push(...line[0].map((u, i) => at(u, line[1][i])));
+  const notes = beside(labeled, drawn, (row) => at(light[row], y[row]), width);
   Plotly.react("cfas", found, {
     xaxis: Object.assign({title: {text: plain(overview.x_label).replace(": ", narrow() ? ":<br>" : ": ")}, range: [left, right]}, grid),
     yaxis: Object.assign({title: {text: plain(overview.y_label)}, range: [0, 1.1 * top]}, grid),
-    height: narrow() ? 460 : 440, margin: {l: 60, r: 10, t: 30, b: 50}, hovermode: "closest", plot_bgcolor: "#fff", annotations: notes,
+    height: narrow() ? 460 : 370, margin: {l: 60, r: 10, t: 30, b: 50}, hovermode: "closest", plot_bgcolor: "#fff", annotations: notes,
     legend: narrow() ? {orientation: "h", y: -0.3, font: {size: 11}} : {x: 1.01, y: 1, font: {size: 12}},
     title: {text: plain(overview.title), font: {size: narrow() ? 12 : 15}},
   }, config);
@@ -188,8 +193,8 @@ function traces() {
       {size: 10, symbol: "diamond", color: color.named}));
   const best = rowsOf("best");
   if (best.length)
-    found.push(points(best, "best of the search",
-      {size: 17, symbol: "star", color: color.best, line: {color: "#000000", width: 1}}));
+    found.unshift(points(best, "best of the search",
+      {size: 19, symbol: "star", color: color.best, line: {color: "#000000", width: 1}}));
   return found;
 }
 
@@ -391,7 +396,7 @@ function drawProfiles() {
 }
 
 function drawSeries(series, box) {
-  const found = [];
+  const found = [], keyed = !narrow() || box.id === "series-0";
   Object.entries(series.lines).forEach(([name, line], i) => {
     const color = cycle[i % cycle.length], shared = {type: "scatter", x: series.x, legendgroup: name};
     if (line.upper) {
@@ -402,22 +407,26 @@ function drawSeries(series, box) {
     const symbol = ["circle", "square", "diamond", "triangle-up", "x", "star"][i % 6];
     const marker = ring < 0 ? {size: 6, symbol} : {color, opacity: 1, line: {color, width: x.map((_, at) => at === ring ? 2 : 0)},
       size: x.map((_, at) => at === ring ? 13 : 6), symbol: x.map((_, at) => at === ring ? "circle-open" : symbol)};
-    found.push(Object.assign({}, shared, {mode: "lines+markers", x, y, name: plain(name), line: {color, width: 2}, marker}));
+    found.push(Object.assign({}, shared, {mode: "lines+markers", x, y, name: plain(name), line: {color, width: 2, dash: dashes[i % 4]}, marker}));
   });
+  const values = Object.values(series.lines).flatMap((line) => line.y).filter((value) => value > 0);
   const shapes = series.level === null ? [] : [{type: "line", xref: "paper", x0: 0, x1: 1, y0: series.level, y1: series.level,
     line: {color: "#666666", width: 1, dash: "dash"}}];
   Plotly.react(box, found, {
-    title: {text: plain(series.title), font: {size: 14}}, height: narrow() ? 460 : 420, shapes, hovermode: "x unified",
+    title: {text: plain(series.title), font: {size: 14}}, height: narrow() ? (keyed ? 420 : 310) : 420, shapes, hovermode: "x unified", showlegend: keyed,
     margin: {l: 60, r: 10, t: 36, b: 50}, legend: narrow() ? {orientation: "h", y: -0.25} : {tracegroupgap: 2},
     xaxis: Object.assign({title: {text: plain(series.x_label)}, type: series.log_x ? "log" : "linear"},
       series.log_x ? logTicks(series.x) : {}, grid),
     yaxis: Object.assign({title: {text: plain(series.y_label)}, type: series.log_y ? "log" : "linear", exponentformat: "power",
-      rangemode: series.from_zero && !series.log_y ? "tozero" : "normal"}, grid),
+      rangemode: series.from_zero && !series.log_y ? "tozero" : "normal"}, series.log_y ? logTicks(values) : {}, grid),
   }, config);
 }
 
+/* Readable ticks of a logarithmic axis; over many decades Plotly's own. */
 function logTicks(values) {
-  const low = Math.min(...values), high = Math.max(...values), steps = high / low < 1e4 ? [1, 2, 5] : [1], ticks = [];
+  const low = Math.min(...values), high = Math.max(...values), decades = Math.log10(high / low), ticks = [];
+  if (decades > 5) return {};
+  const steps = decades > (narrow() ? 2 : 4) ? [1] : [1, 2, 5];
   for (let power = Math.floor(Math.log10(low)); power <= Math.log10(high); power++) {
     for (const step of steps) ticks.push(Number(`${step}e${power}`));
   }
