@@ -47,14 +47,8 @@ _STYLES: dict[str, dict[str, Any]] = {
     "front": {"color": COLORS["front"], "marker": "o", "s": 14, "zorder": 3},
     "plain": {"marker": "s", "s": 44, "color": COLORS["reference"], "zorder": 5},
     "named": {"color": COLORS["named"], "marker": "D", "s": 42, "zorder": 5},
-    "best": {
-        "marker": "*",
-        "s": 260,
-        "facecolors": "none",
-        "edgecolors": COLORS["best"],
-        "linewidths": 1.8,
-        "zorder": 6,
-    },
+    # The star lies below the others, so that it hides none.
+    "best": {"color": COLORS["best"], "marker": "*", "s": 260, "edgecolors": "black", "linewidths": 0.8, "zorder": 2.5},
 }
 
 
