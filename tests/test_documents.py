@@ -10,9 +10,11 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from sweep.base.errors import OutputError
 from sweep.cli.accuracy import measure_accuracy
 from sweep.metrics.share import format_share
 from sweep.report.price import price_table
+from sweep.report.vision_report import vision_parts
 from sweep.results.output import read_output
 from sweep.study import load_study
 
@@ -205,3 +207,60 @@ def test_the_table_of_the_readme_is_that_of_its_command(finished: FinishedFolder
         )
         own = f"{' | '.join(f'{value:.0f} DN' for value in values)} | {kept} |"
         assert own in line, name
+
+
+GUIDE_TO_IMAGES = (STUDIES / "guide" / "07-other-tasks-and-images.md").read_text()
+ERRORS_OF_IMAGES = {
+    cells[0]: cells[1:]
+    for line in GUIDE_TO_IMAGES.split("| | network | ideal observer |")[1].splitlines()[2:9]
+    if (cells := [cell.strip() for cell in line.strip("|").split("|")])
+}
+"""Design -> errors of network and ideal observer, and the difference to RGGB, as the guide has them."""
+
+
+def tables_of_images(folder: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """The report's tables of errors by design, and of rank correlations by predictor."""
+    errors, _, ranks, _ = vision_parts(read_output(folder)).values()
+    return errors.set_index("design"), ranks.set_index("predictor")
+
+
+@pytest.mark.slow
+def test_the_errors_of_the_ideal_observer_are_those_of_their_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    draw_nothing(monkeypatch)
+    text = (STUDIES / "vision.yaml").read_text()
+    (tmp_path / "vision.yaml").write_text(text.replace("\nvision:\n", "\nvision:\n  network: false\n"))
+    code, _, said = commanded("run", tmp_path / "vision.yaml", "--output", tmp_path, "--quiet")
+    assert code == 0, said
+    observed = tables_of_images(tmp_path / "vision")[0]["error %: ideal observer, lenses shuffled"]
+    assert {design: cells[1] for design, cells in ERRORS_OF_IMAGES.items()} == dict(observed)
+
+
+@pytest.mark.slow
+def test_the_errors_of_the_network_are_those_of_their_command() -> None:
+    """The command is `make study NAME=vision`, too long for a test; this reads what it left."""
+    folder = ROOT / "outputs" / "vision"
+    try:
+        read_output(folder)
+    except OutputError:
+        pytest.skip("there is no finished run in outputs/vision: make study NAME=vision")
+    if load_study(folder / "study.resolved.yaml").section != load_study(STUDIES / "vision.yaml").section:
+        pytest.skip("outputs/vision is of another study: make study NAME=vision")
+    errors, ranks = tables_of_images(folder)
+    shown = ["error %: network, lenses shuffled", "error %: ideal observer, lenses shuffled", "less that of RGGB %"]
+    assert errors[shown].replace("-", "").T.to_dict("list") == ERRORS_OF_IMAGES
+    value = errors.map(lambda text: float(text.split()[0]) if " (" in text else math.nan)
+    half = value["error %: network, half of the images, lenses shuffled"] - value[shown[0]]
+    everywhere, within = (ranks[name].str.partition(" (") for name in ranks)
+    csd, dprime, _, observer = within[0]
+    low, high = within[2]["CSD"].strip(")").split(" to ")
+    figures = (
+        f"rank correlation {csd}, from {low} to {high}",
+        f"points the other way ({dprime})",
+        f"says nothing ({observer}, from",
+        f"the CSD's is {everywhere[0]['CSD']}.",
+        f"reads {half.min():.1f} to {half.max():.1f} percent more",
+    )
+    text = " ".join(GUIDE_TO_IMAGES.split())
+    assert [figure for figure in figures if figure not in text] == []
