@@ -99,7 +99,7 @@ def _of_designs(output: Output) -> tuple[list[str], list[str]]:
     if output.best.empty and (scores := score_lines(scorecard(output))):
         return scores, list(_best(output, leaders))
     best = list(_best(output, leaders))
-    return [*best[:1], *cost_of_worst_case(output, leaders.chosen), *_named_over_field(output, leaders)], [
+    return [*best[:1], *cost_of_worst_case(output, leaders.chosen), *_over_field(output, leaders)], [
         *best[1:],
         *_best_of_other_scenarios(output),
         *robustness_lines(output, leaders.chosen),
@@ -157,7 +157,7 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
             values = [f"{float(row[name]):.3g} {output.columns[name].unit}".rstrip() for row in rows]
             beside = f" ({plain['name']} {values[1]})" if plain is not None else ""
             yield f"Its {output.words(name)} is {values[0]}{beside}."
-    if assumption := angle_note(output, best):
+    if output.study.scenarios[leaders.scenario].field is None and (assumption := angle_note(output, best)):
         yield assumption
     if limits := _limits(output, best):
         yield limits
@@ -215,18 +215,26 @@ def _limits(output: Output, best: Row) -> str:
     return " ".join(parts)
 
 
-def _named_over_field(output: Output, leaders: Leaders) -> Iterator[str]:
-    """Yield the separations of named designs, if the scenario is of several field positions."""
-    if leaders.chosen is not None and output.study.scenarios[leaders.scenario].field is not None:
-        separation = output.trade_off[0]
-        named = output.kind(NAMED)
-        named = named[(named["scenario"] == leaders.scenario) & (named["status"] == "ok")]
-        others = named[named["design_id"] != leaders.chosen["design_id"]].sort_values(separation.name, ascending=False)
-        texts = [
-            f"{name} {separation.formatted(value)}" for name, value in others[["name", separation.name]].to_numpy()
-        ]
-        if texts:
-            yield f"The worst field position leaves of the other designs: {', '.join(texts)}."
+def _over_field(output: Output, leaders: Leaders) -> Iterator[str]:
+    """Yield the angles of several field positions, and the separations of named designs at the first and the worst."""
+    best = leaders.chosen
+    if best is None or output.places is None or output.study.scenarios[leaders.scenario].field is None:
+        return
+    if note := angle_note(output, best):
+        yield note
+    separation, places = output.trade_off[0], output.places
+    if separation.name not in places:
+        return
+    named = output.kind(NAMED)
+    named = named[(named["scenario"] == leaders.scenario) & (named["status"] == "ok")]
+    parts = []
+    for row in named.sort_values(separation.name, ascending=False).to_dict("records"):
+        of_design = places[places["design_id"] == row["design_id"]]
+        if row["design_id"] != best["design_id"] and len(of_design):
+            center = float(of_design.nsmallest(1, "height")[separation.name].iloc[0])
+            parts.append(f"{label(row)} {separation.formatted(center)} to {separation.formatted(row[separation.name])}")
+    if parts:
+        yield f"From the center to the worst field position: {', '.join(parts)}."
 
 
 def _best_of_other_scenarios(output: Output) -> Iterator[str]:
@@ -395,7 +403,8 @@ def headline_numbers(output: Output) -> list[tuple[str, str, str]]:
     bound, search = upper_bound_beside(output, best), output.provenance.search
     if bound is not None and search is not None:
         shown = f"{separation.format_bound(bound)}: proven under {_constraints_of_bound(output)}, before quantization"
-        name = f"below the upper bound for any filter in {search.channel} of {search.cfa}"
+        alike = " that moves like it" if is_angle_dependent(output, best) else ""
+        name = f"below the upper bound for any filter{alike} in {search.channel} of {search.cfa}"
         numbers.append((separation.formatted(bound - value), name, shown))
     elif best[measure] == best[measure] and separation.unit != DECADES and separation.metric not in (D_PRIME, CNR):
         rate = f"{_rate(float(best[measure]))} {separation.unit}"

@@ -9,6 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ..base.errors import UpperBoundExceededError, ValidationIssue
+from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.quantity import DN
 from ..results.facts import SearchFacts
 from ..results.output import Output
@@ -84,10 +85,10 @@ def _first(rows: pd.DataFrame) -> Row | None:
 
 
 def _most(rows: pd.DataFrame, column: str) -> Row | None:
-    """Return the row with the largest value; of equal ones a named one, then the first."""
+    """Return the row with the largest value; of equal ones a named one, then that with the most light."""
     most = rows[rows[column] == rows[column].max()]
     named = most[most["name"].notna()]
-    return _first(most if named.empty else named)
+    return _first((most if named.empty else named).sort_values(CFA_SENSITIVITY, ascending=False, kind="stable"))
 
 
 def of_reference(output: Output) -> str:

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 _MARKERS = "osD^vPX*"
 _MOST_FACTOR = 10.0
+_MOST_NAMED = 4
+"""Gains that a sentence names; of more it says how many."""
 _SAME = 1e-9
 """Designs whose values differ by less, relative to the largest, differ by rounding alone."""
 
@@ -133,6 +135,8 @@ def score_lines(card: Scorecard | None) -> list[str]:
     order = sorted(range(len(card.names)), key=lambda at: (-best[at], worst[at]))
     counts = "; ".join(f"{card.names[at]} {best[at]} and {worst[at]}" for at in order[1:])
     lines = _against(card, marked)
+    equal = [row.column.words for row in card.rows if not row.best]
+    lines += [f"Equal in all: {', '.join(equal)}."] if equal else []
     return [
         f"{card.names[order[0]]} is best in {best[order[0]]} of {len(marked)} figures of tasks and worst in "
         f"{worst[order[0]]}; the others, best and worst: {counts}.",
@@ -141,14 +145,15 @@ def score_lines(card: Scorecard | None) -> list[str]:
 
 
 def _against(card: Scorecard, rows: Sequence[ScoreRow]) -> list[str]:
-    """Return how often each other design is better and worse than the reference, in one line."""
-    parts = []
+    """Return where, or how often, other designs are better than the first, in one line; equal ones together."""
     reference, *others = card.names
+    alike: dict[tuple[str, int], list[str]] = {}
     for at, name in enumerate(others, 1):
-        signs = [np.sign(row.values[at] - row.values[0]) for row in rows]
-        gains = sum(sign == (1 if row.column.wanted == "more" else -1) for sign, row in zip(signs, rows, strict=True))
-        losses = sum(bool(sign) for sign in signs if np.isfinite(sign)) - gains
-        parts.append(f"{name} in {gains} and {losses}")
+        signs = [np.sign(row.values[at] - row.values[0]) * (1 if row.column.wanted == "more" else -1) for row in rows]
+        gains = [row.column.words for row, sign in zip(rows, signs, strict=True) if sign > 0]
+        better = f"in {len(gains)}" + (f" ({', '.join(gains)})" if 0 < len(gains) <= _MOST_NAMED else "")
+        alike.setdefault((better, sum(sign < 0 for sign in signs)), []).append(name)
+    parts = [f"{', '.join(names)} {better} and {worse}" for (better, worse), names in alike.items()]
     return [f"Better and worse than {reference}: {'; '.join(parts)}."]
 
 

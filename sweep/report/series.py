@@ -262,36 +262,37 @@ def vanishing_line(series: SeriesFigure) -> list[str]:
         for where, designs in ranges.items()
     ]
     what, among = series.y_label.partition(" / ")[0], f", {series.among}," if series.among else ""
+    never = [design for design in series.lines if not any(design in designs for designs in ranges.values())]
+    parts += [f"at no {quantity_of(series.key)[0]} for {', '.join(never)}"] if never else []
     return [f"{capital(what)}{among} is below {_LEAST_LEAD:g} {DN} {'; '.join(parts)}."]
 
 
 def _below(series: SeriesFigure) -> dict[str, list[str]]:
     """Return designs below 1 DN by the range of numbers, in words."""
     ranges: dict[str, list[str]] = {}
-    name, unit = quantity_of(series.key)
+    name = quantity_of(series.key)[0]
     article = "an" if name[0] in "aeiou" else "a"
     for design, y in series.values.items() if series.y_label.endswith(f" / {DN}") else ():
         below = y < _LEAST_LEAD
         ends = np.flatnonzero(np.diff(below))
         if below.all():
             where = f"at every {name}"
-        elif len(ends) == 1:
-            between = f"between {series.x[ends[0]]:g} and {series.x[ends[0] + 1]:g} {unit}".rstrip()
-            where = f"up to {article} {name} {between}" if below[0] else f"from {article} {name} {between} on"
         else:
             runs = np.split(np.arange(below.size), ends + 1)
-            where = " and ".join(_run(series, run) for run in runs if below[run[0]])
+            where = " and ".join(_run(series, run, article) for run in runs if below[run[0]])
         if below.any():
             ranges.setdefault(where, []).append(design)
     return ranges
 
 
-def _run(series: SeriesFigure, run: IndexArray) -> str:
+def _run(series: SeriesFigure, run: IndexArray, article: str) -> str:
     """Return a range of neighboring numbers in words."""
-    first, last = series.at(int(run[0])), series.at(int(run[-1]))
-    if run[0] == 0:
-        return f"up to {last}"
-    return f"from {first} on" if run[-1] == series.x.size - 1 else f"from {first} to {last}"
+    first, last, (name, unit) = int(run[0]), int(run[-1]), quantity_of(series.key)
+    if first == 0:
+        return f"up to {article} {name} between {series.x[last]:g} and {series.x[last + 1]:g} {unit}".rstrip()
+    if last == series.x.size - 1:
+        return f"from {article} {name} between {series.x[first - 1]:g} and {series.x[first]:g} {unit} on".rstrip()
+    return f"from {series.at(first)} to {series.at(last)}"
 
 
 def leads_of(series: SeriesFigure) -> list[tuple[str | None, int, int]]:
@@ -340,8 +341,9 @@ def draw_series(series: SeriesFigure) -> Figure:
         Figure.
     """
     figure, axes = canvas(8.0, 4.8)
+    widths = iter(np.linspace(3.0, 1.5, len(series.lines)))  # of equal lines each is seen below the next
     for (name, line), color, dash in zip(series.lines.items(), CURVE_CYCLE * 4, DASHES * 7, strict=False):
-        axes.plot(*line.over(series.x), linestyle=dash, color=color, linewidth=1.5)
+        axes.plot(*line.over(series.x), linestyle=dash, color=color, linewidth=next(widths))
         axes.plot(series.x, line.y, "o", color=color, markersize=3.5)
         axes.plot([], [], "o", linestyle=dash, color=color, label=name, linewidth=1.5, markersize=3.5)
         if line.passes is not None:

@@ -15,6 +15,7 @@ from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
 from ..results.thinning import even
 from .figures import COLORS, canvas, legend_beside
 from .leaders import bounds_figure, label
+from .terms import is_angle_dependent
 from .values import modifications
 
 if TYPE_CHECKING:
@@ -223,8 +224,11 @@ def around_designs(output: Output, scenario: str) -> TradeOff:
 
 def _limit_name(output: Output) -> str:
     """Return the filters of the upper bound, for a legend; empty without a search."""
-    search = output.provenance.search
-    return "" if search is None else f"upper bound for {search.channel} of {search.cfa}, unquantized"
+    search, found = output.provenance.search, output.kind(FOUND)
+    if search is None:
+        return ""
+    such = "such layers in " if len(found) and is_angle_dependent(output, found.iloc[0].to_dict()) else ""
+    return f"upper bound for {such}{search.channel} of {search.cfa}, unquantized"
 
 
 def _points(output: Output, rows: pd.DataFrame, x: str, labels: Sequence[str] = ()) -> Points:
@@ -292,7 +296,7 @@ def draw_trade_off(figure: TradeOff) -> Figure:
             axes.scatter(points.x[kept], points.y[kept], label=text, rasterized=True, **_STYLES[group])
     traced, limit = figure.traced, figure.limit
     if traced is not None:
-        axes.plot(traced.x, traced.y, "+", color=COLORS["best"], markersize=8, label=_TRACED_NAME, zorder=4)
+        axes.plot(traced.x, traced.y, "+", color="black", markersize=7, label=_TRACED_NAME, zorder=4)
     if limit is not None:
         style: dict[str, Any] = {"color": COLORS["limit"], "linestyle": "--", "linewidth": 1.5, "zorder": 4}
         axes.plot(limit.x, limit.y, label=figure.limit_name, drawstyle="steps-post", **style)

@@ -71,10 +71,10 @@ def vision_sentences(output: Output) -> Iterator[str]:
             (d, benchmark.error(d, NETWORK, SHUFFLED), benchmark.error(d, OBSERVER, SHUFFLED))
             for d in benchmark.designs
         ]
-        best = min(pairs, key=lambda pair: pair[1].value)
+        errors = [f"{design} {100 * ours.value:.1f} and {100 * least.value:.1f}" for design, ours, least in pairs]
         yield (
-            f"The network reads {format_percent(best[1])} % of the images of {best[0]} wrongly, the ideal observer "
-            f"{format_percent(best[2])} % (lamps not seen in training, lenses in any order)."
+            "Percent of the images that the network and the ideal observer read wrongly (lamps not seen in training, "
+            f"lenses in any order): {', '.join(errors)}."
         )
 
 

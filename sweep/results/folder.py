@@ -100,9 +100,9 @@ def begin(folder: Path, study: Study) -> Inventory:
 def _changed(held: Inventory, study: Study) -> str:
     """Return the first few keys that differ, with their values."""
     before, after = (dict(_flat(x)) for x in (held.facts.get("identity"), json.loads(json.dumps(identity(study)))))
-    if not before.keys() & after.keys():
-        return "of an earlier version"
     keys = [key for key in {**before, **after} if before.get(key) != after.get(key)]
+    if not keys or not before.keys() & after.keys():
+        return "of another version of this package"
     shown = [f"{_short(key)}: {_short(before.get(key))} -> {_short(after.get(key))}" for key in keys[:_MOST_SHOWN]]
     more = f", {len(keys) - _MOST_SHOWN} more" if len(keys) > _MOST_SHOWN else ""
     return "changed " + ", ".join(shown) + more

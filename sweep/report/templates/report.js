@@ -103,14 +103,14 @@ function points(rows, name, marker, extra) {
 function levelTraces(drawn) {
   const found = [];
   if (drawn.traced) found.push({type: drawnBy, mode: "markers", name: "found by the search", x: drawn.traced[0],
-    y: drawn.traced[1], hoverinfo: "skip", marker: {symbol: "cross-thin-open", size: 9, color: data.colors.groups.best, line: {width: 2}}});
+    y: drawn.traced[1], hoverinfo: "skip", marker: {symbol: "cross-thin-open", size: 8, color: "#000000", line: {width: 1}}});
   if (drawn.limit) found.push({type: drawnBy, mode: "lines", name: drawn.limit_name, x: drawn.limit[0],
     y: drawn.limit[1], hoverinfo: "skip", line: {shape: "hv", color: data.colors.groups.limit, dash: "dash", width: 2}});
   return found;
 }
 
 /* Names of designs, each where it lies on no marker and no other name, as far as there is room; in pixels. */
-function beside(labeled, others, at, width) {
+function beside(labeled, others, at, width, height) {
   const boxOf = ([u, v], r) => [u - r, v - r, u + r, v + r];
   const markers = [...labeled.map((row) => boxOf(at(row), 8)), ...others.map((place) => boxOf(place, 3))], placed = [];
   const meets = (a, b) => a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];
@@ -122,7 +122,7 @@ function beside(labeled, others, at, width) {
       const start = u + right - {left: 0, center: long / 2, right: long}[anchor];
       const box = [start, v + up - 8, start + long, v + up + 8];
       const over = markers.filter((marker) => meets(box, marker)).length + 20 * placed.filter((other) => meets(box, other)).length;
-      return {anchor, right, up, box, over: over + (box[0] < 0 || box[2] > width || box[1] < -8 ? 50 : 0)};
+      return {anchor, right, up, box, over: over + (box[0] < 0 || box[2] > width || box[1] < -8 || box[3] > height ? 50 : 0)};
     });
     const best = rated.reduce((least, place) => place.over < least.over ? place : least);
     placed.push(best.box);
@@ -140,7 +140,7 @@ function drawOverview() {
     found.push(points(rows, text, marker, {x: rows.map((i) => light[i])}));
   };
   /* The star lies below all others, so that it hides none. */
-  add("best", "best of the search", {size: 19, symbol: "star", color: color.best, line: {color: "#000000", width: 1}}, true);
+  add("best", "best of the search", {size: 22, symbol: "star", color: color.best, line: {color: "#000000", width: 1}}, true);
   add("front", "swept front", {size: 6, color: color.front});
   found.push(...levelTraces(overview));
   add("plain", "plain CFAs", {size: 10, symbol: "square", color: color.reference}, true);
@@ -156,7 +156,7 @@ function drawOverview() {
   const at = (u, v) => [(u - left) / (right - left) * width, v / (1.1 * top) * height];
   const drawn = rowsOf("front", true).map((i) => at(light[i], y[i]));
   for (const line of [overview.traced, overview.limit]) if (line) drawn.push(...line[0].map((u, i) => at(u, line[1][i])));
-  const notes = beside(labeled, drawn, (row) => at(light[row], y[row]), width);
+  const notes = beside(labeled, drawn, (row) => at(light[row], y[row]), width, height);
   Plotly.react("cfas", found, {
     xaxis: Object.assign({title: {text: plain(overview.x_label).replace(": ", narrow() ? ":<br>" : ": ")}, range: [left, right]}, grid),
     yaxis: Object.assign({title: {text: plain(overview.y_label)}, range: [0, 1.1 * top]}, grid),
@@ -194,7 +194,7 @@ function traces() {
   const best = rowsOf("best");
   if (best.length)
     found.unshift(points(best, "best of the search",
-      {size: 19, symbol: "star", color: color.best, line: {color: "#000000", width: 1}}));
+      {size: 22, symbol: "star", color: color.best, line: {color: "#000000", width: 1}}));
   return found;
 }
 
@@ -407,7 +407,7 @@ function drawSeries(series, box) {
     const symbol = ["circle", "square", "diamond", "triangle-up", "x", "star"][i % 6];
     const marker = ring < 0 ? {size: 6, symbol} : {color, opacity: 1, line: {color, width: x.map((_, at) => at === ring ? 2 : 0)},
       size: x.map((_, at) => at === ring ? 13 : 6), symbol: x.map((_, at) => at === ring ? "circle-open" : symbol)};
-    found.push(Object.assign({}, shared, {mode: "lines+markers", x, y, name: plain(name), line: {color, width: 2, dash: dashes[i % 4]}, marker}));
+    found.push(Object.assign({}, shared, {mode: "lines+markers", x, y, name: plain(name), line: {color, width: Math.max(1.5, 4 - 0.4 * i), dash: dashes[i % 4]}, marker}));
   });
   const values = Object.values(series.lines).flatMap((line) => line.y).filter((value) => value > 0);
   const shapes = series.level === null ? [] : [{type: "line", xref: "paper", x0: 0, x1: 1, y0: series.level, y1: series.level,
