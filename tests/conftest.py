@@ -49,6 +49,7 @@ FEWER = {
     "angle": {"[0, 5, 10, 15, 20, 25, 30]": "[0, 15, 30]", "starts: 8": "starts: 2"},
     "producible": {"starts: 32": "starts: 4"},
     "freeform": {"starts: 4": "starts: 2"},
+    "dye": {"box: {absorbance_1": "box: {colorant_1: [20, 27], colorant_2: [20, 27], absorbance_1"},
     "dual": {"starts: 8": "starts: 2"},
     "rccb": {"front: {min: 0.80, max: 1.0, count: 11}": "front: {min: 0.80, max: 1.0, count: 3}"},
     "robust": {"max: 0.94, count: 3}": "max: 0.94, count: 2}"},

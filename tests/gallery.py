@@ -19,6 +19,7 @@ PICTURES = {
     "producible": "cfas",
     "robust": "figures/regions-1",
     "angle": "figures/places-1",
+    "dye": "cfas",
     "dual": "cfas",
     "rccb": "pareto",
     "balanced": "figures/scorecard",

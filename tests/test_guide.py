@@ -19,7 +19,7 @@ from .commanded import commanded
 from .conftest import STUDIES
 
 GUIDE = STUDIES / "guide"
-PAGES = sorted(path.name for path in GUIDE.glob("0*.md"))
+PAGES = sorted(path.name for path in GUIDE.glob("[0-9]*.md"))
 PUBLIC = {*sweep.__all__} - {"__version__"}
 SLOW = "slow"
 """After the language of a block: it takes more than a few seconds."""

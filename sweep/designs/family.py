@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Protocol, Self, runtime_checkable
 
-from ..base.types import FloatArray, Section
+from ..base.types import FloatArray, IndexArray, Section
 from .tolerance import ProductionError
 
 
@@ -241,4 +241,27 @@ class SeparableFamily(Protocol):
         -------
         ndarray of shape (n, n_wavelengths)
             Edges, 0 to 1.
+        """
+
+
+@runtime_checkable
+class ChoosingFamily(Protocol):
+    """Family of which some parameters are numbers in a catalog, with nothing in between, and others their amounts."""
+
+    @property
+    def slots(self) -> tuple[tuple[int, int], ...]:
+        """Indices of a number and its amount."""
+
+    def only(self, numbers: IndexArray) -> Family:
+        """Return the family with some members of the catalog, under their numbers.
+
+        Parameters
+        ----------
+        numbers : ndarray of int, shape (n,)
+            Ascending numbers.
+
+        Returns
+        -------
+        Family
+            The family.
         """

@@ -51,6 +51,47 @@ def described_families() -> str:
     return ", ".join(families)
 
 
+def options_of(kind: str, options: FamilyOptions, *, has_target: bool) -> Section:
+    """Return the options of a family, out of those of all.
+
+    Parameters
+    ----------
+    kind : str
+        Name of the family.
+    options : FamilyOptions
+        Options of the study.
+    has_target : bool
+        True if the study names a target curve.
+
+    Returns
+    -------
+    Section
+        Options of the family.
+
+    Raises
+    ------
+    SweepError
+        If there is no such family, or if a target or option is missing or superfluous.
+    """
+    family = FAMILIES.get(kind)
+    if family is None:
+        allowed = ", ".join(FAMILIES)
+        raise SweepError(
+            ValidationIssue("unknown family", value=kind, allowed=allowed, nearest=nearest(kind, FAMILIES))
+        )
+    if has_target != family.needs_target:
+        raise SweepError(ValidationIssue(f"{kind} {'needs' if family.needs_target else 'has no'} `to`"))
+    given = {name: value for name in FamilyOptions.model_fields if (value := getattr(options, name)) is not None}
+    known_options = family.Options.model_fields
+    needed = {name for name, field in known_options.items() if field.is_required()}
+    for name in FamilyOptions.model_fields:
+        if (name in given and name not in known_options) or (name in needed and name not in given):
+            owners = " or ".join(owner for owner, made in FAMILIES.items() if name in made.Options.model_fields)
+            problem = f"`{name}` goes with {owners}, and {owners} with `{name}`"
+            raise SweepError(ValidationIssue(problem, value=given.get(name)))
+    return family.Options(**given)
+
+
 def build_family(
     kind: str, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None, options: FamilyOptions
 ) -> Family:
@@ -75,20 +116,5 @@ def build_family(
     SweepError
         If there is no such family, or if a target or option is missing or superfluous.
     """
-    family = FAMILIES.get(kind)
-    if family is None:
-        allowed = ", ".join(FAMILIES)
-        raise SweepError(
-            ValidationIssue("unknown family", value=kind, allowed=allowed, nearest=nearest(kind, FAMILIES))
-        )
-    if (target is not None) != family.needs_target:
-        raise SweepError(ValidationIssue(f"{kind} {'needs' if family.needs_target else 'has no'} `to`"))
-    given = {name: value for name in FamilyOptions.model_fields if (value := getattr(options, name)) is not None}
-    known_options = family.Options.model_fields
-    needed = {name for name, field in known_options.items() if field.is_required()}
-    for name in FamilyOptions.model_fields:
-        if (name in given and name not in known_options) or (name in needed and name not in given):
-            owners = " or ".join(owner for owner, made in FAMILIES.items() if name in made.Options.model_fields)
-            problem = f"`{name}` goes with {owners}, and {owners} with `{name}`"
-            raise SweepError(ValidationIssue(problem, value=given.get(name)))
-    return family.of_study(wavelength_nm, base, target, family.Options(**given))
+    own = options_of(kind, options, has_target=target is not None)
+    return FAMILIES[kind].of_study(wavelength_nm, base, target, own)

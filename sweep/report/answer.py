@@ -139,7 +139,11 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
             yield f"In {leaders.scenario}, no design meets every constraint."
         return
     under, stated = format_constraints(output), technology_of(output, best)
-    notes = [*([edges] if (edges := _edges(best)) else []), *([] if stated is None else [stated.description])]
+    notes = [
+        *_colorants(output, best),
+        *([edges] if (edges := _edges(best)) else []),
+        *([] if stated is None else [stated.description]),
+    ]
     who = full_name(best) + (f" ({'; '.join(notes)})" if notes else "")
     if best["kind"] in (PLAIN, NAMED):
         who = f"the best {'CFA' if best['kind'] == PLAIN else 'design'} of this study, {who},"
@@ -179,6 +183,19 @@ def _equal(output: Output, best: Row) -> str:
     shown = separation.formatted(best[separation.name])
     names = [label(row) for row in rows.to_dict("records") if separation.formatted(row[separation.name]) == shown]
     return f" {' and '.join(names)} {'has' if len(names) == 1 else 'have'} {shown}, too." if names else ""
+
+
+def _colorants(output: Output, best: Row) -> Iterator[str]:
+    """Yield the colorants of a filter with their absorbances, or the peak and width of its only modeled band."""
+    names = list(output.curves.colorants)
+    slots = [name.removeprefix("colorant_") for name in output.parameters if name.startswith("colorant_")]
+    for slot in slots:
+        number, absorbance = float(best[f"colorant_{slot}"]), float(best[f"absorbance_{slot}"])
+        if np.isfinite(number) and absorbance > 0:
+            yield f"{names[round(number) - 1]} with an absorbance of {absorbance:.2f}"
+    peak_nm, fwhm_nm = (float(best.get(name, np.nan)) for name in ("peak_nm", "fwhm_nm"))
+    if np.isfinite([peak_nm, fwhm_nm]).all():
+        yield f"a band at {peak_nm:.0f} nm of {fwhm_nm:.0f} nm FWHM with an absorbance of {best['absorbance']:.2f}"
 
 
 def _edges(best: Row) -> str:

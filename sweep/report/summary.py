@@ -74,6 +74,8 @@ def summary_lines(output: Output, took_s: float | None = None) -> list[str]:
     if facts.search:
         reached = f"{output.goal.amount(facts.search.best_smooth_objective)} before clipping and quantization"
         starts, evaluations = _count(facts.search.starts, "start"), _count(facts.search.evaluations, "evaluation")
+        if facts.search.combinations:
+            lines.append(f"Tried: {', '.join(facts.search.combinations)} of colorants.")
         lines.append(f"Search: {facts.search.algorithm}, {starts}, {evaluations}: {reached}.")
         lines.append(_limit_line(output, facts.search))
     if facts.hypervolume:

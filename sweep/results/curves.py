@@ -11,8 +11,9 @@ import pyarrow as pa
 from ..base.types import FloatArray
 
 _QE, _LIGHT, _TASK, _DESIGN, _ON_FRONT, _LIMIT = "qe", "light", "task", "design", "front", "limit"
+_COLORANT = "colorant"
 """Kinds: of the sensor; of a signal; of an own task's file; a modified channel of a design that is drawn, or of one on
-the front; of the limit."""
+the front; of the limit; the absorbance of a colorant, relative to its peak."""
 _WORD = pa.dictionary(pa.int32(), pa.string())
 SCHEMA = pa.schema(
     [
@@ -37,7 +38,7 @@ class KeptCurves:
 
     QE of the sensor by name, photons per nm by type and name of the signal, QE of the designs that are drawn and of
     others on the front by `design_id` and channel, of the limit's filter by CFA, spectra of own tasks that are from
-    files by task and class, and by file and column.
+    files by task and class, and by file and column, absorbances of colorants in the order of their numbers.
     """
 
     wavelength_nm: FloatArray
@@ -47,6 +48,7 @@ class KeptCurves:
     on_front: dict[int, FilterCurves] = field(default_factory=dict)
     limits: dict[str, FloatArray] = field(default_factory=dict)
     tasks: dict[tuple[str, str], FloatArray] = field(default_factory=dict)
+    colorants: dict[str, FloatArray] = field(default_factory=dict)
 
     @property
     def designs(self) -> dict[int, FilterCurves]:
@@ -70,6 +72,7 @@ class KeptCurves:
                 for channel, values in channels.items():
                     yield what, f"{design_id} {channel}", values, None, design_id, channel
         yield from ((_LIMIT, cfa, values, None, None, None) for cfa, values in self.limits.items())
+        yield from ((_COLORANT, name, values, None, None, None) for name, values in self.colorants.items())
 
     def table(self) -> pa.Table:
         """Return the long table.
@@ -126,5 +129,5 @@ class KeptCurves:
             elif kind in (_LIGHT, _TASK):
                 (kept.lights if kind == _LIGHT else kept.tasks)[owner, name] = curve
             else:
-                (kept.sensor if kind == _QE else kept.limits)[name] = curve
+                {_QE: kept.sensor, _COLORANT: kept.colorants}.get(kind, kept.limits)[name] = curve
         return kept

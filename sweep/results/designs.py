@@ -187,11 +187,13 @@ def study_of(output: Output, data: Path | None, *, allow_code: bool = False) -> 
         raise OutputError(ValidationIssue(problem, str(output.folder), allowed=f"{where}--allow-code, if you trust it"))
     kept = output.curves
     if data is None and digests.keys() - code:
-        return load_study(path, kept=KeptSources(kept.sensor, kept.lights, kept.tasks), allow_code=code)
+        return load_study(path, kept=KeptSources(kept.sensor, kept.lights, kept.tasks, kept.colorants), allow_code=code)
     study = load_study(path, data, allow_code=code)
     lights = zip(study.lights.types, study.lights.names, study.lights.photons, strict=True)
     check_kept(output, kept.sensor, study.sensor.qe)
     check_kept(output, kept.lights, {(kind, name): values for kind, name, values in lights})
+    made = study.colorants
+    check_kept(output, kept.colorants, {} if made is None else dict(zip(made.names, made.absorbance, strict=True)))
     check_kept(output, kept.tasks, {} if study.tasks is None else study.tasks.from_files)
     return study
 

@@ -141,6 +141,10 @@ FILES = {
     "`design_id`, relative image `height`, `cra_deg` and the CSDs there, DN, before clipping and rounding",
     files.SEARCH_LOG: "every evaluation of the search and of its front: "
     + ", ".join(files.search_schema(["<parameters>"]).names),
+    files.COMBINATIONS: "where a search chooses from colorants, every combination that was tried, the best first: how "
+    "many `colorants`, their numbers and names, the absorbance of each at its peak in 0.8 um (`absorbance_1`), for "
+    "catalogs of molar extinction its concentration (`mol_per_l_1`), `thickness_um`, objective and sensitivity before "
+    "clipping and quantization, `violation` and `feasible`",
     files.FRONT: "results of the search at each level of sensitivity, and the limit there; between two levels rows "
     "with the limit alone: " + ", ".join(files.front_schema(["<parameters>"]).names),
     files.CURVES: "a row per curve and wavelength: " + ", ".join(SCHEMA.names),

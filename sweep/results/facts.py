@@ -113,6 +113,7 @@ class SearchFacts(_Facts):
     front_limits_open: int
     gap: float | None
     no_limit: str | None
+    combinations: tuple[str, ...]
     front_evaluations: int
 
 

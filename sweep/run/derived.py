@@ -145,6 +145,7 @@ def _curves_table(shown: DerivedInput) -> pa.Table:
         _filters(study, shown.other_front),
         limits,
         {} if study.tasks is None else dict(study.tasks.from_files),
+        {} if study.colorants is None else dict(zip(study.colorants.names, study.colorants.absorbance, strict=True)),
     ).table()
 
 

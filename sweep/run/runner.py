@@ -26,6 +26,7 @@ from ..results.inventory import Inventory
 from ..results.lock import LOCK, locked
 from ..results.parts import Parts
 from ..results.tables import (
+    COMBINATIONS,
     FRONT,
     LEFT_OUT,
     PROVENANCE,
@@ -38,6 +39,7 @@ from ..results.tables import (
     write_tables,
 )
 from ..results.thinning import swept_points
+from ..search.combinations import numbers_of
 from ..search.limit import Limit
 from ..study import Study
 from ..study.goals import unreachable_constraints
@@ -50,7 +52,16 @@ from .front import RunRows, report_rows
 from .held_out import left_out_table
 from .provenance import plan_facts, provenance, resolved_yaml
 from .rows import rules_of
-from .search import SearchAnswer, answer_row, front_table, limit_alone, run_search, search_facts, search_log
+from .search import (
+    SearchAnswer,
+    answer_row,
+    combinations_table,
+    front_table,
+    limit_alone,
+    run_search,
+    search_facts,
+    search_log,
+)
 from .sweep import RunOptions, Sweep
 from .workers import Workers, stopped_by_signals, workers
 
@@ -81,6 +92,7 @@ def _whole(study: Study) -> set[str]:
     if study.search is not None:
         names |= {SEARCH_LOG} | ({FRONT} if study.search.levels else set())
         names |= {LEFT_OUT} if study.leaves_one_out else set()
+        names |= {COMBINATIONS} if len(numbers_of(study.problem(study.search))) > 1 else set()
     return names
 
 
@@ -243,6 +255,8 @@ class _Run:
         self.inventory.list_file(RESULTS)
         if answer is not None:
             self._write(SEARCH_LOG, search_log(answer))
+            if answer.choice is not None:
+                self._write(COMBINATIONS, combinations_table(self.study, answer))
             if answer.search.levels:
                 self._write(FRONT, front_table(self.study, answer))
             if self.study.leaves_one_out:

@@ -11,11 +11,13 @@ import pyarrow as pa
 
 from ..base.errors import InfeasibleError, ValidationIssue
 from ..base.types import FloatArray, Parallel, Progress, delayed
+from ..designs.families.mixture import THICKNESS_UM
 from ..designs.space import Space
 from ..metrics.bound import FEASIBLE
 from ..metrics.columns.sensitivity import cfa_sensitivity_at
 from ..results.tables import front_schema, search_schema
 from ..search.certificate import ROUNDING
+from ..search.combinations import Choice, choose, numbers_of, with_members
 from ..search.limit import Limit, limit_of, reason_without_bound
 from ..search.problem import Evaluation, Problem, SearchRun, best_feasible, starting_points
 from ..search.solver import extreme_value, search_from
@@ -24,7 +26,10 @@ from ..study import Search, Study
 from .routes import Rules
 from .rows import Job, run_job
 
+_CM_PER_UM = 1e-4
 _REACH_STARTS = 8
+_MOST_PER_COMBINATION = 60
+"""Evaluations for the amounts of a combination of colorants."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +42,7 @@ class SearchAnswer:
     limit: Limit | None
     no_limit: str | None
     front: tuple[FrontPoint, ...]
+    choice: Choice | None = None
 
     @property
     def gap(self) -> float | None:
@@ -72,6 +78,11 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
     """
     problem = study.problem(search)
     n_starts = min(search.starts, search.max_evaluations)
+    choice = None
+    if len(numbers_of(problem)) > 1:
+        effort_each = min(_MOST_PER_COMBINATION, search.max_evaluations)
+        choice = choose(problem, search.algorithm, effort_each, study.section.seed, parallel, progress)
+        problem = with_members(problem, choice.best.members)
     starts = starting_points(problem, n_starts, study.section.seed)
     per_start = search.max_evaluations // n_starts
     effort = Effort(search.algorithm, starts, per_start, study.section.seed)
@@ -93,7 +104,7 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
     limit = next(answers) if limited else None
     check_proof(best, limit)
     front = trade_off(problem, search.levels, effort, answers, parallel, progress, limited=limited)
-    return SearchAnswer(search, tuple(runs), best, limit, no_limit, front)
+    return SearchAnswer(search, tuple(runs), best, limit, no_limit, front, choice)
 
 
 def limit_alone(study: Study, search: Search) -> Limit | None:
@@ -195,6 +206,7 @@ def search_facts(study: Study, answer: SearchAnswer) -> dict[str, Any]:
         "front_limits_open": sum(p.limit is not None and p.limit.open_parts > 0 for p in answer.front),
         "gap": answer.gap,
         "no_limit": answer.no_limit,
+        "combinations": [] if answer.choice is None else list(answer.choice.counts),
         "front_evaluations": sum(len(run.log) for point in answer.front for run in point.runs),
     }
 
@@ -263,6 +275,45 @@ def search_log(answer: SearchAnswer) -> pa.Table:
         for index, e in enumerate(run.log)
     ]
     return pa.Table.from_pylist(rows, schema=search_schema(names))
+
+
+def combinations_table(study: Study, answer: SearchAnswer) -> pa.Table:
+    """Return one row per combination of colorants that was tried, the best first.
+
+    The concentration of a colorant whose catalog has molar extinctions e is absorbance / (e 0.8 um) (law of Beer and
+    Lambert).
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    answer : SearchAnswer
+        Answer of a search that chooses.
+
+    Returns
+    -------
+    pyarrow.Table
+        Table.
+    """
+    assert answer.choice is not None
+    assert study.colorants is not None
+    names, parameters = study.colorants.names, answer.search.space.parameters
+    molar = study.section.colorants is not None and study.section.colorants.quantity == "molar_extinction"
+    rows = []
+    for tried in sorted(answer.choice.tried, key=lambda one: one.rank, reverse=True):
+        x = dict(zip(parameters, map(float, tried.best.x), strict=True))
+        row: dict[str, Any] = {"colorants": len(tried.members)}
+        for slot, number in enumerate(tried.members, 1):
+            absorbance = x[f"absorbance_{slot}"]
+            row |= {f"colorant_{slot}": number, f"name_{slot}": names[number - 1], f"absorbance_{slot}": absorbance}
+            if molar:
+                row[f"mol_per_l_{slot}"] = absorbance / (study.colorants.peaks[number - 1] * THICKNESS_UM * _CM_PER_UM)
+        best = tried.best
+        row |= {"thickness_um": x["thickness_um"], "objective": best.objective, "sensitivity": best.sensitivity}
+        row |= {"violation": best.violation, "feasible": best.violation <= FEASIBLE}
+        rows.append(row)
+    columns = dict.fromkeys(name for row in sorted(rows, key=lambda row: -len(row)) for name in row)
+    return pa.table({name: [row.get(name) for row in rows] for name in columns})
 
 
 def front_table(study: Study, answer: SearchAnswer) -> pa.Table:

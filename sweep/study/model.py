@@ -27,6 +27,7 @@ from ..metrics.quantity import Quantity, RequestedQuantities
 from ..metrics.separation import csd_name
 from ..metrics.user_metrics import UserMetric
 from ..search.problem import Problem
+from ..spectra.colorants import Colorants
 from ..spectra.lights import Lights, Pair, class_pairs
 from ..spectra.spectrum import WavelengthGrid
 from ..spectra.tasks import StudyTasks
@@ -70,6 +71,7 @@ class Study:
     tasks: StudyTasks | None = None
     user_metrics: tuple[UserMetric, ...] = ()
     user_effects: tuple[UserEffect, ...] = ()
+    colorants: Colorants | None = None
     plans: Mapping[str, Plan] = field(default_factory=dict)
 
     @property

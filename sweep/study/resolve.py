@@ -61,7 +61,7 @@ def resolve(section: StudySection, sources: Sources) -> Study:
     held_out = attempt(lambda: held_out_lights(section, lights, sources))
     if lights is not None:
         lights = with_population(lights, section, sources)
-    tasks, spaces = None, []
+    tasks, spaces, colorants = None, [], None
     if section.tasks is not None:
         from .tasks import check_tasks_in_scenes, tasks_of  # noqa: PLC0415  (few studies have tasks)
 
@@ -70,7 +70,8 @@ def resolve(section: StudySection, sources: Sources) -> Study:
     effects = attempt(lambda: user_effects(section, sources))
     check_cfas(section, sources)
     if sensor is not None:
-        spaces = SpaceBuilder(section, sources, sensor, mosaics).spaces()
+        colorants = None if section.colorants is None else sources.colorants(section.colorants)
+        spaces = SpaceBuilder(section, sources, sensor, mosaics, colorants).spaces()
         check_lenses(section, sensor, spaces, sources)
         if tasks is not None:
             check_tasks_in_scenes(tasks, section, sensor, spaces, sources)
@@ -107,6 +108,7 @@ def resolve(section: StudySection, sources: Sources) -> Study:
         tasks=tasks,
         user_metrics=metrics or (),
         user_effects=effects or (),
+        colorants=colorants,
     )
     for check in (checks.check_size, try_effects, try_metrics, check_range, checks.check_count):
         check(study, sources)

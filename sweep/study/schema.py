@@ -12,8 +12,9 @@ from ..camera.accuracy import STANDARD, AccuracySection
 from ..camera.pixel import Pixel
 from ..camera.scene import Geometry, Scene
 from ..camera.sensor import BUILT_IN_SENSORS
-from ..designs.registry import FamilyOptions, described_families
-from ..designs.technology import Stated
+from ..designs.families.mixture import Absorbing
+from ..designs.registry import FAMILIES, FamilyOptions, described_families
+from ..designs.technology import PIGMENT, Stated
 from ..designs.tolerance import Tolerance
 from ..metrics.bound import Bound
 from ..metrics.objective import Objective
@@ -24,12 +25,14 @@ from ..vision.section import Vision
 from .axes import ScenarioTemplate, Span, Values, expanded
 from .schema_curves import (
     LIGHTS_NAME,
+    ColorantsSection,
     LightsSection,
     Name,
     SensorSection,
     TasksAsked,
     Validation,
     builtin,
+    catalog,
     listed,
     named,
 )
@@ -79,14 +82,20 @@ class Modification(Section):
     """Options of the family, such as `bands` or `nodes`."""
     technology: Stated = None
     """`pigment`, or `interference: {effective_index: 1.8}`, which moves with the angle of the light; left out, as on
-    axis."""
+    axis. Filters of colorants are pigments."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_colorants(cls, value: Any) -> Any:
+        made = FAMILIES.get(str(value.get("family"))) if isinstance(value, dict) else None
+        return {"technology": PIGMENT} | value if isinstance(made, type) and issubclass(made, Absorbing) else value
 
 
 class DesignSection(Modification):
     """One filter by its parameters, or by the name of a built-in one."""
 
-    at: dict[Name, Number] | Name
-    """Parameter -> value, or the name of a built-in design."""
+    at: dict[Name, Number | Name] | Name
+    """Parameter -> value, or the name of a built-in design; the value of `colorant_1` may be a colorant's name."""
 
 
 class SweepSection(Modification):
@@ -274,6 +283,11 @@ class StudySection(Section):
         Field(min_length=1, max_length=1000),
     ]
     """CFAs to compare: a list of names of 2x2 pixels (RGGB, RYYCy), or NAME: {tile: [[R, G], [B, W]]}."""
+    colorants: Annotated[
+        ColorantsSection | None,
+        BeforeValidator(catalog, json_schema_input_type=list[Name] | Name | ColorantsSection | None),
+    ] = None
+    """Colorants that filters of the family `mixture` choose from."""
     designs: Annotated[dict[Name, DesignSection], Field(max_length=10_000)] = {}
     """Single filters to compare with, by name."""
     sweeps: Annotated[dict[Name, SweepSection], Field(max_length=1000)] = {}

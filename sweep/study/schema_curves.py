@@ -200,6 +200,33 @@ def listed(value: Any) -> Any:
     return value if isinstance(value, list) else [value]
 
 
+def catalog(value: Any) -> Any:
+    """Read a name, or a list of names, as `{catalog: [...]}`.
+
+    Parameters
+    ----------
+    value : any
+        Value of the key.
+
+    Returns
+    -------
+    any
+        The mapping; other values unchanged.
+    """
+    return {"catalog": listed(value)} if isinstance(value, str | list) else value
+
+
+class ColorantsSection(Section):
+    """Absorption spectra that filters of the family `mixture` choose from."""
+
+    catalog: Annotated[
+        list[_Path], BeforeValidator(listed, json_schema_input_type=list[_Path] | _Path), Field(min_length=1)
+    ]
+    """`modeled`, the built-in catalog of modeled bands, which no dye has; or files, or folders of files, of curves."""
+    quantity: Literal["absorbance", "molar_extinction"] = "absorbance"
+    """Quantity of the files; of molar extinctions, l/(mol cm), the results have concentrations in mol/l."""
+
+
 _Spectra = Annotated[
     Annotated[Name, Tag("<group>")] | Annotated[TaskFile, Tag("<file>")],
     Discriminator(lambda value: "<group>" if isinstance(value, str) else "<file>"),

@@ -9,20 +9,25 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
-from ..base.disk import is_file
+import numpy as np
+
+from ..base.disk import is_file, is_folder
 from ..base.errors import MOST_ISSUES, DataError, StudyError, SweepError, ValidationIssue, nearest
 from ..base.types import FloatArray
 from ..camera.sensor import SensorCurves
 from ..spectra.builtin.surrogate import BUILT_IN_RANGE_NM
+from ..spectra.colorants import MODELED, Colorants, modeled_colorants, read_colorants
 from ..spectra.files import digest, read_curves
 from ..spectra.lens_files import ChiefRays, read_chief_rays
 from ..spectra.lights import Lights
 from ..spectra.spectrum import Curves, WavelengthGrid, photons_from_energy
 from .document import Document, KeyPath, by_line
-from .schema_curves import CurveFile, LightFile, TaskFile
+from .schema_curves import ColorantsSection, CurveFile, LightFile, TaskFile
 
 _MOST_VALUES = 10_000_000
 """Most values of the curves of a sensor, or of lights, on the grid: 80 MB."""
+_MOST_REFUSED = 5
+"""Spectra that were not read and that a note names."""
 _CUT_OFF = 0.01
 """Share of a light's photons outside the grid from which on the user gets a warning."""
 _Made = TypeVar("_Made", SensorCurves, Lights)
@@ -35,12 +40,13 @@ _Entry = CurveFile | LightFile | TaskFile
 class KeptSources:
     """Curves of a finished run, on its wavelength grid, which replace those of files.
 
-    QE by name, photon spectra by signal type and name, spectra of tasks by class and name.
+    QE by name, photon spectra by signal type and name, spectra of tasks by class and name, absorbances of colorants.
     """
 
     sensor: Mapping[str, FloatArray]
     lights: Mapping[tuple[str, str], FloatArray]
     tasks: Mapping[tuple[str, str], FloatArray] = field(default_factory=dict)
+    colorants: Mapping[str, FloatArray] = field(default_factory=dict)
 
 
 @dataclass
@@ -304,6 +310,50 @@ class Sources:
         elif entry.file not in self._read:
             self._read[entry.file] = self._content((*path, "file"), entry.file, read_curves)
         return self._read[entry.file]
+
+    def colorants(self, section: ColorantsSection) -> Colorants | None:
+        """Read the catalog of colorants.
+
+        Parameters
+        ----------
+        section : ColorantsSection
+            Names of files and folders, or `modeled`.
+
+        Returns
+        -------
+        Colorants or None
+            None after adding issues.
+        """
+        path: KeyPath = ("colorants", "catalog")
+        if self.kept is not None and self.kept.colorants:
+            kept = self.kept.colorants
+            return Colorants(tuple(kept), np.stack(list(kept.values())), np.ones(len(kept)))
+        if MODELED in section.catalog:
+            if len(section.catalog) > 1:
+                self.add(path, f"`{MODELED}` goes with no file: its bands are no dyes", section.catalog)
+                return None
+            return modeled_colorants(self.grid)
+        places = []
+        for name in section.catalog:
+            folder = next((where / name for where in self.folders if is_folder(where / name)), None)
+            place = folder or self.file(path, name)
+            if place is not None:
+                places.append(place)
+        if len(places) < len(section.catalog):
+            return None
+        try:
+            found = read_colorants(places, self.grid)
+        except DataError as error:
+            self.add_error(path, error)
+            return None
+        content = hashlib.sha256("".join(found.names).encode() + found.absorbance.tobytes() + found.peaks.tobytes())
+        self.digests[f"colorants: {', '.join(section.catalog)}"] = content.hexdigest()
+        total = len(found) + len(found.refused)
+        if found.refused:
+            shown = "; ".join(found.refused[:_MOST_REFUSED])
+            more = f"; {len(found.refused) - _MOST_REFUSED} more" if len(found.refused) > _MOST_REFUSED else ""
+            self.warnings.append(f"colorants: {len(found)} of {total} spectra were read; not {shown}{more}")
+        return found
 
     def chief_rays(self, path: KeyPath, file: str, corner_mm: float | None) -> ChiefRays | None:
         """Read the chief ray angles of a lens.

@@ -11,13 +11,15 @@ from ..base.types import FloatArray
 from ..base.user_code import Offered, is_in_file, offers
 from ..camera.mosaic import Mosaic
 from ..camera.sensor import SensorCurves
+from ..designs.families.mixture import Absorbing, Mixture
 from ..designs.family import Family, Parameter
 from ..designs.plugin import PluginFamily
-from ..designs.registry import FAMILIES, build_family
+from ..designs.registry import FAMILIES, build_family, options_of
 from ..designs.space import Filter, Kind, Space
 from ..designs.technology import PIGMENT
 from ..designs.ungridded import ListedDesigns, Method, PairedDesigns, SampledDesigns
 from ..spectra.builtin.surrogate import surrogate_parameters
+from ..spectra.colorants import Colorants
 from .document import KeyPath
 from .schema import DesignSection, Modification, StudySection, SweepSection
 from .sensors import check_filter
@@ -53,6 +55,7 @@ class SpaceBuilder:
     sources: Sources
     sensor: SensorCurves
     mosaics: Mapping[str, Mosaic]
+    colorants: Colorants | None = None
 
     def spaces(self) -> list[Space]:
         """Return plain CFAs (those whose every channel has a curve), then named designs, then sweeps."""
@@ -75,7 +78,7 @@ class SpaceBuilder:
             if not missing:
                 spaces.append(Space("reference", name, name))
         for name, design in section.designs.items():
-            axes: dict[str, tuple[float, ...]] = {key: (value,) for key, value in self._built_in(name, design).items()}
+            axes: dict[str, tuple[float, ...]] = {key: (value,) for key, value in self._at(name, design).items()}
             spaces += self._filtered("design", name, design, axes, ("designs", name, "at"))
         for name, sweep in section.sweeps.items():
             way, axes, rows = _sweep_axes(sweep, section.seed)
@@ -95,10 +98,14 @@ class SpaceBuilder:
             self.sources.add(("sweeps",), "too many values of parameters", f"{total:,}", allowed)
         return total <= _MOST_POINTS
 
-    def _built_in(self, name: str, design: DesignSection) -> Mapping[str, float]:
-        """Return a design's parameters, looked up when it names a built-in filter."""
+    def _at(self, name: str, design: DesignSection) -> Mapping[str, float]:
+        """Return a design's parameters, looked up where it names a built-in filter or a colorant."""
         if not isinstance(design.at, str):
-            return design.at
+            numbers = {} if self.colorants is None else self.colorants.numbers
+            for key, value in design.at.items():
+                if isinstance(value, str) and value not in numbers:
+                    self.sources.unknown(("designs", name, "at", key), "colorant", value, numbers)
+            return {key: numbers.get(value, 1) if isinstance(value, str) else value for key, value in design.at.items()}
         known = surrogate_parameters().stopbands
         if design.at not in known:
             self.sources.unknown(("designs", name, "at"), "built-in filter", design.at, known)
@@ -120,6 +127,11 @@ class SpaceBuilder:
         external = is_from_outside(entry.family, _FAMILIES, FAMILIES)
         if external and not allowed(self.sources, (*path, "family"), entry.family):
             return
+        absorbs = isinstance(made := FAMILIES.get(entry.family), type) and issubclass(made, Absorbing)
+        if absorbs and stated is not None and stated.interference is not None:
+            self.sources.add((*path, "technology"), f"{entry.family} is of colorants", stated.description, PIGMENT)
+        if entry.family == Mixture.kind and self.section.colorants is None:
+            self.sources.add((*path, "family"), "mixture needs `colorants`, the catalog that it chooses from")
         if external and self.section.production.tolerance:
             self.sources.add((*path, "family"), "a family of one's own has no edges that production could shift")
         elif not external and entry.family not in FAMILIES:
@@ -174,6 +186,10 @@ class SpaceBuilder:
     def _family(self, entry: Modification, base: FloatArray, target: FloatArray | None) -> Family:
         """Return the family over its curves; raises SweepError."""
         nodes_nm = self.section.wavelengths.nodes_nm
+        if entry.family == Mixture.kind and self.colorants is not None:
+            own = options_of(entry.family, entry.options, has_target=target is not None)
+            assert isinstance(own, Mixture.Options)
+            return cast(Family, Mixture(nodes_nm, base, self.colorants.absorbance, own.at_most))
         if not is_from_outside(entry.family, _FAMILIES, FAMILIES):
             return build_family(entry.family, nodes_nm, base, target, entry.options)
         plugin = PluginFamily(code_of(self.sources, entry.family, _FAMILIES), nodes_nm, base, target)

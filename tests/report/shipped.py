@@ -11,6 +11,7 @@ SEARCHED = (
     "chromatic",
     "robust",
     "angle",
+    "dye",
     "dual",
     "freeform",
     "producible",
@@ -22,6 +23,7 @@ SEARCHED = (
 SLOW = (
     "chromatic",
     "fog",
+    "dye",
     "dual",
     "paper",
     "freeform",

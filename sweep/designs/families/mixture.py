@@ -1,0 +1,432 @@
+"""Filters of colorants: a channel is a base curve behind a mixture that absorbs (law of Beer and Lambert)."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from copy import copy
+from typing import ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import Field
+
+from ...base.errors import SweepError, ValidationIssue
+from ...base.types import FloatArray, IndexArray, Section
+from ..family import Parameter
+from ..tolerance import AS_DESIGNED, ProductionError
+
+GaussianIn = Literal["wavenumber", "wavelength"]
+
+_LN10 = math.log(10)
+_WIDTH = 4 * math.log(2)
+_MOST_ABSORBANCE = 6.0
+THICKNESS_UM = 0.8
+"""Usual thickness of a color resist, which absorbances of colorants are stated for."""
+_BANDS: tuple[Parameter, ...] = (
+    Parameter("peak_nm", 200, 2000),
+    Parameter("fwhm_nm", 1, 500),
+    Parameter("absorbance", 0, _MOST_ABSORBANCE),
+)
+
+
+class Absorbing(ABC):
+    """Filter that is the base times 10 to the minus absorbance; methods as in `Family`.
+
+    Parameters
+    ----------
+    wavelength_nm : ndarray of shape (n_wavelengths,)
+        Wavelengths, nm.
+    base : ndarray of shape (n_wavelengths,)
+        QE of the replaced curve.
+    """
+
+    n_modified: ClassVar[int] = 1
+    needs_target: ClassVar[bool] = False
+    start_dimensions: int | None = None
+    parameters: tuple[Parameter, ...]
+
+    def __init__(self, wavelength_nm: FloatArray, base: FloatArray) -> None:
+        self._wavelength_nm, self._base, self._off = wavelength_nm, base, AS_DESIGNED
+
+    @abstractmethod
+    def absorbance(self, x: FloatArray) -> FloatArray:
+        """Return the absorbance.
+
+        Parameters
+        ----------
+        x : ndarray of shape (n_designs, n_parameters)
+            Parameters.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n_wavelengths)
+            Absorbance, decadic.
+        """
+
+    @abstractmethod
+    def absorbance_gradient(self, x: FloatArray) -> FloatArray:
+        """Return the derivative of `absorbance` at one design.
+
+        Parameters
+        ----------
+        x : ndarray of shape (n_parameters,)
+            Parameters of one design.
+
+        Returns
+        -------
+        ndarray of shape (n_parameters, n_wavelengths)
+            Absorbance per unit of parameter.
+        """
+
+    def curves(self, x: FloatArray) -> FloatArray:
+        """Return the QE of the modified channel."""
+        return np.asarray((self._base * np.power(10.0, -self.absorbance(x)))[:, None, :], dtype=float)
+
+    def gradient(self, x: FloatArray) -> FloatArray:
+        """Return the derivative of `curves` at one design."""
+        slope = -_LN10 * self.curves(x[None])[0] * self.absorbance_gradient(x)
+        return np.asarray(slope[:, None, :], dtype=float)
+
+    def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        """Return the base behind the least absorbance of a box."""
+        return self.hull(low, high)[1]
+
+    def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        """Return the base behind the largest absorbance of a box."""
+        return self.hull(low, high)[0]
+
+    def hull(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the base behind the largest and the least absorbance of a box."""
+        least, most = self.absorbance_range(low, high)
+        return (self._base * np.power(10.0, -most))[None], (self._base * np.power(10.0, -least))[None]
+
+    @abstractmethod
+    def absorbance_range(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return bounds on the absorbance in a box.
+
+        Parameters
+        ----------
+        low, high : ndarray of shape (n_parameters,)
+            Ends of the box of parameters.
+
+        Returns
+        -------
+        least, most : ndarray of shape (n_wavelengths,)
+            Absorbance, decadic.
+        """
+
+    @property
+    def dimensions(self) -> Mapping[str, FloatArray]:
+        """None, since it has no edges."""
+        return {}
+
+    def perturbed(self, off: ProductionError) -> Self:
+        """Return the family with its bands moved.
+
+        Parameters
+        ----------
+        off : ProductionError
+            Production error.
+
+        Returns
+        -------
+        Absorbing
+            The family as production makes it.
+        """
+        made = copy(self)
+        made._off = off
+        return made
+
+    def start(self, points: FloatArray) -> FloatArray:
+        """Return the points: a search starts anywhere in the box."""
+        return points
+
+    def violation(self, x: FloatArray) -> FloatArray:
+        """Return zeros: every absorbance is well formed."""
+        return np.zeros((len(x), 1))
+
+    def violation_gradient(self, x: FloatArray) -> FloatArray:
+        """Return zeros."""
+        return np.zeros((1, x.size))
+
+
+class AbsorptionBands(Absorbing):
+    """Modeled absorption bands, and an absorbance at all wavelengths; methods as in `Family`.
+
+    Notes
+    -----
+    = base times 10^-(baseline + sum of absorbance exp(-4 ln 2 u^2)), with u = (peak / l - 1) peak / fwhm for Gaussians
+    in wavenumber, which bands of dyes are nearer to (Siano and Metzler, J. Chem. Phys. 51, 1856, 1969; the width is in
+    nm at the peak), and u = (peak - l) / fwhm for Gaussians in wavelength.
+
+    Parameters
+    ----------
+    wavelength_nm : ndarray of shape (n_wavelengths,)
+        Wavelengths, nm.
+    base : ndarray of shape (n_wavelengths,)
+        QE of the replaced curve.
+    bands : int
+        Number of bands.
+    gaussian_in : str
+        `wavenumber` or `wavelength`.
+    """
+
+    kind = "absorption_bands"
+
+    class Options(Section):
+        """Options: number and form of the bands."""
+
+        absorption_bands: int = Field(default=1, ge=1, le=8)
+        """Number of absorption bands."""
+        gaussian_in: GaussianIn = "wavenumber"
+        """Whether absorption bands are Gaussian in `wavenumber`, as those of dyes, or in `wavelength`."""
+
+    def __init__(
+        self, wavelength_nm: FloatArray, base: FloatArray, bands: int, gaussian_in: GaussianIn = "wavenumber"
+    ) -> None:
+        super().__init__(wavelength_nm, base)
+        self._count, self._in_wavelength = bands, gaussian_in == "wavelength"
+        numbers = [""] if bands == 1 else [str(number) for number in range(1, bands + 1)]
+        split = [name.name.partition("_") for name in _BANDS]
+        named = [
+            Parameter(f"{first}{number}{bar}{unit}", known.low, known.high)
+            for number in numbers
+            for known, (first, bar, unit) in zip(_BANDS, split, strict=True)
+        ]
+        self.parameters = (*named, Parameter("baseline_absorbance", 0, _MOST_ABSORBANCE, default=0.0))
+
+    @classmethod
+    def of_study(
+        cls, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None, options: Section
+    ) -> AbsorptionBands:
+        """Make the family over curves of a study.
+
+        Parameters
+        ----------
+        wavelength_nm : ndarray of shape (n_wavelengths,)
+            Wavelengths, nm.
+        base : ndarray of shape (n_wavelengths,)
+            QE of the replaced curve.
+        target : ndarray of shape (n_wavelengths,) or None
+            QE that the filter takes inside its band.
+        options : Section
+            Options of the family.
+
+        Returns
+        -------
+        AbsorptionBands
+            The family.
+        """
+        assert target is None
+        assert isinstance(options, AbsorptionBands.Options)
+        return AbsorptionBands(wavelength_nm, base, options.absorption_bands, options.gaussian_in)
+
+    def _offsets(self, peaks_nm: FloatArray, fwhm_nm: FloatArray) -> FloatArray:
+        """Return the distances from the peaks in widths; ndarray of shape (..., n_wavelengths)."""
+        peak_nm, wave_nm = peaks_nm[..., None], self._off.nominal_nm(self._wavelength_nm)
+        away_nm = peak_nm - wave_nm if self._in_wavelength else (peak_nm / wave_nm - 1) * peak_nm
+        return np.asarray(away_nm / fwhm_nm[..., None])
+
+    def _split(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return peak, width and absorbance of each band."""
+        bands = x[..., :-1].reshape(*x.shape[:-1], self._count, len(_BANDS))
+        return bands[..., 0], bands[..., 1], bands[..., 2]
+
+    def absorbance(self, x: FloatArray) -> FloatArray:
+        """Return the absorbance; see `Absorbing.absorbance`."""
+        peaks_nm, fwhm_nm, absorbance = self._split(x)
+        total = np.repeat(x[..., -1:], self._wavelength_nm.size, axis=-1)
+        for band in range(self._count):  # one after the other: a row alone is summed as in a block
+            offsets = self._offsets(peaks_nm[..., band], fwhm_nm[..., band])
+            total += absorbance[..., band, None] * np.exp(-_WIDTH * offsets**2)
+        return total
+
+    def absorbance_gradient(self, x: FloatArray) -> FloatArray:
+        """Return the derivative of `absorbance`; see `Absorbing.absorbance_gradient`."""
+        peaks_nm, fwhm_nm, absorbance = self._split(x)
+        offsets = self._offsets(peaks_nm, fwhm_nm)
+        shape = np.exp(-_WIDTH * offsets**2)
+        slope = -2 * _WIDTH * absorbance[:, None] * offsets * shape
+        wave_nm = self._off.nominal_nm(self._wavelength_nm)
+        by_peak = (1.0 if self._in_wavelength else 2 * peaks_nm[:, None] / wave_nm - 1) / fwhm_nm[:, None]
+        rows = np.stack([slope * by_peak, -slope * offsets / fwhm_nm[:, None], shape], axis=1)
+        return np.concatenate([rows.reshape(-1, shape.shape[1]), np.ones((1, shape.shape[1]))])
+
+    def absorbance_range(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return every band where it is farthest and nearest; see `Absorbing.absorbance_range`."""
+        wave_nm = self._off.nominal_nm(self._wavelength_nm)
+        (low_nm, narrowest_nm, least), (high_nm, widest_nm, most) = self._split(low), self._split(high)
+        # An offset has its extremes at an end, at the wavelength, or, in wavenumber, at half of it.
+        peaks_nm = [
+            np.clip(at, low_nm[:, None], high_nm[:, None]) for at in (0.0 * wave_nm, wave_nm / 2, wave_nm, np.inf)
+        ]
+        peak_nm = np.stack([np.broadcast_to(each, peaks_nm[0].shape) for each in peaks_nm])
+        away_nm = np.abs(peak_nm - wave_nm if self._in_wavelength else (peak_nm / wave_nm - 1) * peak_nm)
+        farthest, nearest = away_nm.max(axis=0) / narrowest_nm[:, None], away_nm.min(axis=0) / widest_nm[:, None]
+        ends = [
+            end + (amount[:, None] * np.exp(-_WIDTH * offsets**2)).sum(axis=0)
+            for end, amount, offsets in ((low[-1], least, farthest), (high[-1], most, nearest))
+        ]
+        return ends[0], ends[1]
+
+
+class Mixture(Absorbing):
+    """Colorants of a catalog in one film; methods as in `Family`.
+
+    Notes
+    -----
+    = base times 10^-(thickness / 0.8 um * sum of absorbance_i a_i), with a_i the spectrum of a colorant with a peak of
+    1: `absorbance_i` is that of the colorant alone at its peak, in a film of 0.8 um. `colorant_i` is its number in the
+    catalog, from 1 on.
+
+    Parameters
+    ----------
+    wavelength_nm : ndarray of shape (n_wavelengths,)
+        Wavelengths, nm.
+    base : ndarray of shape (n_wavelengths,)
+        QE of the replaced curve.
+    spectra : ndarray of shape (n_colorants, n_wavelengths)
+        Absorbances with a peak of 1.
+    at_most : int
+        Number of colorants in one film.
+    numbers : ndarray of int, shape (n_colorants,), optional
+        Ascending numbers of the spectra; left out, from 1 on.
+    """
+
+    kind = "mixture"
+
+    class Options(Section):
+        """Options: number of colorants."""
+
+        at_most: int = Field(default=1, ge=1, le=3)
+        """Largest number of colorants in one film."""
+
+    def __init__(
+        self,
+        wavelength_nm: FloatArray,
+        base: FloatArray,
+        spectra: FloatArray,
+        at_most: int,
+        numbers: IndexArray | None = None,
+    ) -> None:
+        super().__init__(wavelength_nm, base)
+        self._spectra, self._slots = spectra, at_most
+        self._most = spectra.max(axis=0)  # of the whole catalog, whatever is chosen
+        self._numbers = np.arange(1, len(spectra) + 1) if numbers is None else numbers
+        last = float(self._numbers[-1])
+        self.parameters = (
+            *(
+                parameter
+                for slot in range(1, at_most + 1)
+                for parameter in (
+                    Parameter(f"colorant_{slot}", 1, last),
+                    Parameter(f"absorbance_{slot}", 0, _MOST_ABSORBANCE),
+                )
+            ),
+            Parameter("thickness_um", 0.01, 100, default=THICKNESS_UM),
+        )
+
+    @classmethod
+    def of_study(
+        cls, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None, options: Section
+    ) -> Mixture:
+        """Raise an error: `with_colorants` makes it, as its spectra come with the study.
+
+        Parameters
+        ----------
+        wavelength_nm : ndarray of shape (n_wavelengths,)
+            Wavelengths, nm.
+        base : ndarray of shape (n_wavelengths,)
+            QE of the replaced curve.
+        target : ndarray of shape (n_wavelengths,) or None
+            QE that the filter takes inside its band.
+        options : Section
+            Options of the family.
+
+        Raises
+        ------
+        SweepError
+            Always.
+        """
+        assert wavelength_nm.shape == base.shape
+        assert target is None
+        assert isinstance(options, Mixture.Options)
+        raise SweepError(ValidationIssue("mixture needs `colorants`: the catalog that the study chooses from"))
+
+    @property
+    def slots(self) -> tuple[tuple[int, int], ...]:
+        """Indices of number and absorbance of each colorant; see `ChoosingFamily`."""
+        return tuple((at, at + 1) for at in range(0, 2 * self._slots, 2))
+
+    def only(self, numbers: IndexArray) -> Self:
+        """Return the family with some colorants of the catalog, under their numbers; see `ChoosingFamily`.
+
+        Parameters
+        ----------
+        numbers : ndarray of int, shape (n,)
+            Ascending numbers.
+
+        Returns
+        -------
+        Mixture
+            The family with these colorants.
+        """
+        made = copy(self)
+        made._spectra, made._numbers = self._spectra[np.searchsorted(self._numbers, numbers)], numbers
+        return made
+
+    def perturbed(self, off: ProductionError) -> Self:
+        """Return the family with its spectra moved.
+
+        Parameters
+        ----------
+        off : ProductionError
+            Production error.
+
+        Returns
+        -------
+        Mixture
+            The family as production makes it.
+        """
+        made = super().perturbed(off)
+        nominal_nm = off.nominal_nm(self._wavelength_nm)
+        rows = np.stack([*self._spectra, self._most])
+        *spectra, most = (np.interp(nominal_nm, self._wavelength_nm, row) for row in rows)
+        made._spectra, made._most = np.stack(spectra), most
+        return made
+
+    def _chosen(self, x: FloatArray) -> FloatArray:
+        """Return the spectra of each slot, ndarray of shape (..., at_most, n_wavelengths)."""
+        return self._spectra[np.searchsorted(self._numbers, np.rint(x[..., : 2 * self._slots : 2]).astype(np.intp))]
+
+    def absorbance(self, x: FloatArray) -> FloatArray:
+        """Return the absorbance; see `Absorbing.absorbance`."""
+        chosen, amounts = self._chosen(x), x[..., 1 : 2 * self._slots : 2]
+        total = np.zeros((*x.shape[:-1], self._wavelength_nm.size))
+        for slot in range(self._slots):
+            total += amounts[..., slot, None] * chosen[..., slot, :]
+        return np.asarray(x[..., -1:] / THICKNESS_UM * total, dtype=float)
+
+    def absorbance_gradient(self, x: FloatArray) -> FloatArray:
+        """Return the derivative of `absorbance`, 0 by a number; see `Absorbing.absorbance_gradient`."""
+        rows = np.zeros((x.size, self._wavelength_nm.size))
+        rows[1 : 2 * self._slots : 2] = self._chosen(x) * (x[-1] / THICKNESS_UM)
+        rows[-1] = self.absorbance(x[None])[0] / x[-1]
+        return rows
+
+    def absorbance_range(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the least and the largest of the colorants of each slot; see `Absorbing.absorbance_range`."""
+        least, most = np.zeros((2, self._wavelength_nm.size))
+        for number, amount in self.slots:
+            inside = (self._numbers >= np.rint(low[number])) & (self._numbers <= np.rint(high[number]))
+            least = least + low[amount] * self._spectra[inside].min(axis=0)
+            most = most + high[amount] * self._spectra[inside].max(axis=0)
+        return low[-1] / THICKNESS_UM * least, high[-1] / THICKNESS_UM * most
+
+    def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        """Return the base behind the largest absorbance of the whole catalog, whatever is chosen of it."""
+        assert low.shape == high.shape
+        amount = float(sum(high[amount] for _, amount in self.slots))
+        most = high[-1] / THICKNESS_UM * amount * self._most
+        return np.asarray((self._base * np.power(10.0, -most))[None], dtype=float)

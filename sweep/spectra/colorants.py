@@ -1,0 +1,157 @@
+"""Colorants: absorption spectra of a built-in catalog, a file, or a folder of files."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from ..base.errors import DataError, ValidationIssue
+from ..base.types import FloatArray
+from .facts import repair_curves
+from .files import is_curve_file, scan_curves
+from .spectrum import WavelengthGrid
+
+MODELED = "modeled"
+"""Name of the built-in catalog: modeled bands, no dyes that can be bought."""
+_PEAKS_NM = range(560, 701, 10)
+_FWHM_NM = (30, 40, 50)
+_MOST_COLORANTS = 10_000
+_END = 0.02
+"""Share of the peak up to which a spectrum may end inside the grid; it is 0 from there on."""
+GAUSSIAN = 4 * math.log(2)
+"""exp(-GAUSSIAN u^2) is 1/2 where u is 1/2: u is in widths at half height."""
+
+
+@dataclass(frozen=True)
+class Colorants:
+    """Absorption spectra with a peak of 1, and what was not read.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Names.
+    absorbance : ndarray of shape (n_colorants, n_wavelengths)
+        Absorbance relative to the peak of the whole spectrum, which may lie outside the wavelength grid.
+    peaks : ndarray of shape (n_colorants,)
+        Value of the file at the peak: l/(mol cm) for molar extinction.
+    refused : tuple of str
+        Name and reason of each spectrum that was left out.
+    notes : tuple of str
+        Changes of spectra that were read.
+    """
+
+    names: tuple[str, ...]
+    absorbance: FloatArray
+    peaks: FloatArray
+    refused: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @cached_property
+    def numbers(self) -> dict[str, int]:
+        """Number of each colorant in the catalog, from 1 on."""
+        return {name: at for at, name in enumerate(self.names, 1)}
+
+
+def modeled_colorants(grid: WavelengthGrid) -> Colorants:
+    """Return modeled absorption bands with peaks at 560 to 700 nm and widths of 30, 40 and 50 nm.
+
+    Gaussians in wavenumber (Siano and Metzler, J. Chem. Phys. 51, 1856, 1969), with widths in nm at the peak.
+
+    Parameters
+    ----------
+    grid : WavelengthGrid
+        Wavelengths, nm.
+
+    Returns
+    -------
+    Colorants
+        Catalog.
+    """
+    bands = [(float(peak), float(fwhm)) for peak in _PEAKS_NM for fwhm in _FWHM_NM]
+    peak_nm, fwhm_nm = np.array(bands).T[:, :, None]
+    shapes = np.exp(-GAUSSIAN * ((peak_nm / grid.nodes_nm - 1) * peak_nm / fwhm_nm) ** 2)
+    names = tuple(f"modeled band {peak:g} nm, FWHM {fwhm:g} nm" for peak, fwhm in bands)
+    return Colorants(names, shapes, np.ones(len(bands)))
+
+
+def read_colorants(places: Sequence[Path], grid: WavelengthGrid) -> Colorants:
+    """Read absorbances or molar extinctions of files, and of all files of folders in the order of their names.
+
+    Negative values of up to 2 % of the peak become 0. A spectrum that ends inside the grid is 0 from there on, if it
+    ends below 2 % of its peak.
+
+    Parameters
+    ----------
+    places : sequence of Path
+        Files and folders.
+    grid : WavelengthGrid
+        Wavelengths, nm.
+
+    Returns
+    -------
+    Colorants
+        Catalog.
+
+    Raises
+    ------
+    DataError
+        If no spectrum can be read, or there are more than 10,000.
+    """
+    names: list[str] = []
+    rows: list[FloatArray] = []
+    peaks: list[float] = []
+    refused: list[str] = []
+    notes: list[str] = []
+    for file in [file for place in places for file in _files(place)]:
+        try:
+            curves = repair_curves(scan_curves(file))
+        except DataError as error:
+            refused.append(f"{file.name}: {error.issues[0].problem}")
+            continue
+        if not curves.names:
+            refused.append(f"{file.name}: no curves")
+        notes += [f"{file.name}: {change}" for change in curves.changes]
+        wrong = {issue.key: issue.problem for issue in curves.issues}
+        for name, values in zip(curves.names, curves.values.T, strict=True):
+            own = file.stem if len(curves.names) == 1 else f"{file.stem} {name}"
+            problem = wrong.get(name) or wrong.get(None) or _unsuitable(curves.wavelength_nm, values, grid)
+            if own in names:
+                problem = "a colorant of this name was read before"
+            if problem:
+                refused.append(f"{file.name}{'' if len(curves.names) == 1 else f' {name}'}: {problem}")
+                continue
+            peak = float(values.max())
+            names.append(own)
+            peaks.append(peak)
+            rows.append(np.interp(grid.nodes_nm, curves.wavelength_nm, values / peak, left=0.0, right=0.0))
+    if not rows or len(rows) > _MOST_COLORANTS:
+        problem = "no colorants" if not rows else "too many colorants"
+        allowed = f"1 to {_MOST_COLORANTS:,} spectra of absorbance or molar extinction"
+        raise DataError(ValidationIssue(problem, value="; ".join(refused[:3]) or None, allowed=allowed))
+    return Colorants(tuple(names), np.stack(rows), np.array(peaks), tuple(refused), tuple(notes))
+
+
+def _files(place: Path) -> list[Path]:
+    """Return a file, or the files of curves in a folder."""
+    if not place.is_dir():
+        return [place]
+    return sorted(file for file in place.iterdir() if file.is_file() and is_curve_file(file.name))
+
+
+def _unsuitable(wave_nm: FloatArray, values: FloatArray, grid: WavelengthGrid) -> str:
+    """Return why a spectrum is not taken; empty if it is."""
+    peak = values.max()
+    if not peak > 0:
+        return "it absorbs nothing"
+    for end, inside in ((0, wave_nm[0] > grid.start_nm), (-1, wave_nm[-1] < grid.stop_nm)):
+        if inside and values[end] > _END * peak:
+            return f"it ends at {wave_nm[end]:g} nm with {values[end] / peak:.0%} of its peak"
+    return ""

@@ -1,0 +1,90 @@
+"""Choice from a catalog: every combination, exchanges, and the amounts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sweep.base.types import in_turn
+from sweep.designs.families.mixture import Mixture
+from sweep.search.combinations import Choice, choose, with_members
+from sweep.search.problem import Problem, best_feasible, starting_points
+from sweep.search.solver import search_from
+from sweep.study import load_study
+
+STUDY = """\
+study: mix
+sensor: ar0820
+lights: tl16
+cfas: [RGGB, RYNCy]
+colorants: modeled
+boxes:
+  mix: {cfa: RYNCy, channel: N, base: Y, family: mixture, options: {at_most: SLOTS}, box: BOX}
+constraints: {sensitivity: {min: 0.9}}
+search: {starts: 2, max_evaluations: 200}
+"""
+NUMBERS = 20
+
+
+def problem(tmp_path: Path, slots: int, numbers: int = NUMBERS) -> Problem:
+    ranges = [f"colorant_{i}: [1, {numbers}], absorbance_{i}: [0, 3]" for i in range(1, slots + 1)]
+    text = STUDY.replace("SLOTS", str(slots)).replace("BOX", f"{{{', '.join(ranges)}}}")
+    (tmp_path / "mix.yaml").write_text(text)
+    study = load_study(tmp_path / "mix.yaml")
+    assert study.search is not None
+    return study.problem(study.search)
+
+
+def chosen(task: Problem, exhaustive: int) -> Choice:
+    return choose(task, "SLSQP", 60, 1, in_turn, lambda *_: None, exhaustive)
+
+
+@pytest.mark.slow
+def test_exchange_finds_the_best_pair_of_all(tmp_path: Path) -> None:
+    task = problem(tmp_path, 2, 30)
+    every, some = chosen(task, 1_000), chosen(task, 0)
+    assert every.counts == ("all 30 singles", "all 435 pairs")
+    assert some.counts[1].endswith("of 435 pairs by exchange")
+    assert len(some.tried) < 0.6 * len(every.tried)
+    assert some.best.members == every.best.members
+    assert some.best.best.objective == every.best.best.objective
+
+
+def test_singles_are_those_of_a_fine_grid_of_amounts(tmp_path: Path) -> None:
+    """Of each colorant the largest CSD over 3,000 amounts, by the forward model itself."""
+    task = problem(tmp_path, 1)
+    assert isinstance(task.family, Mixture)
+    found = {one.members[0]: one.best for one in chosen(task, 0).tried}
+    assert sorted(found) == list(range(1, NUMBERS + 1))
+    for number in (1, 7, 20):
+        alone = with_members(task, (number,))
+        amounts = np.linspace(0, 1, 301)[:, None]
+        log = [search_from(alone, 0, u, "COBYLA", 1).log[0] for u in amounts]
+        best = best_feasible(log)
+        assert best is not None
+        assert found[number].objective >= best.objective - 1e-9
+        assert found[number].objective <= best.objective * 1.03
+        assert found[number].x[0] == number
+
+
+def test_a_slot_without_a_member_has_no_amount(tmp_path: Path) -> None:
+    alone = with_members(problem(tmp_path, 2), (5,))
+    assert alone.free.tolist() == [1]
+    np.testing.assert_array_equal(alone.from_unit(np.array([0.5])), [5, 1.5, 5, 0, 0.8])
+    (start,) = starting_points(alone, 1, 1)
+    assert start.shape == (1,)
+
+
+def test_equal_colorants_and_one_that_absorbs_nothing_are_no_trouble(tmp_path: Path) -> None:
+    task = problem(tmp_path, 2)
+    assert isinstance(task.family, Mixture)
+    spectra = task.family._spectra.copy()
+    spectra[1], spectra[2] = spectra[0], 0.0
+    wave, base = task.family._wavelength_nm, task.family._base
+    family = Mixture(wave, base, spectra[:4], 2)
+    tried = chosen(replace(task, family=family, high=np.array([4, 3, 4, 3, 0.8])), 100)
+    assert len(tried.tried) == 4 + 6
+    assert np.isfinite(tried.best.best.objective)
