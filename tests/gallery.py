@@ -20,6 +20,7 @@ PICTURES = {
     "robust": "figures/regions-1",
     "angle": "figures/places-1",
     "dye": "cfas",
+    "band": "figures/map",
     "dual": "cfas",
     "rccb": "pareto",
     "balanced": "figures/scorecard",

@@ -18,6 +18,7 @@ from ..study.axes import series_of
 from .lamps import cost_of_worst_case, lamp_lines, over_population, robustness_lines
 from .leaders import Leaders, Row, capital, full_name, label, leaders_of, of_reference, upper_bound_beside
 from .noise import usable_lines
+from .parameter_map import map_lines
 from .scorecard import score_lines, scorecard
 from .series import lead_sentence, leads_of, series_figures, vanishing_line
 from .terms import (
@@ -99,7 +100,12 @@ def _of_designs(output: Output) -> tuple[list[str], list[str]]:
     if output.best.empty and (scores := score_lines(scorecard(output))):
         return scores, list(_best(output, leaders))
     best = list(_best(output, leaders))
-    return [*best[:1], *cost_of_worst_case(output, leaders.chosen), *_over_field(output, leaders)], [
+    return [
+        *best[:1],
+        *cost_of_worst_case(output, leaders.chosen),
+        *_over_field(output, leaders),
+        *map_lines(output),
+    ], [
         *best[1:],
         *_best_of_other_scenarios(output),
         *robustness_lines(output, leaders.chosen),

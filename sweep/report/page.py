@@ -28,6 +28,7 @@ from .leaders import leaders_of
 from .noise import all_series, recognition_table
 from .page_data import payload
 from .pages import inlined, page, rows, script
+from .parameter_map import map_drawing
 from .price import price_table
 from .scenes import effect_table, scene_groups, scene_table
 from .scorecard import draw_scorecard, scorecard
@@ -46,6 +47,7 @@ _SHOWN = {
     "vision_images": (VISION_FIGURES,),
     "score_images": ("scorecard", "color-noise", "rendered"),
     "map_images": ("places-",),
+    "parameter_images": ("map",),
 }
 """Places of the page -> how the names of the pictures there begin; the page draws all other figures itself."""
 
@@ -192,6 +194,7 @@ def _drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
     if card is not None:
         yield "scorecard", f"Every figure relative to {card.names[0]}", partial(draw_scorecard, card)
     yield from map_drawings(output)
+    yield from map_drawing(output)
     yield from color_drawings(output)
     yield from lamp_drawings(output)
     tiles = partial(signals.draw_tiles, signals.first_mosaics(output), signals.replaced_channels(output))

@@ -29,6 +29,7 @@ from ..results.tables import (
     COMBINATIONS,
     FRONT,
     LEFT_OUT,
+    MAP,
     PROVENANCE,
     RESOLVED,
     RESULTS,
@@ -58,6 +59,7 @@ from .search import (
     combinations_table,
     front_table,
     limit_alone,
+    map_table,
     run_search,
     search_facts,
     search_log,
@@ -92,6 +94,7 @@ def _whole(study: Study) -> set[str]:
     if study.search is not None:
         names |= {SEARCH_LOG} | ({FRONT} if study.search.levels else set())
         names |= {LEFT_OUT} if study.leaves_one_out else set()
+        names |= {MAP} if study.search.map else set()
         names |= {COMBINATIONS} if len(numbers_of(study.problem(study.search))) > 1 else set()
     return names
 
@@ -255,6 +258,8 @@ class _Run:
         self.inventory.list_file(RESULTS)
         if answer is not None:
             self._write(SEARCH_LOG, search_log(answer))
+            if answer.search.map:
+                self._write(MAP, map_table(self.study, answer.search, self._kept("map"), self.progress))
             if answer.choice is not None:
                 self._write(COMBINATIONS, combinations_table(self.study, answer))
             if answer.search.levels:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import islice
+from itertools import islice, product
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from ..metrics.columns.sensitivity import cfa_sensitivity_at
 from ..results.tables import front_schema, search_schema
 from ..search.certificate import ROUNDING
 from ..search.combinations import Choice, choose, numbers_of, with_members
+from ..search.held import search_cells
 from ..search.limit import Limit, limit_of, reason_without_bound
 from ..search.problem import Evaluation, Problem, SearchRun, best_feasible, starting_points
 from ..search.solver import extreme_value, search_from
@@ -27,6 +28,7 @@ from .routes import Rules
 from .rows import Job, run_job
 
 _CM_PER_UM = 1e-4
+_CELLS_AT_ONCE = 16
 _REACH_STARTS = 8
 _MOST_PER_COMBINATION = 60
 """Evaluations for the amounts of a combination of colorants."""
@@ -275,6 +277,41 @@ def search_log(answer: SearchAnswer) -> pa.Table:
         for index, e in enumerate(run.log)
     ]
     return pa.Table.from_pylist(rows, schema=search_schema(names))
+
+
+def map_table(study: Study, search: Search, parallel: Parallel, progress: Progress) -> pa.Table:
+    """Return the best objective over the values of two parameters, with all other parameters free.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    search : Search
+        Search with a map.
+    parallel : callable
+        Runs calls on the cores.
+    progress : callable
+        Called with a phase, work done and work in total.
+
+    Returns
+    -------
+    pyarrow.Table
+        One row per pair of values: all parameters, objective and sensitivity before clipping and quantization.
+    """
+    problem, names = study.problem(search), search.space.parameters
+    indices = [names.index(name) for name in search.map]
+    cells = [dict(zip(indices, values, strict=True)) for values in product(*search.map.values())]
+    each = min(_MOST_PER_COMBINATION, search.max_evaluations)
+    parts = [cells[at : at + _CELLS_AT_ONCE] for at in range(0, len(cells), _CELLS_AT_ONCE)]
+    calls = [delayed(search_cells, problem, part, search.algorithm, each, study.section.seed) for part in parts]
+    rows = []
+    for found in parallel(calls):
+        for held in found:
+            row = dict(zip(names, map(float, held.best.x), strict=True))
+            row |= {"objective": held.best.objective, "sensitivity": held.best.sensitivity}
+            rows.append(row | {"violation": held.best.violation, "feasible": held.feasible})
+        progress("cells of the map", len(rows), len(cells))
+    return pa.Table.from_pylist(rows)
 
 
 def combinations_table(study: Study, answer: SearchAnswer) -> pa.Table:

@@ -11,9 +11,8 @@ import numpy as np
 
 from ..base.types import IndexArray, Parallel, Progress, delayed
 from ..designs.family import ChoosingFamily
-from ..metrics.bound import FEASIBLE
-from .problem import Evaluation, Problem, best_feasible
-from .solver import search_from
+from .held import Held, held_at, search_held
+from .problem import Evaluation, Problem
 
 MOST_EXHAUSTIVE = 2_000
 """Combinations of one size that are all tried; of more, those are that exchanges of members lead to."""
@@ -22,8 +21,6 @@ _MOST_PARTNERS = 1_000
 _SEEDS = 5
 _MOST_ROUNDS = 20
 _AT_ONCE = 32
-_STARTS = (0.02, 0.3)
-"""Shares of the largest amounts that a search begins at: of some colorants none is better than much."""
 _SIZES = {1: "single", 2: "pair", 3: "triple"}
 
 Members = tuple[int, ...]
@@ -31,17 +28,20 @@ Members = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Tried:
-    """Combination of members with its best evaluation: the best feasible one, else the least infeasible one."""
+    """Combination of members with its best amounts."""
 
     members: Members
-    best: Evaluation
-    evaluations: int
+    found: Held
+
+    @property
+    def best(self) -> Evaluation:
+        """Best evaluation."""
+        return self.found.best
 
     @property
     def rank(self) -> tuple[bool, float]:
         """What the best combination has most of."""
-        feasible = self.best.violation <= FEASIBLE
-        return feasible, self.best.objective if feasible else -self.best.violation
+        return self.found.rank
 
 
 @dataclass(frozen=True)
@@ -93,12 +93,12 @@ def with_members(problem: Problem, members: Members) -> Problem:
         Problem whose numbers are fixed.
     """
     assert isinstance(problem.family, ChoosingFamily)
-    low, high = problem.low.copy(), problem.high.copy()
+    held = {}
     for slot, (number, amount) in enumerate(problem.family.slots):
-        low[number] = high[number] = members[min(slot, len(members) - 1)]
+        held[number] = float(members[min(slot, len(members) - 1)])
         if slot >= len(members):
-            low[amount] = high[amount] = 0.0
-    return replace(problem, family=problem.family.only(np.unique(members)), low=low, high=high)
+            held[amount] = 0.0
+    return held_at(replace(problem, family=problem.family.only(np.unique(members))), held)
 
 
 def amounts_of(
@@ -124,15 +124,10 @@ def amounts_of(
     list of Tried
         Results, in order.
     """
-    tried = []
-    for members in combinations:
-        chosen = with_members(problem, members)
-        starts = [np.full(chosen.free.size, share) for share in _STARTS]
-        runs = [search_from(chosen, i, u0, algorithm, max_evaluations, seed) for i, u0 in enumerate(starts)]
-        log = [evaluation for run in runs for evaluation in run.log]
-        best = best_feasible(log) or min(log, key=lambda evaluation: evaluation.violation)
-        tried.append(Tried(members, best, len(log)))
-    return tried
+    return [
+        Tried(members, search_held(with_members(problem, members), algorithm, max_evaluations, seed))
+        for members in combinations
+    ]
 
 
 def choose(

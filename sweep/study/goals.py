@@ -11,6 +11,7 @@ import numpy as np
 from ..base.errors import ValidationIssue
 from ..base.user_code import kind_in_words
 from ..camera.scene import WhitePatchExposure
+from ..designs.family import ChoosingFamily
 from ..designs.space import Space
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY, SENSITIVITY
 from ..metrics.quantity import DN, OF_A_SHARE, WORST_CASE, Quantity, RequestedQuantities
@@ -23,6 +24,8 @@ from .schema import StudySection
 from .sources import Sources
 
 _SLACK = 1e-9
+_MOST_OF_AXIS = 200
+"""Values of one parameter of a map."""
 _LEAST_ERROR = 1e-12
 """Smallest error that is stated where errors are no exact sums."""
 
@@ -158,7 +161,29 @@ def search_of(section: StudySection, spaces: Sequence[Space], sources: Sources) 
     name = requested.name or f"best {kind_in_words(space.filter.family.kind)}"
     name += " (search)" if name in others else ""
     effort = requested.algorithm, requested.starts, requested.max_evaluations
-    return Search(name, space, scenario, *effort, levels)
+    return Search(name, space, scenario, *effort, levels, _map_of(requested.map or {}, space, sources))
+
+
+def _map_of(requested: Mapping[str, Axis], space: Space, sources: Sources) -> dict[str, tuple[float, ...]]:
+    """Return the values of a map, checked to be of the search's parameters and inside its box."""
+    assert space.filter is not None
+    ends = dict(zip(space.parameters, ((min(axis), max(axis)) for axis in space.axes), strict=True))
+    chosen = space.filter.family.slots if isinstance(space.filter.family, ChoosingFamily) else ()
+    values = {}
+    for name, axis in requested.items():
+        path: KeyPath = ("search", "map", name)
+        if name not in ends:
+            sources.unknown(path, "parameter", name, ends)
+        elif chosen:
+            sources.add(path, "a map has no choice from a catalog", space.name, "a box of another family")
+        elif axis.size > _MOST_OF_AXIS:
+            sources.add(path, "too many values", axis.size, f"at most {_MOST_OF_AXIS}")
+        elif min(axis.points()) < ends[name][0] or max(axis.points()) > ends[name][1]:
+            shown = f"{min(axis.points()):g} to {max(axis.points()):g}"
+            sources.add(path, "outside the box", shown, "{:g} to {:g}".format(*ends[name]))
+        else:
+            values[name] = axis.points()
+    return values
 
 
 def check_searched(section: StudySection, space: Space, known: Mapping[str, Quantity], sources: Sources) -> None:

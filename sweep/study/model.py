@@ -46,6 +46,7 @@ class Search:
     starts: int
     max_evaluations: int
     levels: tuple[float, ...] = ()
+    map: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -211,6 +211,8 @@ class SearchSection(Section):
     """The sweep or box to search; may be left out where there is one."""
     front: Levels | None = None
     """Levels of the lowest allowed sensitivity at which the search is repeated for the trade-off."""
+    map: Annotated[dict[Name, Values], Field(min_length=2, max_length=2)] | None = None
+    """Two parameters and their values: the best objective at each pair of values, with all others free."""
     scenario: Name | None = None
     """Scenario of the search; may be left out where there is one."""
     algorithm: Name = "SLSQP"

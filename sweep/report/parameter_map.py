@@ -1,0 +1,178 @@
+"""Map of the best objective over two parameters: what a filter would have to be."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..base.types import FloatArray
+from ..results.output import Output
+from ..results.tables import NAMED
+from .figures import Drawing, canvas
+from .leaders import label, leaders_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_BAND = ("peak_nm", "fwhm_nm")
+"""Parameters of a map of absorption bands."""
+_MOST_NAMED = 3
+_STYLES = ("-", "--", ":", "-.")
+
+
+@dataclass(frozen=True)
+class MapFigure:
+    """Best objective over two parameters.
+
+    Parameters
+    ----------
+    title, label : str
+        Texts.
+    names : tuple of str
+        Parameters along x and y.
+    x : ndarray of shape (n,)
+        Values along x.
+    y : ndarray of shape (m,)
+        Values along y.
+    best : ndarray of shape (m, n)
+        Best objective; NaN where no design is feasible.
+    levels : sequence of (name, value)
+        Objectives of other designs.
+    points : ndarray of shape (k, 2)
+        Peak and width of the colorants of a catalog, nm.
+    """
+
+    title: str
+    label: str
+    names: tuple[str, str]
+    x: FloatArray
+    y: FloatArray
+    best: FloatArray
+    levels: Sequence[tuple[str, float]]
+    points: FloatArray
+
+
+def map_figure(output: Output) -> MapFigure | None:
+    """Return the map of a run's search.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    MapFigure or None
+        None without a map.
+    """
+    search = output.study.search
+    if output.map is None or search is None or search.map is None:
+        return None
+    first, second = search.map
+    cells = output.map.assign(objective=output.map["objective"].where(output.map["feasible"]))
+    grid = cells.pivot(index=second, columns=first, values="objective")
+    plain, goal = leaders_of(output).plain, output.goal.name
+    named = output.kind(NAMED)
+    named = named[(named["scenario"] == output.scenario) & named[goal].notna()].nlargest(_MOST_NAMED, goal)
+    rows = [*([] if plain is None else [plain]), *named.to_dict("records")]
+    is_band = (first, second) == _BAND
+    points = [_peak_and_width(output.curves.wavelength_nm, curve) for curve in output.curves.colorants.values()]
+    return MapFigure(
+        f"{output.study.study}: best {output.goal.words}",
+        output.goal.axis,
+        (first, second),
+        grid.columns.to_numpy(dtype=float),
+        grid.index.to_numpy(dtype=float),
+        grid.to_numpy(dtype=float),
+        [(label(row), float(row[goal])) for row in rows],
+        np.array(points if is_band else []).reshape(-1, 2),
+    )
+
+
+def _peak_and_width(wavelength_nm: FloatArray, curve: FloatArray) -> tuple[float, float]:
+    """Return the peak of a curve and its width at half height, nm; NaN where it has no half height on a side."""
+    peak, half = int(curve.argmax()), float(curve.max()) / 2
+    sides = []
+    for side in (slice(peak, None, -1), slice(peak, None)):
+        nm, values = wavelength_nm[side], curve[side]
+        below = np.flatnonzero(values < half)
+        if not below.size:
+            return float(wavelength_nm[peak]), np.nan
+        at = slice(int(below[0]) - 1, int(below[0]) + 1)
+        sides.append(float(np.interp(half, values[at][::-1], nm[at][::-1])))
+    return float(wavelength_nm[peak]), sides[1] - sides[0]
+
+
+def map_lines(output: Output) -> Iterator[str]:
+    """Yield the widest absorption band of a map that reaches each other design.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Yields
+    ------
+    str
+        Sentences, only of a map of absorption bands.
+    """
+    figure = map_figure(output)
+    if figure is None or output.map is None or figure.names != _BAND:
+        return
+    cells = output.map[output.map["feasible"]]
+    for name, level in figure.levels:
+        reaching = cells[cells["objective"] >= level]
+        what = f"{output.goal.words} of {name} ({output.goal.formatted(level)})"
+        if reaching.empty:
+            yield f"No band of the map has the {what}."
+            continue
+        widest = reaching[reaching["fwhm_nm"] == reaching["fwhm_nm"].max()].nlargest(1, "objective").iloc[0]
+        yield (
+            f"The widest band of the map that has the {what} is of {widest['fwhm_nm']:g} nm FWHM, at "
+            f"{widest['peak_nm']:g} nm, with an absorbance of {widest['absorbance']:.2f}."
+        )
+
+
+def map_drawing(output: Output) -> Iterator[tuple[str, str, Drawing]]:
+    """Yield the map, if there is one.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Yields
+    ------
+    name, caption, drawing : str, str, Drawing
+        File name, caption and drawing.
+    """
+    figure = map_figure(output)
+    if figure is not None:
+        lines = ", ".join(name for name, _ in figure.levels)
+        dots = "; dots are the colorants of the catalog" if len(figure.points) else ""
+        caption = f"Best {output.goal.words} over {figure.names[0]} and {figure.names[1]}; lines: as {lines}{dots}"
+        yield "map", caption, partial(_draw, figure)
+
+
+def _draw(figure: MapFigure) -> Figure:
+    """Draw the objective in colors, and a line where it is that of another design."""
+    drawn, axes = canvas(8.0, 5.0)
+    colors = axes.pcolormesh(figure.x, figure.y, figure.best, shading="nearest", cmap="cividis", vmin=0.0)
+    low, high = np.nanmin(figure.best), np.nanmax(figure.best)
+    for (name, level), style in zip(figure.levels, _STYLES, strict=False):
+        if low < level < high:
+            axes.contour(figure.x, figure.y, figure.best, levels=[level], colors="white", linestyles=style)
+            axes.plot([], [], color="#888888", linestyle=style, label=f"as {name} ({level:.0f})")
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    axes.plot(*figure.points.T, "o", color="white", markeredgecolor="black", markersize=4, linestyle="none")
+    axes.set(xlim=(left, right), ylim=(bottom, top), title=figure.title)
+    axes.set_xlabel(figure.names[0].replace("_nm", " / nm"))
+    axes.set_ylabel(figure.names[1].replace("_nm", " / nm"))
+    drawn.colorbar(colors, ax=axes, label=figure.label)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(loc="upper right", fontsize=8)
+    return drawn

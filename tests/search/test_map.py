@@ -1,0 +1,96 @@
+"""The map of the best objective over two parameters, and its report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from sweep.base.errors import StudyError
+from sweep.report import read_output
+from sweep.report.parameter_map import _peak_and_width, map_drawing, map_figure, map_lines
+from sweep.search.gradients import Model
+from sweep.search.problem import SearchRun
+from sweep.study import load_study
+
+from ..build import ran
+
+STUDY = """\
+study: tiny band
+sensor: ar0820
+lights: tl16
+cfas: [RGGB, RYNCy]
+colorants: modeled
+boxes:
+  band: {cfa: RYNCy, channel: N, base: Y, family: absorption_bands, box: {peak_nm: [580, 700], fwhm_nm: [20, 80], absorbance: [0, 3]}}
+constraints: {sensitivity: {min: 0.9}}
+search: {starts: 2, max_evaluations: 200, map: MAP}
+"""
+MAP = "{peak_nm: [628, 636, 644], fwhm_nm: [30, 44, 60]}"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("map")
+    (made / "band.yaml").write_text(STUDY.replace("MAP", MAP))
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("sweep.report.page._drawings", lambda _: ())
+        ran(load_study(made / "band.yaml"), made / "out", 1)
+    return made
+
+
+def test_each_cell_is_the_best_of_a_fine_grid_of_amounts(folder: Path) -> None:
+    """By the forward model itself, at 601 absorbances."""
+    table = pd.read_parquet(folder / "out" / "map.parquet")
+    assert list(zip(table["peak_nm"], table["fwhm_nm"], strict=True)) == [
+        (peak, fwhm) for peak in (628, 636, 644) for fwhm in (30, 44, 60)
+    ]
+    study = load_study(folder / "band.yaml")
+    assert study.search is not None
+    problem = study.problem(study.search)
+    for cell in table.iloc[[0, 4, 8]].to_dict("records"):
+        model = Model(problem, SearchRun(0), 10_000)
+        x = np.array([[cell["peak_nm"], cell["fwhm_nm"], amount, 0.0] for amount in np.linspace(0, 1.5, 601)])
+        found = [model.at(problem.to_unit(row)).evaluation for row in x]
+        best = max(one.objective for one in found if one.violation <= 0)
+        assert best - 1e-9 <= cell["objective"] <= best * 1.01
+        assert cell["feasible"]
+
+
+def test_the_report_says_how_wide_a_band_may_be(folder: Path) -> None:
+    output = read_output(folder / "out")
+    figure = map_figure(output)
+    assert figure is not None
+    assert figure.best.shape == (3, 3)
+    assert [name for name, _ in figure.levels] == ["RGGB"]
+    ((name, _, draw),) = map_drawing(output)
+    assert name == "map"
+    assert [text.get_text() for text in draw().axes[0].get_legend().get_texts()] == ["as RGGB (139)"]
+    (line,) = map_lines(output)
+    cells = pd.read_parquet(folder / "out" / "map.parquet")
+    rggb = output.table[output.table["name"] == "RGGB"]["csd_yellow_red"].iloc[0]
+    assert cells[cells["objective"] >= rggb]["fwhm_nm"].max() == 44
+    assert "(139 DN) is of 44 nm FWHM, at 636 nm, with an absorbance of 0." in line
+
+
+def test_the_width_of_a_colorant_is_that_at_half_height() -> None:
+    nm = np.arange(400.0, 701.0)
+    assert _peak_and_width(nm, np.exp(-4 * np.log(2) * ((nm - 600) / 33) ** 2)) == pytest.approx((600, 33), rel=1e-3)
+    assert np.isnan(_peak_and_width(nm, np.exp(-4 * np.log(2) * ((nm - 690) / 33) ** 2))[1])
+
+
+@pytest.mark.parametrize(
+    ("axes", "said"),
+    [
+        ("{peak: [1], fwhm_nm: [30]}", "unknown parameter .* did you mean 'peak_nm'"),
+        ("{peak_nm: [500, 600], fwhm_nm: [30]}", "outside the box .*500 to 600.*allowed: 580 to 700"),
+        ("{peak_nm: {min: 600, max: 610, count: 300}, fwhm_nm: [30]}", "too many values"),
+        ("{peak_nm: [600]}", "map"),
+    ],
+)
+def test_an_unsuitable_map_is_refused(tmp_path: Path, axes: str, said: str) -> None:
+    (tmp_path / "band.yaml").write_text(STUDY.replace("MAP", axes))
+    with pytest.raises(StudyError, match=said):
+        load_study(tmp_path / "band.yaml")
