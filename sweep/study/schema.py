@@ -153,9 +153,10 @@ class Production(Section):
     """Production tolerances of a filter: shifts of single edges, and of the film thickness; both are independent."""
 
     edge_shift_nm: float = Field(default=0.0, ge=0, le=1000)
-    """Largest shift of an edge, to either side, in nm."""
+    """Largest shift of an edge, or of the bands of a colorant in its film, to either side, in nm."""
     thickness: float = Field(default=0.0, ge=0, le=0.2)
-    """Largest relative error of the films of an interference filter; moves l nm to l (1 + thickness)."""
+    """Largest relative error of the films of an interference filter; moves l nm to l (1 + thickness). A film of
+    colorants absorbs so much more or less, by its thickness or its concentration."""
 
     @property
     def tolerance(self) -> Tolerance:

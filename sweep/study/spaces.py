@@ -118,7 +118,8 @@ class SpaceBuilder:
             if not value:
                 self.sources.add((*path, key), "missing")
         stated = entry.technology
-        if self.section.production.thickness and stated is not None and stated.interference is None:
+        absorbs = isinstance(made := FAMILIES.get(entry.family), type) and issubclass(made, Absorbing)
+        if self.section.production.thickness and not absorbs and stated is not None and stated.interference is None:
             problem = "a pigment has no films that come out too thick (`production.thickness`)"
             self.sources.add((*path, "technology"), problem, PIGMENT, "interference, or nothing stated")
         for channel in entry.channel:
@@ -127,7 +128,6 @@ class SpaceBuilder:
         external = is_from_outside(entry.family, _FAMILIES, FAMILIES)
         if external and not allowed(self.sources, (*path, "family"), entry.family):
             return
-        absorbs = isinstance(made := FAMILIES.get(entry.family), type) and issubclass(made, Absorbing)
         if absorbs and stated is not None and stated.interference is not None:
             self.sources.add((*path, "technology"), f"{entry.family} is of colorants", stated.description, PIGMENT)
         if entry.family == Mixture.kind and self.section.colorants is None:
@@ -159,7 +159,8 @@ class SpaceBuilder:
             if isinstance(curve, str) and curve not in self.sensor.qe:
                 self.sources.unknown((*path, key), "curve", curve, self.sensor.qe)
         self._check_channels(path, entry, mosaic)
-        if len(self.sources.issues) > before or mosaic is None:  # a CFA without a mosaic has an issue of its own
+        unread = entry.family == Mixture.kind and self.colorants is None
+        if len(self.sources.issues) > before or mosaic is None or unread:  # these have issues of their own
             return []
         assert entry.base is not None  # else there is an issue
         base = self.sensor.curve(entry.base)

@@ -14,7 +14,7 @@ from pydantic import Field
 from ...base.errors import SweepError, ValidationIssue
 from ...base.types import FloatArray, IndexArray, Section
 from ..family import Parameter
-from ..tolerance import AS_DESIGNED, ProductionError
+from ..tolerance import ProductionError
 
 GaussianIn = Literal["wavenumber", "wavelength"]
 
@@ -47,7 +47,8 @@ class Absorbing(ABC):
     parameters: tuple[Parameter, ...]
 
     def __init__(self, wavelength_nm: FloatArray, base: FloatArray) -> None:
-        self._wavelength_nm, self._base, self._off = wavelength_nm, base, AS_DESIGNED
+        self._wavelength_nm, self._base = wavelength_nm, base
+        self._nominal_nm, self._film = wavelength_nm, 1.0  # as production makes it: wavelengths, and relative thickness
 
     @abstractmethod
     def absorbance(self, x: FloatArray) -> FloatArray:
@@ -81,11 +82,11 @@ class Absorbing(ABC):
 
     def curves(self, x: FloatArray) -> FloatArray:
         """Return the QE of the modified channel."""
-        return np.asarray((self._base * np.power(10.0, -self.absorbance(x)))[:, None, :], dtype=float)
+        return np.asarray((self._base * np.power(10.0, -self._film * self.absorbance(x)))[:, None, :], dtype=float)
 
     def gradient(self, x: FloatArray) -> FloatArray:
         """Return the derivative of `curves` at one design."""
-        slope = -_LN10 * self.curves(x[None])[0] * self.absorbance_gradient(x)
+        slope = -_LN10 * self._film * self.curves(x[None])[0] * self.absorbance_gradient(x)
         return np.asarray(slope[:, None, :], dtype=float)
 
     def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
@@ -98,7 +99,7 @@ class Absorbing(ABC):
 
     def hull(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the base behind the largest and the least absorbance of a box."""
-        least, most = self.absorbance_range(low, high)
+        least, most = (self._film * end for end in self.absorbance_range(low, high))
         return (self._base * np.power(10.0, -most))[None], (self._base * np.power(10.0, -least))[None]
 
     @abstractmethod
@@ -122,7 +123,7 @@ class Absorbing(ABC):
         return {}
 
     def perturbed(self, off: ProductionError) -> Self:
-        """Return the family with its bands moved.
+        """Return the family with its bands moved, in films that are too thick: they absorb more, and move nothing.
 
         Parameters
         ----------
@@ -135,8 +136,13 @@ class Absorbing(ABC):
             The family as production makes it.
         """
         made = copy(self)
-        made._off = off
+        made._nominal_nm, made._film = self._wavelength_nm - off.shift_nm, 1 + off.thickness
         return made
+
+    @property
+    def moved(self) -> tuple[FloatArray, FloatArray]:
+        """Zero, and the base: the transmission moves with the bands; see `MovedFamily`."""
+        return np.zeros_like(self._base), self._base
 
     def start(self, points: FloatArray) -> FloatArray:
         """Return the points: a search starts anywhere in the box."""
@@ -224,7 +230,7 @@ class AbsorptionBands(Absorbing):
 
     def _offsets(self, peaks_nm: FloatArray, fwhm_nm: FloatArray) -> FloatArray:
         """Return the distances from the peaks in widths; ndarray of shape (..., n_wavelengths)."""
-        peak_nm, wave_nm = peaks_nm[..., None], self._off.nominal_nm(self._wavelength_nm)
+        peak_nm, wave_nm = peaks_nm[..., None], self._nominal_nm
         away_nm = peak_nm - wave_nm if self._in_wavelength else (peak_nm / wave_nm - 1) * peak_nm
         return np.asarray(away_nm / fwhm_nm[..., None])
 
@@ -248,14 +254,14 @@ class AbsorptionBands(Absorbing):
         offsets = self._offsets(peaks_nm, fwhm_nm)
         shape = np.exp(-_WIDTH * offsets**2)
         slope = -2 * _WIDTH * absorbance[:, None] * offsets * shape
-        wave_nm = self._off.nominal_nm(self._wavelength_nm)
+        wave_nm = self._nominal_nm
         by_peak = (1.0 if self._in_wavelength else 2 * peaks_nm[:, None] / wave_nm - 1) / fwhm_nm[:, None]
         rows = np.stack([slope * by_peak, -slope * offsets / fwhm_nm[:, None], shape], axis=1)
         return np.concatenate([rows.reshape(-1, shape.shape[1]), np.ones((1, shape.shape[1]))])
 
     def absorbance_range(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return every band where it is farthest and nearest; see `Absorbing.absorbance_range`."""
-        wave_nm = self._off.nominal_nm(self._wavelength_nm)
+        wave_nm = self._nominal_nm
         (low_nm, narrowest_nm, least), (high_nm, widest_nm, most) = self._split(low), self._split(high)
         # An offset has its extremes at an end, at the wavelength, or, in wavenumber, at half of it.
         peaks_nm = [
@@ -390,9 +396,8 @@ class Mixture(Absorbing):
             The family as production makes it.
         """
         made = super().perturbed(off)
-        nominal_nm = off.nominal_nm(self._wavelength_nm)
         rows = np.stack([*self._spectra, self._most])
-        *spectra, most = (np.interp(nominal_nm, self._wavelength_nm, row) for row in rows)
+        *spectra, most = (np.interp(made._nominal_nm, self._wavelength_nm, row) for row in rows)
         made._spectra, made._most = np.stack(spectra), most
         return made
 
@@ -428,5 +433,5 @@ class Mixture(Absorbing):
         """Return the base behind the largest absorbance of the whole catalog, whatever is chosen of it."""
         assert low.shape == high.shape
         amount = float(sum(high[amount] for _, amount in self.slots))
-        most = high[-1] / THICKNESS_UM * amount * self._most
+        most = self._film * high[-1] / THICKNESS_UM * amount * self._most
         return np.asarray((self._base * np.power(10.0, -most))[None], dtype=float)
