@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ..base.errors import OutputError, ValidationIssue
+from ..base.errors import OutputError, SweepError, ValidationIssue
 from ..base.types import FloatArray
 from ..report import Output, check_kept, read_output, study_of
+from ..report.figures import pictures_of
+from ..report.parameter_map import specification
 from ..results.atomic import write_bytes
 from ..results.designs import find_design_row, row_curves
 from ..spectra.filter_files import (
@@ -115,6 +117,21 @@ def export_design(
         text, weight_lines = _rgb_weights(study, curves)
         files[weights] = text.encode("utf-8")
         lines += [f"       {weights} (each channel as a sum of the sensor's R, G and B):", *weight_lines]
+    if ExportFormat.SPECIFICATION in also:
+        specified, page = (path.with_name(f"{path.name}_specification.{kind}") for kind in ("csv", "svg"))
+        made = specification(output)
+        if made is None:
+            problem, allowed = (
+                "no map of absorption bands",
+                "a study with `search: {map: {peak_nm: ..., fwhm_nm: ...}}`",
+            )
+            raise SweepError(ValidationIssue(problem, str(folder), None, "--also", "specification", allowed))
+        specified_table, drawing = made
+        files |= {
+            specified: specified_table.to_csv(index=False).encode("utf-8"),
+            page: pictures_of(drawing, ("svg",))["svg"],
+        }
+        lines.append(f"       {specified}, {page} (what an absorption band would have to be)")
     for file, content in files.items():
         _refuse_other(file, content)
     for file, content in files.items():

@@ -21,10 +21,11 @@ PANELS = (OF_STUDIES, OF_RESULTS, OF_CURVES, OF_TOOL)
 
 
 class ExportFormat(StrEnum):
-    """Files of other programs that an export can write, too."""
+    """Files that an export can write, too: of other programs, or the specification of a colorant from a map."""
 
     SPEOS = "speos"
     RGB = "rgb"
+    SPECIFICATION = "specification"
 
 
 def study_files(incomplete: str) -> list[str]:

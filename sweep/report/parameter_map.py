@@ -2,25 +2,33 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
 from ..base.types import FloatArray
+from ..designs.families.mixture import THICKNESS_UM
 from ..results.output import Output
 from ..results.tables import NAMED
 from .figures import Drawing, canvas
 from .leaders import label, leaders_of
+from .pages import aligned
+from .terms import assumptions_line, format_constraints
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _BAND = ("peak_nm", "fwhm_nm")
 """Parameters of a map of absorption bands."""
 _MOST_NAMED = 3
+_MOST_OF_PAGE = 45
+"""Rows of the table on the page; the file has all."""
 _STYLES = ("-", "--", ":", "-.")
 
 
@@ -133,8 +141,59 @@ def map_lines(output: Output) -> Iterator[str]:
         widest = reaching[reaching["fwhm_nm"] == reaching["fwhm_nm"].max()].nlargest(1, "objective").iloc[0]
         yield (
             f"The widest band of the map that has the {what} is of {widest['fwhm_nm']:g} nm FWHM, at "
-            f"{widest['peak_nm']:g} nm, with an absorbance of {widest['absorbance']:.2f}."
+            f"{widest['peak_nm']:g} nm, with an absorbance of {widest['absorbance']:.2f}{_amount(widest)}."
         )
+
+
+def _amount(cell: pd.Series) -> str:
+    """Return the concentration of a band, if it is known."""
+    if "mol_per_l" not in cell:
+        return ""
+    return f" ({cell['mol_per_l']:.3f} mol/l, {cell['percent_by_weight']:.1f} % by weight)"
+
+
+def specification(output: Output) -> tuple[pd.DataFrame, Drawing] | None:
+    """Return what an absorption band would have to be, as a table and as one page.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    table : pandas.DataFrame
+        For each width the best peak, its absorbance in a film of 0.8 um, objective and sensitivity, and, where an
+        extinction is assumed, concentrations.
+    drawing : Drawing
+        Page with the map, constraints, sentences and the table; None without a map of absorption bands.
+    """
+    figure = map_figure(output)
+    if figure is None or output.map is None or figure.names != _BAND:
+        return None
+    cells = output.map[output.map["feasible"]]
+    best = cells.loc[cells.groupby("fwhm_nm")["objective"].idxmax()].sort_values("fwhm_nm")
+    names = ("fwhm_nm", "peak_nm", "absorbance", "objective", "sensitivity", "mol_per_l", "percent_by_weight")
+    table = best[[name for name in names if name in best]].rename(columns={"objective": output.goal.name})
+    search = output.provenance.search
+    where = "" if search is None else f"Pixel {search.channel} of {search.cfa}, scenario {search.scenario}"
+    heads = [f"{where}; {format_constraints(output)}. Absorbance: decadic, in a film of {THICKNESS_UM:g} um."]
+    lines = [*heads, *map_lines(output), assumptions_line(output)]
+    digits = {"absorbance": 3, "sensitivity": 4, "mol_per_l": 4, "percent_by_weight": 2, output.goal.name: 1}
+    texts = table.apply(lambda column: column.map(f"{{:.{digits.get(str(column.name), 0)}f}}".format))
+    return table, partial(_draw_page, figure, [line for line in lines if line], aligned(texts))
+
+
+def _draw_page(figure: MapFigure, lines: Sequence[str], table: Sequence[str]) -> Figure:
+    """Draw a page of A4: the map, sentences, and the table."""
+    page, axes = canvas(8.27, 11.69)
+    page.set_layout_engine("none")
+    axes.set_position((0.1, 0.6, 0.85, 0.34))
+    _draw_on(page, axes, figure)
+    written = "\n".join(part for line in lines for part in textwrap.wrap(line, 100))
+    page.text(0.07, 0.55, written, fontsize=8.5, va="top")
+    page.text(0.07, 0.43, "\n".join(table[:_MOST_OF_PAGE]), fontsize=7, va="top", family="monospace")
+    return page
 
 
 def map_drawing(output: Output) -> Iterator[tuple[str, str, Drawing]]:
@@ -159,8 +218,14 @@ def map_drawing(output: Output) -> Iterator[tuple[str, str, Drawing]]:
 
 
 def _draw(figure: MapFigure) -> Figure:
-    """Draw the objective in colors, and a line where it is that of another design."""
+    """Draw the map alone."""
     drawn, axes = canvas(8.0, 5.0)
+    _draw_on(drawn, axes, figure)
+    return drawn
+
+
+def _draw_on(drawn: Figure, axes: Axes, figure: MapFigure) -> None:
+    """Draw the objective in colors, and a line where it is that of another design."""
     colors = axes.pcolormesh(figure.x, figure.y, figure.best, shading="nearest", cmap="cividis", vmin=0.0)
     low, high = np.nanmin(figure.best), np.nanmax(figure.best)
     for (name, level), style in zip(figure.levels, _STYLES, strict=False):
@@ -175,4 +240,3 @@ def _draw(figure: MapFigure) -> Figure:
     drawn.colorbar(colors, ax=axes, label=figure.label)
     if axes.get_legend_handles_labels()[0]:
         axes.legend(loc="upper right", fontsize=8)
-    return drawn

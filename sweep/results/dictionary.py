@@ -146,7 +146,8 @@ FILES = {
     "catalogs of molar extinction its concentration (`mol_per_l_1`), `thickness_um`, objective and sensitivity before "
     "clipping and quantization, `violation` and `feasible`",
     files.MAP: "where a search has a map, a row per pair of values: all parameters of the best design there, objective "
-    "and sensitivity before clipping and quantization, `violation` and `feasible`",
+    "and sensitivity before clipping and quantization, `violation` and `feasible`; with `colorants.assumed` the "
+    "concentration of a single absorption band in a film of 0.8 um, `mol_per_l` and `percent_by_weight`",
     files.FRONT: "results of the search at each level of sensitivity, and the limit there; between two levels rows "
     "with the limit alone: " + ", ".join(files.front_schema(["<parameters>"]).names),
     files.CURVES: "a row per curve and wavelength: " + ", ".join(SCHEMA.names),

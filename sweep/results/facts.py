@@ -113,8 +113,8 @@ class SearchFacts(_Facts):
     front_limits_open: int
     gap: float | None
     no_limit: str | None
-    combinations: tuple[str, ...]
     front_evaluations: int
+    combinations: tuple[str, ...] = ()
 
 
 class Provenance(_Facts):

@@ -300,6 +300,7 @@ def map_table(study: Study, search: Search, parallel: Parallel, progress: Progre
     """
     problem, names = study.problem(search), search.space.parameters
     indices = [names.index(name) for name in search.map]
+    assumed = None if study.section.colorants is None else study.section.colorants.assumed
     cells = [dict(zip(indices, values, strict=True)) for values in product(*search.map.values())]
     each = min(_MOST_PER_COMBINATION, search.max_evaluations)
     parts = [cells[at : at + _CELLS_AT_ONCE] for at in range(0, len(cells), _CELLS_AT_ONCE)]
@@ -309,6 +310,11 @@ def map_table(study: Study, search: Search, parallel: Parallel, progress: Progre
         for held in found:
             row = dict(zip(names, map(float, held.best.x), strict=True))
             row |= {"objective": held.best.objective, "sensitivity": held.best.sensitivity}
+            if assumed is not None and "absorbance" in row:
+                mol_per_l = row["absorbance"] / (assumed.molar_extinction * THICKNESS_UM * _CM_PER_UM)
+                g_per_l = mol_per_l * assumed.molar_mass_g_per_mol
+                row["mol_per_l"] = mol_per_l
+                row["percent_by_weight"] = 100 * g_per_l / (1000 * assumed.film_density_g_per_cm3)
             rows.append(row | {"violation": held.best.violation, "feasible": held.feasible})
         progress("cells of the map", len(rows), len(cells))
     return pa.Table.from_pylist(rows)

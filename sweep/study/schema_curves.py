@@ -216,6 +216,17 @@ def catalog(value: Any) -> Any:
     return {"catalog": listed(value)} if isinstance(value, str | list) else value
 
 
+class ColorantMass(Section):
+    """Figures of a colorant and its film, from which an absorbance becomes a concentration."""
+
+    molar_extinction: float = Field(gt=0, le=1e8)
+    """Decadic molar extinction at the peak, l/(mol cm)."""
+    molar_mass_g_per_mol: float = Field(gt=0, le=1e6)
+    """Molar mass, g/mol."""
+    film_density_g_per_cm3: float = Field(gt=0, le=30)
+    """Density of the film, g/cm^3."""
+
+
 class ColorantsSection(Section):
     """Absorption spectra that filters of the family `mixture` choose from."""
 
@@ -225,6 +236,8 @@ class ColorantsSection(Section):
     """`modeled`, the built-in catalog of modeled bands, which no dye has; or files, or folders of files, of curves."""
     quantity: Literal["absorbance", "molar_extinction"] = "absorbance"
     """Quantity of the files; of molar extinctions, l/(mol cm), the results have concentrations in mol/l."""
+    assumed: ColorantMass | None = None
+    """A colorant as a map assumes it: then the map has mol/l and percent by weight, too."""
 
 
 _Spectra = Annotated[

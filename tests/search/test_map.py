@@ -16,13 +16,15 @@ from sweep.search.problem import SearchRun
 from sweep.study import load_study
 
 from ..build import ran
+from ..commanded import commanded
+from ..conftest import FinishedFolder
 
 STUDY = """\
 study: tiny band
 sensor: ar0820
 lights: tl16
 cfas: [RGGB, RYNCy]
-colorants: modeled
+colorants: {catalog: modeled, assumed: {molar_extinction: 80000, molar_mass_g_per_mol: 400, film_density_g_per_cm3: 1.25}}
 boxes:
   band: {cfa: RYNCy, channel: N, base: Y, family: absorption_bands, box: {peak_nm: [580, 700], fwhm_nm: [20, 80], absorbance: [0, 3]}}
 constraints: {sensitivity: {min: 0.9}}
@@ -73,6 +75,33 @@ def test_the_report_says_how_wide_a_band_may_be(folder: Path) -> None:
     rggb = output.table[output.table["name"] == "RGGB"]["csd_yellow_red"].iloc[0]
     assert cells[cells["objective"] >= rggb]["fwhm_nm"].max() == 44
     assert "(139 DN) is of 44 nm FWHM, at 636 nm, with an absorbance of 0." in line
+
+
+def test_the_specification_has_amounts_for_every_width(folder: Path, tmp_path: Path) -> None:
+    """A = e c l: 0.8 um of a dye of 80,000 l/(mol cm) have an absorbance of 6.4 per mol/l; 400 g/mol in 1,250 g/l."""
+    code, said, _ = commanded(
+        *("export", folder / "out", "--design", "best", "--also", "specification", "--to", tmp_path)
+    )
+    assert code == 0
+    assert "what an absorption band would have to be" in said
+    table = pd.read_csv(tmp_path / "best_specification.csv")
+    assert table["fwhm_nm"].tolist() == [30, 44, 60]
+    np.testing.assert_allclose(table["mol_per_l"], table["absorbance"] / 6.4, rtol=1e-12)
+    np.testing.assert_allclose(table["percent_by_weight"], 100 * table["mol_per_l"] * 400 / 1250, rtol=1e-12)
+    cells = pd.read_parquet(folder / "out" / "map.parquet")
+    np.testing.assert_allclose(
+        table["csd_yellow_red"], cells.groupby("fwhm_nm")["objective"].max().to_numpy(), rtol=1e-12
+    )
+    assert (tmp_path / "best_specification.svg").stat().st_size > 10_000
+
+
+def test_without_a_map_there_is_no_specification(finished: FinishedFolder, tmp_path: Path) -> None:
+    code, _, said = commanded(
+        *("export", finished("stopband"), "--design", "RGGB", "--also", "specification", "--to", tmp_path)
+    )
+    assert code == 2
+    assert "no map of absorption bands" in said
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_width_of_a_colorant_is_that_at_half_height() -> None:

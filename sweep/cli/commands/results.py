@@ -64,7 +64,9 @@ def export(
     ] = None,
     also: Annotated[
         list[ExportFormat] | None,
-        typer.Option(help="Another file, too: .spectrum of Speos, or weights of the sensor's R, G and B."),
+        typer.Option(
+            help="Another file, too: .spectrum of Speos, weights of R, G and B, or the specification of a map's band."
+        ),
     ] = None,
     to: Annotated[Path | None, typer.Option(help="Folder for the files.", show_default="FOLDER/export")] = None,
     allow_code: AllowCode = False,
