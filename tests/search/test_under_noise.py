@@ -16,6 +16,7 @@ from sweep.camera.linear import linear_model
 from sweep.camera.readout import draws_dn
 from sweep.designs.families.dual import Dual
 from sweep.designs.families.free_form import FreeForm
+from sweep.designs.families.mixture import AbsorptionBands, Mixture
 from sweep.designs.families.stopband import MultiStopband
 from sweep.designs.family import Family
 from sweep.designs.registry import FAMILIES as REGISTERED
@@ -28,6 +29,7 @@ from sweep.metrics.registry import quantities_of
 from sweep.metrics.smooth import Rows, SmoothDesign
 from sweep.search.problem import Problem, starting_points
 from sweep.search.solver import extreme_value, smooth_objective
+from sweep.spectra.colorants import modeled_colorants
 from sweep.study import load_study
 
 from ..conftest import STUDIES
@@ -40,6 +42,8 @@ FAMILIES: tuple[Family, ...] = (
     MultiStopband(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["G"], 2),
     FreeForm(GRID.nodes_nm, SENSOR.qe["Y"], np.array([500.0, 560.0, 600.0, 620.0, 650.0, 690.0])),
     Dual(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["C"]),
+    AbsorptionBands(GRID.nodes_nm, SENSOR.qe["Y"], 1),
+    Mixture(GRID.nodes_nm, SENSOR.qe["Y"], modeled_colorants(GRID).absorbance[15:20], 2),
 )
 NOISY = [q for q in quantities_of(RequestedQuantities(STATES, STATES)).values() if q.states]
 
@@ -51,6 +55,12 @@ def family_of(seed: int, n_modified: int) -> tuple[Family, np.ndarray, np.ndarra
     family = able[seed % len(able)]
     if isinstance(family, FreeForm):
         return family, rng.uniform(0.2, 1.0, 6), np.ones(6)
+    if isinstance(family, AbsorptionBands):
+        span = np.array([60.0, 30.0, 1.0, 0.2])
+        return family, np.array([570.0, 25.0, 0.3, 0.01]) + rng.uniform(0, 1, 4) * span, span
+    if isinstance(family, Mixture):
+        span = np.array([0.0, 1.0, 0.0, 1.0, 0.2])  # no derivative by the number of a colorant
+        return family, np.array([2.0, 0.2, 3.0, 0.2, 0.7]) + rng.uniform(0, 1, 5) * span, span
     bands = len(family.parameters) // 5
     middle = np.repeat(np.arange(bands), 5) * np.tile([85.0, 0, 85, 0, 0], bands)
     x = np.tile([500.0, 12.0, 545.0, 15.0, 0.7], bands) + middle
