@@ -30,8 +30,8 @@ from .rows import Job, run_job
 _CM_PER_UM = 1e-4
 _CELLS_AT_ONCE = 16
 _REACH_STARTS = 8
-_MOST_PER_COMBINATION = 60
-"""Evaluations for the amounts of a combination of colorants."""
+_MOST_HELD = 60
+"""Evaluations of each start where some parameters are held: of a combination of colorants, or a cell of a map."""
 
 
 @dataclass(frozen=True)
@@ -82,9 +82,9 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
     n_starts = min(search.starts, search.max_evaluations)
     choice = None
     if len(numbers_of(problem)) > 1:
-        effort_each = min(_MOST_PER_COMBINATION, search.max_evaluations)
-        choice = choose(problem, search.algorithm, effort_each, study.section.seed, parallel, progress)
-        problem = with_members(problem, choice.best.members)
+        most = min(_MOST_HELD, search.max_evaluations)
+        choice = choose(problem, search.algorithm, most, study.section.seed, parallel, progress)
+        problem = with_members(problem, choice.best)
     starts = starting_points(problem, n_starts, study.section.seed)
     per_start = search.max_evaluations // n_starts
     effort = Effort(search.algorithm, starts, per_start, study.section.seed)
@@ -302,20 +302,20 @@ def map_table(study: Study, search: Search, parallel: Parallel, progress: Progre
     indices = [names.index(name) for name in search.map]
     assumed = None if study.section.colorants is None else study.section.colorants.assumed
     cells = [dict(zip(indices, values, strict=True)) for values in product(*search.map.values())]
-    each = min(_MOST_PER_COMBINATION, search.max_evaluations)
+    most = min(_MOST_HELD, search.max_evaluations)
     parts = [cells[at : at + _CELLS_AT_ONCE] for at in range(0, len(cells), _CELLS_AT_ONCE)]
-    calls = [delayed(search_cells, problem, part, search.algorithm, each, study.section.seed) for part in parts]
+    calls = [delayed(search_cells, problem, part, search.algorithm, most, study.section.seed) for part in parts]
     rows = []
-    for found in parallel(calls):
-        for held in found:
-            row = dict(zip(names, map(float, held.best.x), strict=True))
-            row |= {"objective": held.best.objective, "sensitivity": held.best.sensitivity}
+    for evaluations in parallel(calls):
+        for best in evaluations:
+            row = dict(zip(names, map(float, best.x), strict=True))
+            row |= {"objective": best.objective, "sensitivity": best.sensitivity}
             if assumed is not None and "absorbance" in row:
                 mol_per_l = row["absorbance"] / (assumed.molar_extinction * THICKNESS_UM * _CM_PER_UM)
                 g_per_l = mol_per_l * assumed.molar_mass_g_per_mol
                 row["mol_per_l"] = mol_per_l
                 row["percent_by_weight"] = 100 * g_per_l / (1000 * assumed.film_density_g_per_cm3)
-            rows.append(row | {"violation": held.best.violation, "feasible": held.feasible})
+            rows.append(row | {"violation": best.violation, "feasible": best.feasible})
         progress("cells of the map", len(rows), len(cells))
     return pa.Table.from_pylist(rows)
 
@@ -343,17 +343,16 @@ def combinations_table(study: Study, answer: SearchAnswer) -> pa.Table:
     names, parameters = study.colorants.names, answer.search.space.parameters
     molar = study.section.colorants is not None and study.section.colorants.quantity == "molar_extinction"
     rows = []
-    for tried in sorted(answer.choice.tried, key=lambda one: one.rank, reverse=True):
-        x = dict(zip(parameters, map(float, tried.best.x), strict=True))
-        row: dict[str, Any] = {"colorants": len(tried.members)}
-        for slot, number in enumerate(tried.members, 1):
+    for members, best in sorted(answer.choice.tried.items(), key=lambda item: item[1].rank, reverse=True):
+        x = dict(zip(parameters, map(float, best.x), strict=True))
+        row: dict[str, Any] = {"colorants": len(members)}
+        for slot, number in enumerate(members, 1):
             absorbance = x[f"absorbance_{slot}"]
             row |= {f"colorant_{slot}": number, f"name_{slot}": names[number - 1], f"absorbance_{slot}": absorbance}
             if molar:
                 row[f"mol_per_l_{slot}"] = absorbance / (study.colorants.peaks[number - 1] * THICKNESS_UM * _CM_PER_UM)
-        best = tried.best
         row |= {"thickness_um": x["thickness_um"], "objective": best.objective, "sensitivity": best.sensitivity}
-        row |= {"violation": best.violation, "feasible": best.violation <= FEASIBLE}
+        row |= {"violation": best.violation, "feasible": best.feasible}
         rows.append(row)
     columns = dict.fromkeys(name for row in sorted(rows, key=lambda row: -len(row)) for name in row)
     return pa.table({name: [row.get(name) for row in rows] for name in columns})

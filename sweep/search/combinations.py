@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..base.types import IndexArray, Parallel, Progress, delayed
 from ..designs.family import ChoosingFamily
-from .held import Held, held_at, search_held
+from .held import held_at, search_held
 from .problem import Evaluation, Problem
 
 MOST_EXHAUSTIVE = 2_000
@@ -27,35 +27,17 @@ Members = tuple[int, ...]
 
 
 @dataclass(frozen=True)
-class Tried:
-    """Combination of members with its best amounts."""
-
-    members: Members
-    found: Held
-
-    @property
-    def best(self) -> Evaluation:
-        """Best evaluation."""
-        return self.found.best
-
-    @property
-    def rank(self) -> tuple[bool, float]:
-        """What the best combination has most of."""
-        return self.found.rank
-
-
-@dataclass(frozen=True)
 class Choice:
-    """Combinations that were tried, and how many of how many, in words."""
+    """Best evaluation of each combination that was tried, and how many of how many were, in words."""
 
-    tried: tuple[Tried, ...]
+    tried: Mapping[Members, Evaluation]
     counts: tuple[str, ...]
 
     @property
-    def best(self) -> Tried:
+    def best(self) -> Members:
         """The best combination of the largest size; of equal ones the first."""
-        largest = len(self.tried[-1].members)
-        return max((one for one in self.tried if len(one.members) == largest), key=lambda one: one.rank)
+        largest = max(map(len, self.tried))
+        return max((m for m in self.tried if len(m) == largest), key=lambda members: self.tried[members].rank)
 
 
 def numbers_of(problem: Problem) -> IndexArray:
@@ -103,7 +85,7 @@ def with_members(problem: Problem, members: Members) -> Problem:
 
 def amounts_of(
     problem: Problem, combinations: Sequence[Members], algorithm: str, max_evaluations: int, seed: int
-) -> list[Tried]:
+) -> list[Evaluation]:
     """Search the amounts of combinations, from little and from more of each.
 
     Parameters
@@ -121,13 +103,10 @@ def amounts_of(
 
     Returns
     -------
-    list of Tried
-        Results, in order.
+    list of Evaluation
+        Results of `search_held`, in order.
     """
-    return [
-        Tried(members, search_held(with_members(problem, members), algorithm, max_evaluations, seed))
-        for members in combinations
-    ]
+    return [search_held(with_members(problem, members), algorithm, max_evaluations, seed) for members in combinations]
 
 
 def choose(
@@ -168,48 +147,46 @@ def choose(
     """
     assert isinstance(problem.family, ChoosingFamily)
     family, numbers = problem.family, numbers_of(problem)
-    every: dict[Members, Tried] = {}
+    tried: dict[Members, Evaluation] = {}
 
     def attempt(combinations: Iterable[Members]) -> None:
-        new = [members for members in dict.fromkeys(combinations) if members not in every]
+        new = [members for members in dict.fromkeys(combinations) if members not in tried]
         parts = [new[at : at + _AT_ONCE] for at in range(0, len(new), _AT_ONCE)]
         calls = []
         for part in parts:
-            some = replace(problem, family=family.only(np.unique(np.concatenate(part))))
-            calls.append(delayed(amounts_of, some, part, algorithm, max_evaluations, seed))
-        for done, answer in enumerate(parallel(calls), 1):
-            every.update((one.members, one) for one in answer)
-            progress("combinations of colorants", min(done * _AT_ONCE, len(new)), len(new))
+            subset = replace(problem, family=family.only(np.unique(np.concatenate(part))))
+            calls.append(delayed(amounts_of, subset, part, algorithm, max_evaluations, seed))
+        done = 0
+        for part, evaluations in zip(parts, parallel(calls), strict=True):
+            tried.update(zip(part, evaluations, strict=True))
+            done += len(part)
+            progress("combinations of colorants", done, len(new))
 
-    def ranked(size: int) -> list[Tried]:
-        return sorted(
-            (one for one in every.values() if len(one.members) == size), key=lambda one: one.rank, reverse=True
-        )
+    def ranked(size: int) -> list[Members]:
+        return sorted((m for m in tried if len(m) == size), key=lambda members: tried[members].rank, reverse=True)
 
     attempt((int(number),) for number in numbers)
-    counts = [_count(len(ranked(1)), len(numbers), 1)]
-    partners = sorted(one.members[0] for one in ranked(1)[:_MOST_PARTNERS])
+    counts = [_count(len(numbers), len(numbers), 1)]
+    partners = sorted(number for (number,) in ranked(1)[:_MOST_PARTNERS])
     for size in range(2, min(len(family.slots), len(numbers)) + 1):
         total = math.comb(len(numbers), size)
         if total <= exhaustive:
             attempt(itertools.combinations(map(int, numbers), size))
         else:
-            seeds = ranked(size - 1)[:_SEEDS]
-            attempt(
-                _joined(one.members, partner) for one in seeds for partner in partners if partner not in one.members
-            )
+            attempt(_extended(ranked(size - 1)[:_SEEDS], partners))
             for _ in range(_MOST_ROUNDS):
                 best = ranked(size)[0]
-                kept = itertools.combinations(best.members, size - 1)
-                attempt(_joined(some, partner) for some in kept for partner in partners if partner not in some)
-                if ranked(size)[0] is best:
+                attempt(_extended(itertools.combinations(best, size - 1), partners))
+                if ranked(size)[0] == best:
                     break
         counts.append(_count(len(ranked(size)), total, size))
-    return Choice(tuple(every.values()), tuple(counts))
+    return Choice(tried, tuple(counts))
 
 
-def _joined(members: Members, other: int) -> Members:
-    return tuple(sorted((*members, other)))
+def _extended(combinations: Iterable[Members], partners: Sequence[int]) -> Iterator[Members]:
+    """Yield combinations with one more member."""
+    for members in combinations:
+        yield from (tuple(sorted((*members, number))) for number in partners if number not in members)
 
 
 def _count(tried: int, total: int, size: int) -> str:

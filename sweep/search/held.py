@@ -3,34 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from ..metrics.bound import FEASIBLE
-from .problem import Evaluation, Problem, best_feasible
+from .problem import Evaluation, Problem
 from .solver import search_from
 
 _STARTS = (0.02, 0.3)
 """Shares of the box of what is free that a search begins at: of some colorants none is better than much."""
-
-
-@dataclass(frozen=True)
-class Held:
-    """Best evaluation with held parameters, the best feasible one, else the least infeasible one, and their number."""
-
-    best: Evaluation
-    evaluations: int
-
-    @property
-    def feasible(self) -> bool:
-        """True if the best evaluation meets every constraint."""
-        return self.best.violation <= FEASIBLE
-
-    @property
-    def rank(self) -> tuple[bool, float]:
-        """What the best of several has most of."""
-        return self.feasible, self.best.objective if self.feasible else -self.best.violation
 
 
 def held_at(problem: Problem, values: Mapping[int, float]) -> Problem:
@@ -54,7 +35,7 @@ def held_at(problem: Problem, values: Mapping[int, float]) -> Problem:
     return replace(problem, low=low, high=high)
 
 
-def search_held(problem: Problem, algorithm: str, max_evaluations: int, seed: int) -> Held:
+def search_held(problem: Problem, algorithm: str, max_evaluations: int, seed: int) -> Evaluation:
     """Search what is free, from two starts.
 
     Parameters
@@ -70,18 +51,17 @@ def search_held(problem: Problem, algorithm: str, max_evaluations: int, seed: in
 
     Returns
     -------
-    Held
-        Result.
+    Evaluation
+        The best feasible one, else the least infeasible one.
     """
     starts = [np.full(problem.free.size, share) for share in _STARTS]
     runs = [search_from(problem, i, u0, algorithm, max_evaluations, seed) for i, u0 in enumerate(starts)]
-    log = [evaluation for run in runs for evaluation in run.log]
-    return Held(best_feasible(log) or min(log, key=lambda evaluation: evaluation.violation), len(log))
+    return max((evaluation for run in runs for evaluation in run.log), key=lambda evaluation: evaluation.rank)
 
 
 def search_cells(
     problem: Problem, cells: Sequence[Mapping[int, float]], algorithm: str, max_evaluations: int, seed: int
-) -> list[Held]:
+) -> list[Evaluation]:
     """Search what is free with other parameters held at the values of each cell.
 
     Parameters
@@ -99,7 +79,7 @@ def search_cells(
 
     Returns
     -------
-    list of Held
-        Results, in order.
+    list of Evaluation
+        Results of `search_held`, in order.
     """
     return [search_held(held_at(problem, cell), algorithm, max_evaluations, seed) for cell in cells]

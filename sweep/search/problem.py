@@ -214,6 +214,16 @@ class Evaluation:
     cfa_sensitivity: float
     violation: float
 
+    @property
+    def feasible(self) -> bool:
+        """True if every constraint is met and the objective is known."""
+        return self.violation <= FEASIBLE and bool(np.isfinite(self.objective))
+
+    @property
+    def rank(self) -> tuple[bool, float]:
+        """Key by which evaluations are ranked: feasible ones by objective, before others by violation."""
+        return self.feasible, self.objective if self.feasible else -self.violation
+
 
 @dataclass
 class SearchRun:
@@ -237,7 +247,7 @@ def best_feasible(log: Sequence[Evaluation]) -> Evaluation | None:
     Evaluation or None
         None if none is feasible.
     """
-    feasible = [e for e in log if e.violation <= FEASIBLE and np.isfinite(e.objective)]
+    feasible = [e for e in log if e.feasible]
     return max(feasible, key=lambda e: e.objective, default=None)
 
 
