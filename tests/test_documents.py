@@ -244,7 +244,7 @@ def tables_of_images(folder: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
 def test_the_errors_of_the_ideal_observer_are_those_of_their_command(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of some CFAs alone: the images of one do not depend on the others."""
+    """For some CFAs alone: the images of one do not depend on the others."""
     draw_nothing(monkeypatch)
     changes = ("--set", "vision.network=false", "--set", "cfas=[RGGB, RYNCy]")
     code, _, said = commanded("run", STUDIES / "vision.yaml", "--output", tmp_path, "--quiet", *changes)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 from pydantic import Field, create_model
 
@@ -10,6 +10,7 @@ from ..base.errors import SweepError, ValidationIssue, nearest
 from ..base.modules import files_in
 from ..base.types import FloatArray, Section
 from . import families
+from .families.mixture import Absorbing, Mixture
 from .family import Family
 
 
@@ -51,49 +52,17 @@ def described_families() -> str:
     return ", ".join(families)
 
 
-def options_of(kind: str, options: FamilyOptions, *, has_target: bool) -> Section:
-    """Return the options of a family, out of those of all.
-
-    Parameters
-    ----------
-    kind : str
-        Name of the family.
-    options : FamilyOptions
-        Options of the study.
-    has_target : bool
-        True if the study names a target curve.
-
-    Returns
-    -------
-    Section
-        Options of the family.
-
-    Raises
-    ------
-    SweepError
-        If there is no such family, or if a target or option is missing or superfluous.
-    """
-    family = FAMILIES.get(kind)
-    if family is None:
-        allowed = ", ".join(FAMILIES)
-        raise SweepError(
-            ValidationIssue("unknown family", value=kind, allowed=allowed, nearest=nearest(kind, FAMILIES))
-        )
-    if has_target != family.needs_target:
-        raise SweepError(ValidationIssue(f"{kind} {'needs' if family.needs_target else 'has no'} `to`"))
-    given = {name: value for name in FamilyOptions.model_fields if (value := getattr(options, name)) is not None}
-    known_options = family.Options.model_fields
-    needed = {name for name, field in known_options.items() if field.is_required()}
-    for name in FamilyOptions.model_fields:
-        if (name in given and name not in known_options) or (name in needed and name not in given):
-            owners = " or ".join(owner for owner, made in FAMILIES.items() if name in made.Options.model_fields)
-            problem = f"`{name}` goes with {owners}, and {owners} with `{name}`"
-            raise SweepError(ValidationIssue(problem, value=given.get(name)))
-    return family.Options(**given)
+PIGMENTS = tuple(kind for kind, family in FAMILIES.items() if issubclass(family, Absorbing))
+"""Families of colorants, which do not move with the angle of the light."""
 
 
 def build_family(
-    kind: str, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None, options: FamilyOptions
+    kind: str,
+    wavelength_nm: FloatArray,
+    base: FloatArray,
+    target: FloatArray | None,
+    options: FamilyOptions,
+    colorants: FloatArray | None = None,
 ) -> Family:
     """Make a family.
 
@@ -105,6 +74,8 @@ def build_family(
         Wavelengths, nm, and curves; see `Family.of_study`.
     options : FamilyOptions
         Options of the study.
+    colorants : ndarray of shape (n_colorants, n_wavelengths), optional
+        Absorbances of the study's catalog, each with a peak of 1.
 
     Returns
     -------
@@ -114,7 +85,27 @@ def build_family(
     Raises
     ------
     SweepError
-        If there is no such family, or if a target or option is missing or superfluous.
+        If there is no such family, or if a target, option or catalog is missing or superfluous.
     """
-    own = options_of(kind, options, has_target=target is not None)
-    return FAMILIES[kind].of_study(wavelength_nm, base, target, own)
+    family = FAMILIES.get(kind)
+    if family is None:
+        allowed = ", ".join(FAMILIES)
+        raise SweepError(
+            ValidationIssue("unknown family", value=kind, allowed=allowed, nearest=nearest(kind, FAMILIES))
+        )
+    if (target is not None) != family.needs_target:
+        raise SweepError(ValidationIssue(f"{kind} {'needs' if family.needs_target else 'has no'} `to`"))
+    given = {name: value for name in FamilyOptions.model_fields if (value := getattr(options, name)) is not None}
+    known_options = family.Options.model_fields
+    needed = {name for name, field in known_options.items() if field.is_required()}
+    for name in FamilyOptions.model_fields:
+        if (name in given and name not in known_options) or (name in needed and name not in given):
+            owners = " or ".join(owner for owner, made in FAMILIES.items() if name in made.Options.model_fields)
+            problem = f"`{name}` goes with {owners}, and {owners} with `{name}`"
+            raise SweepError(ValidationIssue(problem, value=given.get(name)))
+    if kind == Mixture.kind and colorants is None:
+        raise SweepError(ValidationIssue("mixture needs `colorants`, the catalog that it chooses from"))
+    if kind == Mixture.kind:
+        assert colorants is not None
+        return cast(Family, Mixture(wavelength_nm, base, colorants, Mixture.Options(**given).at_most))
+    return family.of_study(wavelength_nm, base, target, family.Options(**given))

@@ -63,13 +63,15 @@ def scene_names(runs: Mapping[str, Output]) -> dict[str, dict[str, str]]:
         Name of the scene, by run and scenario.
     """
     names: dict[str, str] = {}
+    taken = set[str]()
     shared = {}
     for run, output in runs.items():
         shared[run] = dict[str, str]()
         for scenario, scene in output.study.scenarios.items():
             content = scene.model_dump_json()
             if content not in names:
-                names[content] = f"{scenario} of {run}" if scenario in names.values() else scenario
+                names[content] = f"{scenario} of {run}" if scenario in taken else scenario
+                taken.add(names[content])
             shared[run][scenario] = names[content] if names[content] not in shared[run].values() else scenario
     return shared
 

@@ -12,8 +12,7 @@ from ..camera.accuracy import STANDARD, AccuracySection
 from ..camera.pixel import Pixel
 from ..camera.scene import Geometry, Scene
 from ..camera.sensor import BUILT_IN_SENSORS
-from ..designs.families.mixture import Absorbing
-from ..designs.registry import FAMILIES, FamilyOptions, described_families
+from ..designs.registry import PIGMENTS, FamilyOptions, described_families
 from ..designs.technology import PIGMENT, Stated
 from ..designs.tolerance import Tolerance
 from ..metrics.bound import Bound
@@ -87,8 +86,8 @@ class Modification(Section):
     @model_validator(mode="before")
     @classmethod
     def _of_colorants(cls, value: Any) -> Any:
-        made = FAMILIES.get(str(value.get("family"))) if isinstance(value, dict) else None
-        return {"technology": PIGMENT} | value if isinstance(made, type) and issubclass(made, Absorbing) else value
+        absorbs = isinstance(value, dict) and value.get("family") in PIGMENTS
+        return {"technology": PIGMENT} | value if absorbs else value
 
 
 class DesignSection(Modification):

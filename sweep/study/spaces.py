@@ -11,10 +11,9 @@ from ..base.types import FloatArray
 from ..base.user_code import Offered, is_in_file, offers
 from ..camera.mosaic import Mosaic
 from ..camera.sensor import SensorCurves
-from ..designs.families.mixture import Absorbing, Mixture
 from ..designs.family import Family, Parameter
 from ..designs.plugin import PluginFamily
-from ..designs.registry import FAMILIES, build_family, options_of
+from ..designs.registry import FAMILIES, PIGMENTS, build_family
 from ..designs.space import Filter, Kind, Space
 from ..designs.technology import PIGMENT
 from ..designs.ungridded import ListedDesigns, Method, PairedDesigns, SampledDesigns
@@ -118,7 +117,7 @@ class SpaceBuilder:
             if not value:
                 self.sources.add((*path, key), "missing")
         stated = entry.technology
-        absorbs = isinstance(made := FAMILIES.get(entry.family), type) and issubclass(made, Absorbing)
+        absorbs = entry.family in PIGMENTS
         if self.section.production.thickness and not absorbs and stated is not None and stated.interference is None:
             problem = "a pigment has no films that come out too thick (`production.thickness`)"
             self.sources.add((*path, "technology"), problem, PIGMENT, "interference, or nothing stated")
@@ -130,8 +129,6 @@ class SpaceBuilder:
             return
         if absorbs and stated is not None and stated.interference is not None:
             self.sources.add((*path, "technology"), f"{entry.family} is of colorants", stated.description, PIGMENT)
-        if entry.family == Mixture.kind and self.section.colorants is None:
-            self.sources.add((*path, "family"), "mixture needs `colorants`, the catalog that it chooses from")
         if external and self.section.production.tolerance:
             self.sources.add((*path, "family"), "a family of one's own has no edges that production could shift")
         elif not external and entry.family not in FAMILIES:
@@ -159,7 +156,7 @@ class SpaceBuilder:
             if isinstance(curve, str) and curve not in self.sensor.qe:
                 self.sources.unknown((*path, key), "curve", curve, self.sensor.qe)
         self._check_channels(path, entry, mosaic)
-        unread = entry.family == Mixture.kind and self.colorants is None
+        unread = self.section.colorants is not None and self.colorants is None
         if len(self.sources.issues) > before or mosaic is None or unread:  # these have issues of their own
             return []
         assert entry.base is not None  # else there is an issue
@@ -187,12 +184,9 @@ class SpaceBuilder:
     def _family(self, entry: Modification, base: FloatArray, target: FloatArray | None) -> Family:
         """Return the family over its curves; raises SweepError."""
         nodes_nm = self.section.wavelengths.nodes_nm
-        if entry.family == Mixture.kind and self.colorants is not None:
-            own = options_of(entry.family, entry.options, has_target=target is not None)
-            assert isinstance(own, Mixture.Options)
-            return cast(Family, Mixture(nodes_nm, base, self.colorants.absorbance, own.at_most))
         if not is_from_outside(entry.family, _FAMILIES, FAMILIES):
-            return build_family(entry.family, nodes_nm, base, target, entry.options)
+            catalog = None if self.colorants is None else self.colorants.absorbance
+            return build_family(entry.family, nodes_nm, base, target, entry.options, catalog)
         plugin = PluginFamily(code_of(self.sources, entry.family, _FAMILIES), nodes_nm, base, target)
         bounds = f"0 and {entry.base or 1}" if plugin.below_base else "0 and 1"
         whose = "code of that file" if is_in_file(entry.family) else "code of an installed package"

@@ -11,15 +11,14 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field
 
-from ...base.errors import SweepError, ValidationIssue
 from ...base.types import FloatArray, IndexArray, Section
+from ...spectra.colorants import GAUSSIAN
 from ..family import Parameter
 from ..tolerance import ProductionError
 
 GaussianIn = Literal["wavenumber", "wavelength"]
 
 _LN10 = math.log(10)
-_WIDTH = 4 * math.log(2)
 _MOST_ABSORBANCE = 6.0
 THICKNESS_UM = 0.8
 """Usual thickness of a color resist, which absorbances of colorants are stated for."""
@@ -123,18 +122,7 @@ class Absorbing(ABC):
         return {}
 
     def perturbed(self, off: ProductionError) -> Self:
-        """Return the family with its bands moved, in films that are too thick: they absorb more, and move nothing.
-
-        Parameters
-        ----------
-        off : ProductionError
-            Production error.
-
-        Returns
-        -------
-        Absorbing
-            The family as production makes it.
-        """
+        """Return the family with its bands moved, in films that are too thick: they absorb more, and move nothing."""
         made = copy(self)
         made._nominal_nm, made._film = self._wavelength_nm - off.shift_nm, 1 + off.thickness
         return made
@@ -186,7 +174,7 @@ class AbsorptionBands(Absorbing):
         absorption_bands: int = Field(default=1, ge=1, le=8)
         """Number of absorption bands."""
         gaussian_in: GaussianIn = "wavenumber"
-        """Whether absorption bands are Gaussian in `wavenumber`, as those of dyes, or in `wavelength`."""
+        """`wavenumber`: absorption bands are Gaussian in it, as those of dyes; or `wavelength`."""
 
     def __init__(
         self, wavelength_nm: FloatArray, base: FloatArray, bands: int, gaussian_in: GaussianIn = "wavenumber"
@@ -206,24 +194,7 @@ class AbsorptionBands(Absorbing):
     def of_study(
         cls, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None, options: Section
     ) -> AbsorptionBands:
-        """Make the family over curves of a study.
-
-        Parameters
-        ----------
-        wavelength_nm : ndarray of shape (n_wavelengths,)
-            Wavelengths, nm.
-        base : ndarray of shape (n_wavelengths,)
-            QE of the replaced curve.
-        target : ndarray of shape (n_wavelengths,) or None
-            QE that the filter takes inside its band.
-        options : Section
-            Options of the family.
-
-        Returns
-        -------
-        AbsorptionBands
-            The family.
-        """
+        """Make the family over curves of a study; see `Family.of_study`."""
         assert target is None
         assert isinstance(options, AbsorptionBands.Options)
         return AbsorptionBands(wavelength_nm, base, options.absorption_bands, options.gaussian_in)
@@ -245,15 +216,15 @@ class AbsorptionBands(Absorbing):
         total = np.repeat(x[..., -1:], self._wavelength_nm.size, axis=-1)
         for band in range(self._count):  # one after the other: a row alone is summed as in a block
             offsets = self._offsets(peaks_nm[..., band], fwhm_nm[..., band])
-            total += absorbance[..., band, None] * np.exp(-_WIDTH * offsets**2)
+            total += absorbance[..., band, None] * np.exp(-GAUSSIAN * offsets**2)
         return total
 
     def absorbance_gradient(self, x: FloatArray) -> FloatArray:
         """Return the derivative of `absorbance`; see `Absorbing.absorbance_gradient`."""
         peaks_nm, fwhm_nm, absorbance = self._split(x)
         offsets = self._offsets(peaks_nm, fwhm_nm)
-        shape = np.exp(-_WIDTH * offsets**2)
-        slope = -2 * _WIDTH * absorbance[:, None] * offsets * shape
+        shape = np.exp(-GAUSSIAN * offsets**2)
+        slope = -2 * GAUSSIAN * absorbance[:, None] * offsets * shape
         wave_nm = self._nominal_nm
         by_peak = (1.0 if self._in_wavelength else 2 * peaks_nm[:, None] / wave_nm - 1) / fwhm_nm[:, None]
         rows = np.stack([slope * by_peak, -slope * offsets / fwhm_nm[:, None], shape], axis=1)
@@ -271,7 +242,7 @@ class AbsorptionBands(Absorbing):
         away_nm = np.abs(peak_nm - wave_nm if self._in_wavelength else (peak_nm / wave_nm - 1) * peak_nm)
         farthest, nearest = away_nm.max(axis=0) / narrowest_nm[:, None], away_nm.min(axis=0) / widest_nm[:, None]
         ends = [
-            end + (amount[:, None] * np.exp(-_WIDTH * offsets**2)).sum(axis=0)
+            end + (amount[:, None] * np.exp(-GAUSSIAN * offsets**2)).sum(axis=0)
             for end, amount, offsets in ((low[-1], least, farthest), (high[-1], most, nearest))
         ]
         return ends[0], ends[1]
@@ -333,68 +304,19 @@ class Mixture(Absorbing):
             Parameter("thickness_um", 0.01, 100, default=THICKNESS_UM),
         )
 
-    @classmethod
-    def of_study(
-        cls, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None, options: Section
-    ) -> Mixture:
-        """Raise an error: `with_colorants` makes it, as its spectra come with the study.
-
-        Parameters
-        ----------
-        wavelength_nm : ndarray of shape (n_wavelengths,)
-            Wavelengths, nm.
-        base : ndarray of shape (n_wavelengths,)
-            QE of the replaced curve.
-        target : ndarray of shape (n_wavelengths,) or None
-            QE that the filter takes inside its band.
-        options : Section
-            Options of the family.
-
-        Raises
-        ------
-        SweepError
-            Always.
-        """
-        assert wavelength_nm.shape == base.shape
-        assert target is None
-        assert isinstance(options, Mixture.Options)
-        raise SweepError(ValidationIssue("mixture needs `colorants`: the catalog that the study chooses from"))
-
     @property
     def slots(self) -> tuple[tuple[int, int], ...]:
         """Indices of number and absorbance of each colorant; see `ChoosingFamily`."""
         return tuple((at, at + 1) for at in range(0, 2 * self._slots, 2))
 
     def only(self, numbers: IndexArray) -> Self:
-        """Return the family with some colorants of the catalog, under their numbers; see `ChoosingFamily`.
-
-        Parameters
-        ----------
-        numbers : ndarray of int, shape (n,)
-            Ascending numbers.
-
-        Returns
-        -------
-        Mixture
-            The family with these colorants.
-        """
+        """Return the family with some colorants of the catalog, under their numbers; see `ChoosingFamily`."""
         made = copy(self)
         made._spectra, made._numbers = self._spectra[np.searchsorted(self._numbers, numbers)], numbers
         return made
 
     def perturbed(self, off: ProductionError) -> Self:
-        """Return the family with its spectra moved.
-
-        Parameters
-        ----------
-        off : ProductionError
-            Production error.
-
-        Returns
-        -------
-        Mixture
-            The family as production makes it.
-        """
+        """Return the family with its spectra moved; see `Absorbing.perturbed`."""
         made = super().perturbed(off)
         rows = np.stack([*self._spectra, self._most])
         *spectra, most = (np.interp(made._nominal_nm, self._wavelength_nm, row) for row in rows)
