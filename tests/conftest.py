@@ -49,7 +49,10 @@ FEWER = {
     "angle": {"[0, 5, 10, 15, 20, 25, 30]": "[0, 15, 30]", "starts: 8": "starts: 2"},
     "producible": {"starts: 32": "starts: 4"},
     "freeform": {"starts: 4": "starts: 2"},
-    "band": {"max: 680, count: 21}": "max: 680, count: 6}", "max: 80, count: 31}": "max: 80, count: 4}"},
+    "band": {
+        "min: 600, max: 680, count: 21}": "min: 628, max: 644, count: 5}",
+        "max: 80, count: 31}": "max: 46, count: 14}",
+    },
     "dye": {"box: {absorbance_1": "box: {colorant_1: [20, 27], colorant_2: [20, 27], absorbance_1"},
     "dual": {"starts: 8": "starts: 2"},
     "rccb": {"front: {min: 0.80, max: 1.0, count: 11}": "front: {min: 0.80, max: 1.0, count: 3}"},

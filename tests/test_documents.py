@@ -11,11 +11,14 @@ import pandas as pd
 import pytest
 
 from sweep.base.errors import OutputError
+from sweep.base.types import in_turn
 from sweep.cli.accuracy import measure_accuracy
 from sweep.metrics.share import format_share
+from sweep.report.parameter_map import map_lines
 from sweep.report.price import price_table
 from sweep.report.vision_report import vision_parts
 from sweep.results.output import read_output
+from sweep.run.search import run_search
 from sweep.study import load_study
 
 from .commanded import commanded
@@ -66,7 +69,7 @@ SCENES = dict(re.findall(r"^\| `(\w+)` \| .* \| (.*\d.*) \|$", README, re.MULTIL
 WHOLE = ("fog", "noise", "exposure")
 """Studies whose findings need all of their scenarios."""
 FIGURE = re.compile(
-    r"(?:RGGB|RC+B?|RYYCy|RYN4Cy|best stopband) \d[\d.]* DN|\d[\d.]* (?:DN|m|e|times)\b|\d+ of \d+ figures"
+    r"(?:RGGB|RC+B?|RYYCy|RYN4Cy|best stopband) \d[\d.]* DN|\d[\d.]* (?:DN|m|nm|e|times)\b|\d+ of \d+ figures"
 )
 
 
@@ -223,6 +226,30 @@ def test_the_figures_of_colorants_are_those_of_their_command(finished: FinishedF
         assert f"| {shown} | {' | '.join(f'{value:.0f}' for value in cells)} |" in text
         if name in bands:
             assert cells[0] == pytest.approx(cells[1], rel=1e-12)
+
+
+@pytest.mark.slow
+def test_the_figures_of_single_bands_are_those_of_a_search(finished: FinishedFolder, tmp_path: Path) -> None:
+    text = " ".join((STUDIES / "guide" / "10-colorants.md").read_text().split())
+    study = (STUDIES / "band.yaml").read_text().split("  map:")[0]
+    best: dict[str, list[str]] = {}
+    for form in ("wavelength", "wavenumber"):
+        for width in (25, 30, 35, 40, 50):
+            made = study.replace("fwhm_nm: [20, 80]", f"fwhm_nm: {width}")
+            made = made.replace(
+                "family: absorption_bands", f"family: absorption_bands\n    options: {{gaussian_in: {form}}}"
+            )
+            (tmp_path / "band.yaml").write_text(made)
+            loaded = load_study(tmp_path / "band.yaml")
+            assert loaded.search is not None
+            answer = run_search(loaded, loaded.search, in_turn, lambda *_: None)
+            best.setdefault(form, []).append(f"{answer.best.objective:.1f}")
+    for form, said in (("wavelength", "has {} DN for widths"), ("wavenumber", "it has {} DN.")):
+        *first, last = best[form]
+        assert said.format(f"{', '.join(first)} and {last}") in text
+    lines = " ".join(map_lines(read_output(finished("band"))))
+    assert "is of 44 nm FWHM, at 636 nm, with an absorbance of 0.39" in lines
+    assert "44 nm, at 636 nm with an absorbance of 0.39, to have the 139 DN of RGGB" in text
 
 
 GUIDE_TO_IMAGES = (STUDIES / "guide" / "07-other-tasks-and-images.md").read_text()

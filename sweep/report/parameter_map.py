@@ -129,20 +129,26 @@ def map_lines(output: Output) -> Iterator[str]:
         Sentences, only of a map of absorption bands.
     """
     figure = map_figure(output)
-    if figure is None or output.map is None or figure.names != _BAND:
+    if figure is None or figure.names != _BAND:
         return
-    cells = output.map[output.map["feasible"]]
+    cells = _feasible(output)
     for name, level in figure.levels:
         reaching = cells[cells["objective"] >= level]
-        what = f"{output.goal.words} of {name} ({output.goal.formatted(level)})"
+        separation = f"{output.goal.words} of {name} ({output.goal.formatted(level)})"
         if reaching.empty:
-            yield f"No band of the map has the {what}."
+            yield f"No band of the map has the {separation}."
             continue
         widest = reaching[reaching["fwhm_nm"] == reaching["fwhm_nm"].max()].nlargest(1, "objective").iloc[0]
         yield (
-            f"The widest band of the map that has the {what} is of {widest['fwhm_nm']:g} nm FWHM, at "
+            f"The widest band of the map that has the {separation} is of {widest['fwhm_nm']:g} nm FWHM, at "
             f"{widest['peak_nm']:g} nm, with an absorbance of {widest['absorbance']:.2f}{_amount(widest)}."
         )
+
+
+def _feasible(output: Output) -> pd.DataFrame:
+    """Return the feasible cells of a run's map."""
+    assert output.map is not None
+    return output.map[output.map["feasible"]]
 
 
 def _amount(cell: pd.Series) -> str:
@@ -169,9 +175,9 @@ def specification(output: Output) -> tuple[pd.DataFrame, Drawing] | None:
         Page with the map, constraints, sentences and the table; None without a map of absorption bands.
     """
     figure = map_figure(output)
-    if figure is None or output.map is None or figure.names != _BAND:
+    if figure is None or figure.names != _BAND:
         return None
-    cells = output.map[output.map["feasible"]]
+    cells = _feasible(output)
     best = cells.loc[cells.groupby("fwhm_nm")["objective"].idxmax()].sort_values("fwhm_nm")
     names = ("fwhm_nm", "peak_nm", "absorbance", "objective", "sensitivity", "mol_per_l", "percent_by_weight")
     table = best[[name for name in names if name in best]].rename(columns={"objective": output.goal.name})

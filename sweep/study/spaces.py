@@ -11,7 +11,7 @@ from ..base.types import FloatArray
 from ..base.user_code import Offered, is_in_file, offers
 from ..camera.mosaic import Mosaic
 from ..camera.sensor import SensorCurves
-from ..designs.family import Family, Parameter
+from ..designs.family import ChoosingFamily, Family, Parameter
 from ..designs.plugin import PluginFamily
 from ..designs.registry import FAMILIES, PIGMENTS, build_family
 from ..designs.space import Filter, Kind, Space
@@ -173,6 +173,8 @@ class SpaceBuilder:
         if rows is not None and rows.size * len(ordered) > _MOST_DRAWN:
             allowed = f"at most {_MOST_DRAWN // len(ordered):,} designs of {len(ordered)} parameters"
             self.sources.add(path, "too many designs that are no grid", f"{rows.size:,}", allowed)
+        if isinstance(family, ChoosingFamily):
+            self._check_numbers(family, ordered, rows, axes_path)
         if len(self.sources.issues) > before:
             return []
         target_name = "" if entry.to is None else str(entry.to)
@@ -180,6 +182,16 @@ class SpaceBuilder:
         space = Space(kind, name, entry.cfa, made, tuple(ordered), kind != "search" and rows is None, rows)
         check_filter(space, path, self.sensor, self.sources)
         return [space]
+
+    def _check_numbers(
+        self, family: ChoosingFamily, axes: list[tuple[float, ...]], rows: ListedDesigns | None, path: KeyPath
+    ) -> None:
+        """Check that numbers of a catalog are whole, and in a box from one range for all."""
+        numbers = [axes[number] for number, _ in family.slots]
+        if isinstance(rows, SampledDesigns) or any(value != round(value) for axis in numbers for value in axis):
+            self.sources.add((*path, "colorant_1"), "colorants have whole numbers", None, "a list of them, or a grid")
+        if path[-1] == "box" and len({(min(axis), max(axis)) for axis in numbers if axis}) > 1:
+            self.sources.add((*path, "colorant_2"), "the range is not that of `colorant_1`", None, "one range for all")
 
     def _family(self, entry: Modification, base: FloatArray, target: FloatArray | None) -> Family:
         """Return the family over its curves; raises SweepError."""

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sweep.base.errors import StudyError
 from sweep.base.types import in_turn
 from sweep.designs.families.mixture import Mixture
 from sweep.search.combinations import Choice, choose, with_members
@@ -89,3 +90,17 @@ def test_equal_colorants_and_one_that_absorbs_nothing_are_no_trouble(tmp_path: P
     choice = chosen(replace(task, family=family, high=np.array([4, 3, 4, 3, 0.8])), 100)
     assert len(choice.tried) == 4 + 6
     assert np.isfinite(choice.tried[choice.best].objective)
+
+
+@pytest.mark.parametrize(
+    ("box", "said"),
+    [
+        ("{colorant_1: [1, 5], absorbance_1: [0, 3], absorbance_2: [0, 3]}", "colorant_2: the range is not that of"),
+        ("{colorant_1: [1.5, 5], colorant_2: [1.5, 5]}", "colorant_1: colorants have whole numbers"),
+        ("{colorant_1: [0, 5], colorant_2: [0, 5]}", "colorant_1: out of range .* allowed: 1 to 45"),
+    ],
+)
+def test_an_unsuitable_range_of_colorants_is_refused(tmp_path: Path, box: str, said: str) -> None:
+    (tmp_path / "mix.yaml").write_text(STUDY.replace("SLOTS", "2").replace("BOX", box))
+    with pytest.raises(StudyError, match=said):
+        load_study(tmp_path / "mix.yaml")
