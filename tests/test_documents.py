@@ -212,6 +212,38 @@ def test_the_table_of_the_readme_is_that_of_its_command(finished: FinishedFolder
         assert own in line, name
 
 
+GUIDE_TO_LAMPS = (STUDIES / "guide" / "06-lamps-angles-tolerances.md").read_text()
+
+
+def table_below(text: str, head: str) -> dict[str, list[str]]:
+    """Cells of the table whose head begins so, by the first cell of each row."""
+    lines = text.split(head)[1].split("\n\n", maxsplit=1)[0].splitlines()[2:]
+    return {name: cells for name, *cells in ([cell.strip() for cell in line.strip("|").split("|")] for line in lines)}
+
+
+@pytest.mark.slow
+def test_the_worst_cases_of_the_guide_are_those_of_their_command(finished: FinishedFolder) -> None:
+    rows = pd.read_parquet(finished("robust") / "results.parquet").set_index("name")
+    cells = table_below(GUIDE_TO_LAMPS, "| | nominal | worst case: temperature |")
+    bound = cells.pop("upper bound")
+    assert list(cells) == ["RGGB", "RYYCy", "RYN4Cy", "best at f/2", "robust to lamps"]
+    for name, shown in cells.items():
+        assert shown[::2] == [f"{rows.loc[name, column]:.0f}" for column in ("csd_yellow_red", "worst_csd_yellow_red")]
+    assert bound[2] == f"{math.ceil(rows['limit'].max())}"
+
+
+@pytest.mark.slow
+def test_the_angles_of_the_guide_are_those_of_their_command(finished: FinishedFolder) -> None:
+    rows = pd.read_parquet(finished("angle") / "results.parquet").set_index(["name", "scenario"])
+    cells = table_below(GUIDE_TO_LAMPS, "| | nothing moves | on axis, f/1.6 |")
+    bound = cells.pop("upper bound")
+    assert len(cells) == 7
+    for name, shown in cells.items():
+        scenes = ("f/1.6 cra_deg=0", "field")
+        assert shown[1:] == [f"{rows.loc[(name, scene), 'csd_yellow_red']:.0f}" for scene in scenes]
+    assert bound[2] == f"{math.ceil(rows['limit'].max())}"
+
+
 @pytest.mark.slow
 def test_the_figures_of_colorants_are_those_of_their_command(finished: FinishedFolder) -> None:
     """A filter of colorants does not move with the angle, so that the answer, a row in the field, is the same on axis."""
@@ -253,11 +285,7 @@ def test_the_figures_of_single_bands_are_those_of_a_search(finished: FinishedFol
 
 
 GUIDE_TO_IMAGES = (STUDIES / "guide" / "07-other-tasks-and-images.md").read_text()
-ERRORS_OF_IMAGES = {
-    cells[0]: cells[1:]
-    for line in GUIDE_TO_IMAGES.split("| | network | ideal observer |")[1].splitlines()[2:9]
-    if (cells := [cell.strip() for cell in line.strip("|").split("|")])
-}
+ERRORS_OF_IMAGES = table_below(GUIDE_TO_IMAGES, "| | network | ideal observer |")
 """Design -> errors of network and ideal observer, and the difference to RGGB, as the guide has them."""
 
 

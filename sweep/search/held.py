@@ -41,7 +41,7 @@ def search_held(problem: Problem, algorithm: str, max_evaluations: int, seed: in
     Parameters
     ----------
     problem : Problem
-        Search problem; nothing need be free.
+        Search problem with a free parameter.
     algorithm : str
         Algorithm of nlopt.
     max_evaluations : int

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -138,7 +138,7 @@ def search_of(section: StudySection, spaces: Sequence[Space], sources: Sources) 
         sources.add(("search", "space"), problem, None, ", ".join(names) or "a sweep")
     elif chosen not in names:
         sources.unknown(("search", "space"), "sweep or box", chosen, names)
-    elif chosen in boxes and all(min(axis) == max(axis) for axis in boxes[chosen].axes):
+    elif chosen in boxes and not _free(boxes[chosen], requested.map or {}):
         sources.add(("search", "space"), "every parameter is fixed", chosen, "one free parameter or more")
     if requested.scenario is not None and requested.scenario not in scenarios:
         sources.unknown(("search", "scenario"), "scenario", requested.scenario, scenarios)
@@ -162,6 +162,16 @@ def search_of(section: StudySection, spaces: Sequence[Space], sources: Sources) 
     name += " (search)" if name in others else ""
     effort = requested.algorithm, requested.starts, requested.max_evaluations
     return Search(name, space, scenario, *effort, levels, _map_of(requested.map or {}, space, sources))
+
+
+def _free(space: Space, held: Iterable[str]) -> list[str]:
+    """Return the parameters that a search varies: neither fixed, nor held by a map, nor numbers of a catalog."""
+    assert space.filter is not None
+    family = space.filter.family
+    numbers = [space.parameters[number] for number, _ in family.slots] if isinstance(family, ChoosingFamily) else []
+    fixed = {*held, *numbers}
+    ranges = zip(space.parameters, space.axes, strict=True)
+    return [name for name, axis in ranges if name not in fixed and min(axis) < max(axis)]
 
 
 def _map_of(requested: Mapping[str, Axis], space: Space, sources: Sources) -> dict[str, tuple[float, ...]]:

@@ -123,3 +123,17 @@ def test_an_unsuitable_map_is_refused(tmp_path: Path, axes: str, said: str) -> N
     (tmp_path / "band.yaml").write_text(STUDY.replace("MAP", axes))
     with pytest.raises(StudyError, match=said):
         load_study(tmp_path / "band.yaml")
+
+
+@pytest.mark.parametrize(
+    "box",
+    [
+        "family: absorption_bands, box: {peak_nm: [580, 700], fwhm_nm: [20, 80], absorbance: 1}",
+        "family: mixture, box: {absorbance_1: 1}",
+    ],
+)
+def test_a_search_that_has_nothing_to_vary_is_refused(tmp_path: Path, box: str) -> None:
+    text = STUDY.replace("MAP", MAP).replace(STUDY[STUDY.index("family:") : STUDY.index("}\nconstraints")], box)
+    (tmp_path / "band.yaml").write_text(text if "peak_nm: [580" in box else text.replace(f", map: {MAP}", ""))
+    with pytest.raises(StudyError, match="every parameter is fixed"):
+        load_study(tmp_path / "band.yaml")
