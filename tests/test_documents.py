@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from collections.abc import Callable
@@ -282,6 +283,32 @@ def test_the_figures_of_single_bands_are_those_of_a_search(finished: FinishedFol
     lines = " ".join(map_lines(read_output(finished("band"))))
     assert "is of 44 nm FWHM, at 636 nm, with an absorbance of 0.39" in lines
     assert "44 nm, at 636 nm with an absorbance of 0.39, to have the 139 DN of RGGB" in text
+    color = pd.read_parquet(finished("band") / "results.parquet").set_index("name")["color_delta_e_mean_d65"]
+    said = "of {:.1f} for the best band and for the best stopband, {:.1f} for RYYCy, and {:.1f} for RGGB"
+    assert said.format(color["best band"], color["RYYCy"], color["RGGB"]) in text
+    assert f"{color['best band']:.1f}" == f"{color['best stopband']:.1f}"
+
+
+def test_the_figures_of_measured_films_are_those_of_a_search(tmp_path: Path) -> None:
+    text = " ".join((STUDIES / "guide" / "10-colorants.md").read_text().split())
+    study = (STUDIES / "band.yaml").read_text().split("tasks:")[0].replace("catalog: modeled", "catalog: films")
+    found = []
+    for pair, sensitivity in itertools.product((1, 2), (0.90, 0.85, 0.80)):
+        (tmp_path / "films.yaml").write_text(f"""{study}
+boxes:
+  films: {{cfa: RYNCy, channel: N, base: Y, family: mixture, options: {{at_most: {pair}}}, box: {{absorbance_1: [0, 6]}}}}
+constraints: {{sensitivity: {{min: {sensitivity}}}}}
+search: {{starts: 1}}
+""")
+        loaded = load_study(tmp_path / "films.yaml")
+        assert loaded.search is not None
+        answer = run_search(loaded, loaded.search, in_turn, lambda *_: None)
+        assert answer.choice is not None
+        assert answer.best.objective >= answer.choice.tried[answer.choice.best].objective
+        found.append(f"{answer.best.objective:.1f}")
+    first, second, third = found[:3]
+    assert f"The best single one has {first}, {second} and {third} DN at 90, 85 and 80 % of the sensitivity" in text
+    assert found[3:] == found[:3], "no pair has more"
 
 
 GUIDE_TO_IMAGES = (STUDIES / "guide" / "07-other-tasks-and-images.md").read_text()

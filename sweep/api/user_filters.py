@@ -267,9 +267,8 @@ def any_filter_problem(study: Study, setup: Setup) -> Problem:
         high,
         study.objective,
         study.constraints,
-        edge_shift_nm=study.tolerance.edge_shift_nm,
+        tolerance=study.tolerance,
         states=study.states,
-        thickness=study.tolerance.thickness,
         user_metrics=study.user_metrics,
         vision=study.images,
     )

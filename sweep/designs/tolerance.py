@@ -1,4 +1,4 @@
-"""Production errors of a filter: shifted edges, and films of another thickness."""
+"""Production errors of a filter: shifted edges, films of another thickness, and broader bands of colorants."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from ..base.types import FloatArray
 
 SHIFTS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 """Where in the range of a tolerance the worst case is looked for, in units of its half width."""
+_WIDTHS = (0.0, 1.0)
+"""Where in the range of broadening it is looked for."""
 
 
 class ProductionError(NamedTuple):
@@ -20,10 +22,13 @@ class ProductionError(NamedTuple):
         Shift, nm.
     thickness : float
         Relative error of the thickness.
+    broadening : float
+        Relative excess of the width of an absorption band, of equal area.
     """
 
     shift_nm: float = 0.0
     thickness: float = 0.0
+    broadening: float = 0.0
 
     def nominal_nm(self, wavelength_nm: FloatArray) -> FloatArray:
         """Return the designed wavelengths of features.
@@ -56,13 +61,16 @@ class Tolerance:
     thickness : float
         Largest relative error of the thickness of all films, which moves every wavelength of an
         interference filter.
+    broadening : float
+        Largest relative excess of the width of the bands of colorants.
     """
 
     edge_shift_nm: float = 0.0
     thickness: float = 0.0
+    broadening: float = 0.0
 
     def __bool__(self) -> bool:
-        return self.edge_shift_nm > 0 or self.thickness > 0
+        return self.edge_shift_nm > 0 or self.thickness > 0 or self.broadening > 0
 
     def scaled(self, factor: float) -> Tolerance:
         """Return a tolerance that is larger by a factor.
@@ -77,27 +85,32 @@ class Tolerance:
         Tolerance
             Scaled tolerance.
         """
-        return Tolerance(factor * self.edge_shift_nm, factor * self.thickness)
+        return Tolerance(factor * self.edge_shift_nm, factor * self.thickness, factor * self.broadening)
 
-    def at(self, edge: float, film: float) -> ProductionError:
+    def at(self, edge: float, film: float, width: float = 0.0) -> ProductionError:
         """Return a production error within the tolerance.
 
         Parameters
         ----------
         edge, film : float
             Shift and thickness error, -1 to 1 times their tolerance.
+        width : float
+            Broadening, 0 to 1 times its tolerance.
 
         Returns
         -------
         ProductionError
             Production error.
         """
-        return ProductionError(edge * self.edge_shift_nm + 0.0, film * self.thickness + 0.0)  # no negative zeros
+        moved = edge * self.edge_shift_nm + 0.0, film * self.thickness + 0.0  # no negative zeros
+        return ProductionError(*moved, width * self.broadening)
 
     @property
     def places(self) -> tuple[ProductionError, ...]:
-        """Production errors at which the worst case is searched: both from end to end, and two mixed corners."""
-        if not self:
-            return (AS_DESIGNED,)
-        independent = self.edge_shift_nm > 0 and self.thickness > 0
-        return (*(self.at(s, s) for s in SHIFTS), *((self.at(s, -s) for s in (-1.0, 1.0)) if independent else ()))
+        """Where the worst case is searched: from end to end, and corners; with and without broadening."""
+        mixed = ((-1.0, 1.0), (1.0, -1.0)) if self.edge_shift_nm > 0 and self.thickness > 0 else ()
+        both = (*((s, s) for s in SHIFTS), *mixed)
+        return tuple(dict.fromkeys(self.at(edge, film, width) for width in _WIDTHS for edge, film in both))
+
+
+NONE = Tolerance()

@@ -12,6 +12,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -22,8 +23,8 @@ from ..spectra.members import Members
 from .members import PopulationImager
 from .separation import csd_name
 
-_PARTS, _PARTS_OF_BOTH = 101, 25
-"""Equal parts of the range of a tolerance, and of each where there are two; draws are middles of parts."""
+_PARTS = {0: 1, 1: 101, 2: 25, 3: 9}
+"""Equal parts of the range of each tolerance, by the number of tolerances; draws are middles of parts."""
 _NEAR = 0.1
 """Share of the draws that may have less over which the mean is taken."""
 _MISTAKEN = 0.05
@@ -119,7 +120,7 @@ def draws_of(members: Members, pair: Pair, tolerance: Tolerance, seed: Sequence[
     """
     population = members.population
     rng, n = np.random.default_rng(seed), population.draws
-    ambient, heating, u, chosen, edge, place, film = (rng.random((n, k)) for k in (2, 2, 2, 4, 1, 1, 1))
+    ambient, heating, u, chosen, edge, place, film, broader = (rng.random((n, k)) for k in (2, 2, 2, 4, 1, 1, 1, 1))
     if population.temperatures == "common":
         ambient, heating = (np.repeat(values[:, :1], 2, axis=1) for values in (ambient, heating))
     low, high = population.temperature_c
@@ -137,21 +138,20 @@ def draws_of(members: Members, pair: Pair, tolerance: Tolerance, seed: Sequence[
         steps.append(members.steps_of(nm))
     first, shifts = np.stack(rows, axis=1), np.stack(steps, axis=1)
     below = np.minimum(np.floor(shifts).astype(np.intp), members.n_steps - 2)
-    offs, which = _offs(tolerance, edge[:, 0], film[:, 0])
+    offs, which = _offs(tolerance, [edge[:, 0], film[:, 0], broader[:, 0]])
     order = np.argsort(which, kind="stable")
     starts = np.searchsorted(which[order], np.arange(len(offs) + 1))
     return Draws(offs, starts, (first + below)[order], (shifts - below)[order], place[order, 0])
 
 
-def _offs(tolerance: Tolerance, edge: FloatArray, film: FloatArray) -> tuple[tuple[ProductionError, ...], IndexArray]:
-    """Return production errors, and which of them each draw has, from numbers in 0..1."""
-    kinds = tolerance.edge_shift_nm > 0, tolerance.thickness > 0
-    parts = _PARTS_OF_BOTH if all(kinds) else _PARTS
-    edges, films = (parts if kind else 1 for kind in kinds)
-    middles = [[(2 * number + 1) / count - 1 for number in range(count)] for count in (edges, films)]
-    places = [np.minimum((drawn * count).astype(np.intp), count - 1) for drawn, count in ((edge, edges), (film, films))]
-    offs = tuple(tolerance.at(one, other) for one in middles[0] for other in middles[1])
-    return offs, places[0] * films + places[1]
+def _offs(tolerance: Tolerance, drawn: Sequence[FloatArray]) -> tuple[tuple[ProductionError, ...], IndexArray]:
+    """Return production errors, and which of them each draw has, from numbers in 0..1 of edge, film and width."""
+    kinds = [tolerance.edge_shift_nm > 0, tolerance.thickness > 0, tolerance.broadening > 0]
+    counts = [_PARTS[sum(kinds)] if kind else 1 for kind in kinds]
+    edges, films, widths = ([(number + 0.5) / count for number in range(count)] for count in counts)
+    offs = tuple(tolerance.at(2 * edge - 1, 2 * film - 1, width) for edge, film, width in product(edges, films, widths))
+    parts = [np.minimum((u * count).astype(np.intp), count - 1) for u, count in zip(drawn, counts, strict=True)]
+    return offs, np.ravel_multi_index(parts, counts)
 
 
 def rank_below(draws: int, share: float) -> int:

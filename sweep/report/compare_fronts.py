@@ -125,6 +125,7 @@ def _meaning(output: Output) -> tuple[str, ...]:
     production, population = output.study.production, output.study.population
     over = [f"edges {production.edge_shift_nm:g} nm off"] if production.edge_shift_nm else []
     over += [f"films {production.thickness:.2%} off"] if production.thickness else []
+    over += [f"bands {production.broadening:.0%} broader"] if production.broadening else []
     over += [] if population is None else [population.description]
     shifted = any(output.columns[name].extreme == WORST_CASE for name in output.objective.weights)
     words = []

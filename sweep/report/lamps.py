@@ -127,6 +127,8 @@ def _breaks(output: Output, row: Row, plain: list[Row]) -> str:
         text += f", edges {row['breaks_edge_nm']:+.1f} nm"
     if row["breaks_thickness"]:
         text += f", films {row['breaks_thickness']:+.2%}"
+    if row["breaks_broadening"]:
+        text += f", bands {row['breaks_broadening']:.0%} broader"
     return (
         f"{who} falls below {rival['name']} at {row['breaks_at']:.2f} times the stated range of lamps and "
         f"production: {text}, {separation.formatted(row['breaks_dn'])}."

@@ -44,7 +44,7 @@ _COLUMNS: dict[str, Sequence[str]] = {
     files.POINTS: ["design_id", "signal_type", "signal", "channel", "dn"],
     files.FRONT: files.front_schema(()).names,
     files.LEFT_OUT: ["objective", "signal_type", "signal", "fall"],
-    files.ROBUSTNESS: ["design_id", "breaks_at", "breaks_thickness"],
+    files.ROBUSTNESS: ["design_id", "breaks_at", "breaks_broadening"],
 }
 """Columns that a report needs of the tables beside the result table."""
 

@@ -12,7 +12,7 @@ import pyarrow as pa
 from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..camera.setup import Setup
 from ..designs.space import Space
-from ..designs.tolerance import AS_DESIGNED, ProductionError, Tolerance
+from ..designs.tolerance import AS_DESIGNED, NONE, ProductionError, Tolerance
 from ..metrics.drawn import draws_of
 from ..metrics.members import PopulationImager, population_imager
 from ..metrics.separation import csd_name
@@ -30,7 +30,10 @@ _LARGEST, _STEP, _HALVINGS = 3.0, 0.25, 6
 """Times the population that are looked at, the steps in which, and how often the last of these is halved."""
 _FIELDS = [
     ("design_id", pa.int64()),
-    *((name, pa.float64()) for name in ("breaks_at", "breaks_dn", "breaks_edge_nm", "breaks_thickness")),
+    *(
+        (name, pa.float64())
+        for name in ("breaks_at", "breaks_dn", "breaks_edge_nm", "breaks_thickness", "breaks_broadening")
+    ),
     *((name, pa.string()) for name in ("breaks_first", "breaks_second")),
     *((name, pa.float64()) for name in ("breaks_first_nm", "breaks_second_nm", "breaks_low_c", "breaks_high_c")),
     *((name, pa.float64()) for name in ("yield", "yield_low", "yield_high")),
@@ -177,7 +180,7 @@ def _breaks(design: Candidate, rival: Candidate, pair: Pair) -> tuple[dict[str, 
     lights, population = design.setup.lights, design.imager(scale).members.population
     names = dict[str, str]()
     numbers: dict[str, float] = {"breaks_at": scale, "breaks_dn": least, "breaks_edge_nm": off.shift_nm}
-    numbers["breaks_thickness"] = off.thickness
+    numbers |= {"breaks_thickness": off.thickness, "breaks_broadening": off.broadening}
     warm = []
     for side, (name, starts) in enumerate((("first", near.first), ("second", near.second))):
         signal = imager.members.signal(int(starts[at[side]]))
@@ -223,7 +226,7 @@ def drawn_dn(design: Candidate, pair: Pair, seed: int) -> FloatArray:
         CSD, DN.
     """
     imager = population_imager(design.setup)
-    tolerance = design.tolerance if design.space.filter is not None else Tolerance()
+    tolerance = design.tolerance if design.space.filter is not None else NONE
     draws = draws_of(imager.members, pair, tolerance, (seed, 1))
     dn = np.empty(draws.size)
     for number, off in enumerate(draws.offs):

@@ -15,7 +15,7 @@ from ..camera.plan import Plan
 from ..camera.setup import Setup
 from ..designs.block import CurveBlock, edges_of
 from ..designs.space import Space
-from ..designs.tolerance import AS_DESIGNED, Tolerance
+from ..designs.tolerance import AS_DESIGNED, NONE, Tolerance
 from ..metrics.bound import Bound
 from ..metrics.evaluate import evaluate, family_quantities, image_quantities
 from ..metrics.objective import COMBINED, Objective, columns_of
@@ -208,7 +208,7 @@ def _of_a_share(space: Space, setup: Setup, points: FloatArray, rules: Rules) ->
     from ..metrics.drawn import LampsAndCameras  # noqa: PLC0415  (only where a share of lamps and cameras counts)
     from ..metrics.members import population_imager  # noqa: PLC0415
 
-    tolerance = rules.tolerance if space.filter is not None else Tolerance()
+    tolerance = rules.tolerance if space.filter is not None else NONE
     drawn = LampsAndCameras(population_imager(setup), tolerance, rules.seed)
     pairs = [q.pair for q in rules.quantities.values() if q.extreme == OF_A_SHARE and q.pair is not None]
     csds = drawn.columns(lambda off, some: space.curves(points[some], setup.camera.grid.size, off), len(points), pairs)

@@ -53,7 +53,7 @@ class SearchAnswer:
 
 
 def run_search(study: Study, search: Search, parallel: Parallel, progress: Progress) -> SearchAnswer:
-    """Search from Sobol points; the evaluations are shared evenly among the starts.
+    """Search from Sobol points and the best combination; the evaluations are shared evenly among the starts.
 
     Parameters
     ----------
@@ -86,6 +86,8 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
         choice = choose(problem, search.algorithm, most, study.section.seed, parallel, progress)
         problem = with_members(problem, choice.best)
     starts = starting_points(problem, n_starts, study.section.seed)
+    if choice is not None:
+        starts[0] = problem.to_unit(choice.tried[choice.best].x)
     per_start = search.max_evaluations // n_starts
     effort = Effort(search.algorithm, starts, per_start, study.section.seed)
     no_limit = reason_without_bound(problem)

@@ -168,7 +168,7 @@ def _moves(problem: Problem) -> Iterator[PerturbedFilter]:
         return
     for off in problem.tolerance.places:
         steps = round(off.shift_nm / step_nm)
-        if any(off) and not off.thickness and abs(off.shift_nm / step_nm - steps) < _WHOLE:
+        if any(off) and not (off.thickness or off.broadening) and abs(off.shift_nm / step_nm - steps) < _WHOLE:
             perturbed: Family = family.perturbed(off)
             ends = (end(problem.low, problem.high)[0] for end in (perturbed.lower, perturbed.upper))
             yield _moved(problem.setup.camera.base_qe[0], *family.moved, steps, *ends)

@@ -10,7 +10,7 @@ import numpy as np
 from ..base.types import FloatArray, IndexArray
 from ..camera.setup import Setup
 from ..designs.family import Family
-from ..designs.tolerance import AS_DESIGNED, ProductionError, Tolerance
+from ..designs.tolerance import AS_DESIGNED, NONE, ProductionError, Tolerance
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.objective import Objective
 from ..metrics.quantity import DN, OF_A_SHARE, WORST_CASE, Quantity, RequestedQuantities
@@ -36,8 +36,8 @@ class Problem:
         Objective.
     constraints : mapping of str to Bound
         Bounds of quantities.
-    edge_shift_nm, thickness : float
-        Production tolerances of worst cases.
+    tolerance : Tolerance
+        Production tolerance of worst cases.
     states : tuple of str
         Signal types that noise may confuse.
     user_metrics : tuple of UserMetric
@@ -54,9 +54,8 @@ class Problem:
     high: FloatArray
     objective: Objective
     constraints: Mapping[str, Bound]
-    edge_shift_nm: float = 0.0
+    tolerance: Tolerance = NONE
     states: tuple[str, ...] = ()
-    thickness: float = 0.0
     user_metrics: tuple[UserMetric, ...] = ()
     seed: int = 0
     vision: SeededVision | None = None
@@ -144,11 +143,6 @@ class Problem:
     def free(self) -> IndexArray:
         """Indices of the parameters that are not fixed."""
         return np.flatnonzero(self.high > self.low)
-
-    @property
-    def tolerance(self) -> Tolerance:
-        """Tolerance of production."""
-        return Tolerance(self.edge_shift_nm, self.thickness)
 
     def perturbed(self, quantity: str) -> tuple[ProductionError, ...]:
         """Return the production errors over which a quantity is the smallest.

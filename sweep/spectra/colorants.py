@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -16,10 +16,9 @@ from .facts import repair_curves
 from .files import is_curve_file, scan_curves
 from .spectrum import WavelengthGrid
 
-MODELED = "modeled"
-"""Name of the built-in catalog: modeled bands, no dyes that can be bought."""
 _PEAKS_NM = range(560, 701, 10)
 _FWHM_NM = (30, 40, 50)
+_FILMS = Path(__file__).parent / "builtin" / "films.csv"
 _MOST_COLORANTS = 10_000
 _END = 0.02
 """Share of the peak up to which a spectrum may end inside the grid; it is 0 from there on."""
@@ -80,6 +79,27 @@ def modeled_colorants(grid: WavelengthGrid) -> Colorants:
     shapes = np.exp(-GAUSSIAN * ((peak_nm / grid.nodes_nm - 1) * peak_nm / fwhm_nm) ** 2)
     names = tuple(f"modeled band {peak:g} nm, FWHM {fwhm:g} nm" for peak, fwhm in bands)
     return Colorants(names, shapes, np.ones(len(bands)))
+
+
+def measured_films(grid: WavelengthGrid) -> Colorants:
+    """Return measured films: rhodamine 6G, six conjugated polymers and a squaraine, none of them a color resist.
+
+    4 pi k d / (ln 10 l), the absorbance of a pure film of d = 0.8 um, by the extinction coefficient k of light at
+    normal incidence in the database refractiveindex.info (CC0): Seckin et al., ACS Appl. Mater. Interfaces 15, 43124,
+    2023; Kamptner et al., ChemPhysChem, e202400233, 2024; Bernhardt et al., Aggregate, e698, 2024.
+
+    Parameters
+    ----------
+    grid : WavelengthGrid
+        Wavelengths, nm.
+
+    Returns
+    -------
+    Colorants
+        Catalog.
+    """
+    found = read_colorants([_FILMS], grid)
+    return replace(found, names=tuple(name.removeprefix(f"{_FILMS.stem} ") for name in found.names))
 
 
 def read_colorants(places: Sequence[Path], grid: WavelengthGrid) -> Colorants:
@@ -155,3 +175,7 @@ def _unsuitable(wave_nm: FloatArray, values: FloatArray, grid: WavelengthGrid) -
         if inside and values[end] > _END * peak:
             return f"it ends at {wave_nm[end]:g} nm with {values[end] / peak:.0%} of its peak"
     return ""
+
+
+BUILTIN_COLORANTS = {"modeled": modeled_colorants, "films": measured_films}
+"""Built-in catalogs by name."""

@@ -149,18 +149,21 @@ class BoxSection(Modification):
 
 
 class Production(Section):
-    """Production tolerances of a filter: shifts of single edges, and of the film thickness; both are independent."""
+    """Production tolerances of a filter, independent of each other."""
 
     edge_shift_nm: float = Field(default=0.0, ge=0, le=1000)
     """Largest shift of an edge, or of the bands of a colorant in its film, to either side, in nm."""
     thickness: float = Field(default=0.0, ge=0, le=0.2)
     """Largest relative error of the films of an interference filter; moves l nm to l (1 + thickness). A film of
     colorants absorbs so much more or less, by its thickness or its concentration."""
+    broadening: float = Field(default=0.0, ge=0, le=2)
+    """Largest relative excess of the width of a colorant's bands in a film, of equal area: 0.2 is up to 1.2 times.
+    Thin layers have none."""
 
     @property
     def tolerance(self) -> Tolerance:
         """Production tolerance of a filter."""
-        return Tolerance(self.edge_shift_nm, self.thickness)
+        return Tolerance(self.edge_shift_nm, self.thickness, self.broadening)
 
 
 class Recognition(Section):

@@ -233,7 +233,8 @@ class ColorantsSection(Section):
     catalog: Annotated[
         list[_Path], BeforeValidator(listed, json_schema_input_type=list[_Path] | _Path), Field(min_length=1)
     ]
-    """`modeled`, the built-in catalog of modeled bands, which no dye has; or files, or folders of files, of curves."""
+    """`modeled`, the built-in catalog of modeled bands, which no dye has; `films`, nine measured films; or files, or
+    folders of files, of curves."""
     quantity: Literal["absorbance", "molar_extinction"] = "absorbance"
     """Quantity of the files; of molar extinctions, l/(mol cm), the results have concentrations in mol/l."""
     assumed: ColorantMass | None = None

@@ -16,7 +16,7 @@ from ..base.errors import MOST_ISSUES, DataError, StudyError, SweepError, Valida
 from ..base.types import FloatArray
 from ..camera.sensor import SensorCurves
 from ..spectra.builtin.surrogate import BUILT_IN_RANGE_NM
-from ..spectra.colorants import MODELED, Colorants, modeled_colorants, read_colorants
+from ..spectra.colorants import BUILTIN_COLORANTS, Colorants, read_colorants
 from ..spectra.files import digest, read_curves
 from ..spectra.lens_files import ChiefRays, read_chief_rays
 from ..spectra.lights import Lights
@@ -317,7 +317,7 @@ class Sources:
         Parameters
         ----------
         section : ColorantsSection
-            Names of files and folders, or `modeled`.
+            Names of files and folders, or of a built-in catalog.
 
         Returns
         -------
@@ -328,11 +328,11 @@ class Sources:
         if self.kept is not None and self.kept.colorants:
             kept = self.kept.colorants
             return Colorants(tuple(kept), np.stack(list(kept.values())), np.ones(len(kept)))
-        if MODELED in section.catalog:
+        for name in BUILTIN_COLORANTS.keys() & set(section.catalog):
             if len(section.catalog) > 1:
-                self.add(path, f"`{MODELED}` goes with no file: its bands are no dyes", section.catalog)
+                self.add(path, f"the built-in catalog `{name}` goes with no other", section.catalog)
                 return None
-            return modeled_colorants(self.grid)
+            return BUILTIN_COLORANTS[name](self.grid)
         places = []
         for name in section.catalog:
             folder = next((where / name for where in self.folders if is_folder(where / name)), None)

@@ -62,6 +62,9 @@ class SpaceBuilder:
         if not self._fits():
             return []
         entries = (*section.designs.values(), *section.sweeps.values(), *section.boxes.values())
+        if section.production.broadening and not any(entry.family in PIGMENTS for entry in entries):
+            problem = f"no filter of the study has bands of colorants ({', '.join(PIGMENTS)})"
+            self.sources.add(("production", "broadening"), problem)
         changed = {(entry.cfa, channel) for entry in entries for channel in entry.channel}
         spaces = []
         for name, mosaic in self.mosaics.items():

@@ -175,6 +175,28 @@ def test_a_film_that_is_too_thick_absorbs_more(name: str) -> None:
         assert (bound <= end + 1e-12).all()
 
 
+@pytest.mark.parametrize("name", ["absorption_bands", "mixture"])
+def test_bands_of_a_film_may_be_broader_with_equal_area(name: str) -> None:
+    """One colorant alone: 1.3 times as wide about its peak, 1 / 1.3 as high, and then 2 nm to the red."""
+    _, x = FAMILIES[name]
+    if name == "mixture":
+        family, x = Mixture(WAVE, BASE, SPECTRA, 1), np.array([2.0, 0.8, 0.8])
+    else:
+        family, x = AbsorptionBands(WAVE, BASE, 1, "wavelength"), np.array([601.0, 37.0, 0.8, 0.0])
+    off = family.perturbed(ProductionError(2.0, 0.0, 0.3))
+    absorbed, broader = (-np.log10(made.curves(x[None])[0, 0] / BASE) for made in (family, off))
+    peak_nm = WAVE[absorbed.argmax()]
+    expected = np.interp(peak_nm + (WAVE - 2 - peak_nm) / 1.3, WAVE, absorbed) / 1.3
+    np.testing.assert_allclose(broader, expected, atol=1e-10 if name == "mixture" else 5e-4)
+    step = 1e-6 * np.where(family.gradient(x).any(axis=(1, 2)), np.maximum(np.abs(x), 1), 0)
+    for k in np.flatnonzero(step):
+        ends = off.curves(np.stack([x + step * (np.arange(x.size) == k), x - step * (np.arange(x.size) == k)]))
+        np.testing.assert_allclose(off.gradient(x)[k], (ends[0] - ends[1]) / (2 * step[k]), atol=1e-8)
+    for end, bound in zip(off.hull(x, x), (off.lower(x, x), off.upper(x, x)), strict=True):
+        np.testing.assert_allclose(end, off.curves(x[None])[0], rtol=1e-12)
+        assert (bound <= end + 1e-12).all()
+
+
 def test_bands_that_are_gaussian_in_wavelength_are_symmetric() -> None:
     family = AbsorptionBands(WAVE, BASE, 1, "wavelength")
     ratio = -np.log10(family.curves(np.array([[600.0, 30.0, 0.7, 0.0]]))[0, 0] / BASE)

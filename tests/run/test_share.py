@@ -13,7 +13,7 @@ import pytest
 from scipy.stats import binom
 
 from sweep.camera.linear import LinearModel
-from sweep.designs.tolerance import ProductionError
+from sweep.designs.tolerance import ProductionError, Tolerance
 from sweep.metrics import drawn as drawn_module
 from sweep.metrics.bound import Bound
 from sweep.metrics.drawn import LampsAndCameras, rank_below
@@ -90,7 +90,7 @@ def test_yield_exceeds_the_true_value_in_at_most_a_twentieth_of_cases(draws: int
 
 @pytest.mark.parametrize("thickness", thinned([0.0, 0.004]))
 def test_its_derivative_is_exact(thickness: float) -> None:
-    model = Model(replace(problem(), thickness=thickness), SearchRun(0), 1000)
+    model = Model(replace(problem(), tolerance=Tolerance(0.0, thickness)), SearchRun(0), 1000)
     for u in starting_points(problem(), 2, 5)[: 2 if not thickness else 1]:
         slopes = model.at(u).terms.by_u[0] / (2 * model.at(u).evaluation.objective)  # its terms are squares
         for free, slope in enumerate(slopes):

@@ -14,6 +14,7 @@ import pytest
 from sweep.base.errors import SweepError
 from sweep.camera.scene import FixedExposure, Scene
 from sweep.designs.families.stopband import Stopband
+from sweep.designs.tolerance import NONE, Tolerance
 from sweep.metrics.bound import FEASIBLE, Bound, total_violation
 from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.objective import Objective
@@ -135,7 +136,7 @@ def test_the_limit_of_the_smallest_of_several_distances() -> None:
 
 def test_upper_bound_leaves_out_constraints_of_edges() -> None:
     found = limit_of(
-        replace(constrained(edge_width_nm=Bound(min=20.0), worst_sensitivity=Bound(min=0.93)), edge_shift_nm=2.0)
+        replace(constrained(edge_width_nm=Bound(min=20.0), worst_sensitivity=Bound(min=0.93)), tolerance=Tolerance(2.0))
     )
     assert found.left_out == ("edge_width_nm", "edge shifts of sensitivity")
     assert found.proven == pytest.approx(limit_of(constrained(sensitivity=Bound(min=0.93))).proven, abs=1e-9)
@@ -220,12 +221,14 @@ HALF = {"temperature_c": [-40, 85], "self_heating_k": 20, "binning_nm": 2, "want
 def half_yield_problem() -> Problem:
     """Half of the lamps have a distance; edges come out off."""
     setup = replace(SETUP, lights=replace(SETUP.lights, population=Population.model_validate(HALF)))
-    return replace(PROBLEM, setup=setup, edge_shift_nm=2.0, constraints={"sensitivity": Bound(min=0.9)})
+    return replace(PROBLEM, setup=setup, tolerance=Tolerance(2.0), constraints={"sensitivity": Bound(min=0.9)})
 
 
 def noisy() -> Problem:
     """d' and errors under noise; edges come out off."""
-    return replace(noisy_problem("stopband", 4.0, 0.9, Objective(minimum={"csd_yellow_red": 1.0})), edge_shift_nm=2.0)
+    return replace(
+        noisy_problem("stopband", 4.0, 0.9, Objective(minimum={"csd_yellow_red": 1.0})), tolerance=Tolerance(2.0)
+    )
 
 
 def values(problem: Problem, names: list[str]) -> list[dict[str, float]]:
@@ -262,7 +265,7 @@ def test_yield_constraint_is_left_out_of_the_upper_bound() -> None:
     problem = replace(
         half_yield_problem(),
         setup=replace(half_yield_problem().setup, lights=lights),
-        edge_shift_nm=0.0,
+        tolerance=NONE,
         constraints=requested,
     )
     found = best_of(problem, 1, 60)
@@ -281,5 +284,5 @@ def test_no_limit_is_claimed_where_a_filter_comes_out_above_the_curve_that_it_re
         half_yield_problem(), family=Stopband(wave, BASE, target), low=low, high=high, objective=objective
     )
     assert reason_without_bound(problem) == "filters of the box may exceed the curve that they replace"
-    assert reason_without_bound(replace(problem, edge_shift_nm=0.0)) is None
+    assert reason_without_bound(replace(problem, tolerance=NONE)) is None
     assert reason_without_bound(replace(problem, objective=Objective(minimum={"csd_yellow_red": 1.0}))) is None

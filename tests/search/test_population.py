@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sweep.api.user_filters import evaluate_curves
-from sweep.designs.tolerance import ProductionError
+from sweep.designs.tolerance import ProductionError, Tolerance
 from sweep.metrics.members import population_imager
 from sweep.metrics.objective import Objective
 from sweep.metrics.smooth import smooth_csd
@@ -32,7 +32,7 @@ def problem(**given: float) -> Problem:
 
 @pytest.mark.slow
 def test_rows_over_the_population_have_their_derivative() -> None:
-    shifted = replace(problem(binning_nm=1), edge_shift_nm=2.0, thickness=0.003)
+    shifted = replace(problem(binning_nm=1), tolerance=Tolerance(2.0, 0.003))
     model, checked = Model(shifted, SearchRun(0), 1000), 0
     for u in starting_points(shifted, 4, 3):
         here = model.at(u)

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from sweep.designs.tolerance import ProductionError
+from sweep.designs.tolerance import NONE, ProductionError, Tolerance
 from sweep.metrics.bound import Bound
 from sweep.metrics.members import population_imager
 from sweep.metrics.objective import Objective
@@ -24,7 +24,7 @@ from .problems import PROBLEM, STUDY, YELLOW_RED, best_of
 
 BASE, TARGET, WAVE = STUDY.sensor.qe["Y"], STUDY.sensor.qe["G"], STUDY.grid.nodes_nm
 SHIFTS = (-2, -1, 0, 1, 2)
-MOVED = replace(PROBLEM, edge_shift_nm=2.0, objective=Objective(minimum={"worst_csd_yellow_red": 1.0}))
+MOVED = replace(PROBLEM, tolerance=Tolerance(2.0), objective=Objective(minimum={"worst_csd_yellow_red": 1.0}))
 """The search for the largest worst case over what production does to the edges."""
 FREE_FORM = (
     "{cfa: RYNCy, channel: N, base: Y, technology: {interference: {effective_index: 1.8}}, family: free_form, "
@@ -67,15 +67,15 @@ def test_a_way_is_the_family_as_production_has_it() -> None:
 
 def test_nonlinear_constraints_are_left_out_and_reported() -> None:
     """Moves by part of a step, films that are too thick, a field of all places."""
-    assert not all_ways(replace(MOVED, edge_shift_nm=1.5))
-    assert len(perturbed_filters(replace(MOVED, edge_shift_nm=1.5))) == 1
-    found = limit_of(replace(MOVED, edge_shift_nm=1.0))
+    assert not all_ways(replace(MOVED, tolerance=Tolerance(1.5)))
+    assert len(perturbed_filters(replace(MOVED, tolerance=Tolerance(1.5)))) == 1
+    found = limit_of(replace(MOVED, tolerance=Tolerance(1.0)))
     assert found.left_out == ("some edge shifts",)  # half a nanometer is no whole step
     assert found.proven > limit().proven
     assert limit().left_out == ()
-    thick = limit_of(replace(MOVED, thickness=0.003))
+    thick = limit_of(replace(MOVED, tolerance=Tolerance(2.0, 0.003)))
     assert thick.left_out == ("edge shifts",)
-    assert thick.proven == pytest.approx(limit_of(replace(MOVED, edge_shift_nm=0.0)).proven, abs=1e-3)
+    assert thick.proven == pytest.approx(limit_of(replace(MOVED, tolerance=NONE)).proven, abs=1e-3)
 
 
 def moved(curve: np.ndarray, shift: int) -> np.ndarray:

@@ -10,6 +10,7 @@ import pytest
 from sweep.camera.accuracy import Accuracy
 from sweep.camera.pixel import Pixel
 from sweep.camera.scene import Scene
+from sweep.designs.tolerance import NONE, Tolerance
 from sweep.metrics.bound import Bound
 from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.objective import Objective
@@ -65,7 +66,7 @@ def check_derivatives(problem: Problem, u: np.ndarray, parameters: range) -> Non
 def test_derivatives_agree_with_differences(name: str, objective: Objective) -> None:
     problem = problem_of(name)
     own = {n: b for n, b in EVERYTHING.items() if n not in ("edge_width_nm", "band_width_nm") or name != "freeform"}
-    problem = replace(problem, objective=objective, constraints=own, edge_shift_nm=2.0)
+    problem = replace(problem, objective=objective, constraints=own, tolerance=Tolerance(2.0))
     u = np.clip(starting_points(problem, 3, 4)[2], 0.05, 0.95)
     check_derivatives(problem, u, range(0, u.size, 7 if name == "freeform" else 1))
 
@@ -100,7 +101,7 @@ def test_a_search_in_a_far_scene_stays_below_its_limit() -> None:
 
 
 def test_worst_case_is_the_smallest_over_the_shifts() -> None:
-    problem = replace(PROBLEM, edge_shift_nm=4.0, objective=Objective(minimum={"worst_csd_yellow_red": 1.0}))
+    problem = replace(PROBLEM, tolerance=Tolerance(4.0), objective=Objective(minimum={"worst_csd_yellow_red": 1.0}))
     problem = replace(problem, constraints={"worst_sensitivity": Bound(min=0.9)})
     best = best_of(problem, 1, 100)
     moved = np.repeat(best.x[None], 401, axis=0)
@@ -111,14 +112,14 @@ def test_worst_case_is_the_smallest_over_the_shifts() -> None:
     # Between the five shifts that are computed, nothing is much worse.
     assert csd.min() >= best.objective * 0.99
     assert designed_quantities(problem.setup, curves)["sensitivity"].min() >= 0.9 - 1e-3
-    assert best_of(replace(problem, edge_shift_nm=0.0), 1, 100).objective > best.objective
+    assert best_of(replace(problem, tolerance=NONE), 1, 100).objective > best.objective
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("algorithm", ["SLSQP", "COBYLA"])
 @pytest.mark.parametrize("objective", OBJECTIVES[1:], ids=str)
 def test_combined_objectives_improve_on_random_designs(algorithm: str, objective: Objective) -> None:
-    problem = replace(PROBLEM, objective=objective, edge_shift_nm=1.0)
+    problem = replace(PROBLEM, objective=objective, tolerance=Tolerance(1.0))
     assert best_of(problem, 4, 150, algorithm).objective > best_random(problem, 400).objective
 
 

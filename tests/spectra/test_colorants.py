@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sweep.base.errors import DataError
-from sweep.spectra.colorants import modeled_colorants, read_colorants
+from sweep.spectra.colorants import measured_films, modeled_colorants, read_colorants
 from sweep.spectra.spectrum import WavelengthGrid
 
 GRID = WavelengthGrid()
@@ -34,6 +34,16 @@ def test_modeled_bands_have_their_peak_and_width() -> None:
     assert GRID.nodes_nm[band.argmax()] == 630
     above = GRID.nodes_nm[band >= 0.5]
     assert above[-1] - above[0] == pytest.approx(40, abs=2)
+
+
+def test_measured_films_absorb_where_their_dyes_do() -> None:
+    """The peak of rhodamine 6G: k is 0.791 at 530 nm in the database, and the absorbance 4 pi k 800 / (530 ln 10)."""
+    films = measured_films(GRID)
+    assert films.names[0] == "rhodamine 6G"
+    assert (len(films), films.refused) == (9, ())
+    at = films.absorbance[0].argmax()
+    assert GRID.nodes_nm[at] == 530
+    assert films.peaks[0] == pytest.approx(4 * np.pi * 0.791 * 800 / (530 * np.log(10)), rel=1e-3)
 
 
 def test_a_folder_says_what_was_read_and_what_not(tmp_path: Path) -> None:

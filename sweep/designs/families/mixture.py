@@ -47,7 +47,8 @@ class Absorbing(ABC):
 
     def __init__(self, wavelength_nm: FloatArray, base: FloatArray) -> None:
         self._wavelength_nm, self._base = wavelength_nm, base
-        self._nominal_nm, self._film = wavelength_nm, 1.0  # as production makes it: wavelengths, and relative thickness
+        # As production makes it: wavelengths, relative thickness of the film, and relative width of the bands.
+        self._nominal_nm, self._film, self._width = wavelength_nm, 1.0, 1.0
 
     @abstractmethod
     def absorbance(self, x: FloatArray) -> FloatArray:
@@ -122,9 +123,10 @@ class Absorbing(ABC):
         return {}
 
     def perturbed(self, off: ProductionError) -> Self:
-        """Return the family with its bands moved, in films that are too thick: they absorb more, and move nothing."""
+        """Return the family with bands that are moved and broader, in films that are too thick, which moves nothing."""
         made = copy(self)
         made._nominal_nm, made._film = self._wavelength_nm - off.shift_nm, 1 + off.thickness
+        made._width = 1 + off.broadening
         return made
 
     @property
@@ -206,9 +208,9 @@ class AbsorptionBands(Absorbing):
         return np.asarray(away_nm / fwhm_nm[..., None])
 
     def _split(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return peak, width and absorbance of each band."""
+        """Return peak, width and absorbance of each band, as production makes them."""
         bands = x[..., :-1].reshape(*x.shape[:-1], self._count, len(_BANDS))
-        return bands[..., 0], bands[..., 1], bands[..., 2]
+        return bands[..., 0], bands[..., 1] * self._width, bands[..., 2] / self._width
 
     def absorbance(self, x: FloatArray) -> FloatArray:
         """Return the absorbance; see `Absorbing.absorbance`."""
@@ -227,7 +229,8 @@ class AbsorptionBands(Absorbing):
         slope = -2 * GAUSSIAN * absorbance[:, None] * offsets * shape
         wave_nm = self._nominal_nm
         by_peak = (1.0 if self._in_wavelength else 2 * peaks_nm[:, None] / wave_nm - 1) / fwhm_nm[:, None]
-        rows = np.stack([slope * by_peak, -slope * offsets / fwhm_nm[:, None], shape], axis=1)
+        by_fwhm = -slope * offsets / fwhm_nm[:, None]
+        rows = np.stack([slope * by_peak, by_fwhm * self._width, shape / self._width], axis=1)
         return np.concatenate([rows.reshape(-1, shape.shape[1]), np.ones((1, shape.shape[1]))])
 
     def absorbance_range(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -316,11 +319,16 @@ class Mixture(Absorbing):
         return made
 
     def perturbed(self, off: ProductionError) -> Self:
-        """Return the family with its spectra moved; see `Absorbing.perturbed`."""
+        """Return the family with its spectra moved, and stretched about their peaks; see `Absorbing.perturbed`."""
         made = super().perturbed(off)
-        rows = np.stack([*self._spectra, self._most])
-        *spectra, most = (np.interp(made._nominal_nm, self._wavelength_nm, row) for row in rows)
-        made._spectra, made._most = np.stack(spectra), most
+        wave_nm, nominal_nm, width = self._wavelength_nm, made._nominal_nm, made._width
+        peaks_nm = wave_nm[self._spectra.argmax(axis=1)]
+        stretched = [
+            np.interp(peak_nm + (nominal_nm - peak_nm) / width, wave_nm, row) / width
+            for peak_nm, row in zip(peaks_nm, self._spectra, strict=True)
+        ]
+        made._spectra = np.stack(stretched)
+        made._most = np.interp(nominal_nm, wave_nm, self._most) if width == 1 else np.ones(wave_nm.size) / width
         return made
 
     def _chosen(self, x: FloatArray) -> FloatArray:
