@@ -157,7 +157,7 @@ def test_the_measured_study_loads() -> None:
         (
             "constraints:\n",
             "production: {edge_shift: 2}\nconstraints:\n",
-            "tiny.yaml:18: production.edge_shift: unknown key; allowed: edge_shift_nm, thickness; did you mean 'edge_shift_nm'?",
+            "tiny.yaml:18: production.edge_shift: unknown key; allowed: edge_shift_nm, thickness, broadening; did you mean 'edge_shift_nm'?",
         ),
         (
             "constraints:\n",
