@@ -170,7 +170,11 @@ def _rounding_bound_dn(box: Box, _: frozenset[str]) -> float:
 
 def _not_saturated(box: Box) -> str | None:
     pixel = box.setup.camera.pixel
-    if box.setup.scene.noise is not None or box.brightest_pixel_dn / pixel.dn_per_e > pixel.saturation_e:
+    if (
+        pixel.captures
+        or box.setup.scene.noise is not None
+        or box.brightest_pixel_dn / pixel.dn_per_e > pixel.saturation_e
+    ):
         return None
     return f"the brightest signal has at most {box.brightest_signal_dn:.0f} DN"
 

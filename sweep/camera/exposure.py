@@ -186,6 +186,8 @@ class SceneLight:
         Returns
         -------
         ndarray of shape (n_designs, n_moments)
-            Relative light.
+            Relative light; of an HDR pixel (n_exposures, n_designs, n_moments).
         """
+        if self.setup.camera.pixel.captures:
+            return pwm.exposure_scales(self.setup, exposure_s, self.moments)
         return pwm.scales(self.setup, exposure_s, self.moments)

@@ -158,7 +158,7 @@ class ForwardModel:
             Digital numbers, DN; None if the designs differ in more, or if a channel is read from several
             elements.
         """
-        if self._in_parts or not self.readout.by_channel:
+        if self._in_parts or not self.readout.by_channel or self.setup.camera.pixel.captures:
             return None
         electrons = self.electrons.changing(block)
         if electrons is None:
@@ -192,7 +192,7 @@ class ForwardModel:
             return np.concatenate([part.unlit(curves, exposure_s) for part in self._parts()], axis=1)
         electrons = self.electrons.unlit(curves) * exposure_s[:, None, None]
         dn = self.readout.folded(unquantized(electrons, self.readout.pixel)[:, :, None])[:, :, 0]
-        return np.repeat(dn, self.light.scales(exposure_s).shape[1], axis=1)
+        return np.repeat(dn, self.light.scales(exposure_s).shape[-1], axis=1)
 
     def read(self, curves: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Read out a batch of designs.
@@ -262,11 +262,43 @@ class ForwardModel:
     def _blocks(self, curves: FloatArray, exposure_s: FloatArray) -> Iterator[FloatArray]:
         """Yield expected electrons of blocks of designs."""
         scales = self.light.scales(exposure_s)
-        size = self.n_cases * scales.shape[1] * len(self.light.signals) * self._response.shape[1]
+        size = self.n_cases * scales.shape[-1] * len(self.light.signals) * self._response.shape[1]
         step = max(1, _BLOCK // size)
         for start in range(0, len(curves), step):
             block = slice(start, start + step)
-            yield self.electrons.expected(curves[block], scales[block], exposure_s[block])
+            yield self._captured(curves[block], scales[..., block, :], exposure_s[block])
+
+    def _captured(self, curves: FloatArray, scales: FloatArray, exposure_s: FloatArray) -> FloatArray:
+        """Return expected electrons; of an HDR pixel those of each exposure, on the first axis."""
+        if not self.setup.camera.pixel.captures:
+            return self.electrons.expected(curves, scales, exposure_s)
+        modified, found = list(self.setup.camera.modified), []
+        for (factors, model), scale, exposure in zip(
+            self._of_exposures, scales, self.setup.camera.pixel.exposures, strict=True
+        ):
+            electrons = model.electrons.expected(curves * factors[modified, None], scale, exposure_s)
+            electrons *= exposure.capture.light
+            found.append(
+                model._of_pixels(electrons) if model.readout.by_channel and not self.readout.by_channel else electrons
+            )
+        return np.stack(found)
+
+    @cached_property
+    def _of_exposures(self) -> list[tuple[FloatArray, ForwardModel]]:
+        """QE factors of the channels, and model of the electrons, of each exposure of an HDR pixel."""
+        camera, made = self.setup.camera, []
+        for exposure in camera.pixel.exposures:
+            own = exposure.capture
+            factors = np.array([own.qe_factor.get(channel, 1.0) for channel in camera.mosaic.channels])
+            if own.qe_factor or own.crosstalk is not None:
+                crosstalk = camera.pixel.crosstalk if own.crosstalk is None else own.crosstalk
+                pixel = camera.pixel.model_copy(update={"crosstalk": crosstalk})
+                changes = {"qe": camera.qe * factors[:, None], "pixel": pixel}
+                model = type(self)(self.setup.with_camera(**changes), self.phases, once=self._once)
+            else:
+                model = self
+            made.append((factors, model))
+        return made
 
     def pixel_electrons(self, curves: FloatArray) -> FloatArray:
         """Return expected electrons of the pixels that are read.
@@ -279,7 +311,8 @@ class ForwardModel:
         Returns
         -------
         ndarray of shape (n_designs, n_cases, n_signals, n_pixels)
-            Electrons; for a patch that fills the field, the pixels of one tile, row by row.
+            Electrons; for a patch that fills the field, the pixels of one tile, row by row. Of an HDR pixel those of
+            each exposure, on the first axis.
 
         Raises
         ------
@@ -290,12 +323,15 @@ class ForwardModel:
             most = f"at most those of {len(self._phase_blocks[0])} sampling phases: a smaller light, or a named phase"
             raise SweepError(ValidationIssue("too many pixels to draw", value=f"{self.n_cases} phases", allowed=most))
         if self._in_parts:
-            return np.concatenate([part.pixel_electrons(curves) for part in self._parts()], axis=1)
+            return np.concatenate([part.pixel_electrons(curves) for part in self._parts()], axis=-3)
         exposure_s = self.light.exposure_s(curves)
-        result = self.electrons.expected(curves, self.light.scales(exposure_s), exposure_s)
+        return self._of_pixels(self._captured(curves, self.light.scales(exposure_s), exposure_s))
+
+    def _of_pixels(self, electrons: FloatArray) -> FloatArray:
+        """Return the electrons of the pixels of a tile from those of channels that fill the field."""
         if self.readout.by_channel and self.setup.scene.target is None:
-            return result[..., self.setup.camera.mosaic.indices.ravel()]
-        return result
+            return electrons[..., self.setup.camera.mosaic.indices.ravel()]
+        return electrons
 
     def channels_of(self, pixels: FloatArray, case: int) -> FloatArray:
         """Return the channels from their pixels at one phase and field position.
@@ -317,6 +353,11 @@ class ForwardModel:
                 return position.channels_of(pixels, case)
             case -= position.n_cases
         return self.readout.channels_of(pixels, case)
+
+    @property
+    def capture_light(self) -> FloatArray | None:
+        """Relative light of exposures on `pixel_electrons`, [n_exposures, n_pixels]; None for a pixel read once."""
+        return self._of_pixels(self.readout.capture_light) if self.setup.camera.pixel.captures else None
 
     @property
     def few_pixels(self) -> tuple[IndexArray, ...] | None:

@@ -3,23 +3,34 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from functools import lru_cache
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+import numpy as np
+from pydantic import BeforeValidator, Field, model_validator
 
-from ..base.types import FloatArray, Meters, NonNegative, Section, Share
+from ..base.types import FloatArray, Meters, NonNegative, Section, Share, from_to
+from .captures import (
+    MOST_CAPTURES,
+    Bits,
+    Capture,
+    Crosstalk,
+    Exposure,
+    GainDnPerE,
+    Merge,
+    ReadNoise,
+    WellE,
+    as_tuple,
+    named_captures,
+)
 
-ReadNoise = Annotated[float, Field(ge=0, le=1e4)]
-"""Electrons; sensors have 1 to 100."""
 DarkCurrent = Annotated[float, Field(ge=0, le=1e15)]
 """Electrons per second; any well is full in less than a second."""
 
 MOST_PRNU = 0.1
 """Largest relative deviation of gains: a Gaussian gain is then positive within ten of them. Sensors have 0.01."""
 Prnu = Annotated[float, Field(ge=0, le=MOST_PRNU)]
-WellE = Annotated[float, Field(ge=1e-3, le=1e7)]
-"""Ten million electrons are more than pixels for visible light hold."""
-GainDnPerE = Annotated[float, Field(ge=1e-6, le=1e9)]
+_Knee = Annotated[tuple[NonNegative, NonNegative], BeforeValidator(from_to)]
 
 
 class Optics(Section):
@@ -44,31 +55,71 @@ class Pixel(Section):
     """Light-sensitive share of the pixel's area."""
     well_e: WellE = 10_000.0
     """Full well, electrons."""
-    bits: int = Field(default=12, ge=1, le=24)
+    bits: Bits = 12
     """Bits of the ADC."""
     gain_dn_per_e: GainDnPerE | None = None
     """Gain, DN per electron; left out, full scale over full well."""
     offset_dn: NonNegative = 0.0
     """Black level (pedestal), DN."""
-    crosstalk: float = Field(default=0.0, ge=0, lt=1)
+    crosstalk: Crosstalk = 0.0
     """Share of a pixel's light that comes through the filters of its four neighbors."""
     read_noise_e: ReadNoise = 0.0
     """Read noise, electrons (standard deviation)."""
     dark_e_per_s: DarkCurrent = 0.0
     """Dark current, electrons per second."""
     prnu: Prnu = 0.0
-    """Photo response non-uniformity: relative standard deviation of the pixels' gains."""
+    """Photo response non-uniformity: relative standard deviation of the pixels' gains, which its captures share."""
+    captures: Annotated[
+        tuple[Capture, ...],
+        BeforeValidator(
+            named_captures, json_schema_input_type=Literal["split_pixel", "dual_gain", "staggered"] | list[Capture]
+        ),
+        Field(max_length=MOST_CAPTURES),
+    ] = ()
+    """Readouts of an HDR pixel, from the most sensitive to the least; or `split_pixel`, `dual_gain`, `staggered`.
+    DN are then those of the first one; the merged value goes beyond its full scale."""
+    merge: Merge = "saturated"
+    """`saturated`: the most sensitive capture below its threshold; `weighted`: the mean of all below theirs, weighted
+    by the inverse variances at the expected light, with photon noise shared within an exposure."""
+    threshold: Share = 0.9
+    """Share of saturation from which on a capture is not used; the least sensitive one always is, alone."""
+    companding: Annotated[tuple[_Knee, ...], BeforeValidator(as_tuple, json_schema_input_type=list[_Knee])] = ()
+    """Knees of the code that the merged value is stored in: DN of the merged value, code."""
 
     @model_validator(mode="after")
-    def _pedestal_in_range(self) -> Pixel:
-        if not self.offset_dn < self.full_scale_dn:
-            raise ValueError(f"offset_dn {self.offset_dn:g} must be below full scale, {self.full_scale_dn}")
+    def _consistent(self) -> Pixel:
+        for number, pixel in enumerate(self.read_as or (self,)):
+            if not pixel.offset_dn < pixel.full_scale_dn:
+                where = f"captures.{number}: " if self.captures else ""
+                raise ValueError(f"{where}offset_dn {self.offset_dn:g} must be below full scale, {pixel.full_scale_dn}")
+        slopes = [capture.light * pixel.dn_per_e for capture, pixel in zip(self.captures, self.read_as, strict=True)]
+        for number in range(1, len(slopes)):
+            if slopes[number] > slopes[number - 1] * (1 + 1e-9):
+                raise ValueError(f"captures.{number} is more sensitive (DN per photon) than the one before it")
+        if not self.crosstalk and any(capture.crosstalk for capture in self.captures):
+            raise ValueError("crosstalk of a capture needs a crosstalk of the pixel above 0")
+        knees = np.array([(0.0, 0.0), *self.companding])
+        if (np.diff(knees, axis=0) <= 0).any():
+            raise ValueError("companding: knees must ascend in DN and in code, from above 0")
         return self
 
     @property
+    def read_as(self) -> tuple[Pixel, ...]:
+        """Each capture as a pixel that is read once."""
+        return _read_as(self)
+
+    @property
+    def exposures(self) -> tuple[Exposure, ...]:
+        """Electrons that captures read, each once, in the order of their most sensitive captures."""
+        groups: dict[object, list[int]] = {}
+        for number, capture in enumerate(self.captures):
+            groups.setdefault(capture.electrons_key, []).append(number)
+        return tuple(Exposure(self.captures[numbers[0]], tuple(numbers)) for numbers in groups.values())
+
+    @property
     def full_scale_dn(self) -> int:
-        """Largest digital number, 4095 for 12 bits."""
-        return int(2**self.bits - 1)
+        """Largest digital number, 4095 for 12 bits; of an HDR pixel that of its first capture."""
+        return self.read_as[0].full_scale_dn if self.captures else int(2**self.bits - 1)
 
     @property
     def area_m2(self) -> float:
@@ -77,13 +128,28 @@ class Pixel(Section):
 
     @property
     def dn_per_e(self) -> float:
-        """Gain, DN per electron (the inverse of the conversion gain)."""
+        """Gain, DN per electron (the inverse of the conversion gain).
+
+        That of an HDR pixel is DN of its first capture per electron of a pixel of full sensitivity.
+        """
+        if self.captures:
+            return self.read_as[0].dn_per_e * self.captures[0].light
         return self.full_scale_dn / self.well_e if self.gain_dn_per_e is None else self.gain_dn_per_e
 
     @property
     def saturation_e(self) -> float:
-        """Electrons at saturation: the full well, or the end of the range of the ADC."""
+        """Electrons at saturation: the full well, or the end of the range of the ADC; of an HDR pixel, of all."""
+        if self.captures:
+            return max(one.saturation_e / of.light for one, of in zip(self.read_as, self.captures, strict=True))
         return min(self.well_e, (self.full_scale_dn - self.offset_dn) / self.dn_per_e)
+
+
+@lru_cache(maxsize=64)
+def _read_as(pixel: Pixel) -> tuple[Pixel, ...]:
+    once = {"captures": (), "companding": ()}
+    names = ("well_e", "gain_dn_per_e", "read_noise_e", "bits")
+    given = [{n: v for n in names if (v := getattr(capture, n)) is not None} for capture in pixel.captures]
+    return tuple(pixel.model_copy(update=once | figures) for figures in given)
 
 
 def irradiance_factor(optics: Optics, magnification: float = 0.0, field_angle_rad: float = 0.0) -> float:

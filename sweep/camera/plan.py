@@ -124,7 +124,7 @@ def _inactive(effect: Effect, boxes: Sequence[Box]) -> Choice | None:
 
 
 def _bound_dn(effect: Effect, boxes: Sequence[Box], readout: frozenset[str]) -> float | None:
-    if effect.bound_dn is None:
+    if effect.bound_dn is None or any(box.setup.camera.pixel.captures for box in boxes):
         return None
     bounds = [effect.bound_dn(box, readout) for box in boxes]
     return max(bounds) if all(bound < float("inf") for bound in bounds) else None

@@ -77,6 +77,90 @@ def _candidates(drive: PwmDrive, shortest_s: float, longest_s: float, rest: floa
     return np.array([shortest_s, longest_s, *times_s[(times_s >= shortest_s) & (times_s <= longest_s)]])
 
 
+def on_time(drive: PwmDrive, periods: FloatArray) -> FloatArray:
+    """Return how long the light has been on since it was switched on, at the start of a period.
+
+    Parameters
+    ----------
+    drive : PwmDrive
+        Duty and frequency.
+    periods : ndarray
+        Time, periods.
+
+    Returns
+    -------
+    ndarray of the same shape
+        Periods.
+    """
+    whole = np.floor(periods)
+    return np.asarray(whole * drive.duty + np.minimum(periods - whole, drive.duty), dtype=float)
+
+
+def light_in(drive: PwmDrive, start: FloatArray, length: FloatArray) -> FloatArray:
+    """Return the light in an exposure relative to its mean.
+
+    Parameters
+    ----------
+    drive : PwmDrive
+        Duty and frequency.
+    start : ndarray
+        Start of the exposure after the start of a pulse, periods.
+    length : ndarray, broadcast to it
+        Exposure time, periods.
+
+    Returns
+    -------
+    ndarray
+        Relative light.
+    """
+    return np.asarray((on_time(drive, start + length) - on_time(drive, start)) / (length * drive.duty), dtype=float)
+
+
+def _phases(drive: PwmDrive, starts: FloatArray, lengths: FloatArray, between: int) -> FloatArray:
+    """Return phases of a pulse: those at which an exposure begins or ends with a pulse, and some between them.
+
+    The light in each exposure is linear between two such phases, so that its extremes are at them.
+
+    `starts`, `lengths`: [n_exposures, n_designs], periods. Returns [n_designs, n_phases].
+    """
+    ends = np.stack([starts, starts + lengths])[None] - np.array([0.0, drive.duty])[:, None, None, None]
+    corners = np.sort(np.mod(-ends, 1.0).reshape(-1, starts.shape[1]), axis=0)
+    gaps = np.diff(np.concatenate([corners, corners[:1] + 1.0]), axis=0)
+    steps = np.arange(between + 1) / (between + 1)
+    return np.asarray((corners[:, None] + gaps[:, None] * steps[:, None]).reshape(-1, starts.shape[1]).T, dtype=float)
+
+
+def exposure_scales(setup: Setup, exposure_s: FloatArray, moments: FloatArray | None = None) -> FloatArray:
+    """Return the light in each exposure of an HDR pixel relative to its mean, at phases of the pulse.
+
+    Parameters
+    ----------
+    setup : Setup
+        Drive, pixel and accuracy.
+    exposure_s : ndarray of shape (n_designs,)
+        Exposure time of the scene, s.
+    moments : ndarray of shape (n_moments,), optional
+        Phases, in periods, instead of those of the accuracy.
+
+    Returns
+    -------
+    ndarray of shape (n_exposures, n_designs, n_moments)
+        Relative light.
+    """
+    captures = [exposure.capture for exposure in setup.camera.pixel.exposures]
+    drive = setup.scene.drive
+    if drive is None or not setup.computes("flicker"):
+        return np.ones((len(captures), len(exposure_s), 1))
+    periods = exposure_s * drive.frequency_hz
+    starts = np.array([capture.start_ratio for capture in captures])[:, None] * periods
+    lengths = np.array([capture.exposure_ratio for capture in captures])[:, None] * periods
+    if moments is None:
+        phases = _phases(drive, starts, lengths, setup.accuracy.pwm_moments - 2)
+    else:
+        phases = np.broadcast_to(moments, (len(exposure_s), moments.size))
+    return light_in(drive, phases + starts[:, :, None], lengths[:, :, None])
+
+
 def scales(setup: Setup, exposure_s: FloatArray, moments: FloatArray | None = None) -> FloatArray:
     """Return the light relative to its mean at the moments that are computed.
 

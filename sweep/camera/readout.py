@@ -11,45 +11,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.types import BoolArray, FloatArray, IndexArray
+from . import merge
 from .noise import table
 from .pixel import Pixel, unquantized
 from .pixel_response import PixelResponse
+from .rounding import DITHERED_DN, MANY_STEPS, MOST_POISSON_E, rounded
 from .setup import Setup
 
 _CERTAIN_DN2 = 1e-9
 _FEW = 16
 _MANY = 50_000
 """Values from which on a compiled pass saves more time than it takes to load."""
-_MOST_POISSON_E = 1e18
-"""NumPy's Poisson generator takes no larger mean."""
-_DITHERED_DN = 0.7
-_MANY_STEPS = 16.0
-
-
-def rounded(dn: FloatArray, pixel: Pixel) -> FloatArray:
-    """Add the pedestal, round half up, and clip to the range of the ADC.
-
-    The whole part of the pedestal is added after rounding, so that values with and without a whole pedestal differ by
-    exactly that.
-
-    Parameters
-    ----------
-    dn : ndarray
-        Unrounded values without pedestal, DN.
-    pixel : Pixel
-        Pedestal and bits.
-
-    Returns
-    -------
-    ndarray of the same shape
-        Digital numbers, DN.
-    """
-    whole = math.floor(pixel.offset_dn)
-    steps = np.asarray(dn + (pixel.offset_dn - whole), dtype=float)
-    steps += 0.5
-    np.floor(steps, out=steps)
-    steps += whole
-    return np.clip(steps, 0.0, pixel.full_scale_dn, out=steps)
 
 
 def draws_dn(electrons: FloatArray, pixel: Pixel, rng: np.random.Generator) -> FloatArray:
@@ -74,7 +46,7 @@ def draws_dn(electrons: FloatArray, pixel: Pixel, rng: np.random.Generator) -> F
     expected *= pixel.prnu
     expected += 1
     expected *= electrons
-    held = rng.poisson(np.clip(expected, 0.0, _MOST_POISSON_E, out=expected))
+    held = rng.poisson(np.clip(expected, 0.0, MOST_POISSON_E, out=expected))
     dn = rng.standard_normal(out=expected)
     dn *= pixel.read_noise_e
     dn += np.minimum(held, pixel.well_e)
@@ -148,8 +120,8 @@ def is_gaussian(variance: FloatArray, heaviest: FloatArray, cut: BoolArray, pixe
     ndarray of bool
         True where the noise is Gaussian.
     """
-    dithered = pixel.dn_per_e * pixel.read_noise_e >= _DITHERED_DN
-    return np.asarray(~cut & (dithered | (variance >= _MANY_STEPS * heaviest**2)), dtype=bool)
+    dithered = pixel.dn_per_e * pixel.read_noise_e >= DITHERED_DN
+    return np.asarray(~cut & (dithered | (variance >= MANY_STEPS * heaviest**2)), dtype=bool)
 
 
 def reach_dn(electrons: FloatArray, pixel: Pixel) -> FloatArray:
@@ -172,6 +144,28 @@ def reach_dn(electrons: FloatArray, pixel: Pixel) -> FloatArray:
     return np.asarray(reach.max(axis=-1, keepdims=True), dtype=float)
 
 
+def capture_light(setup: Setup, response: PixelResponse) -> FloatArray:
+    """Return the light of each exposure of an HDR pixel relative to that of a pixel of full sensitivity.
+
+    Parameters
+    ----------
+    setup : Setup
+        Camera.
+    response : PixelResponse
+        Elements, each of one channel.
+
+    Returns
+    -------
+    ndarray of shape (n_exposures, n_elements)
+        Relative electrons.
+    """
+    channels = setup.camera.mosaic.channels
+    of_element = [channels[at] for at in response.readout.max(axis=0).argmax(axis=1)]
+    captures = [exposure.capture for exposure in setup.camera.pixel.exposures]
+    light = [[one.light * one.qe_factor.get(channel, 1.0) for channel in of_element] for one in captures]
+    return np.array(light, dtype=float).reshape(len(captures), len(of_element))
+
+
 class Readout:
     """Readout of the elements of a pixel response.
 
@@ -188,6 +182,7 @@ class Readout:
         self.n_cases = response.shape[0]
         self._weights, self._spread = response.readout, response.spread
         self.pixel = setup.camera.pixel
+        self.capture_light = capture_light(setup, response)
         self.by_channel = response.by_channel
 
     def transfer(self, electrons: FloatArray) -> FloatArray:
@@ -196,14 +191,18 @@ class Readout:
         Parameters
         ----------
         electrons : ndarray
-            Expected electrons of the elements.
+            Expected electrons of the elements; of an HDR pixel those of each exposure, on the first axis.
 
         Returns
         -------
-        ndarray of the same shape
+        ndarray of the shape of the elements
             Digital numbers, DN.
         """
         setup, pixel = self.setup, self.pixel
+        if pixel.captures:
+            light = self.capture_light_of(electrons)
+            noiseless = setup.scene.noise is None
+            return (merge.merged_without_noise if noiseless else merge.merged_mean)(electrons, light, pixel)
         clips, rounds = setup.computes("saturation"), setup.computes("quantization")
         noisy = setup.scene.noise is not None
         if noisy and setup.computes("noise"):
@@ -228,6 +227,22 @@ class Readout:
         line = top_e, self.pixel.dn_per_e, self.pixel.offset_dn, float(self.pixel.full_scale_dn)
         whole_numbers(many.reshape(-1), *line, numbers.reshape(-1))
         return numbers
+
+    def capture_light_of(self, electrons: FloatArray) -> FloatArray:
+        """Return the relative light of exposures, broadcast to their electrons.
+
+        Parameters
+        ----------
+        electrons : ndarray of shape (n_exposures, ..., n_elements)
+            Expected electrons.
+
+        Returns
+        -------
+        ndarray of shape (n_exposures, 1, ..., n_elements)
+            Electrons relative to those of a pixel of full sensitivity.
+        """
+        shape = (len(electrons), *(1,) * (electrons.ndim - 2), electrons.shape[-1])
+        return self.capture_light.reshape(shape)
 
     def variance_dn(self, electrons: FloatArray) -> FloatArray:
         """Return the variance of the digital numbers, with rounding.
@@ -280,19 +295,25 @@ class Readout:
         Parameters
         ----------
         electrons : ndarray of shape (n_designs, n_cases, n_signals, n_elements)
-            Expected electrons; elements are pixels.
+            Expected electrons; elements are pixels. Of an HDR pixel those of each exposure, on the first axis.
 
         Returns
         -------
         mean, variance, gaussian, reach_dn : ndarray
             As in `NoisyReadout`.
         """
-        dn, variance_dn = self.transfer(electrons), self.variance_dn(electrons)
+        if self.pixel.captures:
+            of_pixels = merge.merged(electrons, self.capture_light_of(electrons), self.pixel)
+            dn, variance_dn = of_pixels.mean, of_pixels.variance
+        else:
+            dn, variance_dn = self.transfer(electrons), self.variance_dn(electrons)
         # A digital number that is the same in all but one of a billion readouts: what is left of its noise is
         # rounding of the arithmetic, by which two signals would seem separated with certainty.
         certain = variance_dn < _CERTAIN_DN2
         dn, variance_dn = np.where(certain, np.rint(dn), dn), np.where(certain, 0.0, variance_dn)
         mean, variance = self.folded(dn), self.spread(variance_dn)
+        if self.pixel.captures:
+            return (mean, variance, *self._shape_of_merged(of_pixels, electrons, variance))
         return (mean, variance, *self._shape_of_noise(electrons, variance))
 
     def channels_of(self, pixels: FloatArray, phase_index: int) -> FloatArray:
@@ -332,8 +353,21 @@ class Readout:
 
     def _shape_of_noise(self, electrons: FloatArray, variance: FloatArray) -> tuple[BoolArray, FloatArray]:
         """Return `gaussian` and `reach_dn` of `NoisyReadout`."""
-        repeats = electrons.shape[1] // self.n_cases
-        heaviest = self._weights.max(axis=1) if self.setup.scene.target else 1 / self.setup.camera.mosaic.counts[None]
-        heaviest = np.repeat(np.broadcast_to(heaviest, (self.n_cases, variance.shape[-1])), repeats, axis=0)[:, None]
+        heaviest = self._heaviest(variance)
         cut = self._weighed(is_cut(electrons, self.pixel), (self._weights > 0).astype(float)) > 0
         return is_gaussian(variance, heaviest, cut, self.pixel), reach_dn(electrons, self.pixel) * heaviest
+
+    def _shape_of_merged(
+        self, pixels: merge.Merged, electrons: FloatArray, variance: FloatArray
+    ) -> tuple[BoolArray, FloatArray]:
+        """Return `gaussian` and `reach_dn` of `NoisyReadout` for HDR pixels."""
+        heaviest, some = self._heaviest(variance), (self._weights > 0).astype(float)
+        spread = merge.spread_of(electrons, self.capture_light_of(electrons), self.pixel, pixels.certain)
+        gaussian = self._weighed((~spread.gaussian).astype(float), some) == 0
+        return gaussian, spread.reach_dn.max(axis=-1, keepdims=True) * heaviest
+
+    def _heaviest(self, variance: FloatArray) -> FloatArray:
+        """Return the largest weight of a pixel in each channel, broadcast to the cases."""
+        repeats = variance.shape[1] // self.n_cases
+        heaviest = self._weights.max(axis=1) if self.setup.scene.target else 1 / self.setup.camera.mosaic.counts[None]
+        return np.repeat(np.broadcast_to(heaviest, (self.n_cases, variance.shape[-1])), repeats, axis=0)[:, None]

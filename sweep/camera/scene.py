@@ -9,7 +9,8 @@ from pydantic import BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from ..base.types import Meters, Ratio, Seconds, Section, Share
-from .pixel import DarkCurrent, Optics, Pixel, Prnu, ReadNoise
+from .captures import ReadNoise
+from .pixel import DarkCurrent, Optics, Pixel, Prnu
 from .sensor_field import SensorField
 
 DIAMETER_M = 0.2

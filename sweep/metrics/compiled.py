@@ -217,6 +217,70 @@ def channel_numbers(
 
 
 @njit(cache=True, nogil=True)
+def merged_shares(
+    electrons: FloatArray,
+    prnu: float,
+    exposure: IndexArray,
+    passed: FloatArray,
+    starts: IndexArray,
+    columns: IndexArray,
+    shares: FloatArray,
+    n_bins: int,
+) -> tuple[int, FloatArray]:
+    """Return the distribution of the merged value of an HDR pixel.
+
+    Parameters
+    ----------
+    electrons : ndarray of shape (n_exposures,)
+        Expected electrons.
+    prnu : float
+        PRNU, common to all exposures.
+    exposure, passed, starts, columns, shares, n_bins
+        As in `merged_numbers.MergedTable`.
+
+    Returns
+    -------
+    first : int
+        First bin that occurs.
+    shares : ndarray
+        Probability of each bin from there on.
+    """
+    n_captures, n_exposures, n_counts = passed.shape
+    total, brightest = np.zeros(n_bins), electrons.max()
+    half = int(_TAIL * _PER_DEVIATION * math.sqrt(1 + prnu * prnu * min(brightest, 1e8))) + 1 if prnu > 0 else 0
+    counts, before = np.empty((n_exposures, n_counts)), np.empty((n_captures, n_exposures))
+    ends = np.empty((n_exposures, 2), np.intp)
+    all_gains = 0.0
+    for i in range(-half, half + 1):
+        z = _TAIL * i / half if half else 0.0
+        weight = math.exp(-z * z / 2)
+        all_gains += weight
+        for at in range(n_exposures):
+            ends[at] = poisson_shares(max(electrons[at] * (1 + prnu * z), 0.0), 0, RARE, counts[at])
+            some = counts[at, ends[at, 0] : ends[at, 1]]
+            some /= some.sum()
+            for k in range(n_captures):
+                before[k, at] = (some * passed[k, at, ends[at, 0] : ends[at, 1]]).sum()
+        for k in range(n_captures):
+            others = weight
+            for at in range(n_exposures):
+                if at != exposure[k]:
+                    others *= before[k, at]
+            if others < RARE:
+                continue
+            for count in range(ends[exposure[k], 0], ends[exposure[k], 1]):
+                share = others * counts[exposure[k], count]
+                for entry in range(starts[k, count], starts[k, count + 1]):
+                    total[columns[entry]] += share * shares[entry]
+    low, high = 0, n_bins
+    while low + 1 < high and total[low] < RARE:
+        low += 1
+    while high - 1 > low and total[high - 1] < RARE:
+        high -= 1
+    return low, total[low:high] / all_gains
+
+
+@njit(cache=True, nogil=True)
 def overlaps(firsts: IndexArray, starts: IndexArray, roots: FloatArray, rows: IndexArray) -> FloatArray:
     """Return the Bhattacharyya coefficient of each two signals of a design.
 

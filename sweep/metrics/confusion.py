@@ -15,6 +15,7 @@ import numpy as np
 from ..base.types import FloatArray, IndexArray
 from ..camera.pixel import Pixel
 from ..spectra.lights import class_pairs
+from . import merged_numbers as hdr
 
 FLOOR = 1e-18
 """Largest contribution of neglected tails to an error or to its bound."""
@@ -73,6 +74,8 @@ def affordable(pixel: Pixel, channels: Sequence[IndexArray]) -> bool:
     bool
         True if exact sums are used.
     """
+    if pixel.captures:
+        return hdr.affordable(pixel)
     (wide, sigma, n_bins), prnu = _bins(pixel), pixel.prnu
     most = math.ceil(pixel.well_e)
     electrons = min(most / max(1 - _FAR * prnu, 0.01), 100 * pixel.well_e + 1e5)
@@ -111,7 +114,11 @@ def _numbers(
 
 
 def errors(
-    electrons: FloatArray, channels: Sequence[IndexArray], pixel: Pixel, members: Mapping[str, IndexArray]
+    electrons: FloatArray,
+    channels: Sequence[IndexArray],
+    pixel: Pixel,
+    members: Mapping[str, IndexArray],
+    light: FloatArray | None = None,
 ) -> Errors:
     """Compute errors and bounds of a batch of designs.
 
@@ -122,13 +129,15 @@ def errors(
     Parameters
     ----------
     electrons : ndarray of shape (n_designs, n_signals, n_pixels)
-        Expected electrons of each pixel.
+        Expected electrons of each pixel; of an HDR pixel those of each exposure, on the first axis.
     channels : sequence of ndarray of int
         Pixels of each channel.
     pixel : Pixel
         Full well, gain, noise and ADC.
     members : mapping of str to ndarray of int
         Signals of each type.
+    light : ndarray of shape (n_exposures, n_pixels), optional
+        Light of the exposures of an HDR pixel relative to that of a pixel of full sensitivity.
 
     Returns
     -------
@@ -137,21 +146,25 @@ def errors(
     """
     from . import compiled as kernels  # noqa: PLC0415  (compiled: kept off the start-up path)
 
-    n_designs, n_signals = electrons.shape[:2]
-    unknown = np.asarray(np.isnan(electrons).any(axis=(1, 2)))
-    electrons = np.where(unknown[:, None, None], 0.0, np.minimum(electrons, 100 * pixel.well_e + 1e5))
+    n_designs, n_signals = electrons.shape[-3:-1]
+    unknown = np.asarray(np.isnan(electrons).reshape(-1, *electrons.shape[-3:]).any(axis=(0, 2, 3)))
+    most_e = max(one.well_e for one in pixel.read_as or (pixel,))
+    electrons = np.where(unknown[:, None, None], 0.0, np.minimum(electrons, 100 * most_e + 1e5))
     pairs = class_pairs(list(members))
     pair_errors = {pair: np.empty(n_designs) for pair in pairs}
     bounds = {pair: np.empty(n_designs) for pair in pairs}
     state = np.empty(n_designs)
     step = _NATS / len(channels)
     for start in range(0, n_designs, max(1, _AT_ONCE // n_signals)):
-        block = electrons[start : start + max(1, _AT_ONCE // n_signals)]
-        firsts, starts, roots, all_rows = _numbers(block, channels, pixel)
+        block = electrons[..., start : start + max(1, _AT_ONCE // n_signals), :, :]
+        if light is None:
+            firsts, starts, roots, all_rows = _numbers(block, channels, pixel)
+        else:
+            firsts, starts, roots, all_rows = hdr.merged_numbers(block, light, channels, pixel)
         parts = firsts, starts, roots
         with np.errstate(divide="ignore"):
             logs = np.log(roots)
-        for d in range(len(block)):
+        for d in range(block.shape[-3]):
             rows = np.ascontiguousarray(all_rows[:, d])
             overlap = kernels.overlaps(*parts, rows)
             sums = np.zeros(n_signals)

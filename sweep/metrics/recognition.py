@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 
 from ..base.types import FloatArray, IndexArray
+from ..camera import merge
 from ..camera.forward import AllPhases
 from ..camera.readout import draws_dn
 from .share import share_interval
@@ -120,10 +121,10 @@ def recognize(
     class_signals = [model.setup.members[name] for name in states]
     signals = np.concatenate(class_signals)
     class_of_signal = np.repeat(np.arange(len(states)), [len(indices) for indices in class_signals])
-    electrons = model.pixel_electrons(curves)[0]
-    cases = rng.integers(len(electrons), size=(patches, len(signals)))  # phase, field position and moment
+    electrons = model.pixel_electrons(curves)[..., 0, :, :, :]
+    cases = rng.integers(electrons.shape[-3], size=(patches, len(signals)))  # phase, field position and moment
     truth = np.broadcast_to(class_of_signal, cases.shape)
-    n_pixels = electrons.shape[2]
+    n_pixels = electrons.shape[-1]
     used_pixels = np.sort(rng.permutation(n_pixels)[:_MAX_PIXELS])
     raw_dn = np.empty((*cases.shape, used_pixels.size), dtype=np.float32)
     predicted = np.empty(cases.shape, dtype=class_of_signal.dtype)
@@ -132,7 +133,11 @@ def recognize(
     variance = np.maximum(readout.variance[0][:, signals], _MIN_VARIANCE_DN2)
     block_size = max(1, _BLOCK_PIXELS // (len(signals) * n_pixels))
     for block in (slice(start, start + block_size) for start in range(0, patches, block_size)):
-        block_dn = draws_dn(electrons[cases[block], signals], model.readout.pixel, rng)
+        drawn, light = electrons[..., cases[block], signals, :], model.capture_light
+        if light is None:
+            block_dn = draws_dn(drawn, model.readout.pixel, rng)
+        else:
+            block_dn = merge.draws(drawn, light[:, None, None], model.readout.pixel, rng)
         raw_dn[block] = block_dn[..., used_pixels]
         for case in np.unique(cases[block]):
             here = cases[block] == case

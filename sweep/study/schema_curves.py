@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
 
 from ..base.types import Ratio, Seconds, Section
-from ..camera.pixel import ReadNoise
+from ..camera.captures import ReadNoise
 from ..designs.technology import Stated
 from ..spectra.builtin.registry import BUILT_IN_LIGHTS
 from ..spectra.spectrum import Outside, Resampling

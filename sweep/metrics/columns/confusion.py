@@ -129,7 +129,8 @@ def _exact(
     if few is None or not confusion.affordable(imager.readout.pixel, few):
         return None
     electrons = imager.pixel_electrons(curves)
-    return [confusion.errors(case, few, imager.readout.pixel, members) for case in np.moveaxis(electrons, 1, 0)]
+    light = imager.capture_light
+    return [confusion.errors(case, few, imager.readout.pixel, members, light) for case in np.moveaxis(electrons, -3, 0)]
 
 
 def _gaussian(read: NoisyReadout, members: Mapping[str, IndexArray]) -> _ByPair:

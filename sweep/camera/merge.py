@@ -1,0 +1,349 @@
+"""Merged value of an HDR pixel: mean and variance from the moments of its captures.
+
+A capture k of relative light a_k (sensitivity times exposure ratio) reads x_k electrons; x_k / a_k is an estimate of
+the electrons of a pixel of full sensitivity. Captures at or beyond their threshold are left out; the last one never
+is. The merged value is the weighted sum of the estimates:
+
+`saturated` : the first capture that is usable (ISETCam's rule for split pixels).
+`weighted` : generalized least squares, with the variances at the expected light: (n + r^2 + q^2 / 12) / a^2 for n
+    expected electrons, read noise r and steps of q electrons; captures of an exposure share their photon noise.
+
+Gains of pixels (PRNU) are common to all captures of a pixel.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.types import BoolArray, FloatArray
+from .noise.moments import DRAWN
+from .noise.subsets import Subset, SubsetMoments, subset_table, threshold_dn
+from .noise.table import unclipped_e
+from .pixel import Pixel
+from .rounding import DITHERED_DN, MANY_STEPS, MOST_POISSON_E, rounded
+
+_PER_DEVIATION = 1.3
+_CERTAIN = 1 - 1e-12
+
+
+@dataclass(frozen=True)
+class Merged:
+    """Merged values, ndarray of one shape each.
+
+    Parameters
+    ----------
+    mean, variance : ndarray
+        Mean, DN of the first capture, and variance, DN^2.
+    certain : ndarray of bool
+        True where the same captures are used in all but 1e-12 of the readouts.
+    """
+
+    mean: FloatArray
+    variance: FloatArray
+    certain: BoolArray
+
+
+def limits_dn(pixel: Pixel) -> tuple[int | None, ...]:
+    """Return the digital number from which on each capture is not used; None for the last one.
+
+    Parameters
+    ----------
+    pixel : Pixel
+        HDR pixel.
+
+    Returns
+    -------
+    tuple of int or None
+        Digital numbers, DN.
+    """
+    return (*(threshold_dn(capture, pixel.threshold) for capture in pixel.read_as[:-1]), None)
+
+
+def merged(electrons: FloatArray, light: FloatArray, pixel: Pixel) -> Merged:
+    """Merge noisy captures.
+
+    Parameters
+    ----------
+    electrons : ndarray of shape (n_exposures, ...)
+        Expected electrons of each of `Pixel.exposures`.
+    light : ndarray, broadcast to it
+        Light of each exposure relative to that of a pixel of full sensitivity.
+    pixel : Pixel
+        HDR pixel.
+
+    Returns
+    -------
+    Merged
+        Merged values.
+    """
+    if not pixel.prnu:
+        return _merged(electrons, light, pixel)
+    most = float(electrons.max(initial=0.0))
+    steps = math.ceil(DRAWN * _PER_DEVIATION * math.sqrt(1 + pixel.prnu**2 * min(most, 1e8)))
+    z = DRAWN * np.arange(-steps, steps + 1) / steps
+    weights = np.exp(-0.5 * z**2) / np.exp(-0.5 * z**2).sum()
+    mean = square = spread = np.zeros(electrons.shape[1:])
+    about = _merged(electrons, light, pixel)
+    certain = about.certain
+    for weight, gain in zip(weights, 1 + pixel.prnu * z, strict=True):
+        one = _merged(electrons * gain, light, pixel)
+        off = one.mean - about.mean
+        mean, square, spread = mean + weight * off, square + weight * off**2, spread + weight * one.variance
+        certain = certain & one.certain
+    return Merged(about.mean + mean, spread + square - mean**2, certain)
+
+
+def merged_mean(electrons: FloatArray, light: FloatArray, pixel: Pixel) -> FloatArray:
+    """Return the mean of `merged`.
+
+    Parameters
+    ----------
+    electrons, light, pixel
+        As in `merged`.
+
+    Returns
+    -------
+    ndarray of shape (...)
+        Mean, DN of the first capture.
+    """
+    return merged(electrons, light, pixel).mean
+
+
+def _merged(electrons: FloatArray, light: FloatArray, pixel: Pixel) -> Merged:
+    known, moments = limits_dn(pixel), []
+    for exposure, expected in zip(pixel.exposures, electrons, strict=True):
+        captures = tuple(pixel.read_as[number] for number in exposure.numbers)
+        table = subset_table(captures, tuple(known[number] for number in exposure.numbers))
+        moments.append(table.at(expected))
+    total, offset = np.zeros(electrons.shape[1:]), pixel.offset_dn
+    parts = []
+    for usable in itertools.product(*moments):
+        some = [of[subset] for of, subset in zip(moments, usable, strict=True)]
+        share = np.prod([one.share for one in some], axis=0)
+        if not any(usable) or not share.any():
+            continue
+        parts.append((share, *_combined(some, weights_of(usable, electrons, light, pixel), light)))
+    for share, mean, _ in parts:
+        total = total + share * mean
+    variance = sum(share * (spread + (mean - total) ** 2) for share, mean, spread in parts)
+    certain = np.any([share >= _CERTAIN for share, *_ in parts], axis=0)
+    gain = pixel.dn_per_e
+    return Merged(gain * total + offset, np.asarray(gain**2 * variance, dtype=float), certain)
+
+
+def _combined(
+    some: list[SubsetMoments], weights: Mapping[tuple[int, int], FloatArray], light: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return mean and variance of the weighted sum, in electrons of a pixel of full sensitivity."""
+    mean = variance = np.zeros(some[0].share.shape)
+    for (at, number), weight in weights.items():
+        share = weight / light[at]
+        mean = mean + share * some[at].mean_e[number]
+        for (other_at, other), other_weight in weights.items():
+            if other_at == at:
+                variance = variance + share * other_weight / light[at] * some[at].covariance_e2[number, other]
+    return mean, variance
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Shape of the noise of merged values, ndarray of one shape each.
+
+    Parameters
+    ----------
+    gaussian : ndarray of bool
+        True where the noise may be taken as Gaussian.
+    reach_dn : ndarray
+        Largest distance from the mean with a probability above 1e-15, DN of the first capture.
+    """
+
+    gaussian: BoolArray
+    reach_dn: FloatArray
+
+
+def spread_of(electrons: FloatArray, light: FloatArray, pixel: Pixel, certain: BoolArray) -> Spread:
+    """Return the shape of the noise of merged values.
+
+    Parameters
+    ----------
+    electrons : ndarray of shape (n_exposures, ...)
+        Expected electrons.
+    light : ndarray, broadcast to it
+        Relative light.
+    pixel : Pixel
+        HDR pixel.
+    certain : ndarray of bool
+        Where the same captures are always used.
+
+    Returns
+    -------
+    Spread
+        Shape of the noise.
+    """
+    gaussian, reach_dn = certain.copy(), np.zeros(certain.shape)
+    for at, exposure in enumerate(pixel.exposures):
+        expected = electrons[at]
+        for number in exposure.numbers:
+            one, limit_dn = pixel.read_as[number], limits_dn(pixel)[number]
+            noise_e = np.sqrt(expected + (one.prnu * expected) ** 2 + one.read_noise_e**2)
+            limit_e = np.inf if limit_dn is None else (limit_dn - one.offset_dn) / one.dn_per_e
+            used = expected - 9 * noise_e - 27 < limit_e
+            low_e, high_e = unclipped_e(one)
+            dithered = one.dn_per_e * one.read_noise_e >= DITHERED_DN
+            fine = (expected >= low_e) & (expected <= high_e)
+            fine &= dithered | (one.dn_per_e * noise_e >= MANY_STEPS**0.5)
+            gaussian &= fine | ~used
+            reach_e = 9 * (np.sqrt(expected) + one.prnu * expected + one.read_noise_e) + 27 + 1 / one.dn_per_e
+            # Its mean, if it is used, is within its reach of the expected number, and so is the mean of all.
+            reach_dn = np.maximum(reach_dn, np.where(used, 2 * reach_e * pixel.dn_per_e / light[at], 0.0))
+    return Spread(gaussian, reach_dn)
+
+
+def weights_of(
+    usable: tuple[Subset, ...], electrons: FloatArray, light: FloatArray, pixel: Pixel
+) -> dict[tuple[int, int], FloatArray]:
+    """Return the weight of each usable capture.
+
+    Parameters
+    ----------
+    usable : tuple of tuple of int
+        Usable captures of each exposure, by their place in it.
+    electrons : ndarray of shape (n_exposures, ...)
+        Expected electrons.
+    light : ndarray, broadcast to it
+        Relative light.
+    pixel : Pixel
+        HDR pixel.
+
+    Returns
+    -------
+    dict of (int, int) to ndarray
+        Exposure and place in it -> weight; their sum is 1.
+    """
+    places = [(at, number) for at, numbers in enumerate(usable) for number in numbers]
+    order = {place: pixel.exposures[place[0]].numbers[place[1]] for place in places}
+    if pixel.merge == "saturated":
+        return {min(places, key=lambda place: order[place]): np.ones(electrons.shape[1:])}
+    of_light, in_exposure = dict[int, FloatArray](), dict[tuple[int, int], float]()
+    for at, numbers in enumerate(usable):
+        if numbers:
+            noise_e2 = {number: _read_noise_e2(pixel.read_as[order[at, number]]) for number in numbers}
+            together = 1 / sum(1 / noise for noise in noise_e2.values())
+            in_exposure |= {(at, number): together / noise for number, noise in noise_e2.items()}
+            of_light[at] = light[at] ** 2 / (electrons[at] + together)
+    total = sum(of_light.values())
+    return {place: share * of_light[place[0]] / total for place, share in in_exposure.items()}
+
+
+def _read_noise_e2(pixel: Pixel) -> float:
+    return float(pixel.read_noise_e**2 + 1 / (12 * pixel.dn_per_e**2))
+
+
+def merged_without_noise(electrons: FloatArray, light: FloatArray, pixel: Pixel) -> FloatArray:
+    """Merge captures that are clipped and rounded, without noise.
+
+    Parameters
+    ----------
+    electrons : ndarray of shape (n_exposures, ...)
+        Electrons of each of `Pixel.exposures`.
+    light : ndarray, broadcast to it
+        Relative light.
+    pixel : Pixel
+        HDR pixel.
+
+    Returns
+    -------
+    ndarray of shape (...)
+        Merged values, DN of the first capture.
+    """
+    read = [
+        rounded(np.minimum(electrons[at], one.saturation_e) * one.dn_per_e, one)
+        for at, one in zip(_exposure_of(pixel), pixel.read_as, strict=True)
+    ]
+    return merged_readings(read, electrons, light, pixel)
+
+
+def draws(electrons: FloatArray, light: FloatArray, pixel: Pixel, rng: np.random.Generator) -> FloatArray:
+    """Draw one merged value of each pixel (Monte Carlo).
+
+    Parameters
+    ----------
+    electrons : ndarray of shape (n_exposures, ...)
+        Expected electrons of each of `Pixel.exposures`.
+    light : ndarray, broadcast to it
+        Relative light.
+    pixel : Pixel
+        HDR pixel.
+    rng : numpy.random.Generator
+        Source of random numbers.
+
+    Returns
+    -------
+    ndarray of shape (...)
+        Merged values, DN of the first capture.
+    """
+    gain = 1 + pixel.prnu * rng.standard_normal(electrons.shape[1:])
+    held = rng.poisson(np.clip(electrons * gain, 0.0, MOST_POISSON_E))
+    read = []
+    for at, one in zip(_exposure_of(pixel), pixel.read_as, strict=True):
+        noisy_e = np.minimum(held[at], one.well_e) + one.read_noise_e * rng.standard_normal(gain.shape)
+        read.append(rounded(noisy_e * one.dn_per_e, one))
+    return merged_readings(read, electrons, light, pixel)
+
+
+def merged_readings(
+    read_dn: Sequence[FloatArray], electrons: FloatArray, light: FloatArray, pixel: Pixel
+) -> FloatArray:
+    """Merge what captures read.
+
+    Parameters
+    ----------
+    read_dn : sequence of ndarray of shape (...)
+        Digital numbers of each capture, DN.
+    electrons : ndarray of shape (n_exposures, ...)
+        Expected electrons, which weights of `merge: weighted` depend on.
+    light : ndarray, broadcast to it
+        Relative light.
+    pixel : Pixel
+        HDR pixel.
+
+    Returns
+    -------
+    ndarray of shape (...)
+        Merged values, DN of the first capture.
+    """
+    limits, result = limits_dn(pixel), np.zeros(electrons.shape[1:])
+    everywhere = np.ones(result.shape, dtype=bool)
+    below = [everywhere if limit is None else dn < limit for dn, limit in zip(read_dn, limits, strict=True)]
+    for usable in _subsets(pixel):
+        chosen = {pixel.exposures[at].numbers[place] for at, places in enumerate(usable) for place in places}
+        here = np.all([below[k] == (k in chosen) for k in range(len(below))], axis=0)
+        if not here.any():
+            continue
+        for (at, place), weight in weights_of(usable, electrons, light, pixel).items():
+            number = pixel.exposures[at].numbers[place]
+            estimate = (read_dn[number] - pixel.offset_dn) / (pixel.read_as[number].dn_per_e * light[at])
+            result += here * weight * estimate
+    return np.asarray(pixel.dn_per_e * result + pixel.offset_dn, dtype=float)
+
+
+def _exposure_of(pixel: Pixel) -> list[int]:
+    """Return the index of the exposure of each capture."""
+    of = {number: at for at, exposure in enumerate(pixel.exposures) for number in exposure.numbers}
+    return [of[number] for number in range(len(pixel.captures))]
+
+
+def _subsets(pixel: Pixel) -> Iterator[tuple[Subset, ...]]:
+    """Yield usable captures of each exposure; the last capture always is."""
+    last = len(pixel.captures) - 1
+    of_exposure = []
+    for exposure in pixel.exposures:
+        places = range(len(exposure.numbers))
+        some = [s for size in range(len(places) + 1) for s in itertools.combinations(places, size)]
+        of_exposure.append([s for s in some if last not in exposure.numbers or exposure.numbers.index(last) in s])
+    return itertools.product(*of_exposure)

@@ -1,0 +1,43 @@
+"""Rounding of an ADC, and the noise that hides its steps."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..base.types import FloatArray
+from .pixel import Pixel
+
+MOST_POISSON_E = 1e18
+"""NumPy's Poisson generator takes no larger mean."""
+DITHERED_DN = 0.7
+"""Read noise, DN, from which on rounding shows in no error."""
+MANY_STEPS = 16.0
+"""Variance in squared steps, from which on it shows in none, either."""
+
+
+def rounded(dn: FloatArray, pixel: Pixel) -> FloatArray:
+    """Add the pedestal, round half up, and clip to the range of the ADC.
+
+    The whole part of the pedestal is added after rounding, so that values with and without a whole pedestal differ by
+    exactly that.
+
+    Parameters
+    ----------
+    dn : ndarray
+        Unrounded values without pedestal, DN.
+    pixel : Pixel
+        Pedestal and bits.
+
+    Returns
+    -------
+    ndarray of the same shape
+        Digital numbers, DN.
+    """
+    whole = math.floor(pixel.offset_dn)
+    steps = np.asarray(dn + (pixel.offset_dn - whole), dtype=float)
+    steps += 0.5
+    np.floor(steps, out=steps)
+    steps += whole
+    return np.clip(steps, 0.0, pixel.full_scale_dn, out=steps)

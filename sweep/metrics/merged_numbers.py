@@ -1,0 +1,319 @@
+"""Distribution of the merged value of HDR pixels whose first usable capture counts, by exact sums.
+
+The merged value is in bins of a quarter of its noise, or in the codes of a companded pixel. Which captures are usable,
+read noise, full well, ADC range and rounding are exact.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from ..base.types import FloatArray, IndexArray
+from ..camera.merge import limits_dn
+from ..camera.noise import gaussian
+from ..camera.pixel import Pixel
+
+_PER_NOISE = 4.0
+"""Bins per standard deviation of the noise."""
+_REACH = 9.5
+_MOST_READ = 2e7
+"""Numbers of electrons times digital numbers that read noise spreads each over."""
+_LEAST = 1e-25
+"""Probability of a digital number, of given electrons, below which it is left out."""
+
+
+@dataclass(frozen=True)
+class Bins:
+    """Bins of merged values: a quarter of the noise of the capture that is used at them, or codes.
+
+    Parameters
+    ----------
+    edges_e : ndarray of shape (n_captures,)
+        Merged value from which on each capture is used, electrons of a pixel of full sensitivity, from 0 on.
+    light : ndarray of shape (n_captures,)
+        Relative light of each capture.
+    dark_e : ndarray of shape (n_captures,)
+        Electrons whose photons have the variance of its read noise.
+    knees : ndarray of shape (2, n_knees)
+        Electrons and codes of a companded pixel, from (0, 0) on; of shape (2, 1) if it is none.
+    """
+
+    edges_e: FloatArray
+    light: FloatArray
+    dark_e: FloatArray
+    knees: FloatArray
+
+    @classmethod
+    def of(cls, pixel: Pixel, light: FloatArray) -> Bins:
+        """Return the bins of a pixel.
+
+        Parameters
+        ----------
+        pixel : Pixel
+            HDR pixel.
+        light : ndarray of shape (n_captures,)
+            Relative light of each capture.
+
+        Returns
+        -------
+        Bins
+            Bins.
+        """
+        read = [(*each, a) for *each, a in zip(pixel.read_as, limits_dn(pixel), light, strict=True)]
+        ends = [(limit - one.offset_dn) / (one.dn_per_e * a) for one, limit, a in read if limit is not None]
+        dark = np.array([max(one.read_noise_e**2, 1.0) / a for one, _, a in read])
+        knees = np.array([(0.0, 0.0), *pixel.companding]).T / [[pixel.dn_per_e], [1.0]]
+        return cls(np.maximum.accumulate([0.0, *ends]), light, dark, knees)
+
+    @property
+    def _starts(self) -> FloatArray:
+        """Widths of the noise below each of the edges."""
+        ends = (
+            2
+            * np.sqrt(self.light[:-1])
+            * (np.sqrt(self.edges_e[1:] + self.dark_e[:-1]) - np.sqrt(self.edges_e[:-1] + self.dark_e[:-1]))
+        )
+        return np.concatenate([[0.0], np.cumsum(ends)])
+
+    def number(self, electrons: FloatArray) -> IndexArray:
+        """Return the bins of merged values.
+
+        Parameters
+        ----------
+        electrons : ndarray
+            Merged values, electrons of a pixel of full sensitivity.
+
+        Returns
+        -------
+        ndarray of int, same shape
+            Bins; negative below 0.
+        """
+        if self.knees.shape[1] > 1:
+            return np.asarray(np.floor(np.interp(electrons, *self.knees) + 0.5), dtype=np.intp)
+        at = np.maximum(np.searchsorted(self.edges_e, electrons, side="right") - 1, 0)
+        light, dark, edge = np.sqrt(self.light[at]), self.dark_e[at], self.edges_e[at]
+        widths = 2 * light * (np.sqrt(np.maximum(electrons, 0.0) + dark) - np.sqrt(edge + dark)) + self._starts[at]
+        widths += np.minimum(electrons, 0.0) * light / np.sqrt(dark)
+        return np.asarray(np.floor(_PER_NOISE * widths), dtype=np.intp)
+
+    def value(self, number: IndexArray) -> FloatArray:
+        """Return the values in the middle of bins.
+
+        Parameters
+        ----------
+        number : ndarray of int
+            Bins.
+
+        Returns
+        -------
+        ndarray of the same shape
+            Electrons of a pixel of full sensitivity.
+        """
+        if self.knees.shape[1] > 1:
+            return np.asarray(np.interp(number, *self.knees[::-1]), dtype=float)
+        widths, starts = (number + 0.5) / _PER_NOISE, self._starts
+        at = np.maximum(np.searchsorted(starts, widths, side="right") - 1, 0)
+        light, dark, edge = np.sqrt(self.light[at]), self.dark_e[at], self.edges_e[at]
+        above = (np.maximum(widths - starts[at], 0.0) / (2 * light) + np.sqrt(edge + dark)) ** 2 - dark
+        return np.asarray(above + np.minimum(widths, 0.0) * np.sqrt(dark) / light, dtype=float)
+
+
+@dataclass(frozen=True)
+class MergedTable:
+    """What each number of electrons reads, for all captures of an HDR pixel.
+
+    Parameters
+    ----------
+    bins : Bins
+        Bins of a pixel of full sensitivity.
+    exposure : ndarray of int, shape (n_captures,)
+        Exposure of each capture.
+    passed : ndarray of shape (n_captures, n_exposures, n_counts)
+        Probability that all captures of an exposure before this one are not usable, by count.
+    starts : ndarray of int, shape (n_captures, n_counts + 1)
+        Start of the entries of each count.
+    columns, shares : ndarray of shape (n_entries,)
+        Bins from `first` on, and probabilities that the capture is the first usable one of its exposure and reads it.
+    first : int
+        The lowest bin.
+    n_bins : int
+        Number of bins.
+    """
+
+    bins: Bins
+    exposure: IndexArray
+    passed: FloatArray
+    starts: IndexArray
+    columns: IndexArray
+    shares: FloatArray
+    first: int
+    n_bins: int
+
+
+def affordable(pixel: Pixel) -> bool:
+    """Return whether merged values are summed up.
+
+    Parameters
+    ----------
+    pixel : Pixel
+        HDR pixel.
+
+    Returns
+    -------
+    bool
+        True for `merge: saturated`, unless wells or read noise are very large.
+    """
+    read = [capture.well_e * (2 * _REACH * capture.dn_per_e * capture.read_noise_e + 3) for capture in pixel.read_as]
+    return pixel.merge == "saturated" and max(read) <= _MOST_READ
+
+
+@lru_cache(maxsize=8)
+def merged_table(pixel: Pixel, light: tuple[float, ...]) -> MergedTable:
+    """Compute what each number of electrons reads.
+
+    Parameters
+    ----------
+    pixel : Pixel
+        HDR pixel.
+    light : tuple of float
+        Light of each exposure relative to that of a pixel of full sensitivity.
+
+    Returns
+    -------
+    MergedTable
+        The table.
+    """
+    limits = limits_dn(pixel)
+    n_counts = max(math.ceil(capture.well_e) for capture in pixel.read_as) + 1
+    counts, n_captures = np.arange(n_counts, dtype=float), len(pixel.captures)
+    exposure = np.empty(n_captures, dtype=np.intp)
+    for at, of in enumerate(pixel.exposures):
+        exposure[list(of.numbers)] = at
+    bins = Bins.of(pixel, np.array(light)[exposure])
+    passed = np.ones((n_captures, len(pixel.exposures), n_counts))
+    entries = []
+    for number, (capture, limit) in enumerate(zip(pixel.read_as, limits, strict=True)):
+        rows, numbers_dn, shares = _read(counts, capture, limit)
+        value_e = (numbers_dn - capture.offset_dn) / (capture.dn_per_e * light[exposure[number]])
+        shares = shares * passed[number, exposure[number], rows]
+        entries.append((rows, bins.number(value_e), shares))
+        if limit is not None:
+            passed[number + 1 :, exposure[number]] *= _beyond(counts, capture, limit)
+    first = min(int(of_bins.min()) for _, of_bins, _ in entries)
+    n_bins = max(int(of_bins.max()) for _, of_bins, _ in entries) - first + 1
+    starts, columns, probabilities, total = [], [], [], 0
+    for rows, of_bins, shares in entries:
+        key = rows * n_bins + of_bins - first
+        distinct, which = np.unique(key, return_inverse=True)
+        summed = np.bincount(which, shares, distinct.size)
+        row = distinct // n_bins
+        starts.append(total + np.searchsorted(row, np.arange(n_counts + 1)))
+        columns.append(distinct % n_bins)
+        probabilities.append(summed)
+        total += distinct.size
+    return MergedTable(
+        bins, exposure, passed, np.stack(starts), np.concatenate(columns), np.concatenate(probabilities), first, n_bins
+    )
+
+
+def _beyond(counts: FloatArray, pixel: Pixel, limit_dn: int) -> FloatArray:
+    """Return the probability that a capture reads its limit or more, for each count."""
+    over = pixel.dn_per_e * np.minimum(counts, pixel.well_e) + pixel.offset_dn - (limit_dn - 0.5)
+    sigma = pixel.dn_per_e * pixel.read_noise_e
+    return gaussian.share_below(over / sigma) if sigma else (over >= 0).astype(float)
+
+
+def _read(counts: FloatArray, pixel: Pixel, limit_dn: int | None) -> tuple[IndexArray, FloatArray, FloatArray]:
+    """Return row, digital number below the limit, and probability, of each count and number that occur."""
+    sigma = pixel.dn_per_e * pixel.read_noise_e
+    mean = pixel.dn_per_e * np.minimum(counts, pixel.well_e) + pixel.offset_dn
+    top = pixel.full_scale_dn
+    reach = min(math.ceil(_REACH * sigma) + 1, top)
+    center = np.clip(np.floor(mean + 0.5), 0, top)
+    number = center[:, None] + np.arange(-reach, reach + 1)
+    low, high = (number + side - mean[:, None] for side in (-0.5, 0.5))
+    # An end of the range takes what lies beyond it.
+    low, high = np.where(number == 0, -np.inf, low), np.where(number == top, np.inf, high)
+    if sigma:
+        upper = low > 0  # differences of small tails, not of numbers near 1
+        tails = [gaussian.share_below(np.where(upper, -end, end) / sigma) for end in (low, high)]
+        share = np.where(upper, tails[0] - tails[1], tails[1] - tails[0])
+    else:
+        share = ((low <= 0) & (high > 0)).astype(float)
+    inside = (number >= 0) & (number <= top) & (share > _LEAST)
+    if limit_dn is not None:
+        inside &= number < limit_dn
+    rows = np.asarray(np.nonzero(inside)[0], dtype=np.intp)
+    return rows, np.asarray(number[inside], dtype=float), np.asarray(share[inside], dtype=float)
+
+
+def merged_numbers(
+    electrons: FloatArray, light: FloatArray, channels: Sequence[IndexArray], pixel: Pixel
+) -> tuple[IndexArray, IndexArray, FloatArray, IndexArray]:
+    """Return the distributions of the mean merged value of the pixels of channels.
+
+    Parameters
+    ----------
+    electrons : ndarray of shape (n_exposures, n_designs, n_signals, n_pixels)
+        Expected electrons of each pixel.
+    light : ndarray of shape (n_exposures, n_pixels)
+        Light of exposures relative to that of a pixel of full sensitivity.
+    channels : sequence of ndarray of int
+        Pixels of each channel.
+    pixel : Pixel
+        HDR pixel.
+
+    Returns
+    -------
+    firsts, starts, roots, rows : ndarray
+        As in `confusion`: first bin, start and roots of the shares of each distinct signal, and the row of each
+        design's signal in each channel, ndarray of int of shape (n_channels, n_designs, n_signals).
+    """
+    firsts, shares, rows = list[int](), list[FloatArray](), list[IndexArray]()
+    for of_channel in channels:
+        lights = {tuple(light[:, at]) for at in of_channel}
+        assert len(lights) == 1
+        table = merged_table(pixel, lights.pop())
+        signals = np.moveaxis(electrons[..., of_channel], 0, -1)  # [n_designs, n_signals, n_pixels, n_exposures]
+        order = np.lexsort(np.moveaxis(signals, -1, 0), axis=-1)
+        flat = np.take_along_axis(signals, order[..., None], axis=2).reshape(-1, *signals.shape[2:])
+        distinct, which = np.unique(flat, axis=0, return_inverse=True)
+        rows.append(which.reshape(signals.shape[:2]) + len(firsts))
+        for pixels in distinct:
+            first, distribution = _channel(pixels, table, pixel.prnu)
+            firsts.append(first)
+            shares.append(distribution)
+    starts = np.concatenate([[0], np.cumsum([of.size for of in shares])]).astype(np.intp)
+    return np.array(firsts, dtype=np.intp), starts, np.sqrt(np.concatenate(shares)), np.stack(rows)
+
+
+def _channel(pixels: FloatArray, table: MergedTable, prnu: float) -> tuple[int, FloatArray]:
+    """Return first bin and shares of the mean of independent pixels, ndarray of shape (n_pixels, n_exposures)."""
+    from .compiled import merged_shares  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+    arrays = table.exposure, table.passed, table.starts, table.columns, table.shares
+    known: dict[bytes, tuple[int, FloatArray]] = {}
+    parts = []
+    for expected in pixels:
+        key = expected.tobytes()
+        if key not in known:
+            known[key] = merged_shares(expected, prnu, *arrays, table.n_bins)
+        parts.append(known[key])
+    first, shares = parts[0]
+    if len(parts) == 1:
+        return first + table.first, shares
+    # Sums of values in the middle of bins, sorted into the bins of the mean.
+    value, chance = table.bins.value(np.arange(shares.size) + first + table.first), shares
+    for at, (first, shares) in enumerate(parts[1:], 1):
+        other = table.bins.value(np.arange(shares.size) + first + table.first)
+        mean = (value[:, None] * at + other) / (at + 1)
+        number = table.bins.number(mean)
+        low = int(number.min())
+        chance = np.asarray(np.bincount((number - low).ravel(), (chance[:, None] * shares).ravel()), dtype=float)
+        value = table.bins.value(np.arange(chance.size) + low)
+    return low, chance
