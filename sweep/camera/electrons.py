@@ -142,7 +142,7 @@ class Electrons:
             self._kept: FloatArray | None = None
             if 0 < size <= KEPT and not once:
                 self._kept = self._table()
-                if setup.accuracy.single_precision:
+                if setup.accuracy.single_precision and not setup.camera.pixel.captures:
                     self._kept = np.asarray(self._kept, dtype=np.float32)
         else:
             self._touched, self._kept = np.empty(0, dtype=np.intp), None

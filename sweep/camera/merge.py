@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.types import BoolArray, FloatArray
-from .noise.moments import DRAWN
+from .noise.moments import DRAWN, LinearRange
 from .noise.subsets import Subset, SubsetMoments, subset_table, threshold_dn
 from .noise.table import unclipped_e
 from .pixel import Pixel
@@ -29,6 +29,9 @@ from .rounding import DITHERED_DN, MANY_STEPS, MOST_POISSON_E, rounded
 
 _PER_DEVIATION = 1.3
 _CERTAIN = 1 - 1e-12
+_CERTAIN_DN2, _ROUNDING = 1e-9, 1e-15
+_HELD = 200_000
+"""Values of pixels, of several gains, that are held at once."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,22 @@ def limits_dn(pixel: Pixel) -> tuple[int | None, ...]:
     return (*(threshold_dn(capture, pixel.threshold) for capture in pixel.read_as[:-1]), None)
 
 
+def saturating_e(pixel: Pixel) -> list[float]:
+    """Return the expected electrons of each exposure from which on all its captures are saturated.
+
+    Parameters
+    ----------
+    pixel : Pixel
+        HDR pixel.
+
+    Returns
+    -------
+    list of float
+        Electrons.
+    """
+    return [max(LinearRange.of(pixel.read_as[k]).last_e for k in exposure.numbers) for exposure in pixel.exposures]
+
+
 def merged(electrons: FloatArray, light: FloatArray, pixel: Pixel) -> Merged:
     """Merge noisy captures.
 
@@ -81,20 +100,28 @@ def merged(electrons: FloatArray, light: FloatArray, pixel: Pixel) -> Merged:
     Merged
         Merged values.
     """
-    if not pixel.prnu:
-        return _merged(electrons, light, pixel)
-    most = float(electrons.max(initial=0.0))
-    steps = math.ceil(DRAWN * _PER_DEVIATION * math.sqrt(1 + pixel.prnu**2 * min(most, 1e8)))
+    found = _merged(electrons, light, pixel) if not pixel.prnu else _over_gains(electrons, light, pixel)
+    # One reading in all but a billionth of the readouts: what is left is rounding of the arithmetic, by which two
+    # signals would seem separated with certainty. Two readings of a capture are at least 1 DN apart.
+    one = found.variance < np.maximum(_CERTAIN_DN2, _ROUNDING * found.mean**2)
+    return Merged(np.where(one, np.round(found.mean, 6), found.mean), np.where(one, 0.0, found.variance), found.certain)
+
+
+def _over_gains(electrons: FloatArray, light: FloatArray, pixel: Pixel) -> Merged:
+    """Return the mean over Gaussian gains of the pixels, by the trapezoidal rule."""
+    steps = math.ceil(DRAWN * _PER_DEVIATION * math.sqrt(1 + pixel.prnu**2 * max(saturating_e(pixel))))
     z = DRAWN * np.arange(-steps, steps + 1) / steps
     weights = np.exp(-0.5 * z**2) / np.exp(-0.5 * z**2).sum()
     mean = square = spread = np.zeros(electrons.shape[1:])
     about = _merged(electrons, light, pixel)
-    certain = about.certain
-    for weight, gain in zip(weights, 1 + pixel.prnu * z, strict=True):
-        one = _merged(electrons * gain, light, pixel)
-        off = one.mean - about.mean
-        mean, square, spread = mean + weight * off, square + weight * off**2, spread + weight * one.variance
-        certain = certain & one.certain
+    certain, at_once = about.certain, max(1, _HELD // max(1, electrons.size))
+    for start in range(0, z.size, at_once):
+        some = slice(start, start + at_once)
+        gains = (1 + pixel.prnu * z[some]).reshape(-1, *(1,) * (electrons.ndim - 1))
+        block = _merged(electrons[:, None] * gains, light[:, None], pixel)
+        for weight, value, variance in zip(weights[some], block.mean - about.mean, block.variance, strict=True):
+            mean, square, spread = mean + weight * value, square + weight * value**2, spread + weight * variance
+        certain = certain & block.certain.all(axis=0)
     return Merged(about.mean + mean, spread + square - mean**2, certain)
 
 

@@ -303,17 +303,15 @@ class Readout:
             As in `NoisyReadout`.
         """
         if self.pixel.captures:
-            of_pixels = merge.merged(electrons, self.capture_light_of(electrons), self.pixel)
-            dn, variance_dn = of_pixels.mean, of_pixels.variance
-        else:
-            dn, variance_dn = self.transfer(electrons), self.variance_dn(electrons)
+            merged = merge.merged(electrons, self.capture_light_of(electrons), self.pixel)
+            mean, variance = self.folded(merged.mean), self.spread(merged.variance)
+            return (mean, variance, *self._shape_of_merged(merged, electrons, variance))
+        dn, variance_dn = self.transfer(electrons), self.variance_dn(electrons)
         # A digital number that is the same in all but one of a billion readouts: what is left of its noise is
         # rounding of the arithmetic, by which two signals would seem separated with certainty.
         certain = variance_dn < _CERTAIN_DN2
         dn, variance_dn = np.where(certain, np.rint(dn), dn), np.where(certain, 0.0, variance_dn)
         mean, variance = self.folded(dn), self.spread(variance_dn)
-        if self.pixel.captures:
-            return (mean, variance, *self._shape_of_merged(of_pixels, electrons, variance))
         return (mean, variance, *self._shape_of_noise(electrons, variance))
 
     def channels_of(self, pixels: FloatArray, phase_index: int) -> FloatArray:

@@ -12,6 +12,8 @@ from ..camera.noise.compiled import poisson_shares
 
 RARE = 1e-40
 """Counts less probable than this, relative to the most probable one, are left out."""
+_RARE_COUNT, _MOST_GAIN = 1e-25, 9.0
+"""The same for HDR pixels, and standard deviations of their gains beyond which these are left out."""
 _TAIL = 13.0
 _PER_DEVIATION = 1.3
 _MOST_NATS = 100.0
@@ -160,6 +162,17 @@ def _sum_of(one: FloatArray, other: FloatArray) -> FloatArray:
 
 
 @njit(cache=True, nogil=True)
+def _occurring(shares: FloatArray, rare: float) -> tuple[int, int]:
+    """Return the range of shares without the rare ones at both ends."""
+    low, high = 0, shares.size
+    while low + 1 < high and shares[low] < rare:
+        low += 1
+    while high - 1 > low and shares[high - 1] < rare:
+        high -= 1
+    return low, high
+
+
+@njit(cache=True, nogil=True)
 def channel_numbers(
     electrons: FloatArray,
     most: int,
@@ -199,11 +212,7 @@ def channel_numbers(
                     electrons[i, u], most, well_e, prnu, read_e, line, n_bins, table
                 )
             first, shares = first + pixel_first, _sum_of(shares, pixel_shares)
-        low, high = 0, shares.size
-        while low + 1 < high and shares[low] < RARE:
-            low += 1
-        while high - 1 > low and shares[high - 1] < RARE:
-            high -= 1
+        low, high = _occurring(shares, RARE)
         firsts[i] = first + low
         starts[i + 1] = starts[i] + high - low
         if starts[i + 1] > values.size:
@@ -247,16 +256,22 @@ def merged_shares(
     """
     n_captures, n_exposures, n_counts = passed.shape
     total, brightest = np.zeros(n_bins), electrons.max()
-    half = int(_TAIL * _PER_DEVIATION * math.sqrt(1 + prnu * prnu * min(brightest, 1e8))) + 1 if prnu > 0 else 0
+    half = int(_MOST_GAIN * math.sqrt(1 + prnu * prnu * brightest)) + 1 if prnu > 0 else 0
     counts, before = np.empty((n_exposures, n_counts)), np.empty((n_captures, n_exposures))
-    ends = np.empty((n_exposures, 2), np.intp)
+    ends, first, last = (
+        np.empty((n_exposures, 2), np.intp),
+        np.full(n_exposures, n_counts),
+        np.zeros(n_exposures, np.intp),
+    )
+    chosen = np.zeros((n_captures, n_counts))
     all_gains = 0.0
     for i in range(-half, half + 1):
-        z = _TAIL * i / half if half else 0.0
+        z = _MOST_GAIN * i / half if half else 0.0
         weight = math.exp(-z * z / 2)
         all_gains += weight
         for at in range(n_exposures):
-            ends[at] = poisson_shares(max(electrons[at] * (1 + prnu * z), 0.0), 0, RARE, counts[at])
+            ends[at] = poisson_shares(max(electrons[at] * (1 + prnu * z), 0.0), 0, _RARE_COUNT, counts[at])
+            first[at], last[at] = min(first[at], ends[at, 0]), max(last[at], ends[at, 1])
             some = counts[at, ends[at, 0] : ends[at, 1]]
             some /= some.sum()
             for k in range(n_captures):
@@ -269,14 +284,12 @@ def merged_shares(
             if others < RARE:
                 continue
             for count in range(ends[exposure[k], 0], ends[exposure[k], 1]):
-                share = others * counts[exposure[k], count]
-                for entry in range(starts[k, count], starts[k, count + 1]):
-                    total[columns[entry]] += share * shares[entry]
-    low, high = 0, n_bins
-    while low + 1 < high and total[low] < RARE:
-        low += 1
-    while high - 1 > low and total[high - 1] < RARE:
-        high -= 1
+                chosen[k, count] += others * counts[exposure[k], count]
+    for k in range(n_captures):
+        for count in range(first[exposure[k]], last[exposure[k]]):
+            for entry in range(starts[k, count], starts[k, count + 1]):
+                total[columns[entry]] += chosen[k, count] * shares[entry]
+    low, high = _occurring(total, _RARE_COUNT)
     return low, total[low:high] / all_gains
 
 

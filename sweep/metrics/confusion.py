@@ -146,6 +146,9 @@ def errors(
     """
     from . import compiled as kernels  # noqa: PLC0415  (compiled: kept off the start-up path)
 
+    used = np.unique(np.concatenate(list(members.values())))
+    members = {name: np.searchsorted(used, signals) for name, signals in members.items()}
+    electrons = electrons[..., used, :]
     n_designs, n_signals = electrons.shape[-3:-1]
     unknown = np.asarray(np.isnan(electrons).reshape(-1, *electrons.shape[-3:]).any(axis=(0, 2, 3)))
     most_e = max(one.well_e for one in pixel.read_as or (pixel,))

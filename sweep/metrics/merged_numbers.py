@@ -14,7 +14,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..base.types import FloatArray, IndexArray
-from ..camera.merge import limits_dn
+from ..camera.merge import limits_dn, saturating_e
 from ..camera.noise import gaussian
 from ..camera.pixel import Pixel
 
@@ -275,45 +275,43 @@ def merged_numbers(
         design's signal in each channel, ndarray of int of shape (n_channels, n_designs, n_signals).
     """
     firsts, shares, rows = list[int](), list[FloatArray](), list[IndexArray]()
+    electrons = np.minimum(electrons, np.reshape(saturating_e(pixel), (-1, 1, 1, 1)))
     for of_channel in channels:
         lights = {tuple(light[:, at]) for at in of_channel}
         assert len(lights) == 1
-        table = merged_table(pixel, lights.pop())
+        of_light = lights.pop()
         signals = np.moveaxis(electrons[..., of_channel], 0, -1)  # [n_designs, n_signals, n_pixels, n_exposures]
         order = np.lexsort(np.moveaxis(signals, -1, 0), axis=-1)
         flat = np.take_along_axis(signals, order[..., None], axis=2).reshape(-1, *signals.shape[2:])
         distinct, which = np.unique(flat, axis=0, return_inverse=True)
         rows.append(which.reshape(signals.shape[:2]) + len(firsts))
         for pixels in distinct:
-            first, distribution = _channel(pixels, table, pixel.prnu)
+            first, distribution = _channel(pixels, pixel, of_light)
             firsts.append(first)
             shares.append(distribution)
     starts = np.concatenate([[0], np.cumsum([of.size for of in shares])]).astype(np.intp)
     return np.array(firsts, dtype=np.intp), starts, np.sqrt(np.concatenate(shares)), np.stack(rows)
 
 
-def _channel(pixels: FloatArray, table: MergedTable, prnu: float) -> tuple[int, FloatArray]:
-    """Return first bin and shares of the mean of independent pixels, ndarray of shape (n_pixels, n_exposures)."""
+@lru_cache(maxsize=4096)
+def _pixel(electrons: tuple[float, ...], pixel: Pixel, light: tuple[float, ...]) -> tuple[int, FloatArray]:
+    """Return first bin and shares of one pixel; cached, since CFAs share channels."""
     from .compiled import merged_shares  # noqa: PLC0415  (compiled: kept off the start-up path)
 
+    table = merged_table(pixel, light)
     arrays = table.exposure, table.passed, table.starts, table.columns, table.shares
-    known: dict[bytes, tuple[int, FloatArray]] = {}
-    parts = []
-    for expected in pixels:
-        key = expected.tobytes()
-        if key not in known:
-            known[key] = merged_shares(expected, prnu, *arrays, table.n_bins)
-        parts.append(known[key])
-    first, shares = parts[0]
-    if len(parts) == 1:
-        return first + table.first, shares
+    first, shares = merged_shares(np.array(electrons), pixel.prnu, *arrays, table.n_bins)
+    return first + table.first, shares
+
+
+def _channel(pixels: FloatArray, pixel: Pixel, light: tuple[float, ...]) -> tuple[int, FloatArray]:
+    """Return first bin and shares of the mean of independent pixels, ndarray of shape (n_pixels, n_exposures)."""
+    parts, bins = [_pixel(tuple(expected), pixel, light) for expected in pixels], merged_table(pixel, light).bins
+    low, chance = parts[0]
     # Sums of values in the middle of bins, sorted into the bins of the mean.
-    value, chance = table.bins.value(np.arange(shares.size) + first + table.first), shares
     for at, (first, shares) in enumerate(parts[1:], 1):
-        other = table.bins.value(np.arange(shares.size) + first + table.first)
-        mean = (value[:, None] * at + other) / (at + 1)
-        number = table.bins.number(mean)
+        value, other = bins.value(np.arange(chance.size) + low), bins.value(np.arange(shares.size) + first)
+        number = bins.number((value[:, None] * at + other) / (at + 1))
         low = int(number.min())
         chance = np.asarray(np.bincount((number - low).ravel(), (chance[:, None] * shares).ravel()), dtype=float)
-        value = table.bins.value(np.arange(chance.size) + low)
     return low, chance

@@ -14,9 +14,12 @@ from ..base.types import Number, Section
 from ..camera.scene import Scene
 from .schema_curves import Name
 
+FORMS = "a number, a list of numbers, `min`, `max` and `count`, or `geometric: [min, max, count]`"
+_MOST_COUNT = 1_000_000
+
 
 class Axis(Section):
-    """Values of one parameter: a list, or `count` equidistant ones from `min` to `max`."""
+    """Values of one parameter: a list, `count` equidistant ones from `min` to `max`, or ones of equal ratio."""
 
     values: list[Number] | None = Field(default=None, min_length=1)
     """List of values."""
@@ -24,14 +27,21 @@ class Axis(Section):
     """Smallest value."""
     max: Number | None = None
     """Largest value."""
-    count: int | None = Field(default=None, ge=1, le=1_000_000)
+    count: int | None = Field(default=None, ge=1, le=_MOST_COUNT)
     """Number of equidistant values."""
+    geometric: Annotated[list[Number], Field(min_length=3, max_length=3)] | None = None
+    """Smallest value, largest value, and number of values whose ratio to the one before is the same."""
 
     @model_validator(mode="after")
     def _one_form(self) -> Axis:
         spanned = (self.min, self.max, self.count)
-        if (self.values is None) == (None in spanned) or (self.values is not None and spanned != (None, None, None)):
-            raise ValueError("an axis is a number, a list of numbers, or `min`, `max` and `count`")
+        forms = (self.values is not None, None not in spanned, self.geometric is not None)
+        if sum(forms) != 1 or (not forms[1] and spanned != (None, None, None)):
+            raise ValueError(f"an axis is {FORMS}")
+        if self.geometric is not None:
+            low, high, count = self.geometric
+            if not (0 < low < high and count == int(count) and 2 <= count <= _MOST_COUNT):
+                raise ValueError("geometric: a number above 0, a larger one, and how many values, 2 or more")
         if self.min is not None and self.max is not None and not self.min <= self.max:
             raise ValueError(f"min {self.min:g} must not be above max {self.max:g}")
         if self.count == 1 and self.min != self.max:
@@ -41,12 +51,15 @@ class Axis(Section):
     @property
     def size(self) -> int:
         """Number of values."""
-        return self.count or len(self.values or ())
+        return self.count or len(self.values or ()) or int((self.geometric or [0])[-1])
 
     def points(self) -> tuple[float, ...]:
         """Return the values, in order."""
         if self.values is not None:
             return tuple(self.values)
+        if self.geometric is not None:
+            low, high, last = self.geometric[0], self.geometric[1], int(self.geometric[2]) - 1
+            return tuple(high if i == last else low * (high / low) ** (i / last) for i in range(last + 1))
         assert self.min is not None and self.max is not None and self.count is not None  # noqa: PT018
         step = (self.max - self.min) / max(1, self.count - 1)
         return tuple(self.max if i == self.count - 1 else self.min + i * step for i in range(self.count))
@@ -136,7 +149,7 @@ def _numbers(where: str, axis: Any) -> tuple[float, ...]:
     try:
         checked = Axis.model_validate(_axis(axis))
     except ValidationError:
-        raise ValueError(f"{where}: a number, a list of numbers, or `min`, `max` and `count`") from None
+        raise ValueError(f"{where}: {FORMS}") from None
     if checked.size > _MOST_SCENARIOS:
         raise ValueError(f"{where}: more than {_MOST_SCENARIOS} scenarios")
     return tuple(axis) if isinstance(axis, list) else checked.points()
