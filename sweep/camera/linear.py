@@ -285,7 +285,8 @@ def linear_model(setup: Setup) -> LinearModel:
     Parameters
     ----------
     setup : Setup
-        Camera, lights, scene and accuracy; at most 9 field positions and 2 moments of a pulse are used.
+        Camera, lights, scene and accuracy; at most 9 field positions and 2 moments of a pulse are used. An HDR
+        pixel is one of full sensitivity, read once.
 
     Returns
     -------
@@ -295,5 +296,6 @@ def linear_model(setup: Setup) -> LinearModel:
     few = setup.accuracy.model_copy(
         update={"field_positions": min(setup.accuracy.field_positions, _FIELD_POSITIONS), "pwm_moments": 2}
     )
+    setup = setup.with_camera(pixel=setup.camera.pixel.read_once) if setup.camera.pixel.captures else setup
     without_readout = replace(setup, left_out=setup.left_out | READOUT, accuracy=few)
     return _models.get(hashlib.sha256(pickle.dumps(without_readout)).digest(), lambda: LinearModel(without_readout))

@@ -109,6 +109,11 @@ class Pixel(Section):
         return _read_as(self)
 
     @property
+    def read_once(self) -> Pixel:
+        """The pixel of full sensitivity whose DN are those of the merged value."""
+        return self.model_copy(update={"captures": (), "companding": (), "gain_dn_per_e": self.dn_per_e})
+
+    @property
     def exposures(self) -> tuple[Exposure, ...]:
         """Electrons that captures read, each once, in the order of their most sensitive captures."""
         groups: dict[object, list[int]] = {}

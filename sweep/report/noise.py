@@ -23,6 +23,11 @@ _COMPUTED = (
     "two that are confused most. The dashed line is the error that the study allows; a ring marks where a design "
     "passes it."
 )
+_ANY = "error with a signal of another state at any intensity"
+_ANY_NOTE = (
+    "A camera does not know how bright a lamp is: each signal is compared with those of other states at all "
+    "intensities of the axis. Noise is taken as Gaussian."
+)
 _COUNTED = (
     "Counted: of raw patches drawn with noise, of all signals, the share whose state a classifier says that was "
     "trained on others. It is of all signals, the error above of the two that are confused most: neither follows from "
@@ -63,6 +68,11 @@ def _noise_figures(output: Output) -> Iterator[SeriesFigure]:
         allowed = output.study.recognition.error_max
         y_label = f"{_ERROR} ({_LEAST:g}: or less)"
         yield draw(f"{where}: {_ERROR}", y_label=y_label, lines=errors, log_y=True, level=allowed, note=_COMPUTED)
+        of_any = _any_intensity(output, base, key)
+        if of_any:
+            lines = {name: Line(np.maximum(error, _LEAST), None) for name, error in of_any.items()}
+            y_label = f"{_ANY} ({_LEAST:g}: or less)"
+            yield draw(f"{where}: {_ANY}", y_label=y_label, lines=lines, log_y=True, level=allowed, note=_ANY_NOTE)
         if output.recognition is not None:
             for rule in CLASSIFIERS:
                 accuracies = over_series(output.recognition, scenarios, f"{rule}_accuracy")
@@ -94,6 +104,12 @@ def usable_lines(output: Output) -> Iterator[str]:
         for design, errors in over_series(output.few, scenarios, STATE_ERROR).items():
             where = _range(x, errors <= allowed, unit, passes.get(design))
             ranges.setdefault(where, []).append(design)
+        of_any: dict[str, list[str]] = {}
+        for design, errors in _any_intensity(output, base, key).items():
+            of_any.setdefault(_range(x, errors <= allowed, unit, None), []).append(design)
+        if of_any:
+            usable = "; ".join(f"{', '.join(designs)} {where}" for where, designs in of_any.items())
+            yield f"With lamps of unknown intensity, at most {_rate(allowed)} over {name}: {usable}."
         if ranges:
             usable = "; ".join(f"{', '.join(designs)} {where}" for where, designs in ranges.items())
             yield f"At most {_rate(allowed)} between the worst two states, over {name}: {usable}."
@@ -114,7 +130,9 @@ def _range(x: FloatArray, usable: BoolArray, unit: str, passes: tuple[float, flo
     ends = np.flatnonzero(np.diff(usable))
     of = f" of {unit}" if " " in unit else f" {unit}".rstrip()
     if len(ends) > 1:
-        return f"at {' '.join(f'{v:g}' for v in x[usable])}{of}"
+        runs = [run for run in np.split(np.arange(x.size), ends + 1) if usable[run[0]]]
+        spans = [f"{x[run[0]]:.3g}" + (f" to {x[run[-1]]:.3g}" if run.size > 1 else "") for run in runs]
+        return f"at {', '.join(spans)}{of}"
     word = "up to" if usable[0] else "from"
     if passes is None:
         low, high = x[ends[0] : ends[0] + 2]
@@ -137,6 +155,14 @@ def _crossings(output: Output, series: str, key: str) -> dict[str, tuple[float, 
     known = output.crossings.dropna(subset=["at", "error"])
     known = known[(known["series"] == series) & (known["key"] == key)]
     return dict(zip(known["name"], zip(known["at"], known["error"], strict=True), strict=True))
+
+
+def _any_intensity(output: Output, series: str, key: str) -> dict[str, FloatArray]:
+    """Return errors with signals of any intensity, over the series, by design."""
+    if output.any_intensity is None or key not in output.any_intensity:
+        return {}
+    known = output.any_intensity[output.any_intensity["series"] == series].sort_values(key, kind="stable")
+    return {str(name): part["error"].to_numpy(dtype=float) for name, part in known.groupby("name", sort=False)}
 
 
 def recognition_table(output: Output) -> pd.DataFrame:

@@ -21,6 +21,7 @@ from . import signal_figures as signals
 from . import tables
 from . import values as content
 from .answer import answer_parts, headline_numbers
+from .captures import capture_drawings
 from .colors import color_drawings
 from .figures import Drawing, draw_curves, pictures_of
 from .lamps import lamp_drawings, lamp_table
@@ -190,6 +191,7 @@ def _drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
         yield f"filters-{number}", f"Filters of {cfa}", partial(draw_curves, content.filters_figure(output, cfa))
     for number, series in enumerate(all_series(output), 1):
         yield f"series-{number}", series.title, partial(draw_series, series)
+    yield from capture_drawings(output)
     card = scorecard(output)
     if card is not None:
         yield "scorecard", f"Every figure relative to {card.names[0]}", partial(draw_scorecard, card)

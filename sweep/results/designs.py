@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -15,6 +15,7 @@ from ..base.types import FloatArray
 from ..base.user_code import CODE_OF, is_code
 from ..designs.space import Space
 from ..study import Study, load_study
+from ..study.axes import series_of
 from ..study.sources import KeptSources
 from .tables import FEW, RESOLVED, RESULTS, batches
 
@@ -108,6 +109,44 @@ def few_rows(table: pd.DataFrame) -> list[dict[Any, Any]]:
         Rows.
     """
     return computed_rows(table[table["kind"].isin(FEW)])
+
+
+def rows_of_series(
+    study: Study, table: pd.DataFrame
+) -> Iterator[tuple[str, str, dict[str, float], Mapping[Any, Any], FloatArray, Space]]:
+    """Yield each design that was computed in all scenarios of a series.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    table : pandas.DataFrame
+        Result table.
+
+    Yields
+    ------
+    series, key : str
+        Name of the series, and key in which its scenarios differ.
+    scenarios : dict of str to float
+        Number of each scenario.
+    row : mapping
+        Row of the first scenario.
+    curves : ndarray of shape (1, n_modified, n_wavelengths)
+        QE.
+    space : Space
+        Design space.
+    """
+    few = few_rows(table)
+    for (series, key), scenarios in series_of(study.scenarios).items():
+        by_name: dict[str, dict[str, Mapping[Any, Any]]] = {}
+        for row in few:
+            if row["scenario"] in scenarios:
+                by_name.setdefault(row["name"], {})[row["scenario"]] = row
+        for of_scene in by_name.values():
+            if of_scene.keys() == scenarios.keys():
+                first = of_scene[next(iter(scenarios))]
+                space, curves = row_curves(study, first)
+                yield series, key, scenarios, first, curves, space
 
 
 def find_design_row(output: Output, key: str) -> Mapping[Any, Any]:

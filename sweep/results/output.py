@@ -57,8 +57,9 @@ class Output:
     sweep is no grid. `swept_points`: ids of the swept designs that figures show as points. `searched`: the search's
     evaluations. `audited`: rows of `sweep audit`; `left_out`: a row per light that was left out of a search; `regions`:
     cells of the maps of color regions. `error_against_noise`: color error against noise, `rendered`: areas of
-    pictures; `places`: separations over the sensor; `map`: the best objective over two parameters; `vision`: tables of
-    the benchmark of vision by their files' names.
+    pictures; `places`: separations over the sensor; `map`: the best objective over two parameters; `handovers`: where
+    captures of an HDR pixel are full; `any_intensity`: lamps of unknown intensity; `vision`: tables of the benchmark of
+    vision by their files' names.
     """
 
     folder: Path
@@ -81,6 +82,8 @@ class Output:
     rendered: pd.DataFrame | None
     places: pd.DataFrame | None
     map: pd.DataFrame | None
+    handovers: pd.DataFrame | None
+    any_intensity: pd.DataFrame | None
     vision: Mapping[str, pd.DataFrame]
     profiles: Mapping[str, Sequence[ParameterProfile]]
     _made: dict[object, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
@@ -307,6 +310,8 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         rendered=more.get(files.RENDERED),
         places=more.get(files.SENSOR_MAP),
         map=more.get(files.MAP),
+        handovers=more.get(files.HANDOVERS),
+        any_intensity=more.get(files.ANY_INTENSITY),
         vision={name: more[name] for name in files.VISION_TABLES if name in more},
         profiles=profiles.found if all(made.grid is not None for made in study.sweeps.values()) else {},
     )

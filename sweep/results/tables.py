@@ -36,6 +36,7 @@ TRADED, RENDERED = "color_noise.parquet", "rendered.parquet"
 CHART, NIGHT = "chart", "night"
 """Pictures of which `rendered.parquet` has the areas."""
 COMBINATIONS, MAP = "combinations.parquet", "map.parquet"
+HANDOVERS, ANY_INTENSITY = "handovers.parquet", "any_intensity.parquet"
 VALIDATED, LEFT_OUT = "validated.parquet", "leave_one_out.parquet"
 VISION, VISION_CONDITIONS = "vision.parquet", "vision_conditions.parquet"
 VISION_MISREAD = "vision_misread.parquet"
@@ -49,14 +50,15 @@ REPORT, FIGURES, VISION_FIGURES = "report.html", "figures", "vision-"
 MADE_BY_RUN = frozenset(
     (
         *(RESULTS, SEARCH_LOG, FRONT, CURVES, POINTS, RECOGNITION, CROSSINGS, LIMITED_BY, ROBUSTNESS, REGIONS_MAP),
-        *(SENSOR_MAP, TRADED, RENDERED, VALIDATED, LEFT_OUT, COMBINATIONS, MAP, *VISION_TABLES, PROVENANCE, RESOLVED),
+        *(SENSOR_MAP, TRADED, RENDERED, VALIDATED, LEFT_OUT, COMBINATIONS, MAP, HANDOVERS, ANY_INTENSITY),
+        *(*VISION_TABLES, PROVENANCE, RESOLVED),
     )
 )
 """Files that a run itself writes beside its lists; the report draws from them, `sweep audit` adds a table."""
 _DRAWN = re.compile(
     r"report\.html|cfas\.(png|svg)|pareto(-\d+)?\.(png|svg)|paper_comparison\.(csv|parquet)"
     r"|figures/((filters|series|places)-\d+|tiles|sensor|signals|chart|scorecard|(color-noise|rendered)-\d+"
-    r"|regions-\d+|map|clouds-(cfas|designs)|vision-(errors|ranks|misread))\.(png|svg)"
+    r"|regions-\d+|map|captures-\d+|clouds-(cfas|designs)|vision-(errors|ranks|misread))\.(png|svg)"
 )
 _PARAMETERS = "cfa_sweep_parameters"
 _ROWS_AT_ONCE = 65_536
