@@ -116,13 +116,38 @@ def light_in(drive: PwmDrive, start: FloatArray, length: FloatArray) -> FloatArr
     return np.asarray((on_time(drive, start + length) - on_time(drive, start)) / (length * drive.duty), dtype=float)
 
 
-def _phases(drive: PwmDrive, starts: FloatArray, lengths: FloatArray, between: int) -> FloatArray:
+def _windows(setup: Setup, exposure_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return start and length of each exposure of an HDR pixel, ndarray of shape (n_exposures, n_designs), periods."""
+    drive = setup.scene.drive
+    assert drive is not None
+    captures = [exposure.capture for exposure in setup.camera.pixel.exposures]
+    periods = exposure_s * drive.frequency_hz
+    starts, lengths = ([getattr(capture, name) for capture in captures] for name in ("start_ratio", "exposure_ratio"))
+    return np.array(starts)[:, None] * periods, np.array(lengths)[:, None] * periods
+
+
+def phases_of(setup: Setup, exposure_s: FloatArray, between: int) -> FloatArray:
     """Return phases of a pulse: those at which an exposure begins or ends with a pulse, and some between them.
 
     The light in each exposure is linear between two such phases, so that its extremes are at them.
 
-    `starts`, `lengths`: [n_exposures, n_designs], periods. Returns [n_designs, n_phases].
+    Parameters
+    ----------
+    setup : Setup
+        Drive and HDR pixel.
+    exposure_s : ndarray of shape (n_designs,)
+        Exposure time of the scene, s.
+    between : int
+        Number of phases between two.
+
+    Returns
+    -------
+    ndarray of shape (n_designs, n_phases)
+        Start of the first exposure after the start of a pulse, periods, ascending.
     """
+    drive = setup.scene.drive
+    assert drive is not None
+    starts, lengths = _windows(setup, exposure_s)
     ends = np.stack([starts, starts + lengths])[None] - np.array([0.0, drive.duty])[:, None, None, None]
     corners = np.sort(np.mod(-ends, 1.0).reshape(-1, starts.shape[1]), axis=0)
     gaps = np.diff(np.concatenate([corners, corners[:1] + 1.0]), axis=0)
@@ -147,15 +172,12 @@ def exposure_scales(setup: Setup, exposure_s: FloatArray, moments: FloatArray | 
     ndarray of shape (n_exposures, n_designs, n_moments)
         Relative light.
     """
-    captures = [exposure.capture for exposure in setup.camera.pixel.exposures]
     drive = setup.scene.drive
     if drive is None or not setup.computes("flicker"):
-        return np.ones((len(captures), len(exposure_s), 1))
-    periods = exposure_s * drive.frequency_hz
-    starts = np.array([capture.start_ratio for capture in captures])[:, None] * periods
-    lengths = np.array([capture.exposure_ratio for capture in captures])[:, None] * periods
+        return np.ones((len(setup.camera.pixel.exposures), len(exposure_s), 1))
+    starts, lengths = _windows(setup, exposure_s)
     if moments is None:
-        phases = _phases(drive, starts, lengths, setup.accuracy.pwm_moments - 2)
+        phases = phases_of(setup, exposure_s, setup.accuracy.pwm_moments - 2)
     else:
         phases = np.broadcast_to(moments, (len(exposure_s), moments.size))
     return light_in(drive, phases + starts[:, :, None], lengths[:, :, None])

@@ -294,6 +294,42 @@ def merged_shares(
 
 
 @njit(cache=True, nogil=True)
+def mean_shares(
+    value: FloatArray, chance: FloatArray, other: FloatArray, shares: FloatArray, edges: FloatArray, weight: int
+) -> FloatArray:
+    """Return the distribution of the mean of `weight` values and another one.
+
+    Parameters
+    ----------
+    value, other : ndarray of shape (n,) and (m,)
+        Values, ascending: means of `weight` pixels, and of one.
+    chance, shares : ndarray of the same shapes
+        Their probabilities.
+    edges : ndarray of shape (n_bins - 1,)
+        Edges between bins, ascending.
+    weight : int
+        Number of pixels.
+
+    Returns
+    -------
+    ndarray of shape (n_bins,)
+        Probability of each bin.
+    """
+    total = np.zeros(edges.size + 1)
+    for i in range(value.size):
+        if chance[i] == 0:
+            continue
+        fixed = value[i] * weight / (weight + 1)
+        at = np.searchsorted(edges, fixed + other[0] / (weight + 1), side="right")
+        for j in range(other.size):
+            mean = fixed + other[j] / (weight + 1)
+            while at < edges.size and mean >= edges[at]:
+                at += 1
+            total[at] += chance[i] * shares[j]
+    return total
+
+
+@njit(cache=True, nogil=True)
 def overlaps(firsts: IndexArray, starts: IndexArray, roots: FloatArray, rows: IndexArray) -> FloatArray:
     """Return the Bhattacharyya coefficient of each two signals of a design.
 

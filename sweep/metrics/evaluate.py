@@ -12,6 +12,7 @@ from ..camera.electrons import Changing
 from ..camera.field import field_heights, refined_heights, setup_at
 from ..camera.forward import ForwardModel, forward_model
 from ..camera.phases import Phases, fine_lattice, refined_minima
+from ..camera.pwm import phases_of
 from ..camera.setup import Setup
 from ..designs.block import Block, CurveBlock
 from ..designs.family import Family
@@ -25,6 +26,7 @@ from .quantity import (
     DesignMetric,
     FamilyMetric,
     NoiseMetric,
+    PulseMetric,
     ReadoutMetric,
     RequestedQuantities,
     VisionMetric,
@@ -150,7 +152,10 @@ def _over_pulse(model: ForwardModel, curves: FloatArray, pairs: Sequence[int], p
         response = model.at(phases, moments).read(curves)[0][0]
         return list(separations(response, model.setup.members).values())
 
-    first = np.linspace(0.0, 1.0, _FINER_MOMENTS * (model.setup.accuracy.pwm_moments - 1) + 1)
+    finer = _FINER_MOMENTS * (model.setup.accuracy.pwm_moments - 1)
+    first = np.linspace(0.0, 1.0, finer + 1)
+    if model.setup.camera.pixel.captures:
+        first = phases_of(model.setup, model.light.exposure_s(curves), finer)[0]
     at_first = distances(first)
     smallest = np.array([at_first[pair].min() for pair in pairs])
     for number, pair in enumerate(pairs):
@@ -403,5 +408,7 @@ def _read(
     else:
         response, exposure_s = model.read(curves)
     apart |= extra(len(curves), response.__getitem__, lambda part: model.unlit(curves[part], exposure_s[part]))
+    if model.setup.scene.drive is not None and model.setup.camera.pixel.captures:
+        apart |= _joined([metric.of_pulses(model, curves) for metric in METRICS if isinstance(metric, PulseMetric)])
     cases = by_case(model.setup, response, _CSD)
     return cases, over_cases(model, cases) | apart | {EXPOSURE: exposure_s}

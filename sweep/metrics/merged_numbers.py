@@ -1,6 +1,6 @@
 """Distribution of the merged value of HDR pixels whose first usable capture counts, by exact sums.
 
-The merged value is in bins of a quarter of its noise, or in the codes of a companded pixel. Which captures are usable,
+The merged value is in bins of an eighth of its noise, or in the codes of a companded pixel. Which captures are usable,
 read noise, full well, ADC range and rounding are exact.
 """
 
@@ -18,7 +18,7 @@ from ..camera.merge import limits_dn, saturating_e
 from ..camera.noise import gaussian
 from ..camera.pixel import Pixel
 
-_PER_NOISE = 4.0
+_PER_NOISE = 8.0
 """Bins per standard deviation of the noise."""
 _REACH = 9.5
 _MOST_READ = 2e7
@@ -29,7 +29,7 @@ _LEAST = 1e-25
 
 @dataclass(frozen=True)
 class Bins:
-    """Bins of merged values: a quarter of the noise of the capture that is used at them, or codes.
+    """Bins of merged values: an eighth of the noise of the capture that is used at them, or codes.
 
     Parameters
     ----------
@@ -101,13 +101,13 @@ class Bins:
         widths += np.minimum(electrons, 0.0) * light / np.sqrt(dark)
         return np.asarray(np.floor(_PER_NOISE * widths), dtype=np.intp)
 
-    def value(self, number: IndexArray) -> FloatArray:
+    def value(self, number: IndexArray | FloatArray) -> FloatArray:
         """Return the values in the middle of bins.
 
         Parameters
         ----------
-        number : ndarray of int
-            Bins.
+        number : ndarray
+            Bins; half a bin less is a bin's lower edge.
 
         Returns
         -------
@@ -306,12 +306,15 @@ def _pixel(electrons: tuple[float, ...], pixel: Pixel, light: tuple[float, ...])
 
 def _channel(pixels: FloatArray, pixel: Pixel, light: tuple[float, ...]) -> tuple[int, FloatArray]:
     """Return first bin and shares of the mean of independent pixels, ndarray of shape (n_pixels, n_exposures)."""
+    from .compiled import mean_shares  # noqa: PLC0415  (compiled: kept off the start-up path)
+
     parts, bins = [_pixel(tuple(expected), pixel, light) for expected in pixels], merged_table(pixel, light).bins
     low, chance = parts[0]
-    # Sums of values in the middle of bins, sorted into the bins of the mean.
+    # Means of values in the middle of bins, sorted into bins.
     for at, (first, shares) in enumerate(parts[1:], 1):
-        value, other = bins.value(np.arange(chance.size) + low), bins.value(np.arange(shares.size) + first)
-        number = bins.number((value[:, None] * at + other) / (at + 1))
-        low = int(number.min())
-        chance = np.asarray(np.bincount((number - low).ravel(), (chance[:, None] * shares).ravel()), dtype=float)
+        value, other = (bins.value(np.arange(of.size) + begin) for of, begin in ((chance, low), (shares, first)))
+        ends = [(value[k] * at + other[k]) / (at + 1) for k in (0, -1)]
+        low, last = (int(number) for number in bins.number(np.array(ends)))
+        edges = bins.value(np.arange(low + 0.5, last))
+        chance = mean_shares(value, chance, other, shares, edges, at)
     return low, chance

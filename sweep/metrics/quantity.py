@@ -334,8 +334,8 @@ class RequestedQuantities:
         Share of random lamps and cameras; 0: none.
     tasks : tuple of TaskColumns
         Tasks.
-    probabilities, vision : bool
-        Contrast detection probability; benchmark of vision.
+    probabilities, vision, flicker : bool
+        Contrast detection probability; benchmark of vision; pulsed lamps in an HDR pixel.
     user_metrics : tuple of UserMetric
         Metrics of user code.
     brightest : str
@@ -351,6 +351,7 @@ class RequestedQuantities:
     tasks: tuple[TaskColumns, ...] = ()
     probabilities: bool = False
     vision: bool = False
+    flicker: bool = False
     user_metrics: tuple[UserMetric, ...] = ()
     brightest: str = ""
 
@@ -441,6 +442,27 @@ class NoiseMetric(Metric):
             Readout of these designs.
         members : mapping of str to ndarray of int
             Signals of each state.
+
+        Returns
+        -------
+        dict of str to ndarray of shape (n_designs,)
+            Column name -> values.
+        """
+
+
+class PulseMetric(Metric):
+    """Metric of a pulsed lamp in an HDR pixel."""
+
+    @abstractmethod
+    def of_pulses(self, model: ForwardModel, curves: FloatArray) -> Columns:
+        """Compute the columns over all phases of a pulse.
+
+        Parameters
+        ----------
+        model : ForwardModel
+            Model of the scene.
+        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE of the modified channels.
 
         Returns
         -------

@@ -160,8 +160,9 @@ FILES = {
     "CFA, named design and answer of the search (`name`) and intensity, the smallest d' of a signal from one of "
     "another state at any intensity of the series (`other_cd`), and the `error` of Gaussians at it",
     files.HANDOVERS: "where the pixel has captures and scenarios differ in one number: for each plain CFA, named "
-    "design and answer of the search (`name`), channel and signal type, the number `at` which the median signal reaches "
-    "the threshold of each capture (from 1 on), or saturation of the last one; inf: at none of the series, -inf: at all",
+    "design and answer of the search (`name`), channel and signal type, the number `at` which the median signal "
+    "reaches the threshold of each capture (from 1 on), or saturation of the last one; inf: at none of the series, "
+    "-inf: at all",
     files.TRADED: "where a study has the task `color`: mean color error against luminance SNR, a row per design, "
     "light and regularization of the color matrix",
     files.RENDERED: "there, too: colors (XYZ over white) and noise of the areas of two rendered pictures",

@@ -378,6 +378,7 @@ def requested_quantities(
         wanted_yield=section.wanted_yield,
         tasks=() if tasks is None else tasks.columns,
         vision=section.vision is not None,
+        flicker=bool(section.pixel.captures) and any(one.drive is not None for one in section.scenarios.values()),
         user_metrics=user_metrics,
     )
 

@@ -1,0 +1,300 @@
+"""HDR pixels: merged captures against Monte Carlo, brute-force distributions and ISETCam's rule; pulsed lamps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from pydantic import ValidationError
+from scipy import stats
+
+from sweep.camera.captures import NAMED_CAPTURES, Capture
+from sweep.camera.forward import forward_model
+from sweep.camera.merge import limits_dn, merged, merged_without_noise
+from sweep.camera.pixel import Pixel
+from sweep.camera.pwm import exposure_scales, light_in, phases_of
+from sweep.camera.scene import FixedExposure, PwmDrive, Scene
+from sweep.camera.setup import Setup
+from sweep.metrics import confusion
+from sweep.metrics.evaluate import evaluate
+
+from ..metrics.test_evaluate import setup as setup_of_chart
+
+Array = NDArray[np.float64]
+DRAWS = 1_000_000
+
+
+def chart_setup(scene: Scene, pixel: Pixel) -> Setup:
+    """RYNCy with its base curve in N."""
+    return setup_of_chart(scenario=scene).with_camera(pixel=pixel)
+
+
+def base_curves(setup: Setup) -> Array:
+    return setup.camera.base_qe[None]
+
+
+def relative_light(pixel: Pixel) -> Array:
+    return np.array([exposure.capture.light for exposure in pixel.exposures])
+
+
+def exposure_of(pixel: Pixel) -> list[int]:
+    """Captures read the same electrons if they have the same light, start, QE and crosstalk."""
+    return [[k in e.numbers for e in pixel.exposures].index(True) for k in range(len(pixel.captures))]
+
+
+def drawn(expected: Array, pixel: Pixel, rng: np.random.Generator, n: int) -> Array:
+    """Merged values of n readouts, by the textbook: gain, Poisson, well, read noise, ADC; then the rule."""
+    light, at, limits = relative_light(pixel), exposure_of(pixel), limits_dn(pixel)
+    gain = 1 + pixel.prnu * rng.standard_normal(n)
+    counts = [rng.poisson(np.maximum(e * gain, 0)) for e in expected]
+    read = []
+    for k, one in enumerate(pixel.read_as):
+        e = np.minimum(counts[at[k]], one.well_e) + one.read_noise_e * rng.standard_normal(n)
+        read.append(np.clip(np.floor(e * one.dn_per_e + one.offset_dn + 0.5), 0, one.full_scale_dn))
+    usable = np.array([np.full(n, True) if c is None else dn < c for dn, c in zip(read, limits, strict=True)])
+    x = np.array([(dn - o.offset_dn) / o.dn_per_e / light[a] for dn, o, a in zip(read, pixel.read_as, at, strict=True)])
+    if pixel.merge == "saturated":
+        return pixel.dn_per_e * x[usable.argmax(axis=0), np.arange(n)] + pixel.offset_dn
+    value, code = np.empty(n), (usable * 2 ** np.arange(len(read))[:, None]).sum(axis=0)
+    for which in np.unique(code):
+        some = [k for k in range(len(read)) if which >> k & 1]
+        covariance = np.zeros((len(some), len(some)))
+        for i, a in enumerate(some):
+            for j, b in enumerate(some):
+                if at[a] == at[b]:
+                    covariance[i, j] += expected[at[a]] / light[at[a]] ** 2
+                if a == b:
+                    one = pixel.read_as[a]
+                    covariance[i, j] += (one.read_noise_e**2 + 1 / (12 * one.dn_per_e**2)) / light[at[a]] ** 2
+        weights = np.linalg.solve(covariance, np.ones(len(some)))
+        here = code == which
+        value[here] = weights / weights.sum() @ x[some][:, here]
+    return pixel.dn_per_e * value + pixel.offset_dn
+
+
+def random_pixel(rng: np.random.Generator, **changes: Any) -> tuple[Pixel, Array]:
+    """A pixel and expected electrons of its exposures: dark, at a threshold, or beyond it."""
+    captures: Any = str(rng.choice(list(NAMED_CAPTURES)))
+    if rng.random() < 0.5:
+        light = np.sort(10 ** rng.uniform(-2, 0, 3))[::-1]
+        wells = rng.uniform(200, 5_000, 3)
+        wells[1:] = np.maximum(wells[1:], light[1:] / light[:-1] * wells[:-1] * rng.uniform(1, 3, 2))
+        captures = [{"sensitivity": a, "well_e": w, "bits": 14} for a, w in zip(light, np.sort(wells), strict=True)]
+    chosen = {
+        "merge": str(rng.choice(["saturated", "weighted"])),
+        "offset_dn": float(rng.choice([0, 64, 168])),
+        "prnu": float(rng.choice([0, 0.01])),
+        "read_noise_e": float(rng.choice([0, 0.5, 3])),
+        "threshold": float(rng.choice([0.5, 0.9, 1.0])),
+    }
+    pixel = Pixel(captures=captures, **(chosen | changes))
+    light = relative_light(pixel)
+    k = rng.integers(len(pixel.captures))
+    full = pixel.read_as[k].saturation_e / light[exposure_of(pixel)[k]]
+    near = full * pixel.threshold * rng.uniform(0.97, 1.03)
+    return pixel, float(rng.choice([near, full * rng.uniform(0.01, 1.3), 10 ** rng.uniform(-1, 2)])) * light
+
+
+def agree_with_draws(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    pixel, expected = random_pixel(rng)
+    found = merged(expected[:, None], relative_light(pixel)[:, None], pixel)
+    value = drawn(expected, pixel, rng, DRAWS)
+    assert found.mean[0] == pytest.approx(value.mean(), abs=4 * value.std() / DRAWS**0.5 + 1e-6)
+    spread = (value - value.mean()) ** 2
+    rare = 5e-6 * (value.max() - value.min()) ** 2  # a few readouts of another capture, which a million may not show
+    tolerance = 4 * spread.std() / DRAWS**0.5 + 1e-9 + rare
+    assert found.variance[0] == pytest.approx(spread.mean(), rel=0.02, abs=tolerance)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_mean_and_variance_are_those_of_draws(seed: int) -> None:
+    agree_with_draws(seed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(12, 200))
+def test_mean_and_variance_are_those_of_draws_in_many_pixels(seed: int) -> None:
+    agree_with_draws(seed)
+
+
+def outcomes(expected: Array, pixel: Pixel) -> dict[float, float]:
+    """Probability of each merged value of `merge: saturated` without PRNU, from SciPy's distributions alone."""
+    light, at, limits = relative_light(pixel), exposure_of(pixel), limits_dn(pixel)
+    found: dict[float, float] = {}
+    passed = np.ones(1)
+    for g, exposure in enumerate(pixel.exposures):
+        counts = np.arange(int(expected[g] + 40 * expected[g] ** 0.5 + 60))
+        left = stats.poisson.pmf(counts, expected[g]) * passed.sum()
+        for k in exposure.numbers:
+            one, numbers = pixel.read_as[k], np.arange(pixel.read_as[k].full_scale_dn + 1)
+            mean = (np.minimum(counts, one.well_e) * one.dn_per_e + one.offset_dn)[:, None]
+            edges = np.concatenate([[-np.inf], numbers[:-1] + 0.5, [np.inf]])
+            chance = np.diff(stats.norm.cdf(edges, mean, one.dn_per_e * one.read_noise_e), axis=1)
+            usable = numbers < (np.inf if limits[k] is None else limits[k])
+            values = (numbers - one.offset_dn) / one.dn_per_e / light[at[k]]
+            for value, share in zip(values[usable], left @ chance[:, usable], strict=True):
+                found[round(value, 6)] = found.get(round(value, 6), 0.0) + share
+            left = left * chance[:, ~usable].sum(axis=1)
+        passed = left
+    return found
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_errors_are_those_of_all_outcomes(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    captures = [
+        {"well_e": 300.0, "read_noise_e": 1.0, "bits": 9},
+        {"well_e": 1_200.0, "read_noise_e": 3.0, "bits": 9},
+        {"sensitivity": 0.1, "well_e": 900.0, "read_noise_e": 1.0, "bits": 9},
+    ]
+    pixel = Pixel(captures=captures, offset_dn=20, threshold=0.9)
+    light = relative_light(pixel)
+    first = float(rng.choice([260.0, 275.0, 1_050.0, 1_100.0, 3_000.0, 40.0]))
+    signals = np.array([first, first * rng.uniform(1.03, 1.3)])
+    expected = light[:, None, None, None] * signals[None, None, :, None]
+    members = {"one": np.array([0]), "other": np.array([1])}
+    found = confusion.errors(expected, [np.array([0])], pixel, members, light[:, None])
+    one, other = (outcomes(light * e, pixel) for e in signals)
+    error = sum(min(one.get(v, 0.0), other.get(v, 0.0)) for v in one | other) / 2
+    assert sum(one.values()) == pytest.approx(1, abs=1e-9)
+    assert found.error["one", "other"][0] == pytest.approx(error, rel=0.02)
+
+
+def test_the_error_is_that_of_draws_judged_by_all_outcomes() -> None:
+    """With PRNU, and two pixels in the channel: the share of draws that a Gaussian mixture of the draws themselves misreads."""
+    rng = np.random.default_rng(3)
+    pixel = Pixel(captures="dual_gain", offset_dn=64, prnu=0.01)
+    light, signals = relative_light(pixel), np.array([4_800.0, 4_890.0])
+    expected = light[:, None, None, None] * np.repeat(signals, 2).reshape(1, 1, 2, 2)
+    members = {"one": np.array([0]), "other": np.array([1])}
+    found = confusion.errors(expected, [np.array([0, 1])], pixel, members, np.ones((1, 2)))
+    values = [np.mean([drawn(light * e, pixel, rng, DRAWS) for _ in range(2)], axis=0) for e in signals]
+    edges = np.linspace(min(v.min() for v in values), max(v.max() for v in values), 120)
+    halves = [[np.histogram(part, edges)[0] for part in np.split(v, 2)] for v in values]
+    chosen = halves[0][0] >= halves[1][0]  # a rule from one half, judged on the other
+    wrong = (halves[0][1][~chosen].sum() + halves[1][1][chosen].sum()) / DRAWS
+    assert found.error["one", "other"][0] == pytest.approx(wrong, rel=0.02)
+
+
+@pytest.mark.parametrize("merge", ["saturated", "weighted"])
+@pytest.mark.parametrize("prnu", [0.0, 0.01])
+def test_a_single_capture_is_a_pixel_that_is_read_once(merge: Any, prnu: float) -> None:
+    scene = Scene(noise=True)
+    once = chart_setup(scene=scene, pixel=Pixel(read_noise_e=2, offset_dn=64, prnu=prnu))
+    pixel = Pixel(read_noise_e=2, offset_dn=64, prnu=prnu, captures=[{}], merge=merge)
+    hdr = once.with_camera(pixel=pixel)
+    curves = once.camera.base_qe[None]
+    plain, of_capture = (forward_model(setup).read_with_noise(curves) for setup in (once, hdr))
+    np.testing.assert_allclose(of_capture.mean, plain.mean, rtol=1e-9)
+    np.testing.assert_allclose(of_capture.variance, plain.variance, rtol=1e-6)
+    one, other = (evaluate(forward_model(setup), curves, ("yellow", "red")) for setup in (once, hdr))
+    for name in ("csd_yellow_red", "chromatic_csd_yellow_red", "dprime_yellow_red"):
+        np.testing.assert_allclose(other[name], one[name], rtol=1e-6)
+    without = (replace(setup, scene=Scene()) for setup in (once, hdr))
+    one, other = (evaluate(forward_model(setup), curves) for setup in without)
+    assert one["csd_yellow_red"] == other["csd_yellow_red"]
+
+
+def test_the_rule_of_saturation_is_that_of_isetcam() -> None:
+    """ISETCam, sensorComputeArray: the first of LPD-HCG and SPD where it has at most 95 % of its swing, else the other."""
+    captures = [{"well_e": 22_000.0 * 49 / 200, "bits": 24}, {"sensitivity": 0.01, "well_e": 7_900.0, "bits": 24}]
+    pixel = Pixel(captures=captures, threshold=0.95)
+    light = relative_light(pixel)
+    electrons = np.geomspace(1, 1e6, 4001)
+    large, small = np.minimum(electrons, 22_000.0 * 49 / 200), np.minimum(electrons * 0.01, 7_900.0)
+    expected = np.where(large > 0.95 * 22_000.0 * 49 / 200, small / 0.01, large)
+    found = merged_without_noise(light[:, None] * electrons, light[:, None], pixel) / pixel.dn_per_e
+    half_a_step_e = 0.5 * 7_900.0 / 2**24 / 0.01
+    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=half_a_step_e)
+
+
+def test_equal_captures_one_electron_and_other_hard_pixels() -> None:
+    twins = Pixel(captures=[{"read_noise_e": 2}, {"read_noise_e": 2}], merge="weighted")
+    alone = Pixel(captures=[{"read_noise_e": 2}])
+    e = np.array([[0.0, 1e-9, 1.0, 500.0, 1e12]])
+    both, one = (merged(e, np.ones((1, 1)), pixel) for pixel in (twins, alone))
+    np.testing.assert_allclose(both.mean[2:], one.mean[2:], rtol=1e-3)
+    assert (both.variance[:4] < one.variance[:4]).all()
+    assert (both.variance >= 0).all()
+    tiny = Pixel(captures=[{"well_e": 1.0, "bits": 1}, {"sensitivity": 0.5, "well_e": 1.0, "bits": 1}], threshold=1.0)
+    found = merged(np.array([[1.0], [0.5]]), np.array([[1.0], [0.5]]), tiny)
+    assert np.isfinite([found.mean, found.variance]).all()
+    equal = Pixel(captures=[{}, {"sensitivity": 0.5}, {"sensitivity": 0.5, "start_ratio": 1.0}])
+    assert len(equal.exposures) == 3
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"captures": [{"sensitivity": 0.1}, {}]}, "captures.1 is more sensitive"),
+        ({"captures": "split"}, "one of split_pixel, dual_gain, staggered"),
+        ({"captures": [{"exposure_ratio": 0.0}]}, "greater than or equal to"),
+        ({"captures": [{}] * 5}, "at most 4"),
+        ({"captures": [{}], "companding": [[100, 50], [90, 60]]}, "knees must ascend"),
+        ({"captures": [{"crosstalk": 0.1}]}, "needs a crosstalk of the pixel"),
+        ({"captures": [{"bits": 4}], "offset_dn": 20.0}, "captures.0: offset_dn 20 must be below full scale, 15"),
+    ],
+)
+def test_unsuitable_captures_are_refused(changes: dict[str, Any], said: str) -> None:
+    with pytest.raises(ValidationError, match=said):
+        Pixel(**changes)
+
+
+def test_qe_and_crosstalk_of_a_photodiode_change_its_electrons() -> None:
+    scene = Scene(noise=True)
+    setup = chart_setup(scene=scene, pixel=Pixel(read_noise_e=2, offset_dn=64, crosstalk=0.02))
+    small = Capture(sensitivity=0.1, qe_factor={"R": 0.5}, crosstalk=0.1)
+    hdr = setup.with_camera(pixel=setup.camera.pixel.model_copy(update={"captures": (Capture(), small)}))
+    curves = setup.camera.base_qe[None]
+    electrons = forward_model(hdr).pixel_electrons(curves)
+    factor = np.where(np.array(hdr.camera.mosaic.channels) == "R", 0.5, 1.0)
+    other = setup.with_camera(
+        qe=setup.camera.qe * factor[:, None], pixel=setup.camera.pixel.model_copy(update={"crosstalk": 0.1})
+    )
+    modified = curves * factor[list(setup.camera.modified)][:, None]
+    np.testing.assert_allclose(electrons[1], 0.1 * forward_model(other).pixel_electrons(modified), rtol=1e-12)
+    np.testing.assert_allclose(electrons[0], forward_model(setup).pixel_electrons(curves), rtol=1e-12)
+
+
+@pytest.mark.parametrize("duty", [0.05, 0.3, 0.9])
+def test_light_in_windows_is_that_of_all_phases(duty: float) -> None:
+    """100,000 phases by a lamp that is on or off at each of 400,000 instants of a period; the extremes are at the corners."""
+    drive = PwmDrive(duty=duty, frequency_hz=90.0)
+    phases = (np.arange(100_000) + 0.5) / 100_000
+    for start, length in ((0.0, 0.99), (0.7, 0.06), (1.3, 2.4), (0.0, 1.0)):
+        light = light_in(drive, phases + start, np.array(length))
+        assert light.mean() == pytest.approx(1, abs=1e-9)
+        instants = (np.arange(400_000) + 0.5) / 400_000 * length
+        for phase in phases[::20_011]:
+            on = np.mod(phase + start + instants, 1.0) < duty
+            assert on.mean() / duty == pytest.approx(float(light_in(drive, phase + start, np.array(length))), abs=1e-4)
+    scene = Scene(exposure=FixedExposure(exposure_s=0.011), drive=drive, noise=True)
+    setup = chart_setup(scene=scene, pixel=Pixel(captures="staggered", read_noise_e=2))
+    corners = phases_of(setup, np.array([0.011]), 0)[0]
+    everywhere = exposure_scales(setup, np.array([0.011]), phases)[:, 0]
+    at_corners = exposure_scales(setup, np.array([0.011]), corners)[:, 0]
+    assert (at_corners.min(axis=1) <= everywhere.min(axis=1) + 1e-12).all()
+    assert (at_corners.max(axis=1) >= everywhere.max(axis=1) - 1e-12).all()
+    np.testing.assert_allclose(at_corners.min(axis=1), everywhere.min(axis=1), atol=1e-3)
+
+
+def test_staggered_exposures_show_a_false_hue_and_a_split_pixel_none() -> None:
+    scene = Scene(
+        exposure=FixedExposure(exposure_s=0.011),
+        intensity_cd=50.0,
+        drive=PwmDrive(duty=0.1, frequency_hz=200.0),
+        noise=True,
+    )
+    found = {}
+    for captures in ("split_pixel", "staggered"):
+        setup = chart_setup(scene=scene, pixel=Pixel(captures=captures, read_noise_e=2, offset_dn=64))
+        found[captures] = evaluate(forward_model(setup), setup.camera.base_qe[None])
+    assert found["split_pixel"]["false_hue_dn"] < 0.1 * found["split_pixel"]["chromatic_csd_yellow_red"]
+    assert found["split_pixel"]["lamp_seen"] == 1
+    assert found["staggered"]["false_hue_dn"] > 1_000
+    assert found["staggered"]["lamp_seen"] < 0.5
+    assert found["staggered"]["flicker_modulation"] == pytest.approx(1)
