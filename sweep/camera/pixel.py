@@ -30,6 +30,10 @@ DarkCurrent = Annotated[float, Field(ge=0, le=1e15)]
 MOST_PRNU = 0.1
 """Largest relative deviation of gains: a Gaussian gain is then positive within ten of them. Sensors have 0.01."""
 Prnu = Annotated[float, Field(ge=0, le=MOST_PRNU)]
+_Names = Literal["split_pixel", "dual_gain", "staggered"]
+_Captures = Annotated[list[Capture], Field(max_length=MOST_CAPTURES)]
+_MOST_WELL_E = 1e6
+"""Of a capture: its electrons are counted one by one."""
 _Knee = Annotated[tuple[NonNegative, NonNegative], BeforeValidator(from_to)]
 
 
@@ -71,10 +75,8 @@ class Pixel(Section):
     """Photo response non-uniformity: relative standard deviation of the pixels' gains, which its captures share."""
     captures: Annotated[
         tuple[Capture, ...],
-        BeforeValidator(
-            named_captures, json_schema_input_type=Literal["split_pixel", "dual_gain", "staggered"] | list[Capture]
-        ),
         Field(max_length=MOST_CAPTURES),
+        BeforeValidator(named_captures, json_schema_input_type=_Names | _Captures),
     ] = ()
     """Readouts of an HDR pixel, from the most sensitive to the least; or `split_pixel`, `dual_gain`, `staggered`.
     DN are then those of the first one; the merged value goes beyond its full scale."""
@@ -92,6 +94,10 @@ class Pixel(Section):
             if not pixel.offset_dn < pixel.full_scale_dn:
                 where = f"captures.{number}: " if self.captures else ""
                 raise ValueError(f"{where}offset_dn {self.offset_dn:g} must be below full scale, {pixel.full_scale_dn}")
+            if self.captures and pixel.well_e > _MOST_WELL_E:
+                raise ValueError(f"captures.{number}: well_e {pixel.well_e:g} is above {_MOST_WELL_E:,.0f} electrons")
+        if self.companding and not self.captures:
+            raise ValueError("companding needs captures")
         slopes = [capture.light * pixel.dn_per_e for capture, pixel in zip(self.captures, self.read_as, strict=True)]
         for number in range(1, len(slopes)):
             if slopes[number] > slopes[number - 1] * (1 + 1e-9):

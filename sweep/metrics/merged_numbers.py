@@ -21,8 +21,8 @@ from ..camera.pixel import Pixel
 _PER_NOISE = 8.0
 """Bins per standard deviation of the noise."""
 _REACH = 9.5
-_MOST_READ = 2e7
-"""Numbers of electrons times digital numbers that read noise spreads each over."""
+_MOST_READ, _MOST_SUMS = 5e6, 1e6
+"""Numbers of electrons times digital numbers that read noise spreads each over; additions for each pixel."""
 _LEAST = 1e-25
 """Probability of a digital number, of given electrons, below which it is left out."""
 
@@ -72,7 +72,7 @@ class Bins:
 
     @property
     def _starts(self) -> FloatArray:
-        """Widths of the noise below each of the edges."""
+        """Standard deviations of the noise below each of the edges."""
         ends = (
             2
             * np.sqrt(self.light[:-1])
@@ -91,15 +91,15 @@ class Bins:
         Returns
         -------
         ndarray of int, same shape
-            Bins; negative below 0.
+            Bins; those below 0 mirror those above.
         """
         if self.knees.shape[1] > 1:
             return np.asarray(np.floor(np.interp(electrons, *self.knees) + 0.5), dtype=np.intp)
-        at = np.maximum(np.searchsorted(self.edges_e, electrons, side="right") - 1, 0)
+        size = np.abs(electrons)
+        at = np.searchsorted(self.edges_e, size, side="right") - 1
         light, dark, edge = np.sqrt(self.light[at]), self.dark_e[at], self.edges_e[at]
-        widths = 2 * light * (np.sqrt(np.maximum(electrons, 0.0) + dark) - np.sqrt(edge + dark)) + self._starts[at]
-        widths += np.minimum(electrons, 0.0) * light / np.sqrt(dark)
-        return np.asarray(np.floor(_PER_NOISE * widths), dtype=np.intp)
+        widths = 2 * light * (np.sqrt(size + dark) - np.sqrt(edge + dark)) + self._starts[at]
+        return np.asarray(np.floor(_PER_NOISE * np.copysign(widths, electrons)), dtype=np.intp)
 
     def value(self, number: IndexArray | FloatArray) -> FloatArray:
         """Return the values in the middle of bins.
@@ -117,10 +117,11 @@ class Bins:
         if self.knees.shape[1] > 1:
             return np.asarray(np.interp(number, *self.knees[::-1]), dtype=float)
         widths, starts = (number + 0.5) / _PER_NOISE, self._starts
-        at = np.maximum(np.searchsorted(starts, widths, side="right") - 1, 0)
+        size = np.abs(widths)
+        at = np.searchsorted(starts, size, side="right") - 1
         light, dark, edge = np.sqrt(self.light[at]), self.dark_e[at], self.edges_e[at]
-        above = (np.maximum(widths - starts[at], 0.0) / (2 * light) + np.sqrt(edge + dark)) ** 2 - dark
-        return np.asarray(above + np.minimum(widths, 0.0) * np.sqrt(dark) / light, dtype=float)
+        above = ((size - starts[at]) / (2 * light) + np.sqrt(edge + dark)) ** 2 - dark
+        return np.asarray(np.copysign(above, widths), dtype=float)
 
 
 @dataclass(frozen=True)
@@ -166,10 +167,12 @@ def affordable(pixel: Pixel) -> bool:
     Returns
     -------
     bool
-        True for `merge: saturated`, unless wells or read noise are very large.
+        True for `merge: saturated`, unless wells, PRNU or read noise are very large.
     """
-    read = [capture.well_e * (2 * _REACH * capture.dn_per_e * capture.read_noise_e + 3) for capture in pixel.read_as]
-    return pixel.merge == "saturated" and max(read) <= _MOST_READ
+    well_e = max(capture.well_e for capture in pixel.read_as)
+    sums = 2 * _REACH * math.sqrt(well_e) * (1 + 2 * _REACH * math.sqrt(1 + pixel.prnu**2 * well_e) * bool(pixel.prnu))
+    reach_dn = [min(2 * _REACH * one.dn_per_e * one.read_noise_e + 3, one.full_scale_dn) for one in pixel.read_as]
+    return pixel.merge == "saturated" and well_e * max(reach_dn) <= _MOST_READ and sums <= _MOST_SUMS
 
 
 @lru_cache(maxsize=8)
@@ -204,8 +207,8 @@ def merged_table(pixel: Pixel, light: tuple[float, ...]) -> MergedTable:
         entries.append((rows, bins.number(value_e), shares))
         if limit is not None:
             passed[number + 1 :, exposure[number]] *= _beyond(counts, capture, limit)
-    first = min(int(of_bins.min()) for _, of_bins, _ in entries)
-    n_bins = max(int(of_bins.max()) for _, of_bins, _ in entries) - first + 1
+    occurring = np.concatenate([of_bins for _, of_bins, _ in entries])
+    first, n_bins = int(occurring.min()), int(np.ptp(occurring)) + 1
     starts, columns, probabilities, total = [], [], [], 0
     for rows, of_bins, shares in entries:
         key = rows * n_bins + of_bins - first

@@ -11,25 +11,31 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 from scipy import stats
 
+from sweep.camera.camera import Camera
 from sweep.camera.captures import NAMED_CAPTURES, Capture
 from sweep.camera.forward import forward_model
 from sweep.camera.merge import limits_dn, merged, merged_without_noise
+from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
 from sweep.camera.pwm import exposure_scales, light_in, phases_of
 from sweep.camera.scene import FixedExposure, PwmDrive, Scene
+from sweep.camera.sensor import BUILT_IN_SENSORS
 from sweep.camera.setup import Setup
 from sweep.metrics import confusion
 from sweep.metrics.evaluate import evaluate
-
-from ..metrics.test_evaluate import setup as setup_of_chart
+from sweep.spectra.builtin.registry import BUILT_IN_LIGHTS
+from sweep.spectra.spectrum import WavelengthGrid
 
 Array = NDArray[np.float64]
 DRAWS = 1_000_000
 
 
 def chart_setup(scene: Scene, pixel: Pixel) -> Setup:
-    """RYNCy with its base curve in N."""
-    return setup_of_chart(scenario=scene).with_camera(pixel=pixel)
+    """RYNCy with Y in N."""
+    grid, mosaic = WavelengthGrid(), Mosaic.from_name("RYNCy")
+    sensor, modified = BUILT_IN_SENSORS["ar0820"](grid), (mosaic.channels.index("N"),)
+    qe = sensor.mosaic_qe(mosaic, {"N": "Y"})
+    return Setup(Camera(grid, mosaic, qe, modified, sensor.qe["C"], pixel), BUILT_IN_LIGHTS["tl16"](grid), scene)
 
 
 def base_curves(setup: Setup) -> Array:

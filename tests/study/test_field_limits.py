@@ -141,7 +141,7 @@ def test_the_study_says_every_number_that_the_schema_knows(tmp_path: Path) -> No
         if '"number"' in json.dumps(prop) or '"integer"' in json.dumps(prop)
     }
     said = {part for path in NUMBERS for part in path if isinstance(part, str)}
-    assert known <= said | {"phase_px", "each"}
+    assert known <= said | {"phase_px", "each", "threshold", "companding"}  # of HDR pixels: see below
 
 
 def test_every_physical_figure_has_limits_that_editors_know() -> None:
@@ -256,6 +256,38 @@ def test_many_figures_at_their_limits_together(tmp_path: Path) -> None:
                 assert statuses(study, name) == {"ok"}, tree
         computed += 1
     assert computed > 2
+
+
+CAPTURE_LIMITS: dict[str, tuple[float, float]] = {
+    **{"sensitivity": (1e-9, 1), "exposure_ratio": (1e-9, 1), "start_ratio": (0, 1e6), "crosstalk": (0, 0.999999)},
+    **{"well_e": (1e-3, 1e6), "gain_dn_per_e": (1e-6, 1e9), "read_noise_e": (0, 1e4), "bits": (1, 24)},
+}
+
+
+@pytest.mark.slow
+def test_captures_at_their_limits_together(tmp_path: Path) -> None:
+    """Finite, or one line: of two captures, about half of the figures at a limit."""
+    rng, computed = np.random.default_rng(5), 0
+    usual = {"sensitivity": 1.0, "well_e": 5_000.0, "read_noise_e": 2.0, "bits": 12}
+    for _ in range(40):
+        tree, captures = whole(), []
+        for light in (1.0, 0.1):
+            chosen = {key: ends[int(rng.integers(2))] for key, ends in CAPTURE_LIMITS.items() if rng.random() < 0.4}
+            captures.append(usual | {"sensitivity": light} | chosen)
+            captures[-1]["bits"] = int(captures[-1]["bits"])
+        limits = {"threshold": float(rng.choice([1e-9, 0.9, 1])), "prnu": float(rng.choice([0, 0.1]))}
+        tree["pixel"] = {**tree["pixel"], "captures": captures, "merge": str(rng.choice(["saturated", "weighted"]))}
+        tree["pixel"] |= limits
+        try:
+            study = loaded(tmp_path, tree)
+        except StudyError as error:
+            assert len(str(error).splitlines()) <= 2  # noqa: PT017
+            continue
+        with warnings.catch_warnings(), within(HANG_S):
+            warnings.simplefilter("error")
+            assert statuses(study, "patch") == {"ok"}, tree["pixel"]
+        computed += 1
+    assert computed > 5
 
 
 def test_negative_zero_is_zero(tmp_path: Path) -> None:

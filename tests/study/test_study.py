@@ -185,7 +185,7 @@ def test_the_measured_study_loads() -> None:
             "sensor: ar0820\n",
             "sensor: ar0820\npixel: {well_ke: 10}\n",
             "tiny.yaml:3: pixel.well_ke: unknown key; allowed: pitch_um, fill_factor, well_e, bits, gain_dn_per_e, "
-            "offset_dn, crosstalk, read_noise_e, dark_e_per_s, prnu; did you mean 'well_e'?",
+            "offset_dn, crosstalk, read_noise_e, dark_e_per_s, prnu, captures, merge, threshold, companding; did you mean 'well_e'?",
         ),
         (
             "lights: tl16\n",

@@ -38,7 +38,7 @@ from ..build import BASE, issues, load
         ),
         (
             "a: {each: {off_axis_deg: [mean]}}",
-            "tiny.yaml:4: scenarios: a: each.off_axis_deg: a number, a list of numbers, or `min`, `max` and `count`, or `geometric: [min, max, count]`",
+            "tiny.yaml:4: scenarios: a: each.off_axis_deg: a number, a list of numbers, `min`, `max` and `count`, or `geometric: [min, max, count]`",
         ),
         (
             "a: {intensity_cd: 200}",

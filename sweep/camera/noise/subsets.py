@@ -19,11 +19,13 @@ import numpy as np
 from ...base.types import FloatArray
 from ..pixel import Pixel
 from . import gaussian
-from .moments import STEP, LinearRange, counts_of
+from .moments import LinearRange, counts_of
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
+_STEP = 1 / 32
+"""Distance of nodes in the root of the electrons, in which Poisson means are smooth at a scale of 1/2."""
 _AT_ONCE = 256
 """Nodes whose counts are summed together."""
 _NEVER = 1e-18
@@ -175,7 +177,7 @@ def subset_table(captures: tuple[Pixel, ...], limits_dn: tuple[int | None, ...])
     from scipy.interpolate import CubicSpline  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
     last_e = max(LinearRange.of(pixel).last_e for pixel in captures)
-    roots = np.arange(0, math.sqrt(last_e) + 2 * STEP, STEP)
+    roots = np.arange(0, math.sqrt(last_e) + 2 * _STEP, _STEP)
     blocks = [_moments(roots[at : at + _AT_ONCE] ** 2, captures, limits_dn) for at in range(0, roots.size, _AT_ONCE)]
     subsets = tuple(blocks[0])
     rows = [np.concatenate([block[subset] for block in blocks], axis=1) for subset in subsets]
