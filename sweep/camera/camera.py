@@ -97,4 +97,5 @@ class Camera:
     @property
     def longest_distance_dn(self) -> float:
         """Upper bound on the distance of two unclipped responses within the range of the ADC, DN."""
-        return float(2 * self.pixel.full_scale_dn * np.sqrt(len(self.mosaic.channels)))
+        top_dn = max(self.pixel.full_scale_dn, self.pixel.saturation_e * self.pixel.dn_per_e)
+        return float(2 * top_dn * np.sqrt(len(self.mosaic.channels)))

@@ -103,8 +103,38 @@ def merged(electrons: FloatArray, light: FloatArray, pixel: Pixel) -> Merged:
     found = _merged(electrons, light, pixel) if not pixel.prnu else _over_gains(electrons, light, pixel)
     # One reading in all but a billionth of the readouts: what is left is rounding of the arithmetic, by which two
     # signals would seem separated with certainty. Two readings of a capture are at least 1 DN apart.
+    found = _with_steps(found, pixel) if pixel.companding else found
     one = found.variance < np.maximum(_CERTAIN_DN2, _ROUNDING * found.mean**2)
     return Merged(np.where(one, np.round(found.mean, 6), found.mean), np.where(one, 0.0, found.variance), found.certain)
+
+
+def _with_steps(found: Merged, pixel: Pixel) -> Merged:
+    """Return merged values with the variance of rounding to codes: a twelfth of a squared step, as if noise dithers."""
+    knees_dn, codes = np.array([(0.0, 0.0), *pixel.companding]).T
+    at = np.clip(np.searchsorted(knees_dn, found.mean, side="right") - 1, 0, codes.size - 2)
+    step_dn = (np.diff(knees_dn) / np.diff(codes))[at]
+    return Merged(found.mean, found.variance + step_dn**2 / 12, found.certain)
+
+
+def coded(dn: FloatArray, pixel: Pixel) -> FloatArray:
+    """Store merged values as codes, and read them back.
+
+    Parameters
+    ----------
+    dn : ndarray
+        Merged values, DN of the first capture.
+    pixel : Pixel
+        HDR pixel; without companding the values stay.
+
+    Returns
+    -------
+    ndarray of the same shape
+        Values of the codes, DN of the first capture.
+    """
+    if not pixel.companding:
+        return dn
+    knees_dn, codes = np.array([(0.0, 0.0), *pixel.companding]).T
+    return np.asarray(np.interp(np.floor(np.interp(dn, knees_dn, codes) + 0.5), codes, knees_dn), dtype=float)
 
 
 def _over_gains(electrons: FloatArray, light: FloatArray, pixel: Pixel) -> Merged:
@@ -356,7 +386,7 @@ def merged_readings(
             number = pixel.exposures[at].numbers[place]
             estimate = (read_dn[number] - pixel.offset_dn) / (pixel.read_as[number].dn_per_e * light[at])
             result += here * weight * estimate
-    return np.asarray(pixel.dn_per_e * result + pixel.offset_dn, dtype=float)
+    return coded(np.asarray(pixel.dn_per_e * result + pixel.offset_dn, dtype=float), pixel)
 
 
 def _exposure_of(pixel: Pixel) -> list[int]:

@@ -86,7 +86,7 @@ class Pixel(Section):
     threshold: Share = 0.9
     """Share of saturation from which on a capture is not used; the least sensitive one always is, alone."""
     companding: Annotated[tuple[_Knee, ...], BeforeValidator(as_tuple, json_schema_input_type=list[_Knee])] = ()
-    """Knees of the code that the merged value is stored in: DN of the merged value, code."""
+    """Knees of the code that the merged value is stored in: [DN of the merged value, code], from [0, 0] on."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Pixel:
@@ -107,6 +107,9 @@ class Pixel(Section):
         knees = np.array([(0.0, 0.0), *self.companding])
         if (np.diff(knees, axis=0) <= 0).any():
             raise ValueError("companding: knees must ascend in DN and in code, from above 0")
+        top_dn = self.saturation_e * self.dn_per_e + self.offset_dn
+        if self.companding and knees[-1, 0] < top_dn * (1 - 1e-9):
+            raise ValueError(f"companding: the last knee must be at {top_dn:.6g} DN or more, where all are saturated")
         return self
 
     @property

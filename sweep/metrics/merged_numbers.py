@@ -67,7 +67,8 @@ class Bins:
         read = [(*each, a) for *each, a in zip(pixel.read_as, limits_dn(pixel), light, strict=True)]
         ends = [(limit - one.offset_dn) / (one.dn_per_e * a) for one, limit, a in read if limit is not None]
         dark = np.array([max(one.read_noise_e**2, 1.0) / a for one, _, a in read])
-        knees = np.array([(0.0, 0.0), *pixel.companding]).T / [[pixel.dn_per_e], [1.0]]
+        knees = np.array([(0.0, 0.0), *pixel.companding]).T
+        knees[0] = (knees[0] - pixel.offset_dn) / pixel.dn_per_e
         return cls(np.maximum.accumulate([0.0, *ends]), light, dark, knees)
 
     @property

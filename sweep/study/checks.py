@@ -43,6 +43,17 @@ def check_scenes(section: StudySection, sources: Sources) -> None:
             sources.add(("scenarios", name, *key), problem, value, allowed)
 
 
+def _check_captures(section: StudySection, mosaics: Mapping[str, Mosaic], sources: Sources) -> None:
+    """Check that all parts of a study read an HDR pixel, and that its photodiodes have channels of the study."""
+    channels = dict.fromkeys(channel for mosaic in mosaics.values() for channel in mosaic.channels)
+    for number, capture in enumerate(section.pixel.captures):
+        for channel in capture.qe_factor.keys() - channels.keys():
+            sources.unknown(("pixel", "captures", number, "qe_factor"), "channel", channel, channels)
+    for key, stated in (("vision", section.vision is not None), ("tasks", section.tasks is not None)):
+        if stated and section.pixel.captures:
+            sources.add((key,), "of a pixel that is read once; `pixel.captures` are merged", None, "no captures")
+
+
 def check_lights(
     section: StudySection,
     lights: Lights,
@@ -69,6 +80,7 @@ def check_lights(
     _check_recognition(section, lights, sources)
     _check_vision(section, lights, mosaics, sources)
     _check_published(section, lights, mosaics, sources)
+    _check_captures(section, mosaics, sources)
 
 
 def _check_columns(requested: RequestedQuantities, sources: Sources) -> None:

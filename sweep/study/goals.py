@@ -217,6 +217,10 @@ def check_searched(section: StudySection, space: Space, known: Mapping[str, Quan
         if name in known and known[name].needs == "family" and name not in dimensions:
             problem = f"{space.filter.family.kind} has no {name}"
             sources.add(("constraints", name), problem, None, ", ".join(dimensions) or "none")
+    noisy = [name for name in (*goals, *section.constraints) if name in known and known[name].states]
+    if section.pixel.captures and noisy:
+        problem = f"{noisy[0]} is searched with the noise of a pixel that is read once; `pixel.captures` are merged"
+        sources.add(("objective" if noisy[0] in goals else "constraints",), problem, None, "quantities without noise")
     if section.search.front is not None and any(known[name].role == "light" for name in goals if name in known):
         problem = "the front is searched at levels of sensitivity, which is in the objective"
         sources.add(("search", "front"), problem, None, "an objective of CSDs")

@@ -14,7 +14,7 @@ from scipy import stats
 from sweep.camera.camera import Camera
 from sweep.camera.captures import NAMED_CAPTURES, Capture
 from sweep.camera.forward import forward_model
-from sweep.camera.merge import limits_dn, merged, merged_without_noise
+from sweep.camera.merge import coded, limits_dn, merged, merged_without_noise
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
 from sweep.camera.pwm import exposure_scales, light_in, phases_of
@@ -218,6 +218,28 @@ def test_the_rule_of_saturation_is_that_of_isetcam() -> None:
     np.testing.assert_allclose(found, expected, rtol=1e-6, atol=half_a_step_e)
 
 
+def test_codes_of_companding_add_their_steps() -> None:
+    """12 bits for a merged range of 20: mean and variance of draws, and an error that is no smaller."""
+    rng = np.random.default_rng(5)
+    linear = Pixel(captures="split_pixel", offset_dn=64, prnu=0.005)
+    knees = [[1_024.0, 1_024.0], [32_768.0, 2_560.0], [700_000.0, 4_095.0]]
+    pixel = Pixel.model_validate(linear.model_dump() | {"companding": knees})
+    light = relative_light(pixel)
+    for electrons in (30.0, 3_000.0, 15_000.0, 90_000.0):
+        expected = light * electrons
+        found = merged(expected[:, None], light[:, None], pixel)
+        value = coded(drawn(expected, linear, rng, 200_000), pixel)
+        assert found.mean[0] == pytest.approx(value.mean(), abs=4 * value.std() / 200_000**0.5 + 0.02 * value.std())
+        assert found.variance[0] == pytest.approx(value.var(), rel=0.05)
+        signals = light[:, None, None, None] * (electrons * np.array([1.0, 1.05]))[None, None, :, None]
+        members = {"one": np.array([0]), "other": np.array([1])}
+        errors = [
+            confusion.errors(signals, [np.array([0])], one, members, light[:, None]).error["one", "other"][0]
+            for one in (linear, pixel)
+        ]
+        assert errors[1] > errors[0] * (1 - 1e-3)
+
+
 def test_equal_captures_one_electron_and_other_hard_pixels() -> None:
     twins = Pixel(captures=[{"read_noise_e": 2}, {"read_noise_e": 2}], merge="weighted")
     alone = Pixel(captures=[{"read_noise_e": 2}])
@@ -240,7 +262,9 @@ def test_equal_captures_one_electron_and_other_hard_pixels() -> None:
         ({"captures": "split"}, "one of split_pixel, dual_gain, staggered"),
         ({"captures": [{"exposure_ratio": 0.0}]}, "greater than or equal to"),
         ({"captures": [{}] * 5}, "at most 4"),
-        ({"captures": [{}], "companding": [[100, 50], [90, 60]]}, "knees must ascend"),
+        ({"captures": [{}], "companding": [[100.0, 50.0], [90.0, 60.0]]}, "knees must ascend"),
+        ({"captures": [{}], "companding": [[100.0, 50.0]]}, "the last knee must be at 4095 DN or more"),
+        ({"companding": [[5000.0, 50.0]]}, "companding needs captures"),
         ({"captures": [{"crosstalk": 0.1}]}, "needs a crosstalk of the pixel"),
         ({"captures": [{"bits": 4}], "offset_dn": 20.0}, "captures.0: offset_dn 20 must be below full scale, 15"),
     ],
