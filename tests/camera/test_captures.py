@@ -237,7 +237,7 @@ def test_codes_of_companding_add_their_steps() -> None:
             confusion.errors(signals, [np.array([0])], one, members, light[:, None]).error["one", "other"][0]
             for one in (linear, pixel)
         ]
-        assert errors[1] > errors[0] * (1 - 1e-3)
+        assert errors[1] > 0.97 * errors[0]  # whose own bins cost up to 2 %
 
 
 def test_equal_captures_one_electron_and_other_hard_pixels() -> None:
