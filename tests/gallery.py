@@ -31,11 +31,17 @@ PICTURES = {
     "exposure": "figures/series-1",
     "fog": "figures/series-1",
     "night": "figures/series-1",
+    "hdr": "figures/series-2",
+    "flicker": "figures/series-1",
     "noise": "figures/series-1",
     "vision": "figures/vision-ranks",
 }
 """Study -> picture of its run."""
-OTHERS = {"tiles": ("stopband", "figures/tiles"), "night-scene": ("scorecard", "figures/rendered-2")}
+OTHERS = {
+    "tiles": ("stopband", "figures/tiles"),
+    "night-scene": ("scorecard", "figures/rendered-2"),
+    "captures": ("hdr", "figures/captures-1"),
+}
 """Further picture of the documentation -> study, and picture of its run."""
 ROW = re.compile(r"^\| `(\w+)` \| (.*) \| !\[(.*)\]\(figures/(\w+)\.png\) \| (.*) \|$", re.MULTILINE)
 

@@ -363,3 +363,34 @@ def test_the_errors_of_the_network_are_those_of_their_command() -> None:
     )
     text = " ".join(GUIDE_TO_IMAGES.split())
     assert [figure for figure in figures if figure not in text] == []
+
+
+@pytest.mark.slow
+def test_the_figures_of_hdr_pixels_are_those_of_their_commands(finished: FinishedFolder) -> None:
+    text = " ".join((STUDIES / "guide" / "11-hdr-and-flicker.md").read_text().split())
+    folder = finished("hdr")
+    handovers = pd.read_parquet(folder / "handovers.parquet").query("name == 'best stopband' and signal_type == 'red'")
+    at = handovers.set_index(["channel", "capture"])["at"]
+    assert (
+        f"at {at['R', 2]:.1f} cd in R, at {at['N', 2]:.0f} cd in N of the best stopband, and at {at['Cy', 2]:.0f} cd in Cy"
+        in text
+    )
+    assert f"saturated from {at['R', 3]:.0f}, {at['N', 3]:.0f} and {at['Cy', 3]:,.0f} cd on" in text
+    unknown = pd.read_parquet(folder / "any_intensity.parquet")
+    usable = unknown[unknown["error"] <= 1e-3].groupby("name")["intensity_cd"]
+    crossed = pd.read_parquet(folder / "crossings.parquet").set_index("name")["at"]
+    cells = table_below(
+        (STUDIES / "guide" / "11-hdr-and-flicker.md").read_text(), "| at most 1 error in 1,000 from 1 cd up to |"
+    )
+    assert len(cells) == 6
+    for name, (equal, shown) in cells.items():
+        assert equal == ("10,000 cd" if name not in crossed else f"{math.floor(crossed[name])} cd")
+        if name == "RYYCy":
+            some = usable.get_group(name)
+            last, again = some[some < 10].max(), some[some > 10]
+            assert shown == f"{last:.3g} cd, and again from {again.min():.3g} to {again.max():.3g} cd"
+        else:
+            assert shown == f"{usable.max()[name]:.3g} cd"
+    flicker = pd.read_parquet(finished("flicker") / "results.parquet")
+    assert (flicker["lamp_seen"] == 1).all()
+    assert f"the false hue is at most {flicker['false_hue_dn'].max():.0f} DN" in text

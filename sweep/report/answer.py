@@ -15,6 +15,7 @@ from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
 from ..results.thinning import per_exposure
 from ..study.axes import series_of
+from .captures import flicker_lines
 from .lamps import cost_of_worst_case, lamp_lines, over_population, robustness_lines
 from .leaders import Leaders, Row, capital, full_name, label, leaders_of, of_reference, upper_bound_beside
 from .noise import usable_lines
@@ -87,7 +88,7 @@ def _of_designs(output: Output) -> tuple[list[str], list[str]]:
         under = format_constraints(output)
         none = f"No design meets every constraint{f': {under}' if under else ''}."
         return [none], [*unknown_lines(output), *largest_separation_elsewhere(output)]
-    usable = list(usable_lines(output))
+    usable = [*flicker_lines(output), *usable_lines(output)]
     if usable:  # where the question is of noise, separations matter where another CFA begins to lead
         series = [lead_sentence(drawn) for drawn in series_figures(output) if len(leads_of(drawn)) > 1]
     else:

@@ -23,7 +23,7 @@ _COMPUTED = (
     "two that are confused most. The dashed line is the error that the study allows; a ring marks where a design "
     "passes it."
 )
-_ANY = "error with a signal of another state at any intensity"
+_ANY = "error, lamps of unknown intensity"
 _ANY_NOTE = (
     "A camera does not know how bright a lamp is: each signal is compared with those of other states at all "
     "intensities of the axis. Noise is taken as Gaussian."

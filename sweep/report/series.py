@@ -28,6 +28,8 @@ _LABELS = {
     "distance_m": "distance / m",
     "exposure_s": "exposure / s",
     "visibility_m": "visibility / m",
+    "frequency_hz": "frequency of the pulses / Hz",
+    "duty": "duty of the pulses",
     "intensity_cd": "luminous intensity / cd",
     "read_noise_e": "read noise / e",
     "dark_e_per_s": "dark current / (e/s)",

@@ -10,6 +10,7 @@ from ...camera.pwm import phases_of
 from ..chromatic import squared_distance
 from ..quantity import DN, Columns, PulseMetric, Quantity, RequestedQuantities
 
+MODULATION, LAMP_SEEN, FALSE_HUE = "flicker_modulation", "lamp_seen", "false_hue_dn"
 _BETWEEN = 7
 """Phases between two at which an exposure begins or ends with a pulse."""
 _SEEN_DN = 1.0
@@ -25,8 +26,8 @@ class Flicker(PulseMetric):
             return ()
         return (
             Quantity(
-                name="flicker_modulation",
-                metric="flicker_modulation",
+                name=MODULATION,
+                metric=MODULATION,
                 meaning="flicker modulation of a pulsed lamp: (most - least) / (most + least) of its brightest channel "
                 "over all phases of its pulses (IEEE P2020), for the lamp with most",
                 wanted="less",
@@ -34,8 +35,8 @@ class Flicker(PulseMetric):
                 digits=3,
             ),
             Quantity(
-                name="lamp_seen",
-                metric="lamp_seen",
+                name=LAMP_SEEN,
+                metric=LAMP_SEEN,
                 meaning="share of the phases of its pulses in which a lamp's brightest channel has 1 DN or more above "
                 "the readout without lamps, for the lamp with least",
                 wanted="more",
@@ -43,8 +44,8 @@ class Flicker(PulseMetric):
                 digits=3,
             ),
             Quantity(
-                name="false_hue_dn",
-                metric="false_hue_dn",
+                name=FALSE_HUE,
+                metric=FALSE_HUE,
                 meaning="false hue of a pulsed lamp: the largest chromatic distance, as of `chromatic_csd_<a>_<b>`, "
                 "between its color at a phase of its pulses and its mean color",
                 unit=DN,
@@ -84,7 +85,7 @@ def _of_phases(lit: FloatArray, phases: FloatArray) -> dict[str, float]:
     part = np.where(lower >= _SEEN_DN, 1.0, np.clip(part, 0.0, 1.0))
     hue = np.sqrt(squared_distance(lit, np.broadcast_to(mean[:, None], lit.shape)))
     return {
-        "flicker_modulation": float(modulation.max()),
-        "lamp_seen": float((part * widths[:, None]).sum(axis=1).min()),
-        "false_hue_dn": float(hue.max()),
+        MODULATION: float(modulation.max()),
+        LAMP_SEEN: float((part * widths[:, None]).sum(axis=1).min()),
+        FALSE_HUE: float(hue.max()),
     }
