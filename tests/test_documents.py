@@ -393,4 +393,4 @@ def test_the_figures_of_hdr_pixels_are_those_of_their_commands(finished: Finishe
             assert shown == f"{usable.max()[name]:.3g} cd"
     flicker = pd.read_parquet(finished("flicker") / "results.parquet")
     assert (flicker["lamp_seen"] == 1).all()
-    assert f"the false hue is at most {flicker['false_hue_dn'].max():.0f} DN" in text
+    assert f"the false hue is at most {flicker['false_hue_dn'].max():.1f} DN" in text
