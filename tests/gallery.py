@@ -31,7 +31,7 @@ PICTURES = {
     "exposure": "figures/series-1",
     "fog": "figures/series-1",
     "night": "figures/series-1",
-    "hdr": "figures/series-2",
+    "hdr": "figures/series-1",
     "flicker": "figures/series-1",
     "noise": "figures/series-1",
     "vision": "figures/vision-ranks",

@@ -66,13 +66,13 @@ def _noise_figures(output: Output) -> Iterator[SeriesFigure]:
             for name, error in over_series(output.few, scenarios, STATE_ERROR).items()
         }
         allowed = output.study.recognition.error_max
-        y_label = f"{_ERROR} ({_LEAST:g}: or less)"
-        yield draw(f"{where}: {_ERROR}", y_label=y_label, lines=errors, log_y=True, level=allowed, note=_COMPUTED)
         of_any = _any_intensity(output, base, key)
         if of_any:
             lines = {name: Line(np.maximum(error, _LEAST), None) for name, error in of_any.items()}
             y_label = f"{_ANY} ({_LEAST:g}: or less)"
             yield draw(f"{where}: {_ANY}", y_label=y_label, lines=lines, log_y=True, level=allowed, note=_ANY_NOTE)
+        y_label = f"{_ERROR} ({_LEAST:g}: or less)"
+        yield draw(f"{where}: {_ERROR}", y_label=y_label, lines=errors, log_y=True, level=allowed, note=_COMPUTED)
         if output.recognition is not None:
             for rule in CLASSIFIERS:
                 accuracies = over_series(output.recognition, scenarios, f"{rule}_accuracy")
@@ -112,7 +112,8 @@ def usable_lines(output: Output) -> Iterator[str]:
             yield f"With lamps of unknown intensity, at most {_rate(allowed)} over {name}: {usable}."
         if ranges:
             usable = "; ".join(f"{', '.join(designs)} {where}" for where, designs in ranges.items())
-            yield f"At most {_rate(allowed)} between the worst two states, over {name}: {usable}."
+            equal = " of equal intensity" if of_any else ""
+            yield f"At most {_rate(allowed)} between the worst two states{equal}, over {name}: {usable}."
 
 
 def _rate(allowed: float) -> str:
@@ -135,7 +136,7 @@ def _range(x: FloatArray, usable: BoolArray, unit: str, passes: tuple[float, flo
         return f"at {', '.join(spans)}{of}"
     word = "up to" if usable[0] else "from"
     if passes is None:
-        low, high = x[ends[0] : ends[0] + 2]
+        low, high = (float(f"{end:.3g}") for end in x[ends[0] : ends[0] + 2])
         return f"{word} a number between {low:g} and {high:g}{of}"
     return f"{word} {_rounded(passes[0], up=not usable[0])}{of}"
 
