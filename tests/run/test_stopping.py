@@ -204,15 +204,15 @@ def emptied(folder: Path) -> None:
 @pytest.mark.long
 @pytest.mark.usefixtures("plain_pictures")
 @pytest.mark.parametrize("seed", range(4))
-def test_forty_kills_in_every_phase(tmp_path: Path, undisturbed: Path, whole_s: float, seed: int) -> None:
+def test_kills_in_every_phase(tmp_path: Path, undisturbed: Path, whole_s: float, seed: int) -> None:
     """Parents and workers, by three signals, at random moments; the rows are those of an undisturbed run each time.
 
-    Ten kills of each seed; a run that goes on may have another number of workers than the one that was killed.
+    Seven kills of each seed; a run that goes on may have another number of workers than the one that was killed.
     """
     rng = np.random.default_rng([17, seed])
     kills, out = {"run": 0, "worker": 0}, tmp_path / "out" / "tiny"
     noisy_study(tmp_path)
-    while sum(kills.values()) < 10:
+    while sum(kills.values()) < 7:
         run = begun(tmp_path, 1 + int(rng.integers(2)))
         time.sleep(float(rng.uniform(0, whole_s)))
         number = [signal.SIGKILL, signal.SIGTERM, signal.SIGINT][int(rng.integers(3))]
