@@ -20,17 +20,8 @@ from ..spectra.lights import class_pairs
 from ..vision.section import Vision
 from .columns.color_separation import ColorSeparation
 from .columns.exposure import EXPOSURE
-from .quantity import (
-    BEST_PLACE,
-    Columns,
-    DesignMetric,
-    FamilyMetric,
-    NoiseMetric,
-    PulseMetric,
-    ReadoutMetric,
-    RequestedQuantities,
-    VisionMetric,
-)
+from .metric import DesignMetric, FamilyMetric, NoiseMetric, PulseMetric, ReadoutMetric, VisionMetric
+from .quantity import BEST_PLACE, Columns, RequestedQuantities
 from .registry import METRICS, quantities_of
 from .separation import csd_name, separations, separations_along
 from .user_metrics import UserMetric, user_quantities

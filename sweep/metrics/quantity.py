@@ -3,22 +3,16 @@
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from ..base.types import FloatArray, IndexArray
-from ..camera.forward import ForwardModel
-from ..camera.readout import NoisyReadout
+from ..base.types import FloatArray
 from ..camera.setup import Setup
-from ..designs.block import Block
-from ..designs.family import Family
 from ..spectra.lights import Pair
 from ..spectra.tasks import TaskColumns
-from ..vision.section import Vision
 from .smooth import Rows, SmoothDesign
 from .user_metrics import UserMetric
 
@@ -354,164 +348,3 @@ class RequestedQuantities:
     flicker: bool = False
     user_metrics: tuple[UserMetric, ...] = ()
     brightest: str = ""
-
-
-class Metric(ABC):
-    """Columns that are computed together; a class in `metrics/columns/`. `order` is their position in the table."""
-
-    order: ClassVar[int]
-
-    @abstractmethod
-    def quantities(self, requested: RequestedQuantities) -> Sequence[Quantity]:
-        """Return the columns in a study.
-
-        Parameters
-        ----------
-        requested : RequestedQuantities
-            Requested quantities.
-
-        Returns
-        -------
-        sequence of Quantity
-            Columns; none if they are not requested.
-        """
-
-
-class DesignMetric(Metric):
-    """Metric of designs without light."""
-
-    @abstractmethod
-    def of_designs(self, setup: Setup, block: Block) -> Columns:
-        """Compute the columns.
-
-        Parameters
-        ----------
-        setup : Setup
-            Scene and camera.
-        block : Block
-            Designs.
-
-        Returns
-        -------
-        dict of str to ndarray of shape (n_designs,)
-            Column name -> values.
-        """
-
-
-class ReadoutMetric(Metric):
-    """Metric of the digital numbers of a scene."""
-
-    @abstractmethod
-    def of_readout(self, setup: Setup, response: FloatArray, unlit: FloatArray) -> Columns:
-        """Compute the columns at one sampling phase and moment; the worst of all counts.
-
-        Parameters
-        ----------
-        setup : Setup
-            Scene and camera.
-        response : ndarray of shape (n_designs, n_signals, n_channels)
-            Readout, DN.
-        unlit : ndarray of shape (n_designs, n_channels)
-            Response without the lamps, DN.
-
-        Returns
-        -------
-        dict of str to ndarray of shape (n_designs,)
-            Column name -> values.
-        """
-
-
-class NoiseMetric(Metric):
-    """Metric of mean and variance of a noisy scene; `extra`: only if a study requests probabilities."""
-
-    extra: ClassVar[bool] = False
-
-    @abstractmethod
-    def of_noise(
-        self, imager: ForwardModel, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
-    ) -> Columns:
-        """Compute the columns, the worst over all phases and moments.
-
-        Parameters
-        ----------
-        imager : ForwardModel
-            Model of the scene.
-        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
-            QE of the modified channels.
-        read : NoisyReadout
-            Readout of these designs.
-        members : mapping of str to ndarray of int
-            Signals of each state.
-
-        Returns
-        -------
-        dict of str to ndarray of shape (n_designs,)
-            Column name -> values.
-        """
-
-
-class PulseMetric(Metric):
-    """Metric of a pulsed lamp in an HDR pixel."""
-
-    @abstractmethod
-    def of_pulses(self, model: ForwardModel, curves: FloatArray) -> Columns:
-        """Compute the columns over all phases of a pulse.
-
-        Parameters
-        ----------
-        model : ForwardModel
-            Model of the scene.
-        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
-            QE of the modified channels.
-
-        Returns
-        -------
-        dict of str to ndarray of shape (n_designs,)
-            Column name -> values.
-        """
-
-
-class VisionMetric(Metric):
-    """Metric of images of signal heads."""
-
-    @abstractmethod
-    def of_images(self, setup: Setup, curves: FloatArray, vision: Vision, seed: int) -> Columns:
-        """Compute the columns.
-
-        Parameters
-        ----------
-        setup : Setup
-            Scene and camera.
-        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
-            QE of the modified channels.
-        vision : Vision
-            Benchmark.
-        seed : int
-            Seed of the study.
-
-        Returns
-        -------
-        dict of str to ndarray of shape (n_designs,)
-            Column name -> values.
-        """
-
-
-class FamilyMetric(Metric):
-    """Metric of the parameters of a family."""
-
-    @abstractmethod
-    def of_parameters(self, family: Family | None, points: FloatArray) -> Columns:
-        """Compute the columns.
-
-        Parameters
-        ----------
-        family : Family or None
-            Family.
-        points : ndarray of shape (n_designs, n_parameters)
-            Parameters.
-
-        Returns
-        -------
-        dict of str to ndarray of shape (n_designs,)
-            Column name -> values.
-        """

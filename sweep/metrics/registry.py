@@ -7,7 +7,8 @@ from functools import lru_cache
 
 from ..base.modules import instances_in
 from . import columns
-from .quantity import Metric, Quantity, RequestedQuantities
+from .metric import Metric
+from .quantity import Quantity, RequestedQuantities
 
 EDGES = "edges that production shifts"
 POPULATION = "the population of the lights, before clipping and rounding"

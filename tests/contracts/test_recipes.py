@@ -123,7 +123,8 @@ RED_SHARE = '''\
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from sweep.metrics.quantity import DesignMetric, LinearRows, Quantity
+from sweep.metrics.quantity import LinearRows, Quantity
+from sweep.metrics.metric import DesignMetric
 from sweep.metrics.smooth import Rows
 
 NAME = "red_share"
@@ -166,7 +167,8 @@ class RedShare(DesignMetric):
 DARKEST = '''\
 """The weakest signal of a scene."""
 
-from sweep.metrics.quantity import Quantity, ReadoutMetric
+from sweep.metrics.quantity import Quantity
+from sweep.metrics.metric import ReadoutMetric
 
 
 class Darkest(ReadoutMetric):

@@ -16,7 +16,8 @@ from sweep.designs.block import CurveBlock, EdgeBlock, edges_of
 from sweep.metrics import evaluate as route
 from sweep.metrics import registry
 from sweep.metrics.evaluate import evaluate
-from sweep.metrics.quantity import Columns, Quantity, ReadoutMetric, RequestedQuantities
+from sweep.metrics.metric import ReadoutMetric
+from sweep.metrics.quantity import Columns, Quantity, RequestedQuantities
 from sweep.metrics.user_metrics import UserMetric
 
 from ..blocks import SPACE, VIEWS

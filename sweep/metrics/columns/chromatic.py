@@ -11,7 +11,8 @@ from ...camera.readout import NoisyReadout
 from ...camera.setup import Setup
 from ...spectra.lights import class_pairs, pair_name
 from ..chromatic import chromatic_rows, chromatic_separations, noise_referred
-from ..quantity import DN, Columns, NoiseMetric, Quantity, ReadoutMetric, RequestedQuantities
+from ..metric import NoiseMetric, ReadoutMetric
+from ..quantity import DN, Columns, Quantity, RequestedQuantities
 
 CHROMATIC_CSD, CHROMATIC_DPRIME = "chromatic_csd", "chromatic_dprime"
 

@@ -8,7 +8,8 @@ from functools import partial
 from ...base.types import FloatArray
 from ...camera.setup import Setup
 from ...spectra.lights import class_pairs
-from ..quantity import BEST_PLACE, DN, Columns, Quantity, ReadoutMetric, RequestedQuantities
+from ..metric import ReadoutMetric
+from ..quantity import BEST_PLACE, DN, Columns, Quantity, RequestedQuantities
 from ..separation import csd_name, separations
 from ..smooth import SmoothDesign
 

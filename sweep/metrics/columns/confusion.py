@@ -13,7 +13,8 @@ from ...camera.readout import NoisyReadout
 from ...spectra.lights import Pair, class_pairs, pair_name
 from .. import confusion
 from ..discrimination import NoiseShape, contrast_to_noise, detectability, error_bounds, pairwise_error
-from ..quantity import Columns, NoiseMetric, Quantity, RequestedQuantities
+from ..metric import NoiseMetric
+from ..quantity import Columns, Quantity, RequestedQuantities
 from ..smooth_noise import bound_rows, error_decades, pair_rows, squared_contrast, squared_detectability
 
 CNR, D_PRIME, ERROR, ERROR_BOUND = "cnr", "dprime", "error", "error_bound"

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from ..quantity import Metric, Quantity, RequestedQuantities
+from ..metric import Metric
+from ..quantity import Quantity, RequestedQuantities
 
 EXPOSURE = "exposure_s"
 

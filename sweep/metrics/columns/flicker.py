@@ -8,7 +8,8 @@ from ...base.types import FloatArray
 from ...camera.forward import ForwardModel
 from ...camera.pwm import phases_of
 from ..chromatic import squared_distance
-from ..quantity import DN, Columns, PulseMetric, Quantity, RequestedQuantities
+from ..metric import PulseMetric
+from ..quantity import DN, Columns, Quantity, RequestedQuantities
 
 MODULATION, LAMP_SEEN, FALSE_HUE = "flicker_modulation", "lamp_seen", "false_hue_dn"
 _BETWEEN = 7

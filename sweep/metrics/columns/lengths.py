@@ -9,7 +9,8 @@ import numpy as np
 from ...base.types import FloatArray
 from ...designs.family import Family
 from ...designs.products import row_products
-from ..quantity import Columns, FamilyMetric, Quantity, RequestedQuantities
+from ..metric import FamilyMetric
+from ..quantity import Columns, Quantity, RequestedQuantities
 from ..smooth import Rows, SmoothDesign
 
 _MEANINGS = {

@@ -19,7 +19,8 @@ from ...camera.noise.gaussian import share_below
 from ...camera.readout import NoisyReadout
 from ...spectra.lights import class_pairs, pair_name
 from ..discrimination import NoiseShape
-from ..quantity import Columns, NoiseMetric, Quantity, RequestedQuantities
+from ..metric import NoiseMetric
+from ..quantity import Columns, Quantity, RequestedQuantities
 
 CTA = "cta"
 _MOST = 1e12

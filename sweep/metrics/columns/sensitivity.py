@@ -9,7 +9,8 @@ import numpy as np
 from ...base.types import FloatArray
 from ...camera.setup import Setup
 from ...designs.block import Block, CurveBlock
-from ..quantity import Columns, DesignMetric, LinearRows, Quantity, RequestedQuantities
+from ..metric import DesignMetric
+from ..quantity import Columns, LinearRows, Quantity, RequestedQuantities
 from ..separation import cfa_sensitivity
 from ..smooth import Rows, SmoothDesign
 

@@ -6,7 +6,8 @@ import numpy as np
 
 from ...camera.setup import Setup
 from ...designs.block import Block
-from ..quantity import Columns, DesignMetric, LinearRows, Quantity, RequestedQuantities
+from ..metric import DesignMetric
+from ..quantity import Columns, LinearRows, Quantity, RequestedQuantities
 from ..smooth import Rows, SmoothDesign
 
 _SLOPE, _LEAST = "slope_per_nm", "min_transmission"

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from ...camera.setup import Setup
 from ...designs.block import Block
 from ...spectra.tasks import LightName
-from ..quantity import Columns, DesignMetric, Quantity, RequestedQuantities
+from ..metric import DesignMetric
+from ..quantity import Columns, Quantity, RequestedQuantities
 from ..smooth import Rows, SmoothDesign
 
 if TYPE_CHECKING:

@@ -8,7 +8,8 @@ import numpy as np
 
 from ...base.errors import SweepError, ValidationIssue
 from ...base.types import FloatArray
-from ..quantity import Metric, Quantity, RequestedQuantities
+from ..metric import Metric
+from ..quantity import Quantity, RequestedQuantities
 from ..smooth import Rows, SmoothDesign
 from ..user_metrics import Readings, UserMetric
 

@@ -7,7 +7,8 @@ import numpy as np
 from ...base.types import FloatArray
 from ...camera.setup import Setup
 from ...vision.section import Vision
-from ..quantity import Columns, Quantity, RequestedQuantities, VisionMetric
+from ..metric import VisionMetric
+from ..quantity import Columns, Quantity, RequestedQuantities
 from ..smooth import Rows, SmoothDesign
 
 VISION_ERROR = "vision_error"

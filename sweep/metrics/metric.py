@@ -1,0 +1,177 @@
+"""Abstract metrics: base classes of `columns`, by their input: designs, readouts, noise, pulses or images."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+from ..base.types import FloatArray, IndexArray
+from ..camera.forward import ForwardModel
+from ..camera.readout import NoisyReadout
+from ..camera.setup import Setup
+from ..designs.block import Block
+from ..designs.family import Family
+from ..vision.section import Vision
+from .quantity import Columns, Quantity, RequestedQuantities
+
+
+class Metric(ABC):
+    """Columns that are computed together; a class in `metrics/columns/`. `order` is their position in the table."""
+
+    order: ClassVar[int]
+
+    @abstractmethod
+    def quantities(self, requested: RequestedQuantities) -> Sequence[Quantity]:
+        """Return the columns in a study.
+
+        Parameters
+        ----------
+        requested : RequestedQuantities
+            Requested quantities.
+
+        Returns
+        -------
+        sequence of Quantity
+            Columns; none if they are not requested.
+        """
+
+
+class DesignMetric(Metric):
+    """Metric of designs without light."""
+
+    @abstractmethod
+    def of_designs(self, setup: Setup, block: Block) -> Columns:
+        """Compute the columns.
+
+        Parameters
+        ----------
+        setup : Setup
+            Scene and camera.
+        block : Block
+            Designs.
+
+        Returns
+        -------
+        dict of str to ndarray of shape (n_designs,)
+            Column name -> values.
+        """
+
+
+class ReadoutMetric(Metric):
+    """Metric of the digital numbers of a scene."""
+
+    @abstractmethod
+    def of_readout(self, setup: Setup, response: FloatArray, unlit: FloatArray) -> Columns:
+        """Compute the columns at one sampling phase and moment; the worst of all counts.
+
+        Parameters
+        ----------
+        setup : Setup
+            Scene and camera.
+        response : ndarray of shape (n_designs, n_signals, n_channels)
+            Readout, DN.
+        unlit : ndarray of shape (n_designs, n_channels)
+            Response without the lamps, DN.
+
+        Returns
+        -------
+        dict of str to ndarray of shape (n_designs,)
+            Column name -> values.
+        """
+
+
+class NoiseMetric(Metric):
+    """Metric of mean and variance of a noisy scene; `extra`: only if a study requests probabilities."""
+
+    extra: ClassVar[bool] = False
+
+    @abstractmethod
+    def of_noise(
+        self, imager: ForwardModel, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
+    ) -> Columns:
+        """Compute the columns, the worst over all phases and moments.
+
+        Parameters
+        ----------
+        imager : ForwardModel
+            Model of the scene.
+        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE of the modified channels.
+        read : NoisyReadout
+            Readout of these designs.
+        members : mapping of str to ndarray of int
+            Signals of each state.
+
+        Returns
+        -------
+        dict of str to ndarray of shape (n_designs,)
+            Column name -> values.
+        """
+
+
+class PulseMetric(Metric):
+    """Metric of a pulsed lamp in an HDR pixel."""
+
+    @abstractmethod
+    def of_pulses(self, model: ForwardModel, curves: FloatArray) -> Columns:
+        """Compute the columns over all phases of a pulse.
+
+        Parameters
+        ----------
+        model : ForwardModel
+            Model of the scene.
+        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE of the modified channels.
+
+        Returns
+        -------
+        dict of str to ndarray of shape (n_designs,)
+            Column name -> values.
+        """
+
+
+class VisionMetric(Metric):
+    """Metric of images of signal heads."""
+
+    @abstractmethod
+    def of_images(self, setup: Setup, curves: FloatArray, vision: Vision, seed: int) -> Columns:
+        """Compute the columns.
+
+        Parameters
+        ----------
+        setup : Setup
+            Scene and camera.
+        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE of the modified channels.
+        vision : Vision
+            Benchmark.
+        seed : int
+            Seed of the study.
+
+        Returns
+        -------
+        dict of str to ndarray of shape (n_designs,)
+            Column name -> values.
+        """
+
+
+class FamilyMetric(Metric):
+    """Metric of the parameters of a family."""
+
+    @abstractmethod
+    def of_parameters(self, family: Family | None, points: FloatArray) -> Columns:
+        """Compute the columns.
+
+        Parameters
+        ----------
+        family : Family or None
+            Family.
+        points : ndarray of shape (n_designs, n_parameters)
+            Parameters.
+
+        Returns
+        -------
+        dict of str to ndarray of shape (n_designs,)
+            Column name -> values.
+        """
