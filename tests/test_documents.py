@@ -304,7 +304,7 @@ search: {{starts: 1}}
         assert loaded.search is not None
         answer = run_search(loaded, loaded.search, in_turn, lambda *_: None)
         assert answer.choice is not None
-        assert answer.best.objective >= answer.choice.tried[answer.choice.best].objective
+        assert answer.best.objective >= answer.choice.tried[answer.choice.best].objective * (1 - 1e-9)
         found.append(f"{answer.best.objective:.1f}")
     first, second, third = found[:3]
     assert f"The best single one has {first}, {second} and {third} DN at 90, 85 and 80 % of the sensitivity" in text
@@ -392,5 +392,5 @@ def test_the_figures_of_hdr_pixels_are_those_of_their_commands(finished: Finishe
         else:
             assert shown == f"{usable.max()[name]:.3g} cd"
     flicker = pd.read_parquet(finished("flicker") / "results.parquet")
-    assert (flicker["lamp_seen"] == 1).all()
+    assert (flicker["lamp_seen"] > 1 - 1e-9).all()
     assert f"the false hue is at most {flicker['false_hue_dn'].max():.1f} DN" in text

@@ -17,6 +17,7 @@ WellE = Annotated[float, Field(ge=1e-3, le=1e7)]
 GainDnPerE = Annotated[float, Field(ge=1e-6, le=1e9)]
 Bits = Annotated[int, Field(ge=1, le=24)]
 Merge = Literal["saturated", "weighted"]
+CaptureNames = Literal["split_pixel", "dual_gain", "staggered"]
 
 
 class Capture(Section):

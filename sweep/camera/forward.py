@@ -272,26 +272,26 @@ class ForwardModel:
         """Return expected electrons; of an HDR pixel those of each exposure, on the first axis."""
         if not self.setup.camera.pixel.captures:
             return self.electrons.expected(curves, scales, exposure_s)
-        modified, found = list(self.setup.camera.modified), []
+        modified, captured = list(self.setup.camera.modified), []
         for (factors, model), scale, exposure in zip(
             self._of_exposures, scales, self.setup.camera.pixel.exposures, strict=True
         ):
             electrons = model.electrons.expected(curves * factors[modified, None], scale, exposure_s)
             electrons *= exposure.capture.light
-            found.append(
+            captured.append(
                 model._of_pixels(electrons) if model.readout.by_channel and not self.readout.by_channel else electrons
             )
-        return np.stack(found)
+        return np.stack(captured)
 
     @cached_property
     def _of_exposures(self) -> list[tuple[FloatArray, ForwardModel]]:
         """QE factors of the channels, and model of the electrons, of each exposure of an HDR pixel."""
         camera, made = self.setup.camera, []
         for exposure in camera.pixel.exposures:
-            own = exposure.capture
-            factors = np.array([own.qe_factor.get(channel, 1.0) for channel in camera.mosaic.channels])
-            if own.qe_factor or own.crosstalk is not None:
-                crosstalk = camera.pixel.crosstalk if own.crosstalk is None else own.crosstalk
+            capture = exposure.capture
+            factors = np.array([capture.qe_factor.get(channel, 1.0) for channel in camera.mosaic.channels])
+            if capture.qe_factor or capture.crosstalk is not None:
+                crosstalk = camera.pixel.crosstalk if capture.crosstalk is None else capture.crosstalk
                 pixel = camera.pixel.model_copy(update={"crosstalk": crosstalk})
                 changes = {"qe": camera.qe * factors[:, None], "pixel": pixel}
                 model = type(self)(self.setup.with_camera(**changes), self.phases, once=self._once)

@@ -100,20 +100,21 @@ def merged(electrons: FloatArray, light: FloatArray, pixel: Pixel) -> Merged:
     Merged
         Merged values.
     """
-    found = _merged(electrons, light, pixel) if not pixel.prnu else _over_gains(electrons, light, pixel)
+    result = _over_gains(electrons, light, pixel) if pixel.prnu else _merged(electrons, light, pixel)
+    mean, variance = result.mean, result.variance
+    if pixel.companding:
+        variance = variance + _step_dn(mean, pixel) ** 2 / 12  # as if noise dithers the steps
     # One reading in all but a billionth of the readouts: what is left is rounding of the arithmetic, by which two
     # signals would seem separated with certainty. Two readings of a capture are at least 1 DN apart.
-    found = _with_steps(found, pixel) if pixel.companding else found
-    one = found.variance < np.maximum(_CERTAIN_DN2, _ROUNDING * found.mean**2)
-    return Merged(np.where(one, np.round(found.mean, 6), found.mean), np.where(one, 0.0, found.variance), found.certain)
+    constant = variance < np.maximum(_CERTAIN_DN2, _ROUNDING * mean**2)
+    return Merged(np.where(constant, np.round(mean, 6), mean), np.where(constant, 0.0, variance), result.certain)
 
 
-def _with_steps(found: Merged, pixel: Pixel) -> Merged:
-    """Return merged values with the variance of rounding to codes: a twelfth of a squared step, as if noise dithers."""
-    knees_dn, codes = np.array([(0.0, 0.0), *pixel.companding]).T
-    at = np.clip(np.searchsorted(knees_dn, found.mean, side="right") - 1, 0, codes.size - 2)
-    step_dn = (np.diff(knees_dn) / np.diff(codes))[at]
-    return Merged(found.mean, found.variance + step_dn**2 / 12, found.certain)
+def _step_dn(dn: FloatArray, pixel: Pixel) -> FloatArray:
+    """Return the step of a code at merged values, DN."""
+    knees_dn, codes = pixel.knees
+    at = np.clip(np.searchsorted(knees_dn, dn, side="right") - 1, 0, codes.size - 2)
+    return np.asarray((np.diff(knees_dn) / np.diff(codes))[at], dtype=float)
 
 
 def coded(dn: FloatArray, pixel: Pixel) -> FloatArray:
@@ -133,7 +134,7 @@ def coded(dn: FloatArray, pixel: Pixel) -> FloatArray:
     """
     if not pixel.companding:
         return dn
-    knees_dn, codes = np.array([(0.0, 0.0), *pixel.companding]).T
+    knees_dn, codes = pixel.knees
     return np.asarray(np.interp(np.floor(np.interp(dn, knees_dn, codes) + 0.5), codes, knees_dn), dtype=float)
 
 
@@ -146,45 +147,29 @@ def _over_gains(electrons: FloatArray, light: FloatArray, pixel: Pixel) -> Merge
     about = _merged(electrons, light, pixel)
     certain, at_once = about.certain, max(1, _HELD // max(1, electrons.size))
     for start in range(0, z.size, at_once):
-        some = slice(start, start + at_once)
-        gains = (1 + pixel.prnu * z[some]).reshape(-1, *(1,) * (electrons.ndim - 1))
+        part = slice(start, start + at_once)
+        gains = (1 + pixel.prnu * z[part]).reshape(-1, *(1,) * (electrons.ndim - 1))
         block = _merged(electrons[:, None] * gains, light[:, None], pixel)
-        for weight, value, variance in zip(weights[some], block.mean - about.mean, block.variance, strict=True):
+        for weight, value, variance in zip(weights[part], block.mean - about.mean, block.variance, strict=True):
             mean, square, spread = mean + weight * value, square + weight * value**2, spread + weight * variance
         certain = certain & block.certain.all(axis=0)
     return Merged(about.mean + mean, spread + square - mean**2, certain)
 
 
-def merged_mean(electrons: FloatArray, light: FloatArray, pixel: Pixel) -> FloatArray:
-    """Return the mean of `merged`.
-
-    Parameters
-    ----------
-    electrons, light, pixel
-        As in `merged`.
-
-    Returns
-    -------
-    ndarray of shape (...)
-        Mean, DN of the first capture.
-    """
-    return merged(electrons, light, pixel).mean
-
-
 def _merged(electrons: FloatArray, light: FloatArray, pixel: Pixel) -> Merged:
-    known, moments = limits_dn(pixel), []
+    limits, moments = limits_dn(pixel), []
     for exposure, expected in zip(pixel.exposures, electrons, strict=True):
         captures = tuple(pixel.read_as[number] for number in exposure.numbers)
-        table = subset_table(captures, tuple(known[number] for number in exposure.numbers))
+        table = subset_table(captures, tuple(limits[number] for number in exposure.numbers))
         moments.append(table.at(expected))
     total, offset = np.zeros(electrons.shape[1:]), pixel.offset_dn
     parts = []
     for usable in itertools.product(*moments):
-        some = [of[subset] for of, subset in zip(moments, usable, strict=True)]
-        share = np.prod([one.share for one in some], axis=0)
+        conditional = [of[subset] for of, subset in zip(moments, usable, strict=True)]
+        share = np.prod([one.share for one in conditional], axis=0)
         if not any(usable) or not share.any():
             continue
-        parts.append((share, *_combined(some, weights_of(usable, electrons, light, pixel), light)))
+        parts.append((share, *_combined(conditional, weights_of(usable, electrons, light, pixel), light)))
     for share, mean, _ in parts:
         total = total + share * mean
     variance = sum(share * (spread + (mean - total) ** 2) for share, mean, spread in parts)
@@ -194,36 +179,22 @@ def _merged(electrons: FloatArray, light: FloatArray, pixel: Pixel) -> Merged:
 
 
 def _combined(
-    some: list[SubsetMoments], weights: Mapping[tuple[int, int], FloatArray], light: FloatArray
+    moments: list[SubsetMoments], weights: Mapping[tuple[int, int], FloatArray], light: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return mean and variance of the weighted sum, in electrons of a pixel of full sensitivity."""
-    mean = variance = np.zeros(some[0].share.shape)
+    mean = variance = np.zeros(moments[0].share.shape)
     for (at, number), weight in weights.items():
         share = weight / light[at]
-        mean = mean + share * some[at].mean_e[number]
+        mean = mean + share * moments[at].mean_e[number]
         for (other_at, other), other_weight in weights.items():
             if other_at == at:
-                variance = variance + share * other_weight / light[at] * some[at].covariance_e2[number, other]
+                variance = variance + share * other_weight / light[at] * moments[at].covariance_e2[number, other]
     return mean, variance
 
 
-@dataclass(frozen=True)
-class Spread:
-    """Shape of the noise of merged values, ndarray of one shape each.
-
-    Parameters
-    ----------
-    gaussian : ndarray of bool
-        True where the noise may be taken as Gaussian.
-    reach_dn : ndarray
-        Largest distance from the mean with a probability above 1e-15, DN of the first capture.
-    """
-
-    gaussian: BoolArray
-    reach_dn: FloatArray
-
-
-def spread_of(electrons: FloatArray, light: FloatArray, pixel: Pixel, certain: BoolArray) -> Spread:
+def shape_of_noise(
+    electrons: FloatArray, light: FloatArray, pixel: Pixel, certain: BoolArray
+) -> tuple[BoolArray, FloatArray]:
     """Return the shape of the noise of merged values.
 
     Parameters
@@ -239,8 +210,10 @@ def spread_of(electrons: FloatArray, light: FloatArray, pixel: Pixel, certain: B
 
     Returns
     -------
-    Spread
-        Shape of the noise.
+    gaussian : ndarray of bool
+        True where the noise may be taken as Gaussian.
+    reach_dn : ndarray
+        Largest distance from the mean with a probability above 1e-15, DN of the first capture.
     """
     gaussian, reach_dn = certain.copy(), np.zeros(certain.shape)
     for at, exposure in enumerate(pixel.exposures):
@@ -258,7 +231,7 @@ def spread_of(electrons: FloatArray, light: FloatArray, pixel: Pixel, certain: B
             reach_e = 9 * (np.sqrt(expected) + one.prnu * expected + one.read_noise_e) + 27 + 1 / one.dn_per_e
             # Its mean, if it is used, is within its reach of the expected number, and so is the mean of all.
             reach_dn = np.maximum(reach_dn, np.where(used, 2 * reach_e * pixel.dn_per_e / light[at], 0.0))
-    return Spread(gaussian, reach_dn)
+    return gaussian, reach_dn
 
 
 def weights_of(
@@ -301,7 +274,7 @@ def _read_noise_e2(pixel: Pixel) -> float:
     return float(pixel.read_noise_e**2 + 1 / (12 * pixel.dn_per_e**2))
 
 
-def merged_without_noise(electrons: FloatArray, light: FloatArray, pixel: Pixel) -> FloatArray:
+def without_noise(electrons: FloatArray, light: FloatArray, pixel: Pixel) -> FloatArray:
     """Merge captures that are clipped and rounded, without noise.
 
     Parameters
@@ -401,6 +374,6 @@ def _subsets(pixel: Pixel) -> Iterator[tuple[Subset, ...]]:
     of_exposure = []
     for exposure in pixel.exposures:
         places = range(len(exposure.numbers))
-        some = [s for size in range(len(places) + 1) for s in itertools.combinations(places, size)]
-        of_exposure.append([s for s in some if last not in exposure.numbers or exposure.numbers.index(last) in s])
+        subsets = [s for size in range(len(places) + 1) for s in itertools.combinations(places, size)]
+        of_exposure.append([s for s in subsets if last not in exposure.numbers or exposure.numbers.index(last) in s])
     return itertools.product(*of_exposure)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
@@ -14,6 +14,7 @@ from .captures import (
     MOST_CAPTURES,
     Bits,
     Capture,
+    CaptureNames,
     Crosstalk,
     Exposure,
     GainDnPerE,
@@ -30,10 +31,9 @@ DarkCurrent = Annotated[float, Field(ge=0, le=1e15)]
 MOST_PRNU = 0.1
 """Largest relative deviation of gains: a Gaussian gain is then positive within ten of them. Sensors have 0.01."""
 Prnu = Annotated[float, Field(ge=0, le=MOST_PRNU)]
-_Names = Literal["split_pixel", "dual_gain", "staggered"]
 _Captures = Annotated[list[Capture], Field(max_length=MOST_CAPTURES)]
 _MOST_WELL_E = 1e6
-"""Of a capture: its electrons are counted one by one."""
+"""Largest full well of a capture, electrons, which are counted one by one."""
 _Knee = Annotated[tuple[NonNegative, NonNegative], BeforeValidator(from_to)]
 
 
@@ -76,7 +76,7 @@ class Pixel(Section):
     captures: Annotated[
         tuple[Capture, ...],
         Field(max_length=MOST_CAPTURES),
-        BeforeValidator(named_captures, json_schema_input_type=_Names | _Captures),
+        BeforeValidator(named_captures, json_schema_input_type=CaptureNames | _Captures),
     ] = ()
     """Readouts of an HDR pixel, from the most sensitive to the least; or `split_pixel`, `dual_gain`, `staggered`.
     DN are then those of the first one; the merged value goes beyond its full scale."""
@@ -84,7 +84,7 @@ class Pixel(Section):
     """`saturated`: the most sensitive capture below its threshold; `weighted`: the mean of all below theirs, weighted
     by the inverse variances at the expected light, with photon noise shared within an exposure."""
     threshold: Share = 0.9
-    """Share of saturation from which on a capture is not used; the least sensitive one always is, alone."""
+    """Share of saturation from which on a capture is not used; the least sensitive one always is."""
     companding: Annotated[tuple[_Knee, ...], BeforeValidator(as_tuple, json_schema_input_type=list[_Knee])] = ()
     """Knees of the code that the merged value is stored in: [DN of the merged value, code], from [0, 0] on."""
 
@@ -104,13 +104,17 @@ class Pixel(Section):
                 raise ValueError(f"captures.{number} is more sensitive (DN per photon) than the one before it")
         if not self.crosstalk and any(capture.crosstalk for capture in self.captures):
             raise ValueError("crosstalk of a capture needs a crosstalk of the pixel above 0")
-        knees = np.array([(0.0, 0.0), *self.companding])
-        if (np.diff(knees, axis=0) <= 0).any():
+        if (np.diff(self.knees) <= 0).any():
             raise ValueError("companding: knees must ascend in DN and in code, from above 0")
         top_dn = self.saturation_e * self.dn_per_e + self.offset_dn
-        if self.companding and knees[-1, 0] < top_dn * (1 - 1e-9):
+        if self.companding and self.knees[0, -1] < top_dn * (1 - 1e-9):
             raise ValueError(f"companding: the last knee must be at {top_dn:.6g} DN or more, where all are saturated")
         return self
+
+    @property
+    def knees(self) -> FloatArray:
+        """DN of the merged value, and codes, at 0 and at each knee, ndarray of shape (2, n_knees + 1)."""
+        return np.array([(0.0, 0.0), *self.companding]).T
 
     @property
     def read_as(self) -> tuple[Pixel, ...]:

@@ -199,12 +199,11 @@ class Readout:
             Digital numbers, DN.
         """
         setup, pixel = self.setup, self.pixel
+        noisy = setup.scene.noise is not None
         if pixel.captures:
             light = self.capture_light_of(electrons)
-            noiseless = setup.scene.noise is None
-            return (merge.merged_without_noise if noiseless else merge.merged_mean)(electrons, light, pixel)
+            return merge.merged(electrons, light, pixel).mean if noisy else merge.without_noise(electrons, light, pixel)
         clips, rounds = setup.computes("saturation"), setup.computes("quantization")
-        noisy = setup.scene.noise is not None
         if noisy and setup.computes("noise"):
             return (table.mean_rounded if rounds else table.mean_unrounded)(electrons, pixel)
         if rounds and not noisy and electrons.size > _MANY:
@@ -359,10 +358,10 @@ class Readout:
         self, pixels: merge.Merged, electrons: FloatArray, variance: FloatArray
     ) -> tuple[BoolArray, FloatArray]:
         """Return `gaussian` and `reach_dn` of `NoisyReadout` for HDR pixels."""
-        heaviest, some = self._heaviest(variance), (self._weights > 0).astype(float)
-        spread = merge.spread_of(electrons, self.capture_light_of(electrons), self.pixel, pixels.certain)
-        gaussian = self._weighed((~spread.gaussian).astype(float), some) == 0
-        return gaussian, spread.reach_dn.max(axis=-1, keepdims=True) * heaviest
+        light = self.capture_light_of(electrons)
+        gaussian, reach_dn = merge.shape_of_noise(electrons, light, self.pixel, pixels.certain)
+        others = self._weighed((~gaussian).astype(float), (self._weights > 0).astype(float))
+        return others == 0, reach_dn.max(axis=-1, keepdims=True) * self._heaviest(variance)
 
     def _heaviest(self, variance: FloatArray) -> FloatArray:
         """Return the largest weight of a pixel in each channel, broadcast to the cases."""

@@ -10,7 +10,7 @@ from ..base.types import FloatArray
 SHIFTS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 """Where in the range of a tolerance the worst case is looked for, in units of its half width."""
 _WIDTHS = (0.0, 1.0)
-"""Where in the range of broadening it is looked for."""
+"""Points in the range of broadening at which it is looked for."""
 
 
 class ProductionError(NamedTuple):
@@ -107,10 +107,10 @@ class Tolerance:
 
     @property
     def places(self) -> tuple[ProductionError, ...]:
-        """Where the worst case is searched: from end to end, and corners; with and without broadening."""
+        """Production errors of the worst case: from end to end, and corners; with and without broadening."""
         mixed = ((-1.0, 1.0), (1.0, -1.0)) if self.edge_shift_nm > 0 and self.thickness > 0 else ()
-        both = (*((s, s) for s in SHIFTS), *mixed)
-        return tuple(dict.fromkeys(self.at(edge, film, width) for width in _WIDTHS for edge, film in both))
+        errors = (*((s, s) for s in SHIFTS), *mixed)
+        return tuple(dict.fromkeys(self.at(edge, film, width) for width in _WIDTHS for edge, film in errors))
 
 
 NONE = Tolerance()

@@ -272,10 +272,10 @@ def merged_shares(
         for at in range(n_exposures):
             ends[at] = poisson_shares(max(electrons[at] * (1 + prnu * z), 0.0), 0, _RARE_COUNT, counts[at])
             first[at], last[at] = min(first[at], ends[at, 0]), max(last[at], ends[at, 1])
-            some = counts[at, ends[at, 0] : ends[at, 1]]
-            some /= some.sum()
+            shares_of_counts = counts[at, ends[at, 0] : ends[at, 1]]
+            shares_of_counts /= shares_of_counts.sum()
             for k in range(n_captures):
-                before[k, at] = (some * passed[k, at, ends[at, 0] : ends[at, 1]]).sum()
+                before[k, at] = (shares_of_counts * passed[k, at, ends[at, 0] : ends[at, 1]]).sum()
         for k in range(n_captures):
             others = weight
             for at in range(n_exposures):

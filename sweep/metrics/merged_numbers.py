@@ -16,6 +16,7 @@ import numpy as np
 from ..base.types import FloatArray, IndexArray
 from ..camera.merge import limits_dn, saturating_e
 from ..camera.noise import gaussian
+from ..camera.noise.subsets import share_beyond
 from ..camera.pixel import Pixel
 
 _PER_NOISE = 8.0
@@ -67,8 +68,8 @@ class Bins:
         read = [(*each, a) for *each, a in zip(pixel.read_as, limits_dn(pixel), light, strict=True)]
         ends = [(limit - one.offset_dn) / (one.dn_per_e * a) for one, limit, a in read if limit is not None]
         dark = np.array([max(one.read_noise_e**2, 1.0) / a for one, _, a in read])
-        knees = np.array([(0.0, 0.0), *pixel.companding]).T
-        knees[0] = (knees[0] - pixel.offset_dn) / pixel.dn_per_e
+        knees_dn, codes = pixel.knees
+        knees = np.stack([(knees_dn - pixel.offset_dn) / pixel.dn_per_e, codes])
         return cls(np.maximum.accumulate([0.0, *ends]), light, dark, knees)
 
     @property
@@ -127,7 +128,7 @@ class Bins:
 
 @dataclass(frozen=True)
 class MergedTable:
-    """What each number of electrons reads, for all captures of an HDR pixel.
+    """Distribution of the readings of each number of electrons, for all captures of an HDR pixel.
 
     Parameters
     ----------
@@ -178,7 +179,7 @@ def affordable(pixel: Pixel) -> bool:
 
 @lru_cache(maxsize=8)
 def merged_table(pixel: Pixel, light: tuple[float, ...]) -> MergedTable:
-    """Compute what each number of electrons reads.
+    """Compute the distribution of the readings of each number of electrons.
 
     Parameters
     ----------
@@ -207,7 +208,7 @@ def merged_table(pixel: Pixel, light: tuple[float, ...]) -> MergedTable:
         shares = shares * passed[number, exposure[number], rows]
         entries.append((rows, bins.number(value_e), shares))
         if limit is not None:
-            passed[number + 1 :, exposure[number]] *= _beyond(counts, capture, limit)
+            passed[number + 1 :, exposure[number]] *= share_beyond(counts, capture, limit)
     occurring = np.concatenate([of_bins for _, of_bins, _ in entries])
     first, n_bins = int(occurring.min()), int(np.ptp(occurring)) + 1
     starts, columns, probabilities, total = [], [], [], 0
@@ -223,13 +224,6 @@ def merged_table(pixel: Pixel, light: tuple[float, ...]) -> MergedTable:
     return MergedTable(
         bins, exposure, passed, np.stack(starts), np.concatenate(columns), np.concatenate(probabilities), first, n_bins
     )
-
-
-def _beyond(counts: FloatArray, pixel: Pixel, limit_dn: int) -> FloatArray:
-    """Return the probability that a capture reads its limit or more, for each count."""
-    over = pixel.dn_per_e * np.minimum(counts, pixel.well_e) + pixel.offset_dn - (limit_dn - 0.5)
-    sigma = pixel.dn_per_e * pixel.read_noise_e
-    return gaussian.share_below(over / sigma) if sigma else (over >= 0).astype(float)
 
 
 def _read(counts: FloatArray, pixel: Pixel, limit_dn: int | None) -> tuple[IndexArray, FloatArray, FloatArray]:

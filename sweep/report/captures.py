@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 _SHADES = ("#08519c", "#3182bd", "#9ecae1", "#deebf7")
 _SATURATED = "#d62728"
 _TYPES = 2
+_ALL = 1 - 1e-9
 
 
 @dataclass(frozen=True)
@@ -93,9 +94,9 @@ def flicker_lines(output: Output) -> Iterator[str]:
         for column, which in ((LAMP_SEEN, "idxmin"), (MODULATION, "idxmax"), (FALSE_HUE, "idxmax"))
     )
     least = seen[LAMP_SEEN]
-    where = "all phases" if least == 1 else f"{least:.1%} of the phases ({seen['name']} in {seen['scenario']})"
+    share = f"as few as {least:.1%} of the phases ({seen['name']} in {seen['scenario']})"
     yield (
-        f"Pulsed lamps are seen in {where if least == 1 else f'as few as {where}'}; their modulation is at most "
+        f"Pulsed lamps are seen in {'all phases' if least > _ALL else share}; their modulation is at most "
         f"{modulated[MODULATION]:.2f} ({modulated['scenario']}), their false hue at most {hue[FALSE_HUE]:.3g} DN "
         f"({hue['name']} in {hue['scenario']})."
     )

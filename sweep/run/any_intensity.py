@@ -64,7 +64,7 @@ def any_intensity_table(study: Study, rows: pd.DataFrame, parallel: Parallel, pr
             keys.append({"name": row["name"], "series": series})
             calls.append(delayed(_nearest, setups, curves, np.array([*scenarios.values()]), members))
     answers = run_with_progress(parallel, calls, "lamps of any intensity", progress)
-    made = [key | row for key, found in zip(keys, answers, strict=True) for row in found]
+    made = [key | row for key, rows_of_design in zip(keys, answers, strict=True) for row in rows_of_design]
     return pa.Table.from_pylist(made, schema=_SCHEMA)
 
 
@@ -78,9 +78,9 @@ def _nearest(
     for at, cd in enumerate(intensity_cd):
         least: dict[str, Any] = {"dprime": np.inf}
         for pair in class_pairs(list(members)):
-            for own, other in (pair, pair[::-1]):
+            for kind, other in (pair, pair[::-1]):
                 for case in range(mean.shape[1]):
-                    points = mean[at, case, members[own]], variance[at, case, members[own]]
+                    points = mean[at, case, members[kind]], variance[at, case, members[kind]]
                     lines = mean[:, case, members[other]], variance[:, case, members[other]]
                     dprime, share = detectability_from_lines(*points, *lines)
                     one, segment, another = np.unravel_index(int(dprime.argmin()), dprime.shape)
@@ -88,8 +88,8 @@ def _nearest(
                         low, high = intensity_cd[segment : segment + 2]
                         least = {
                             "dprime": float(dprime[one, segment, another]),
-                            "signal_type": own,
-                            "signal": names[members[own][one]],
+                            "signal_type": kind,
+                            "signal": names[members[kind][one]],
                             "other_type": other,
                             "other": names[members[other][another]],
                             "other_cd": float(low + share[one, segment, another] * (high - low)),

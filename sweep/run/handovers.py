@@ -1,4 +1,4 @@
-"""Where captures of an HDR pixel hand over to the next one: the number of a series at which one is full."""
+"""Handovers of an HDR pixel: the number of a series at which a capture is full."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def handovers_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progre
         keys.append({"name": row["name"], "series": series, "key": key})
         calls.append(delayed(_handovers, setups, curves, np.array([*scenarios.values()])))
     answers = run_with_progress(parallel, calls, "handovers of captures", progress)
-    made = [key | row for key, found in zip(keys, answers, strict=True) for row in found]
+    made = [key | row for key, rows_of_design in zip(keys, answers, strict=True) for row in rows_of_design]
     return pa.Table.from_pylist(made, schema=_SCHEMA)
 
 

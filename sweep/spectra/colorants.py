@@ -98,8 +98,8 @@ def measured_films(grid: WavelengthGrid) -> Colorants:
     Colorants
         Catalog.
     """
-    found = read_colorants([_FILMS], grid)
-    return replace(found, names=tuple(name.removeprefix(f"{_FILMS.stem} ") for name in found.names))
+    films = read_colorants([_FILMS], grid)
+    return replace(films, names=tuple(name.removeprefix(f"{_FILMS.stem} ") for name in films.names))
 
 
 def read_colorants(places: Sequence[Path], grid: WavelengthGrid) -> Colorants:

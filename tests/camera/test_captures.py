@@ -14,7 +14,7 @@ from scipy import stats
 from sweep.camera.camera import Camera
 from sweep.camera.captures import NAMED_CAPTURES, Capture
 from sweep.camera.forward import forward_model
-from sweep.camera.merge import coded, limits_dn, merged, merged_without_noise
+from sweep.camera.merge import coded, limits_dn, merged, without_noise
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
 from sweep.camera.pwm import exposure_scales, light_in, phases_of
@@ -202,7 +202,7 @@ def test_a_single_capture_is_a_pixel_that_is_read_once(merge: Any, prnu: float) 
         np.testing.assert_allclose(other[name], one[name], rtol=1e-6)
     without = (replace(setup, scene=Scene()) for setup in (once, hdr))
     one, other = (evaluate(forward_model(setup), curves) for setup in without)
-    assert one["csd_yellow_red"] == other["csd_yellow_red"]
+    np.testing.assert_allclose(other["csd_yellow_red"], one["csd_yellow_red"], rtol=1e-12)
 
 
 def test_the_rule_of_saturation_is_that_of_isetcam() -> None:
@@ -213,7 +213,7 @@ def test_the_rule_of_saturation_is_that_of_isetcam() -> None:
     electrons = np.geomspace(1, 1e6, 4001)
     large, small = np.minimum(electrons, 22_000.0 * 49 / 200), np.minimum(electrons * 0.01, 7_900.0)
     expected = np.where(large > 0.95 * 22_000.0 * 49 / 200, small / 0.01, large)
-    found = merged_without_noise(light[:, None] * electrons, light[:, None], pixel) / pixel.dn_per_e
+    found = without_noise(light[:, None] * electrons, light[:, None], pixel) / pixel.dn_per_e
     half_a_step_e = 0.5 * 7_900.0 / 2**24 / 0.01
     np.testing.assert_allclose(found, expected, rtol=1e-6, atol=half_a_step_e)
 
@@ -324,7 +324,7 @@ def test_staggered_exposures_show_a_false_hue_and_a_split_pixel_none() -> None:
         setup = chart_setup(scene=scene, pixel=Pixel(captures=captures, read_noise_e=2, offset_dn=64))
         found[captures] = evaluate(forward_model(setup), setup.camera.base_qe[None])
     assert found["split_pixel"]["false_hue_dn"] < 0.1 * found["split_pixel"]["chromatic_csd_yellow_red"]
-    assert found["split_pixel"]["lamp_seen"] == 1
+    assert found["split_pixel"]["lamp_seen"] == pytest.approx(1)
     assert found["staggered"]["false_hue_dn"] > 1_000
     assert found["staggered"]["lamp_seen"] < 0.5
     assert found["staggered"]["flicker_modulation"] == pytest.approx(1)

@@ -107,7 +107,7 @@ class SubsetTable:
         """
         held = np.minimum(electrons, self.last_e)
         roots, n = np.sqrt(held), self.n_captures
-        found = {}
+        moments = {}
         for subset, spline in zip(self.subsets, self.splines, strict=True):
             rows = spline(roots)
             mean_e, covariance_e2 = np.zeros((n, *roots.shape)), np.zeros((n, n, *roots.shape))
@@ -115,12 +115,34 @@ class SubsetTable:
                 mean_e[one] = rows[at] + held
             for at, (one, other) in enumerate(_pairs(subset), 1 + len(subset)):
                 covariance_e2[one, other] = covariance_e2[other, one] = rows[at]
-            found[subset] = SubsetMoments(np.clip(rows[0], 0.0, 1.0), mean_e, covariance_e2)
-        return found
+            moments[subset] = SubsetMoments(np.clip(rows[0], 0.0, 1.0), mean_e, covariance_e2)
+        return moments
 
 
 def _pairs(subset: Subset) -> list[tuple[int, int]]:
     return list(itertools.combinations_with_replacement(subset, 2))
+
+
+def share_beyond(counts: FloatArray, pixel: Pixel, limit_dn: int) -> FloatArray:
+    """Return the probability that a capture reads its limit or more, for given numbers of electrons.
+
+    Parameters
+    ----------
+    counts : ndarray of shape (n,)
+        Numbers of electrons.
+    pixel : Pixel
+        Capture, as a pixel that is read once.
+    limit_dn : int
+        Digital number.
+
+    Returns
+    -------
+    ndarray of shape (n,)
+        Probability.
+    """
+    over = pixel.dn_per_e * np.minimum(counts, pixel.well_e) + pixel.offset_dn - (limit_dn - 0.5)
+    sigma = pixel.dn_per_e * pixel.read_noise_e
+    return gaussian.share_below(over / sigma) if sigma else (over >= 0).astype(float)
 
 
 def usable_of_count(
@@ -149,9 +171,8 @@ def usable_of_count(
     second, share = variance + first**2, np.ones_like(counts)
     if limit_dn is not None:
         # Digital numbers from the threshold on count as the threshold, and are taken away.
-        from_limit = mean_dn - (limit_dn - 0.5)
-        beyond = gaussian.share_below(from_limit / sigma) if sigma else (from_limit >= 0).astype(float)
-        share = 1 - beyond if not sigma else gaussian.share_below(-from_limit / sigma)
+        beyond = share_beyond(counts, pixel, limit_dn)
+        share = 1 - beyond
         first, second = first - top * beyond, second - top**2 * beyond
     offset = pixel.offset_dn
     first_e = (first - offset * share) / gain

@@ -58,7 +58,7 @@ class Flicker(PulseMetric):
 
     def of_pulses(self, model: ForwardModel, curves: FloatArray) -> Columns:
         """Compute the columns, design by design, since phases depend on the exposure."""
-        exposure_s, found = model.light.exposure_s(curves), []
+        exposure_s, rows = model.light.exposure_s(curves), []
         for one, time_s in zip(curves, exposure_s, strict=True):
             pulsed = model.setup.computes("flicker")
             phases = phases_of(model.setup, np.array([time_s]), _BETWEEN)[0] if pulsed else np.zeros(1)
@@ -66,8 +66,8 @@ class Flicker(PulseMetric):
             dark = model.unlit(one[None], np.array([time_s]))[0]
             lit = response.reshape(model.n_cases, phases.size, *response.shape[1:])
             lit = lit - dark.reshape(model.n_cases, -1, dark.shape[-1])[:, :1, None]
-            found.append(_of_phases(lit, phases))
-        return {name: np.array([of[name] for of in found]) for name in found[0]}
+            rows.append(_of_phases(lit, phases))
+        return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
 def _of_phases(lit: FloatArray, phases: FloatArray) -> dict[str, float]:
