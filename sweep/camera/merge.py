@@ -67,7 +67,23 @@ def limits_dn(pixel: Pixel) -> tuple[int | None, ...]:
     return (*(threshold_dn(capture, pixel.threshold) for capture in pixel.read_as[:-1]), None)
 
 
-def saturating_e(pixel: Pixel) -> list[float]:
+def light_of(pixel: Pixel) -> FloatArray:
+    """Return the light of each exposure relative to that of a pixel of full sensitivity.
+
+    Parameters
+    ----------
+    pixel : Pixel
+        HDR pixel, whose captures have its QE and crosstalk.
+
+    Returns
+    -------
+    ndarray of shape (n_exposures,)
+        Relative light.
+    """
+    return np.array([exposure.capture.light for exposure in pixel.exposures])
+
+
+def saturating_e(pixel: Pixel) -> FloatArray:
     """Return the expected electrons of each exposure from which on all its captures are saturated.
 
     Parameters
@@ -77,10 +93,11 @@ def saturating_e(pixel: Pixel) -> list[float]:
 
     Returns
     -------
-    list of float
+    ndarray of shape (n_exposures,)
         Electrons.
     """
-    return [max(LinearRange.of(pixel.read_as[k]).last_e for k in exposure.numbers) for exposure in pixel.exposures]
+    last_e = np.array([LinearRange.of(capture).last_e for capture in pixel.read_as])
+    return np.array([last_e[list(exposure.numbers)].max() for exposure in pixel.exposures])
 
 
 def merged(electrons: FloatArray, light: FloatArray, pixel: Pixel) -> Merged:

@@ -8,12 +8,10 @@ import numpy as np
 
 from ..base.machine_code import njit
 from ..base.types import FloatArray, IndexArray
-from ..camera.noise.compiled import poisson_shares
+from ..camera.noise.compiled import occurring, poisson_shares
 
 RARE = 1e-40
 """Counts less probable than this, relative to the most probable one, are left out."""
-_RARE_COUNT, _MOST_GAIN = 1e-25, 9.0
-"""The same for HDR pixels, and standard deviations of their gains beyond which these are left out."""
 _TAIL = 13.0
 _PER_DEVIATION = 1.3
 _MOST_NATS = 100.0
@@ -162,17 +160,6 @@ def _sum_of(one: FloatArray, other: FloatArray) -> FloatArray:
 
 
 @njit(cache=True, nogil=True)
-def _occurring(shares: FloatArray, rare: float) -> tuple[int, int]:
-    """Return the range of shares without the rare ones at both ends."""
-    low, high = 0, shares.size
-    while low + 1 < high and shares[low] < rare:
-        low += 1
-    while high - 1 > low and shares[high - 1] < rare:
-        high -= 1
-    return low, high
-
-
-@njit(cache=True, nogil=True)
 def channel_numbers(
     electrons: FloatArray,
     most: int,
@@ -212,7 +199,7 @@ def channel_numbers(
                     electrons[i, u], most, well_e, prnu, read_e, line, n_bins, table
                 )
             first, shares = first + pixel_first, _sum_of(shares, pixel_shares)
-        low, high = _occurring(shares, RARE)
+        low, high = occurring(shares, RARE)
         firsts[i] = first + low
         starts[i + 1] = starts[i] + high - low
         if starts[i + 1] > values.size:
@@ -223,74 +210,6 @@ def channel_numbers(
         for k in range(low, high):
             values[starts[i] + k - low] = shares[k]
     return firsts, starts, values[: starts[-1]]
-
-
-@njit(cache=True, nogil=True)
-def merged_shares(
-    electrons: FloatArray,
-    prnu: float,
-    exposure: IndexArray,
-    passed: FloatArray,
-    starts: IndexArray,
-    columns: IndexArray,
-    shares: FloatArray,
-    n_bins: int,
-) -> tuple[int, FloatArray]:
-    """Return the distribution of the merged value of an HDR pixel.
-
-    Parameters
-    ----------
-    electrons : ndarray of shape (n_exposures,)
-        Expected electrons.
-    prnu : float
-        PRNU, common to all exposures.
-    exposure, passed, starts, columns, shares, n_bins
-        As in `merged_numbers.MergedTable`.
-
-    Returns
-    -------
-    first : int
-        First bin that occurs.
-    shares : ndarray
-        Probability of each bin from there on.
-    """
-    n_captures, n_exposures, n_counts = passed.shape
-    total, brightest = np.zeros(n_bins), electrons.max()
-    half = int(_MOST_GAIN * math.sqrt(1 + prnu * prnu * brightest)) + 1 if prnu > 0 else 0
-    counts, before = np.empty((n_exposures, n_counts)), np.empty((n_captures, n_exposures))
-    ends, first, last = (
-        np.empty((n_exposures, 2), np.intp),
-        np.full(n_exposures, n_counts),
-        np.zeros(n_exposures, np.intp),
-    )
-    chosen = np.zeros((n_captures, n_counts))
-    all_gains = 0.0
-    for i in range(-half, half + 1):
-        z = _MOST_GAIN * i / half if half else 0.0
-        weight = math.exp(-z * z / 2)
-        all_gains += weight
-        for at in range(n_exposures):
-            ends[at] = poisson_shares(max(electrons[at] * (1 + prnu * z), 0.0), 0, _RARE_COUNT, counts[at])
-            first[at], last[at] = min(first[at], ends[at, 0]), max(last[at], ends[at, 1])
-            shares_of_counts = counts[at, ends[at, 0] : ends[at, 1]]
-            shares_of_counts /= shares_of_counts.sum()
-            for k in range(n_captures):
-                before[k, at] = (shares_of_counts * passed[k, at, ends[at, 0] : ends[at, 1]]).sum()
-        for k in range(n_captures):
-            others = weight
-            for at in range(n_exposures):
-                if at != exposure[k]:
-                    others *= before[k, at]
-            if others < RARE:
-                continue
-            for count in range(ends[exposure[k], 0], ends[exposure[k], 1]):
-                chosen[k, count] += others * counts[exposure[k], count]
-    for k in range(n_captures):
-        for count in range(first[exposure[k]], last[exposure[k]]):
-            for entry in range(starts[k, count], starts[k, count + 1]):
-                total[columns[entry]] += chosen[k, count] * shares[entry]
-    low, high = _occurring(total, _RARE_COUNT)
-    return low, total[low:high] / all_gains
 
 
 @njit(cache=True, nogil=True)

@@ -14,8 +14,9 @@ import numpy as np
 
 from ..base.types import FloatArray, IndexArray
 from ..camera.pixel import Pixel
+from ..camera.readings import countable
 from ..spectra.lights import class_pairs
-from . import merged_numbers as hdr
+from .merged_numbers import merged_numbers
 
 FLOOR = 1e-18
 """Largest contribution of neglected tails to an error or to its bound."""
@@ -75,7 +76,7 @@ def affordable(pixel: Pixel, channels: Sequence[IndexArray]) -> bool:
         True if exact sums are used.
     """
     if pixel.captures:
-        return hdr.affordable(pixel)
+        return countable(pixel)
     (wide, sigma, n_bins), prnu = _bins(pixel), pixel.prnu
     most = math.ceil(pixel.well_e)
     electrons = min(most / max(1 - _FAR * prnu, 0.01), 100 * pixel.well_e + 1e5)
@@ -163,7 +164,7 @@ def errors(
         if light is None:
             firsts, starts, roots, all_rows = _numbers(block, channels, pixel)
         else:
-            firsts, starts, roots, all_rows = hdr.merged_numbers(block, light, channels, pixel)
+            firsts, starts, roots, all_rows = merged_numbers(block, light, channels, pixel)
         parts = firsts, starts, roots
         with np.errstate(divide="ignore"):
             logs = np.log(roots)

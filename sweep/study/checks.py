@@ -9,12 +9,23 @@ from dataclasses import replace
 from ..camera import psf
 from ..camera.memory import MOST_BYTES, memory_problem
 from ..camera.mosaic import Mosaic
+from ..camera.pixel import Pixel
+from ..camera.readings import NOISE_BINS, countable
 from ..camera.scene import OBJECT_RESOLUTION, FixedExposure, Scene
 from ..metrics.quantity import Quantity, RequestedQuantities
 from ..metrics.registry import listed, quantities_of
 from ..spectra.color import luminance_per_photon_radiance
 from ..spectra.lights import Lights
-from ..vision.section import FEWEST_LAMPS, MOST_BITS, MOST_READ_NOISE_DN, MOST_WELL_E, Vision
+from ..vision.pixel_table import n_roots
+from ..vision.section import (
+    FEWEST_LAMPS,
+    MOST_BITS,
+    MOST_READ_NOISE_DN,
+    MOST_READINGS,
+    MOST_ROOTS,
+    MOST_WELL_E,
+    Vision,
+)
 from .model import Study
 from .schema import StudySection
 from .sources import Sources
@@ -49,9 +60,8 @@ def _check_captures(section: StudySection, mosaics: Mapping[str, Mosaic], source
     for number, capture in enumerate(section.pixel.captures):
         for channel in capture.qe_factor.keys() - channels.keys():
             sources.unknown(("pixel", "captures", number, "qe_factor"), "channel", channel, channels)
-    for key, stated in (("vision", section.vision is not None), ("tasks", section.tasks is not None)):
-        if stated and section.pixel.captures:
-            sources.add((key,), "of a pixel that is read once; `pixel.captures` are merged", None, "no captures")
+    if section.tasks is not None and section.pixel.captures:
+        sources.add(("tasks",), "of a pixel that is read once; `pixel.captures` are merged", None, "no captures")
 
 
 def check_lights(
@@ -238,17 +248,41 @@ def _check_vision(section: StudySection, lights: Lights, mosaics: Mapping[str, M
 def _check_pixel(section: StudySection, sources: Sources) -> None:
     """Check that the table of a pixel's digital numbers can be held, and that there is one pixel."""
     pixel = section.pixel
-    read_dn = pixel.read_noise_e * pixel.dn_per_e
-    for key, value, most in (("bits", pixel.bits, MOST_BITS), ("well_e", pixel.well_e, MOST_WELL_E)):
-        if value > most:
-            sources.add(("pixel", key), "too large for `vision`", value, f"at most {most:g}")
-    if read_dn > MOST_READ_NOISE_DN:
-        problem = f"too large for `vision`: {read_dn:.4g} DN"
-        sources.add(("pixel", "read_noise_e"), problem, pixel.read_noise_e, f"at most {MOST_READ_NOISE_DN:g} DN")
+    for number, read in enumerate(pixel.read_as or (pixel,)):
+        path = ("pixel", "captures", number) if pixel.captures else ("pixel",)
+        read_dn = read.read_noise_e * read.dn_per_e
+        for key, value, most in (("bits", read.bits, MOST_BITS), ("well_e", read.well_e, MOST_WELL_E)):
+            if value > most and not (key == "bits" and pixel.captures):
+                sources.add((*path, key), "too large for `vision`", value, f"at most {most:g}")
+        if read_dn > MOST_READ_NOISE_DN:
+            problem = f"too large for `vision`: {read_dn:.4g} DN"
+            sources.add((*path, "read_noise_e"), problem, read.read_noise_e, f"at most {MOST_READ_NOISE_DN:g} DN")
+    if pixel.captures:
+        _check_merged(pixel, sources)
     for name, scene in section.scenarios.items():
         if scene.noise is not None and scene.noise.of(pixel) != pixel:
             allowed = "noise: true, and the figures in `pixel`"
             sources.add(("scenarios", name, "noise"), "`vision` has one pixel for all scenarios", None, allowed)
+
+
+def _check_merged(pixel: Pixel, sources: Sources) -> None:
+    """Check that the images of an HDR pixel follow from one number of electrons, and have few enough readings."""
+    for number, capture in enumerate(pixel.captures):
+        for key, stated in (("qe_factor", capture.qe_factor), ("crosstalk", capture.crosstalk is not None)):
+            if stated:
+                path = ("pixel", "captures", number, key)
+                sources.add(path, "`vision` has captures of one QE and one crosstalk", None, "those of the pixel")
+    if sources.issues:
+        return
+    if not countable(pixel):
+        problem = "`vision` counts electrons of the first usable capture"
+        sources.add(("pixel", "merge"), problem, pixel.merge, "saturated, with smaller wells, PRNU or read noise")
+    readings = pixel.knees[1, -1] or NOISE_BINS * sum(2 * math.sqrt(one.well_e) for one in pixel.read_as)
+    if readings > MOST_READINGS or n_roots(pixel) > MOST_ROOTS:
+        light = min(capture.light for capture in pixel.captures)
+        problem = f"too many readings for `vision`: {readings:,.0f}, and light from 1 to {light:.3g}"
+        allowed = f"at most {MOST_READINGS:,} readings, and captures nearer in light"
+        sources.add(("pixel", "captures"), problem, None, allowed)
 
 
 def _check_memory(vision: Vision, lights: Lights, mosaics: Mapping[str, Mosaic], sources: Sources) -> None:

@@ -54,8 +54,9 @@ def cases_on_table(
     cases: NDArray[np.intp],
     candelas: NDArray[np.float64],
     orders: NDArray[np.intp],
+    nodes_e: NDArray[np.float64],
+    node_of_root: NDArray[np.int32],
     step: float,
-    last: int,
     node: NDArray[np.int32],
     share: NDArray[np.float32],
 ) -> None:
@@ -71,13 +72,14 @@ def cases_on_table(
         Luminous intensity, cd.
     orders : ndarray of int
         Signal type of each lens in each order.
+    nodes_e, node_of_root : ndarray
+        As in `PixelTable`.
     step : float
-        Step of the table.
-    last : int
-        Last node but one.
+        Its `ROOT_STEP`.
     node, share : ndarray of shape (n_cases, n_pixels)
         Results.
     """
+    last = node_of_root.size - 1
     for case in range(len(cases)):
         kind, lamp, order, sunny, place = cases[case]
         for p in range(unlit.shape[1]):
@@ -88,8 +90,8 @@ def cases_on_table(
                     electrons += phantoms[place, position, kind_here, p]
                 if kind_here == kind:
                     electrons += candelas[case] * lamps[place, position, lamp, p]
-            below = min(int(np.sqrt(electrons) / step), last)
-            part = (electrons / (step * step) - float(below) * below) / (2.0 * below + 1)
+            below = node_of_root[min(int(np.sqrt(electrons) / step), last)]
+            part = (electrons - nodes_e[below]) / (nodes_e[below + 1] - nodes_e[below])
             node[case, p] = below
             share[case, p] = min(max(part, 0.0), 1.0)
 

@@ -94,11 +94,12 @@ def _of_states(camera: HeadCamera, images: Numbers, heads: HeadElectrons, backgr
     dark, sun, lamp = (np.ascontiguousarray(part[..., telling]) for part in (unlit, heads.phantoms, heads.lamps))
     node = np.empty((n_cases, telling.size), dtype=np.int32)
     share = np.empty(node.shape, dtype=np.float32)
-    light, last = cases.candelas * heads.time_s, camera.table.last
+    light, table = cases.candelas * heads.time_s, camera.table
     orders = orders_of_lenses(len(camera.vision.lenses))
-    cases_on_table(dark, sun, lamp, cases.table, light, orders, ROOT_STEP, last, node, share)
+    nodes = table.nodes_e, table.node_of_root, ROOT_STEP
+    cases_on_table(dark, sun, lamp, cases.table, light, orders, *nodes, node, share)
     likelihood = np.empty((len(images), n_cases))
-    log_likelihoods(np.ascontiguousarray(images[:, telling]), node, share, camera.table.shares, likelihood)
+    log_likelihoods(np.ascontiguousarray(images[:, telling]), node, share, table.shares, likelihood)
     weights = np.exp(likelihood - likelihood.max(axis=1, keepdims=True)) * cases.share
     is_state = cases.table[:, 0] + 1 == np.arange(1 + len(camera.vision.lenses))[:, None]
     probabilities = weights @ is_state.T.astype(float)

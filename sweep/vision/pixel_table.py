@@ -1,8 +1,8 @@
-"""Distribution of a pixel's digital number: sums over Poisson electrons, tabulated over the expected electrons.
+"""Distribution of what a pixel reads, by exact sums over Poisson electrons, tabulated over the expected electrons.
 
-The order is the camera's: gain error, Poisson electrons, full well, read noise, gain and pedestal, ADC range,
-rounding. Between two nodes of the root of the electrons the distributions are mixed linearly: the mean is exact, and a
-mixture of two neighbors has up to 0.4 % more variance.
+The order is the camera's: gain error, Poisson electrons, full well, read noise, gain and pedestal, ADC range, rounding,
+and for an HDR pixel the merge. Between two nodes of the expected electrons the distributions are mixed linearly: the
+mean is exact, and a mixture of two neighbors has up to 0.4 % more variance.
 """
 
 from __future__ import annotations
@@ -13,37 +13,46 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaln, ndtr
 
 from ..base.types import FloatArray
-from ..camera.noise import gaussian, moments
+from ..camera.captures import Capture
+from ..camera.merge import light_of, saturating_e
+from ..camera.noise import gaussian
+from ..camera.noise.moments import without_prnu
 from ..camera.pixel import Pixel
+from ..camera.readings import Bins, readings_of
 
 ROOT_STEP = 1 / 16
-"""Distance of nodes in the root of the expected electrons."""
+"""Grid of the root of the expected electrons that nodes lie on."""
 _LEAST = 1e-30
-_REACH = 9.5
 
 
 @dataclass(frozen=True)
 class PixelTable:
-    """Distribution of a pixel at nodes of the expected electrons.
+    """Distribution of a pixel's reading at nodes of the expected electrons.
+
+    A reading is a digital number, the code of a companded HDR pixel, or a bin of an eighth of the noise of a merged
+    value.
 
     Parameters
     ----------
-    shares : ndarray of shape (n_numbers, n_nodes)
-        Log of the probability of each number, less its largest over all nodes.
-    below : ndarray of shape (n_nodes, n_numbers)
+    nodes_e : ndarray of shape (n_nodes,)
+        Expected electrons of a pixel of full sensitivity.
+    node_of_root : ndarray of int, shape (n_roots,)
+        The last node that is not above each multiple of `ROOT_STEP`, squared; at most the last but one.
+    shares : ndarray of shape (n_readings, n_nodes)
+        Log of the probability of each reading, less its largest over all nodes.
+    below : ndarray of shape (n_nodes, n_readings)
         Cumulative probability.
+    values_dn : ndarray of shape (n_readings,)
+        Value of each reading, DN; of a merged one those of the first capture.
     """
 
+    nodes_e: FloatArray
+    node_of_root: NDArray[np.int32]
     shares: NDArray[np.float32]
     below: NDArray[np.float32]
-
-    @property
-    def last(self) -> int:
-        """Last node but one."""
-        return len(self.below) - 2
+    values_dn: FloatArray
 
     def at(self, electrons: FloatArray) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
         """Return the node below each expected number of electrons, and the share of the next one.
@@ -51,17 +60,35 @@ class PixelTable:
         Parameters
         ----------
         electrons : ndarray
-            Expected electrons.
+            Expected electrons of a pixel of full sensitivity.
 
         Returns
         -------
         node, share : ndarray of the same shape
             Node and share.
         """
-        node = np.minimum(np.sqrt(electrons) / ROOT_STEP, self.last).astype(np.int32)
+        root = np.minimum(np.sqrt(electrons) / ROOT_STEP, self.node_of_root.size - 1).astype(np.intp)
+        node = self.node_of_root[root]
         # Linear in the electrons, not in their root, so that the mean is exact.
-        share = (electrons / ROOT_STEP**2 - node.astype(float) ** 2) / (2.0 * node + 1)
+        share = (electrons - self.nodes_e[node]) / np.diff(self.nodes_e)[node]
         return node, np.clip(share, 0.0, 1.0).astype(np.float32)
+
+
+def n_roots(pixel: Pixel) -> int:
+    """Return the number of multiples of `ROOT_STEP` up to the root of the electrons from which on all is saturated.
+
+    Parameters
+    ----------
+    pixel : Pixel
+        Pixel.
+
+    Returns
+    -------
+    int
+        Number.
+    """
+    merged = _merged(without_prnu(pixel))
+    return math.ceil(math.sqrt(float((saturating_e(merged) / light_of(merged)).max())) / ROOT_STEP) + 2
 
 
 @lru_cache(maxsize=4)
@@ -71,66 +98,61 @@ def pixel_table(pixel: Pixel) -> PixelTable:
     Parameters
     ----------
     pixel : Pixel
-        Full well, gain, noise and ADC.
+        Full well, gain, noise and ADC; captures of an HDR pixel have its QE and crosstalk.
 
     Returns
     -------
     PixelTable
         Table.
     """
-    shares = _with_prnu(_without_prnu(pixel), pixel)
+    from ..camera.noise.compiled import merged_shares  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+    merged = _merged(without_prnu(pixel))
+    light, most_e = light_of(merged), saturating_e(merged)
+    roots_e = np.square(np.arange(n_roots(pixel), dtype=float) * ROOT_STEP)
+    is_node = np.ones(roots_e.size, dtype=bool)
+    if pixel.captures:  # a small photodiode has more noise, and needs fewer nodes
+        light_of_captures = np.array([capture.light for capture in pixel.captures])
+        noise_bins = Bins.of(merged.model_copy(update={"companding": ()}), light_of_captures).number(roots_e)
+        is_node[1:-1] = np.diff(noise_bins)[:-1] > 0
+    nodes_e = roots_e[is_node]
+    readings = readings_of(merged, tuple(light))
+    parts = readings.exposure, readings.passed, readings.starts, readings.columns, readings.shares
+    shares = np.zeros((nodes_e.size, readings.n_bins))
+    for of_node, electrons in zip(shares, nodes_e, strict=True):
+        first, some = merged_shares(np.minimum(electrons * light, most_e), 0.0, *parts, readings.n_bins)
+        of_node[first : first + some.size] = some
+    shares = _with_prnu(shares, nodes_e, pixel.prnu)
     logs = np.log(np.maximum(shares, _LEAST)).T
     logs -= logs.max(axis=1, keepdims=True)
     below = np.cumsum(shares, axis=1)
     below /= below[:, -1:]
-    return PixelTable(np.ascontiguousarray(logs, dtype=np.float32), np.ascontiguousarray(below, dtype=np.float32))
+    values_e = readings.bins.value(readings.first + np.arange(readings.n_bins))
+    return PixelTable(
+        nodes_e,
+        np.minimum(np.cumsum(is_node) - 1, nodes_e.size - 2).astype(np.int32),
+        np.ascontiguousarray(logs, dtype=np.float32),
+        np.ascontiguousarray(below, dtype=np.float32),
+        values_e * pixel.dn_per_e + pixel.offset_dn,
+    )
 
 
-def _nodes_e(pixel: Pixel) -> FloatArray:
-    """Return the expected electrons of the nodes, from 0 to saturation."""
-    last = math.sqrt(moments.LinearRange.of(moments.without_prnu(pixel)).last_e)
-    return np.asarray((np.arange(math.ceil(last / ROOT_STEP) + 2) * ROOT_STEP) ** 2, dtype=float)
+def _merged(pixel: Pixel) -> Pixel:
+    """Return a pixel that is read once as one of a single capture, whose codes are the digital numbers."""
+    top = float(pixel.full_scale_dn)
+    changes = {"captures": (Capture(),), "merge": "saturated", "companding": ((top, top),)}
+    return pixel if pixel.captures else pixel.model_copy(update=changes)
 
 
-def _without_prnu(pixel: Pixel) -> FloatArray:
-    """Return the distribution at each node without gain errors, ndarray of shape (n_nodes, n_numbers)."""
-    from scipy.sparse import csr_matrix  # noqa: PLC0415  (slow to import: kept off the start-up path)
-
-    well = math.ceil(pixel.well_e)
-    counts = np.arange(well + 1, dtype=float)
-    electrons = _nodes_e(pixel)[:, None]
-    logs = counts * np.log(np.maximum(electrons, 1e-300)) - electrons - gammaln(counts + 1)
-    poisson = np.exp(logs)
-    poisson[0] = counts == 0
-    poisson[:, -1] += np.maximum(1 - poisson.sum(axis=1), 0.0)  # electrons beyond the full well
-    held = np.minimum(counts, pixel.well_e)
-    mean, sigma = held * pixel.dn_per_e + pixel.offset_dn, pixel.read_noise_e * pixel.dn_per_e
-    top = pixel.full_scale_dn
-    reach = min(math.ceil(_REACH * sigma), top) + 1
-    number = np.floor(np.clip(mean, 0, top) + 0.5)[:, None] + np.arange(-reach, reach + 1)
-    low, high = (number + side - mean[:, None] for side in (-0.5, 0.5))
-    low[:, 0], high[:, -1] = -np.inf, np.inf
-    if sigma:
-        low, high = ndtr(low / sigma), ndtr(high / sigma)
-    else:
-        low, high = (low > 0).astype(float), (high > 0).astype(float)
-    rows = np.broadcast_to(np.arange(counts.size)[:, None], number.shape).ravel()
-    columns = np.clip(number, 0, top).astype(int).ravel()  # numbers beyond an end are read as the end
-    read = csr_matrix(((high - low).ravel(), (rows, columns)), shape=(counts.size, top + 1))
-    poisson[poisson < _LEAST] = 0.0
-    return np.asarray((csr_matrix(poisson) @ read).toarray(), dtype=float)
-
-
-def _with_prnu(shares: FloatArray, pixel: Pixel) -> FloatArray:
+def _with_prnu(shares: FloatArray, electrons: FloatArray, prnu: float) -> FloatArray:
     """Return the mean over Gaussian gains of the pixels, by the trapezoidal rule between the nodes."""
-    if not pixel.prnu:
+    if not prnu:
         return shares
     from scipy.sparse import csr_matrix  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
-    electrons = _nodes_e(pixel)
     z = np.linspace(-6, 6, 49)
     weight = gaussian.density(z) / gaussian.density(z).sum()
-    scaled_electrons = np.minimum(electrons[:, None] * np.maximum(1 + pixel.prnu * z, 0.0), electrons[-1])
+    scaled_electrons = np.minimum(electrons[:, None] * np.maximum(1 + prnu * z, 0.0), electrons[-1])
     left = np.clip(np.searchsorted(electrons, scaled_electrons, side="right") - 1, 0, electrons.size - 2)
     share = (scaled_electrons - electrons[left]) / np.diff(electrons)[left]
     rows = np.broadcast_to(np.arange(electrons.size)[:, None], scaled_electrons.shape).ravel()

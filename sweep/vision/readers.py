@@ -122,7 +122,7 @@ def _drawn(camera: HeadCamera, lamps: Lamps, order: str, count: int, key: tuple[
 
 
 def planes_of(camera: HeadCamera, images: Numbers) -> FloatArray:
-    """Return the input of the network: roots of the digital numbers above the pedestal, whose noise is uniform.
+    """Return the input of the network: roots of the values above the pedestal, whose noise is uniform.
 
     Parameters
     ----------
@@ -136,11 +136,11 @@ def planes_of(camera: HeadCamera, images: Numbers) -> FloatArray:
     ndarray
         Raw pixels by tile position, or every channel at every pixel, as the study asks.
     """
-    pixel, mosaic = camera.pixel, camera.setup.camera.mosaic
+    offset_dn, values_dn, mosaic = camera.pixel.offset_dn, camera.table.values_dn, camera.setup.camera.mosaic
     whole = camera.vision.input == "demosaicked"
-    raw = images.astype(float)
+    raw = values_dn[images]
     numbers = demosaicked(raw, mosaic) if whole else tile_planes(raw, mosaic)
-    light = np.maximum(numbers - pixel.offset_dn, 0.0) / (pixel.full_scale_dn - pixel.offset_dn)
+    light = np.maximum(numbers - offset_dn, 0.0) / (values_dn[-1] - offset_dn)
     return np.asarray(np.sqrt(light), dtype=float)
 
 
@@ -175,6 +175,6 @@ def _pictures(camera: HeadCamera, answers: Answers, images: Numbers) -> tuple[Fl
     curves = camera.qe
     mean_nm = curves @ camera.setup.camera.grid.nodes_nm / np.maximum(curves.sum(axis=1), 1e-300)
     mosaic, offset = camera.setup.camera.mosaic, camera.pixel.offset_dn
-    shown = [false_colors(images[at].astype(float), mosaic, mean_nm, offset) for at in wrong]
+    shown = [false_colors(camera.table.values_dn[images[at]], mosaic, mean_nm, offset) for at in wrong]
     side = camera.vision.crop_px
     return np.array(shown).reshape(-1, side, side, 3), [int(at) for at in wrong]

@@ -19,6 +19,7 @@ MOST_IMAGES = 100_000
 FEWEST_LAMPS = 3
 """Fewest lamps of each lens: one to train, one to check, one to test."""
 MOST_BITS, MOST_WELL_E, MOST_READ_NOISE_DN = 12, 30_000.0, 100.0
+MOST_READINGS, MOST_ROOTS = 8192, 200_000
 """Tables of larger pixels would not fit into a worker's memory."""
 
 

@@ -5,15 +5,18 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from itertools import combinations, permutations, product
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 import pytest
 from scipy.spatial.distance import cdist
 
+from sweep.base.types import FloatArray
 from sweep.camera.forward import ForwardModel
+from sweep.camera.merge import draws, light_of, limits_dn
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.noise import table
+from sweep.camera.pixel import Pixel
 from sweep.camera.readout import draws_dn
 from sweep.camera.sampling import Window, center_weights
 from sweep.camera.setup import READOUT
@@ -142,17 +145,47 @@ def test_a_surface_sends_back_a_share_of_the_light(name: Material) -> None:
         np.testing.assert_allclose(found, np.mean(seen, axis=0), rtol=1e-9)
 
 
+def held_shares(pixel: Pixel, electrons: FloatArray) -> FloatArray:
+    """Probability of each reading."""
+    held = pixel_table(pixel)
+    node, share = held.at(electrons)
+    below = held.below[node].astype(float) * (1 - share[:, None]) + held.below[node + 1] * share[:, None]
+    return np.diff(below, prepend=0.0, axis=1)
+
+
 def test_the_table_is_the_product_s_noise() -> None:
     """Mean and variance of every digital number that is read, dark, bright and saturated."""
     pixel = head_setup().camera.pixel
-    held, electrons = pixel_table(pixel), np.array([0.0, 3.3, 40.0, 700.0, 5000.0, 9900.0, 50000.0])
-    node, share = held.at(electrons)
-    below = held.below[node].astype(float) * (1 - share[:, None]) + held.below[node + 1] * share[:, None]
-    shares, numbers = np.diff(below, prepend=0.0, axis=1), np.arange(4096)
+    electrons, numbers = np.array([0.0, 3.3, 40.0, 700.0, 5000.0, 9900.0, 50000.0]), np.arange(4096)
+    np.testing.assert_allclose(pixel_table(pixel).values_dn, numbers, atol=1e-9)
+    shares = held_shares(pixel, electrons)
     mean = shares @ numbers
     variance = shares @ numbers**2 - mean**2
     np.testing.assert_allclose(mean, table.mean_rounded(electrons, pixel), rtol=2e-4)
     np.testing.assert_allclose(variance, table.variance(electrons, pixel), rtol=2e-2, atol=0.05)
+
+
+CODED = {"captures": "split_pixel", "companding": [(1024, 1024), (16384, 2048), (600_000, 4000)]}
+
+
+@pytest.mark.parametrize("hdr", [{"captures": "split_pixel"}, {"captures": "staggered", "well_e": 10_000.0}, CODED])
+def test_an_hdr_image_has_the_merged_value_s_noise(hdr: dict[str, Any]) -> None:
+    """In the dark, at each handover and saturated, as 200,000 draws; readings stand for values within half a bin."""
+    pixel = Pixel(**{"pitch_um": 2.8, "offset_dn": 64.0, "prnu": 0.005, "read_noise_e": 2.0} | hdr)
+    light = light_of(pixel)
+    full_e = [limit / one.dn_per_e for one, limit in zip(pixel.read_as, limits_dn(pixel), strict=True) if limit]
+    at = [full / light[k] for full, k in zip(full_e, (0, 0) if len(light) == 2 else (0, 1), strict=True)]
+    electrons = np.array([0.0, 3.3, 700.0, *(share * e for e in at for share in (0.9, 0.97, 1.0, 1.1)), 3e6])
+    shares, values_dn = held_shares(pixel, electrons), pixel_table(pixel).values_dn
+    mean = shares @ values_dn
+    variance = shares @ values_dn**2 - mean**2
+    n = 200_000
+    expected = np.repeat((electrons * light[:, None])[:, None], n, axis=1)
+    drawn = draws(expected, light.reshape(-1, 1, 1), pixel, np.random.default_rng(3))
+    noise_dn = drawn.std(axis=0)
+    noise_dn[-1] = 0.01 * mean[-1]  # saturated: that of the full well's photons, which the bins go by
+    assert (np.abs(drawn.mean(axis=0) - mean) < (5 / np.sqrt(n) + 1 / 16) * noise_dn).all()
+    np.testing.assert_allclose(variance, drawn.var(axis=0), rtol=0.05, atol=1e-3)
 
 
 def test_drawn_images_are_as_noisy_as_the_product_draws_them() -> None:

@@ -89,6 +89,25 @@ def test_the_observer_is_as_often_wrong_as_it_says(order: str, lenses: list[str]
         assert abs(off.mean()) < 4 * off.std() / np.sqrt(600)
 
 
+def test_the_observer_of_an_hdr_pixel_sees_what_saturates_another() -> None:
+    """By day, exposed for 11 ms: the large photodiode of clear pixels is full. Its doubt is how often it errs."""
+    level = {"illuminance_lx": 4e4, "exposure_s": 0.011}
+    requested = vision(distances_m=[400.0], intensities_cd=[10.0, 50.0], levels={"day": level})
+    wrong = {}
+    for captures in ("dual_gain", "split_pixel"):
+        setup = head_setup("RCCC", offset_dn=64.0, captures=captures, prnu=0.005)
+        camera, lamps = HeadCamera(setup, NO_FILTERS, requested), split_lamps(setup.lights, requested, (1, 0))[TEST]
+        scenes = draw_scenes(requested, lamps, SHUFFLED, 300, (8,))
+        images = camera.images(scenes)
+        found = posteriors(camera, scenes, images, lamps, SHUFFLED)
+        off = (found.argmax(axis=1) != scenes.state) - (1 - found.max(axis=1))
+        assert abs(off.mean()) <= 4 * off.std() / np.sqrt(300) + 1e-6
+        wrong[captures] = float((1 - found.max(axis=1)).mean())
+        assert np.isfinite(planes_of(camera, images)).all()
+        assert planes_of(camera, images).max() <= 1
+    assert 0.01 < wrong["split_pixel"] < 0.6 * wrong["dual_gain"]
+
+
 def test_an_observer_of_other_lenses_is_worse() -> None:
     """It does not take the order of the lenses from the scene: in the street's order it would know the color."""
     requested, setup = (
@@ -223,3 +242,20 @@ def test_a_study_without_vision_loads_nothing_of_it(tmp_path: Path) -> None:
     assert done.stdout.strip() == "['sweep.vision.installed', 'sweep.vision.section']"
     assert not list((tmp_path / "out").glob("vision*"))
     assert "Images of traffic lights" not in (tmp_path / "out" / "report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("pixel", "line"),
+    [
+        ("captures: [{}, {sensitivity: 0.01, qe_factor: {R: 0.9}}]", "pixel.captures[1].qe_factor: `vision` has"),
+        ("captures: split_pixel, merge: weighted", "pixel.merge: `vision` counts electrons of the first usable"),
+        ("captures: [{}, {sensitivity: 1.0e-6}]", "pixel.captures: too many readings for `vision`"),
+        ("captures: [{}, {sensitivity: 0.1, well_e: 40000}]", "pixel.captures[1].well_e: too large for `vision`"),
+    ],
+)
+def test_images_of_an_hdr_pixel_that_would_take_another_table_are_refused(
+    tmp_path: Path, pixel: str, line: str
+) -> None:
+    requested = "vision: {distances_m: [100], levels: {day: {illuminance_lx: 1, exposure_s: 1}}}"
+    (found,) = issues(tmp_path, f"{BASE}pixel: {{{pixel}}}\n{requested}\n")
+    assert line in found

@@ -14,6 +14,9 @@ _TAIL = 9.5
 _NONE = np.empty(0)
 _RARE = 1e-22
 """Numbers of electrons that occur less often than this, relative to the most frequent one, are left out."""
+_RARE_COUNT, _MOST_GAIN, _RARE_CAPTURE = 1e-25, 9.0, 1e-40
+"""The same for merged values, standard deviations of gains beyond which these are left out, and least probability that
+a capture is used."""
 
 
 @njit(cache=True, nogil=True)
@@ -265,3 +268,95 @@ def cubic_of_electrons(
         k += at >= nodes[k + 1] and k + 2 < nodes.size
         s, cubic = at - nodes[k], coefficients[k]
         out[i] = ((cubic[0] * s + cubic[1]) * s + cubic[2]) * s + cubic[3]
+
+
+@njit(cache=True, nogil=True)
+def occurring(shares: FloatArray, rare: float) -> tuple[int, int]:
+    """Return the range of shares without the rare ones at both ends.
+
+    Parameters
+    ----------
+    shares : ndarray of shape (n,)
+        Probabilities.
+    rare : float
+        Probability below which one is left out.
+
+    Returns
+    -------
+    low, high : int
+        First index, and the one after the last.
+    """
+    low, high = 0, shares.size
+    while low + 1 < high and shares[low] < rare:
+        low += 1
+    while high - 1 > low and shares[high - 1] < rare:
+        high -= 1
+    return low, high
+
+
+@njit(cache=True, nogil=True)
+def merged_shares(
+    electrons: FloatArray,
+    prnu: float,
+    exposure: IndexArray,
+    passed: FloatArray,
+    starts: IndexArray,
+    columns: IndexArray,
+    shares: FloatArray,
+    n_bins: int,
+) -> tuple[int, FloatArray]:
+    """Return the distribution of the merged value of an HDR pixel.
+
+    Parameters
+    ----------
+    electrons : ndarray of shape (n_exposures,)
+        Expected electrons.
+    prnu : float
+        PRNU, common to all exposures.
+    exposure, passed, starts, columns, shares, n_bins
+        As in `Readings`.
+
+    Returns
+    -------
+    first : int
+        First bin that occurs.
+    shares : ndarray
+        Probability of each bin from there on.
+    """
+    n_captures, n_exposures, n_counts = passed.shape
+    total, brightest = np.zeros(n_bins), electrons.max()
+    half = int(_MOST_GAIN * math.sqrt(1 + prnu * prnu * brightest)) + 1 if prnu > 0 else 0
+    counts, before = np.empty((n_exposures, n_counts)), np.empty((n_captures, n_exposures))
+    ends, first, last = (
+        np.empty((n_exposures, 2), np.intp),
+        np.full(n_exposures, n_counts),
+        np.zeros(n_exposures, np.intp),
+    )
+    chosen = np.zeros((n_captures, n_counts))
+    all_gains = 0.0
+    for i in range(-half, half + 1):
+        z = _MOST_GAIN * i / half if half else 0.0
+        weight = math.exp(-z * z / 2)
+        all_gains += weight
+        for at in range(n_exposures):
+            ends[at] = poisson_shares(max(electrons[at] * (1 + prnu * z), 0.0), 0, _RARE_COUNT, counts[at])
+            first[at], last[at] = min(first[at], ends[at, 0]), max(last[at], ends[at, 1])
+            shares_of_counts = counts[at, ends[at, 0] : ends[at, 1]]
+            shares_of_counts /= shares_of_counts.sum()
+            for k in range(n_captures):
+                before[k, at] = (shares_of_counts * passed[k, at, ends[at, 0] : ends[at, 1]]).sum()
+        for k in range(n_captures):
+            others = weight
+            for at in range(n_exposures):
+                if at != exposure[k]:
+                    others *= before[k, at]
+            if others < _RARE_CAPTURE:
+                continue
+            for count in range(ends[exposure[k], 0], ends[exposure[k], 1]):
+                chosen[k, count] += others * counts[exposure[k], count]
+    for k in range(n_captures):
+        for count in range(first[exposure[k]], last[exposure[k]]):
+            for entry in range(starts[k, count], starts[k, count + 1]):
+                total[columns[entry]] += chosen[k, count] * shares[entry]
+    low, high = occurring(total, _RARE_COUNT)
+    return low, total[low:high] / all_gains
