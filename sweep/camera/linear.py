@@ -15,11 +15,13 @@ import numpy as np
 
 from ..base.cache import Cache
 from ..base.errors import SweepError, ValidationIssue
-from ..base.types import FloatArray, IndexArray
+from ..base.types import BoolArray, FloatArray, IndexArray
 from .exposure import relative_slope
 from .forward import ForwardModel
-from .pixel import unquantized
+from .merged_curve import merged_curve
+from .pixel import Pixel, unquantized
 from .pixel_response import SplitLight
+from .readout import capture_light
 from .setup import READOUT, Setup
 
 _STEPS_DN2 = 1 / 12
@@ -29,7 +31,12 @@ _FIELD_POSITIONS = 9
 
 
 class LinearModel(ForwardModel):
-    """Forward model of an unclipped, unrounded readout, which is linear in a design's QE except for the exposure."""
+    """Forward model of an unclipped, unrounded readout, which is linear in a design's QE except for the exposure.
+
+    `hdr` is the HDR pixel whose merged values have the noise; the model itself reads one of full sensitivity once.
+    """
+
+    hdr: Pixel | None = None
 
     def smooth(self, curves: FloatArray) -> FloatArray:
         """Return the unquantized, unclipped response.
@@ -141,6 +148,43 @@ class LinearModel(ForwardModel):
         whole, slope = self.by_pixel._with_slope(curves, curves_gradient)
         per_e = pixel.dn_per_e**2 * (1 + 2 * pixel.prnu**2 * whole)
         return self.by_pixel.readout.spread(per_e * slope)
+
+    def merged_with_gradient(
+        self, curves: FloatArray, curves_gradient: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return mean and variance of the merged values of an HDR pixel at one design, and their derivatives.
+
+        Unlike `smooth`, the mean is that of pixels which saturate.
+
+        Parameters
+        ----------
+        curves : ndarray of shape (n_modified, n_wavelengths)
+            QE of the modified channels.
+        curves_gradient : ndarray of shape (n_parameters, n_modified, n_wavelengths)
+            Derivative of the QE.
+
+        Returns
+        -------
+        mean, variance : ndarray of shape (n_cases, n_signals, n_channels)
+            Mean, DN of the first capture, and variance, DN^2.
+        mean_by, variance_by : ndarray of shape (n_parameters, n_cases, n_signals, n_channels)
+            Derivatives, per unit of parameter.
+        """
+        assert self.hdr is not None
+        by_pixel = self.by_pixel
+        whole, slope = by_pixel._with_slope(curves, curves_gradient)
+        light = capture_light(self.setup.with_camera(pixel=self.hdr), by_pixel.electrons.response)
+        moments = np.empty((4, *whole.shape))
+        for of_exposures, which in zip(*_distinct_columns(light), strict=True):
+            moments[..., which] = merged_curve(self.hdr, tuple(of_exposures)).at(whole[..., which])
+        mean, variance, mean_per_e, variance_per_e = moments
+        folded, spread = by_pixel.readout.folded, by_pixel.readout.spread
+        return (
+            folded(mean[None])[0],
+            spread(variance[None])[0],
+            folded(mean_per_e * slope),
+            spread(variance_per_e * slope),
+        )
 
     def spread_electrons(self, curves: FloatArray) -> FloatArray:
         """Return expected electrons of the pixels, weighted by their shares of a channel's variance.
@@ -270,6 +314,12 @@ class LinearModel(ForwardModel):
         return np.asarray(total.reshape(-1, *total.shape[2:]) * exposure_s[0], dtype=float)
 
 
+def _distinct_columns(light: FloatArray) -> tuple[list[FloatArray], list[BoolArray]]:
+    """Return the distinct columns, and where each of them is."""
+    columns, which = np.unique(light, axis=1, return_inverse=True)
+    return list(columns.T), [which.ravel() == at for at in range(columns.shape[1])]
+
+
 class _ByPixel(LinearModel):
     """Linear model of single pixels, those of all field positions together."""
 
@@ -285,8 +335,7 @@ def linear_model(setup: Setup) -> LinearModel:
     Parameters
     ----------
     setup : Setup
-        Camera, lights, scene and accuracy; at most 9 field positions and 2 moments of a pulse are used. An HDR
-        pixel is one of full sensitivity, read once.
+        Camera, lights, scene and accuracy; at most 9 field positions and 2 moments of a pulse are used.
 
     Returns
     -------
@@ -296,6 +345,13 @@ def linear_model(setup: Setup) -> LinearModel:
     few = setup.accuracy.model_copy(
         update={"field_positions": min(setup.accuracy.field_positions, _FIELD_POSITIONS), "pwm_moments": 2}
     )
-    setup = setup.with_camera(pixel=setup.camera.pixel.read_once) if setup.camera.pixel.captures else setup
+    hdr = setup.camera.pixel if setup.camera.pixel.captures else None
+    setup = setup if hdr is None else setup.with_camera(pixel=hdr.read_once)
     without_readout = replace(setup, left_out=setup.left_out | READOUT, accuracy=few)
-    return _models.get(hashlib.sha256(pickle.dumps(without_readout)).digest(), lambda: LinearModel(without_readout))
+
+    def made() -> LinearModel:
+        model = LinearModel(without_readout)
+        model.hdr = hdr
+        return model
+
+    return _models.get(hashlib.sha256(pickle.dumps((without_readout, hdr))).digest(), made)

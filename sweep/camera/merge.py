@@ -67,6 +67,23 @@ def limits_dn(pixel: Pixel) -> tuple[int | None, ...]:
     return (*(threshold_dn(capture, pixel.threshold) for capture in pixel.read_as[:-1]), None)
 
 
+def exposure_of(pixel: Pixel) -> list[int]:
+    """Return the index of the exposure of each capture.
+
+    Parameters
+    ----------
+    pixel : Pixel
+        HDR pixel.
+
+    Returns
+    -------
+    list of int
+        Indices.
+    """
+    of = {number: at for at, exposure in enumerate(pixel.exposures) for number in exposure.numbers}
+    return [of[number] for number in range(len(pixel.captures))]
+
+
 def light_of(pixel: Pixel) -> FloatArray:
     """Return the light of each exposure relative to that of a pixel of full sensitivity.
 
@@ -310,7 +327,7 @@ def without_noise(electrons: FloatArray, light: FloatArray, pixel: Pixel) -> Flo
     """
     read = [
         rounded(np.minimum(electrons[at], one.saturation_e) * one.dn_per_e, one)
-        for at, one in zip(_exposure_of(pixel), pixel.read_as, strict=True)
+        for at, one in zip(exposure_of(pixel), pixel.read_as, strict=True)
     ]
     return merged_readings(read, electrons, light, pixel)
 
@@ -337,7 +354,7 @@ def draws(electrons: FloatArray, light: FloatArray, pixel: Pixel, rng: np.random
     gain = 1 + pixel.prnu * rng.standard_normal(electrons.shape[1:])
     held = rng.poisson(np.clip(electrons * gain, 0.0, MOST_POISSON_E))
     read = []
-    for at, one in zip(_exposure_of(pixel), pixel.read_as, strict=True):
+    for at, one in zip(exposure_of(pixel), pixel.read_as, strict=True):
         noisy_e = np.minimum(held[at], one.well_e) + one.read_noise_e * rng.standard_normal(gain.shape)
         read.append(rounded(noisy_e * one.dn_per_e, one))
     return merged_readings(read, electrons, light, pixel)
@@ -377,12 +394,6 @@ def merged_readings(
             estimate = (read_dn[number] - pixel.offset_dn) / (pixel.read_as[number].dn_per_e * light[at])
             result += here * weight * estimate
     return coded(np.asarray(pixel.dn_per_e * result + pixel.offset_dn, dtype=float), pixel)
-
-
-def _exposure_of(pixel: Pixel) -> list[int]:
-    """Return the index of the exposure of each capture."""
-    of = {number: at for at, exposure in enumerate(pixel.exposures) for number in exposure.numbers}
-    return [of[number] for number in range(len(pixel.captures))]
 
 
 def _subsets(pixel: Pixel) -> Iterator[tuple[Subset, ...]]:

@@ -12,14 +12,16 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..base.types import FloatArray, IndexArray
-from .merge import limits_dn
+from ..base.types import BoolArray, FloatArray, IndexArray
+from .merge import exposure_of, limits_dn, saturating_e
 from .noise import gaussian
 from .noise.subsets import share_beyond
 from .pixel import Pixel
 
 NOISE_BINS = 8.0
 """Bins per standard deviation of the noise of a merged value."""
+ROOT_STEP = 1 / 16
+"""Grid of the root of the expected electrons that nodes of tables lie on."""
 _REACH = 9.5
 _MOST_READ, _MOST_SUMS = 5e6, 1e6
 """Numbers of electrons times digital numbers that read noise spreads each over; additions for each pixel."""
@@ -125,6 +127,51 @@ class Bins:
         return np.asarray(np.copysign(above, widths), dtype=float)
 
 
+def nodes_of(pixel: Pixel, light: FloatArray) -> tuple[FloatArray, BoolArray]:
+    """Return expected electrons at which a merged value is tabulated: an eighth of its noise apart.
+
+    Parameters
+    ----------
+    pixel : Pixel
+        HDR pixel.
+    light : ndarray of shape (n_exposures,)
+        Light of each exposure relative to that of a pixel of full sensitivity.
+
+    Returns
+    -------
+    roots_e : ndarray of shape (n_roots,)
+        Squares of the multiples of `ROOT_STEP`, up to where all is saturated, electrons.
+    is_node : ndarray of bool, same shape
+        True for nodes. A step of the root is an eighth of the noise where all light is read, and less where a small
+        photodiode is.
+    """
+    roots_e = np.square(np.arange(n_roots(pixel, light), dtype=float) * ROOT_STEP)
+    is_node = np.ones(roots_e.size, dtype=bool)
+    if len(pixel.captures) > 1:
+        of_capture = np.array([light[at] for at in exposure_of(pixel)])
+        noise_bins = Bins.of(pixel.model_copy(update={"companding": ()}), of_capture).number(roots_e)
+        is_node[1:-1] = np.diff(noise_bins)[:-1] > 0
+    return roots_e, is_node
+
+
+def n_roots(pixel: Pixel, light: FloatArray) -> int:
+    """Return the number of multiples of `ROOT_STEP` up to the root of the electrons from which on all is saturated.
+
+    Parameters
+    ----------
+    pixel : Pixel
+        HDR pixel.
+    light : ndarray of shape (n_exposures,)
+        Relative light.
+
+    Returns
+    -------
+    int
+        Number.
+    """
+    return math.ceil(math.sqrt(float((saturating_e(pixel) / light).max())) / ROOT_STEP) + 2
+
+
 @dataclass(frozen=True)
 class Readings:
     """Distribution of the readings of each number of electrons, for all captures of an HDR pixel.
@@ -197,9 +244,7 @@ def readings_of(pixel: Pixel, light: tuple[float, ...]) -> Readings:
     read, limits = pixel.read_as, limits_dn(pixel)
     n_counts = max(math.ceil(capture.well_e) for capture in read) + 1
     counts, n_captures = np.arange(n_counts, dtype=float), len(read)
-    exposure = np.empty(n_captures, dtype=np.intp)
-    for at, of in enumerate(pixel.exposures):
-        exposure[list(of.numbers)] = at
+    exposure = np.array(exposure_of(pixel))
     bins = Bins.of(pixel, np.array(light)[exposure])
     passed = np.ones((n_captures, len(pixel.exposures), n_counts))
     entries = []

@@ -188,11 +188,13 @@ def chromatic_rows(design: SmoothDesign, *, pairs: Sequence[Pair], noise: bool) 
         return np.concatenate(parts, axis=-1)
 
     response, by_u = design.lamps
-    along = of(
-        response + 1j * COMPLEX_STEP * by_u,
-        design.variance + 1j * COMPLEX_STEP * design.variance_by_u if noise else None,
-    )
-    return Rows(of(response, design.variance if noise else None), along.imag.T / COMPLEX_STEP)
+    if not noise:
+        return Rows(of(response, None), of(response + 1j * COMPLEX_STEP * by_u, None).imag.T / COMPLEX_STEP)
+    mean, variance, mean_by_u, variance_by_u = design.noisy
+    # What saturation takes away from an HDR pixel's mean; else nothing.
+    response, by_u = response + (mean - design.response), by_u + (mean_by_u - design.response_by_u)
+    along = of(response + 1j * COMPLEX_STEP * by_u, variance + 1j * COMPLEX_STEP * variance_by_u)
+    return Rows(of(response, variance), along.imag.T / COMPLEX_STEP)
 
 
 def smooth_chromatic(setup: Setup, curves: FloatArray, pair: Pair) -> FloatArray:

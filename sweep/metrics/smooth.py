@@ -186,14 +186,15 @@ class SmoothDesign:
         return self._imager.lamps_with_gradient(self.curves, self.by_u)
 
     @cached_property
-    def variance(self) -> FloatArray:
-        """Variance of the noise, DN^2, ndarray of shape (n_cases, n_signals, n_channels)."""
-        return np.asarray(self._imager.variance(self.curves[None])[0], dtype=float)
+    def noisy(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Mean, DN, and variance, DN^2, under noise, and their derivatives, in the shapes of `response_by_u`.
 
-    @cached_property
-    def variance_by_u(self) -> FloatArray:
-        """Derivative of the variance, ndarray of shape (n_free, n_cases, n_signals, n_channels)."""
-        return self._imager.variance_gradient(self.curves, self.by_u)
+        The mean is `response`; of an HDR pixel it is that of the merged value, which saturates.
+        """
+        if self._imager.hdr is not None:
+            return self._imager.merged_with_gradient(self.curves, self.by_u)
+        variance = np.asarray(self._imager.variance(self.curves[None])[0], dtype=float)
+        return self.response, variance, self.response_by_u, self._imager.variance_gradient(self.curves, self.by_u)
 
     def linear(self, matrix: FloatArray) -> Rows:
         """Return linear functions of the parameters.

@@ -206,12 +206,10 @@ def _of_signals(design: SmoothDesign, pair: Pair, of: _OfPairs) -> Rows:
         first, second = of_both(mean)
         return of(first - second, *of_both(variance))
 
-    along = of_pairs(
-        design.response + 1j * COMPLEX_STEP * design.response_by_u,
-        design.variance + 1j * COMPLEX_STEP * design.variance_by_u,
-    )
+    mean, variance, mean_by_u, variance_by_u = design.noisy
+    along = of_pairs(mean + 1j * COMPLEX_STEP * mean_by_u, variance + 1j * COMPLEX_STEP * variance_by_u)
     shape = len(along), -1
-    return Rows(of_pairs(design.response, design.variance), along.imag.reshape(shape).T / COMPLEX_STEP)
+    return Rows(of_pairs(mean, variance), along.imag.reshape(shape).T / COMPLEX_STEP)
 
 
 def smooth_detectability(setup: Setup, curves: FloatArray, pair: Pair) -> FloatArray:

@@ -162,6 +162,9 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
     if np.isfinite(held_out):
         text += f" ({separation.formatted(held_out)} on lights that it has not seen)"
     yield f"{text}{_in(output, leaders.scenario)}{_times(output, best, plain)}.{_equal(output, best)}"
+    search = output.provenance.search
+    if search is not None and search.scenarios > 1 and best["kind"] == FOUND:
+        yield f"It was searched for its worst value over {search.scenarios} scenarios, which it has there."
     if output.objective.rule.wanted != "more":  # decades of what is to be the least, in its own unit
         for name in output.objective.weights:
             rows = [row for row in (best, plain) if row is not None]

@@ -89,12 +89,13 @@ class CheckFacts(_Facts):
 class SearchFacts(_Facts):
     """A search in figures; see `search.limit.Limit` for those of the limit.
 
-    `cfa`, `channel`: the searched ones. `bounded`: kind and name of the spaces whose feasible filters the limit holds
-    for, in the search's scenario.
+    `scenario`: of several (`scenarios`) the one in which the answer is worst. `cfa`, `channel`: the searched ones.
+    `bounded`: kind and name of the spaces whose feasible filters the limit holds for, in that scenario.
     """
 
     algorithm: str
     scenario: str
+    scenarios: int
     space: str
     cfa: str
     channel: str

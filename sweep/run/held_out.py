@@ -179,7 +179,8 @@ def _without(
         types=tuple(lights.types[i] for i in kept),
         photons=lights.photons[kept],
     )
-    fewer = replace(problem, setup=replace(problem.setup, lights=fewer_lights))
+    setup, *others = (replace(one, lights=fewer_lights) for one in (problem.setup, *problem.others))
+    fewer = replace(problem, setup=setup, others=tuple(others))
     log = [e for i, start in enumerate(starts) for e in search_from(fewer, i, start, algorithm, evaluations, seed).log]
     best = best_feasible(log)
     if best is None:

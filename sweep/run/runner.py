@@ -55,7 +55,7 @@ from .provenance import plan_facts, provenance, resolved_yaml
 from .rows import rules_of
 from .search import (
     SearchAnswer,
-    answer_row,
+    answer_rows,
     combinations_table,
     front_table,
     limit_alone,
@@ -249,7 +249,7 @@ class _Run:
         """Search, sweep, and write the tables of both; an infeasible search ends the run before the sweep."""
         answer, sweep, gathered = self.answer, self.sweep, self.gathered
         sweep.run(gathered, self.progress, self.options)
-        answered = [] if answer is None else [answer_row(self.study, answer, self.rules, self.pool)]
+        answered = [] if answer is None else answer_rows(self.study, answer, self.rules, self.pool)
         for row in answered:
             gathered.add(row)
         gathered.finish()
@@ -290,13 +290,15 @@ class _Run:
         """Write a table with `filter_id` beside `design_id`, and with units and meanings."""
         if "design_id" in table.column_names and "filter_id" not in table.column_names:
             ids = table["design_id"].to_numpy(zero_copy_only=False)
-            filters = np.where(ids == self.study.n_designs, self.study.n_filters, ids % max(1, self.study.n_filters))
+            filters = np.where(ids >= self.study.n_designs, self.study.n_filters, ids % max(1, self.study.n_filters))
             at = table.column_names.index("design_id") + 1
             table = table.add_column(at, "filter_id", pa.array(filters, pa.int64(), from_pandas=True))
         self.inventory.write_table(name, table.cast(described(table.schema, self.study.quantities)))
 
     def _limit(self) -> Limit | None:
-        """Return the search's upper bound, computed alone if the search need not be repeated."""
+        """Return the upper bound of a search in one scenario, computed alone if the search need not be repeated."""
+        if self.study.search is not None and len(self.study.search.scenarios) > 1:
+            return None
         if "answer" in self.__dict__ or self.study.search is None:
             return None if self.answer is None else self.answer.limit
         return limit_alone(self.study, self.study.search)
@@ -305,7 +307,7 @@ class _Run:
         study, sweep, answer = self.study, self.sweep, self.answer
         facts: dict[str, Any] = {
             "filters": study.n_filters + (answer is not None),
-            "designs": study.n_designs + (answer is not None),
+            "designs": study.n_designs + (0 if answer is None else len(answer.search.scenarios)),
             "failed": sweep.failed,
             "plans": plan_facts(study),
             "trade_off": study.trade_off,
@@ -315,7 +317,7 @@ class _Run:
         warnings = [*study.warnings, *sweep.warnings]
         if answer is not None:
             facts["search"] = search_facts(study, answer)
-            if "saturation" in study.plans[answer.search.scenario].computed:
+            if "saturation" in study.plans[answer.scenario].computed:
                 warnings.append("pixels may saturate: the search sees them before clipping, its row after")
             if answer.front:
                 facts["hypervolume"] = _hypervolumes(answer, self.gathered)

@@ -21,7 +21,7 @@ from ..search.combinations import Choice, choose, numbers_of, with_members
 from ..search.held import search_cells
 from ..search.limit import Limit, limit_of, reason_without_bound
 from ..search.problem import Evaluation, Problem, SearchRun, best_feasible, starting_points
-from ..search.solver import extreme_value, search_from
+from ..search.solver import extreme_value, search_from, smooth_objective
 from ..search.trade_off import Effort, FrontPoint, calls_at_levels, check_proof, gap_of, trade_off
 from ..study import Search, Study
 from .routes import Rules
@@ -36,9 +36,13 @@ _MOST_HELD = 60
 
 @dataclass(frozen=True)
 class SearchAnswer:
-    """All starts of a search, the best feasible evaluation, its upper bound and the front."""
+    """All starts of a search, the best feasible evaluation, its upper bound and the front.
+
+    `scenario`: the one in which the best is worst, if several are searched.
+    """
 
     search: Search
+    scenario: str
     runs: tuple[SearchRun, ...]
     best: Evaluation
     limit: Limit | None
@@ -90,8 +94,8 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
         starts[0] = problem.to_unit(choice.tried[choice.best].x)
     per_start = search.max_evaluations // n_starts
     effort = Effort(search.algorithm, starts, per_start, study.section.seed)
-    no_limit = reason_without_bound(problem)
-    limited = no_limit is None
+    no_limit, series = reason_without_bound(problem), len(search.scenarios) > 1
+    limited = no_limit is None and not series
     # All at once, so that no core waits for another: few of these calls need results of others.
     calls = [
         delayed(search_from, problem, i, u, search.algorithm, per_start, effort.seed) for i, u in enumerate(starts)
@@ -105,10 +109,16 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
     best = best_feasible([e for run in runs for e in run.log])
     if best is None:
         raise _infeasible(study, problem, starts[:_REACH_STARTS], per_start)
-    limit = next(answers) if limited else None
+    limit, worst = next(answers) if limited else None, 0
+    if series:
+        alone = [problem.in_scenario(number) for number in range(len(search.scenarios))]
+        worst = int(np.argmin([smooth_objective(one, best.x) for one in alone]))
+        no_limit = reason_without_bound(alone[worst])
+        # No filter's worst value is above the bound of any one scenario.
+        limit = next(iter(parallel([delayed(limit_of, alone[worst])]))) if no_limit is None else None
     check_proof(best, limit)
     front = trade_off(problem, search.levels, effort, answers, parallel, progress, limited=limited)
-    return SearchAnswer(search, tuple(runs), best, limit, no_limit, front, choice)
+    return SearchAnswer(search, search.scenarios[worst], tuple(runs), best, limit, no_limit, front, choice)
 
 
 def limit_alone(study: Study, search: Search) -> Limit | None:
@@ -140,8 +150,8 @@ def _infeasible(study: Study, problem: Problem, starts: FloatArray, per_start: i
     return InfeasibleError(issues)
 
 
-def answer_row(study: Study, answer: SearchAnswer, rules: Rules, parallel: Parallel) -> pa.Table:
-    """Return the search's answer as the camera reads it out, with its upper bound and gap.
+def answer_rows(study: Study, answer: SearchAnswer, rules: Rules, parallel: Parallel) -> list[pa.Table]:
+    """Return the search's answer as the camera reads it out in each scenario, with its upper bound and gap.
 
     Parameters
     ----------
@@ -156,21 +166,28 @@ def answer_row(study: Study, answer: SearchAnswer, rules: Rules, parallel: Paral
 
     Returns
     -------
-    pyarrow.Table
-        One row.
+    list of pyarrow.Table
+        One row each; upper bound and gap stand in the scenario that they hold for.
     """
     space = answer.search.space
     best = Space(
         "search", answer.search.name, space.cfa, space.filter, tuple((float(value),) for value in answer.best.x)
     )
-    job = Job(best, answer.search.scenario, 0, 1, study.n_designs, study.n_filters)
+    jobs = [
+        Job(best, scenario, 0, 1, study.n_designs + number, study.n_filters)
+        for number, scenario in enumerate(answer.search.scenarios)
+    ]
     # Workers have loaded what this takes, and this process has not.
-    (row,) = parallel([delayed(run_job, job, study.setup(best, job.scenario), rules)])
-    limit = None if answer.limit is None else answer.limit.proven
-    for name, value in {"space": space.name, "limit": limit, "gap": answer.gap}.items():
-        index, kind = row.schema.get_field_index(name), row.schema.field(name)
-        row = row.set_column(index, kind, pa.array([value]).cast(kind.type))
-    return row
+    rows = parallel([delayed(run_job, job, study.setup(best, job.scenario), rules) for job in jobs])
+    proven = None if answer.limit is None else answer.limit.proven
+    made: list[pa.Table] = []
+    for job, row in zip(jobs, rows, strict=True):
+        made.append(row)
+        bound = {"limit": proven, "gap": answer.gap} if job.scenario == answer.scenario else {}
+        for name, value in {"space": space.name, **bound}.items():
+            index, kind = row.schema.get_field_index(name), row.schema.field(name)
+            made[-1] = made[-1].set_column(index, kind, pa.array([value]).cast(kind.type))
+    return made
 
 
 def search_facts(study: Study, answer: SearchAnswer) -> dict[str, Any]:
@@ -191,7 +208,8 @@ def search_facts(study: Study, answer: SearchAnswer) -> dict[str, Any]:
     search, space, limit = answer.search, answer.search.space, answer.limit
     return {
         "algorithm": search.algorithm,
-        "scenario": search.scenario,
+        "scenario": answer.scenario,
+        "scenarios": len(search.scenarios),
         "space": space.name,
         "cfa": space.cfa,
         "channel": " and ".join(space.filter.channels) if space.filter else "",
@@ -263,7 +281,7 @@ def search_log(answer: SearchAnswer) -> pa.Table:
     names = answer.search.space.parameters
     rows = [
         {
-            "scenario": answer.search.scenario,
+            "scenario": answer.scenario,
             "sensitivity_min": level,
             "start": run.start,
             "evaluation": index,

@@ -74,7 +74,9 @@ def vision_tables(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
     vision = study.section.vision
     assert vision is not None
     first = next(iter(study.scenarios))
-    designs = [row for row in few_rows(rows) if row["scenario"] == first or row["kind"] == FOUND]
+    designs = list(
+        {row["name"]: row for row in few_rows(rows) if row["scenario"] == first or row["kind"] == FOUND}.values()
+    )
     setups = []
     for row in designs:
         space, curves = row_curves(study, row)

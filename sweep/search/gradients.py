@@ -84,10 +84,10 @@ def _members_of(setup: Setup) -> PopulationImager:
     return population_imager(setup)
 
 
-def _drawn_of(problem: Problem) -> LampsAndCameras:
+def _drawn_of(problem: Problem, setup: Setup) -> LampsAndCameras:
     from ..metrics.drawn import LampsAndCameras  # noqa: PLC0415  (only where a share of lamps and cameras counts)
 
-    return LampsAndCameras(_members_of(problem.setup), problem.tolerance, problem.seed)
+    return LampsAndCameras(_members_of(setup), problem.tolerance, problem.seed)
 
 
 def _finite(point: Point) -> Point:
@@ -104,12 +104,11 @@ def _finite(point: Point) -> Point:
 
 
 class Model:
-    """Smooth problem in units of the box; objective and constraints share one simulation per point."""
+    """Smooth problem in units of the box; objective and constraints share one simulation of each scenario per point."""
 
     def __init__(self, problem: Problem, run: SearchRun, budget: int) -> None:
         self._problem = problem
         self._quantities = problem.quantities
-        self._imager = linear_model(problem.setup)
         self._run = run
         self._budget = budget
         self.stop: Callable[[], object] | None = None
@@ -123,8 +122,15 @@ class Model:
         errors = dict.fromkeys((AS_DESIGNED, *(off for every in self._perturbed.values() for off in every)))
         self._families = {off: problem.family.perturbed(off) if any(off) else problem.family for off in errors}
         over = any(problem.over_population(name) for name in wanted)
-        self._members = _members_of(problem.setup) if over else None
-        self._drawn = _drawn_of(problem) if any(problem.of_a_share(name) for name in wanted) else None
+        of_a_share = any(problem.of_a_share(name) for name in wanted)
+        self._scenes = [
+            (
+                linear_model(setup),
+                _members_of(setup) if over else None,
+                _drawn_of(problem, setup) if of_a_share else None,
+            )
+            for setup in (problem.setup, *problem.others)
+        ]
         wanted_less = self._rule.wanted == "less"
         self._power = 1 if problem.signed_goal or wanted_less else 2  # a quantity that may be negative has no root
         self._back_off = {name: _back_off(problem, name, bound) for name, bound in problem.constraints.items()}
@@ -179,7 +185,10 @@ class Model:
         problem, free = self._problem, self._free
         x = problem.from_unit(u)
         made = {
-            off: SmoothDesign(self._imager, family, x, free, self._span, self._members, self._drawn, problem.vision)
+            off: [
+                SmoothDesign(imager, family, x, free, self._span, members, drawn, problem.vision)
+                for imager, members, drawn in self._scenes
+            ]
             for off, family in self._families.items()
         }
         terms, objective = self._terms(made)
@@ -193,14 +202,14 @@ class Model:
             rows = quantities[name] = self._rows(name, made)
             conditions += _conditions(self._quantities[name], bound, rows, self._back_off[name])
             worst = max(worst, float(bound.violation(np.array([self._quantities[name].value(rows)]))[0]))
-        light = light_of(made[AS_DESIGNED])
+        light = light_of(made[AS_DESIGNED][0])
         violations, whole = (float(light[name][0]) for name in (SENSITIVITY, CFA_SENSITIVITY))
         evaluation = Evaluation(x, objective, violations, whole, worst)
         own_term = np.arange(len(terms)) * (not self._rule.smallest)  # what is smallest needs one bound
         term = np.repeat(own_term, [rows.values.size for rows in terms])
         return Point(evaluation, Rows.joined(terms), self._power, term, Rows.joined(conditions), quantities)
 
-    def _terms(self, made: Mapping[ProductionError, SmoothDesign]) -> tuple[list[Rows], float]:
+    def _terms(self, made: Mapping[ProductionError, list[SmoothDesign]]) -> tuple[list[Rows], float]:
         """Return the rows of the objective's weighted quantities, and its value."""
         terms, columns = [], {}
         for name, weight in self._weights.items():
@@ -211,11 +220,12 @@ class Model:
             return terms, float(min(rows.values.min() for rows in terms))
         return terms, float(self._problem.objective.of(columns)[0])
 
-    def _rows(self, name: str, made: Mapping[ProductionError, SmoothDesign]) -> Rows:
-        """Return the rows of a quantity."""
+    def _rows(self, name: str, made: Mapping[ProductionError, list[SmoothDesign]]) -> Rows:
+        """Return the rows of a quantity, in every scenario."""
         smooth = self._quantities[name].smooth
         assert smooth is not None
-        return Rows.joined([smooth(made[off]) for off in self._perturbed[name]])
+        n_scenes = len(self._problem.setups_of(name))
+        return Rows.joined([smooth(design) for off in self._perturbed[name] for design in made[off][:n_scenes]])
 
 
 def _term(quantity: Quantity, rows: Rows, weight: float, rule: Rule, power: int) -> Rows:

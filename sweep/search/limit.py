@@ -284,6 +284,7 @@ def reason_without_bound(problem: Problem) -> str | None:
         (lambda: family.n_modified != 1, "more than one modified channel"),
         (lambda: not problem.objective.rule.smallest, f"the objective is a {problem.objective.rule.name}"),
         (lambda: bool(unknown), f"{', '.join(unknown)} {why}"),
+        (lambda: _merges(problem), "the noise of merged captures has no bound"),
         (lambda: problem.setup.camera.pixel.crosstalk > 0, "crosstalk mixes the modified channel into others"),
         (
             lambda: bool((_top(problem) > base * (1 + ROUNDING)).any()),
@@ -304,6 +305,12 @@ def reason_without_bound(problem: Problem) -> str | None:
         ),
     )
     return next((reason for refused, reason in reasons if refused()), None)
+
+
+def _merges(problem: Problem) -> bool:
+    """Return whether the objective has the noise of an HDR pixel."""
+    noisy = any(problem.quantities[name].states for name in problem.objective.weights)
+    return noisy and bool(problem.setup.camera.pixel.captures)
 
 
 def _mixes_chromatic(problem: Problem) -> bool:

@@ -46,6 +46,8 @@ class Problem:
         Seed of random lamps and cameras.
     vision : SeededVision, optional
         Images for readers of signal heads.
+    others : tuple of Setup
+        Further scenarios: a quantity of lamps counts with its worst value over all.
     """
 
     setup: Setup
@@ -59,6 +61,7 @@ class Problem:
     user_metrics: tuple[UserMetric, ...] = ()
     seed: int = 0
     vision: SeededVision | None = None
+    others: tuple[Setup, ...] = ()
 
     @property
     def quantities(self) -> Mapping[str, Quantity]:
@@ -76,6 +79,37 @@ class Problem:
     def population(self) -> bool:
         """True if worst cases are over a population of the lights."""
         return self.setup.lights.population is not None
+
+    def setups_of(self, quantity: str) -> tuple[Setup, ...]:
+        """Return the scenarios over which a quantity is the worst.
+
+        Parameters
+        ----------
+        quantity : str
+            Column name.
+
+        Returns
+        -------
+        tuple of Setup
+            The first one alone for quantities of a filter.
+        """
+        requested = self.quantities[quantity]
+        return (self.setup, *(self.others if requested.pair or requested.states else ()))
+
+    def in_scenario(self, number: int) -> Problem:
+        """Return the problem of one scenario.
+
+        Parameters
+        ----------
+        number : int
+            Its number: 0 is `setup`.
+
+        Returns
+        -------
+        Problem
+            Problem without other scenarios.
+        """
+        return replace(self, setup=(self.setup, *self.others)[number], others=())
 
     def over_population(self, quantity: str) -> bool:
         """Return whether a quantity is a worst case over the population of the lights.

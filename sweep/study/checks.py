@@ -8,15 +8,15 @@ from dataclasses import replace
 
 from ..camera import psf
 from ..camera.memory import MOST_BYTES, memory_problem
+from ..camera.merge import light_of
 from ..camera.mosaic import Mosaic
 from ..camera.pixel import Pixel
-from ..camera.readings import NOISE_BINS, countable
+from ..camera.readings import NOISE_BINS, countable, n_roots
 from ..camera.scene import OBJECT_RESOLUTION, FixedExposure, Scene
 from ..metrics.quantity import Quantity, RequestedQuantities
 from ..metrics.registry import listed, quantities_of
 from ..spectra.color import luminance_per_photon_radiance
 from ..spectra.lights import Lights
-from ..vision.pixel_table import n_roots
 from ..vision.section import (
     FEWEST_LAMPS,
     MOST_BITS,
@@ -278,7 +278,7 @@ def _check_merged(pixel: Pixel, sources: Sources) -> None:
         problem = "`vision` counts electrons of the first usable capture"
         sources.add(("pixel", "merge"), problem, pixel.merge, "saturated, with smaller wells, PRNU or read noise")
     readings = pixel.knees[1, -1] or NOISE_BINS * sum(2 * math.sqrt(one.well_e) for one in pixel.read_as)
-    if readings > MOST_READINGS or n_roots(pixel) > MOST_ROOTS:
+    if readings > MOST_READINGS or n_roots(pixel, light_of(pixel)) > MOST_ROOTS:
         light = min(capture.light for capture in pixel.captures)
         problem = f"too many readings for `vision`: {readings:,.0f}, and light from 1 to {light:.3g}"
         allowed = f"at most {MOST_READINGS:,} readings, and captures nearer in light"

@@ -140,20 +140,25 @@ def search_of(section: StudySection, spaces: Sequence[Space], sources: Sources) 
         sources.unknown(("search", "space"), "sweep or box", chosen, names)
     elif chosen in boxes and not _free(boxes[chosen], requested.map or {}):
         sources.add(("search", "space"), "every parameter is fixed", chosen, "one free parameter or more")
-    if requested.scenario is not None and requested.scenario not in scenarios:
-        sources.unknown(("search", "scenario"), "scenario", requested.scenario, scenarios)
+    series = {name.partition(" ")[0]: None for name in scenarios if "=" in name}
+    wanted = requested.scenario or scenarios[0]
+    searched = [name for name in scenarios if name == wanted or (wanted in series and name.startswith(f"{wanted} "))]
+    if not searched:
+        sources.unknown(("search", "scenario"), "scenario", wanted, [*scenarios, *series])
     if requested.algorithm not in ALGORITHMS:
         what = "algorithm (it must take inequality constraints)"
         sources.unknown(("search", "algorithm"), what, requested.algorithm, list(ALGORITHMS))
-    scenario = requested.scenario or scenarios[0]
-    if chosen not in boxes or requested.algorithm not in ALGORITHMS or scenario not in scenarios:
+    if chosen not in boxes or requested.algorithm not in ALGORITHMS or not searched:
         return None
+    if len(searched) > 1:
+        _check_series(section, sources)
     levels: tuple[float, ...] = ()
     if requested.front is not None:
         levels = Axis(min=requested.front.min, max=requested.front.max, count=requested.front.count).points()
-    scene = section.scenarios[scenario]
-    if scene.drive is not None and isinstance(scene.exposure, WhitePatchExposure):
-        sources.add(("search", "scenario"), "a search under a pulsed light needs a fixed exposure", scenario)
+    for scene in (section.scenarios[name] for name in searched):
+        if scene.drive is not None and isinstance(scene.exposure, WhitePatchExposure):
+            sources.add(("search", "scenario"), "a search under a pulsed light needs a fixed exposure", wanted)
+            break
     space, others = boxes[chosen], {space.name for space in spaces if space.kind in ("reference", "design")}
     assert space.filter is not None
     if requested.name in others:
@@ -161,7 +166,20 @@ def search_of(section: StudySection, spaces: Sequence[Space], sources: Sources) 
     name = requested.name or f"best {kind_in_words(space.filter.family.kind)}"
     name += " (search)" if name in others else ""
     effort = requested.algorithm, requested.starts, requested.max_evaluations
-    return Search(name, space, scenario, *effort, levels, _map_of(requested.map or {}, space, sources))
+    return Search(
+        name, space, searched[0], tuple(searched), *effort, levels, _map_of(requested.map or {}, space, sources)
+    )
+
+
+def _check_series(section: StudySection, sources: Sources) -> None:
+    """Check that a search over several scenarios has an objective with a worst one, and neither front nor map."""
+    assert section.search is not None
+    for key in ("front", "map"):
+        if getattr(section.search, key) is not None:
+            sources.add(("search", key), "of one scenario, and the search is over several", None, "one `scenario`")
+    if not section.objective.rule.smallest:
+        problem = f"the worst of several scenarios is not known of a {section.objective.rule.name}"
+        sources.add(("objective",), problem, None, "`minimum` or `least`")
 
 
 def _free(space: Space, held: Iterable[str]) -> list[str]:
@@ -217,13 +235,23 @@ def check_searched(section: StudySection, space: Space, known: Mapping[str, Quan
         if name in known and known[name].needs == "family" and name not in dimensions:
             problem = f"{space.filter.family.kind} has no {name}"
             sources.add(("constraints", name), problem, None, ", ".join(dimensions) or "none")
-    noisy = [name for name in (*goals, *section.constraints) if name in known and known[name].states]
-    if section.pixel.captures and noisy:
-        problem = f"{noisy[0]} is searched with the noise of a pixel that is read once; `pixel.captures` are merged"
-        sources.add(("objective" if noisy[0] in goals else "constraints",), problem, None, "quantities without noise")
+    if section.pixel.captures and any(known[name].states for name in (*goals, *section.constraints) if name in known):
+        _check_merged(section, sources)
     if section.search.front is not None and any(known[name].role == "light" for name in goals if name in known):
         problem = "the front is searched at levels of sensitivity, which is in the objective"
         sources.add(("search", "front"), problem, None, "an objective of CSDs")
+
+
+def _check_merged(section: StudySection, sources: Sources) -> None:
+    """Check that the captures of an HDR pixel that is searched under noise see the same light."""
+    for number, capture in enumerate(section.pixel.captures):
+        if capture.crosstalk is not None:
+            path: KeyPath = ("pixel", "captures", number, "crosstalk")
+            sources.add(path, "a search under noise has captures of one crosstalk", None, "that of the pixel")
+    for name, scene in section.scenarios.items():
+        if scene.drive is not None:
+            problem = "a search under the noise of merged captures needs steady light"
+            sources.add(("scenarios", name, "drive"), problem, None, "no `drive`")
 
 
 def bounds_like_percentages(study: Study) -> Iterator[str]:

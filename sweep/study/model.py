@@ -37,11 +37,15 @@ from .schema import StudySection
 
 @dataclass(frozen=True)
 class Search:
-    """A search inside the box of a sweep."""
+    """A search inside the box of a sweep.
+
+    Its objective counts in `scenario`, or with its worst value over all `scenarios` of a series.
+    """
 
     name: str
     space: Space
     scenario: str
+    scenarios: tuple[str, ...]
     algorithm: str
     starts: int
     max_evaluations: int
@@ -283,7 +287,7 @@ class Study:
             If numbers that are valid one by one overflow together.
         """
         tolerance_dn = self.section.tolerance_dn if tolerance_dn is None else tolerance_dn
-        searched = None if self.search is None or self.search.scenario != scenario else self.search.space
+        searched = None if self.search is None or scenario not in self.search.scenarios else self.search.space
         spaces = [space for space in self.spaces if space.size or space is searched] or list(self.spaces)
         try:
             boxes = [self.box(space, scenario) for space in spaces]
@@ -338,6 +342,7 @@ class Study:
             user_metrics=self.user_metrics,
             seed=self.section.seed,
             vision=self.images,
+            others=tuple(self.setup(search.space, name) for name in search.scenarios[1:]),
         )
 
     @property

@@ -217,7 +217,8 @@ class SearchSection(Section):
     map: Annotated[dict[Name, Values], Field(min_length=2, max_length=2)] | None = None
     """Two parameters and their values: the best objective at each pair of values, with all others free."""
     scenario: Name | None = None
-    """Scenario of the search; may be left out where there is one."""
+    """Scenario of the search, or one with `each`, of whose scenarios the worst counts; may be left out where there is
+    one."""
     algorithm: Name = "SLSQP"
     """SLSQP, MMA, CCSAQ; without gradients COBYLA, ISRES, ORIG_DIRECT_L, AGS."""
     starts: int = Field(default=16, ge=1, le=10_000)

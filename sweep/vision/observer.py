@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.types import FloatArray, IndexArray
+from ..camera.readings import ROOT_STEP
 from .compiled_images import cases_on_table, log_likelihoods
 from .images import HeadCamera, HeadElectrons, Numbers
 from .lamps import Lamps
-from .pixel_table import ROOT_STEP
 from .scenes import PHANTOM_SHARE, SHUFFLED, Scenes, orders_of_lenses, states_of
 
 

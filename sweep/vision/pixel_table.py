@@ -7,7 +7,6 @@ mean is exact, and a mixture of two neighbors has up to 0.4 % more variance.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -20,10 +19,8 @@ from ..camera.merge import light_of, saturating_e
 from ..camera.noise import gaussian
 from ..camera.noise.moments import without_prnu
 from ..camera.pixel import Pixel
-from ..camera.readings import Bins, readings_of
+from ..camera.readings import ROOT_STEP, nodes_of, readings_of
 
-ROOT_STEP = 1 / 16
-"""Grid of the root of the expected electrons that nodes lie on."""
 _LEAST = 1e-30
 
 
@@ -74,23 +71,6 @@ class PixelTable:
         return node, np.clip(share, 0.0, 1.0).astype(np.float32)
 
 
-def n_roots(pixel: Pixel) -> int:
-    """Return the number of multiples of `ROOT_STEP` up to the root of the electrons from which on all is saturated.
-
-    Parameters
-    ----------
-    pixel : Pixel
-        Pixel.
-
-    Returns
-    -------
-    int
-        Number.
-    """
-    merged = _merged(without_prnu(pixel))
-    return math.ceil(math.sqrt(float((saturating_e(merged) / light_of(merged)).max())) / ROOT_STEP) + 2
-
-
 @lru_cache(maxsize=4)
 def pixel_table(pixel: Pixel) -> PixelTable:
     """Return the table of a pixel with its noise; cached.
@@ -109,12 +89,7 @@ def pixel_table(pixel: Pixel) -> PixelTable:
 
     merged = _merged(without_prnu(pixel))
     light, most_e = light_of(merged), saturating_e(merged)
-    roots_e = np.square(np.arange(n_roots(pixel), dtype=float) * ROOT_STEP)
-    is_node = np.ones(roots_e.size, dtype=bool)
-    if pixel.captures:  # a small photodiode has more noise, and needs fewer nodes
-        light_of_captures = np.array([capture.light for capture in pixel.captures])
-        noise_bins = Bins.of(merged.model_copy(update={"companding": ()}), light_of_captures).number(roots_e)
-        is_node[1:-1] = np.diff(noise_bins)[:-1] > 0
+    roots_e, is_node = nodes_of(merged, light)
     nodes_e = roots_e[is_node]
     readings = readings_of(merged, tuple(light))
     parts = readings.exposure, readings.passed, readings.starts, readings.columns, readings.shares
