@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -13,6 +14,7 @@ from ..base.types import BoolArray, FloatArray
 from ..metrics.columns.confusion import D_PRIME, STATE_ERROR, STATE_ERROR_BOUND
 from ..metrics.recognition import CLASSIFIERS, MOST_LIKELY
 from ..results.output import Output
+from ..spectra.lights import Pair
 from ..study.axes import series_of
 from .series import Line, SeriesFigure, over_series, quantity_of, series_figures
 
@@ -23,6 +25,7 @@ _COMPUTED = (
     "two that are confused most. The dashed line is the error that the study allows; a ring marks where a design "
     "passes it."
 )
+_LEAST_DPRIME, _DRAWN_DPRIME = "d' of the worst pair of states", (0.1, 1e4)
 _ANY = "error, lamps of unknown intensity"
 _ANY_NOTE = (
     "A camera does not know how bright a lamp is: each signal is compared with those of other states at all "
@@ -32,6 +35,9 @@ _COUNTED = (
     "Counted: of raw patches drawn with noise, of all signals, the share whose state a classifier says that was "
     "trained on others. It is of all signals, the error above of the two that are confused most: neither follows from "
     "the other."
+)
+_HANDOVERS = (
+    "A stroke marks where a channel hands over to its next capture, or is saturated, for the median {kind} lamp."
 )
 _RULE_NAMES = {MOST_LIKELY: "most likely signal", "nearest_centroid": "nearest centroid", "lda": "LDA"}
 
@@ -50,7 +56,18 @@ def all_series(output: Output) -> list[SeriesFigure]:
         Figures.
     """
     figures = [*_noise_figures(output), *series_figures(output)]
+    if output.handovers is not None:
+        figures = [_with_handovers(figure, output.handovers, output.trade_off[0].pair) for figure in figures]
     return sorted(figures, key=lambda figure: figure.note == _COUNTED)  # accuracies of drawn patches last
+
+
+def _with_handovers(figure: SeriesFigure, handovers: pd.DataFrame, pair: Pair | None) -> SeriesFigure:
+    """Mark where channels of an HDR pixel hand over to their next capture, or saturate."""
+    known = handovers[(handovers["series"] == figure.base) & (handovers["key"] == figure.key)]
+    kind = known["signal_type"].iloc[-1] if pair is None else pair[-1]
+    known = known[(known["signal_type"] == kind) & known["at"].between(figure.x[0], figure.x[-1])]
+    marks = {str(name): np.unique(part["at"]) for name, part in known.groupby("name", sort=False)}
+    return replace(figure, marks=marks, note=f"{figure.note} {_HANDOVERS.format(kind=kind)}".strip())
 
 
 def _noise_figures(output: Output) -> Iterator[SeriesFigure]:
@@ -58,7 +75,7 @@ def _noise_figures(output: Output) -> Iterator[SeriesFigure]:
     if output.study.recognition is None:
         return
     for (base, key), scenarios in series_of(output.scenarios).items():
-        draw = partial(SeriesFigure, key=key, x=np.array(list(scenarios.values())), band="")
+        draw = partial(SeriesFigure, key=key, x=np.array(list(scenarios.values())), band="", base=base)
         where = f"{output.study.study}, {base}"
         passes = _crossings(output, base, key)
         errors = {
@@ -73,6 +90,12 @@ def _noise_figures(output: Output) -> Iterator[SeriesFigure]:
             yield draw(f"{where}: {_ANY}", y_label=y_label, lines=lines, log_y=True, level=allowed, note=_ANY_NOTE)
         y_label = f"{_ERROR} ({_LEAST:g}: or less)"
         yield draw(f"{where}: {_ERROR}", y_label=y_label, lines=errors, log_y=True, level=allowed, note=_COMPUTED)
+        if output.study.pixel.captures:
+            least = output.few[_dprimes(output)].min(axis=1).clip(*_DRAWN_DPRIME)
+            dprimes = over_series(output.few.assign(**{D_PRIME: least}), scenarios, D_PRIME)
+            lines = {name: Line(dprime, None) for name, dprime in dprimes.items()}
+            y_label = f"{_LEAST_DPRIME} ({_DRAWN_DPRIME[0]:g}: or less)"
+            yield draw(f"{where}: {_LEAST_DPRIME}", y_label=y_label, lines=lines, log_y=True)
         if output.recognition is not None:
             for rule in CLASSIFIERS:
                 accuracies = over_series(output.recognition, scenarios, f"{rule}_accuracy")
@@ -166,6 +189,11 @@ def _any_intensity(output: Output, series: str, key: str) -> dict[str, FloatArra
     return {str(name): part["error"].to_numpy(dtype=float) for name, part in known.groupby("name", sort=False)}
 
 
+def _dprimes(output: Output) -> list[str]:
+    """Return the columns of d'."""
+    return [name for name, column in output.columns.items() if column.metric == D_PRIME]
+
+
 def recognition_table(output: Output) -> pd.DataFrame:
     """Return errors in closed form and accuracies on drawn patches, one row per design and scenario.
 
@@ -182,7 +210,7 @@ def recognition_table(output: Output) -> pd.DataFrame:
     if output.study.recognition is None:
         return pd.DataFrame()
     rows = output.few
-    dprime = [name for name, column in output.columns.items() if column.metric == D_PRIME]
+    dprime = _dprimes(output)
     shown = pd.DataFrame({"name": rows["name"].astype(str), "scenario": rows["scenario"].astype(str)})
     shown["smallest d'"] = rows[dprime].min(axis=1).map("{:.2f}".format)
     for column, label in ((STATE_ERROR, _ERROR), (STATE_ERROR_BOUND, "bound of the error")):

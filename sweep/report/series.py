@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -78,7 +78,10 @@ class Line:
 
 @dataclass(frozen=True)
 class SeriesFigure:
-    """One line per design over the number `key` of the scenarios, with a marked level."""
+    """One line per design over the number `key` of the scenarios of `base`, with a marked level.
+
+    `marks`: numbers to mark on each design's line.
+    """
 
     title: str
     key: str
@@ -91,6 +94,8 @@ class SeriesFigure:
     level: float | None = None
     among: str = ""
     note: str = ""
+    base: str = ""
+    marks: Mapping[str, FloatArray] = field(default_factory=dict)
 
     @property
     def x_label(self) -> str:
@@ -191,7 +196,7 @@ def series_figures(output: Output) -> list[SeriesFigure]:
             title = f"{output.study.study}, {base}: {separation.words}"
             x = np.array(list(scenarios.values()))
             among = base if [other for _, other in series].count(key) > 1 else ""
-            figure = SeriesFigure(title, key, separation.axis, x, lines, band, among=among)
+            figure = SeriesFigure(title, key, separation.axis, x, lines, band, among=among, base=base)
             figures.append(_over_decades(figure) if _below(figure) else figure)
     return sorted(figures, key=lambda figure: -sum(map(len, _below(figure).values())))
 
@@ -329,6 +334,13 @@ def leads_of(series: SeriesFigure) -> list[tuple[str | None, int, int]]:
     return leads
 
 
+def _between(at: FloatArray, x: FloatArray, y: FloatArray, series: SeriesFigure) -> FloatArray:
+    """Return the height of a line, as drawn, at some numbers."""
+    across, up = np.log if series.log_x else np.positive, np.log if series.log_y else np.positive
+    height = np.interp(across(at), across(x), up(y))
+    return np.asarray(np.exp(height) if series.log_y else height, dtype=float)
+
+
 def draw_series(series: SeriesFigure) -> Figure:
     """Draw one line with its band per design; numbers over more than a decade are on a logarithmic axis.
 
@@ -350,8 +362,13 @@ def draw_series(series: SeriesFigure) -> Figure:
         axes.plot([], [], "o", linestyle=dash, color=color, label=name, linewidth=1.5, markersize=3.5)
         if line.passes is not None:
             axes.plot(*line.passes, "o", markerfacecolor="none", markeredgecolor=color, markersize=9)
+        if (marks := series.marks.get(name)) is not None:
+            x, y = line.over(series.x)
+            axes.plot(marks, _between(marks, x, y, series), "|", color=color, markersize=11, markeredgewidth=1.2)
         if line.upper is not None:
             axes.fill_between(series.x, line.y, line.upper, color=color, alpha=0.2, linewidth=0)
+    if series.level is not None:
+        axes.axhline(series.level, color="#666666", linestyle="--", linewidth=1.0)
     if series.log_x:
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter("{x:g}")
@@ -361,8 +378,6 @@ def draw_series(series: SeriesFigure) -> Figure:
             axes.yaxis.set_major_formatter("{x:g}")
     elif series.from_zero:
         axes.set_ylim(bottom=0)
-    if series.level is not None:
-        axes.axhline(series.level, color="#666666", linestyle="--", linewidth=1.0)
     axes.set(xlabel=series.x_label, ylabel=series.y_label, title=series.title)
     legend_beside(axes, f"band: {series.band}" if series.band else None)
     return figure

@@ -95,7 +95,7 @@ class SearchFacts(_Facts):
 
     algorithm: str
     scenario: str
-    scenarios: int
+    scenarios: int = 1
     space: str
     cfa: str
     channel: str

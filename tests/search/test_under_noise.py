@@ -91,7 +91,7 @@ def differences_off(seed: int) -> float:
         return [q.smooth(design) for q in NOISY if q.smooth is not None]
 
     design = SmoothDesign(imager, family, x, free, span)
-    rounding = 2 * np.finfo(float).eps * np.abs(design.response).max() / np.sqrt(design.variance.min())
+    rounding = 2 * np.finfo(float).eps * np.abs(design.response).max() / np.sqrt(design.noisy[1].min())
     own, worst, step = rows(x, free), 0.0, 2e-4
     for k, unit in enumerate(np.eye(x.size) * span):
         ends = [rows(x + sign * share * step * unit) for share in (1, 0.5) for sign in (1, -1)]
