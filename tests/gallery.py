@@ -32,6 +32,7 @@ PICTURES = {
     "fog": "figures/series-1",
     "night": "figures/series-1",
     "hdr": "figures/series-1",
+    "hdr_filter": "figures/series-4",
     "flicker": "figures/series-1",
     "noise": "figures/series-1",
     "vision": "figures/vision-ranks",

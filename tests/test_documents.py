@@ -366,7 +366,9 @@ def test_the_errors_of_the_network_are_those_of_their_command() -> None:
 
 
 @pytest.mark.slow
-def test_the_figures_of_hdr_pixels_are_those_of_their_commands(finished: FinishedFolder) -> None:
+def test_the_figures_of_hdr_pixels_are_those_of_their_commands(
+    finished: FinishedFolder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     text = " ".join((STUDIES / "guide" / "11-hdr-and-flicker.md").read_text().split())
     folder = finished("hdr")
     handovers = pd.read_parquet(folder / "handovers.parquet").query("name == 'best stopband' and signal_type == 'red'")
@@ -391,6 +393,21 @@ def test_the_figures_of_hdr_pixels_are_those_of_their_commands(finished: Finishe
             assert shown == f"{last:.3g} cd, and again from {again.min():.3g} to {again.max():.3g} cd"
         else:
             assert shown == f"{usable.max()[name]:.3g} cd"
+    folder = finished("hdr_filter")
+    worst = pd.read_parquet(folder / "results.parquet").groupby("name")["chromatic_dprime_yellow_red"].min()
+    unknown = pd.read_parquet(folder / "any_intensity.parquet").groupby("name")["dprime"].min()
+    cells = table_below((STUDIES / "guide" / "11-hdr-and-flicker.md").read_text(), "| at the worst intensity |")
+    assert cells == {name: [f"{worst[name]:.1f}", f"{unknown[name]:.1f}"] for name in cells}
+    d = {name: f"{value:.1f}" for name, value in worst.items()}
+    assert SCENES["hdr_filter"] == (
+        f"chromatic d' {d['stopband for HDR']}, RGGB {d['RGGB']}, the best stopband for a pixel that is read once {d['best stopband']}"
+    )
+    assert f"d' is {d['stopband for HDR']} at the worst of 17" in (STUDIES / "README.md").read_text()
     flicker = pd.read_parquet(finished("flicker") / "results.parquet")
     assert (flicker["lamp_seen"] > 1 - 1e-9).all()
     assert f"the false hue is at most {flicker['false_hue_dn'].max():.1f} DN" in text
+    draw_nothing(monkeypatch)
+    changed = ("--set", "pixel.captures=staggered", "--quiet")
+    commanded("run", STUDIES / "flicker.yaml", "--output", tmp_path, *changed)  # 5: its check finds a difference
+    seen = pd.read_parquet(tmp_path / "flicker" / "results.parquet")["lamp_seen"].min()
+    assert f"in as few as {100 * seen:.1f} % of the phases" in text

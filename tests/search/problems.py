@@ -61,6 +61,15 @@ def best_random(problem: Problem, count: int) -> Evaluation | None:
     return best_feasible(run.log)
 
 
+def rows_at(problem: Problem, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """All rows of the smooth model, terms before conditions, and their derivatives."""
+    point = Model(problem, SearchRun(0), 1).at(u)
+    return (
+        np.concatenate([point.terms.values, point.conditions.values]),
+        np.vstack([point.terms.by_u, point.conditions.by_u]),
+    )
+
+
 def csd_of(setup: Setup, curves: np.ndarray, pair: tuple[str, str] = YELLOW_RED) -> np.ndarray:
     """CSD of each filter by the smooth response at the first phase, ndarray[n_designs], DN."""
     return separation(smooth_response(setup, curves)[:, 0], *(setup.members[name] for name in pair))

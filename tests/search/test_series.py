@@ -21,8 +21,7 @@ from sweep.search.problem import Problem, starting_points
 from sweep.search.solver import smooth_objective
 
 from ..build import issues, load, ran
-from .problems import STATES, best_of, best_random, problem_of
-from .test_smooth import at
+from .problems import STATES, best_of, best_random, problem_of, rows_at
 
 CHROMATIC = Objective(minimum={"chromatic_dprime_yellow_red": 1.0})
 SCENE: dict[str, Any] = {
@@ -50,11 +49,13 @@ def test_derivatives_of_merged_noise_agree_with_differences(objective: Objective
     """In the dark, at a handover of N, in the small photodiode, and where it is full."""
     problem = hdr_problem(objective, [0.5, 16.0, 90.0, 500.0], **pixel)
     u, step = np.array([0.41, 0.33, 0.57, 0.62]), 1e-4
-    own, by_u = at(problem, u)
+    own, by_u = rows_at(problem, u)
     scale = np.abs(by_u).max(axis=1) + 1e-6 * np.abs(own)  # differences of saturated signals are rounding
     for k in range(4):
         off = step * np.eye(4)[k]
-        wide, near = ((at(problem, u + off / n)[0] - at(problem, u - off / n)[0]) / (2 * step / n) for n in (1, 2))
+        wide, near = (
+            (rows_at(problem, u + off / n)[0] - rows_at(problem, u - off / n)[0]) / (2 * step / n) for n in (1, 2)
+        )
         np.testing.assert_allclose(by_u[:, k] / scale, (4 * near - wide) / 3 / scale, atol=1e-4)
 
 

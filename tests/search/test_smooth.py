@@ -15,13 +15,12 @@ from sweep.metrics.bound import Bound
 from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.objective import Objective
 from sweep.metrics.smooth import smooth_csd
-from sweep.search.gradients import Model
 from sweep.search.limit import limit_of, reason_without_bound
-from sweep.search.problem import Problem, SearchRun, starting_points
+from sweep.search.problem import Problem, starting_points
 from sweep.search.solver import extreme_value
 
 from ..cases import thinned
-from .problems import PROBLEM, best_of, best_random, csd_of, problem_of
+from .problems import PROBLEM, best_of, best_random, csd_of, problem_of, rows_at
 
 EVERYTHING = {
     "sensitivity": Bound(min=0.9, max=0.99),
@@ -41,23 +40,14 @@ OBJECTIVES = (
 )
 
 
-def at(problem: Problem, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """All rows of the model and their derivatives."""
-    point = Model(problem, SearchRun(0), 1).at(u)
-    return (
-        np.concatenate([point.terms.values, point.conditions.values]),
-        np.vstack([point.terms.by_u, point.conditions.by_u]),
-    )
-
-
 def check_derivatives(problem: Problem, u: np.ndarray, parameters: range) -> None:
     """Compare with central differences: the responses are analytic between the kinks of the edge's curve, so these err by
     O(h^2), here < 1e-5.
     """
-    _, by_u = at(problem, u)
+    _, by_u = rows_at(problem, u)
     scale, step = np.abs(by_u).max(axis=1) + 1e-9, 1e-5
     for k in parameters:
-        ends = [at(problem, u + sign * step * np.eye(u.size)[k])[0] for sign in (1, -1)]
+        ends = [rows_at(problem, u + sign * step * np.eye(u.size)[k])[0] for sign in (1, -1)]
         np.testing.assert_allclose(by_u[:, k] / scale, (ends[0] - ends[1]) / (2 * step) / scale, atol=1e-5)
 
 
