@@ -18,6 +18,8 @@ from .hard.registry import write_table
 
 ROOT = Path(__file__).parent.parent
 STUDIES = ROOT / "studies"
+MEASURED = ROOT / "sweep" / "spectra" / "builtin" / "measured"
+"""Measured curves of the package."""
 SHARED = ROOT.parent / "shared"
 
 needs_measured = pytest.mark.skipif(
@@ -116,12 +118,11 @@ def finished(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Finish
                     text = text.replace(every, fewer)
                 study = outputs / f"{name}.yaml"
                 study.write_text(text)
-                data = ["--data", STUDIES] if name == "measured" else []
                 with pytest.MonkeyPatch.context() as patch:
                     if name not in LOOKED_AT:
                         patch.setattr("sweep.report.figures.rendered", lambda _, kind: kind.encode())
                         patch.setattr("sweep.report.page.inlined", lambda _: "data:image/png;base64,cG5n")
-                    code, out, err = commanded("run", study, "--output", outputs, "--jobs", 1, *data)
+                    code, out, err = commanded("run", study, "--output", outputs, "--jobs", 1)
                 assert code == 0, err
                 said.write_text(out)
         return outputs / name

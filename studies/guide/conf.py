@@ -3,7 +3,7 @@
 project = "sweep"
 root_doc = "studies/guide/index"
 extensions = ["sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc", "myst_parser"]
-include_patterns = ["*.md", "outputs/README.md", "studies/*.md", "studies/guide/*", "studies/data/*.md", "sweep/**.md", "tests/*.md"]
+include_patterns = ["*.md", "outputs/README.md", "studies/*.md", "studies/guide/*", "sweep/**.md", "tests/*.md"]
 exclude_patterns = ["studies/guide/conf.py"]
 html_theme = "alabaster"
 html_title = "sweep"

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
 from ..base.errors import DataError, ValidationIssue, nearest
 from ..base.types import FloatArray
 from ..designs.technology import Technology
-from ..spectra.builtin.ar0820 import ar0820
+from ..spectra.builtin.ar0820 import ar0820, ir_cut_transmission
+from ..spectra.builtin.measured_sets import SENSORS, ir_cut
 from ..spectra.builtin.surrogate import SurrogateParameters, surrogate_parameters
 from ..spectra.spectrum import WavelengthGrid
 from .mosaic import Mosaic
@@ -43,6 +45,8 @@ class SensorCurves:
         Physical principle of the filters, where it is stated.
     has_clear : bool
         True if `clear` is a pixel without a filter.
+    ir_cut : ndarray of shape (n_wavelengths,), optional
+        Transmission of the IR cut that is part of all curves, where it is known apart.
     """
 
     name: str
@@ -53,6 +57,7 @@ class SensorCurves:
     variants: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     technologies: Mapping[str, Technology | None] = field(default_factory=dict)
     has_clear: bool = True
+    ir_cut: FloatArray | None = None
 
     @property
     def brightest(self) -> str:
@@ -200,10 +205,40 @@ def ar0820_sensor(grid: WavelengthGrid, parameters: SurrogateParameters) -> Sens
     """
     curves = ar0820(grid, parameters)
     red = {"R": "Rx"}
-    return SensorCurves("ar0820", curves.values, "C", curves.source, True, {"RCCC": red, "RCCB": red})
+    cut = ir_cut_transmission(grid.nodes_nm, parameters)
+    return SensorCurves("ar0820", curves.values, "C", curves.source, True, {"RCCC": red, "RCCB": red}, ir_cut=cut)
+
+
+def measured_sensor(name: str, grid: WavelengthGrid) -> SensorCurves:
+    """Make a measured sensor that the package ships.
+
+    Parameters
+    ----------
+    name : str
+        Name in `measured_sets.SENSORS`.
+    grid : WavelengthGrid
+        Wavelengths, nm.
+
+    Returns
+    -------
+    SensorCurves
+        The sensor; RCCC and RCCB have a red of their own where it was measured.
+
+    Raises
+    ------
+    DataError
+        If the grid goes beyond the curves.
+    """
+    measured = SENSORS[name]
+    curves = measured.curves(grid)
+    red = {cfa: {"R": "Rx"} for cfa in ("RCCC", "RCCB")} if "Rx" in curves else {}
+    source = f"built-in {name}, digitized: {measured.source}"
+    clear = "W" if "W" in curves else "C"
+    return SensorCurves(name, curves, clear, source, variants=red, ir_cut=ir_cut(name, grid))
 
 
 BUILT_IN_SENSORS: dict[str, Callable[[WavelengthGrid], SensorCurves]] = {
-    "ar0820": lambda grid: ar0820_sensor(grid, surrogate_parameters())
+    "ar0820": lambda grid: ar0820_sensor(grid, surrogate_parameters()),
+    **{name: partial(measured_sensor, name) for name in SENSORS},
 }
 """Sensors that a study can name; each is a function of the wavelength grid (inside 400-700 nm)."""

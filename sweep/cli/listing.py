@@ -8,10 +8,13 @@ from typing import Any
 
 from ..base.disk import is_folder, read_facts
 from ..base.errors import StudyError, SweepError, ValidationIssue
+from ..camera.sensor import BUILT_IN_SENSORS
 from ..results.folder import run_in
 from ..results.lock import in_use
 from ..results.tables import PROVENANCE
 from ..run import output_folder
+from ..spectra.builtin.measured_sets import LUXEON, SENSORS, MeasuredSet
+from ..spectra.builtin.registry import BUILT_IN_LIGHTS
 from ..spectra.builtin.spectra import cards
 from ..spectra.builtin.surrogate_spectra import surrogate_cards
 from ..study import Study, folder_name, load_study
@@ -139,6 +142,14 @@ def data_lines() -> list[str]:
     """Return for each set of spectra its data card: kind, range, license, groups, source, credit and digest."""
     lines, total = [], 0
     sets = [*cards(), *surrogate_cards()]
+    for kind, name, measured in _measured():
+        low, high = measured.range_nm
+        lines += [
+            f"{name}: {measured.what}; {low:g} to {high:g} nm, {measured.license}",
+            f"  {kind}: {', '.join(measured.names)}",
+            f"  source: {measured.source}",
+            *(f"  sha256: {sha256}  {file}" for file, sha256 in measured.digests.items()),
+        ]
     for card in sets:
         count = sum(card.groups.values())
         total += count
@@ -150,9 +161,23 @@ def data_lines() -> list[str]:
             f"  credit: {card.credit}",
             f"  sha256: {card.sha256}",
         ]
-    return [*lines, f"{total} spectra in {len(sets)} sets. A study's tasks name their groups: tasks: {{own: ...}}."]
+    return [
+        *lines,
+        f"Sensors: {', '.join(BUILT_IN_SENSORS)}; lights: {', '.join(BUILT_IN_LIGHTS)} (ar0820, tl16: surrogates).",
+        f"{total} spectra in {len(sets)} sets. A study's tasks name their groups: tasks: {{own: ...}}.",
+    ]
+
+
+def _measured() -> list[tuple[str, str, MeasuredSet]]:
+    """Return kind, name and set of the measured sensors and lights."""
+    return [*(("sensor", name, measured) for name, measured in SENSORS.items()), ("lights", "luxeon", LUXEON)]
 
 
 def data_facts() -> dict[str, Any]:
     """Return the same as plain values."""
-    return {"sets": [asdict(card) for card in (*cards(), *surrogate_cards())]}
+    measured = [
+        {"name": name, "kind": kind, "what": one.what, "license": one.license, "source": one.source}
+        | {"range_nm": one.range_nm, "curves": one.names, "sha256": one.digests}
+        for kind, name, one in _measured()
+    ]
+    return {"sets": [asdict(card) for card in (*cards(), *surrogate_cards())], "measured": measured}

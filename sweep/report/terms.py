@@ -248,8 +248,11 @@ def assumptions_line(output: Output) -> str:
         Text; empty if neither applies.
     """
     notes = []
-    if output.provenance.sensor.surrogate or output.provenance.lights.surrogate:
+    modeled = [one.name for one in (output.provenance.sensor, output.provenance.lights) if one.surrogate]
+    if len(modeled) == 2:  # noqa: PLR2004
         notes.append("Built-in curves are surrogates, modeled from stated parameters, not measured.")
+    elif modeled:
+        notes.append(f"The curves of {modeled[0]} are surrogates, modeled from stated parameters, not measured.")
     if any(modification.technology is None for modification in modifications(output)):
         notes.append(_NO_TECHNOLOGY)
     return f"Note: {' '.join(notes)}" if notes else ""

@@ -170,7 +170,12 @@ class Sources:
             allowed = f"{', '.join(known)}, or a mapping with `files`"
             self.add(at, f"unknown built-in {at[-1]}", name, allowed, nearest(name, known))
             return None
-        return known[name](self.grid) if self.in_built_in_range("the built-in curves") else None
+        try:
+            return known[name](self.grid) if self.in_built_in_range("the built-in curves") else None
+        except DataError as error:
+            (first, *_) = error.issues
+            self.add(("wavelengths",), f"{name} has curves from {first.value}", None, "wavelengths within them")
+            return None
 
     def in_built_in_range(self, what: str) -> bool:
         """Return True if the wavelength grid lies inside that of the built-in curves; add one issue otherwise.

@@ -12,7 +12,7 @@ from sweep.spectra.files import read_curves
 
 from ..build import SCENES, study_file
 from ..commanded import commanded, sweep
-from ..conftest import STUDIES, FinishedFolder
+from ..conftest import MEASURED, STUDIES, FinishedFolder
 
 
 @pytest.fixture(scope="module")
@@ -164,7 +164,7 @@ def test_measured_curves_run_to_a_report(tmp_path: Path) -> None:
     plain = frame[frame["cfa"] == "RGBW"]["csd_yellow_red"].iloc[0]
     assert best["csd_yellow_red"].max() > plain
     curves = pd.read_parquet(tmp_path / "measured" / "curves.parquet")
-    raw = read_curves(STUDIES / "data" / "qe_ar0132at_rgbw.csv")
+    raw = read_curves(MEASURED / "qe_ar0132at_rgbw.csv")
     at_630 = raw.values["W"][list(raw.wavelength_nm).index(630)]
     assert curves[(curves["curve"] == "W") & (curves["wavelength_nm"] == 630)]["value"].item() == pytest.approx(
         at_630, rel=1e-12

@@ -21,7 +21,7 @@ from sweep.study.editors import schema_text
 
 from ..cases import thinned
 from ..commanded import commanded
-from ..conftest import SHARED, STUDIES, needs_measured
+from ..conftest import MEASURED, SHARED, needs_measured
 from ..curve_texts import WAVE, bell, csv
 
 
@@ -209,8 +209,8 @@ def test_curves_that_are_called_qe_are_read_as_qe(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("file", "guess"),
     [
-        (STUDIES / "data" / "qe_ar0132at_rgbw.csv", "QE"),
-        (STUDIES / "data" / "led_luxeon.csv", "light"),
+        (MEASURED / "qe_ar0132at_rgbw.csv", "QE"),
+        (MEASURED / "led_luxeon.csv", "light"),
         pytest.param(SHARED / "data" / "qe_mt9v024_rccc.csv", "QE", marks=needs_measured),
         pytest.param(SHARED / "data" / "traffic_lica.csv", "light", marks=needs_measured),
     ],

@@ -10,7 +10,7 @@ import pytest
 
 from ..build import SCENES
 from ..commanded import commanded
-from ..conftest import ROOT, STUDIES, draw_nothing
+from ..conftest import MEASURED, ROOT, draw_nothing
 
 SECTION = (ROOT / "studies" / "guide" / "reference.md").read_text().split("## JSON objects")[1].split("## ")[0]
 DOCUMENTED = dict(re.findall(r"^\| `(\w+)` \| (.*) \|$", SECTION, re.MULTILINE))
@@ -33,7 +33,7 @@ def arguments(base: Path, command: str) -> tuple[object, ...]:
         "run": (base / "scenes.yaml", "--output", base / "out"),
         "plan": (base / "scenes.yaml",),
         "evaluate": (folder,),
-        "describe": (next((STUDIES / "data").glob("*.csv")), "--output", base / "pictures"),
+        "describe": (next(MEASURED.glob("*.csv")), "--output", base / "pictures"),
         "list": (base, "--output", base / "out"),
         "status": (folder, "--verify"),
         "compare": (folder, folder, "--output", base / "compared"),

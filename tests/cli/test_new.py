@@ -18,7 +18,7 @@ from sweep.study.document import Document
 
 from ..build import made
 from ..commanded import commanded
-from ..conftest import STUDIES
+from ..conftest import MEASURED
 from ..curve_texts import WAVE, bell, csv
 
 
@@ -215,7 +215,7 @@ def test_any_column_name_survives_yaml(tmp_path: Path, text: str) -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("plain_pictures")
 def test_measured_files_lead_to_a_report_without_editing(tmp_path: Path) -> None:
-    data, path = STUDIES / "data", tmp_path / "studies" / "mine.yaml"
+    data, path = MEASURED, tmp_path / "studies" / "mine.yaml"
     files = ("--qe", str(data / "qe_ar0132at_rgbw.csv"), "--lights", str(data / "led_luxeon.csv"))
     code, out, said = commanded("new", "mine", "--folder", path.parent, *files)
     assert code == 0, said

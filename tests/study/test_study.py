@@ -50,11 +50,6 @@ def test_shipped_studies_load(name: str) -> None:
 def test_the_measured_study_loads() -> None:
     study = load_study(STUDIES / "measured.yaml")
     assert not study.sensor.surrogate
-    assert set(study.digests) == {
-        "data/qe_ar0132at_rgbw.csv",
-        "data/qe_ar0132at_rccc.csv",
-        "data/led_luxeon.csv",
-    }
     assert study.lights.classes == ("green", "yellow", "red")
     # one common scale: both files give the same clear pixel at 630 nm
     assert study.sensor.qe["C"][230] == pytest.approx(study.sensor.qe["W"][230], rel=1e-3)

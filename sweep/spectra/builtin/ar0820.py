@@ -108,6 +108,24 @@ def _logistic(offset_widths: FloatArray) -> FloatArray:
     return np.asarray(1 / (1 + np.exp(-_LOGISTIC_PER_WIDTH * offset_widths)), dtype=float)
 
 
+def ir_cut_transmission(wavelength_nm: FloatArray, parameters: SurrogateParameters) -> FloatArray:
+    """Return the transmission of the IR cut.
+
+    Parameters
+    ----------
+    wavelength_nm : ndarray of shape (n_wavelengths,)
+        Wavelengths, nm.
+    parameters : SurrogateParameters
+        Parameters of the model.
+
+    Returns
+    -------
+    ndarray of shape (n_wavelengths,)
+        Values.
+    """
+    return _logistic((parameters.ir_cut.center_nm - wavelength_nm) / parameters.ir_cut.width_nm)
+
+
 def ar0820(grid: WavelengthGrid, parameters: SurrogateParameters) -> Curves:
     """Return the surrogate sensor: C and every filter of the parameter file.
 
@@ -124,8 +142,6 @@ def ar0820(grid: WavelengthGrid, parameters: SurrogateParameters) -> Curves:
         QE.
     """
     wave = grid.nodes_nm
-    clear = clear_qe(wave, parameters.clear_pixel) * _logistic(
-        (parameters.ir_cut.center_nm - wave) / parameters.ir_cut.width_nm
-    )
+    clear = clear_qe(wave, parameters.clear_pixel) * ir_cut_transmission(wave, parameters)
     values = {"C": clear} | {name: clear * transmission(wave, f) for name, f in parameters.filters.items()}
     return Curves(wave, values, "built-in surrogate ar0820", surrogate=True)

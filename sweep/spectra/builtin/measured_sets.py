@@ -1,0 +1,178 @@
+"""Measured sensors and lights that the package ships, with source and license; see `measured/README.md`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from ...base.types import FloatArray
+from ..files import digest, read_curves
+from ..spectrum import Curves, WavelengthGrid, photons_from_energy
+
+_FOLDER = Path(__file__).parent / "measured"
+_ISETCAM = "ISETCam, https://github.com/ISET/isetcam"
+
+
+@dataclass(frozen=True)
+class MeasuredFile:
+    """File of curves.
+
+    Parameters
+    ----------
+    file : str
+        Name.
+    columns : mapping of str to str
+        Curve -> column of the file.
+    scale : float
+        Factor that brings them to the scale of the other files.
+    times : str
+        Column that multiplies all others; empty if none does.
+    """
+
+    file: str
+    columns: Mapping[str, str]
+    scale: float = 1.0
+    times: str = ""
+
+    @property
+    def raw(self) -> Curves:
+        """Curves of the file."""
+        return _read(self.file)
+
+
+@dataclass(frozen=True)
+class MeasuredSet:
+    """Sensor or set of lights with its origin.
+
+    Parameters
+    ----------
+    what : str
+        What was measured, for a list.
+    source, license : str
+        Origin and license.
+    files : tuple of MeasuredFile
+        Files.
+    """
+
+    what: str
+    source: str
+    license: str
+    files: tuple[MeasuredFile, ...]
+
+    @property
+    def range_nm(self) -> tuple[float, float]:
+        """Wavelengths that all curves have, nm."""
+        ends = [file.raw.wavelength_nm[[0, -1]] for file in self.files]
+        return float(max(low for low, _ in ends)), float(min(high for _, high in ends))
+
+    @property
+    def names(self) -> list[str]:
+        """Curves."""
+        return [name for file in self.files for name in file.columns]
+
+    def curves(self, grid: WavelengthGrid) -> dict[str, FloatArray]:
+        """Return the curves on a grid.
+
+        Parameters
+        ----------
+        grid : WavelengthGrid
+            Wavelengths inside `range_nm`.
+
+        Returns
+        -------
+        dict of str to ndarray of shape (n_wavelengths,)
+            Curves.
+
+        Raises
+        ------
+        DataError
+            If the grid goes beyond.
+        """
+        return {
+            name: file.raw.on(grid, column) * file.scale * (file.raw.on(grid, file.times) if file.times else 1.0)
+            for file in self.files
+            for name, column in file.columns.items()
+        }
+
+    def photons(self, grid: WavelengthGrid) -> dict[str, FloatArray]:
+        """Return photons of spectra of radiant power.
+
+        Parameters
+        ----------
+        grid : WavelengthGrid
+            Wavelengths inside `range_nm`.
+
+        Returns
+        -------
+        dict of str to ndarray of shape (n_wavelengths,)
+            Photons, in any scale.
+        """
+        return {name: photons_from_energy(grid.nodes_nm, energy) for name, energy in self.curves(grid).items()}
+
+    @property
+    def digests(self) -> dict[str, str]:
+        """SHA-256 of each file."""
+        return {file.file: digest(_FOLDER / file.file) for file in self.files}
+
+
+@lru_cache(maxsize=16)
+def _read(file: str) -> Curves:
+    return read_curves(_FOLDER / file)
+
+
+_RGBW = {"R": "R", "G": "G", "B": "B", "W": "W"}
+_RCCC = {"Rx": "R", "C": "C"}
+IR_CUT = "ir_cut"
+SENSORS: dict[str, MeasuredSet] = {
+    "opencam": MeasuredSet(
+        "a sensor of unknown name with red, green, blue, yellow, cyan and clear pixels behind an IR cut: QE, digitized",
+        "open-cam, spectra/QE/original, 2026",
+        "MIT",
+        (MeasuredFile("qe_opencam.csv", {**{n: n for n in ("R", "G", "B", "Y", "Cy")}, "C": "W"}, times=IR_CUT),),
+    ),
+    "ar0132at": MeasuredSet(
+        "ON Semiconductor AR0132AT, without IR cut: relative QE, digitized from its data sheet",
+        _ISETCAM,
+        "MIT",
+        # Normalized apart; brought to the same clear pixel at 630 nm.
+        (MeasuredFile("qe_ar0132at_rgbw.csv", _RGBW), MeasuredFile("qe_ar0132at_rccc.csv", _RCCC, 0.9445)),
+    ),
+    "mt9v024": MeasuredSet(
+        "ON Semiconductor MT9V024, without IR cut: QE, digitized from its data sheet",
+        _ISETCAM,
+        "MIT",
+        (MeasuredFile("qe_mt9v024_rgbw.csv", _RGBW), MeasuredFile("qe_mt9v024_rccc.csv", _RCCC)),
+    ),
+}
+"""Sensors by name; `C` is the pixel without a filter, `Rx` the red of RCCC."""
+LUXEON = MeasuredSet(
+    "five Luxeon Rebel LEDs as green, yellow and red lights: relative spectral power, measured",
+    _ISETCAM,
+    "MIT",
+    (
+        MeasuredFile(
+            "led_luxeon.csv", {n: n for n in ("cyan_504", "green_528", "amber_592", "red_orange_632", "red_642")}
+        ),
+    ),
+)
+
+
+def ir_cut(name: str, grid: WavelengthGrid) -> FloatArray | None:
+    """Return the transmission of a sensor's IR cut.
+
+    Parameters
+    ----------
+    name : str
+        Sensor.
+    grid : WavelengthGrid
+        Wavelengths, nm.
+
+    Returns
+    -------
+    ndarray of shape (n_wavelengths,) or None
+        Transmission; None if it has none.
+    """
+    file = SENSORS[name].files[0]
+    return file.raw.on(grid, file.times) if file.times else None
