@@ -16,10 +16,12 @@ from ..base.errors import ErrorBoundExceededError, SweepError, ValidationIssue
 from ..base.types import in_turn
 from ..results.tables import REPORT
 from ..run.workers import workers
-from ..study import folder_name, load_study
+from ..study import Member, SeveralStudies, folder_name, load_study
 from .output import ProgressDisplay, print_lines
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from ..base.types import Parallel
 
 _JSON_KEYS = ("filters", "designs", "failed", "duration_s", "search", "check", "warnings")
@@ -42,6 +44,7 @@ def run_one(
     as_json: bool,
     quiet: bool,
     began_s: float,
+    member: Member | None = None,
 ) -> dict[str, Any]:
     """Run a study, or continue it, draw its report and print the result.
 
@@ -55,6 +58,8 @@ def run_one(
         Time at which the user began to wait, by the monotonic clock, s.
     data, output, jobs, backend, scheduler, dry_run, options, allow_code, opens, as_json, quiet
         Options of `sweep run`.
+    member : Member, optional
+        One of several sensors or light sets; its summary is not printed.
 
     Returns
     -------
@@ -74,7 +79,7 @@ def run_one(
     if backend not in runner.BACKENDS:
         allowed = ", ".join(runner.BACKENDS)
         raise SweepError(ValidationIssue("unknown backend", key="--backend", value=backend, allowed=allowed))
-    study = load_study(path, data, changes=changes, allow_code=allow_code)
+    study = load_study(path, data, changes=changes, allow_code=allow_code, member=member)
     folder, other = runner.output_folder(output / folder_name(study.name), study)
     n_workers = jobs or os.cpu_count() or 1
     if other is not None:
@@ -102,10 +107,57 @@ def run_one(
 
         audit_again(folder, data)
         with workers(n_workers if computed and backend == "loky" else 1) as parallel:
-            facts = finish(folder, began_s, repair=True, parallel=parallel, as_json=as_json, quiet=quiet)
+            silent = quiet or member is not None
+            facts = finish(folder, began_s, repair=True, parallel=parallel, as_json=as_json, quiet=silent)
     if opens and not webbrowser.open((folder / REPORT).absolute().as_uri()):
         note(f"no browser was found for {folder / REPORT}.")
     return {"computed": bool(computed), **facts}
+
+
+def run_several(
+    several: SeveralStudies,
+    run: Callable[..., dict[str, Any]],
+    *,
+    output: Path,
+    as_json: bool,
+    quiet: bool,
+    dry_run: bool,
+) -> dict[str, Any]:
+    """Run a study for each of its sensors and light sets, and compare them.
+
+    Parameters
+    ----------
+    several : SeveralStudies
+        Study.
+    run : callable
+        Runs a member into the folder `output`.
+    output : Path
+        Folder of results.
+    as_json, quiet, dry_run : bool
+        Options of `sweep run`.
+
+    Returns
+    -------
+    dict
+        Folders and facts of the runs, for `--json`.
+
+    Raises
+    ------
+    SweepError
+        As `run_one`, for the first member that cannot be run.
+    """
+    folder, made = output / folder_name(several.name), list[dict[str, Any]]()
+    for member in several.members:
+        if not quiet:
+            typer.echo(f"-- {member.name} --", err=True)
+        made.append(run(member=member, output=folder))
+    if dry_run:
+        return {"folder": str(folder), "runs": made}
+    from ..report.sensors import SensorRun, report_sensors  # noqa: PLC0415  (loaded while workers compute)
+
+    runs = [SensorRun(member, Path(one["folder"])) for member, one in zip(several.members, made, strict=True)]
+    print_lines(report_sensors(folder, several.name, several.question, runs), as_json=as_json, quiet=quiet)
+    return {"folder": str(folder), "runs": made}
 
 
 def finish(

@@ -249,7 +249,7 @@ def assumptions_line(output: Output) -> str:
     """
     notes = []
     modeled = [one.name for one in (output.provenance.sensor, output.provenance.lights) if one.surrogate]
-    if len(modeled) == 2:  # noqa: PLR2004
+    if len(modeled) == 2:
         notes.append("Built-in curves are surrogates, modeled from stated parameters, not measured.")
     elif modeled:
         notes.append(f"The curves of {modeled[0]} are surrogates, modeled from stated parameters, not measured.")

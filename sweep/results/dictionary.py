@@ -131,6 +131,11 @@ FILES = {
     "that of the best plain CFA (`breaks_at`; null: not up to 3 times), and the CSD, lights, shifts and temperatures "
     "there; "
     "`yield`, the share of random lamps and cameras with the wanted CSD, with its 95 % interval",
+    files.UNCERTAINTY: "where a study has `uncertainty`, for each plain CFA, named design and answer of the search and "
+    "each CSD (`quantity`), before clipping and rounding: `dn_5`, `dn_50`, `dn_95`, the CSD that so many percent of "
+    "random sensors fall below, with 95 % intervals (`_low`, `_high`); `ratio_...`, `light_ratio_...`, CSD and light "
+    "relative to the `reference` on the same sensor; `ratio_sd`, `light_ratio_sd` and their `correlation`; "
+    "`at_least_dn`, below which no sensor is (without `shift_nm` and `ir_cut_nm`)",
     files.REGIONS_MAP: "where a study asks for maps of color regions, for each plain CFA, named design and answer of "
     "the search: design_id, norm, peak of the yellow LED (yellow_nm) and of the red one (red_nm), how many pairs of "
     "widths the norm allows (pairs), how many of these have the wanted distance (separated), the smallest one "

@@ -56,10 +56,10 @@ class Output:
     `study`: the study that was run, and `resolved` its file. `profiles`: over the whole table, per CFA; none where a
     sweep is no grid. `swept_points`: ids of the swept designs that figures show as points. `searched`: the search's
     evaluations. `audited`: rows of `sweep audit`; `left_out`: a row per light that was left out of a search; `regions`:
-    cells of the maps of color regions. `error_against_noise`: color error against noise, `rendered`: areas of
-    pictures; `places`: separations over the sensor; `map`: the best objective over two parameters; `handovers`: where
-    captures of an HDR pixel are full; `any_intensity`: lamps of unknown intensity; `vision`: tables of the benchmark of
-    vision by their files' names.
+    cells of the maps of color regions. `error_against_noise`: color error against noise, `rendered`: areas of pictures;
+    `places`: separations over the sensor; `map`: the best objective over two parameters; `handovers`: where captures of
+    an HDR pixel are full; `any_intensity`: lamps of unknown intensity; `uncertainty`: quantiles over random sensors;
+    `vision`: tables of the benchmark of vision by their files' names.
     """
 
     folder: Path
@@ -84,6 +84,7 @@ class Output:
     map: pd.DataFrame | None
     handovers: pd.DataFrame | None
     any_intensity: pd.DataFrame | None
+    uncertainty: pd.DataFrame | None
     vision: Mapping[str, pd.DataFrame]
     profiles: Mapping[str, Sequence[ParameterProfile]]
     _made: dict[object, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
@@ -312,6 +313,7 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         map=more.get(files.MAP),
         handovers=more.get(files.HANDOVERS),
         any_intensity=more.get(files.ANY_INTENSITY),
+        uncertainty=more.get(files.UNCERTAINTY),
         vision={name: more[name] for name in files.VISION_TABLES if name in more},
         profiles=profiles.found if all(made.grid is not None for made in study.sweeps.values()) else {},
     )

@@ -30,6 +30,7 @@ RECOGNITION = "recognition.parquet"
 CROSSINGS = "crossings.parquet"
 LIMITED_BY = "limited_by.parquet"
 ROBUSTNESS = "robustness.parquet"
+UNCERTAINTY = "uncertainty.parquet"
 REGIONS_MAP = "regions.parquet"
 SENSOR_MAP = "sensor_map.parquet"
 TRADED, RENDERED = "color_noise.parquet", "rendered.parquet"
@@ -50,7 +51,7 @@ REPORT, FIGURES, VISION_FIGURES = "report.html", "figures", "vision-"
 MADE_BY_RUN = frozenset(
     (
         *(RESULTS, SEARCH_LOG, FRONT, CURVES, POINTS, RECOGNITION, CROSSINGS, LIMITED_BY, ROBUSTNESS, REGIONS_MAP),
-        *(SENSOR_MAP, TRADED, RENDERED, VALIDATED, LEFT_OUT, COMBINATIONS, MAP, HANDOVERS, ANY_INTENSITY),
+        *(SENSOR_MAP, TRADED, RENDERED, VALIDATED, LEFT_OUT, COMBINATIONS, MAP, HANDOVERS, ANY_INTENSITY, UNCERTAINTY),
         *(*VISION_TABLES, PROVENANCE, RESOLVED),
     )
 )

@@ -26,6 +26,7 @@ from ..results.tables import (
     ROBUSTNESS,
     SENSOR_MAP,
     TRADED,
+    UNCERTAINTY,
     VALIDATED,
 )
 from ..search.limit import Limit
@@ -39,6 +40,7 @@ from .details import Details, limited_by_table, recognition_table, sensor_map_ta
 from .handovers import handovers_table
 from .held_out import held_out_table
 from .robustness import robustness_table
+from .uncertainty import uncertainty_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -120,6 +122,8 @@ def row_tables(study: Study) -> dict[str, Callable[[DerivedInput], pa.Table]]:
         tables[VALIDATED] = lambda s: held_out_table(s.study, s.rows, s.on_front, s.parallel, s.progress)
     if study.pair_over_population is not None:
         tables[ROBUSTNESS] = lambda s: robustness_table(s.study, s.rows, s.kept("robustness"), s.progress)
+    if study.section.uncertainty is not None:
+        tables[UNCERTAINTY] = lambda s: uncertainty_table(s.study, s.rows, s.parallel, s.progress)
     if study.section.regions is not None:
         tables[REGIONS_MAP] = lambda s: regions_table(s.study, s.rows, s.parallel, s.progress)
     if any(scene.field is not None for scene in study.scenarios.values()):

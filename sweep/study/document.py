@@ -278,6 +278,21 @@ class Document:
             )
         self._tree.put(node, int(last) if isinstance(node, list) else last, value, option)
 
+    def take(self, key: str, at: int, to: str) -> None:
+        """Set a key to an entry of another one's list, with its position.
+
+        Parameters
+        ----------
+        key : str
+            Key of the list.
+        at : int
+            Index of the entry.
+        to : str
+            Key to set.
+        """
+        entries = self.data[key]
+        self._tree.put(self.data, to, entries[at], self._tree.place(entries, at) or self.place((key,)))
+
     def place(self, path: Sequence[Key]) -> Place:
         """Return the position of the deepest existing key of a path.
 

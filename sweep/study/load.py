@@ -16,6 +16,7 @@ from .document import Document
 from .model import Study
 from .resolve import resolve
 from .schema import StudySection
+from .several import Member, SeveralStudies, choose, members_of, narrowed
 from .sources import KeptSources, Sources
 
 
@@ -27,6 +28,7 @@ def load_study(
     changes: Mapping[str, str] = {},
     *,
     allow_code: bool | Mapping[str, str] = False,
+    member: Member | None = None,
 ) -> Study:
     """Read and check a study file.
 
@@ -44,16 +46,26 @@ def load_study(
         Dotted key -> value to take instead, as a study file would have it.
     allow_code
         Code that the study names may run, or only code with these digests.
+    member
+        One of several sensors or light sets.
 
     Raises
     ------
     StudyError
         With one issue per problem: file:line, key, value, allowed values, nearest name.
     """
-    document = Document(path)
-    for key, text in changes.items():
-        document.change(key, text)
+    document = _changed(path, changes)
+    members = members_of(document)
+    if member is None and len(members) > 1:
+        names = ", ".join(one.name for one in members)
+        problem = f"a study of several sensors or lights ({names}): `sweep run` runs all"
+        allowed = f"--set sensors=[{members[0].sensor}] --set lights={members[0].lights}"
+        raise StudyError(ValidationIssue(problem, str(path), allowed=f"one of each here: {allowed}"))
+    chosen, notes = member or members[0], list[str]()
+    choose(document, chosen)
     section = _checked(document)
+    if max(chosen.indices) >= 0:
+        section, notes = narrowed(section, chosen)
     if step_nm is not None:
         grid = section.wavelengths
         finer = WavelengthGrid(start_nm=grid.start_nm, stop_nm=grid.stop_nm, step_nm=step_nm)
@@ -61,7 +73,42 @@ def load_study(
     if data is not None and not is_folder(data):
         raise StudyError(ValidationIssue("no such folder", None, None, "--data", str(data)))
     folders = [path.parent] if data is None else [data, path.parent]
-    return resolve(section, Sources(document, section.wavelengths, folders, kept, allow_code=allow_code))
+    sources = Sources(document, section.wavelengths, folders, kept, allow_code=allow_code)
+    sources.warnings += notes
+    return resolve(section, sources)
+
+
+def several_in(path: Path, changes: Mapping[str, str] = {}) -> SeveralStudies | None:
+    """Return the sensors and light sets of a study file; None if it is a plain study.
+
+    Parameters
+    ----------
+    path : Path
+        The study file.
+    changes : mapping of str to str
+        Dotted key -> value to take instead, as a study file would have it.
+
+    Returns
+    -------
+    SeveralStudies or None
+        The study.
+
+    Raises
+    ------
+    StudyError
+        If the file is no YAML, or its lists have no names.
+    """
+    document = _changed(path, changes)
+    members = members_of(document)
+    name, question = (str(document.data.get(key) or "") for key in ("study", "question"))
+    return SeveralStudies(name or path.stem, question, tuple(members)) if len(members) > 1 else None
+
+
+def _changed(path: Path, changes: Mapping[str, str]) -> Document:
+    document = Document(path)
+    for key, text in changes.items():
+        document.change(key, text)
+    return document
 
 
 def study_of_keys(

@@ -9,6 +9,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from ..base.types import Number, Section
 from ..camera.accuracy import STANDARD, AccuracySection
+from ..camera.curve_errors import CurveErrors
 from ..camera.pixel import Pixel
 from ..camera.scene import Geometry, Scene
 from ..camera.sensor import BUILT_IN_SENSORS
@@ -263,14 +264,20 @@ class StudySection(Section):
     sensor: Annotated[
         SensorSection, BeforeValidator(builtin, json_schema_input_type=named(BUILT_IN_SENSORS) | SensorSection)
     ]
-    """QE curves: `ar0820`, a built-in surrogate, a plugin of a package, or a mapping with `files`."""
+    """QE curves: `ar0820`, a built-in surrogate, a measured one (`sweep list data`), a plugin of a package, or a
+    mapping with `files`."""
+    sensors: list[named(BUILT_IN_SENSORS) | SensorSection] | None = None  # type: ignore[valid-type]
+    """Several sensors instead of `sensor`: one run for each, and their comparison."""
     pixel: Pixel = Pixel()
     """The pixel and its readout."""
     lights: Annotated[
         LightsSection,
-        BeforeValidator(builtin, json_schema_input_type=LIGHTS_NAME | LightsSection),
+        BeforeValidator(
+            builtin, json_schema_input_type=LIGHTS_NAME | LightsSection | list[LIGHTS_NAME | LightsSection]
+        ),
     ]
-    """Traffic lights: `tl16`, a built-in surrogate, a file, a plugin of a package, or a mapping with `files`."""
+    """Traffic lights: `tl16`, a built-in surrogate, measured `luxeon`, a file, a plugin of a package, or a mapping with
+    `files`; a list of them has one run for each."""
     scenarios: Annotated[
         dict[Name, Scene],
         BeforeValidator(expanded, json_schema_input_type=dict[Name, ScenarioTemplate]),
@@ -304,6 +311,8 @@ class StudySection(Section):
     """Production tolerances of the filter; then worst_... quantities exist."""
     population: Population | None = None
     """The lamps that the lights stand for: temperature, binning, ageing; then worst_csd_... quantities exist."""
+    uncertainty: CurveErrors | None = None
+    """Errors of the sensor's curves: separations on random sensors, as quantiles."""
     regions: RegionMap | None = None
     """Map of the yellow and red lamps that a norm allows and each CFA separates."""
     recognition: Recognition | None = None

@@ -12,6 +12,7 @@ import typer
 
 from ...base.errors import InterruptedRunError, StudyError, SweepError, ValidationIssue
 from ...spectra import LightUnit
+from ...study import Member
 from ..endings import print_issues
 from ..options import OF_STUDIES, AllowCode, Changes, DataFolder, Outputs, StudyPath, StudyPaths, changes_of
 from ..output import Json, Quiet, print_result
@@ -21,16 +22,20 @@ PANEL = OF_STUDIES
 
 def check(study: StudyPath, data: DataFolder = None, changes: Changes = None, allow_code: AllowCode = False) -> None:
     """Check a study file and count its designs, without running it."""
-    from ...study import load_study
+    from ...study import load_study, several_in
     from ...study.goals import bounds_like_percentages, unreachable_constraints
 
-    loaded = load_study(study, data, changes=changes_of(changes), allow_code=allow_code)
-    typer.echo(f"{study}: {loaded.n_designs:,} designs on {', '.join(loaded.mosaics)}; nothing wrong found.")
-    reach = (
-        [] if loaded.search is None else unreachable_constraints(loaded, loaded.search.space, loaded.search.scenario)
-    )
-    for warning in (*loaded.warnings, *bounds_like_percentages(loaded), *reach):
-        typer.echo(f"Note: {warning}.")
+    changed = changes_of(changes)
+    several = several_in(study, changed)
+    members: tuple[Member | None, ...] = (None,) if several is None else several.members
+    for member in members:
+        loaded = load_study(study, data, changes=changed, allow_code=allow_code, member=member)
+        which = "" if member is None else f"{member.name}: "
+        typer.echo(f"{study}: {which}{loaded.n_designs:,} designs on {', '.join(loaded.mosaics)}; nothing wrong found.")
+        search = loaded.search
+        reach = [] if search is None else unreachable_constraints(loaded, search.space, search.scenario)
+        for warning in (*loaded.warnings, *bounds_like_percentages(loaded), *reach):
+            typer.echo(f"Note: {warning}.")
 
 
 def list_(
@@ -138,7 +143,8 @@ def run(
     If one study cannot be run, the others are.
     """
     from ...run import RunOptions
-    from ..run import run_one
+    from ...study import several_in
+    from ..run import run_one, run_several
 
     with_options = partial(
         run_one,
@@ -161,7 +167,12 @@ def run(
         if len(studies) > 1 and not quiet:
             typer.echo(f"== {path} ==", err=as_json)
         try:
-            facts = with_options(path, began_s=began_s)
+            several = several_in(path, changes_of(changes))
+            run_it = partial(with_options, path, began_s=began_s)
+            if several is None:
+                facts = run_it()
+            else:
+                facts = run_several(several, run_it, output=output, as_json=as_json, quiet=quiet, dry_run=dry_run)
         except InterruptedRunError:
             raise
         except SweepError as error:  # the others are run all the same

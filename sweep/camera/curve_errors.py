@@ -1,0 +1,130 @@
+"""Curves of a sensor that are not known exactly: random curves within stated errors, the same for all designs.
+
+A curve is c(l) = d(l) r(l), with the transmission r of the IR cut where that is known apart. As it may be:
+
+    d(l - s) (1 + g) (1 + n(l)) r(l - e)
+
+with a gain g, a shift s and a smooth noise n of its own, and the shift e of the IR cut that all curves share; each is
+evenly distributed within its error to either side. n is A (2 Phi(z) - 1) of a Gaussian process z of variance 1 with the
+correlation exp(-d^2 / 2 L^2) over a distance d.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Sequence
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from ..base.types import FloatArray, Section
+from ..spectra.spectrum import WavelengthGrid
+from .noise.gaussian import share_below
+from .sensor import SensorCurves
+
+_LEAST_CUT = 1e-3
+"""Transmission of the IR cut below which nothing is known of what is behind it."""
+_LEAST_BASE = 1e-6
+"""Share of a curve's peak below which the transmission of a filter on it is not known."""
+_IR_CUT = "IR cut"
+_JITTER = 1e-10
+
+
+class CurveErrors(Section):
+    """Errors of the sensor's curves, each to either side and evenly distributed within.
+
+    A filter keeps its transmission relative to the curve that it replaces, and has the errors of that curve.
+    """
+
+    gain: Annotated[float, Field(ge=0, le=0.5)] = 0.0
+    """Relative error of each curve's height."""
+    shift_nm: Annotated[float, Field(ge=0, le=50)] = 0.0
+    """Error of each curve's wavelengths, nm."""
+    noise: Annotated[float, Field(ge=0, le=0.5)] = 0.0
+    """Largest relative error of a curve at any wavelength, smooth over `correlation_nm`."""
+    correlation_nm: Annotated[float, Field(ge=1, le=1000)] = 40.0
+    """Correlation length of this error, nm."""
+    ir_cut_nm: Annotated[float, Field(ge=0, le=50)] = 0.0
+    """Shift of the IR cut, nm; of sensors whose IR cut is known apart (`ar0820`, `opencam`)."""
+    draws: Annotated[int, Field(ge=100, le=100_000)] = 2000
+    """Random sensors."""
+
+    @property
+    def linear(self) -> bool:
+        """True if every curve's response is linear in the errors."""
+        return self.shift_nm == 0 and self.ir_cut_nm == 0
+
+
+def drawn_curves(
+    sensor: SensorCurves, grid: WavelengthGrid, names: Sequence[str], errors: CurveErrors, seed: int
+) -> FloatArray:
+    """Draw curves of a sensor; those of a name are the same whatever others are drawn.
+
+    Parameters
+    ----------
+    sensor : SensorCurves
+        Curves.
+    grid : WavelengthGrid
+        Their wavelengths.
+    names : sequence of str
+        Names of curves.
+    errors : CurveErrors
+        Errors and number of draws.
+    seed : int
+        Seed.
+
+    Returns
+    -------
+    ndarray of shape (n_draws, n_names, n_wavelengths)
+        QE.
+    """
+    wave, cut = grid.nodes_nm, sensor.ir_cut
+    known = np.ones(wave.size) if cut is None else cut
+    (moved,) = _evenly(_IR_CUT, errors, seed, 1) * errors.ir_cut_nm
+    cuts = np.stack([np.interp(wave - e, wave, known) for e in moved]) if errors.ir_cut_nm else known[None]
+    root = _root(wave, errors.correlation_nm)
+    curves = np.empty((errors.draws, len(names), wave.size))
+    for at, name in enumerate(names):
+        dye = sensor.curve(name) / np.maximum(known, _LEAST_CUT)
+        gain, shift = _evenly(name, errors, seed, 2)
+        z = _rng(name, seed, 1).standard_normal((errors.draws, wave.size)) @ root.T
+        height = (1 + errors.gain * gain[:, None]) * (1 + errors.noise * (2 * share_below(z) - 1))
+        there = [np.interp(wave - s, wave, dye) for s in errors.shift_nm * shift] if errors.shift_nm else dye
+        curves[:, at] = there * height * cuts
+    return curves
+
+
+def _rng(name: str, seed: int, part: int) -> np.random.Generator:
+    """Return a generator of a curve's own."""
+    return np.random.default_rng([seed, zlib.crc32(name.encode()), part])
+
+
+def _evenly(name: str, errors: CurveErrors, seed: int, count: int) -> FloatArray:
+    """Return numbers from -1 to 1, ndarray of shape (count, n_draws)."""
+    return np.asarray(_rng(name, seed, 0).uniform(-1, 1, (count, errors.draws)), dtype=float)
+
+
+def _root(wave: FloatArray, length_nm: float) -> FloatArray:
+    """Return a root of the correlation matrix."""
+    correlation = np.exp(-0.5 * ((wave[:, None] - wave) / length_nm) ** 2)
+    return np.asarray(np.linalg.cholesky(correlation + _JITTER * np.eye(wave.size)), dtype=float)
+
+
+def with_filters(curves: FloatArray, base: FloatArray, designed: FloatArray) -> FloatArray:
+    """Put a filter on drawn curves: its transmission relative to the curve that it replaces stays.
+
+    Parameters
+    ----------
+    curves : ndarray of shape (n_draws, n_wavelengths)
+        Drawn base curves.
+    base, designed : ndarray of shape (n_wavelengths,)
+        The base curve, and the curve of the filter on it.
+
+    Returns
+    -------
+    ndarray of shape (n_draws, n_wavelengths)
+        QE.
+    """
+    known = base > _LEAST_BASE * base.max()
+    return curves * np.divide(designed, base, out=np.ones_like(base), where=known)

@@ -1,0 +1,241 @@
+"""Comparison of a study's sensors and light sets: one table, one picture, one sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from ..base.types import FloatArray
+from ..metrics.columns.sensitivity import CFA_SENSITIVITY
+from ..results.atomic import write_bytes, write_text
+from ..results.output import Output, read_output
+from ..results.tables import FOUND, PLAIN, RESULTS
+from ..study import Member
+from .figures import CURVE_CYCLE, canvas, legend_beside, rendered
+from .pages import inlined, page, rows
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PAGE, PICTURE = "report.html", "sensors"
+REFERENCE = "RGGB"
+_MARKERS = "osD^vPX*<>"
+_NINE_TENTHS = 2.1459660262893476
+"""Semiaxis of the ellipse that holds 90 % of a Gaussian in two dimensions, in deviations: sqrt(-2 ln 0.1)."""
+
+
+@dataclass(frozen=True)
+class SensorRun:
+    """Finished run of one sensor under one set of lights."""
+
+    member: Member
+    folder: Path
+
+
+def report_sensors(folder: Path, name: str, question: str, runs: Sequence[SensorRun]) -> list[str]:
+    """Write one table of all rows, a picture and a page of a study of several sensors.
+
+    `results.parquet` has the rows of all runs with `sensor` and `lights` before them.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the study, which has those of the runs.
+    name, question : str
+        Study.
+    runs : sequence of SensorRun
+        Finished runs.
+
+    Returns
+    -------
+    list of str
+        Answer, as it is printed.
+    """
+    outputs = [(run.member, read_output(run.folder)) for run in runs]
+    tables = []
+    for run in runs:
+        table = pq.read_table(run.folder / RESULTS)
+        kinds = [f.type.value_type if pa.types.is_dictionary(f.type) else f.type for f in table.schema]
+        table = table.cast(pa.schema(zip(table.column_names, kinds, strict=True)))
+        for at, (key, value) in enumerate((("sensor", run.member.sensor), ("lights", run.member.lights))):
+            table = table.add_column(at, key, pa.array([value] * len(table)))
+        tables.append(table)
+    sink = pa.BufferOutputStream()
+    pq.write_table(pa.concat_tables(tables, promote_options="default"), sink)
+    write_bytes(sink.getvalue().to_pybytes(), folder / RESULTS)
+    figures = pd.DataFrame([row for member, output in outputs for row in _figures(member, output)])
+    drawn = draw_sensors(figures, outputs[0][1].trade_off[0].words)
+    images = {kind: rendered(drawn, kind) for kind in ("png", "svg")}
+    for kind, image in images.items():
+        write_bytes(image, folder / f"{PICTURE}.{kind}")
+    lines = [*_answer(figures, outputs[0][1].trade_off[0].words), *_notes(outputs)]
+    links = [(run.member.name, f"{run.folder.name}/{PAGE}") for run in runs]
+    text = page(
+        "sensors.html.j2",
+        title=name,
+        question=question,
+        lines=lines,
+        image=inlined(images["png"]),
+        table=rows(_shown(figures)),
+        links=links,
+    )
+    write_text(text, folder / PAGE)
+    return [*lines, f"Files: {folder}/: {RESULTS}, {PAGE}, {PICTURE}.png; a run and its report in each folder."]
+
+
+def _figures(member: Member, output: Output) -> Iterator[dict[str, Any]]:
+    """Yield a row per plain CFA, named design and answer, in the first scenario."""
+    separation = output.trade_off[0].name
+    few = output.few[(output.few["scenario"] == output.scenario) & (output.few["status"] == "ok")]
+    plain = few[few["kind"] == PLAIN]
+    known = plain[plain["name"] == REFERENCE]
+    reference = (known if len(known) else plain if len(plain) else few).iloc[0]
+    drawn = _uncertain(output, separation)
+    for row in few.to_dict("records"):
+        yield {
+            "sensor": member.sensor,
+            "lights": member.lights,
+            "name": str(row["name"]),
+            "cfa": str(row["cfa"]),
+            "kind": str(row["kind"]),
+            "reference": str(reference["name"]),
+            "dn": float(row[separation]),
+            "light": float(row[CFA_SENSITIVITY]),
+            "ratio": float(row[separation]) / float(reference[separation]),
+            "light_ratio": float(row[CFA_SENSITIVITY]) / float(reference[CFA_SENSITIVITY]),
+            **drawn.get(row["design_id"], {}),
+        }
+
+
+def _uncertain(output: Output, separation: str) -> Mapping[Any, Mapping[str, float]]:
+    """Return quantiles of both ratios and their deviations by row, where the study has uncertain curves."""
+    if output.uncertainty is None:
+        return {}
+    known = output.uncertainty[output.uncertainty["quantity"] == separation].set_index("design_id")
+    names = ["ratio_5", "ratio_95", "light_ratio_5", "light_ratio_95", "ratio_sd", "light_ratio_sd", "correlation"]
+    return {key: {str(n): float(v) for n, v in row.items()} for key, row in known[names].iterrows()}
+
+
+def _answer(figures: pd.DataFrame, words: str) -> Iterator[str]:
+    """Yield on how many sensors the searched design, then each named one, separates more at more light."""
+    found = figures[figures["kind"] == FOUND]
+    names = [*(["the searched filter"] if len(found) else []), *_others(figures)]
+    for name in names:
+        some = found if name == "the searched filter" else figures[figures["name"] == name]
+        reference, n = some["reference"].iloc[0], len(some)
+        holds = (some["ratio"] > 1) & (some["light_ratio"] > 1)
+        text = (
+            f"{name[0].upper()}{name[1:]} has {_span(some['ratio'])} times the {words} of {reference} at "
+            f"{_span(some['light_ratio'])} times its light; more of both on {int(holds.sum())} of {n} "
+            f"pairs of sensor and lights ({some.loc[holds, 'sensor'].nunique()} of {some['sensor'].nunique()} sensors)"
+        )
+        if "ratio_5" in some:
+            sure = int(((some["ratio_5"] > 1) & (some["light_ratio_5"] > 1)).sum())
+            text += f", and with uncertain curves in 19 of 20 random sensors on {sure}"
+        yield f"{text}."
+
+
+def _others(figures: pd.DataFrame) -> list[str]:
+    """Return the other designs, in order."""
+    others = figures[(figures["kind"] != FOUND) & (figures["name"] != figures["reference"])]
+    return [*dict.fromkeys(others["name"])]
+
+
+def _span(values: pd.Series[float]) -> str:
+    """Return the range of ratios."""
+    low, high = f"{values.min():.2f}", f"{values.max():.2f}"
+    return low if low == high else f"{low} to {high}"
+
+
+def _notes(outputs: Sequence[tuple[Member, Output]]) -> Iterator[str]:
+    """Yield what was left out, and which curves are modeled."""
+    for member, output in outputs:
+        yield from (f"Note: {w}." for w in output.provenance.warnings if w.startswith(f"{member.name}: "))
+    origins = [one for _, output in outputs for one in (output.provenance.sensor, output.provenance.lights)]
+    modeled = dict.fromkeys(one.name for one in origins if one.surrogate)
+    if modeled:
+        names = " and ".join(modeled)
+        yield f"Note: the curves of {names} are surrogates, modeled from stated parameters, not measured."
+
+
+def _shown(figures: pd.DataFrame) -> pd.DataFrame:
+    """Return the table as it is shown."""
+    shown = pd.DataFrame(
+        {
+            "sensor": figures["sensor"],
+            "lights": figures["lights"],
+            "design": figures["name"],
+            "CFA": figures["cfa"],
+            "separation / DN": figures["dn"].map("{:.1f}".format),
+            "light of a clear sensor's": figures["light"].map("{:.3f}".format),
+            "times the reference's separation": figures["ratio"].map("{:.2f}".format),
+            "times its light": figures["light_ratio"].map("{:.2f}".format),
+        }
+    )
+    if "ratio_5" in figures:
+        for of, label in (("ratio", "separation"), ("light_ratio", "light")):
+            ends = zip(figures[f"{of}_5"], figures[f"{of}_95"], strict=True)
+            shown[f"{label}, 5 to 95 % of random sensors"] = [f"{low:.2f} to {high:.2f}" for low, high in ends]
+    return shown
+
+
+def draw_sensors(figures: pd.DataFrame, words: str) -> Figure:
+    """Draw the ratio of separations against that of light: a color per design, a marker per sensor and lights.
+
+    Parameters
+    ----------
+    figures : pandas.DataFrame
+        Rows of `_figures`.
+    words : str
+        Name of the separation.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Figure; ellipses hold 90 % of the random sensors.
+    """
+    from matplotlib.patches import Polygon  # noqa: PLC0415  (slow to import)
+
+    drawn, axes = canvas(9.0, 5.6)
+    figures = figures[figures["name"] != figures["reference"]]
+    names = [*dict.fromkeys(figures["name"])]
+    pairs = [*dict.fromkeys(zip(figures["sensor"], figures["lights"], strict=True))]
+    for row in figures.to_dict("records"):
+        color = CURVE_CYCLE[names.index(row["name"]) % len(CURVE_CYCLE)]
+        marker = _MARKERS[pairs.index((row["sensor"], row["lights"])) % len(_MARKERS)]
+        axes.plot(row["light_ratio"], row["ratio"], marker, color=color, markersize=6, markeredgecolor="white")
+        if row.get("ratio_sd", 0) > 0:
+            axes.add_patch(Polygon(_ellipse(row), closed=True, facecolor=color, alpha=0.15, edgecolor="none"))
+    for name in names:
+        axes.plot([], [], "o", color=CURVE_CYCLE[names.index(name) % len(CURVE_CYCLE)], label=name)
+    for (sensor, lights), marker in zip(pairs, _MARKERS * 3, strict=False):
+        axes.plot([], [], marker, color="#666666", label=f"{sensor}, {lights}")
+    reference = figures["reference"].iloc[0] if len(figures) else REFERENCE
+    for line in (axes.axhline, axes.axvline):
+        line(1.0, color="#666666", linestyle="--", linewidth=1.0)
+    axes.set_yscale("log")
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_formatter("{x:g}")
+    axes.set(xlabel=f"light, times that of {reference}", ylabel=f"{words}, times that of {reference}")
+    axes.set_title("Above and to the right of the dashed lines: more separation at more light")
+    legend_beside(axes)
+    return drawn
+
+
+def _ellipse(row: Mapping[Any, Any]) -> FloatArray:
+    """Return the outline of the ellipse that holds 90 % of the random sensors, ndarray of shape (n, 2)."""
+    angle = np.linspace(0, 2 * np.pi, 73)
+    x, y = np.cos(angle), np.sin(angle)
+    along = row["correlation"] * x + np.sqrt(max(1 - row["correlation"] ** 2, 0.0)) * y
+    outline = [
+        row["light_ratio"] + _NINE_TENTHS * row["light_ratio_sd"] * x,
+        np.maximum(row["ratio"] + _NINE_TENTHS * row["ratio_sd"] * along, 1e-3),
+    ]
+    return np.stack(outline, axis=1)

@@ -1,0 +1,200 @@
+"""Studies of several sensors or light sets: one study for each pair of them."""
+
+from __future__ import annotations
+
+import math
+from itertools import product
+from typing import Any, NamedTuple
+
+from ..base.errors import StudyError
+from ..camera.mosaic import Mosaic
+from ..camera.sensor import BUILT_IN_SENSORS
+from ..spectra.builtin.measured_sets import LUXEON, SENSORS
+from .document import Document
+from .schema import Modification, StudySection
+
+_MOST = 24
+_SURROGATE_CURVES = ("C", "R", "G", "B", "Y", "Cy", "Rx")
+_RANGES_NM = {**{name: one.range_nm for name, one in SENSORS.items()}, "luxeon": LUXEON.range_nm}
+
+
+class Member(NamedTuple):
+    """One sensor under one set of lights.
+
+    Parameters
+    ----------
+    sensor, lights : str
+        Names.
+    indices : tuple of (int, int)
+        Their places in the lists of the study; -1 where there is no list.
+    """
+
+    sensor: str
+    lights: str
+    indices: tuple[int, int]
+
+    @property
+    def name(self) -> str:
+        """Name of its study, and of the folder of its results."""
+        return f"{self.sensor} {self.lights}"
+
+
+class SeveralStudies(NamedTuple):
+    """A study of several sensors or light sets: its name, its question and its members."""
+
+    name: str
+    question: str
+    members: tuple[Member, ...]
+
+
+def members_of(document: Document) -> list[Member]:
+    """Return the sensors and lights of a study, each pair once; a plain study has one member.
+
+    Parameters
+    ----------
+    document : Document
+        Study file.
+
+    Returns
+    -------
+    list of Member
+        Members.
+
+    Raises
+    ------
+    StudyError
+        If `sensors` stands beside `sensor`, or a list is empty, too long, or names one twice.
+    """
+    data = document.data
+    if data.get("sensors") is not None and "sensor" in data:
+        raise StudyError(document.issue(("sensors",), "beside `sensor`", None, "one of both"))
+    sensors, lights = _listed(document, "sensors", data.get("sensor")), _listed(document, "lights", data.get("lights"))
+    if len(sensors) * len(lights) > _MOST:
+        allowed = f"at most {_MOST} sensors times lights"
+        raise StudyError(document.issue(("sensors",), "too many", len(sensors) * len(lights), allowed))
+    return [Member(one, other, (i, k)) for (one, i), (other, k) in product(sensors, lights)]
+
+
+def _listed(document: Document, key: str, alone: Any) -> list[tuple[str, int]]:
+    """Return the names of a list's entries with their indices; a value alone has -1."""
+    value = document.data.get(key)
+    if not isinstance(value, list):
+        return [(_name(alone, key, 0), -1)]
+    names = [_name(entry, key, at) for at, entry in enumerate(value)]
+    if not names or len(set(names)) < len(names):
+        problem = "an empty list" if not names else "one is named twice; `name` tells mappings apart"
+        raise StudyError(document.issue((key,), problem, None, "different names, one or more"))
+    return [(name, at) for at, name in enumerate(names)]
+
+
+def _name(entry: Any, key: str, at: int) -> str:
+    """Return the name of a sensor or of lights."""
+    stated = (entry.get("name") or entry.get("builtin")) if isinstance(entry, dict) else entry
+    return str(stated or f"{key.removesuffix('s')} {at + 1}")
+
+
+def choose(document: Document, member: Member) -> None:
+    """Leave one sensor and one set of lights in a document.
+
+    Parameters
+    ----------
+    document : Document
+        Study file; changed in place.
+    member : Member
+        Member.
+    """
+    for key, to, at in (("sensors", "sensor", member.indices[0]), ("lights", "lights", member.indices[1])):
+        if at >= 0:
+            document.take(key, at, to)
+    document.data.pop("sensors", None)
+
+
+def narrowed(section: StudySection, member: Member) -> tuple[StudySection, list[str]]:
+    """Return a member's study: its name, the wavelengths that its curves have, and the CFAs that the sensor has.
+
+    Parameters
+    ----------
+    section : StudySection
+        The whole study with this member's sensor and lights.
+    member : Member
+        Member.
+
+    Returns
+    -------
+    section : StudySection
+        Its study.
+    notes : list of str
+        What was left out.
+    """
+    grid, notes = section.wavelengths, list[str]()
+    ends = [_RANGES_NM[name] for name in (section.sensor.builtin, section.lights.builtin) if name in _RANGES_NM]
+    low = max([grid.start_nm, *(low for low, _ in ends)])
+    high = min([grid.stop_nm, *(high for _, high in ends)])
+    if (low, high) != (grid.start_nm, grid.stop_nm):
+        start = grid.start_nm + grid.step_nm * math.ceil((low - grid.start_nm) / grid.step_nm)
+        stop = start + grid.step_nm * math.floor((high - start) / grid.step_nm)
+        grid = grid.model_copy(update={"start_nm": start, "stop_nm": stop})
+        notes.append(f"{member.name}: curves from {start:g} to {stop:g} nm")
+    changes: dict[str, Any] = {"study": member.name, "wavelengths": grid}
+    curves = _curves_of(section)
+    if curves is not None:
+        changes |= _of_curves(section, curves)
+        left_out = [name for key in ("cfas", "designs", "sweeps", "boxes") for name in getattr(section, key)]
+        kept = {name for key in ("cfas", "designs", "sweeps", "boxes") for name in changes.get(key, ())}
+        gone = [name for name in dict.fromkeys(left_out) if name not in kept]
+        if gone:
+            notes.append(f"{member.name}: without {', '.join(gone)}, whose curves {member.sensor} does not have")
+        before, after = section.search, changes.get("search", section.search)
+        if before is not None and after is not before:
+            notes.append(f"{member.name}: {'no search' if after is None else f'the search is of {after.space}'}")
+    return section.model_copy(update=changes), notes
+
+
+def _curves_of(section: StudySection) -> dict[str, dict[str, str]] | None:
+    """Return curves of the sensor (""), those of any ("anywhere"), and names by channel of CFAs; None if unknown."""
+    sensor = section.sensor
+    if sensor.builtin is not None and sensor.builtin not in BUILT_IN_SENSORS:
+        return None
+    names = {column for entry in sensor.files for column in entry.columns}
+    variants: dict[str, dict[str, str]] = {}
+    if sensor.builtin is not None:
+        low, high = _RANGES_NM.get(sensor.builtin, (400.0, 700.0))
+        grid = section.wavelengths.model_copy(update={"start_nm": low, "stop_nm": high, "step_nm": high - low})
+        made = BUILT_IN_SENSORS[sensor.builtin](grid)
+        names |= set(made.qe)
+        variants = {cfa: dict(channels) for cfa, channels in made.variants.items()}
+    anywhere = {curve for one in SENSORS.values() for curve in one.names} | {*_SURROGATE_CURVES, *names}
+    return {"": dict.fromkeys(names, ""), "anywhere": dict.fromkeys(anywhere, ""), **variants}
+
+
+def _of_curves(section: StudySection, curves: dict[str, dict[str, str]]) -> dict[str, Any]:
+    """Return CFAs, filters and search without those that need other curves."""
+    known, anywhere = curves[""], curves["anywhere"]
+
+    def buildable(entry: Modification) -> bool:
+        needed = [entry.base, entry.to if isinstance(entry.to, str) else None]
+        return all(name is None or name in known or name not in anywhere for name in needed)
+
+    filters = {
+        key: {name: entry for name, entry in getattr(section, key).items() if buildable(entry)}
+        for key in ("designs", "sweeps", "boxes")
+    }
+    modified = {(e.cfa, channel) for entries in filters.values() for e in entries.values() for channel in e.channel}
+    cfas = {}
+    for name, cfa in section.cfas.items():
+        mosaic = Mosaic.from_name(name) if cfa.tile is None else Mosaic.from_rows(name, cfa.tile)
+        named = {c: cfa.curves.get(c, curves.get(name, {}).get(c, c)) for c in mosaic.channels}
+        if all(c in known or c not in anywhere or (name, channel) in modified for channel, c in named.items()):
+            cfas[name] = cfa
+    filters = {
+        key: {n: e for n, e in entries.items() if e.cfa in cfas or e.cfa not in section.cfas}
+        for key, entries in filters.items()
+    }
+    searched = {**filters["sweeps"], **filters["boxes"]}
+    wanted = None if section.search is None else section.search.space
+    if section.search is None or wanted is None or wanted in searched:
+        return {"cfas": cfas, **filters} | ({"search": None} if not searched else {})
+    named_anywhere = wanted in {**section.sweeps, **section.boxes}
+    instead = next(iter(searched), None) if named_anywhere else wanted
+    search = None if instead is None else section.search.model_copy(update={"space": instead})
+    return {"cfas": cfas, **filters, "search": search}
