@@ -80,13 +80,13 @@ def drawn_curves(
         QE.
     """
     wave, cut = grid.nodes_nm, sensor.ir_cut
-    known = np.ones(wave.size) if cut is None else cut
+    known = np.ones(wave.size) if cut is None else np.maximum(cut, _LEAST_CUT)
     (moved,) = _evenly(_IR_CUT, errors, seed, 1) * errors.ir_cut_nm
     cuts = np.stack([np.interp(wave - e, wave, known) for e in moved]) if errors.ir_cut_nm else known[None]
     root = _root(wave, errors.correlation_nm)
     curves = np.empty((errors.draws, len(names), wave.size))
     for at, name in enumerate(names):
-        dye = sensor.curve(name) / np.maximum(known, _LEAST_CUT)
+        dye = sensor.curve(name) / known
         gain, shift = _evenly(name, errors, seed, 2)
         z = _rng(name, seed, 1).standard_normal((errors.draws, wave.size)) @ root.T
         height = (1 + errors.gain * gain[:, None]) * (1 + errors.noise * (2 * share_below(z) - 1))

@@ -7,7 +7,7 @@ import sys
 import time
 import webbrowser
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import typer
 
@@ -16,7 +16,7 @@ from ..base.errors import ErrorBoundExceededError, SweepError, ValidationIssue
 from ..base.types import in_turn
 from ..results.tables import REPORT
 from ..run.workers import workers
-from ..study import Member, SeveralStudies, folder_name, load_study
+from ..study import Member, SeveralStudies, Study, folder_name, load_study
 from .output import ProgressDisplay, print_lines
 
 if TYPE_CHECKING:
@@ -114,14 +114,18 @@ def run_one(
     return {"computed": bool(computed), **facts}
 
 
+class SeveralOptions(NamedTuple):
+    """Options of `sweep run` for a study of several sensors."""
+
+    output: Path
+    jobs: int | None
+    dry_run: bool
+    as_json: bool
+    quiet: bool
+
+
 def run_several(
-    several: SeveralStudies,
-    run: Callable[..., dict[str, Any]],
-    *,
-    output: Path,
-    as_json: bool,
-    quiet: bool,
-    dry_run: bool,
+    several: SeveralStudies, run: Callable[..., dict[str, Any]], load: Callable[..., Study], options: SeveralOptions
 ) -> dict[str, Any]:
     """Run a study for each of its sensors and light sets, and compare them.
 
@@ -129,12 +133,10 @@ def run_several(
     ----------
     several : SeveralStudies
         Study.
-    run : callable
-        Runs a member into the folder `output`.
-    output : Path
-        Folder of results.
-    as_json, quiet, dry_run : bool
-        Options of `sweep run`.
+    run, load : callable
+        Runs a `member` into the folder `output`, and loads its study.
+    options : SeveralOptions
+        Options.
 
     Returns
     -------
@@ -146,17 +148,22 @@ def run_several(
     SweepError
         As `run_one`, for the first member that cannot be run.
     """
-    folder, made = output / folder_name(several.name), list[dict[str, Any]]()
+    folder, made, quiet = options.output / folder_name(several.name), list[dict[str, Any]](), options.quiet
+    studies = [(member, load(member=member)) for member in several.members]  # mistakes before any work
     for member in several.members:
         if not quiet:
             typer.echo(f"-- {member.name} --", err=True)
         made.append(run(member=member, output=folder))
-    if dry_run:
+    if options.dry_run:
         return {"folder": str(folder), "runs": made}
     from ..report.sensors import SensorRun, report_sensors  # noqa: PLC0415  (loaded while workers compute)
+    from ..run.all_sensors import all_sensors_table  # noqa: PLC0415  (few studies have several sensors)
 
+    with ProgressDisplay(quiet=quiet) as display, workers(options.jobs or os.cpu_count() or 1) as parallel:
+        together = all_sensors_table(studies, parallel, display.update)
     runs = [SensorRun(member, Path(one["folder"])) for member, one in zip(several.members, made, strict=True)]
-    print_lines(report_sensors(folder, several.name, several.question, runs), as_json=as_json, quiet=quiet)
+    lines = report_sensors(folder, several.name, several.question, runs, together)
+    print_lines(lines, as_json=options.as_json, quiet=quiet)
     return {"folder": str(folder), "runs": made}
 
 

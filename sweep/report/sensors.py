@@ -14,9 +14,11 @@ import pyarrow.parquet as pq
 
 from ..base.types import FloatArray
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
+from ..metrics.quantity import Column
 from ..results.atomic import write_bytes, write_text
 from ..results.output import Output, read_output
 from ..results.tables import FOUND, PLAIN, RESULTS
+from ..run.all_sensors import ALL
 from ..study import Member
 from .figures import CURVE_CYCLE, canvas, legend_beside, rendered
 from .pages import inlined, page, rows
@@ -24,7 +26,7 @@ from .pages import inlined, page, rows
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PAGE, PICTURE = "report.html", "sensors"
+PAGE, PICTURE, TOGETHER = "report.html", "sensors", "all_sensors.parquet"
 REFERENCE = "RGGB"
 _MARKERS = "osD^vPX*<>"
 _NINE_TENTHS = 2.1459660262893476
@@ -39,7 +41,9 @@ class SensorRun:
     folder: Path
 
 
-def report_sensors(folder: Path, name: str, question: str, runs: Sequence[SensorRun]) -> list[str]:
+def report_sensors(
+    folder: Path, name: str, question: str, runs: Sequence[SensorRun], together: pa.Table | None
+) -> list[str]:
     """Write one table of all rows, a picture and a page of a study of several sensors.
 
     `results.parquet` has the rows of all runs with `sensor` and `lights` before them.
@@ -52,6 +56,8 @@ def report_sensors(folder: Path, name: str, question: str, runs: Sequence[Sensor
         Study.
     runs : sequence of SensorRun
         Finished runs.
+    together : pyarrow.Table or None
+        Filters for several sensors, see `all_sensors_table`; written as `all_sensors.parquet`.
 
     Returns
     -------
@@ -75,7 +81,13 @@ def report_sensors(folder: Path, name: str, question: str, runs: Sequence[Sensor
     images = {kind: rendered(drawn, kind) for kind in ("png", "svg")}
     for kind, image in images.items():
         write_bytes(image, folder / f"{PICTURE}.{kind}")
-    lines = [*_answer(figures, outputs[0][1].trade_off[0].words), *_notes(outputs)]
+    lines = [*_answer(figures, outputs[0][1].trade_off[0].words)]
+    if together is not None:
+        sink = pa.BufferOutputStream()
+        pq.write_table(together, sink)
+        write_bytes(sink.getvalue().to_pybytes(), folder / TOGETHER)
+        lines += _together(together.to_pandas(), outputs[0][1].goal)
+    lines += _notes(outputs)
     links = [(run.member.name, f"{run.folder.name}/{PAGE}") for run in runs]
     text = page(
         "sensors.html.j2",
@@ -84,6 +96,7 @@ def report_sensors(folder: Path, name: str, question: str, runs: Sequence[Sensor
         lines=lines,
         image=inlined(images["png"]),
         table=rows(_shown(figures)),
+        together=[] if together is None else rows(together.to_pandas()),
         links=links,
     )
     write_text(text, folder / PAGE)
@@ -124,28 +137,47 @@ def _uncertain(output: Output, separation: str) -> Mapping[Any, Mapping[str, flo
 
 
 def _answer(figures: pd.DataFrame, words: str) -> Iterator[str]:
-    """Yield on how many sensors the searched design, then each named one, separates more at more light."""
+    """Yield on how many sensors the searched design of each CFA, then each named one, separates more at more light."""
     found = figures[figures["kind"] == FOUND]
-    names = [*(["the searched filter"] if len(found) else []), *_others(figures)]
-    for name in names:
-        some = found if name == "the searched filter" else figures[figures["name"] == name]
-        reference, n = some["reference"].iloc[0], len(some)
-        holds = (some["ratio"] > 1) & (some["light_ratio"] > 1)
+    others = figures[(figures["kind"] != FOUND) & (figures["name"] != figures["reference"])]
+    designs = [(f"the {name} of {cfa}", some) for (name, cfa), some in found.groupby(["name", "cfa"], sort=False)]
+    for who, some in [*designs, *others.groupby("name", sort=False)]:
+        reference, holds = some["reference"].iloc[0], (some["ratio"] > 1) & (some["light_ratio"] > 1)
         text = (
-            f"{name[0].upper()}{name[1:]} has {_span(some['ratio'])} times the {words} of {reference} at "
-            f"{_span(some['light_ratio'])} times its light; more of both on {int(holds.sum())} of {n} "
-            f"pairs of sensor and lights ({some.loc[holds, 'sensor'].nunique()} of {some['sensor'].nunique()} sensors)"
+            f"On {_sensors(some)}, {who} has {_span(some['ratio'])} times the {words} of {reference} at "
+            f"{_span(some['light_ratio'])} times its light; more of both on {_sensors(some[holds])}"
         )
-        if "ratio_5" in some:
+        if "ratio_5" in some and holds.any():
             sure = int(((some["ratio_5"] > 1) & (some["light_ratio_5"] > 1)).sum())
-            text += f", and with uncertain curves in 19 of 20 random sensors on {sure}"
+            text += (
+                f", and with uncertain curves in 19 of 20 random sensors for {sure} of these {int(holds.sum())} pairs"
+            )
         yield f"{text}."
 
 
-def _others(figures: pd.DataFrame) -> list[str]:
-    """Return the other designs, in order."""
-    others = figures[(figures["kind"] != FOUND) & (figures["name"] != figures["reference"])]
-    return [*dict.fromkeys(others["name"])]
+def _sensors(some: pd.DataFrame) -> str:
+    """Return how many sensors rows are of, and how many pairs of sensor and lights."""
+    if some.empty:
+        return "none"
+    n = some["sensor"].nunique()
+    return f"{n} sensor{'s' * (n > 1)} ({len(some)} pair{'s' * (len(some) > 1)} with lights)"
+
+
+def _together(table: pd.DataFrame, goal: Column) -> Iterator[str]:
+    """Yield how a filter for all sensors does on each, and one that was designed without a sensor on that one."""
+    for (designed_on, space), filters in table.groupby(["designed_on", "space"], sort=False):
+        shown = filters if designed_on == ALL else filters[filters["judged"]]
+        kept, least = shown["objective"] / shown["own_best"], shown["objective"].min()
+        what = f"One {space} filter for all sensors" if designed_on == ALL else f"A {space} filter for {designed_on}"
+        where = "" if designed_on == ALL else " on that one"
+        text = (
+            f"{what} ({shown['parameters'].iloc[0]}) has {goal.formatted(least)} or more{where}, "
+            f"{kept.min():.0%} to {kept.max():.0%} of the {goal.words} of the best alone"
+        )
+        broken = shown[shown["violation"] > 0]
+        if len(broken):
+            text += f"; there it breaks a constraint by up to {broken['violation'].max():.2g} of its bound"
+        yield f"{text}."
 
 
 def _span(values: pd.Series[float]) -> str:

@@ -179,7 +179,7 @@ def _without(
         types=tuple(lights.types[i] for i in kept),
         photons=lights.photons[kept],
     )
-    setup, *others = (replace(one, lights=fewer_lights) for one in (problem.setup, *problem.others))
+    (setup, _), *others = ((replace(one, lights=fewer_lights), family) for one, family in problem.scenes)
     fewer = replace(problem, setup=setup, others=tuple(others))
     log = [e for i, start in enumerate(starts) for e in search_from(fewer, i, start, algorithm, evaluations, seed).log]
     best = best_feasible(log)

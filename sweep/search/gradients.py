@@ -120,16 +120,17 @@ class Model:
         wanted = (*self._weights, *problem.constraints)
         self._perturbed = {name: problem.perturbed(name) for name in wanted}
         errors = dict.fromkeys((AS_DESIGNED, *(off for every in self._perturbed.values() for off in every)))
-        self._families = {off: problem.family.perturbed(off) if any(off) else problem.family for off in errors}
         over = any(problem.over_population(name) for name in wanted)
         of_a_share = any(problem.of_a_share(name) for name in wanted)
+        self._errors = tuple(errors)
         self._scenes = [
             (
                 linear_model(setup),
+                {off: family.perturbed(off) if any(off) else family for off in errors},
                 _members_of(setup) if over else None,
                 _drawn_of(problem, setup) if of_a_share else None,
             )
-            for setup in (problem.setup, *problem.others)
+            for setup, family in problem.scenes
         ]
         wanted_less = self._rule.wanted == "less"
         self._power = 1 if problem.signed_goal or wanted_less else 2  # a quantity that may be negative has no root
@@ -186,10 +187,10 @@ class Model:
         x = problem.from_unit(u)
         made = {
             off: [
-                SmoothDesign(imager, family, x, free, self._span, members, drawn, problem.vision)
-                for imager, members, drawn in self._scenes
+                SmoothDesign(imager, families[off], x, free, self._span, members, drawn, problem.vision)
+                for imager, families, members, drawn in self._scenes
             ]
-            for off, family in self._families.items()
+            for off in self._errors
         }
         terms, objective = self._terms(made)
         violations = problem.family.violation(x[None])[0]
@@ -224,7 +225,7 @@ class Model:
         """Return the rows of a quantity, in every scenario."""
         smooth = self._quantities[name].smooth
         assert smooth is not None
-        n_scenes = len(self._problem.setups_of(name))
+        n_scenes = self._problem.n_scenes_of(name)
         return Rows.joined([smooth(design) for off in self._perturbed[name] for design in made[off][:n_scenes]])
 
 

@@ -46,8 +46,9 @@ class Problem:
         Seed of random lamps and cameras.
     vision : SeededVision, optional
         Images for readers of signal heads.
-    others : tuple of Setup
-        Further scenarios: a quantity of lamps counts with its worst value over all.
+    others : tuple of (Setup, Family)
+        Further scenarios, or sensors with the same family on their own curves: a quantity counts with its worst value
+        over all.
     """
 
     setup: Setup
@@ -61,7 +62,7 @@ class Problem:
     user_metrics: tuple[UserMetric, ...] = ()
     seed: int = 0
     vision: SeededVision | None = None
-    others: tuple[Setup, ...] = ()
+    others: tuple[tuple[Setup, Family], ...] = ()
 
     @property
     def quantities(self) -> Mapping[str, Quantity]:
@@ -80,8 +81,13 @@ class Problem:
         """True if worst cases are over a population of the lights."""
         return self.setup.lights.population is not None
 
-    def setups_of(self, quantity: str) -> tuple[Setup, ...]:
-        """Return the scenarios over which a quantity is the worst.
+    @property
+    def scenes(self) -> tuple[tuple[Setup, Family], ...]:
+        """All scenarios or sensors."""
+        return ((self.setup, self.family), *self.others)
+
+    def n_scenes_of(self, quantity: str) -> int:
+        """Return over how many of `scenes` a quantity is the worst.
 
         Parameters
         ----------
@@ -90,14 +96,14 @@ class Problem:
 
         Returns
         -------
-        tuple of Setup
-            The first one alone for quantities of a filter.
+        int
+            1 for quantities of a filter alone, which are the same in all scenarios of one sensor.
         """
-        requested = self.quantities[quantity]
-        return (self.setup, *(self.others if requested.pair or requested.states else ()))
+        requested, one_sensor = self.quantities[quantity], all(family is self.family for _, family in self.others)
+        return 1 if one_sensor and not (requested.pair or requested.states) else len(self.scenes)
 
     def in_scenario(self, number: int) -> Problem:
-        """Return the problem of one scenario.
+        """Return the problem of one scenario or sensor.
 
         Parameters
         ----------
@@ -109,7 +115,8 @@ class Problem:
         Problem
             Problem without other scenarios.
         """
-        return replace(self, setup=(self.setup, *self.others)[number], others=())
+        setup, family = self.scenes[number]
+        return replace(self, setup=setup, family=family, others=())
 
     def over_population(self, quantity: str) -> bool:
         """Return whether a quantity is a worst case over the population of the lights.

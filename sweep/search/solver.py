@@ -17,7 +17,7 @@ import numpy as np
 from ..base.types import FloatArray
 from ..metrics.bound import FEASIBLE
 from .gradients import Model, Point
-from .problem import Problem, SearchRun
+from .problem import Evaluation, Problem, SearchRun
 
 GRADIENT = {"SLSQP": nlopt.LD_SLSQP, "MMA": nlopt.LD_MMA, "CCSAQ": nlopt.LD_CCSAQ}
 """Gradient algorithms of nlopt that take inequality constraints, for the epigraph form."""
@@ -94,6 +94,24 @@ def search_from(
     return run
 
 
+def smooth_evaluation(problem: Problem, x: FloatArray) -> Evaluation:
+    """Return one design's objective, sensitivities and violation before clipping and quantization.
+
+    Parameters
+    ----------
+    problem : Problem
+        Search problem.
+    x : ndarray of shape (n_parameters,)
+        Parameters.
+
+    Returns
+    -------
+    Evaluation
+        Values.
+    """
+    return Model(problem, SearchRun(0), 1).at(problem.to_unit(x)).evaluation
+
+
 def smooth_objective(problem: Problem, x: FloatArray) -> float:
     """Return the objective of one design before clipping and quantization.
 
@@ -109,7 +127,7 @@ def smooth_objective(problem: Problem, x: FloatArray) -> float:
     float
         Objective.
     """
-    return Model(problem, SearchRun(0), 1).at(problem.to_unit(x)).evaluation.objective
+    return smooth_evaluation(problem, x).objective
 
 
 def _epigraph(

@@ -342,7 +342,7 @@ class Study:
             user_metrics=self.user_metrics,
             seed=self.section.seed,
             vision=self.images,
-            others=tuple(self.setup(search.space, name) for name in search.scenarios[1:]),
+            others=tuple((self.setup(search.space, name), search.space.filter.family) for name in search.scenarios[1:]),
         )
 
     @property

@@ -40,7 +40,13 @@ def hdr_problem(objective: Objective, intensities_cd: list[float], target: bool 
     light = SCENE | ({"target": {"distance_m": 30, "fov_deg": 60, "phase_px": [0.3, 0.1]}} if target else {})
     scenes = [Scene.model_validate(light | {"intensity_cd": cd}) for cd in intensities_cd]
     setups = [replace(problem.setup, scene=scene).with_camera(pixel=Pixel(**given)) for scene in scenes]
-    return replace(problem, setup=setups[0], others=tuple(setups[1:]), states=STATES, objective=objective)
+    return replace(
+        problem,
+        setup=setups[0],
+        others=tuple((one, problem.family) for one in setups[1:]),
+        states=STATES,
+        objective=objective,
+    )
 
 
 @pytest.mark.parametrize("pixel", [{}, WEIGHTED, OWN_QE, {"target": True}], ids=["split", "weighted", "own QE", "lamp"])
@@ -64,7 +70,7 @@ def test_merged_noise_is_that_of_the_readout(pixel: dict[str, Any]) -> None:
     """Mean to 1/200 of the noise and variance to 0.3 %, or to rounding."""
     problem = hdr_problem(CHROMATIC, [0.5, 4.5, 16.0, 17.0, 90.0, 500.0, 5000.0], **pixel)
     x = problem.from_unit(np.array([0.41, 0.33, 0.57, 0.62]))
-    for setup in (problem.setup, *problem.others):
+    for setup, _ in problem.scenes:
         design = SmoothDesign(linear_model(setup), problem.family, x, problem.free, np.ones(4))
         mean, variance, *_ = design.noisy
         read = ForwardModel(setup).read_with_noise(problem.family.curves(x[None]))

@@ -143,8 +143,8 @@ def run(
     If one study cannot be run, the others are.
     """
     from ...run import RunOptions
-    from ...study import several_in
-    from ..run import run_one, run_several
+    from ...study import load_study, several_in
+    from ..run import SeveralOptions, run_one, run_several
 
     with_options = partial(
         run_one,
@@ -172,7 +172,9 @@ def run(
             if several is None:
                 facts = run_it()
             else:
-                facts = run_several(several, run_it, output=output, as_json=as_json, quiet=quiet, dry_run=dry_run)
+                load = partial(load_study, path, data, changes=changes_of(changes), allow_code=allow_code)
+                how = SeveralOptions(output, jobs, dry_run, as_json, quiet)
+                facts = run_several(several, run_it, load, how)
         except InterruptedRunError:
             raise
         except SweepError as error:  # the others are run all the same

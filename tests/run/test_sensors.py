@@ -1,0 +1,312 @@
+"""Several sensors and lights in one study, measured curves, and curves that are not known exactly."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.special import ndtr
+
+from sweep.base.errors import StudyError
+from sweep.camera.curve_errors import CurveErrors, drawn_curves
+from sweep.camera.sensor import BUILT_IN_SENSORS
+from sweep.search.limit import limit_of
+from sweep.search.solver import smooth_evaluation
+from sweep.spectra.builtin.data_sets.tl16 import lights
+from sweep.spectra.builtin.measured_sets import LUXEON, SENSORS
+from sweep.spectra.spectrum import WavelengthGrid
+from sweep.study import Study, load_study, several_in
+
+from ..build import load, ran
+from ..commanded import commanded
+from ..conftest import MEASURED, STUDIES, draw_nothing
+
+GRID = WavelengthGrid(start_nm=400, stop_nm=664, step_nm=1)
+TILES = {"RGGB": ("R", "G", "G", "B"), "RCCB": ("R", "C", "C", "B"), "RYYCy": ("R", "Y", "Y", "Cy")}
+
+
+def own_csd(qe: np.ndarray, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Yellow/red CSD, DN, of a chart that is exposed for 95 % of the white patch, and mean QE of the tile, by own code.
+
+    `qe` has shape (n, n_channels, n_wavelengths); the signals have K times the photons of an equal-energy white in photons.
+    """
+    tl16 = lights(GRID)
+    light = np.array([tl16.photons[i] for i in range(len(tl16.names))])
+    response = qe @ (light / light.sum(axis=1, keepdims=True)).T  # [n, n_channels, n_signals]
+    white = qe.mean(axis=2).max(axis=1)
+    dn = 0.95 * 4095 * tl16.photon_ratio * response / white[:, None, None]
+    yellow, red = (dn[:, :, tl16.members[kind]] for kind in ("yellow", "red"))
+    apart = np.sqrt(((yellow[..., :, None] - red[..., None, :]) ** 2).sum(axis=1))
+    return apart.min(axis=(1, 2)), qe.mean(axis=2) @ counts / counts.sum()
+
+
+def raw_curves() -> dict[str, np.ndarray]:
+    """Curves of the file itself, each times the IR cut."""
+    raw = pd.read_csv(MEASURED / "qe_opencam.csv")
+    return {name: (raw[name] * raw["ir_cut"]).to_numpy() for name in ("R", "G", "B", "Y", "Cy")} | {
+        "C": (raw["W"] * raw["ir_cut"]).to_numpy()
+    }
+
+
+def opencam(**changes: str) -> Study:
+    study = load_study(STUDIES / "sensors.yaml", changes={"sensors": "[opencam]", "lights": "[tl16]"} | changes)
+    assert study.grid == GRID
+    return study
+
+
+def test_opencam_is_what_an_own_computation_says() -> None:
+    """CSDs and light of its plain CFAs to 1e-6, and the published bound: 319.7 DN."""
+    study, curves = opencam(), raw_curves()
+    for cfa, tile in TILES.items():
+        channels = dict.fromkeys(tile)
+        counts = np.array([tile.count(c) for c in channels], dtype=float)
+        (csd,), (light,) = own_csd(np.stack([curves[c] for c in channels])[None], counts)
+        (space,) = (one for one in study.spaces if one.name == cfa)
+        setup = study.setup(space, "chart")
+        from sweep.metrics.smooth import smooth_csd
+
+        found = smooth_csd(setup, np.empty((1, 0, GRID.size)), ("yellow", "red"))[0]
+        assert found == pytest.approx(csd, rel=1e-6), cfa
+        assert setup.camera.qe.sum(
+            axis=1
+        ) @ setup.camera.mosaic.counts / setup.camera.mosaic.counts.sum() == pytest.approx(light * GRID.size, rel=1e-6)
+    (rggb,), _ = own_csd(np.stack([curves[c] for c in "RGB"])[None], np.array([1.0, 2, 1]))
+    (ryycy,), _ = own_csd(np.stack([curves[c] for c in ("R", "Y", "Cy")])[None], np.array([1.0, 2, 1]))
+    assert ryycy / rggb == pytest.approx(0.42, abs=0.005)
+    assert limit_of(study.problem(study.search)).proven == pytest.approx(319.7, abs=0.05)
+
+
+def test_every_measured_set_has_its_source_and_its_curves() -> None:
+    readme = (MEASURED / "README.md").read_text()
+    for name, measured in (*SENSORS.items(), ("luxeon", LUXEON)):
+        assert measured.license == "MIT"
+        assert measured.source
+        assert f"`{name}`" in readme or f": {name}`" in readme
+        for file in measured.digests:
+            assert f"`{file}`" in readme
+    for name in SENSORS:
+        sensor = BUILT_IN_SENSORS[name](GRID)
+        assert not sensor.surrogate
+        assert sensor.qe[sensor.clear].sum() == pytest.approx(max(q.sum() for q in sensor.qe.values()), rel=0.02)
+
+
+ERRORS = CurveErrors(gain=0.05, shift_nm=2.0, noise=0.03, correlation_nm=30.0, ir_cut_nm=3.0, draws=2000)
+
+
+def own_draws(names: list[str], n: int, errors: CurveErrors, rng: np.random.Generator) -> np.ndarray:
+    """Curves of opencam as the errors allow, ndarray[n, n_names, n_wavelengths], without the package's code."""
+    raw = pd.read_csv(MEASURED / "qe_opencam.csv")
+    wave, cut = GRID.nodes_nm, np.maximum(raw["ir_cut"].to_numpy(), 1e-3)
+    moved = np.array([np.interp(wave - e, wave, cut) for e in errors.ir_cut_nm * rng.uniform(-1, 1, n)])
+    values, vectors = np.linalg.eigh(np.exp(-0.5 * ((wave[:, None] - wave) / errors.correlation_nm) ** 2))
+    root = vectors * np.sqrt(np.maximum(values, 0))
+    curves = []
+    for name in names:
+        dye = raw["W" if name == "C" else name].to_numpy() * raw["ir_cut"].to_numpy() / cut
+        shift = errors.shift_nm * rng.uniform(-1, 1, n)
+        noise = 1 + errors.noise * (2 * ndtr(rng.standard_normal((n, wave.size)) @ root.T) - 1)
+        gain = 1 + errors.gain * rng.uniform(-1, 1, (n, 1))
+        curves.append(np.array([np.interp(wave - s, wave, dye) for s in shift]) * noise * gain * moved)
+    return np.stack(curves, axis=1)
+
+
+def uncertain(folder: Path, errors: CurveErrors, cfas: str = "[RGGB, RYYCy]") -> pd.DataFrame:
+    keys = {name: f"{value}" for name, value in errors.model_dump().items()}
+    text = (
+        "study: uncertain\nsensor: opencam\nlights: tl16\nwavelengths: {stop_nm: 664}\n"
+        f"cfas: {cfas}\nuncertainty: {{{', '.join(f'{k}: {v}' for k, v in keys.items())}}}\n"
+    )
+    ran(load(folder, text), folder / "out", 1)
+    table = pd.read_parquet(folder / "out" / "uncertainty.parquet")
+    return table[table["quantity"] == "csd_yellow_red"].set_index("name")
+
+
+def test_quantiles_are_those_of_brute_force(tmp_path: Path) -> None:
+    """Of 18 quantiles by 20,000 draws of own code, 15 or more lie in the 95 % intervals, and all near them."""
+    found, rng, n = uncertain(tmp_path, ERRORS), np.random.default_rng(11), 20_000
+    names = ["R", "G", "B", "Y", "Cy"]
+    parts = [own_draws(names, 2000, ERRORS, rng) for _ in range(n // 2000)]
+    of = {"RGGB": ([0, 1, 2], [1.0, 2, 1]), "RYYCy": ([0, 3, 4], [1.0, 2, 1])}
+    csd, light = {}, {}
+    for cfa, (channels, counts) in of.items():
+        both = [own_csd(part[:, channels], np.array(counts)) for part in parts]
+        csd[cfa], light[cfa] = (np.concatenate(one) for one in zip(*both, strict=True))
+    drawn: list[tuple[str, str, np.ndarray]] = [(cfa, "dn", csd[cfa]) for cfa in of]
+    drawn += [("RYYCy", "ratio", csd["RYYCy"] / csd["RGGB"]), ("RYYCy", "light_ratio", light["RYYCy"] / light["RGGB"])]
+    inside = []
+    for cfa, what, values in drawn:
+        for share in (5, 50, 95):
+            own, row = np.quantile(values, share / 100), found.loc[cfa]
+            low, high = row[f"{what}_{share}_low"], row[f"{what}_{share}_high"]
+            inside.append(low <= own <= high)
+            assert low - (high - low) <= own <= high + (high - low), (cfa, what, share)
+    assert sum(inside) >= 0.8 * len(inside)
+    row = found.loc["RYYCy"]
+    assert row["ratio_sd"] == pytest.approx((csd["RYYCy"] / csd["RGGB"]).std(), rel=0.06)
+
+
+def test_no_sensor_is_below_the_worst_case(tmp_path: Path) -> None:
+    """With gains and noise alone: 2,000 random sensors, and each curve at the ends of both, which come near it."""
+    errors = ERRORS.model_copy(update={"shift_nm": 0.0, "ir_cut_nm": 0.0, "draws": 200})
+    found, rng = uncertain(tmp_path, errors), np.random.default_rng(2)
+    drawn = own_draws(["R", "G", "B"], 2000, errors, rng)
+    counts = np.array([1.0, 2, 1])
+    least = float(found.loc["RGGB", "at_least_dn"])
+    assert 0 < least <= own_csd(drawn, counts)[0].min()
+    curves, tl16 = np.stack([raw_curves()[c] for c in "RGB"]), lights(GRID)
+    lowest = np.inf
+    for yellow in tl16.members["yellow"]:
+        for red in tl16.members["red"]:
+            apart = tl16.photons[yellow] / tl16.photons[yellow].sum() - tl16.photons[red] / tl16.photons[red].sum()
+            against = np.sign(curves @ apart)[:, None] * np.sign(apart)
+            worst = curves * (1 - errors.noise * against) * (1 - errors.gain)
+            lowest = min(lowest, own_csd(worst[None], counts)[0][0])
+    assert least <= lowest
+    assert least > 0.5 * lowest
+    (tmp_path / "moved").mkdir()
+    assert np.isnan(uncertain(tmp_path / "moved", ERRORS.model_copy(update={"draws": 100}))["at_least_dn"]).all()
+
+
+def test_curves_are_the_same_for_every_design() -> None:
+    sensor = BUILT_IN_SENSORS["opencam"](GRID)
+    errors = ERRORS.model_copy(update={"draws": 100})
+    together = drawn_curves(sensor, GRID, ["R", "G", "Y"], errors, 1)
+    np.testing.assert_array_equal(together[:, 2], drawn_curves(sensor, GRID, ["Y"], errors, 1)[:, 0])
+    assert np.abs(together[:, 2] - drawn_curves(sensor, GRID, ["Y"], errors, 2)[:, 0]).max() > 0
+    nothing = drawn_curves(sensor, GRID, ["R"], CurveErrors(draws=100), 1)
+    np.testing.assert_allclose(nothing[:, 0], np.broadcast_to(sensor.qe["R"], nothing[:, 0].shape), rtol=1e-12)
+
+
+SEVERAL = """\
+study: few
+question: Does it hold?
+wavelengths: {step_nm: 5}
+sensors: [ar0820, opencam, ar0132at]
+lights: [tl16, luxeon]
+cfas:
+  RGGB:
+  RYNCy:
+  RGBN: {tile: [[R, G], [B, N]]}
+designs:
+  RYN4Cy: {cfa: RYNCy, channel: N, base: Y, to: G, at: RYN4Cy}
+boxes:
+  yellow:
+    cfa: RYNCy
+    channel: N
+    base: Y
+    to: G
+    box: &edges {left_nm: [570, 640], left_width_nm: 8, right_nm: [630, 700], right_width_nm: 8}
+  clear: {cfa: RGBN, channel: N, base: C, to: G, box: *edges}
+uncertainty: {gain: 0.03, draws: 200}
+constraints: {sensitivity: {min: 0.9}}
+search: {space: yellow, starts: 2, max_evaluations: 60}
+"""
+
+
+@pytest.fixture(scope="module")
+def several(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    folder = tmp_path_factory.mktemp("several")
+    (folder / "few.yaml").write_text(SEVERAL)
+    with pytest.MonkeyPatch.context() as patch:
+        draw_nothing(patch)
+        patch.setattr("sweep.report.sensors.rendered", lambda _, kind: kind.encode())
+        patch.setattr("sweep.report.sensors.inlined", lambda _: "data:image/png;base64,cG5n")
+        code, out, err = commanded("run", folder / "few.yaml", "--output", folder / "out", "--jobs", 1)
+    assert code == 0, err
+    return folder, out
+
+
+def test_one_table_has_all_sensors_and_lights(several: tuple[Path, str]) -> None:
+    folder, out = several
+    rows = pd.read_parquet(folder / "out" / "few" / "results.parquet")
+    pairs = [("ar0820", "tl16"), ("ar0820", "luxeon"), ("opencam", "tl16"), ("opencam", "luxeon")]
+    pairs += [("ar0132at", "tl16"), ("ar0132at", "luxeon")]
+    assert list(dict.fromkeys(zip(rows["sensor"], rows["lights"], strict=True))) == pairs
+    for (sensor, light), part in rows.groupby(["sensor", "lights"], sort=False):
+        alone = pd.read_parquet(folder / "out" / "few" / f"{sensor}_{light}" / "results.parquet")
+        np.testing.assert_array_equal(part["csd_yellow_red"], alone["csd_yellow_red"])
+        found = part[part["kind"] == "search"].iloc[0]
+        assert found["cfa"] == ("RGBN" if sensor == "ar0132at" else "RYNCy")
+    assert "Note: ar0132at tl16: without RYNCy, RYN4Cy, yellow, whose curves ar0132at does not have." in out
+    assert "Note: ar0132at tl16: the search is of clear." in out
+    assert "Note: opencam luxeon: curves from 400 to 660 nm." in out
+    page = (folder / "out" / "few" / "report.html").read_text()
+    assert "Does it hold?" in page
+    assert 'href="opencam_tl16/report.html"' in page
+    found = rows[rows["kind"] == "search"].set_index(["sensor", "lights"])["csd_yellow_red"]
+    rggb = rows[rows["name"] == "RGGB"].set_index(["sensor", "lights"])["csd_yellow_red"]
+    ratio = (found / rggb).loc[["ar0820", "opencam"]]
+    assert f"has {ratio.min():.2f} to {ratio.max():.2f} times the yellow/red CSD of RGGB" in out.splitlines()[0]
+
+
+def test_filters_for_several_sensors_are_the_worst_on_them(several: tuple[Path, str]) -> None:
+    folder, _ = several
+    table = pd.read_parquet(folder / "out" / "few" / "all_sensors.parquet")
+    assert set(table["designed_on"]) == {"all sensors", "all but ar0820", "all but opencam"}
+    assert set(table["space"]) == {"yellow"}
+    worst = table[~table["judged"]].groupby("designed_on")["objective"].min()
+    members = {f"{m.sensor} {m.lights}": m for m in several_in(folder / "few.yaml").members}
+    for row in table.to_dict("records"):
+        study = load_study(folder / "few.yaml", member=members[f"{row['sensor']} {row['lights']}"])
+        values = dict(part.rsplit(" ", 1) for part in row["parameters"].split(", "))
+        x = np.array([float(values[name]) for name in study.search.space.parameters])
+        here = smooth_evaluation(study.problem(study.search), x)
+        assert here.objective == pytest.approx(row["objective"], rel=2e-3)
+        assert here.sensitivity == pytest.approx(row["sensitivity"], abs=2e-3)
+        if not row["judged"]:
+            assert row["violation"] == 0
+            assert row["sensitivity"] >= 0.9 - 1e-6
+            assert row["objective"] <= row["own_best"] * 1.02  # its search may end elsewhere
+    # What is designed on more sensors is no better on the worst of fewer.
+    of_fewer = table[table["sensor"] == "opencam"].set_index("designed_on")["objective"].groupby(level=0).min()
+    assert of_fewer["all but ar0820"] >= of_fewer["all sensors"] * 0.98
+    assert worst["all sensors"] <= worst.max()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line"),
+    [
+        (
+            "[ar0820, opencam, ar0132at]",
+            "[ar0820, opencm]",
+            "few.yaml:4: sensor: unknown built-in sensor (got 'opencm')",
+        ),
+        ("[ar0820, opencam, ar0132at]", "[ar0820, ar0820]", "few.yaml:4: sensors: one is named twice"),
+        ("[ar0820, opencam, ar0132at]", "[]", "few.yaml:4: sensors: an empty list"),
+        ("sensors: [ar0820", "sensor: ar0820\nsensors: [ar0820", "sensors: beside `sensor`; allowed: one of both"),
+        (
+            "{cfa: RYNCy, channel: N, base: Y, to: G, at",
+            "{cfa: RYNcy, channel: N, base: Y, to: G, at",
+            "did you mean 'RYNCy'",
+        ),
+        ("base: C, to: G, box", "base: CC, to: G, box", "boxes.clear.base"),
+    ],
+)
+def test_a_mistake_is_one_line(tmp_path: Path, old: str, new: str, line: str) -> None:
+    assert old in SEVERAL
+    path = tmp_path / "few.yaml"
+    path.write_text(SEVERAL.replace(old, new))
+    code, _, err = commanded("run", path, "--output", tmp_path / "out", "--jobs", 1, "--quiet")
+    assert code == 2
+    assert line in err
+    assert "Traceback" not in err
+
+
+def test_other_commands_say_how_to_choose_one(tmp_path: Path) -> None:
+    path = tmp_path / "few.yaml"
+    path.write_text(SEVERAL)
+    with pytest.raises(StudyError, match=r"--set sensors=\[ar0820\] --set lights=tl16"):
+        load_study(path)
+    chosen: dict[str, Any] = {"sensors": "[opencam]", "lights": "tl16"}
+    study = load_study(path, changes=chosen)
+    assert study.name == "opencam tl16"
+    assert study.grid.stop_nm == 660
+    code, out, _ = commanded("check", path)
+    assert code == 0
+    assert len([line for line in out.splitlines() if "nothing wrong found" in line]) == 6
+    code, _, err = commanded("plan", path)
+    assert code == 2
+    assert "a study of several sensors or lights" in err
