@@ -255,8 +255,9 @@ def readings_of(pixel: Pixel, light: tuple[float, ...]) -> Readings:
         entries.append((rows, bins.number(value_e), shares))
         if limit is not None:
             passed[number + 1 :, exposure[number]] *= share_beyond(counts, capture, limit)
-    first = min(0, *(int(of_bins.min()) for _, of_bins, _ in entries))
-    n_bins = max(int(of_bins.max()) for _, of_bins, _ in entries) - first + 1
+    occurring = np.concatenate([of_bins for _, of_bins, _ in entries])  # a capture may never be usable
+    first = min(0, int(occurring.min()))
+    n_bins = int(occurring.max()) - first + 1
     summed = [csr_matrix((shares, (rows, at - first)), shape=(n_counts, n_bins)) for rows, at, shares in entries]
     ends = np.concatenate([[0], np.cumsum([matrix.nnz for matrix in summed])])
     starts = np.stack([matrix.indptr + end for matrix, end in zip(summed, ends[:-1], strict=True)]).astype(np.intp)

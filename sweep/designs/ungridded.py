@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -58,6 +59,30 @@ class PairedDesigns:
         return np.stack(columns, axis=1).astype(float)
 
 
+def sobol_points(dimensions: int, count: int, seed: int) -> FloatArray:
+    """Return the first points of a scrambled Sobol sequence.
+
+    Parameters
+    ----------
+    dimensions, count : int
+        Numbers of dimensions and points.
+    seed : int
+        Seed.
+
+    Returns
+    -------
+    ndarray of shape (count, dimensions)
+        Points in the unit cube.
+    """
+    from scipy.stats import qmc  # noqa: PLC0415  (slow to import; only drawn designs and searches need it)
+
+    # In a thread of its own, which takes no signals: SciPy prints a traceback if Ctrl-C reaches it while it reads its
+    # direction numbers, and goes on.
+    with ThreadPoolExecutor(1) as thread:
+        sobol = thread.submit(qmc.Sobol, dimensions, scramble=True, rng=np.random.default_rng(seed)).result()
+    return np.asarray(sobol.random_base2(max(1, (count - 1).bit_length()))[:count], dtype=float)
+
+
 @dataclass(frozen=True)
 class SampledDesigns:
     """Designs between the smallest and largest value of every axis, by SciPy's `qmc`.
@@ -85,13 +110,12 @@ class SampledDesigns:
 
     def _shares(self, n_parameters: int) -> FloatArray:
         """Return points of the unit cube, ndarray of shape (size, n_parameters)."""
+        if self.method == "sobol":
+            return sobol_points(n_parameters, self.size, self.seed)
         from scipy.stats import qmc  # noqa: PLC0415  (slow to import; only a study that draws designs needs it)
 
         random = np.random.default_rng(self.seed)
-        if self.method == "lhs":
-            return np.asarray(qmc.LatinHypercube(d=n_parameters, rng=random).random(self.size), dtype=float)
-        sobol = qmc.Sobol(d=n_parameters, scramble=True, rng=random)
-        return np.asarray(sobol.random_base2(max(1, (self.size - 1).bit_length()))[: self.size], dtype=float)
+        return np.asarray(qmc.LatinHypercube(d=n_parameters, rng=random).random(self.size), dtype=float)
 
 
 _drawn: Cache[tuple[SampledDesigns, int], FloatArray] = Cache(_KEPT)

@@ -11,6 +11,7 @@ from ..base.types import FloatArray, IndexArray
 from ..camera.setup import Setup
 from ..designs.family import Family
 from ..designs.tolerance import AS_DESIGNED, NONE, ProductionError, Tolerance
+from ..designs.ungridded import sobol_points
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.objective import Objective
 from ..metrics.quantity import DN, OF_A_SHARE, WORST_CASE, Quantity, RequestedQuantities
@@ -303,12 +304,9 @@ def starting_points(problem: Problem, starts: int, seed: int) -> FloatArray:
     ndarray of shape (starts, n_free)
         Points in units of the box.
     """
-    from scipy.stats import qmc  # noqa: PLC0415  (slow to import; only a search draws points)
-
     free = problem.free
     dimensions = problem.family.start_dimensions or max(1, free.size)
-    sobol = qmc.Sobol(d=dimensions, scramble=True, rng=np.random.default_rng(seed))
-    points = np.asarray(sobol.random_base2(int(np.ceil(np.log2(max(2, starts)))))[:starts], dtype=float)
+    points = sobol_points(dimensions, starts, seed)
     if problem.family.start_dimensions is None:
         return points[:, : free.size]
     return problem.to_unit(problem.family.start(points))
