@@ -121,7 +121,8 @@ def finished(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Finish
                 with pytest.MonkeyPatch.context() as patch:
                     if name not in LOOKED_AT:
                         patch.setattr("sweep.report.figures.rendered", lambda _, kind: kind.encode())
-                        patch.setattr("sweep.report.page.inlined", lambda _: "data:image/png;base64,cG5n")
+                        for module in ("page", "sensors"):
+                            patch.setattr(f"sweep.report.{module}.inlined", lambda _: "data:image/png;base64,cG5n")
                     code, out, err = commanded("run", study, "--output", outputs, "--jobs", 1)
                 assert code == 0, err
                 said.write_text(out)
@@ -157,7 +158,8 @@ def draw_nothing(patch: pytest.MonkeyPatch) -> None:
     names = ("pareto", "sensor", "signals", "chart")
     patch.setattr("sweep.report.page._drawings", lambda _: ((name, name, None) for name in names))
     patch.setattr("sweep.report.page.pictures_of", lambda _, kinds: {kind: kind.encode() for kind in kinds})
-    patch.setattr("sweep.report.page.inlined", lambda _: "data:image/png;base64,cG5n")
+    for module in ("page", "sensors"):
+        patch.setattr(f"sweep.report.{module}.inlined", lambda _: "data:image/png;base64,cG5n")
     patch.setattr("sweep.cli.describe._png", lambda *_: b"sweep describe")
 
 

@@ -25,6 +25,7 @@ PICTURES = {
     "rccb": "pareto",
     "balanced": "figures/scorecard",
     "measured": "cfas",
+    "sensors": "sensors",
     "paper": "cfas",
     "scorecard": "figures/scorecard",
     "distance": "figures/series-1",

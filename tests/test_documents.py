@@ -124,15 +124,18 @@ FIGURES_OF_ACCURACY: dict[str, tuple[str, int, str]] = {
 """Figures of the README -> preset of `make accuracy`, digits and form of its largest error of any CSD, rounded up."""
 CHROMATIC = ("RYN4Cy stays below RGGB (122 DN to 138 DN)", "finds 197 DN", "is 226.0 DN")
 """Figures of the README that `test_the_chromatic_figures_of_the_readme_are_those_of_their_command` compares."""
+OF_SENSORS = ("On 2 of the 2 sensors", "1.19 to 1.68", "1.45 to 1.68", "0.75 to 0.96", "1.34 to 1.36")
+"""Figures of the README that `test_the_figures_of_several_sensors_are_those_of_their_command` compares."""
 NO_RESULTS = ("Python 3.11", "cos^4", "EN 12368", "RYN4Cy", "f/2", "(`fast`) to seven (`standard`) to 35 (`reference`)")
 """Numbers of the README's prose that are no results."""
 
 
 def test_every_figure_of_the_readme_has_its_command() -> None:
     text = " ".join(prose(README).split())
-    for known in (*FIGURES, *FIGURES_AT_AN_ANGLE, *FIGURES_OF_ACCURACY, *CHROMATIC):
+    results = (*FIGURES, *FIGURES_AT_AN_ANGLE, *FIGURES_OF_ACCURACY, *CHROMATIC, *OF_SENSORS)
+    for known in results:
         assert known in text
-    for known in (*FIGURES, *FIGURES_AT_AN_ANGLE, *FIGURES_OF_ACCURACY, *CHROMATIC, *NO_RESULTS):
+    for known in (*results, *NO_RESULTS):
         text = text.replace(known, "")
     assert re.findall(r"\S*\d\S*", text) == []
 
@@ -411,3 +414,35 @@ def test_the_figures_of_hdr_pixels_are_those_of_their_commands(
     commanded("run", STUDIES / "flicker.yaml", "--output", tmp_path, *changed)  # 5: its check finds a difference
     seen = pd.read_parquet(tmp_path / "flicker" / "results.parquet")["lamp_seen"].min()
     assert f"in as few as {100 * seen:.1f} % of the phases" in text
+
+
+@pytest.mark.slow
+def test_the_figures_of_several_sensors_are_those_of_their_command(finished: FinishedFolder) -> None:
+    folder = finished("sensors")
+    rows = pd.read_parquet(folder / "results.parquet").set_index(["sensor", "lights"])
+    rggb, cells = rows[rows["name"] == "RGGB"], {}
+    guide, readme = (STUDIES / "guide" / "12-sensors.md").read_text(), " ".join(README.split())
+    for (name, cfa), some in rows[rows["name"] != "RGGB"].groupby(["name", "cfa"], sort=False):
+        ratios = [some[column] / rggb[column].loc[some.index] for column in ("csd_yellow_red", "cfa_sensitivity")]
+        spans = [f"{ratio.min():.2f} to {ratio.max():.2f}" for ratio in ratios]
+        n_sensors, more = some.index.get_level_values(0).nunique(), int(((ratios[0] > 1) & (ratios[1] > 1)).sum())
+        who = f"{name} of {cfa}" if name == "best stopband" else name
+        cells[who] = [str(n_sensors), str(len(some)), *spans, f"{more} of {len(some)}"]
+    assert table_below(guide, "| | sensors | pairs with lights |") == cells
+    yellow, clear = cells["best stopband of RYNCy"], cells["best stopband of RGBN"]
+    assert yellow[4] == f"{yellow[1]} of {yellow[1]}"
+    assert f"On {yellow[0]} of the {yellow[0]} sensors here that have yellow pixels" in readme
+    assert f"{yellow[2]} times RGGB's separation at {yellow[3]} times its light" in readme
+    assert f"{clear[2]} times the separation at {clear[3]} times the light" in readme
+    finding = FINDINGS["sensors"]
+    assert f"{yellow[2]} times RGGB's separation at {yellow[3]} times its light" in finding
+    assert f"none of 2: {clear[2]} times" in finding
+    for sensor, lights in list(rows.index.unique())[:4]:
+        known = pd.read_parquet(folder / f"{sensor}_{lights}" / "uncertainty.parquet")
+        best = known[(known["name"] == "best stopband") & (known["quantity"] == "csd_yellow_red")].iloc[0]
+        assert best["ratio_5"] > 1
+        assert best["light_ratio_5"] > 1
+    together = pd.read_parquet(folder / "all_sensors.parquet").query(
+        "designed_on == 'all sensors' and space == 'yellow'"
+    )
+    assert f"keeps {(together['objective'] / together['own_best']).min():.0%}".replace("%", " %") in guide

@@ -17,7 +17,7 @@ from ..spectra.builtin.measured_sets import LUXEON, SENSORS, MeasuredSet
 from ..spectra.builtin.registry import BUILT_IN_LIGHTS
 from ..spectra.builtin.spectra import cards
 from ..spectra.builtin.surrogate_spectra import surrogate_cards
-from ..study import Study, folder_name, load_study
+from ..study import Member, Study, folder_name, load_study, several_in
 
 _QUESTION_LETTERS = 70
 
@@ -112,16 +112,23 @@ def list_facts(studies: list[StudyListing]) -> dict[str, Any]:
 
 def _listed(path: Path, outputs: Path, data: Path | None) -> StudyListing:
     try:
-        study = load_study(path, data)
-        state = _state(study, outputs)
+        several = several_in(path)
+        members: tuple[Member | None, ...] = (None,) if several is None else several.members
+        studies = [load_study(path, data, member=member) for member in members]
+        if several is None:
+            stated, state = studies[0].name, _state(studies[0], outputs)
+        else:
+            stated, folder = several.name, outputs / folder_name(several.name)
+            runs = [run_in(output_folder(folder / folder_name(one.name), one)[0]) for one in studies]
+            state = f"{sum(run is not None and run.finished for run in runs)} of {len(runs)} runs finished"
     except SweepError as error:
         more = f" (and {len(error.issues) - 1} more)" if error.issues[1:] else ""
         return StudyListing(path.stem, None, "cannot be loaded", f"{error.issues[0]}{more}")
-    name = path.stem if study.name == path.stem else f"{path.stem} ({study.name})"
-    question = " ".join(study.section.question.split())
+    name = path.stem if stated == path.stem else f"{path.stem} ({stated})"
+    question = " ".join(studies[0].section.question.split())
     if len(question) > _QUESTION_LETTERS:
         question = question[: _QUESTION_LETTERS - 3].rstrip() + "..."
-    return StudyListing(" ".join(name.split()), study.n_designs, state, question)
+    return StudyListing(" ".join(name.split()), sum(one.n_designs for one in studies), state, question)
 
 
 def _state(study: Study, outputs: Path) -> str:

@@ -30,6 +30,7 @@ from .terms import (
     technology_of,
     unknown_lines,
 )
+from .uncertain import uncertain_lines
 
 _MOST_ANSWERS = 2
 """Lines above the first plot where scenarios that differ in one number are compared."""
@@ -72,6 +73,7 @@ def answer_parts(output: Output) -> tuple[list[str], list[str]]:
         Other lines.
     """
     answer, further = _of_designs(output)
+    further = [*uncertain_lines(output), *further]
     if output.study.vision is None:
         return answer, further
     from .vision_report import vision_sentences  # noqa: PLC0415  (only where a study asks for images)

@@ -149,9 +149,7 @@ def _answer(figures: pd.DataFrame, words: str) -> Iterator[str]:
         )
         if "ratio_5" in some and holds.any():
             sure = int(((some["ratio_5"] > 1) & (some["light_ratio_5"] > 1)).sum())
-            text += (
-                f", and with uncertain curves in 19 of 20 random sensors for {sure} of these {int(holds.sum())} pairs"
-            )
+            text += f", by the 5 % quantiles of both over random sensors on {sure} of these {int(holds.sum())}"
         yield f"{text}."
 
 

@@ -48,6 +48,8 @@ def study_schema() -> Json:
         if "const" in section.get("properties", {}).get("kind", {}):
             section["required"] = ["kind", *section.get("required", [])]
     _loosen_each(sections)
+    schema["required"].remove("sensor")  # or `sensors`
+    schema["anyOf"] = [{"required": ["sensor"]}, {"required": ["sensors"]}]
     # Editors know this dialect; nothing in the schema needs a later one.
     return {"$schema": "http://json-schema.org/draft-07/schema#", "title": TITLE} | schema | {"title": TITLE}
 

@@ -61,7 +61,6 @@ def test_an_installed_copy_has_every_file_of_the_studies() -> None:
         files = {path for pattern in patterns for path in STUDIES.parent.glob(pattern)}
         assert {path.parent for path in files} == {inside}
         assert files >= {*inside.glob("*.yaml"), *inside.glob("*.csv")}
-    assert str(shared / "studies" / "data") in project["tool"]["setuptools"]["data-files"]
 
 
 def test_a_changed_key_is_checked_like_the_file_and_kept(tmp_path: Path) -> None:

@@ -213,7 +213,6 @@ def several(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     with pytest.MonkeyPatch.context() as patch:
         draw_nothing(patch)
         patch.setattr("sweep.report.sensors.rendered", lambda _, kind: kind.encode())
-        patch.setattr("sweep.report.sensors.inlined", lambda _: "data:image/png;base64,cG5n")
         code, out, err = commanded("run", folder / "few.yaml", "--output", folder / "out", "--jobs", 1)
     assert code == 0, err
     return folder, out

@@ -61,8 +61,8 @@ def test_the_measured_study_loads() -> None:
         (
             "search:\n",
             "serach:\n",
-            "tiny.yaml:20: serach: unknown key; allowed: study, question, seed, wavelengths, sensor, pixel, lights, "
-            "scenarios, tolerance_dn, accuracy, geometry, cfas, colorants, designs, sweeps, boxes, production, population, regions, recognition, tasks, vision, metrics, effects, objective, constraints, search, validate, published; did you mean 'search'?",
+            "tiny.yaml:20: serach: unknown key; allowed: study, question, seed, wavelengths, sensor, sensors, pixel, lights, "
+            "scenarios, tolerance_dn, accuracy, geometry, cfas, colorants, designs, sweeps, boxes, production, population, uncertainty, regions, recognition, tasks, vision, metrics, effects, objective, constraints, search, validate, published; did you mean 'search'?",
         ),
         (
             "min: 590, max: 610",
@@ -90,7 +90,7 @@ def test_the_measured_study_loads() -> None:
         (
             "sensor: ar0820",
             "sensor: ar0280",
-            "tiny.yaml:2: sensor: unknown built-in sensor (got 'ar0280'); allowed: ar0820, or a mapping with `files`; "
+            "tiny.yaml:2: sensor: unknown built-in sensor (got 'ar0280'); allowed: ar0820, opencam, ar0132at, mt9v024, or a mapping with `files`; "
             "did you mean 'ar0820'?",
         ),
         (

@@ -6,16 +6,18 @@ import math
 import time
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ...base.errors import InterruptedRunError, StudyError, SweepError, ValidationIssue
 from ...spectra import LightUnit
-from ...study import Member
 from ..endings import print_issues
 from ..options import OF_STUDIES, AllowCode, Changes, DataFolder, Outputs, StudyPath, StudyPaths, changes_of
 from ..output import Json, Quiet, print_result
+
+if TYPE_CHECKING:
+    from ...study import Member
 
 PANEL = OF_STUDIES
 
