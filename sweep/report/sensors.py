@@ -81,7 +81,10 @@ def report_sensors(
     images = {kind: rendered(drawn, kind) for kind in ("png", "svg")}
     for kind, image in images.items():
         write_bytes(image, folder / f"{PICTURE}.{kind}")
-    lines = [*_answer(figures, outputs[0][1].trade_off[0].words)]
+    words, summary = outputs[0][1].trade_off[0].words, _summary(figures)
+    n_found = figures.loc[figures["kind"] == FOUND, "cfa"].nunique()
+    lines = [*_answer(summary, n_found, str(figures["reference"].iloc[0]), words)]
+    answer = lines[: max(n_found, 1)]
     if together is not None:
         sink = pa.BufferOutputStream()
         pq.write_table(together, sink)
@@ -93,7 +96,9 @@ def report_sensors(
         "sensors.html.j2",
         title=name,
         question=question,
-        lines=lines,
+        answer=answer,
+        further=lines[len(answer) :],
+        summary=rows(summary),
         image=inlined(images["png"]),
         table=rows(_shown(figures)),
         together=[] if together is None else rows(together.to_pandas()),
@@ -116,6 +121,7 @@ def _figures(member: Member, output: Output) -> Iterator[dict[str, Any]]:
             "sensor": member.sensor,
             "lights": member.lights,
             "name": str(row["name"]),
+            "design": f"{row['name']} of {row['cfa']}" if row["kind"] == FOUND else str(row["name"]),
             "cfa": str(row["cfa"]),
             "kind": str(row["kind"]),
             "reference": str(reference["name"]),
@@ -136,46 +142,58 @@ def _uncertain(output: Output, separation: str) -> Mapping[Any, Mapping[str, flo
     return {key: {str(n): float(v) for n, v in row.items()} for key, row in known[names].iterrows()}
 
 
-def _answer(figures: pd.DataFrame, words: str) -> Iterator[str]:
-    """Yield on how many sensors the searched design of each CFA, then each named one, separates more at more light."""
-    found = figures[figures["kind"] == FOUND]
-    others = figures[(figures["kind"] != FOUND) & (figures["name"] != figures["reference"])]
-    designs = [(f"the {name} of {cfa}", some) for (name, cfa), some in found.groupby(["name", "cfa"], sort=False)]
-    for who, some in [*designs, *others.groupby("name", sort=False)]:
-        reference, holds = some["reference"].iloc[0], (some["ratio"] > 1) & (some["light_ratio"] > 1)
-        text = (
-            f"On {_sensors(some)}, {who} has {_span(some['ratio'])} times the {words} of {reference} at "
-            f"{_span(some['light_ratio'])} times its light; more of both on {_sensors(some[holds])}"
-        )
-        if "ratio_5" in some and holds.any():
+def _summary(figures: pd.DataFrame) -> pd.DataFrame:
+    """Return a row per design, the searched ones first: ranges of both ratios, and where both are above 1."""
+    figures, rows_of = figures.assign(last=figures["kind"] != FOUND).sort_values("last", kind="stable"), []
+    for design, some in figures[figures["name"] != figures["reference"]].groupby("design", sort=False):
+        more = (some["ratio"] > 1) & (some["light_ratio"] > 1)
+        row = {
+            "design": design,
+            "sensors": some["sensor"].nunique(),
+            "with lights": len(some),
+            "separation": _span(some["ratio"]),
+            "light": _span(some["light_ratio"]),
+            "more of both": f"{int(more.sum())} of {len(some)}",
+        }
+        if "ratio_5" in some:
             sure = int(((some["ratio_5"] > 1) & (some["light_ratio_5"] > 1)).sum())
-            text += f", by the 5 % quantiles of both over random sensors on {sure} of these {int(holds.sum())}"
-        yield f"{text}."
+            row["by 5 % quantiles"] = f"{sure} of {len(some)}"
+        rows_of.append(row)
+    return pd.DataFrame(rows_of)
 
 
-def _sensors(some: pd.DataFrame) -> str:
-    """Return how many sensors rows are of, and how many pairs of sensor and lights."""
-    if some.empty:
-        return "none"
-    n = some["sensor"].nunique()
-    return f"{n} sensor{'s' * (n > 1)} ({len(some)} pair{'s' * (len(some) > 1)} with lights)"
+def _answer(summary: pd.DataFrame, n_found: int, reference: str, words: str) -> Iterator[str]:
+    """Yield on how many sensors the searched designs separate more at more light, and a line on all others."""
+    rows_of = summary.to_dict("records")
+    for row in rows_of[:n_found]:
+        text = (
+            f"The {row['design']} has {row['separation']} times the {words} of {reference} at {row['light']} times its "
+            f"light, on {row['sensors']} sensor{'s' * (row['sensors'] > 1)} ({row['with lights']} pairs with lights): "
+            f"more of both on {row['more of both']}"
+        )
+        yield (
+            f"{text}, by the 5 % quantiles of random sensors on {row['by 5 % quantiles']}."
+            if ("by 5 % quantiles" in row)
+            else f"{text}."
+        )
+    others = [f"{r['design']} {r['separation']} at {r['light']} ({r['more of both']})" for r in rows_of[n_found:]]
+    if others:
+        yield f"Others: {', '.join(others)}."
 
 
 def _together(table: pd.DataFrame, goal: Column) -> Iterator[str]:
-    """Yield how a filter for all sensors does on each, and one that was designed without a sensor on that one."""
-    for (designed_on, space), filters in table.groupby(["designed_on", "space"], sort=False):
-        shown = filters if designed_on == ALL else filters[filters["judged"]]
-        kept, least = shown["objective"] / shown["own_best"], shown["objective"].min()
-        what = f"One {space} filter for all sensors" if designed_on == ALL else f"A {space} filter for {designed_on}"
-        where = "" if designed_on == ALL else " on that one"
-        text = (
-            f"{what} ({shown['parameters'].iloc[0]}) has {goal.formatted(least)} or more{where}, "
-            f"{kept.min():.0%} to {kept.max():.0%} of the {goal.words} of the best alone"
-        )
-        broken = shown[shown["violation"] > 0]
-        if len(broken):
-            text += f"; there it breaks a constraint by up to {broken['violation'].max():.2g} of its bound"
-        yield f"{text}."
+    """Yield how much of the best of each sensor a filter for all keeps, and one that was designed without a sensor."""
+    for space in dict.fromkeys(table["space"]):
+        parts, of_space = [], table[table["space"] == space]
+        for designed_on in dict.fromkeys(of_space["designed_on"]):
+            filters = of_space[of_space["designed_on"] == designed_on]
+            shown = filters if designed_on == ALL else filters[filters["judged"]]
+            kept, broken = shown["objective"] / shown["own_best"], float(shown["violation"].max())
+            what = f"one {space} filter for {designed_on}" if designed_on == ALL else f"one for {designed_on}"
+            text = f"{what} keeps {kept.min():.0%} to {kept.max():.0%}"
+            text += " on that one" * (designed_on != ALL)
+            parts.append(text + (f" and breaks a constraint by {broken:.2g} of its bound" if broken else ""))
+        yield f"Of the best {goal.words} of each sensor and lights: {'; '.join(parts)}."
 
 
 def _span(values: pd.Series[float]) -> str:
@@ -186,8 +204,8 @@ def _span(values: pd.Series[float]) -> str:
 
 def _notes(outputs: Sequence[tuple[Member, Output]]) -> Iterator[str]:
     """Yield what was left out, and which curves are modeled."""
-    for member, output in outputs:
-        yield from (f"Note: {w}." for w in output.provenance.warnings if w.startswith(f"{member.name}: "))
+    warnings = [(member, warning) for member, output in outputs for warning in output.provenance.warnings]
+    yield from dict.fromkeys(f"Note: {one}." for member, one in warnings if one.startswith(f"{member.sensor}: "))
     origins = [one for _, output in outputs for one in (output.provenance.sensor, output.provenance.lights)]
     modeled = dict.fromkeys(one.name for one in origins if one.surrogate)
     if modeled:
@@ -235,10 +253,10 @@ def draw_sensors(figures: pd.DataFrame, words: str) -> Figure:
 
     drawn, axes = canvas(9.0, 5.6)
     figures = figures[figures["name"] != figures["reference"]]
-    names = [*dict.fromkeys(figures["name"])]
+    names = [*dict.fromkeys(figures["design"])]
     pairs = [*dict.fromkeys(zip(figures["sensor"], figures["lights"], strict=True))]
     for row in figures.to_dict("records"):
-        color = CURVE_CYCLE[names.index(row["name"]) % len(CURVE_CYCLE)]
+        color = CURVE_CYCLE[names.index(row["design"]) % len(CURVE_CYCLE)]
         marker = _MARKERS[pairs.index((row["sensor"], row["lights"])) % len(_MARKERS)]
         axes.plot(row["light_ratio"], row["ratio"], marker, color=color, markersize=6, markeredgecolor="white")
         if row.get("ratio_sd", 0) > 0:

@@ -13,7 +13,7 @@ from .goals import check_goals, check_searched, search_of
 from .lights import check_luminances, check_range, held_out_lights, lights_of, with_light_files, with_population
 from .model import Study, requested_quantities
 from .schema import CfaSection, StudySection
-from .sensors import check_lenses, sensor_of, with_chief_rays, with_technologies
+from .sensors import check_lenses, check_uncertainty, sensor_of, with_chief_rays, with_technologies
 from .sources import Sources
 from .spaces import SpaceBuilder, check_cfas
 from .user_code import check_names, try_effects, try_metrics, user_effects, user_metrics
@@ -73,6 +73,7 @@ def resolve(section: StudySection, sources: Sources) -> Study:
         colorants = None if section.colorants is None else sources.colorants(section.colorants)
         spaces = SpaceBuilder(section, sources, sensor, mosaics, colorants).spaces()
         check_lenses(section, sensor, spaces, sources)
+        check_uncertainty(section, sensor, spaces, sources)
         if tasks is not None:
             check_tasks_in_scenes(tasks, section, sensor, spaces, sources)
     checks.check_scenes(section, sources)

@@ -244,3 +244,27 @@ def check_lenses(section: StudySection, sensor: SensorCurves, spaces: Sequence[S
         if (refused := grazing_ray_issue(scenario)) is not None:
             key, problem, value, allowed = refused
             sources.add(("scenarios", name, *key), problem, value, allowed)
+
+
+def check_uncertainty(section: StudySection, sensor: SensorCurves, spaces: Sequence[Space], sources: Sources) -> None:
+    """Check that uncertain curves are of filters that do not move, and say where an IR cut is not known.
+
+    Parameters
+    ----------
+    section : StudySection
+        The keys of the study, checked against the schema.
+    sensor : SensorCurves
+        Sensor of the study.
+    spaces : sequence of Space
+        Design spaces.
+    sources : Sources
+        Files, curves and the issues so far.
+    """
+    if section.uncertainty is None:
+        return
+    filters = [space.filter.technology for space in spaces if space.filter is not None]
+    if any(t is not None and t.interference is not None for t in (*filters, *sensor.technologies.values())):
+        problem = "of filters that do not move with the angle of the light; thin layers do"
+        sources.add(("uncertainty",), problem, None, "no `interference`")
+    if section.uncertainty.ir_cut_nm and sensor.ir_cut is None:
+        sources.warnings.append(f"{sensor.name}: no IR cut is known apart, and `uncertainty.ir_cut_nm` has no effect")

@@ -134,7 +134,7 @@ def narrowed(section: StudySection, member: Member) -> tuple[StudySection, list[
         start = grid.start_nm + grid.step_nm * math.ceil((low - grid.start_nm) / grid.step_nm)
         stop = start + grid.step_nm * math.floor((high - start) / grid.step_nm)
         grid = grid.model_copy(update={"start_nm": start, "stop_nm": stop})
-        notes.append(f"{member.name}: curves from {start:g} to {stop:g} nm")
+        notes.append(f"{member.sensor}: curves from {start:g} to {stop:g} nm")
     changes: dict[str, Any] = {"study": member.name, "wavelengths": grid}
     curves = _curves_of(section)
     if curves is not None:
@@ -143,10 +143,10 @@ def narrowed(section: StudySection, member: Member) -> tuple[StudySection, list[
         kept = {name for key in ("cfas", "designs", "sweeps", "boxes") for name in changes.get(key, ())}
         gone = [name for name in dict.fromkeys(left_out) if name not in kept]
         if gone:
-            notes.append(f"{member.name}: without {', '.join(gone)}, whose curves {member.sensor} does not have")
+            notes.append(f"{member.sensor}: without {', '.join(gone)}, whose curves {member.sensor} does not have")
         before, after = section.search, changes.get("search", section.search)
         if before is not None and after is not before:
-            notes.append(f"{member.name}: {'no search' if after is None else f'the search is of {after.space}'}")
+            notes.append(f"{member.sensor}: {'no search' if after is None else f'the search is of {after.space}'}")
     return section.model_copy(update=changes), notes
 
 

@@ -229,9 +229,9 @@ def test_one_table_has_all_sensors_and_lights(several: tuple[Path, str]) -> None
         np.testing.assert_array_equal(part["csd_yellow_red"], alone["csd_yellow_red"])
         found = part[part["kind"] == "search"].iloc[0]
         assert found["cfa"] == ("RGBN" if sensor == "ar0132at" else "RYNCy")
-    assert "Note: ar0132at tl16: without RYNCy, RYN4Cy, yellow, whose curves ar0132at does not have." in out
-    assert "Note: ar0132at tl16: the search is of clear." in out
-    assert "Note: opencam luxeon: curves from 400 to 660 nm." in out
+    assert "Note: ar0132at: without RYNCy, RYN4Cy, yellow, whose curves ar0132at does not have." in out
+    assert "Note: ar0132at: the search is of clear." in out
+    assert "Note: opencam: curves from 400 to 660 nm." in out
     page = (folder / "out" / "few" / "report.html").read_text()
     assert "Does it hold?" in page
     assert 'href="opencam_tl16/report.html"' in page
@@ -292,6 +292,16 @@ def test_a_mistake_is_one_line(tmp_path: Path, old: str, new: str, line: str) ->
     assert code == 2
     assert line in err
     assert "Traceback" not in err
+
+
+def test_uncertain_curves_of_thin_layers_are_refused(tmp_path: Path) -> None:
+    text = SEVERAL.replace("[ar0820, opencam, ar0132at]", "[ar0132at]").replace("[tl16, luxeon]", "tl16")
+    text = text.replace("gain: 0.03", "gain: 0.03, ir_cut_nm: 2")
+    study = load(tmp_path, text)
+    assert "ar0132at: no IR cut is known apart, and `uncertainty.ir_cut_nm` has no effect" in study.warnings
+    moving = text.replace("base: C, to: G", "base: C, to: G, technology: {interference: {effective_index: 1.8}}")
+    with pytest.raises(StudyError, match="uncertainty: of filters that do not move with the angle of the light"):
+        load(tmp_path, moving)
 
 
 def test_other_commands_say_how_to_choose_one(tmp_path: Path) -> None:
