@@ -19,7 +19,7 @@ from ..results.atomic import write_bytes, write_text
 from ..results.output import Output, read_output
 from ..results.tables import FOUND, PLAIN, RESULTS
 from ..run.all_sensors import ALL
-from ..study import Member
+from ..study import Member, folder_name
 from .figures import CURVE_CYCLE, canvas, legend_beside, rendered
 from .pages import inlined, page, rows
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PAGE, PICTURE, TOGETHER = "report.html", "sensors", "all_sensors.parquet"
-REFERENCE = "RGGB"
+REFERENCE, _KEYS = "RGGB", ("sensor", "lights")
 _MARKERS = "osD^vPX*<>"
 _NINE_TENTHS = 2.1459660262893476
 """Semiaxis of the ellipse that holds 90 % of a Gaussian in two dimensions, in deviations: sqrt(-2 ln 0.1)."""
@@ -39,6 +39,49 @@ class SensorRun:
 
     member: Member
     folder: Path
+
+
+def runs_in(folder: Path) -> list[SensorRun]:
+    """Return the runs of a study of several sensors.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the study.
+
+    Returns
+    -------
+    list of SensorRun
+        Runs; an empty list if the folder is none of such a study.
+    """
+    try:
+        if pq.read_schema(folder / RESULTS).names[:2] != list(_KEYS):
+            return []
+        table = pq.read_table(folder / RESULTS, columns=list(_KEYS))
+    except (OSError, ValueError):
+        return []
+    pairs = dict.fromkeys(zip(*(table[name].to_pylist() for name in _KEYS), strict=True))
+    members = [Member(sensor, lights, (at, at)) for at, (sensor, lights) in enumerate(pairs)]
+    return [SensorRun(member, folder / folder_name(member.name)) for member in members]
+
+
+def report_again(folder: Path, runs: Sequence[SensorRun]) -> list[str]:
+    """Write picture and page of a study of several sensors again.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the study.
+    runs : sequence of SensorRun
+        Its runs.
+
+    Returns
+    -------
+    list of str
+        Answer, as it is printed.
+    """
+    together = pq.read_table(folder / TOGETHER) if (folder / TOGETHER).exists() else None
+    return report_sensors(folder, folder.name, read_output(runs[0].folder).study.question, runs, together)
 
 
 def report_sensors(
@@ -70,7 +113,7 @@ def report_sensors(
         table = pq.read_table(run.folder / RESULTS)
         kinds = [f.type.value_type if pa.types.is_dictionary(f.type) else f.type for f in table.schema]
         table = table.cast(pa.schema(zip(table.column_names, kinds, strict=True)))
-        for at, (key, value) in enumerate((("sensor", run.member.sensor), ("lights", run.member.lights))):
+        for at, (key, value) in enumerate(zip(_KEYS, run.member[:2], strict=True)):
             table = table.add_column(at, key, pa.array([value] * len(table)))
         tables.append(table)
     sink = pa.BufferOutputStream()

@@ -241,6 +241,22 @@ def test_one_table_has_all_sensors_and_lights(several: tuple[Path, str]) -> None
     assert f"has {ratio.min():.2f} to {ratio.max():.2f} times the yellow/red CSD of RGGB" in out.splitlines()[0]
 
 
+def test_the_report_is_drawn_again(several: tuple[Path, str]) -> None:
+    folder, out = several
+    page = folder / "out" / "few" / "report.html"
+    before = page.read_text()
+    page.unlink()
+    with pytest.MonkeyPatch.context() as patch:
+        draw_nothing(patch)
+        patch.setattr("sweep.report.sensors.rendered", lambda _, kind: kind.encode())
+        code, again, err = commanded("report", page.parent)
+    assert code == 0, err
+    assert page.read_text() == before
+    assert again.splitlines()[0] in out
+    code, _, err = commanded("report", folder)
+    assert (code, "no run here" in err) == (2, True)
+
+
 def test_filters_for_several_sensors_are_the_worst_on_them(several: tuple[Path, str]) -> None:
     folder, _ = several
     table = pd.read_parquet(folder / "out" / "few" / "all_sensors.parquet")

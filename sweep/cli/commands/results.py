@@ -80,9 +80,17 @@ def export(
 
 def report(context: typer.Context, folder: RunFolder) -> None:
     """Draw figures and report of a finished run again."""
+    from ...report.sensors import report_again, runs_in
     from ..run import finish
 
-    finish(folder, context.find_root().obj)
+    began_s = context.find_root().obj
+    if not (runs := runs_in(folder)):
+        finish(folder, began_s)
+        return
+    for run in runs:
+        finish(run.folder, began_s, quiet=True)
+    for line in report_again(folder, runs):
+        typer.echo(line)
 
 
 def status(
