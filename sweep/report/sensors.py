@@ -19,6 +19,7 @@ from ..results.atomic import write_bytes, write_text
 from ..results.output import Output, read_output
 from ..results.tables import FOUND, PLAIN, RESULTS
 from ..run.all_sensors import ALL
+from ..run.uncertainty import REFERENCE
 from ..study import Member, folder_name
 from .figures import CURVE_CYCLE, canvas, legend_beside, rendered
 from .pages import inlined, page, rows
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PAGE, PICTURE, TOGETHER = "report.html", "sensors", "all_sensors.parquet"
-REFERENCE, _KEYS = "RGGB", ("sensor", "lights")
+_KEYS = ("sensor", "lights")
 _MARKERS = "osD^vPX*<>"
 _NINE_TENTHS = 2.1459660262893476
 """Semiaxis of the ellipse that holds 90 % of a Gaussian in two dimensions, in deviations: sqrt(-2 ln 0.1)."""

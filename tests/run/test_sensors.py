@@ -125,7 +125,7 @@ def uncertain(folder: Path, errors: CurveErrors, cfas: str = "[RGGB, RYYCy]") ->
 
 
 def test_quantiles_are_those_of_brute_force(tmp_path: Path) -> None:
-    """Of 18 quantiles by 20,000 draws of own code, 15 or more lie in the 95 % intervals, and all near them."""
+    """Of 12 quantiles by 20,000 draws of own code, 10 or more lie in the 95 % intervals, and all near them."""
     found, rng, n = uncertain(tmp_path, ERRORS), np.random.default_rng(11), 20_000
     names = ["R", "G", "B", "Y", "Cy"]
     parts = [own_draws(names, 2000, ERRORS, rng) for _ in range(n // 2000)]
