@@ -132,3 +132,11 @@ Outputs = Annotated[Path, typer.Option(help="Folder for the results of all studi
 DataFolder = Annotated[
     Path | None, typer.Option("--data", help="Folder that the study's files are looked for in first.")
 ]
+
+
+class ImageForm(StrEnum):
+    """Forms of exported images."""
+
+    RAW = "raw"
+    DEMOSAICKED = "demosaicked"
+    ISP = "isp"

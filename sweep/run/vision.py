@@ -73,14 +73,10 @@ def vision_tables(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
     """
     vision = study.section.vision
     assert vision is not None
-    first = next(iter(study.scenarios))
-    designs = list(
-        {row["name"]: row for row in few_rows(rows) if row["scenario"] == first or row["kind"] == FOUND}.values()
-    )
-    setups = []
-    for row in designs:
-        space, curves = row_curves(study, row)
-        setups.append((study.setup(space, row["scenario"]), np.asarray(curves[0], dtype=float)))
+    designs, setups = [], []
+    for row, setup, curves in vision_designs(study, rows):
+        designs.append(row)
+        setups.append((setup, curves))
     pairs = [(at, seed) for seed in range(vision.seeds) for at in range(len(designs))]
     calls = [delayed(read_images, *setups[at], vision, (study.section.seed, seed)) for at, seed in pairs]
     images: list[dict[str, Any]] = []
@@ -102,6 +98,32 @@ def vision_tables(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
         VISION_CONDITIONS: pa.Table.from_pylist(conditions, schema=_CONDITIONS),
         VISION_MISREAD: pa.Table.from_pylist(pictures, schema=_MISREAD),
     }
+
+
+def vision_designs(study: Study, rows: pd.DataFrame) -> list[tuple[dict[Any, Any], Setup, FloatArray]]:
+    """Return the designs of a benchmark: plain CFAs, named designs and the answer, each once.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    rows : pandas.DataFrame
+        Result table.
+
+    Returns
+    -------
+    list of (dict, Setup, ndarray)
+        Row, camera, and QE of the modified channels, ndarray of shape (n_modified, n_wavelengths).
+    """
+    first, by_name = next(iter(study.scenarios)), dict[str, dict[Any, Any]]()
+    for row in few_rows(rows):
+        if row["scenario"] == first or row["kind"] == FOUND:
+            by_name[row["name"]] = row
+    made = []
+    for row in by_name.values():
+        space, curves = row_curves(study, row)
+        made.append((row, study.setup(space, row["scenario"]), np.asarray(curves[0], dtype=float)))
+    return made
 
 
 def _image_rows(study: Study, vision: Vision, key: dict[str, Any], reading: SeedReading) -> Iterator[dict[str, Any]]:

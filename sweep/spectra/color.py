@@ -85,7 +85,7 @@ LUMINOUS_EFFICACY_LM_W = 683.002
 """Luminous efficacy of monochromatic light at 540 THz, which defines the candela."""
 
 
-_XYZ_TO_RGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.204, 1.057]])
+XYZ_TO_RGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.204, 1.057]])
 """Matrix of sRGB (IEC 61966-2-1)."""
 
 
@@ -147,10 +147,26 @@ def display_colors(grid: WavelengthGrid, photons: FloatArray) -> FloatArray:
     xyz = energy_from_photons(grid.nodes_nm, photons) @ color_matching(grid).T
     seen = xyz.max(axis=1) > 0
     colors = np.full((len(xyz), 3), _GRAY)
-    linear = np.clip(xyz[seen] / xyz[seen].max(axis=1, keepdims=True) @ _XYZ_TO_RGB.T, 0, None)
+    linear = np.clip(xyz[seen] / xyz[seen].max(axis=1, keepdims=True) @ XYZ_TO_RGB.T, 0, None)
     linear = linear / linear.max(axis=1, keepdims=True)
-    colors[seen] = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    colors[seen] = srgb_gamma(linear)
     return colors
+
+
+def srgb_gamma(linear: FloatArray) -> FloatArray:
+    """Return sRGB values of linear ones (IEC 61966-2-1).
+
+    Parameters
+    ----------
+    linear : ndarray
+        0 to 1.
+
+    Returns
+    -------
+    ndarray of the same shape
+        0 to 1.
+    """
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
 
 
 _R48 = "UN Regulation 48, 2.29, color of the light emitted from a device (red, amber, white)"

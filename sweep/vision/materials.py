@@ -85,6 +85,26 @@ def reflectance(grid: WavelengthGrid, name: Material) -> FloatArray:
     return np.asarray(np.interp(grid.nodes_nm, held.wavelengths, held.values), dtype=float)
 
 
+@cache
+def chart_reflectances(grid: WavelengthGrid) -> FloatArray:
+    """Return the reflectances of the 24 patches of the ColorChecker; constant beyond their range.
+
+    Parameters
+    ----------
+    grid : WavelengthGrid
+        Wavelengths, nm.
+
+    Returns
+    -------
+    ndarray of shape (24, n_wavelengths)
+        0 to 1.
+    """
+    from colour import SDS_COLOURCHECKERS  # noqa: PLC0415  (more than a second to import)
+
+    held = SDS_COLOURCHECKERS["ColorChecker N Ohta"].values()
+    return np.stack([np.interp(grid.nodes_nm, patch.wavelengths, patch.values) for patch in held])
+
+
 def phantom(grid: WavelengthGrid, kind: str) -> FloatArray:
     """Return the photons of daylight reflected by a colored lens, normalized to an integral of 1.
 

@@ -71,10 +71,12 @@ def read_images(setup: Setup, curves: FloatArray, vision: Vision, seed: tuple[in
     unseen: dict[str, Answers] = {}
     seen: dict[str, Answers] = {}
     for order in ORDERS:
-        key = _key(seed, order)[:-1]
-        test = _drawn(camera, lamps[TEST], order, vision.test_images, _key(seed, order))
-        known = _drawn(camera, lamps[TRAIN], order, vision.test_images // 2, (*key, 1))
-        answers = _of_networks(camera, lamps, order, key, [test[1], known[1]]) if vision.network else _none()
+        scenes = scenes_of(vision, lamps, order, TEST, seed)
+        known_scenes = draw_scenes(
+            vision, lamps[TRAIN], order, vision.test_images // 2, (*_key(seed, order), _KNOWN_KEY)
+        )
+        test, known = ((some, camera.images(some)) for some in (scenes, known_scenes))
+        answers = _of_networks(camera, lamps, order, seed, [test[1], known[1]]) if vision.network else _none()
         for where, (scenes, images), whole, half, of in zip(
             (unseen, seen), (test, known), *answers[:2], (lamps[TEST], lamps[TRAIN]), strict=True
         ):
@@ -106,19 +108,43 @@ def observer_error(setup: Setup, curves: FloatArray, vision: Vision, seed: tuple
         Error probability.
     """
     camera, order = HeadCamera(setup, curves, vision), ORDERS[-1]
-    lamps = split_lamps(setup.lights, vision, seed)[TEST]
-    scenes, images = _drawn(camera, lamps, order, vision.test_images, _key(seed, order))
-    return float(np.mean(1 - posteriors(camera, scenes, images, lamps, order).max(axis=1)))
+    lamps = split_lamps(setup.lights, vision, seed)
+    scenes = scenes_of(vision, lamps, order, TEST, seed)
+    return float(np.mean(1 - posteriors(camera, scenes, camera.images(scenes), lamps[TEST], order).max(axis=1)))
+
+
+_KEYS = {TEST: 0, TRAIN: 2, CHECK: 3}
+"""Last number of the seed of each part's scenes."""
+_KNOWN_KEY = 1
+
+
+def scenes_of(vision: Vision, lamps: dict[str, Lamps], order: str, part: str, seed: tuple[int, int]) -> Scenes:
+    """Return the scenes of a part of the images.
+
+    Parameters
+    ----------
+    vision : Vision
+        Benchmark.
+    lamps : dict of str to Lamps
+        Lamps of each part.
+    order : str
+        Order of the lenses.
+    part : str
+        One of `lamps.PARTS`.
+    seed : tuple of int
+        Seed of the study, and number of this seed.
+
+    Returns
+    -------
+    Scenes
+        Scenes.
+    """
+    count = {TEST: vision.test_images, TRAIN: vision.train_images, CHECK: vision.check_images}[part]
+    return draw_scenes(vision, lamps[part], order, count, (*_key(seed, order), _KEYS[part]))
 
 
 def _key(seed: tuple[int, int], order: str) -> tuple[int, ...]:
-    """Return the seed of the test's scenes."""
-    return (*seed, 10 + ORDERS.index(order), 0)
-
-
-def _drawn(camera: HeadCamera, lamps: Lamps, order: str, count: int, key: tuple[int, ...]) -> tuple[Scenes, Numbers]:
-    scenes = draw_scenes(camera.vision, lamps, order, count, key)
-    return scenes, camera.images(scenes)
+    return (*seed, 10 + ORDERS.index(order))
 
 
 def planes_of(camera: HeadCamera, images: Numbers) -> FloatArray:
@@ -149,20 +175,20 @@ def _none() -> tuple[list[FloatArray], list[FloatArray], int]:
 
 
 def _of_networks(
-    camera: HeadCamera, lamps: dict[str, Lamps], order: str, key: tuple[int, ...], tests: list[Numbers]
+    camera: HeadCamera, lamps: dict[str, Lamps], order: str, seed: tuple[int, int], tests: list[Numbers]
 ) -> tuple[list[FloatArray], list[FloatArray], int]:
     """Return the answers of networks trained on all images and on half of them, and the epochs of the first."""
     from .network import train  # noqa: PLC0415  (JAX: only where a study asks for a network)
 
     vision = camera.vision
-    scenes, images = _drawn(camera, lamps[TRAIN], order, vision.train_images, (*key, 2))
-    checked, check = _drawn(camera, lamps[CHECK], order, vision.check_images, (*key, 3))
-    planes, held_out = planes_of(camera, images), (planes_of(camera, check), checked.state)
+    scenes, checked = (scenes_of(vision, lamps, order, part, seed) for part in (TRAIN, CHECK))
+    planes = planes_of(camera, camera.images(scenes))
+    held_out = planes_of(camera, camera.images(checked)), checked.state
     probabilities, epochs = [], []
     for count in (len(scenes), len(scenes) // 2):
         some = slice(0, count)
         n_states = len(states_of(vision))
-        network = train(planes[some], scenes.state[some], held_out, n_states, vision.epochs, (*key, 4))
+        network = train(planes[some], scenes.state[some], held_out, n_states, vision.epochs, (*_key(seed, order), 4))
         probabilities.append([network.probabilities(planes_of(camera, test_images)) for test_images in tests])
         epochs.append(network.epochs)
     return probabilities[0], probabilities[1], epochs[0]

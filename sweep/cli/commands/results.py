@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from ...base.errors import ErrorBoundExceededError
-from ..options import OF_RESULTS, AllowCode, DataFolder, ExportFormat, RunFolder, run_folders
+from ...base.errors import ErrorBoundExceededError, SweepError, ValidationIssue
+from ..options import OF_RESULTS, AllowCode, DataFolder, ExportFormat, ImageForm, RunFolder, run_folders
 from ..output import Json, ProgressDisplay, Quiet, print_result
 
 PANEL = OF_RESULTS
@@ -58,7 +58,18 @@ def compare(
 
 def export(
     folder: RunFolder,
-    design: Annotated[str, typer.Option(help="A design_id, a name (RYN4Cy, RGGB), or best.", show_default=False)],
+    design: Annotated[
+        str | None, typer.Option(help="A design_id, a name (RYN4Cy, RGGB), or best.", show_default=False)
+    ] = None,
+    images: Annotated[
+        Path | None,
+        typer.Option(help="Folder for the images of a study with `vision`, with labels.", show_default=False),
+    ] = None,
+    form: Annotated[
+        ImageForm, typer.Option(help="Images: raw mosaics, all channels at all pixels, or pictures of a plain ISP.")
+    ] = ImageForm.RAW,
+    png: Annotated[bool, typer.Option("--png", help="A PNG for each image; without it, arrays (.npz) of 256.")] = False,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Workers for images.", show_default="all cores")] = None,
     data: Annotated[
         Path | None, typer.Option(help="Folder with the run's curve files, which are then read again and compared.")
     ] = None,
@@ -70,11 +81,23 @@ def export(
     ] = None,
     to: Annotated[Path | None, typer.Option(help="Folder for the files.", show_default="FOLDER/export")] = None,
     allow_code: AllowCode = False,
+    quiet: Quiet = False,
 ) -> None:
-    """Write a filter of a finished run as CSV and as ISETCam color filters (.mat), and for other programs."""
-    from ..export import export_design
+    """Write a filter of a finished run as CSV and as ISETCam color filters (.mat), or the images of a benchmark."""
+    if (design is None) == (images is None):
+        raise SweepError(ValidationIssue("one of --design and --images", allowed="--design best, or --images FOLDER"))
+    if design is not None:
+        from ..export import export_design
 
-    for line in export_design(folder, design, data, to, also or (), allow_code=allow_code):
+        lines = export_design(folder, design, data, to, also or (), allow_code=allow_code)
+    else:
+        from ..export_images import export_images
+
+        assert images is not None
+        with ProgressDisplay(quiet=quiet) as display:
+            how = images, form, png
+            lines = export_images(folder, how, data, jobs, display.update, allow_code=allow_code)
+    for line in lines:
         typer.echo(line)
 
 

@@ -1,0 +1,78 @@
+"""Images of a finished benchmark as files."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from ..base.errors import SweepError, ValidationIssue
+from ..base.types import Progress
+from ..report import read_output, study_of
+from ..results.inventory import Inventory
+from ..run.image_files import MANIFEST, ImageFiles, write_images
+from ..run.vision import vision_designs
+from ..run.workers import workers
+from .options import ImageForm
+
+
+def export_images(
+    folder: Path,
+    how: tuple[Path, ImageForm, bool],
+    data: Path | None,
+    jobs: int | None,
+    progress: Progress,
+    *,
+    allow_code: bool = False,
+) -> list[str]:
+    """Write the images of a run's benchmark with labels, and say what they are.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the run.
+    how : tuple of (Path, ImageForm, bool)
+        Folder of the images, their form, and whether each is a PNG.
+    data : Path or None
+        Folder of the study's files; without it, the curves that the run kept are taken.
+    jobs : int or None
+        Workers.
+    progress : callable
+        Called with a phase, work done and work in total.
+    allow_code : bool
+        True to run the code that the study names.
+
+    Returns
+    -------
+    list of str
+        Lines to print.
+
+    Raises
+    ------
+    SweepError
+        If the study has no `vision`, or the form is no PNG.
+    OutputError
+        As `read_output` and `write_images`.
+    """
+    to, form, png = how
+    output = read_output(folder)
+    vision = output.study.vision
+    if vision is None:
+        raise SweepError(ValidationIssue("the study has no `vision`", str(folder), key="--images"))
+    if png and form is ImageForm.DEMOSAICKED:
+        raise SweepError(ValidationIssue("of more than three channels", key="--png", allowed="--form raw or isp"))
+    if png and form is ImageForm.RAW and output.study.pixel.captures:
+        problem = "merged values of an HDR pixel are no whole numbers of 16 bits"
+        raise SweepError(ValidationIssue(problem, key="--png", allowed="--form isp, or without --png"))
+    study = study_of(output, data, allow_code=allow_code)
+    designs = vision_designs(study, output.few)
+    files = ImageFiles(to, form.value, png)
+    with workers(jobs or os.cpu_count() or 1) as parallel:
+        fingerprint = Inventory(folder).fingerprint
+        manifest = write_images(designs, vision, study.section.seed, fingerprint, files, parallel, progress)
+    names = ", ".join(str(row["name"]) for row, *_ in designs)
+    splits = manifest["split"].value_counts().to_pylist()
+    counts = ", ".join(f"{one['counts']:,} to {one['values']}" for one in splits)
+    return [
+        f"{len(manifest):,} images of {names}: {counts}; the same scenes, lamps and photons for every design.",
+        f"Files: {to}/: {MANIFEST}, images/.",
+    ]

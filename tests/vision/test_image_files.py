@@ -1,0 +1,154 @@
+"""Images of a benchmark as files: those that the readers of the run have seen, with labels that are true."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from PIL import Image
+
+from sweep.results.output import read_output
+from sweep.run.vision import vision_designs
+from sweep.study import load_study
+from sweep.vision.images import HeadCamera
+from sweep.vision.isp import developed, isp_matrix
+from sweep.vision.lamps import TEST, split_lamps
+from sweep.vision.materials import ambient_light
+from sweep.vision.readers import scenes_of
+
+from ..commanded import commanded
+from ..conftest import draw_nothing
+from .heads import GRID, head_setup
+
+BENCHMARK = """\
+study: heads
+wavelengths: {step_nm: 20}
+sensor: ar0820
+lights: tl16
+pixel: {read_noise_e: 2, offset_dn: 168, prnu: 0.01}
+cfas: [RGGB, RYYCy]
+vision:
+  fov_deg: 120
+  distances_m: [40, 100]
+  intensities_cd: [200]
+  levels:
+    day: {illuminance_lx: 40000, exposure_s: 5.0e-5}
+    night: {illuminance_lx: 1, light: sodium street light, exposure_s: 1.0e-3}
+  test_images: 30
+  train_images: 300
+  check_images: 20
+  seeds: 2
+  network: false
+"""
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("heads")
+    (folder / "heads.yaml").write_text(BENCHMARK)
+    with pytest.MonkeyPatch.context() as patch:
+        draw_nothing(patch)
+        code, _, err = commanded("run", folder / "heads.yaml", "--output", folder, "--jobs", 1)
+    assert code == 0, err
+    return folder / "heads"
+
+
+def exported(run: Path, to: Path, *options: str) -> pd.DataFrame:
+    code, _, err = commanded("export", run, "--images", to, "--jobs", 1, *options)
+    assert code == 0, err
+    return pd.read_parquet(to / "manifest.parquet")
+
+
+def image(folder: Path, row: pd.Series) -> np.ndarray:
+    with np.load(folder / row["file"]) as held:
+        return np.asarray(held["images"][row["index"]])
+
+
+def test_raw_images_are_those_that_the_observer_reads(run: Path, tmp_path: Path) -> None:
+    manifest = exported(run, tmp_path / "raw")
+    study, output = load_study(run / "study.resolved.yaml"), read_output(run)
+    counts = manifest.groupby(["name", "split"]).size()
+    assert counts.to_dict() == {
+        (name, split): n * 4 for name in ("RGGB", "RYYCy") for split, n in (("train", 300), ("check", 20), ("test", 30))
+    }
+    assert manifest["image_id"].is_unique
+    row, setup, curves = vision_designs(study, output.few)[1]
+    vision, seed = study.section.vision, (study.section.seed, 1)
+    camera = HeadCamera(setup, curves, vision)
+    scenes = scenes_of(vision, split_lamps(setup.lights, vision, seed), "shuffled", TEST, seed)
+    here = manifest.query("name == 'RYYCy' and seed == 1 and order == 'shuffled' and split == 'test'")
+    held = np.stack([image(tmp_path / "raw", one) for _, one in here.iterrows()])
+    assert held.dtype == np.uint16
+    np.testing.assert_array_equal(held, camera.images(scenes))
+    answers = pd.read_parquet(run / "vision.parquet").query("name == 'RYYCy' and seed == 1 and order == 'shuffled'")
+    answers = answers[answers["lamps"] == "unseen"]
+    for column in ("state", "lamp", "distance_m", "level", "background"):
+        assert list(here[column]) == list(answers[column]), column
+    assert row["name"] == "RYYCy"
+
+
+def test_lamps_and_scenes_of_splits_are_apart(run: Path, tmp_path: Path) -> None:
+    manifest = exported(run, tmp_path / "raw").dropna(subset=["lamp"])
+    for _, of_seed in manifest.groupby("seed"):
+        lamps = {split: set(part["lamp"]) for split, part in of_seed.groupby("split")}
+        assert not lamps["test"] & (lamps["train"] | lamps["check"])
+        assert not lamps["train"] & lamps["check"]
+
+
+def test_the_lit_lens_is_where_the_label_says(run: Path, tmp_path: Path) -> None:
+    """At night, the center of the light above the darkest pixels: within half a pixel of the lens."""
+    manifest = exported(run, tmp_path / "raw")
+    here = manifest.query("name == 'RGGB' and level == 'night' and distance_m == 100 and state != 'off'")
+    assert len(here) > 20
+    for _, row in here.head(40).iterrows():
+        light = image(tmp_path / "raw", row).astype(float) - 168
+        light[light < 0.05 * light.max()] = 0  # noise, and the dim background
+        rows, columns = np.mgrid[0 : light.shape[0], 0 : light.shape[1]]
+        x, y = ((light * at).sum() / light.sum() for at in (columns, rows))
+        assert abs(x - row["lens_x_px"][int(row["lit"])]) < 1.0
+        assert abs(y - row["lens_y_px"][int(row["lit"])]) < 1.0
+        assert row["lenses"][int(row["lit"])] == row["state"]
+
+
+def test_an_interrupted_export_goes_on_and_another_is_refused(run: Path, tmp_path: Path) -> None:
+    whole, torn = tmp_path / "whole", tmp_path / "torn"
+    first, _ = exported(run, whole), exported(run, torn)
+    for path in (torn / "manifest.parquet", torn / "parts" / "1-0.parquet", *(torn / "images" / "1").glob("0-*.npz")):
+        path.unlink()
+    pd.testing.assert_frame_equal(exported(run, torn), first)
+    for path in whole.rglob("*.npz"):
+        assert path.read_bytes() == (torn / path.relative_to(whole)).read_bytes()
+    code, _, err = commanded("export", run, "--images", whole, "--form", "isp")
+    assert (code, "holds other images" in err) == (2, True)
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "notes.txt").write_text("x")
+    code, _, err = commanded("export", run, "--images", tmp_path / "mine")
+    assert (code, "holds other files" in err) == (2, True)
+    code, _, err = commanded("export", run)
+    assert (code, "one of --design and --images" in err) == (2, True)
+    code, _, err = commanded("export", run, "--images", tmp_path / "d", "--png", "--form", "demosaicked")
+    assert (code, "of more than three channels" in err) == (2, True)
+    assert not (tmp_path / "d").exists()
+
+
+def test_pictures_are_files_that_viewers_open(run: Path, tmp_path: Path) -> None:
+    manifest = exported(run, tmp_path / "isp", "--form", "isp", "--png")
+    row = manifest.query("name == 'RGGB' and state == 'red' and distance_m == 40 and level == 'day'").iloc[0]
+    with Image.open(tmp_path / "isp" / row["file"]) as picture:
+        assert picture.mode == "RGB"
+        assert picture.size == (24, 24)
+        red, green, blue = np.moveaxis(np.asarray(picture, dtype=float), 2, 0)
+    at = int(np.clip(round(row["lens_y_px"][int(row["lit"])]), 0, 23)), round(row["lens_x_px"][0])
+    assert red[at] > 2 * max(green[at], blue[at])
+
+
+@pytest.mark.parametrize("cfa", ["RGGB", "RYYCy", "RCCB"])
+@pytest.mark.parametrize("light", ["daylight", "sodium street light"])
+def test_white_is_white_under_its_own_light(cfa: str, light: str) -> None:
+    qe = head_setup(cfa).camera.qe
+    white = ambient_light(GRID, light) @ qe.T
+    matrix = isp_matrix(GRID, qe, light)
+    np.testing.assert_allclose(matrix @ (white / white.max()), 1.0, rtol=1e-9)
+    assert developed(white / white.max() / 2, matrix).tolist() == [188, 188, 188]  # sRGB of 0.5
