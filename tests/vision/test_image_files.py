@@ -89,6 +89,22 @@ def test_raw_images_are_those_that_the_observer_reads(run: Path, tmp_path: Path)
     assert row["name"] == "RYYCy"
 
 
+def test_the_observer_s_own_answers_are_scored(run: Path, tmp_path: Path) -> None:
+    """By the names of the exported images: no distance from the ideal observer, and a page."""
+    manifest = exported(run, tmp_path / "raw").query("split == 'test'")
+    answers = pd.read_parquet(run / "vision.parquet").query("lamps == 'unseen'")
+    key = ["design_id", "seed", "order", "image"]
+    file = manifest.merge(answers[[*key, "observer"]], on=key).rename(columns={"state": "truth", "observer": "state"})
+    file[["image_id", "state"]].to_csv(tmp_path / "ideal.csv", index=False)
+    code, out, err = commanded("score", run, tmp_path / "ideal.csv", "--output", tmp_path / "scores")
+    assert code == 0, err
+    assert out.splitlines()[0].startswith("ideal, RGGB: errs on")
+    assert "+0.0 points (+0.0 to +0.0) against the ideal observer" in out
+    scores = pd.read_parquet(tmp_path / "scores" / "scores.parquet")
+    assert set(scores["distance_m"]) == {"all", "40.0", "100.0"}
+    assert "<table" in (tmp_path / "scores" / "scores.html").read_text()
+
+
 def test_lamps_and_scenes_of_splits_are_apart(run: Path, tmp_path: Path) -> None:
     manifest = exported(run, tmp_path / "raw").dropna(subset=["lamp"])
     for _, of_seed in manifest.groupby("seed"):

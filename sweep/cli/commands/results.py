@@ -97,7 +97,28 @@ def export(
         with ProgressDisplay(quiet=quiet) as display:
             how = images, form, png
             lines = export_images(folder, how, data, jobs, display.update, allow_code=allow_code)
-    for line in lines:
+    for line in [] if quiet else lines:
+        typer.echo(line)
+
+
+def score(
+    folder: RunFolder,
+    predictions: Annotated[
+        list[Path],
+        typer.Argument(help="CSV or Parquet: image_id, and state or a probability of each.", show_default=False),
+    ],
+    output: Annotated[Path | None, typer.Option(help="Folder of the scores.", show_default="FOLDER/scores")] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Score readers of a benchmark's test images: errors of each CFA, differences, distance from the ideal observer."""
+    from ...report import read_output
+    from ...report.scores import score_readers
+
+    run = read_output(folder)
+    if run.study.vision is None:
+        raise SweepError(ValidationIssue("the study has no `vision`", str(folder)))
+    lines = score_readers(run, predictions, folder / "scores" if output is None else output)
+    for line in [] if quiet else lines:
         typer.echo(line)
 
 

@@ -1,0 +1,92 @@
+"""Page of the scores of readers of a benchmark."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pandas as pd
+
+from ..results.atomic import atomic, write_text
+from ..results.output import Output
+from ..results.tables import VISION
+from ..run.score import Reader, check_unique, read_predictions, score_lines, scores_of, test_images
+from ..vision.scenes import states_of
+from .figures import CURVE_CYCLE, DASHES, canvas, legend_beside, rendered
+from .pages import inlined, page, rows
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PAGE, TABLE = "scores.html", "scores.parquet"
+
+
+def score_readers(output: Output, predictions: Sequence[Path], to: Path) -> list[str]:
+    """Score files of predictions, and write `scores.parquet` and `scores.html`.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run with a benchmark of vision.
+    predictions : sequence of Path
+        Files, one per reader.
+    to : Path
+        Folder of table and page.
+
+    Returns
+    -------
+    list of str
+        Lines to print.
+
+    Raises
+    ------
+    SweepError
+        For predictions that are not of the test images, see `read_predictions`.
+    """
+    vision = output.study.vision
+    assert vision is not None
+    images = test_images(output.vision[VISION])
+    readers: list[Reader] = [read_predictions(path, images, states_of(vision)) for path in predictions]
+    check_unique(readers)
+    scores = pd.concat([scores_of(reader, images, vision.unknown_cost) for reader in readers], ignore_index=True)
+    with atomic(to / TABLE) as hidden:
+        scores.to_parquet(hidden, index=False)
+    lines = [*score_lines(scores)]
+    picture = inlined(rendered(draw_scores(scores), "png"))
+    shown = scores.drop(columns=["design_id"]).round(4)
+    name, folder = output.study.study, output.folder.name
+    text = page("scores.html.j2", title=name, lines=lines, image=picture, table=rows(shown), folder=folder)
+    write_text(text, to / PAGE)
+    return [*lines, f"Files: {to}/: {TABLE}, {PAGE}."]
+
+
+def draw_scores(scores: pd.DataFrame) -> Figure:
+    """Draw errors over distance, a line per reader and design, and the ideal observer's as thin lines.
+
+    Parameters
+    ----------
+    scores : pandas.DataFrame
+        Result of `scores_of`, of one reader or more.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Figure.
+    """
+    order = "shuffled" if (scores["order"] == "shuffled").any() else str(scores["order"].iloc[0])
+    some = scores[(scores["order"] == order) & (scores["level"] == "all") & (scores["distance_m"] != "all")]
+    figure, axes = canvas(9.0, 5.0)
+    names, readers = [*dict.fromkeys(some["name"])], [*dict.fromkeys(some["reader"])]
+    for name, color in zip(names, CURVE_CYCLE * 4, strict=False):
+        for reader, dash in zip(readers, DASHES * 7, strict=False):
+            part = some[(some["name"] == name) & (some["reader"] == reader)]
+            part = part.assign(x=part["distance_m"].astype(float)).sort_values("x")
+            x, label = part["x"], f"{name}, {reader}"
+            axes.plot(x, part["error"], "o", linestyle=dash, color=color, label=label, markersize=3.5)
+            axes.fill_between(x, part["error_low"], part["error_high"], color=color, alpha=0.12, linewidth=0)
+        axes.plot(part["x"], part["observer_error"], color=color, linewidth=0.8, alpha=0.8)
+    axes.set(xlabel="distance / m", ylabel="share of wrong answers", title="Thin lines: the ideal observer")
+    axes.set_ylim(bottom=0)
+    legend_beside(axes)
+    return figure

@@ -1,0 +1,264 @@
+"""Scores of a reader's answers to the test images of a benchmark: errors, differences of CFAs, the ideal observer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ..base.errors import DataError, SweepError, ValidationIssue, nearest
+from ..base.types import FloatArray
+from ..vision.lamps import TEST
+from ..vision.scenes import UNSEEN
+from ..vision.scores import Interval, interval_of_seeds
+from .image_files import image_id
+
+UNKNOWN = "unknown"
+_ID, _STATE = "image_id", "state"
+_SUM = 1e-3
+"""By how much the sum of probabilities may differ from 1."""
+_BINS = 10
+_ALL = "all"
+
+
+@dataclass(frozen=True)
+class Reader:
+    """Answers of a reader to the test images.
+
+    Parameters
+    ----------
+    name : str
+        Name of the reader.
+    answers : pandas.DataFrame
+        `image_id`, `answer` (a state or `unknown`), and `confidence`, the probability of the answered state, or NaN.
+    """
+
+    name: str
+    answers: pd.DataFrame
+
+
+def test_images(images: pd.DataFrame) -> pd.DataFrame:
+    """Return the images of a run that predictions are of, with their names.
+
+    Parameters
+    ----------
+    images : pandas.DataFrame
+        Table of images of a run.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Images of lamps that no network has seen, with `image_id`.
+    """
+    some = images[images["lamps"] == UNSEEN]
+    keys = zip(some["design_id"], some["seed"], some["order"], some["image"], strict=True)
+    return some.assign(**{_ID: [image_id(d, seed, order, TEST, at) for d, seed, order, at in keys]})
+
+
+def read_predictions(path: Path, images: pd.DataFrame, states: Sequence[str]) -> Reader:
+    """Read a file of predictions: `image_id`, and a `state` (or `unknown`) or a probability of each state.
+
+    Parameters
+    ----------
+    path : Path
+        CSV or Parquet.
+    images : pandas.DataFrame
+        Result of `test_images`.
+    states : sequence of str
+        States.
+
+    Returns
+    -------
+    Reader
+        The reader, by the name of the file.
+
+    Raises
+    ------
+    SweepError
+        For a file that cannot be read, other columns, other, double or missing images, other states, and numbers that
+        are no probabilities.
+    """
+    try:
+        table = pd.read_parquet(path) if path.suffix == ".parquet" else pd.read_csv(path)
+    except (OSError, ValueError) as error:
+        raise DataError(ValidationIssue(f"cannot be read: {' '.join(str(error).split())[:200]}", str(path))) from None
+    columns = [_ID, *([_STATE] if _STATE in table else states)]
+    missing = [name for name in columns if name not in table]
+    if missing:
+        allowed = f"{_ID}, and {_STATE} or a column for each of {', '.join(states)}"
+        raise DataError(ValidationIssue("a column is missing", str(path), None, None, missing[0], allowed))
+    ids = table[_ID].astype(str)
+    issues = [*_id_issues(path, ids, images[_ID])]
+    if _STATE in table:
+        answer, confidence = table[_STATE].astype(str), np.full(len(table), np.nan)
+        other = answer[~answer.isin([*states, UNKNOWN])]
+        if len(other):
+            allowed, near = ", ".join([*states, UNKNOWN]), nearest(other.iloc[0], [*states, UNKNOWN])
+            issues.append(_issue("no state", path, other, _STATE, allowed, near))
+    else:
+        probabilities = table[list(states)].apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
+        known = (np.abs(probabilities.sum(axis=1) - 1) <= _SUM) & (probabilities >= 0).all(axis=1)
+        shown = pd.Series([", ".join(f"{p:g}" for p in row) for row in probabilities[~known]], table.index[~known])
+        if len(shown):
+            issues.append(_issue("no probabilities", path, shown, None, "numbers of 0 or more whose sum is 1"))
+        answer = pd.Series(np.array(states)[np.nan_to_num(probabilities).argmax(axis=1)], index=table.index)
+        confidence = probabilities.max(axis=1)
+    if issues:
+        raise DataError(issues)
+    return Reader(path.stem, pd.DataFrame({_ID: ids, "answer": answer, "confidence": confidence}))
+
+
+def _id_issues(path: Path, ids: pd.Series[str], known: pd.Series[str]) -> Iterator[ValidationIssue]:
+    """Yield images that are not of the test, that stand twice, and that are missing."""
+    others, double = ids[~ids.isin(known)], ids[ids.duplicated()]
+    for problem, some in (("not an image of the test", others), ("an image stands twice", double)):
+        if len(some):
+            yield _issue(problem, path, some, _ID)
+    absent = known[~known.isin(ids)]
+    if len(absent):
+        problem, allowed = f"{len(absent):,} images of the test have no answer", f"all {len(known):,}, or `{UNKNOWN}`"
+        yield ValidationIssue(problem, str(path), None, _ID, absent.iloc[0], allowed)
+
+
+def _issue(
+    problem: str, path: Path, some: pd.Series[str], key: str | None, allowed: str | None = None, near: str | None = None
+) -> ValidationIssue:
+    """Return an issue with the first of some wrong values, its line and how many more there are."""
+    more = f" (and {len(some) - 1:,} more)" if len(some) > 1 else ""
+    return ValidationIssue(f"{problem}{more}", str(path), int(some.index[0]) + 2, key, some.iloc[0], allowed, near)
+
+
+def scores_of(reader: Reader, images: pd.DataFrame, unknown_cost: float) -> pd.DataFrame:
+    """Score a reader: one row per order of the lenses, distance and light level, each of them and all, and design.
+
+    `error`: share of wrong answers (`unknown` is none), `cost`: with `unknown_cost` for each `unknown`. Intervals are
+    Student's t over the seeds, of 95 %; differences are paired, since all designs show the same scenes: `apart` from
+    the first design, `above_observer` from the ideal observer. `calibration_error`: mean over ten bins of confidence of
+    the distance from the share of right answers, weighted by their answers.
+
+    Parameters
+    ----------
+    reader : Reader
+        Reader.
+    images : pandas.DataFrame
+        Result of `test_images`.
+    unknown_cost : float
+        Cost of `unknown`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Scores.
+    """
+    table = images.merge(reader.answers, on=_ID, validate="one_to_one")
+    table["unknown"] = table["answer"] == UNKNOWN
+    table["wrong"] = (table["answer"] != table["state"]) & ~table["unknown"]
+    table["cost"] = np.where(table["unknown"], unknown_cost, table["wrong"].astype(float))
+    table["observer_wrong"] = table["observer"] != table["state"]
+    rows = []
+    whole: list[tuple[Any, Any]] = [(_ALL, _ALL), *((d, _ALL) for d in table["distance_m"].unique())]
+    whole += [*((_ALL, level) for level in table["level"].unique())]
+    whole += [*product(table["distance_m"].unique(), table["level"].unique())]
+    for order, (distance, level) in product(table["order"].unique(), whole):
+        some = table[table["order"] == order]
+        some = some if distance == _ALL else some[some["distance_m"] == distance]
+        some = some if level == _ALL else some[some["level"] == level]
+        first = some[some["design_id"] == some["design_id"].iloc[0]]
+        for (design_id, name), part in some.groupby(["design_id", "name"], sort=False):
+            rows.append(
+                {"reader": reader.name, "order": order, "distance_m": str(distance), "level": level}
+                | {"design_id": design_id, "name": name, "images": len(part), "unknown": part["unknown"].mean()}
+                | _shown("error", _mean(part, "wrong"))
+                | _shown("cost", _mean(part, "cost"))
+                | _shown("apart", _difference(part, first, "wrong", "wrong"))
+                | _shown("observer_error", _mean(part, "observer_wrong"))
+                | _shown("above_observer", _difference(part, part, "wrong", "observer_wrong"))
+                | {"calibration_error": _calibration(part)}
+            )
+    return pd.DataFrame(rows)
+
+
+def _shown(name: str, interval: Interval) -> dict[str, Any]:
+    return {name: interval.value, f"{name}_low": interval.low, f"{name}_high": interval.high}
+
+
+def _by_seed(some: pd.DataFrame, column: str) -> FloatArray:
+    return some.groupby("seed")[column].mean().to_numpy(dtype=float)
+
+
+def _mean(some: pd.DataFrame, column: str) -> Interval:
+    return interval_of_seeds(float(some[column].mean()), _by_seed(some, column)).within(0.0, 1.0)
+
+
+def _difference(some: pd.DataFrame, other: pd.DataFrame, column: str, beside: str) -> Interval:
+    value = float(some[column].mean() - other[beside].mean())
+    return interval_of_seeds(value, _by_seed(some, column) - _by_seed(other, beside))
+
+
+def _calibration(some: pd.DataFrame) -> float:
+    """Return the expected calibration error; NaN without probabilities."""
+    known = some.dropna(subset=["confidence"])
+    if known.empty:
+        return float("nan")
+    bins = (known["confidence"] * _BINS).astype(int).clip(upper=_BINS - 1)
+    by_bin = pd.DataFrame({"confidence": known["confidence"], "right": (~known["wrong"]).astype(float)}).groupby(bins)
+    gaps = (by_bin["confidence"].mean() - by_bin["right"].mean()).abs() * by_bin.size()
+    return float(gaps.sum() / len(known))
+
+
+def score_lines(scores: pd.DataFrame) -> Iterator[str]:
+    """Yield a line per reader and design, of all test images with lenses in any order.
+
+    Parameters
+    ----------
+    scores : pandas.DataFrame
+        Result of `scores_of`, of one reader or more.
+
+    Yields
+    ------
+    str
+        Line.
+    """
+    order = "shuffled" if (scores["order"] == "shuffled").any() else str(scores["order"].iloc[0])
+    some = scores[(scores["order"] == order) & (scores["distance_m"] == _ALL) & (scores["level"] == _ALL)]
+    first = str(some["name"].iloc[0])
+    for row in some.to_dict("records"):
+        text = f"{row['reader']}, {row['name']}: errs on {_percent(row, 'error')} of {row['images']:,} images"
+        text += f", unknown {row['unknown']:.1%}" if row["unknown"] else ""
+        if row["name"] != first:
+            told = "" if row["apart_low"] > 0 or row["apart_high"] < 0 else ", not told apart"
+            text += f"; {_points(row, 'apart')} against {first}{told}"
+        yield f"{text}; {_points(row, 'above_observer')} against the ideal observer's {row['observer_error']:.1%}."
+
+
+def _points(row: Mapping[Any, Any], name: str) -> str:
+    value, low, high = (f"{100 * row[key]:+.1f}" for key in (name, f"{name}_low", f"{name}_high"))
+    return f"{value} points ({low} to {high})"
+
+
+def _percent(row: Mapping[Any, Any], name: str) -> str:
+    value, low, high = (f"{100 * row[key]:.1f}" for key in (name, f"{name}_low", f"{name}_high"))
+    return f"{value} % ({low} to {high})"
+
+
+def check_unique(readers: Sequence[Reader]) -> None:
+    """Raise an error if two readers have one name.
+
+    Parameters
+    ----------
+    readers : sequence of Reader
+        Readers.
+
+    Raises
+    ------
+    SweepError
+        If they have.
+    """
+    names = [reader.name for reader in readers]
+    if len(set(names)) < len(names):
+        raise SweepError(ValidationIssue("two files of predictions have one name", value=", ".join(names)))

@@ -1,0 +1,127 @@
+"""Scores of readers of a benchmark's test images."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from sweep.base.errors import DataError
+from sweep.run.score import UNKNOWN, read_predictions, score_lines, scores_of
+from sweep.run.score import test_images as images_of
+
+STATES = ("off", "red", "yellow")
+
+
+def made_images(n_seeds: int = 5, per_seed: int = 200, seed: int = 3) -> pd.DataFrame:
+    """Images of two designs, which show the same scenes, with an observer that errs on a tenth."""
+    rng, rows = np.random.default_rng(seed), []
+    for number in range(n_seeds):
+        states = rng.integers(3, size=per_seed)
+        for design_id, name in enumerate(("RGGB", "RYYCy")):
+            wrong = rng.random(per_seed) < 0.1
+            for at, state in enumerate(states):
+                rows.append(
+                    {"design_id": design_id, "name": name, "cfa": name, "seed": number, "order": "shuffled"}
+                    | {"lamps": "unseen", "image": at, "state": STATES[state], "distance_m": 100.0 + 100 * (at % 2)}
+                    | {"level": "day", "observer": STATES[(state + wrong[at]) % 3]}
+                )
+    frame = pd.DataFrame(rows)
+    return images_of(pd.concat([frame, frame.assign(lamps="seen")]))
+
+
+def predicted(folder: Path, table: pd.DataFrame, name: str = "mine.csv") -> Path:
+    path = folder / name
+    table.to_parquet(path) if name.endswith("parquet") else table.to_csv(path, index=False)
+    return path
+
+
+def test_figures_are_counts(tmp_path: Path) -> None:
+    """Errors, unknown answers, costs and differences by hand, from a shuffled file."""
+    images, rng = made_images(), np.random.default_rng(1)
+    answers = images["observer"].where(rng.random(len(images)) < 0.7, UNKNOWN)
+    file = pd.DataFrame({"image_id": images["image_id"], "state": answers}).sample(frac=1, random_state=2)
+    reader = read_predictions(predicted(tmp_path, file), images, STATES)
+    scores = scores_of(reader, images, 0.2).set_index(["name", "distance_m", "level"])
+    wrong, unknown = (answers != images["state"]) & (answers != UNKNOWN), answers == UNKNOWN
+    for name in ("RGGB", "RYYCy"):
+        for distance, here in (
+            ("all", images["name"] == name),
+            ("200.0", (images["name"] == name) & (images["distance_m"] == 200)),
+        ):
+            row = scores.loc[(name, distance, "all")]
+            assert row["error"] == pytest.approx(wrong[here].mean())
+            assert row["unknown"] == pytest.approx(unknown[here].mean())
+            assert row["cost"] == pytest.approx(wrong[here].mean() + 0.2 * unknown[here].mean())
+            observed = (images["observer"] != images["state"])[here].mean()
+            assert row["above_observer"] == pytest.approx(wrong[here].mean() - observed)
+            assert row["images"] == here.sum()
+    rggb, ryycy = (scores.loc[(name, "all", "all"), "error"] for name in ("RGGB", "RYYCy"))
+    assert scores.loc[("RYYCy", "all", "all"), "apart"] == pytest.approx(ryycy - rggb)
+    assert scores.loc[("RGGB", "all", "all"), "apart"] == 0
+    assert np.isnan(scores["calibration_error"]).all()
+    lines = list(score_lines(scores_of(reader, images, 0.2)))
+    assert lines[0].startswith(f"mine, RGGB: errs on {100 * rggb:.1f} %")
+    assert "against RGGB" in lines[1]
+
+
+def test_the_observer_is_no_distance_from_itself(tmp_path: Path) -> None:
+    images = made_images()
+    file = images[["image_id"]].assign(state=images["observer"])
+    scores = scores_of(read_predictions(predicted(tmp_path, file, "a.parquet"), images, STATES), images, 0.2)
+    assert (scores[["above_observer", "above_observer_low", "above_observer_high"]] == 0).all(axis=None)
+
+
+def test_probabilities_are_calibrated_or_not(tmp_path: Path) -> None:
+    """A reader that says 0.8 and is right in 80 % has no calibration error beyond chance; one that says 0.99 has."""
+    images, rng = made_images(), np.random.default_rng(5)
+    for said, gap in ((0.8, 0.0), (0.99, 0.19)):
+        truth = images["state"].map(STATES.index).to_numpy()
+        answer = np.where(rng.random(len(images)) < 0.8, truth, (truth + 1) % 3)
+        table = np.full((len(images), 3), (1 - said) / 2)
+        table[np.arange(len(images)), answer] = said
+        file = pd.DataFrame(table, columns=list(STATES)).assign(image_id=images["image_id"].to_numpy())
+        scores = scores_of(read_predictions(predicted(tmp_path, file), images, STATES), images, 0.2)
+        whole = scores[(scores["distance_m"] == "all") & (scores["level"] == "all")]
+        assert whole["calibration_error"].to_numpy() == pytest.approx([gap, gap], abs=0.03)
+
+
+def test_paired_intervals_cover_the_difference() -> None:
+    """Of 500 benchmarks of five seeds whose hardness differs by seed: the paired difference, 0.05, in 93 to 97 %."""
+    from sweep.vision.scores import interval_of_seeds
+
+    rng, held = np.random.default_rng(7), 0
+    for _ in range(500):
+        level = 0.2 + 0.05 * rng.standard_normal(5)
+        hard = rng.random((5, 400)) < level[:, None]  # scenes that both read wrongly
+        extra = rng.random((5, 400)) < 0.05
+        by_seed = (hard | extra).mean(axis=1) - hard.mean(axis=1)
+        wanted = (0.05 * (1 - level)).mean()
+        found = interval_of_seeds(float(by_seed.mean()), by_seed)
+        held += found.low <= wanted <= found.high
+    assert 0.93 <= held / 500 <= 0.97
+
+
+@pytest.mark.parametrize(
+    ("change", "line"),
+    [
+        (lambda t: t.iloc[3:], "3 images of the test have no answer"),
+        (lambda t: pd.concat([t, t.iloc[:2]]), "an image stands twice (and 1 more)"),
+        (lambda t: t.assign(image_id=["x", *t["image_id"].iloc[1:]]), "not an image of the test"),
+        (lambda t: t.assign(state=["rde", *t["state"].iloc[1:]]), "no state"),
+        (lambda t: t.drop(columns="state"), "a column is missing (got 'off')"),
+        (lambda t: t.drop(columns="image_id"), "a column is missing (got 'image_id')"),
+        (lambda t: t.drop(columns="state").assign(off=0.5, red=0.6, yellow=0.1), "no probabilities"),
+        (lambda t: t.drop(columns="state").assign(off="a", red=0.5, yellow=0.5), "no probabilities"),
+    ],
+)
+def test_other_predictions_are_refused_with_a_line(tmp_path: Path, change: object, line: str) -> None:
+    images = made_images(2, 20)
+    table = images[["image_id"]].assign(state=images["observer"]).reset_index(drop=True)
+    path = predicted(tmp_path, change(table))  # type: ignore[operator]
+    with pytest.raises(DataError) as refused:
+        read_predictions(path, images, STATES)
+    assert any(line in str(issue) for issue in refused.value.issues)
+    assert len(refused.value.issues) <= 3
