@@ -128,7 +128,7 @@ class Bins:
 
 
 def nodes_of(pixel: Pixel, light: FloatArray) -> tuple[FloatArray, BoolArray]:
-    """Return expected electrons at which a merged value is tabulated: an eighth of its noise apart.
+    """Return expected electrons at which a merged value is tabulated: one in each eighth of its noise.
 
     Parameters
     ----------

@@ -120,7 +120,8 @@ def _listed(path: Path, outputs: Path, data: Path | None) -> StudyListing:
         else:
             stated, folder = several.name, outputs / folder_name(several.name)
             runs = [run_in(output_folder(folder / folder_name(one.name), one)[0]) for one in studies]
-            state = f"{sum(run is not None and run.finished for run in runs)} of {len(runs)} runs finished"
+            finished = sum(run is not None and run.finished for run in runs)
+            state = f"{finished} of {len(runs)} runs finished" if finished < len(runs) else f"finished, {finished} runs"
     except SweepError as error:
         more = f" (and {len(error.issues) - 1} more)" if error.issues[1:] else ""
         return StudyListing(path.stem, None, "cannot be loaded", f"{error.issues[0]}{more}")

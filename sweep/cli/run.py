@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import typer
 
 from .. import run as runner
-from ..base.errors import ErrorBoundExceededError, SweepError, ValidationIssue
+from ..base.errors import ErrorBoundExceededError, InterruptedRunError, OutputError, SweepError, ValidationIssue
 from ..base.types import in_turn
+from ..results.folder import run_in
 from ..results.tables import REPORT
 from ..run.workers import workers
 from ..study import Member, SeveralStudies, Study, folder_name, load_study
@@ -109,7 +110,7 @@ def run_one(
         with workers(n_workers if computed and backend == "loky" else 1) as parallel:
             silent = quiet or member is not None
             facts = finish(folder, began_s, repair=True, parallel=parallel, as_json=as_json, quiet=silent)
-    if opens and not webbrowser.open((folder / REPORT).absolute().as_uri()):
+    if opens and member is None and not webbrowser.open((folder / REPORT).absolute().as_uri()):
         note(f"no browser was found for {folder / REPORT}.")
     return {"computed": bool(computed), **facts}
 
@@ -122,6 +123,7 @@ class SeveralOptions(NamedTuple):
     dry_run: bool
     as_json: bool
     quiet: bool
+    opens: bool
 
 
 def run_several(
@@ -146,25 +148,38 @@ def run_several(
     Raises
     ------
     SweepError
-        As `run_one`, for the first member that cannot be run.
+        As `run_one`, for the first member that cannot be run, after all others; and if the folder holds a plain run.
     """
-    folder, made, quiet = options.output / folder_name(several.name), list[dict[str, Any]](), options.quiet
+    folder, quiet = options.output / folder_name(several.name), options.quiet
     studies = [(member, load(member=member)) for member in several.members]  # mistakes before any work
+    if run_in(folder) is not None:
+        raise OutputError(ValidationIssue("holds a run of one sensor", str(folder), allowed="another --output"))
+    made, failed = dict[Member, dict[str, Any]](), list[SweepError]()
     for member in several.members:
         if not quiet:
             typer.echo(f"-- {member.name} --", err=True)
-        made.append(run(member=member, output=folder))
-    if options.dry_run:
-        return {"folder": str(folder), "runs": made}
-    from ..report.sensors import SensorRun, report_sensors  # noqa: PLC0415  (loaded while workers compute)
-    from ..run.all_sensors import all_sensors_table  # noqa: PLC0415  (few studies have several sensors)
+        try:
+            made[member] = run(member=member, output=folder)
+        except InterruptedRunError:
+            raise
+        except SweepError as error:  # the others are run all the same
+            failed.append(error)
+    if made and not options.dry_run:
+        from ..report.sensors import SensorRun, report_sensors, together_in  # noqa: PLC0415  (while workers compute)
+        from ..run.all_sensors import all_sensors_table  # noqa: PLC0415  (few studies have several sensors)
 
-    with ProgressDisplay(quiet=quiet) as display, workers(options.jobs or os.cpu_count() or 1) as parallel:
-        together = all_sensors_table(studies, parallel, display.update)
-    runs = [SensorRun(member, Path(one["folder"])) for member, one in zip(several.members, made, strict=True)]
-    lines = report_sensors(folder, several.name, several.question, runs, together)
-    print_lines(lines, as_json=options.as_json, quiet=quiet)
-    return {"folder": str(folder), "runs": made}
+        together = together_in(folder)
+        if together is None or any(one["computed"] for one in made.values()):
+            with ProgressDisplay(quiet=quiet) as display, workers(options.jobs or os.cpu_count() or 1) as parallel:
+                together = all_sensors_table(studies, parallel, display.update)
+        runs = [SensorRun(member, Path(one["folder"])) for member, one in made.items()]
+        lines = report_sensors(folder, several.name, several.question, runs, together)
+        print_lines(lines, as_json=options.as_json, quiet=quiet)
+        if options.opens:
+            webbrowser.open((folder / REPORT).absolute().as_uri())
+    if failed:
+        raise failed[0]
+    return {"folder": str(folder), "runs": [*made.values()]}
 
 
 def finish(

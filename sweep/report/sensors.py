@@ -19,7 +19,7 @@ from ..results.atomic import write_bytes, write_text
 from ..results.output import Output, read_output
 from ..results.tables import FOUND, PLAIN, RESULTS
 from ..run.all_sensors import ALL
-from ..run.uncertainty import REFERENCE
+from ..run.uncertainty import REFERENCE, UNCLIPPED
 from ..study import Member, folder_name
 from .figures import CURVE_CYCLE, canvas, legend_beside, rendered
 from .pages import inlined, page, rows
@@ -81,8 +81,23 @@ def report_again(folder: Path, runs: Sequence[SensorRun]) -> list[str]:
     list of str
         Answer, as it is printed.
     """
-    together = pq.read_table(folder / TOGETHER) if (folder / TOGETHER).exists() else None
-    return report_sensors(folder, folder.name, read_output(runs[0].folder).study.question, runs, together)
+    return report_sensors(folder, folder.name, read_output(runs[0].folder).study.question, runs, together_in(folder))
+
+
+def together_in(folder: Path) -> pa.Table | None:
+    """Return the filters for several sensors that a finished study has.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the study.
+
+    Returns
+    -------
+    pyarrow.Table or None
+        None if there are none.
+    """
+    return pq.read_table(folder / TOGETHER) if (folder / TOGETHER).exists() else None
 
 
 def report_sensors(
@@ -179,8 +194,8 @@ def _figures(member: Member, output: Output) -> Iterator[dict[str, Any]]:
 
 def _uncertain(output: Output, separation: str) -> Mapping[Any, Mapping[str, float]]:
     """Return quantiles of both ratios and their deviations by row, where the study has uncertain curves."""
-    if output.uncertainty is None:
-        return {}
+    if output.uncertainty is None or UNCLIPPED in output.provenance.warnings:
+        return {}  # of other separations than those of the rows
     known = output.uncertainty[output.uncertainty["quantity"] == separation].set_index("design_id")
     names = ["ratio_5", "ratio_95", "light_ratio_5", "light_ratio_95", "ratio_sd", "light_ratio_sd", "correlation"]
     return {key: {str(n): float(v) for n, v in row.items()} for key, row in known[names].iterrows()}

@@ -9,6 +9,7 @@ from typing import Any
 import pyarrow as pa
 
 from ..base.types import Parallel, Progress, delayed
+from ..designs.family import ChoosingFamily, Family
 from ..metrics.bound import FEASIBLE
 from ..search.problem import Evaluation, Problem, best_feasible, starting_points
 from ..search.solver import search_from, smooth_evaluation
@@ -51,7 +52,8 @@ def all_sensors_table(
     """
     by_space: dict[str, list[tuple[Member, Problem, Search]]] = {}
     for member, study in studies:
-        if (search := study.search) is not None and search.space.filter is not None:
+        # A choice from a catalog is a search of its own, and is not made for several sensors.
+        if (search := study.search) is not None and not isinstance(_family_of(search), ChoosingFamily):
             by_space.setdefault(search.space.name, []).append((member, study.problem(search), search))
     rows: list[dict[str, Any]] = []
     for space, searched in by_space.items():
@@ -59,6 +61,11 @@ def all_sensors_table(
         if len(sensors) > 1:
             rows += _of_space(space, searched, sensors, parallel, progress)
     return pa.Table.from_pylist(rows, schema=_SCHEMA) if rows else None
+
+
+def _family_of(search: Search) -> Family:
+    assert search.space.filter is not None
+    return search.space.filter.family
 
 
 def _of_space(
@@ -112,5 +119,5 @@ def _of_space(
 
 def _joined(problems: Sequence[Problem]) -> Problem:
     """Return the problem of the worst of several sensors."""
-    first, *others = problems
-    return replace(first, others=tuple(scene for problem in others for scene in problem.scenes))
+    scenes = [scene for problem in problems for scene in problem.scenes]
+    return replace(problems[0], others=tuple(scenes[1:]))

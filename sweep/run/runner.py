@@ -65,6 +65,7 @@ from .search import (
     search_log,
 )
 from .sweep import RunOptions, Sweep
+from .uncertainty import UNCLIPPED
 from .workers import Workers, stopped_by_signals, workers
 
 _CHECK_S, _CHECK_SHARE = 1.0, 0.1
@@ -315,9 +316,13 @@ class _Run:
             "quantities": [quantity.column for quantity in study.quantities.values()],
         }
         warnings = [*study.warnings, *sweep.warnings]
+        if study.section.uncertainty is not None and any(
+            "saturation" in plan.computed for plan in study.plans.values()
+        ):
+            warnings.append(UNCLIPPED)
         if answer is not None:
             facts["search"] = search_facts(study, answer)
-            if "saturation" in study.plans[answer.scenario].computed:
+            if "saturation" in study.plans[answer.scenario].computed and not study.searches_merged:
                 warnings.append("pixels may saturate: the search sees them before clipping, its row after")
             if answer.front:
                 facts["hypervolume"] = _hypervolumes(answer, self.gathered)

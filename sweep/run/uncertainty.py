@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 SHARES = (0.05, 0.5, 0.95)
 REFERENCE = "RGGB"
 """CFA that others are compared with; the first plain one where a study does not have it."""
+UNCLIPPED = "pixels may saturate: random sensors are read before clipping"
 _CONFIDENCE = 0.95
 _TOGETHER = 200
 """Draws that are computed at once."""

@@ -283,8 +283,8 @@ def reason_without_bound(problem: Problem) -> str | None:
     reasons: tuple[tuple[Callable[[], bool], str], ...] = (
         (lambda: family.n_modified != 1, "more than one modified channel"),
         (lambda: not problem.objective.rule.smallest, f"the objective is a {problem.objective.rule.name}"),
-        (lambda: bool(unknown), f"{', '.join(unknown)} {why}"),
         (lambda: _merges(problem), "the noise of merged captures has no bound"),
+        (lambda: bool(unknown), f"{', '.join(unknown)} {why}"),
         (lambda: problem.setup.camera.pixel.crosstalk > 0, "crosstalk mixes the modified channel into others"),
         (
             lambda: bool((_top(problem) > base * (1 + ROUNDING)).any()),

@@ -13,6 +13,7 @@ from ..designs.family import Family
 from ..designs.tolerance import AS_DESIGNED, NONE, ProductionError, Tolerance
 from ..designs.ungridded import sobol_points
 from ..metrics.bound import FEASIBLE, Bound
+from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.objective import Objective
 from ..metrics.quantity import DN, OF_A_SHARE, WORST_CASE, Quantity, RequestedQuantities
 from ..metrics.registry import quantities_of
@@ -100,8 +101,9 @@ class Problem:
         int
             1 for quantities of a filter alone, which are the same in all scenarios of one sensor.
         """
-        requested, one_sensor = self.quantities[quantity], all(family is self.family for _, family in self.others)
-        return 1 if one_sensor and not (requested.pair or requested.states) else len(self.scenes)
+        of_filter = self.quantities[quantity].needs in ("modified", "family") or quantity == CFA_SENSITIVITY
+        one_sensor = all(family is self.family for _, family in self.others)
+        return 1 if of_filter and one_sensor else len(self.scenes)
 
     def in_scenario(self, number: int) -> Problem:
         """Return the problem of one scenario or sensor.

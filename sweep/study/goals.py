@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
@@ -24,6 +25,8 @@ from .schema import StudySection
 from .sources import Sources
 
 _SLACK = 1e-9
+_NUMBERS = re.compile(r"( [^ =]+=[^ =]+)+$")
+"""What `each` adds to a scenario's name."""
 _MOST_OF_AXIS = 200
 """Values of one parameter of a map."""
 _LEAST_ERROR = 1e-12
@@ -140,11 +143,11 @@ def search_of(section: StudySection, spaces: Sequence[Space], sources: Sources) 
         sources.unknown(("search", "space"), "sweep or box", chosen, names)
     elif chosen in boxes and not _free(boxes[chosen], requested.map or {}):
         sources.add(("search", "space"), "every parameter is fixed", chosen, "one free parameter or more")
-    series = {name.partition(" ")[0]: None for name in scenarios if "=" in name}
+    bases = {name: _NUMBERS.sub("", name) for name in scenarios}
     wanted = requested.scenario or scenarios[0]
-    searched = [name for name in scenarios if name == wanted or (wanted in series and name.startswith(f"{wanted} "))]
+    searched = [wanted] if wanted in bases else [name for name, base in bases.items() if base == wanted]
     if not searched:
-        sources.unknown(("search", "scenario"), "scenario", wanted, [*scenarios, *series])
+        sources.unknown(("search", "scenario"), "scenario", wanted, dict.fromkeys([*bases, *bases.values()]))
     if requested.algorithm not in ALGORITHMS:
         what = "algorithm (it must take inequality constraints)"
         sources.unknown(("search", "algorithm"), what, requested.algorithm, list(ALGORITHMS))

@@ -16,7 +16,7 @@ from .document import Document
 from .model import Study
 from .resolve import resolve
 from .schema import StudySection
-from .several import Member, SeveralStudies, choose, members_of, narrowed
+from .several import Member, SeveralStudies, choose, members_of, narrowed, way_to_one
 from .sources import KeptSources, Sources
 
 
@@ -59,13 +59,14 @@ def load_study(
     if member is None and len(members) > 1:
         names = ", ".join(one.name for one in members)
         problem = f"a study of several sensors or lights ({names}): `sweep run` runs all"
-        allowed = f"--set sensors=[{members[0].sensor}] --set lights={members[0].lights}"
-        raise StudyError(ValidationIssue(problem, str(path), allowed=f"one of each here: {allowed}"))
+        raise StudyError(ValidationIssue(problem, str(path), allowed=f"one of each here: {way_to_one(document)}"))
     chosen, notes = member or members[0], list[str]()
     choose(document, chosen)
     section = _checked(document)
     if max(chosen.indices) >= 0:
         section, notes = narrowed(section, chosen)
+        if len(members) > 1:
+            section = section.model_copy(update={"study": chosen.name})
     if step_nm is not None:
         grid = section.wavelengths
         finer = WavelengthGrid(start_nm=grid.start_nm, stop_nm=grid.stop_nm, step_nm=step_nm)

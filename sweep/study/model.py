@@ -346,6 +346,12 @@ class Study:
         )
 
     @property
+    def searches_merged(self) -> bool:
+        """True if the objective has the noise of an HDR pixel, of whose saturation the search knows."""
+        noisy = any(self.quantities[name].states for name in self.objective.weights)
+        return noisy and bool(self.pixel.captures)
+
+    @property
     def images(self) -> SeededVision | None:
         """The benchmark of vision, where the study asks for one."""
         vision = self.section.vision

@@ -93,6 +93,28 @@ def _name(entry: Any, key: str, at: int) -> str:
     return str(stated or f"{key.removesuffix('s')} {at + 1}")
 
 
+def way_to_one(document: Document) -> str:
+    """Return the options that choose a member.
+
+    Parameters
+    ----------
+    document : Document
+        Study file.
+
+    Returns
+    -------
+    str
+        Text.
+    """
+    options = []
+    for key in ("sensors", "lights"):
+        entries = document.data.get(key)
+        if isinstance(entries, list):
+            first = entries[0]
+            options.append(f"--set {key}=[{first}]" if isinstance(first, str) else f"a list `{key}` of one in the file")
+    return " ".join(options)
+
+
 def choose(document: Document, member: Member) -> None:
     """Leave one sensor and one set of lights in a document.
 
@@ -110,7 +132,7 @@ def choose(document: Document, member: Member) -> None:
 
 
 def narrowed(section: StudySection, member: Member) -> tuple[StudySection, list[str]]:
-    """Return a member's study: its name, the wavelengths that its curves have, and the CFAs that the sensor has.
+    """Return a member's study: the wavelengths that its curves have, and the CFAs that the sensor has.
 
     Parameters
     ----------
@@ -133,9 +155,11 @@ def narrowed(section: StudySection, member: Member) -> tuple[StudySection, list[
     if (low, high) != (grid.start_nm, grid.stop_nm):
         start = grid.start_nm + grid.step_nm * math.ceil((low - grid.start_nm) / grid.step_nm)
         stop = start + grid.step_nm * math.floor((high - start) / grid.step_nm)
+        if stop <= start:  # left as it is, for the error of what has no curves there
+            return section, []
         grid = grid.model_copy(update={"start_nm": start, "stop_nm": stop})
         notes.append(f"{member.sensor}: curves from {start:g} to {stop:g} nm")
-    changes: dict[str, Any] = {"study": member.name, "wavelengths": grid}
+    changes: dict[str, Any] = {"wavelengths": grid}
     curves = _curves_of(section)
     if curves is not None:
         changes |= _of_curves(section, curves)

@@ -310,6 +310,46 @@ def test_a_mistake_is_one_line(tmp_path: Path, old: str, new: str, line: str) ->
     assert "Traceback" not in err
 
 
+def test_a_plain_run_is_not_overwritten(tmp_path: Path) -> None:
+    plain = SEVERAL.replace("sensors: [ar0820, opencam, ar0132at]", "sensor: ar0820").replace("[tl16, luxeon]", "tl16")
+    plain = plain.replace("search:", "search_:").split("search_:")[0]
+    path = tmp_path / "few.yaml"
+    path.write_text(plain)
+    assert commanded("run", path, "--output", tmp_path / "out", "--jobs", 1, "--quiet")[0] == 0
+    before = (tmp_path / "out" / "few" / "results.parquet").read_bytes()
+    path.write_text(SEVERAL)
+    code, _, err = commanded("run", path, "--output", tmp_path / "out", "--jobs", 1, "--quiet")
+    assert (code, "holds a run of one sensor" in err) == (2, True)
+    assert (tmp_path / "out" / "few" / "results.parquet").read_bytes() == before
+
+
+def test_one_that_fails_does_not_stop_the_others(tmp_path: Path) -> None:
+    """No CFA with opencam's yellow pixels has 0.55 of a clear sensor's light; ar0820's have."""
+    text = SEVERAL.replace("[tl16, luxeon]", "tl16").replace("[ar0820, opencam, ar0132at]", "[opencam, ar0820]")
+    path = tmp_path / "few.yaml"
+    path.write_text(
+        text.replace("{sensitivity: {min: 0.9}}", "{sensitivity: {min: 0.9}, cfa_sensitivity: {min: 0.55}}")
+    )
+    code, out, err = commanded("run", path, "--output", tmp_path / "out", "--jobs", 1)
+    assert (code, "out of reach: cfa_sensitivity" in err) == (3, True)
+    rows = pd.read_parquet(tmp_path / "out" / "few" / "results.parquet")
+    assert set(rows["sensor"]) == {"ar0820"}
+    assert "report.html" in out
+
+
+def test_several_sensors_and_scenarios_count_together() -> None:
+    from dataclasses import replace as changed
+
+    from sweep.run.all_sensors import _joined
+
+    study = load_study(STUDIES / "hdr_filter.yaml")
+    problem = study.problem(study.search)
+    n = len(problem.scenes)
+    assert n == 17
+    assert len(_joined([problem, changed(problem, seed=2)]).scenes) == 2 * n
+    assert len(_joined([problem]).scenes) == n
+
+
 def test_uncertain_curves_of_thin_layers_are_refused(tmp_path: Path) -> None:
     text = SEVERAL.replace("[ar0820, opencam, ar0132at]", "[ar0132at]").replace("[tl16, luxeon]", "tl16")
     text = text.replace("gain: 0.03", "gain: 0.03, ir_cut_nm: 2")
@@ -323,11 +363,11 @@ def test_uncertain_curves_of_thin_layers_are_refused(tmp_path: Path) -> None:
 def test_other_commands_say_how_to_choose_one(tmp_path: Path) -> None:
     path = tmp_path / "few.yaml"
     path.write_text(SEVERAL)
-    with pytest.raises(StudyError, match=r"--set sensors=\[ar0820\] --set lights=tl16"):
+    with pytest.raises(StudyError, match=r"--set sensors=\[ar0820\] --set lights=\[tl16\]"):
         load_study(path)
     chosen: dict[str, Any] = {"sensors": "[opencam]", "lights": "tl16"}
     study = load_study(path, changes=chosen)
-    assert study.name == "opencam tl16"
+    assert study.name == "few"
     assert study.grid.stop_nm == 660
     code, out, _ = commanded("check", path)
     assert code == 0

@@ -175,7 +175,7 @@ def run(
                 facts = run_it()
             else:
                 load = partial(load_study, path, data, changes=changes_of(changes), allow_code=allow_code)
-                how = SeveralOptions(output, jobs, dry_run, as_json, quiet)
+                how = SeveralOptions(output, jobs, dry_run, as_json, quiet, opens)
                 facts = run_several(several, run_it, load, how)
         except InterruptedRunError:
             raise
