@@ -72,7 +72,8 @@ def summary_lines(output: Output, took_s: float | None = None) -> list[str]:
     lines += comparison_lines(comparison_with_published(output))
     lines += [counts_line(output), _plan_line(output)]
     if facts.search:
-        reached = f"{output.goal.amount(facts.search.best_smooth_objective)} before clipping and quantization"
+        how = "as the search computes it" if output.study.pixel.captures else "before clipping and quantization"
+        reached = f"{output.goal.amount(facts.search.best_smooth_objective)} {how}"
         starts, evaluations = _count(facts.search.starts, "start"), _count(facts.search.evaluations, "evaluation")
         if facts.search.combinations:
             lines.append(f"Tried: {', '.join(facts.search.combinations)} of colorants.")
