@@ -11,7 +11,7 @@ import pandas as pd
 from ..results.atomic import atomic, write_text
 from ..results.output import Output
 from ..results.tables import VISION
-from ..run.score import Reader, check_unique, read_predictions, score_lines, scores_of, test_images
+from ..run.score import Reader, check_unique, images_of_test, read_predictions, score_lines, scores_of
 from ..vision.scenes import states_of
 from .figures import CURVE_CYCLE, DASHES, canvas, legend_beside, rendered
 from .pages import inlined, page, rows
@@ -46,7 +46,7 @@ def score_readers(output: Output, predictions: Sequence[Path], to: Path) -> list
     """
     vision = output.study.vision
     assert vision is not None
-    images = test_images(output.vision[VISION])
+    images = images_of_test(output.vision[VISION])
     readers: list[Reader] = [read_predictions(path, images, states_of(vision)) for path in predictions]
     check_unique(readers)
     scores = pd.concat([scores_of(reader, images, vision.unknown_cost) for reader in readers], ignore_index=True)

@@ -42,7 +42,7 @@ class Reader:
     answers: pd.DataFrame
 
 
-def test_images(images: pd.DataFrame) -> pd.DataFrame:
+def images_of_test(images: pd.DataFrame) -> pd.DataFrame:
     """Return the images of a run that predictions are of, with their names.
 
     Parameters
@@ -68,7 +68,7 @@ def read_predictions(path: Path, images: pd.DataFrame, states: Sequence[str]) ->
     path : Path
         CSV or Parquet.
     images : pandas.DataFrame
-        Result of `test_images`.
+        Result of `images_of_test`.
     states : sequence of str
         States.
 
@@ -146,7 +146,7 @@ def scores_of(reader: Reader, images: pd.DataFrame, unknown_cost: float) -> pd.D
     reader : Reader
         Reader.
     images : pandas.DataFrame
-        Result of `test_images`.
+        Result of `images_of_test`.
     unknown_cost : float
         Cost of `unknown`.
 

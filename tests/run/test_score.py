@@ -9,8 +9,7 @@ import pandas as pd
 import pytest
 
 from sweep.base.errors import DataError
-from sweep.run.score import UNKNOWN, read_predictions, score_lines, scores_of
-from sweep.run.score import test_images as images_of
+from sweep.run.score import UNKNOWN, images_of_test, read_predictions, score_lines, scores_of
 
 STATES = ("off", "red", "yellow")
 
@@ -29,7 +28,7 @@ def made_images(n_seeds: int = 5, per_seed: int = 200, seed: int = 3) -> pd.Data
                     | {"level": "day", "observer": STATES[(state + wrong[at]) % 3]}
                 )
     frame = pd.DataFrame(rows)
-    return images_of(pd.concat([frame, frame.assign(lamps="seen")]))
+    return images_of_test(pd.concat([frame, frame.assign(lamps="seen")]))
 
 
 def predicted(folder: Path, table: pd.DataFrame, name: str = "mine.csv") -> Path:
