@@ -200,21 +200,26 @@ def _refine_phases(model: ForwardModel, block: Block, columns: Columns) -> None:
 
 
 def _refine_heights(model: ForwardModel, block: Block, cases: Columns, columns: Columns) -> None:
-    """Refine the smallest distances over all field positions in the columns."""
+    """Refine the extreme distances over all field positions in the columns; the largest of a single phase alone."""
     setup = model.setup
     names, heights = _csd_names(setup), field_heights(setup)
     if not setup.accuracy.finest_phase_px:
         return
     at_heights = _by_phase(model, cases, len(heights))
+    best = [BEST_PLACE + name for name in names if model.n_cases == len(heights) and BEST_PLACE + name in columns]
     for design in np.flatnonzero(np.isfinite(at_heights).all(axis=(1, 2))):
         curves = block.some(slice(design, design + 1)).curves()
 
         def at_height(height: float, curves: FloatArray = curves) -> FloatArray:
-            return np.asarray(_csds(forward_model(setup_at(setup, height)), curves).min(axis=1))
+            csds = _csds(forward_model(setup_at(setup, height)), curves).min(axis=1)
+            return np.concatenate([csds, -csds]) if best else csds
 
-        smallest, _ = refined_heights(heights, at_heights[design], at_height)
-        for name, least in zip(names, smallest, strict=True):
+        known = at_heights[design]
+        extremes, _ = refined_heights(heights, np.concatenate([known, -known]) if best else known, at_height)
+        for name, least in zip(names, extremes, strict=False):
             columns[name][design] = least
+        for name, largest in zip(best, -extremes[len(names) :], strict=True):
+            columns[name][design] = largest
 
 
 def _whole_readout(
