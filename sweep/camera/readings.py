@@ -1,4 +1,4 @@
-"""What the captures of a pixel read, for given numbers of electrons: exact distributions of the merged value.
+"""Readings of the captures of an HDR pixel for given numbers of electrons: exact distributions of the merged value.
 
 The merged value is in bins of an eighth of its noise, or in the codes of a companded pixel. Which captures are usable,
 read noise, full well, ADC range and rounding are exact.

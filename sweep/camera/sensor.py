@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -188,6 +188,22 @@ def make_sensor(name: str, qe: Mapping[str, FloatArray], source: str, clear: str
     return sensor
 
 
+def own_red(names: Collection[str]) -> dict[str, dict[str, str]]:
+    """Return the channels that have another curve in RCCC and RCCB: a red of their own, where a sensor has one.
+
+    Parameters
+    ----------
+    names : collection of str
+        Curves of a built-in sensor.
+
+    Returns
+    -------
+    dict of str to dict of str to str
+        CFA -> channel -> curve.
+    """
+    return {cfa: {"R": "Rx"} for cfa in ("RCCC", "RCCB")} if "Rx" in names else {}
+
+
 def ar0820_sensor(grid: WavelengthGrid, parameters: SurrogateParameters) -> SensorCurves:
     """Make the surrogate sensor from its parameters; RCCC and RCCB have a red of their own.
 
@@ -204,9 +220,9 @@ def ar0820_sensor(grid: WavelengthGrid, parameters: SurrogateParameters) -> Sens
         The sensor.
     """
     curves = ar0820(grid, parameters)
-    red = {"R": "Rx"}
     cut = ir_cut_transmission(grid.nodes_nm, parameters)
-    return SensorCurves("ar0820", curves.values, "C", curves.source, True, {"RCCC": red, "RCCB": red}, ir_cut=cut)
+    variants = own_red(curves.values)
+    return SensorCurves("ar0820", curves.values, "C", curves.source, True, variants, ir_cut=cut)
 
 
 def measured_sensor(name: str, grid: WavelengthGrid) -> SensorCurves:
@@ -231,10 +247,9 @@ def measured_sensor(name: str, grid: WavelengthGrid) -> SensorCurves:
     """
     measured = SENSORS[name]
     curves = measured.curves(grid)
-    red = {cfa: {"R": "Rx"} for cfa in ("RCCC", "RCCB")} if "Rx" in curves else {}
     source = f"built-in {name}, digitized: {measured.source}"
     clear = "W" if "W" in curves else "C"
-    return SensorCurves(name, curves, clear, source, variants=red, ir_cut=ir_cut(name, grid))
+    return SensorCurves(name, curves, clear, source, variants=own_red(curves), ir_cut=ir_cut(name, grid))
 
 
 BUILT_IN_SENSORS: dict[str, Callable[[WavelengthGrid], SensorCurves]] = {

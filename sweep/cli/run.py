@@ -9,13 +9,15 @@ import webbrowser
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import pyarrow.parquet as pq
 import typer
 
 from .. import run as runner
 from ..base.errors import ErrorBoundExceededError, InterruptedRunError, OutputError, SweepError, ValidationIssue
 from ..base.types import in_turn
+from ..results.atomic import atomic
 from ..results.folder import run_in
-from ..results.tables import REPORT
+from ..results.tables import ALL_SENSORS, REPORT
 from ..run.workers import workers
 from ..study import Member, SeveralStudies, Study, folder_name, load_study
 from .output import ProgressDisplay, print_lines
@@ -165,15 +167,20 @@ def run_several(
         except SweepError as error:  # the others are run all the same
             failed.append(error)
     if made and not options.dry_run:
-        from ..report.sensors import SensorRun, report_sensors, together_in  # noqa: PLC0415  (while workers compute)
+        from ..report.sensors import SensorRun, report_sensors  # noqa: PLC0415  (while workers compute)
         from ..run.all_sensors import all_sensors_table  # noqa: PLC0415  (few studies have several sensors)
 
-        together = together_in(folder)
-        if together is None or any(one["computed"] for one in made.values()):
+        joined = folder / ALL_SENSORS
+        if any(facts["computed"] for facts in made.values()):
+            joined.unlink(missing_ok=True)
+        if not joined.exists():
             with ProgressDisplay(quiet=quiet) as display, workers(options.jobs or os.cpu_count() or 1) as parallel:
-                together = all_sensors_table(studies, parallel, display.update)
+                table = all_sensors_table(studies, parallel, display.update)
+            if table is not None:
+                with atomic(joined) as hidden:
+                    pq.write_table(table, hidden)
         runs = [SensorRun(member, Path(one["folder"])) for member, one in made.items()]
-        lines = report_sensors(folder, several.name, several.question, runs, together)
+        lines = report_sensors(folder, runs)
         print_lines(lines, as_json=options.as_json, quiet=quiet)
         if options.opens:
             webbrowser.open((folder / REPORT).absolute().as_uri())

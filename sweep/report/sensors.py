@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,9 +16,9 @@ import pyarrow.parquet as pq
 from ..base.types import FloatArray
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.quantity import Column
-from ..results.atomic import write_bytes, write_text
+from ..results.atomic import atomic, write_bytes, write_text
 from ..results.output import Output, read_output
-from ..results.tables import FOUND, PLAIN, RESULTS
+from ..results.tables import ALL_SENSORS, FOUND, PLAIN, REPORT, RESULTS
 from ..run.all_sensors import ALL
 from ..run.uncertainty import REFERENCE, UNCLIPPED
 from ..study import Member, folder_name
@@ -27,11 +28,11 @@ from .pages import inlined, page, rows
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PAGE, PICTURE, TOGETHER = "report.html", "sensors", "all_sensors.parquet"
+PICTURE = "sensors"
 _KEYS = ("sensor", "lights")
 _MARKERS = "osD^vPX*<>"
-_NINE_TENTHS = 2.1459660262893476
-"""Semiaxis of the ellipse that holds 90 % of a Gaussian in two dimensions, in deviations: sqrt(-2 ln 0.1)."""
+_NINE_TENTHS = math.sqrt(-2 * math.log(0.1))
+"""Semiaxis of the ellipse that holds 90 % of a Gaussian in two dimensions, in deviations."""
 
 
 @dataclass(frozen=True)
@@ -66,57 +67,18 @@ def runs_in(folder: Path) -> list[SensorRun]:
     return [SensorRun(member, folder / folder_name(member.name)) for member in members]
 
 
-def report_again(folder: Path, runs: Sequence[SensorRun]) -> list[str]:
-    """Write picture and page of a study of several sensors again.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the study.
-    runs : sequence of SensorRun
-        Its runs.
-
-    Returns
-    -------
-    list of str
-        Answer, as it is printed.
-    """
-    return report_sensors(folder, folder.name, read_output(runs[0].folder).study.question, runs, together_in(folder))
-
-
-def together_in(folder: Path) -> pa.Table | None:
-    """Return the filters for several sensors that a finished study has.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the study.
-
-    Returns
-    -------
-    pyarrow.Table or None
-        None if there are none.
-    """
-    return pq.read_table(folder / TOGETHER) if (folder / TOGETHER).exists() else None
-
-
-def report_sensors(
-    folder: Path, name: str, question: str, runs: Sequence[SensorRun], together: pa.Table | None
-) -> list[str]:
+def report_sensors(folder: Path, runs: Sequence[SensorRun]) -> list[str]:
     """Write one table of all rows, a picture and a page of a study of several sensors.
 
-    `results.parquet` has the rows of all runs with `sensor` and `lights` before them.
+    `results.parquet` has the rows of all runs with `sensor` and `lights` before them. The filters for several sensors
+    are read from `all_sensors.parquet`, see `all_sensors_table`, if the folder has it.
 
     Parameters
     ----------
     folder : Path
-        Folder of the study, which has those of the runs.
-    name, question : str
-        Study.
+        Folder of the study, named as it; has those of the runs.
     runs : sequence of SensorRun
         Finished runs.
-    together : pyarrow.Table or None
-        Filters for several sensors, see `all_sensors_table`; written as `all_sensors.parquet`.
 
     Returns
     -------
@@ -132,9 +94,8 @@ def report_sensors(
         for at, (key, value) in enumerate(zip(_KEYS, run.member[:2], strict=True)):
             table = table.add_column(at, key, pa.array([value] * len(table)))
         tables.append(table)
-    sink = pa.BufferOutputStream()
-    pq.write_table(pa.concat_tables(tables, promote_options="default"), sink)
-    write_bytes(sink.getvalue().to_pybytes(), folder / RESULTS)
+    with atomic(folder / RESULTS) as hidden:
+        pq.write_table(pa.concat_tables(tables, promote_options="default"), hidden)
     figures = pd.DataFrame([row for member, output in outputs for row in _figures(member, output)])
     drawn = draw_sensors(figures, outputs[0][1].trade_off[0].words)
     images = {kind: rendered(drawn, kind) for kind in ("png", "svg")}
@@ -144,27 +105,25 @@ def report_sensors(
     n_found = figures.loc[figures["kind"] == FOUND, "cfa"].nunique()
     lines = [*_answer(summary, n_found, str(figures["reference"].iloc[0]), words)]
     answer = lines[: max(n_found, 1)]
-    if together is not None:
-        sink = pa.BufferOutputStream()
-        pq.write_table(together, sink)
-        write_bytes(sink.getvalue().to_pybytes(), folder / TOGETHER)
-        lines += _together(together.to_pandas(), outputs[0][1].goal)
+    together = pd.read_parquet(folder / ALL_SENSORS) if (folder / ALL_SENSORS).exists() else pd.DataFrame()
+    if len(together):
+        lines += _together(together, outputs[0][1].goal)
     lines += _notes(outputs)
-    links = [(run.member.name, f"{run.folder.name}/{PAGE}") for run in runs]
+    links = [(run.member.name, f"{run.folder.name}/{REPORT}") for run in runs]
     text = page(
         "sensors.html.j2",
-        title=name,
-        question=question,
+        title=folder.name,
+        question=outputs[0][1].study.question,
         answer=answer,
         further=lines[len(answer) :],
         summary=rows(summary),
         image=inlined(images["png"]),
         table=rows(_shown(figures)),
-        together=[] if together is None else rows(together.to_pandas()),
+        together=rows(together) if len(together) else [],
         links=links,
     )
-    write_text(text, folder / PAGE)
-    return [*lines, f"Files: {folder}/: {RESULTS}, {PAGE}, {PICTURE}.png; a run and its report in each folder."]
+    write_text(text, folder / REPORT)
+    return [*lines, f"Files: {folder}/: {RESULTS}, {REPORT}, {PICTURE}.png; a run and its report in each folder."]
 
 
 def _figures(member: Member, output: Output) -> Iterator[dict[str, Any]]:

@@ -43,7 +43,7 @@ VISION, VISION_CONDITIONS = "vision.parquet", "vision_conditions.parquet"
 VISION_MISREAD = "vision_misread.parquet"
 VISION_TABLES = (VISION, VISION_CONDITIONS, VISION_MISREAD)
 """Tables of the benchmark of vision: a row per image, per distance and level, per picture that was read wrongly."""
-AUDIT = "audit.parquet"
+AUDIT, ALL_SENSORS = "audit.parquet", "all_sensors.parquet"
 PROVENANCE = "provenance.json"
 RESOLVED = "study.resolved.yaml"
 RUN, SUMS = "run.json", "SHA256SUMS"

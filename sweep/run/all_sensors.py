@@ -95,13 +95,13 @@ def _of_space(
         logs.setdefault(name, []).extend(run.log)
     best = {name: best_feasible(log) for name, log in logs.items()}
     for name, numbers in parts.items():
-        found = best[name]
-        if found is None:
+        design = best[name]
+        if design is None:
             continue
         for at, member in enumerate(members):
-            here = smooth_evaluation(problems[at], found.x)
-            own = best[f"{at}"]
-            shown = zip(search.space.parameters, found.x, strict=True)
+            here = smooth_evaluation(problems[at], design.x)
+            alone_best = best[f"{at}"]
+            parameters = zip(search.space.parameters, design.x, strict=True)
             yield {
                 "designed_on": name,
                 "space": space,
@@ -112,8 +112,8 @@ def _of_space(
                 "sensitivity": here.sensitivity,
                 "cfa_sensitivity": here.cfa_sensitivity,
                 "violation": here.violation if here.violation > FEASIBLE else 0.0,
-                "own_best": None if own is None else own.objective,
-                "parameters": ", ".join(f"{key} {value:.2f}" for key, value in shown),
+                "own_best": None if alone_best is None else alone_best.objective,
+                "parameters": ", ".join(f"{key} {value:.2f}" for key, value in parameters),
             }
 
 

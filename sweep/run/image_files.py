@@ -48,7 +48,7 @@ _SCHEMA = pa.schema([(name, kind) for kind, names in _KINDS.items() for name in 
 
 @dataclass(frozen=True)
 class ImageFiles:
-    """Where images go and what they are.
+    """Folder and form of exported images.
 
     Parameters
     ----------
@@ -236,7 +236,7 @@ def _write_png(image: np.ndarray[Any, Any], path: Path) -> None:
 
 
 def _labels(camera: HeadCamera, scenes: Scenes) -> Iterator[dict[str, Any]]:
-    """Yield what each image shows."""
+    """Yield state, geometry and light of each image."""
     vision, setup = camera.vision, camera.setup
     states, levels = states_of(vision), list(vision.levels.items())
     places, orders = head_places_px(vision, setup.camera.mosaic), orders_of_lenses(len(vision.lenses))

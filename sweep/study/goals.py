@@ -26,7 +26,7 @@ from .sources import Sources
 
 _SLACK = 1e-9
 _NUMBERS = re.compile(r"( [^ =]+=[^ =]+)+$")
-"""What `each` adds to a scenario's name."""
+"""Numbers that `each` adds to a scenario's name."""
 _MOST_OF_AXIS = 200
 """Values of one parameter of a map."""
 _LEAST_ERROR = 1e-12

@@ -8,14 +8,15 @@ from typing import Any, NamedTuple
 
 from ..base.errors import StudyError
 from ..camera.mosaic import Mosaic
-from ..camera.sensor import BUILT_IN_SENSORS
+from ..camera.sensor import BUILT_IN_SENSORS, own_red
 from ..spectra.builtin.measured_sets import LUXEON, SENSORS
 from .document import Document
 from .schema import Modification, StudySection
 
 _MOST = 24
 _SURROGATE_CURVES = ("C", "R", "G", "B", "Y", "Cy", "Rx")
-_RANGES_NM = {**{name: one.range_nm for name, one in SENSORS.items()}, "luxeon": LUXEON.range_nm}
+_MEASURED = {**SENSORS, "luxeon": LUXEON}
+_SPACES = ("cfas", "designs", "sweeps", "boxes")
 
 
 class Member(NamedTuple):
@@ -149,7 +150,7 @@ def narrowed(section: StudySection, member: Member) -> tuple[StudySection, list[
         What was left out.
     """
     grid, notes = section.wavelengths, list[str]()
-    ends = [_RANGES_NM[name] for name in (section.sensor.builtin, section.lights.builtin) if name in _RANGES_NM]
+    ends = [_MEASURED[n].range_nm for n in (section.sensor.builtin, section.lights.builtin) if n in _MEASURED]
     low = max([grid.start_nm, *(low for low, _ in ends)])
     high = min([grid.stop_nm, *(high for _, high in ends)])
     if (low, high) != (grid.start_nm, grid.stop_nm):
@@ -160,55 +161,52 @@ def narrowed(section: StudySection, member: Member) -> tuple[StudySection, list[
         grid = grid.model_copy(update={"start_nm": start, "stop_nm": stop})
         notes.append(f"{member.sensor}: curves from {start:g} to {stop:g} nm")
     changes: dict[str, Any] = {"wavelengths": grid}
-    curves = _curves_of(section)
-    if curves is not None:
-        changes |= _of_curves(section, curves)
-        left_out = [name for key in ("cfas", "designs", "sweeps", "boxes") for name in getattr(section, key)]
-        kept = {name for key in ("cfas", "designs", "sweeps", "boxes") for name in changes.get(key, ())}
-        gone = [name for name in dict.fromkeys(left_out) if name not in kept]
+    names = _curve_names(section)
+    if names is not None:
+        changes |= _buildable(section, names)
+        gone = [name for key in _SPACES for name in getattr(section, key) if name not in changes[key]]
         if gone:
-            notes.append(f"{member.sensor}: without {', '.join(gone)}, whose curves {member.sensor} does not have")
+            left_out = ", ".join(dict.fromkeys(gone))
+            notes.append(f"{member.sensor}: without {left_out}, whose curves {member.sensor} does not have")
         before, after = section.search, changes.get("search", section.search)
         if before is not None and after is not before:
             notes.append(f"{member.sensor}: {'no search' if after is None else f'the search is of {after.space}'}")
     return section.model_copy(update=changes), notes
 
 
-def _curves_of(section: StudySection) -> dict[str, dict[str, str]] | None:
-    """Return curves of the sensor (""), those of any ("anywhere"), and names by channel of CFAs; None if unknown."""
-    sensor = section.sensor
-    if sensor.builtin is not None and sensor.builtin not in BUILT_IN_SENSORS:
-        return None
-    names = {column for entry in sensor.files for column in entry.columns}
-    variants: dict[str, dict[str, str]] = {}
-    if sensor.builtin is not None:
-        low, high = _RANGES_NM.get(sensor.builtin, (400.0, 700.0))
-        grid = section.wavelengths.model_copy(update={"start_nm": low, "stop_nm": high, "step_nm": high - low})
-        made = BUILT_IN_SENSORS[sensor.builtin](grid)
-        names |= set(made.qe)
-        variants = {cfa: dict(channels) for cfa, channels in made.variants.items()}
-    anywhere = {curve for one in SENSORS.values() for curve in one.names} | {*_SURROGATE_CURVES, *names}
-    return {"": dict.fromkeys(names, ""), "anywhere": dict.fromkeys(anywhere, ""), **variants}
+def _curve_names(section: StudySection) -> set[str] | None:
+    """Return the curves of the sensor; None of one that a package offers."""
+    names = {column for entry in section.sensor.files for column in entry.columns}
+    match section.sensor.builtin:
+        case None:
+            return names
+        case name if name in SENSORS:
+            return names | set(SENSORS[name].names)
+        case name:
+            return names | set(_SURROGATE_CURVES) if name in BUILT_IN_SENSORS else None
 
 
-def _of_curves(section: StudySection, curves: dict[str, dict[str, str]]) -> dict[str, Any]:
-    """Return CFAs, filters and search without those that need other curves."""
-    known, anywhere = curves[""], curves["anywhere"]
+def _buildable(section: StudySection, names: set[str]) -> dict[str, Any]:
+    """Return CFAs, filters and search without those that need curves of other sensors.
 
-    def buildable(entry: Modification) -> bool:
-        needed = [entry.base, entry.to if isinstance(entry.to, str) else None]
-        return all(name is None or name in known or name not in anywhere for name in needed)
+    A name that no sensor has is a mistake, and stays for its error.
+    """
+    others = {*_SURROGATE_CURVES, *(curve for one in SENSORS.values() for curve in one.names)} - names
+    variants = own_red(names) if section.sensor.builtin is not None else {}
+
+    def is_buildable(entry: Modification) -> bool:
+        return not others & {entry.base, entry.to if isinstance(entry.to, str) else None}
 
     filters = {
-        key: {name: entry for name, entry in getattr(section, key).items() if buildable(entry)}
+        key: {name: entry for name, entry in getattr(section, key).items() if is_buildable(entry)}
         for key in ("designs", "sweeps", "boxes")
     }
     modified = {(e.cfa, channel) for entries in filters.values() for e in entries.values() for channel in e.channel}
     cfas = {}
     for name, cfa in section.cfas.items():
         mosaic = Mosaic.from_name(name) if cfa.tile is None else Mosaic.from_rows(name, cfa.tile)
-        named = {c: cfa.curves.get(c, curves.get(name, {}).get(c, c)) for c in mosaic.channels}
-        if all(c in known or c not in anywhere or (name, channel) in modified for channel, c in named.items()):
+        curves = {c: cfa.curves.get(c, variants.get(name, {}).get(c, c)) for c in mosaic.channels}
+        if all(curve not in others or (name, channel) in modified for channel, curve in curves.items()):
             cfas[name] = cfa
     filters = {
         key: {n: e for n, e in entries.items() if e.cfa in cfas or e.cfa not in section.cfas}

@@ -124,7 +124,7 @@ def score(
 
 def report(context: typer.Context, folder: RunFolder) -> None:
     """Draw figures and report of a finished run again."""
-    from ...report.sensors import report_again, runs_in
+    from ...report.sensors import report_sensors, runs_in
     from ..run import finish
 
     began_s = context.find_root().obj
@@ -133,7 +133,7 @@ def report(context: typer.Context, folder: RunFolder) -> None:
         return
     for run in runs:
         finish(run.folder, began_s, quiet=True)
-    for line in report_again(folder, runs):
+    for line in report_sensors(folder, runs):
         typer.echo(line)
 
 
