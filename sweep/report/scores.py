@@ -75,12 +75,12 @@ def draw_scores(scores: pd.DataFrame) -> Figure:
         Figure.
     """
     order = "shuffled" if (scores["order"] == "shuffled").any() else str(scores["order"].iloc[0])
-    some = scores[(scores["order"] == order) & (scores["level"] == "all") & (scores["distance_m"] != "all")]
+    by_distance = scores[(scores["order"] == order) & (scores["level"] == "all") & (scores["distance_m"] != "all")]
     figure, axes = canvas(9.0, 5.0)
-    names, readers = [*dict.fromkeys(some["name"])], [*dict.fromkeys(some["reader"])]
+    names, readers = [*dict.fromkeys(by_distance["name"])], [*dict.fromkeys(by_distance["reader"])]
     for name, color in zip(names, CURVE_CYCLE * 4, strict=False):
         for reader, dash in zip(readers, DASHES * 7, strict=False):
-            part = some[(some["name"] == name) & (some["reader"] == reader)]
+            part = by_distance[(by_distance["name"] == name) & (by_distance["reader"] == reader)]
             part = part.assign(x=part["distance_m"].astype(float)).sort_values("x")
             x, label = part["x"], f"{name}, {reader}"
             axes.plot(x, part["error"], "o", linestyle=dash, color=color, label=label, markersize=3.5)

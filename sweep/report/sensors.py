@@ -163,19 +163,19 @@ def _uncertain(output: Output, separation: str) -> Mapping[Any, Mapping[str, flo
 def _summary(figures: pd.DataFrame) -> pd.DataFrame:
     """Return a row per design, the searched ones first: ranges of both ratios, and where both are above 1."""
     figures, rows_of = figures.assign(last=figures["kind"] != FOUND).sort_values("last", kind="stable"), []
-    for design, some in figures[figures["name"] != figures["reference"]].groupby("design", sort=False):
-        more = (some["ratio"] > 1) & (some["light_ratio"] > 1)
+    for design, of_design in figures[figures["name"] != figures["reference"]].groupby("design", sort=False):
+        more = (of_design["ratio"] > 1) & (of_design["light_ratio"] > 1)
         row = {
             "design": design,
-            "sensors": some["sensor"].nunique(),
-            "with lights": len(some),
-            "separation": _span(some["ratio"]),
-            "light": _span(some["light_ratio"]),
-            "more of both": f"{int(more.sum())} of {len(some)}",
+            "sensors": of_design["sensor"].nunique(),
+            "with lights": len(of_design),
+            "separation": _span(of_design["ratio"]),
+            "light": _span(of_design["light_ratio"]),
+            "more of both": f"{int(more.sum())} of {len(of_design)}",
         }
-        if "ratio_5" in some:
-            sure = int(((some["ratio_5"] > 1) & (some["light_ratio_5"] > 1)).sum())
-            row["by 5 % quantiles"] = f"{sure} of {len(some)}"
+        if "ratio_5" in of_design:
+            sure = int(((of_design["ratio_5"] > 1) & (of_design["light_ratio_5"] > 1)).sum())
+            row["by 5 % quantiles"] = f"{sure} of {len(of_design)}"
         rows_of.append(row)
     return pd.DataFrame(rows_of)
 

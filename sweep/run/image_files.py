@@ -162,8 +162,8 @@ def _write_part(
         for split in PARTS:
             scenes = scenes_of(vision, lamps, order, split, seed)
             for start in range(0, len(scenes), _TOGETHER):
-                some = slice(start, min(start + _TOGETHER, len(scenes)))
-                labels += _write_block(row, camera, scenes.some(some), (order, split, start), seed[1], files)
+                block = slice(start, min(start + _TOGETHER, len(scenes)))
+                labels += _write_block(row, camera, scenes.some(block), (order, split, start), seed[1], files)
     with atomic(part) as hidden:
         pq.write_table(pa.Table.from_pylist(labels, schema=_SCHEMA), hidden)
     return len(labels)

@@ -55,9 +55,9 @@ def images_of_test(images: pd.DataFrame) -> pd.DataFrame:
     pandas.DataFrame
         Images of lamps that no network has seen, with `image_id`.
     """
-    some = images[images["lamps"] == UNSEEN]
-    keys = zip(some["design_id"], some["seed"], some["order"], some["image"], strict=True)
-    return some.assign(**{_ID: [image_id(d, seed, order, TEST, at) for d, seed, order, at in keys]})
+    unseen = images[images["lamps"] == UNSEEN]
+    keys = zip(unseen["design_id"], unseen["seed"], unseen["order"], unseen["image"], strict=True)
+    return unseen.assign(**{_ID: [image_id(d, seed, order, TEST, at) for d, seed, order, at in keys]})
 
 
 def read_predictions(path: Path, images: pd.DataFrame, states: Sequence[str]) -> Reader:
@@ -116,9 +116,9 @@ def read_predictions(path: Path, images: pd.DataFrame, states: Sequence[str]) ->
 def _id_issues(path: Path, ids: pd.Series[str], known: pd.Series[str]) -> Iterator[ValidationIssue]:
     """Yield images that are not of the test, that stand twice, and that are missing."""
     others, double = ids[~ids.isin(known)], ids[ids.duplicated()]
-    for problem, some in (("not an image of the test", others), ("an image stands twice", double)):
-        if len(some):
-            yield _issue(problem, path, some, _ID)
+    for problem, wrong in (("not an image of the test", others), ("an image stands twice", double)):
+        if len(wrong):
+            yield _issue(problem, path, wrong, _ID)
     absent = known[~known.isin(ids)]
     if len(absent):
         problem, allowed = f"{len(absent):,} images of the test have no answer", f"all {len(known):,}, or `{UNKNOWN}`"
@@ -126,11 +126,16 @@ def _id_issues(path: Path, ids: pd.Series[str], known: pd.Series[str]) -> Iterat
 
 
 def _issue(
-    problem: str, path: Path, some: pd.Series[str], key: str | None, allowed: str | None = None, near: str | None = None
+    problem: str,
+    path: Path,
+    wrong: pd.Series[str],
+    key: str | None,
+    allowed: str | None = None,
+    near: str | None = None,
 ) -> ValidationIssue:
-    """Return an issue with the first of some wrong values, its line and how many more there are."""
-    more = f" (and {len(some) - 1:,} more)" if len(some) > 1 else ""
-    return ValidationIssue(f"{problem}{more}", str(path), int(some.index[0]) + 2, key, some.iloc[0], allowed, near)
+    """Return an issue with the first of the wrong values, its line and how many more there are."""
+    more = f" (and {len(wrong) - 1:,} more)" if len(wrong) > 1 else ""
+    return ValidationIssue(f"{problem}{more}", str(path), int(wrong.index[0]) + 2, key, wrong.iloc[0], allowed, near)
 
 
 def scores_of(reader: Reader, images: pd.DataFrame, unknown_cost: float) -> pd.DataFrame:
@@ -165,11 +170,11 @@ def scores_of(reader: Reader, images: pd.DataFrame, unknown_cost: float) -> pd.D
     whole += [*((_ALL, level) for level in table["level"].unique())]
     whole += [*product(table["distance_m"].unique(), table["level"].unique())]
     for order, (distance, level) in product(table["order"].unique(), whole):
-        some = table[table["order"] == order]
-        some = some if distance == _ALL else some[some["distance_m"] == distance]
-        some = some if level == _ALL else some[some["level"] == level]
-        first = some[some["design_id"] == some["design_id"].iloc[0]]
-        for (design_id, name), part in some.groupby(["design_id", "name"], sort=False):
+        answers = table[table["order"] == order]
+        answers = answers if distance == _ALL else answers[answers["distance_m"] == distance]
+        answers = answers if level == _ALL else answers[answers["level"] == level]
+        first = answers[answers["design_id"] == answers["design_id"].iloc[0]]
+        for (design_id, name), part in answers.groupby(["design_id", "name"], sort=False):
             rows.append(
                 {"reader": reader.name, "order": order, "distance_m": str(distance), "level": level}
                 | {"design_id": design_id, "name": name, "images": len(part), "unknown": part["unknown"].mean()}
@@ -187,22 +192,22 @@ def _shown(name: str, interval: Interval) -> dict[str, Any]:
     return {name: interval.value, f"{name}_low": interval.low, f"{name}_high": interval.high}
 
 
-def _by_seed(some: pd.DataFrame, column: str) -> FloatArray:
-    return some.groupby("seed")[column].mean().to_numpy(dtype=float)
+def _by_seed(answers: pd.DataFrame, column: str) -> FloatArray:
+    return answers.groupby("seed")[column].mean().to_numpy(dtype=float)
 
 
-def _mean(some: pd.DataFrame, column: str) -> Interval:
-    return interval_of_seeds(float(some[column].mean()), _by_seed(some, column)).within(0.0, 1.0)
+def _mean(answers: pd.DataFrame, column: str) -> Interval:
+    return interval_of_seeds(float(answers[column].mean()), _by_seed(answers, column)).within(0.0, 1.0)
 
 
-def _difference(some: pd.DataFrame, other: pd.DataFrame, column: str, beside: str) -> Interval:
-    value = float(some[column].mean() - other[beside].mean())
-    return interval_of_seeds(value, _by_seed(some, column) - _by_seed(other, beside))
+def _difference(answers: pd.DataFrame, other: pd.DataFrame, column: str, beside: str) -> Interval:
+    value = float(answers[column].mean() - other[beside].mean())
+    return interval_of_seeds(value, _by_seed(answers, column) - _by_seed(other, beside))
 
 
-def _calibration(some: pd.DataFrame) -> float:
+def _calibration(answers: pd.DataFrame) -> float:
     """Return the expected calibration error; NaN without probabilities."""
-    known = some.dropna(subset=["confidence"])
+    known = answers.dropna(subset=["confidence"])
     if known.empty:
         return float("nan")
     bins = (known["confidence"] * _BINS).astype(int).clip(upper=_BINS - 1)
@@ -225,14 +230,14 @@ def score_lines(scores: pd.DataFrame) -> Iterator[str]:
         Line.
     """
     order = "shuffled" if (scores["order"] == "shuffled").any() else str(scores["order"].iloc[0])
-    some = scores[(scores["order"] == order) & (scores["distance_m"] == _ALL) & (scores["level"] == _ALL)]
-    first = str(some["name"].iloc[0])
-    for row in some.to_dict("records"):
+    whole = scores[(scores["order"] == order) & (scores["distance_m"] == _ALL) & (scores["level"] == _ALL)]
+    first = str(whole["name"].iloc[0])
+    for row in whole.to_dict("records"):
         text = f"{row['reader']}, {row['name']}: errs on {_percent(row, 'error')} of {row['images']:,} images"
         text += f", unknown {row['unknown']:.1%}" if row["unknown"] else ""
         if row["name"] != first:
-            told = "" if row["apart_low"] > 0 or row["apart_high"] < 0 else ", not told apart"
-            text += f"; {_points(row, 'apart')} against {first}{told}"
+            note = "" if row["apart_low"] > 0 or row["apart_high"] < 0 else ", not told apart"
+            text += f"; {_points(row, 'apart')} against {first}{note}"
         yield f"{text}; {_points(row, 'above_observer')} against the ideal observer's {row['observer_error']:.1%}."
 
 

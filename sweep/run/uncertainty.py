@@ -76,15 +76,15 @@ def uncertainty_table(study: Study, rows: pd.DataFrame, parallel: Parallel, prog
         setup = study.setup(space, row["scenario"]).with_all_effects
         names = _names(study, space)
         calls.append(delayed(_on_sensors, setup, curves[0], study.sensor, names, errors, study.section.seed))
-    found = [*run_with_progress(parallel, calls, "random sensors", progress)]
+    drawn_sensors = [*run_with_progress(parallel, calls, "random sensors", progress)]
     plain = [row for row in few if row["kind"] == PLAIN] or few
     names = [row["name"] for row in plain]
     reference = REFERENCE if REFERENCE in names else names[0]
     of_reference = {
-        row["scenario"]: sensors for row, sensors in zip(few, found, strict=True) if row["name"] == reference
+        row["scenario"]: sensors for row, sensors in zip(few, drawn_sensors, strict=True) if row["name"] == reference
     }
     made = []
-    for row, (csds, light, least) in zip(few, found, strict=True):
+    for row, (csds, light, least) in zip(few, drawn_sensors, strict=True):
         beside = of_reference.get(row["scenario"])
         for pair in class_pairs(study.lights.classes):
             values = {"dn": csds[pair]}
@@ -155,12 +155,12 @@ def _quantiles(of: str, values: FloatArray) -> dict[str, float]:
     """Return quantiles with distribution-free intervals (order statistics)."""
     from scipy.stats import binom  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
-    ordered, n, found = np.sort(values), values.size, dict[str, float]()
+    ordered, n, quantiles = np.sort(values), values.size, dict[str, float]()
     for share, name in zip(SHARES, _ENDS[::3], strict=True):
         ranks = math.ceil(share * n), *binom.ppf([(1 - _CONFIDENCE) / 2, (1 + _CONFIDENCE) / 2], n, share)
         at = [min(max(int(rank) - 1 + step, 0), n - 1) for rank, step in zip(ranks, (0, 0, 1), strict=True)]
-        found |= {f"{of}_{name}{end}": float(ordered[i]) for end, i in zip(("", "_low", "_high"), at, strict=True)}
-    return found
+        quantiles |= {f"{of}_{name}{end}": float(ordered[i]) for end, i in zip(("", "_low", "_high"), at, strict=True)}
+    return quantiles
 
 
 def _spread(ratio: FloatArray, light: FloatArray) -> dict[str, float]:
