@@ -17,7 +17,7 @@ from ..spectra.builtin.measured_sets import LUXEON, SENSORS, MeasuredSet
 from ..spectra.builtin.registry import BUILT_IN_LIGHTS
 from ..spectra.builtin.spectra import cards
 from ..spectra.builtin.surrogate_spectra import surrogate_cards
-from ..study import Member, Study, folder_name, load_study, several_in
+from ..study import SensorAndLights, Study, folder_name, load_study, sensor_studies_in
 
 _QUESTION_LETTERS = 70
 
@@ -112,8 +112,8 @@ def list_facts(studies: list[StudyListing]) -> dict[str, Any]:
 
 def _listed(path: Path, outputs: Path, data: Path | None) -> StudyListing:
     try:
-        several = several_in(path)
-        members: tuple[Member | None, ...] = (None,) if several is None else several.members
+        several = sensor_studies_in(path)
+        members: tuple[SensorAndLights | None, ...] = (None,) if several is None else several.members
         studies = [load_study(path, data, member=member) for member in members]
         if several is None:
             stated, state = studies[0].name, _state(studies[0], outputs)

@@ -19,7 +19,7 @@ from ..results.atomic import atomic
 from ..results.folder import run_in
 from ..results.tables import ALL_SENSORS, REPORT
 from ..run.workers import workers
-from ..study import Member, SeveralStudies, Study, folder_name, load_study
+from ..study import SensorAndLights, SensorStudies, Study, folder_name, load_study
 from .output import ProgressDisplay, print_lines
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def run_one(
     as_json: bool,
     quiet: bool,
     began_s: float,
-    member: Member | None = None,
+    member: SensorAndLights | None = None,
 ) -> dict[str, Any]:
     """Run a study, or continue it, draw its report and print the result.
 
@@ -61,7 +61,7 @@ def run_one(
         Time at which the user began to wait, by the monotonic clock, s.
     data, output, jobs, backend, scheduler, dry_run, options, allow_code, opens, as_json, quiet
         Options of `sweep run`.
-    member : Member, optional
+    member : SensorAndLights, optional
         One of several sensors or light sets; its summary is not printed.
 
     Returns
@@ -117,7 +117,7 @@ def run_one(
     return {"computed": bool(computed), **facts}
 
 
-class SeveralOptions(NamedTuple):
+class SensorsOptions(NamedTuple):
     """Options of `sweep run` for a study of several sensors."""
 
     output: Path
@@ -128,18 +128,18 @@ class SeveralOptions(NamedTuple):
     opens: bool
 
 
-def run_several(
-    several: SeveralStudies, run: Callable[..., dict[str, Any]], load: Callable[..., Study], options: SeveralOptions
+def run_sensors(
+    several: SensorStudies, run: Callable[..., dict[str, Any]], load: Callable[..., Study], options: SensorsOptions
 ) -> dict[str, Any]:
     """Run a study for each of its sensors and light sets, and compare them.
 
     Parameters
     ----------
-    several : SeveralStudies
+    several : SensorStudies
         Study.
     run, load : callable
         Runs a `member` into the folder `output`, and loads its study.
-    options : SeveralOptions
+    options : SensorsOptions
         Options.
 
     Returns
@@ -156,7 +156,7 @@ def run_several(
     studies = [(member, load(member=member)) for member in several.members]  # mistakes before any work
     if run_in(folder) is not None:
         raise OutputError(ValidationIssue("holds a run of one sensor", str(folder), allowed="another --output"))
-    made, failed = dict[Member, dict[str, Any]](), list[SweepError]()
+    made, failed = dict[SensorAndLights, dict[str, Any]](), list[SweepError]()
     for member in several.members:
         if not quiet:
             typer.echo(f"-- {member.name} --", err=True)

@@ -21,7 +21,7 @@ from ..results.output import Output, read_output
 from ..results.tables import ALL_SENSORS, FOUND, PLAIN, REPORT, RESULTS
 from ..run.all_sensors import ALL
 from ..run.uncertainty import REFERENCE, UNCLIPPED
-from ..study import Member, folder_name
+from ..study import SensorAndLights, folder_name
 from .figures import CURVE_CYCLE, canvas, legend_beside, rendered
 from .pages import inlined, page, rows
 
@@ -39,7 +39,7 @@ _NINE_TENTHS = math.sqrt(-2 * math.log(0.1))
 class SensorRun:
     """Finished run of one sensor under one set of lights."""
 
-    member: Member
+    member: SensorAndLights
     folder: Path
 
 
@@ -63,7 +63,7 @@ def runs_in(folder: Path) -> list[SensorRun]:
     except (OSError, ValueError):
         return []
     pairs = dict.fromkeys(zip(*(table[name].to_pylist() for name in _KEYS), strict=True))
-    members = [Member(sensor, lights, (at, at)) for at, (sensor, lights) in enumerate(pairs)]
+    members = [SensorAndLights(sensor, lights, (at, at)) for at, (sensor, lights) in enumerate(pairs)]
     return [SensorRun(member, folder / folder_name(member.name)) for member in members]
 
 
@@ -126,7 +126,7 @@ def report_sensors(folder: Path, runs: Sequence[SensorRun]) -> list[str]:
     return [*lines, f"Files: {folder}/: {RESULTS}, {REPORT}, {PICTURE}.png; a run and its report in each folder."]
 
 
-def _figures(member: Member, output: Output) -> Iterator[dict[str, Any]]:
+def _figures(member: SensorAndLights, output: Output) -> Iterator[dict[str, Any]]:
     """Yield a row per plain CFA, named design and answer, in the first scenario."""
     separation = output.trade_off[0].name
     few = output.few[(output.few["scenario"] == output.scenario) & (output.few["status"] == "ok")]
@@ -220,7 +220,7 @@ def _span(values: pd.Series[float]) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def _notes(outputs: Sequence[tuple[Member, Output]]) -> Iterator[str]:
+def _notes(outputs: Sequence[tuple[SensorAndLights, Output]]) -> Iterator[str]:
     """Yield what was left out, and which curves are modeled."""
     warnings = [(member, warning) for member, output in outputs for warning in output.provenance.warnings]
     yield from dict.fromkeys(f"Note: {one}." for member, one in warnings if one.startswith(f"{member.sensor}: "))

@@ -13,7 +13,7 @@ from ..designs.family import ChoosingFamily, Family
 from ..metrics.bound import FEASIBLE
 from ..search.problem import Evaluation, Problem, best_feasible, starting_points
 from ..search.solver import search_from, smooth_evaluation
-from ..study import Member, Search, Study
+from ..study import Search, SensorAndLights, Study
 from .workers import run_with_progress
 
 ALL = "all sensors"
@@ -27,7 +27,7 @@ _SCHEMA = pa.schema(
 
 
 def all_sensors_table(
-    studies: Sequence[tuple[Member, Study]], parallel: Parallel, progress: Progress
+    studies: Sequence[tuple[SensorAndLights, Study]], parallel: Parallel, progress: Progress
 ) -> pa.Table | None:
     """Search one filter for all sensors that have the searched space, and one for all but each sensor in turn.
 
@@ -38,7 +38,7 @@ def all_sensors_table(
 
     Parameters
     ----------
-    studies : sequence of (Member, Study)
+    studies : sequence of (SensorAndLights, Study)
         Studies of the members, each with a search.
     parallel : callable
         Runs calls on the cores.
@@ -50,7 +50,7 @@ def all_sensors_table(
     pyarrow.Table or None
         Table, for each space that is searched on two sensors or more; None if there is none.
     """
-    by_space: dict[str, list[tuple[Member, Problem, Search]]] = {}
+    by_space: dict[str, list[tuple[SensorAndLights, Problem, Search]]] = {}
     for member, study in studies:
         # A choice from a catalog is a search of its own, and is not made for several sensors.
         if (search := study.search) is not None and not isinstance(_family_of(search), ChoosingFamily):
@@ -70,7 +70,7 @@ def _family_of(search: Search) -> Family:
 
 def _of_space(
     space: str,
-    searched: Sequence[tuple[Member, Problem, Search]],
+    searched: Sequence[tuple[SensorAndLights, Problem, Search]],
     sensors: Sequence[str],
     parallel: Parallel,
     progress: Progress,

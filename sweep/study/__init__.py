@@ -1,20 +1,20 @@
 """Study files: YAML in, frozen and fully checked objects out, before any work."""
 
-from .load import folder_name, load_study, several_in, study_of_keys
+from .load import folder_name, load_study, sensor_studies_in, study_of_keys
 from .model import Search, Study
 from .schema import StudySection
-from .several import Member, SeveralStudies
+from .sensor_studies import SensorAndLights, SensorStudies
 from .sources import KeptSources
 
 __all__ = [
     "KeptSources",
-    "Member",
     "Search",
-    "SeveralStudies",
+    "SensorAndLights",
+    "SensorStudies",
     "Study",
     "StudySection",
     "folder_name",
     "load_study",
-    "several_in",
+    "sensor_studies_in",
     "study_of_keys",
 ]

@@ -16,7 +16,7 @@ from .document import Document
 from .model import Study
 from .resolve import resolve
 from .schema import StudySection
-from .several import Member, SeveralStudies, choose, members_of, narrowed, way_to_one
+from .sensor_studies import SensorAndLights, SensorStudies, choose, members_of, narrowed, way_to_one
 from .sources import KeptSources, Sources
 
 
@@ -28,7 +28,7 @@ def load_study(
     changes: Mapping[str, str] = {},
     *,
     allow_code: bool | Mapping[str, str] = False,
-    member: Member | None = None,
+    member: SensorAndLights | None = None,
 ) -> Study:
     """Read and check a study file.
 
@@ -79,7 +79,7 @@ def load_study(
     return resolve(section, sources)
 
 
-def several_in(path: Path, changes: Mapping[str, str] = {}) -> SeveralStudies | None:
+def sensor_studies_in(path: Path, changes: Mapping[str, str] = {}) -> SensorStudies | None:
     """Return the sensors and light sets of a study file; None if it is a plain study.
 
     Parameters
@@ -91,7 +91,7 @@ def several_in(path: Path, changes: Mapping[str, str] = {}) -> SeveralStudies | 
 
     Returns
     -------
-    SeveralStudies or None
+    SensorStudies or None
         The study.
 
     Raises
@@ -101,8 +101,8 @@ def several_in(path: Path, changes: Mapping[str, str] = {}) -> SeveralStudies | 
     """
     document = _changed(path, changes)
     members = members_of(document)
-    name, question = (str(document.data.get(key) or "") for key in ("study", "question"))
-    return SeveralStudies(name or path.stem, question, tuple(members)) if len(members) > 1 else None
+    name = str(document.data.get("study") or path.stem)
+    return SensorStudies(name, tuple(members)) if len(members) > 1 else None
 
 
 def _changed(path: Path, changes: Mapping[str, str]) -> Document:

@@ -128,7 +128,7 @@ import sweep.study
 from sweep.cli.app import main
 def ended(*_, **__):
     raise EOFError("Ran out of input")
-sweep.study.several_in = ended
+sweep.study.sensor_studies_in = ended
 main()
 """
     command = [sys.executable, "-c", program, "run", str(tmp_path / "x.yaml")]

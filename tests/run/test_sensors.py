@@ -18,7 +18,7 @@ from sweep.search.solver import smooth_evaluation
 from sweep.spectra.builtin.data_sets.tl16 import lights
 from sweep.spectra.builtin.measured_sets import LUXEON, SENSORS
 from sweep.spectra.spectrum import WavelengthGrid
-from sweep.study import Study, load_study, several_in
+from sweep.study import Study, load_study, sensor_studies_in
 
 from ..build import load, ran
 from ..commanded import commanded
@@ -263,7 +263,7 @@ def test_filters_for_several_sensors_are_the_worst_on_them(several: tuple[Path, 
     assert set(table["designed_on"]) == {"all sensors", "all but ar0820", "all but opencam"}
     assert set(table["space"]) == {"yellow"}
     worst = table[~table["judged"]].groupby("designed_on")["objective"].min()
-    members = {f"{m.sensor} {m.lights}": m for m in several_in(folder / "few.yaml").members}
+    members = {f"{m.sensor} {m.lights}": m for m in sensor_studies_in(folder / "few.yaml").members}
     for row in table.to_dict("records"):
         study = load_study(folder / "few.yaml", member=members[f"{row['sensor']} {row['lights']}"])
         values = dict(part.rsplit(" ", 1) for part in row["parameters"].split(", "))

@@ -17,19 +17,19 @@ from ..options import OF_STUDIES, AllowCode, Changes, DataFolder, Outputs, Study
 from ..output import Json, Quiet, print_result
 
 if TYPE_CHECKING:
-    from ...study import Member
+    from ...study import SensorAndLights
 
 PANEL = OF_STUDIES
 
 
 def check(study: StudyPath, data: DataFolder = None, changes: Changes = None, allow_code: AllowCode = False) -> None:
     """Check a study file and count its designs, without running it."""
-    from ...study import load_study, several_in
+    from ...study import load_study, sensor_studies_in
     from ...study.goals import bounds_like_percentages, unreachable_constraints
 
     changed = changes_of(changes)
-    several = several_in(study, changed)
-    members: tuple[Member | None, ...] = (None,) if several is None else several.members
+    several = sensor_studies_in(study, changed)
+    members: tuple[SensorAndLights | None, ...] = (None,) if several is None else several.members
     for member in members:
         loaded = load_study(study, data, changes=changed, allow_code=allow_code, member=member)
         which = "" if member is None else f"{member.name}: "
@@ -145,8 +145,8 @@ def run(
     If one study cannot be run, the others are.
     """
     from ...run import RunOptions
-    from ...study import load_study, several_in
-    from ..run import SeveralOptions, run_one, run_several
+    from ...study import load_study, sensor_studies_in
+    from ..run import SensorsOptions, run_one, run_sensors
 
     with_options = partial(
         run_one,
@@ -169,14 +169,14 @@ def run(
         if len(studies) > 1 and not quiet:
             typer.echo(f"== {path} ==", err=as_json)
         try:
-            several = several_in(path, changes_of(changes))
+            several = sensor_studies_in(path, changes_of(changes))
             run_it = partial(with_options, path, began_s=began_s)
             if several is None:
                 facts = run_it()
             else:
                 load = partial(load_study, path, data, changes=changes_of(changes), allow_code=allow_code)
-                how = SeveralOptions(output, jobs, dry_run, as_json, quiet, opens)
-                facts = run_several(several, run_it, load, how)
+                how = SensorsOptions(output, jobs, dry_run, as_json, quiet, opens)
+                facts = run_sensors(several, run_it, load, how)
         except InterruptedRunError:
             raise
         except SweepError as error:  # the others are run all the same

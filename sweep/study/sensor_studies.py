@@ -19,7 +19,7 @@ _MEASURED = {**SENSORS, "luxeon": LUXEON}
 _SPACES = ("cfas", "designs", "sweeps", "boxes")
 
 
-class Member(NamedTuple):
+class SensorAndLights(NamedTuple):
     """One sensor under one set of lights.
 
     Parameters
@@ -40,15 +40,14 @@ class Member(NamedTuple):
         return f"{self.sensor} {self.lights}"
 
 
-class SeveralStudies(NamedTuple):
-    """A study of several sensors or light sets: its name, its question and its members."""
+class SensorStudies(NamedTuple):
+    """A study of several sensors or light sets: its name and its members."""
 
     name: str
-    question: str
-    members: tuple[Member, ...]
+    members: tuple[SensorAndLights, ...]
 
 
-def members_of(document: Document) -> list[Member]:
+def members_of(document: Document) -> list[SensorAndLights]:
     """Return the sensors and lights of a study, each pair once; a plain study has one member.
 
     Parameters
@@ -58,7 +57,7 @@ def members_of(document: Document) -> list[Member]:
 
     Returns
     -------
-    list of Member
+    list of SensorAndLights
         Members.
 
     Raises
@@ -73,7 +72,7 @@ def members_of(document: Document) -> list[Member]:
     if len(sensors) * len(lights) > _MOST:
         allowed = f"at most {_MOST} sensors times lights"
         raise StudyError(document.issue(("sensors",), "too many", len(sensors) * len(lights), allowed))
-    return [Member(one, other, (i, k)) for (one, i), (other, k) in product(sensors, lights)]
+    return [SensorAndLights(one, other, (i, k)) for (one, i), (other, k) in product(sensors, lights)]
 
 
 def _listed(document: Document, key: str, alone: Any) -> list[tuple[str, int]]:
@@ -116,15 +115,15 @@ def way_to_one(document: Document) -> str:
     return " ".join(options)
 
 
-def choose(document: Document, member: Member) -> None:
+def choose(document: Document, member: SensorAndLights) -> None:
     """Leave one sensor and one set of lights in a document.
 
     Parameters
     ----------
     document : Document
         Study file; changed in place.
-    member : Member
-        Member.
+    member : SensorAndLights
+        SensorAndLights.
     """
     for key, to, at in (("sensors", "sensor", member.indices[0]), ("lights", "lights", member.indices[1])):
         if at >= 0:
@@ -132,15 +131,15 @@ def choose(document: Document, member: Member) -> None:
     document.data.pop("sensors", None)
 
 
-def narrowed(section: StudySection, member: Member) -> tuple[StudySection, list[str]]:
+def narrowed(section: StudySection, member: SensorAndLights) -> tuple[StudySection, list[str]]:
     """Return a member's study: the wavelengths that its curves have, and the CFAs that the sensor has.
 
     Parameters
     ----------
     section : StudySection
         The whole study with this member's sensor and lights.
-    member : Member
-        Member.
+    member : SensorAndLights
+        SensorAndLights.
 
     Returns
     -------
