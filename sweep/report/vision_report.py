@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from ..metrics.share import format_share
 from ..results.output import Output
 from ..results.tables import VISION_MISREAD
+from ..vision.readers import OBSERVER
 from ..vision.scenes import FIXED, SEEN, SHUFFLED, UNSEEN
 from ..vision.scores import costs, macro_f1
 from .figures import CURVE_CYCLE, Drawing, canvas_grid, legend_beside, panel_grid
 from .vision import (
     NETWORK,
-    OBSERVER,
     PREDICTORS,
     READER_NAMES,
     Benchmark,

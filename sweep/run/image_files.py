@@ -7,12 +7,13 @@ have read, and its `image_id` names it in a file of predictions.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -20,20 +21,13 @@ from ..base.errors import OutputError, ValidationIssue
 from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..camera.setup import Setup
 from ..results.atomic import atomic, write_text
-from ..vision.head import head_places_px, heights
+from ..vision.batches import Batch, Form, images_of_split
 from ..vision.images import HeadCamera
-from ..vision.isp import developed, isp_matrix
-from ..vision.lamps import PARTS, split_lamps
-from ..vision.planes import demosaicked
-from ..vision.readers import scenes_of
-from ..vision.scenes import ORDERS, Scenes, orders_of_lenses, states_of
+from ..vision.lamps import SPLITS, split_lamps
 from ..vision.section import Vision
 from .workers import run_with_progress
 
-Form = Literal["raw", "demosaicked", "isp"]
 MANIFEST, _SETTINGS, _PARTS_FOLDER = "manifest.parquet", "images.json", "parts"
-_TOGETHER = 256
-"""Images of a file of arrays, which are held at once."""
 _TEXT, _NUMBER, _COUNT = pa.string(), pa.float64(), pa.int64()
 _KINDS: dict[pa.DataType, str] = {
     _TEXT: "image_id file name cfa order split state lamp background level",
@@ -55,33 +49,17 @@ class ImageFiles:
     folder : Path
         Folder.
     form : {'raw', 'demosaicked', 'isp'}
-        Raw mosaics (uint16 DN, float32 of HDR pixels), every channel at every pixel (float32 DN above the black
-        level), or pictures of a plain ISP (uint8 sRGB).
+        Form.
     png : bool
-        A PNG for each image instead of arrays of 256.
+        A PNG for each image instead of arrays of 1,024.
+    splits : tuple of str
+        Splits to write.
     """
 
     folder: Path
     form: Form
     png: bool
-
-
-def image_id(design_id: int, seed: int, order: str, split: str, image: int) -> str:
-    """Return the name of an image in manifests and predictions.
-
-    Parameters
-    ----------
-    design_id, seed, image : int
-        Row of the design, number of the seed, and number of the image in its split.
-    order, split : str
-        Order of the lenses, and part of the images.
-
-    Returns
-    -------
-    str
-        Name.
-    """
-    return f"{design_id}-{seed}-{order}-{split}-{image}"
+    splits: tuple[str, ...] = SPLITS
 
 
 def write_images(
@@ -124,7 +102,7 @@ def write_images(
     OutputError
         If the folder holds other images, or the disk refuses.
     """
-    settings = {"fingerprint": fingerprint, "form": files.form, "png": files.png}
+    settings = {"fingerprint": fingerprint, "form": files.form, "png": files.png, "splits": list(files.splits)}
     known = files.folder / _SETTINGS
     if known.exists():
         if json.loads(known.read_text(encoding="utf-8")) != settings:
@@ -147,7 +125,7 @@ def write_images(
 
 
 def _write_part(
-    row: dict[str, Any],
+    row: Mapping[str, Any],
     setup: Setup,
     curves: FloatArray,
     vision: Vision,
@@ -156,76 +134,33 @@ def _write_part(
     part: Path,
 ) -> int:
     """Write the images of one design and seed, then their part of the manifest."""
-    camera = HeadCamera(setup, curves, vision)
-    lamps, labels = split_lamps(setup.lights, vision, seed), list[dict[str, Any]]()
-    for order in ORDERS:
-        for split in PARTS:
-            scenes = scenes_of(vision, lamps, order, split, seed)
-            for start in range(0, len(scenes), _TOGETHER):
-                block = slice(start, min(start + _TOGETHER, len(scenes)))
-                labels += _write_block(row, camera, scenes.some(block), (order, split, start), seed[1], files)
+    camera, lamps = HeadCamera(setup, curves, vision), split_lamps(setup.lights, vision, seed)
+    key = {name: row[name] for name in ("design_id", "name", "cfa")} | {"seed": seed[1]}
+    labels = [
+        _write_block(batch, files)
+        for split in files.splits
+        for batch in images_of_split(camera, lamps, key, seed[0], split, files.form)
+    ]
+    table = pa.Table.from_pandas(pd.concat(labels), schema=_SCHEMA, preserve_index=False)
     with atomic(part) as hidden:
-        pq.write_table(pa.Table.from_pylist(labels, schema=_SCHEMA), hidden)
-    return len(labels)
+        pq.write_table(table, hidden)
+    return len(table)
 
 
-def _write_block(
-    row: dict[str, Any],
-    camera: HeadCamera,
-    scenes: Scenes,
-    which: tuple[str, str, int],
-    seed: int,
-    files: ImageFiles,
-) -> Iterator[dict[str, Any]]:
-    """Write some images, and yield their rows of the manifest."""
-    order, split, start = which
-    images = formed(camera, scenes, files.form)
-    stem = f"images/{row['design_id']}/{seed}-{order}-{split}"
-    block = f"{stem}-{start}.npz"
-    if not files.png:
-        with atomic(files.folder / block) as hidden, hidden.open("wb") as file:
-            np.savez_compressed(file, images=images)
-    for at, label in enumerate(_labels(camera, scenes)):
-        number = start + at
-        name = f"{stem}-{number}.png" if files.png else block
-        if files.png:
-            _write_png(images[at], files.folder / name)
-        key: dict[str, Any] = {"image_id": image_id(row["design_id"], seed, order, split, number), "file": name}
-        key |= {"index": 0 if files.png else at, "seed": seed, "order": order, "split": split, "image": number}
-        yield {**key, **{n: row[n] for n in ("design_id", "name", "cfa")}, **label}
-
-
-def formed(camera: HeadCamera, scenes: Scenes, form: Form) -> np.ndarray[Any, Any]:
-    """Return images of scenes in a form.
-
-    Parameters
-    ----------
-    camera : HeadCamera
-        Design.
-    scenes : Scenes
-        Scenes.
-    form : {'raw', 'demosaicked', 'isp'}
-        Form, see `ImageFiles`.
-
-    Returns
-    -------
-    ndarray of shape (n, rows, columns) or (n, rows, columns, n_channels)
-        Images.
-    """
-    values_dn, pixel, mosaic = camera.table.values_dn, camera.pixel, camera.setup.camera.mosaic
-    dn = values_dn[camera.images(scenes)]
-    if form == "raw":
-        return dn.astype(np.float32) if pixel.captures else np.rint(dn).astype(np.uint16)
-    above_dn = demosaicked(dn, mosaic) - pixel.offset_dn
-    if form == "demosaicked":
-        return above_dn.astype(np.float32)
-    share = above_dn / (values_dn[-1] - pixel.offset_dn)
-    lights = [level.light for level in camera.levels]
-    pictures = np.empty((*share.shape[:3], 3), dtype=np.uint8)
-    for light in dict.fromkeys(lights):
-        here = np.flatnonzero([lights[level] == light for level in scenes.level])
-        pictures[here] = developed(share[here], isp_matrix(camera.setup.camera.grid, camera.qe, light))
-    return pictures
+def _write_block(batch: Batch, files: ImageFiles) -> pd.DataFrame:
+    """Write some images, and return their rows of the manifest."""
+    images, labels = batch
+    first = labels.iloc[0]
+    stem = f"images/{first['design_id']}/{first['seed']}-{first['order']}-{first['split']}"
+    if files.png:
+        names = [f"{stem}-{number}.png" for number in labels["image"]]
+        for image, name in zip(images, names, strict=True):
+            _write_png(image, files.folder / name)
+        return labels.assign(file=names, index=0)
+    name = f"{stem}-{first['image']}.npz"
+    with atomic(files.folder / name) as hidden, hidden.open("wb") as file:
+        np.savez_compressed(file, images=images)
+    return labels.assign(file=name, index=np.arange(len(labels)))
 
 
 def _write_png(image: np.ndarray[Any, Any], path: Path) -> None:
@@ -233,30 +168,3 @@ def _write_png(image: np.ndarray[Any, Any], path: Path) -> None:
 
     with atomic(path) as hidden, hidden.open("wb") as file:
         Image.fromarray(image).save(file, "PNG")
-
-
-def _labels(camera: HeadCamera, scenes: Scenes) -> Iterator[dict[str, Any]]:
-    """Yield state, geometry and light of each image."""
-    vision, setup = camera.vision, camera.setup
-    states, levels = states_of(vision), list(vision.levels.items())
-    places, orders = head_places_px(vision, setup.camera.mosaic), orders_of_lenses(len(vision.lenses))
-    across_px = [vision.target(distance).object_resolution_px for distance in vision.distances_m]
-    for at in range(len(scenes)):
-        lit, (level, settings) = scenes.lamp[at] >= 0, levels[scenes.level[at]]
-        column, row = places[int(scenes.place[at] * camera.n_places())]
-        types, diameter = orders[scenes.order[at]], across_px[scenes.distance[at]]
-        yield {
-            "state": states[scenes.state[at]],
-            "lamp": setup.lights.names[scenes.lamp[at]] if lit else None,
-            "intensity_cd": vision.intensities_cd[scenes.intensity[at]] if lit else None,
-            "background": vision.backgrounds[scenes.background[at]],
-            "phantom": bool(scenes.phantom[at]),
-            "distance_m": vision.distances_m[scenes.distance[at]],
-            "level": level,
-            "exposure_s": settings.exposure_s,
-            "lens_diameter_px": diameter,
-            "lenses": [vision.lenses[kind] for kind in types],
-            "lens_x_px": [float(column)] * len(types),
-            "lens_y_px": [float(row + diameter * height) for height in heights(vision)],
-            "lit": int(np.flatnonzero(types == scenes.state[at] - 1)[0]) if lit else None,
-        }

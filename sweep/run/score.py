@@ -13,10 +13,10 @@ import pandas as pd
 
 from ..base.errors import DataError, SweepError, ValidationIssue, nearest
 from ..base.types import FloatArray
+from ..vision.batches import image_id
 from ..vision.lamps import TEST
 from ..vision.scenes import UNSEEN
 from ..vision.scores import Interval, interval_of_seeds
-from .image_files import image_id
 
 UNKNOWN = "unknown"
 _ID, _STATE = "image_id", "state"

@@ -21,8 +21,8 @@ from ..results.tables import FOUND, VISION, VISION_CONDITIONS, VISION_MISREAD
 from ..spectra.lights import class_pairs, pair_name
 from ..study import Study
 from ..vision.images import setup_at
-from ..vision.readers import Answers, SeedReading, read_images
-from ..vision.scenes import ORDERS, SEEN, UNSEEN, states_of
+from ..vision.readers import OBSERVER, Answers, SeedReading, read_images
+from ..vision.scenes import ORDERS, PARTS, SEEN, UNSEEN, states_of
 from ..vision.section import Vision
 from .workers import run_with_progress
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 _TEXT, _NUMBER, _COUNT = pa.string(), pa.float64(), pa.int64()
 _DESIGN = [("design_id", _COUNT), ("name", _TEXT), ("cfa", _TEXT)]
-_READERS = ("observer", "network", "half")
+_READERS = (OBSERVER, *PARTS)
 _IMAGES = pa.schema(
     [
         *_DESIGN,
@@ -135,7 +135,6 @@ def _image_rows(study: Study, vision: Vision, key: dict[str, Any], reading: Seed
 
 def _rows_of(study: Study, vision: Vision, key: dict[str, Any], answers: Answers) -> Iterator[dict[str, Any]]:
     scenes, states, levels = answers.scenes, states_of(vision), list(vision.levels)
-    readings = {name: getattr(answers, name) for name in _READERS}
     for at in range(len(scenes)):
         row = key | {
             "image": at,
@@ -147,10 +146,9 @@ def _rows_of(study: Study, vision: Vision, key: dict[str, Any], answers: Answers
             "distance_m": vision.distances_m[scenes.distance[at]],
             "level": levels[scenes.level[at]],
         }
-        for name, probabilities in readings.items():
-            if probabilities.size:
-                best = int(probabilities[at].argmax())
-                row |= {name: states[best], f"{name}_p": float(probabilities[at, best])}
+        for name, probabilities in answers.probabilities.items():
+            best = int(probabilities[at].argmax())
+            row |= {name: states[best], f"{name}_p": float(probabilities[at, best])}
         yield row
 
 

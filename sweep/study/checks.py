@@ -30,8 +30,8 @@ from .model import Study
 from .schema import StudySection
 from .sources import Sources
 
-_HELD_TIMES = 3
-"""Times that a network's training images are held in double precision: as they are, and while they are scaled."""
+_HELD_TIMES = 8
+"""Times that a network's training images are held in single precision: mirrored, in blocks, joined, scaled."""
 _LEAST_LUMINANCE = 1e-20
 """cd/m^2 for each photon/s/sr/m^2 of a lamp that the eye sees; at 555 nm it is 2.4e-16."""
 _MOST_DESIGNS = 10**9
@@ -300,7 +300,7 @@ def _check_memory(vision: Vision, lights: Lights, mosaics: Mapping[str, Mosaic],
             sources.add(("vision",), problem, f"{every / 2**30:.1f} GiB", allowed)
             return
         planes = len(mosaic.channels) if vision.input == "demosaicked" else 1
-        trained = 8 * _HELD_TIMES * planes * pixels * max(vision.train_images, vision.check_images, vision.test_images)
+        trained = 4 * _HELD_TIMES * planes * pixels * max(vision.train_images, vision.check_images)
         if vision.network and trained > MOST_BYTES:
             allowed = f"at most {MOST_BYTES / 2**30:g} GiB: smaller images, or fewer of them"
             sources.add(("vision",), f"images take too much memory (CFA {name})", f"{trained / 2**30:.1f} GiB", allowed)

@@ -13,8 +13,8 @@ from ..spectra.lights import Lights
 from .section import Vision
 
 TRAIN, CHECK, TEST = "train", "check", "test"
-PARTS = (TRAIN, CHECK, TEST)
-"""Parts of the images: to learn from, to stop by, and to be judged on."""
+SPLITS = (TRAIN, CHECK, TEST)
+"""Splits of the images: to learn from, to stop by, and to be judged on."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def split_lamps(lights: Lights, vision: Vision, seed: tuple[int, int]) -> dict[s
         If a lamp of the test has the spectrum of another part's.
     """
     rng = np.random.default_rng((*seed, 1))
-    parts: dict[str, list[IndexArray]] = {part: [] for part in PARTS}
+    parts: dict[str, list[IndexArray]] = {part: [] for part in SPLITS}
     for lens in vision.lenses:
         by_digest: dict[str, list[int]] = {}
         for i in lights.members[lens]:

@@ -1,8 +1,9 @@
-"""Small convolutional network on raw pixels, trained with JAX on the CPU; the same for every CFA.
+"""Small convolutional network on planes of raw pixels, trained with JAX; the same for every CFA.
 
-Planes by tile position are the input; three layers of 3 x 3 filters (16, 24 and 32 of them, the last two with a stride
-of two pixels) and a dense layer of 32 follow. The order of the sums is fixed: one seed gives the same numbers on one
-machine.
+Two layers of 3 x 3 filters (40 and 64 of them, the second with a stride of two) and a dense layer of 128 follow on the
+planes; what is known of a scene (distance, light) scales and shifts the first filters and the dense layer. Beside the
+state the network learns which lens is lit, the order of the lenses and the sun on them. The order of the sums is fixed:
+one seed gives the same numbers on one machine. Where JAX has a GPU, it is taken.
 """
 
 from __future__ import annotations
@@ -11,45 +12,53 @@ import math
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.types import FloatArray, IndexArray
 
-# Before JAX is loaded: workers have one thread each, and sums have one order.
+# Before JAX is loaded: workers have one thread each, and sums have one order; workers share a GPU's memory.
 os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1")
-os.environ.setdefault("JAX_PLATFORMS", "cpu")
+os.environ.setdefault("XLA_PYTHON_CLIENT_PREALLOCATE", "false")
 
 import jax
 import jax.numpy as jnp
 import optax
 
-_FILTERS = ((16, 1), (24, 2), (32, 2))
-_DENSE = 32
-_BATCH, _BATCHES = 64, 8
-_RATE = 2e-3
-_PATIENCE = 6
-"""Epochs without a smaller loss on the lamps that are held out, after which training ends."""
+_FILTERS = ((40, 1), (64, 2))
+_DENSE = 128
+_BATCH, _BATCHES = 128, 8
+_RATE, _DECAY = 6e-3, 1e-4
+_WARM_UP = 0.05
+"""Share of the steps in which the rate rises; then it falls along a cosine."""
+_BESIDE = 0.2
+"""Weight of what is learned beside the state."""
+_AT_ONCE = 4096
 _Weights = dict[str, Any]
-_OPTIMIZER = optax.adam(_RATE)
+Inputs = tuple[NDArray[np.float32], NDArray[np.float32]]
+"""Planes, ndarray of shape (n, rows, columns, planes), and what is known, (n, n_known)."""
 
 
-def _start(key: Any, shape: tuple[int, ...], n_states: int) -> _Weights:
-    """Return He's initial weights for planes of a shape, (rows, columns, planes)."""
-    high, wide, planes = shape
+def _start(key: Any, inputs: Inputs, n_outputs: int) -> _Weights:
+    """Return He's initial weights."""
+    high, wide, planes = inputs[0].shape[1:]
+    n_known = inputs[1].shape[1]
     weights: _Weights = {}
-    keys = jax.random.split(key, len(_FILTERS) + 2)
+    keys = jax.random.split(key, len(_FILTERS) + 3)
     for at, (filters, step) in enumerate(_FILTERS):
         weights[f"filters{at}"] = jax.random.normal(keys[at], (9 * planes, filters)) * math.sqrt(2 / (9 * planes))
         weights[f"bias{at}"] = jnp.zeros(filters)
         planes, high, wide = filters, -(-high // step), -(-wide // step)
-    inputs = high * wide * planes
-    weights["dense"] = jax.random.normal(keys[-2], (inputs, _DENSE)) * math.sqrt(2 / inputs)
+    first = _FILTERS[0][0]
+    weights["scale"], weights["shift"] = jnp.zeros((n_known, first)), jnp.zeros((n_known, first))
+    n_inputs = high * wide * planes
+    weights["dense"] = jax.random.normal(keys[-3], (n_inputs, _DENSE)) * math.sqrt(2 / n_inputs)
     weights["dense_bias"] = jnp.zeros(_DENSE)
-    weights["last"] = jax.random.normal(keys[-1], (_DENSE, n_states)) * math.sqrt(1 / _DENSE)
-    weights["last_bias"] = jnp.zeros(n_states)
+    weights["known"] = jax.random.normal(keys[-2], (n_known, _DENSE)) * 0.1
+    weights["last"] = jax.random.normal(keys[-1], (_DENSE, n_outputs)) * math.sqrt(1 / _DENSE)
+    weights["last_bias"] = jnp.zeros(n_outputs)
     return weights
 
 
@@ -58,34 +67,20 @@ def _filtered(x: Any, filters: Any, bias: Any, step: int) -> Any:
     high, wide = x.shape[1:3]
     padded = jnp.pad(x, ((0, 0), (1, 1), (1, 1), (0, 0)))
     shifts = [padded[:, i : i + high : step, j : j + wide : step] for i in range(3) for j in range(3)]
-    return jax.nn.relu(jnp.concatenate(shifts, axis=-1) @ filters + bias)
+    return jnp.concatenate(shifts, axis=-1) @ filters + bias
 
 
-def _logits(weights: _Weights, x: Any) -> Any:
+def _outputs(weights: _Weights, x: Any, known: Any) -> Any:
     for at, (_, step) in enumerate(_FILTERS):
         x = _filtered(x, weights[f"filters{at}"], weights[f"bias{at}"], step)
-    x = jax.nn.relu(x.reshape(len(x), -1) @ weights["dense"] + weights["dense_bias"])
-    return x @ weights["last"] + weights["last_bias"]
+        if at == 0:
+            x = x * (1 + (known @ weights["scale"])[:, None, None]) + (known @ weights["shift"])[:, None, None]
+        x = jax.nn.relu(x)
+    x = x.reshape(len(x), -1) @ weights["dense"] + weights["dense_bias"] + known @ weights["known"]
+    return jax.nn.relu(x) @ weights["last"] + weights["last_bias"]
 
 
-def _loss(weights: _Weights, x: Any, y: Any) -> Any:
-    return optax.softmax_cross_entropy_with_integer_labels(_logits(weights, x), y).mean()
-
-
-@jax.jit
-def _steps(weights: _Weights, state: Any, x: Any, y: Any) -> tuple[_Weights, Any]:
-    """Take one step for each of a few batches."""
-
-    def step(held: tuple[_Weights, Any], batch: tuple[Any, Any]) -> tuple[tuple[_Weights, Any], None]:
-        gradient = jax.grad(_loss)(held[0], *batch)
-        updates, moved = _OPTIMIZER.update(gradient, held[1], held[0])
-        return (optax.apply_updates(held[0], updates), moved), None
-
-    return jax.lax.scan(step, (weights, state), (x, y))[0]
-
-
-_checked = jax.jit(_loss)
-_softmax: Callable[..., Any] = jax.jit(lambda weights, x: jax.nn.softmax(_logits(weights, x)))
+_outputs_compiled: Callable[..., Any] = jax.jit(_outputs)
 
 
 @dataclass(frozen=True)
@@ -94,61 +89,50 @@ class Network:
 
     Parameters
     ----------
-    weights : list
+    weights : dict
         Weights.
-    mean, deviation : float
-        Moments of the training values.
-    epochs : int
-        Passes over the training images.
+    n_states : int
+        Number of states, which are the first outputs.
     """
 
     weights: _Weights
-    mean: float
-    deviation: float
-    epochs: int
+    n_states: int
 
-    def probabilities(self, planes: FloatArray) -> FloatArray:
-        """Return the probability of each state.
+    def logits(self, planes: NDArray[np.float32], known: NDArray[np.float32]) -> FloatArray:
+        """Return the logarithm of the probability of each state, but for a constant of each image.
 
         Parameters
         ----------
         planes : ndarray of shape (n, rows, columns, planes)
             Images.
+        known : ndarray of shape (n, n_known)
+            What is known of them.
 
         Returns
         -------
         ndarray of shape (n, n_states)
-            Probabilities.
+            Logits.
         """
-        probabilities = _softmax(self.weights, _scaled(planes, self.mean, self.deviation))
-        values = np.asarray(probabilities, dtype=float)
-        return np.asarray(values / values.sum(axis=1, keepdims=True), dtype=float)
+        starts = range(0, len(planes), _AT_ONCE)
+        parts = [
+            _outputs_compiled(self.weights, planes[at : at + _AT_ONCE], known[at : at + _AT_ONCE]) for at in starts
+        ]
+        return np.concatenate([np.asarray(part, dtype=float) for part in parts])[:, : self.n_states]
 
 
-def _scaled(planes: FloatArray, mean: float, deviation: float) -> Any:
-    return jnp.asarray((planes - mean) / deviation, dtype=jnp.float32)
-
-
-def train(
-    planes: FloatArray,
-    states: IndexArray,
-    check: tuple[FloatArray, IndexArray],
-    n_states: int,
-    epochs: int,
-    seed: tuple[int, ...],
-) -> Network:
-    """Train a network; the weights with the smallest loss on the check images are kept.
+def train(inputs: Inputs, targets: IndexArray, sizes: tuple[int, ...], epochs: int, seed: tuple[int, ...]) -> Network:
+    """Train a network by AdamW, with a rate that falls along a cosine.
 
     Parameters
     ----------
-    planes : ndarray of shape (n, rows, columns, planes)
-        Training images.
-    states : ndarray of int, shape (n,)
-        Their states.
-    check : tuple of ndarray
-        Images and states for early stopping.
-    n_states, epochs : int
-        Number of states, and of passes at most.
+    inputs : tuple of ndarray
+        Planes and what is known of the training images.
+    targets : ndarray of int, shape (n, n_targets)
+        State of each image, then what is learned beside it.
+    sizes : tuple of int
+        Number of values of each target.
+    epochs : int
+        Passes over the images.
     seed : tuple of int
         Seed.
 
@@ -158,21 +142,36 @@ def train(
         Trained network.
     """
     rng = np.random.default_rng(seed)
-    mean, deviation = float(planes.mean()), max(float(planes.std()), 1e-12)
-    scale = partial(_scaled, mean=mean, deviation=deviation)
-    weights = _start(jax.random.key(int(rng.integers(2**31))), planes.shape[1:], n_states)
-    state, at_once = _OPTIMIZER.init(weights), _BATCH * _BATCHES
-    x, y = np.asarray(scale(planes)), states.astype(np.int32)
-    seen, right = scale(check[0]), jnp.asarray(check[1], dtype=jnp.int32)
-    best = Network(weights, mean, deviation, 0)
-    least = math.inf
-    for epoch in range(1, epochs + 1):
-        order = np.resize(rng.permutation(len(x)), math.ceil(len(x) / at_once) * at_once)
+    planes, known = inputs
+    weights = _start(jax.random.key(int(rng.integers(2**31))), inputs, sum(sizes))
+    calls = max(1, math.ceil(len(planes) / (_BATCH * _BATCHES)))
+    n_steps = epochs * calls * _BATCHES
+    rate = optax.warmup_cosine_decay_schedule(_RATE / 20, _RATE, math.ceil(_WARM_UP * n_steps), n_steps, _RATE / 1000)
+    optimizer = optax.adamw(rate, weight_decay=_DECAY)
+    cuts = np.cumsum(sizes)[:-1]
+
+    def loss(held: _Weights, x: Any, facts: Any, y: Any) -> Any:
+        parts = jnp.split(_outputs(held, x, facts), cuts, axis=1)
+        losses = [
+            optax.softmax_cross_entropy_with_integer_labels(part, y[:, at]).mean() for at, part in enumerate(parts)
+        ]
+        return losses[0] + _BESIDE * sum(losses[1:])
+
+    @jax.jit
+    def steps(held: tuple[_Weights, Any], x: Any, facts: Any, y: Any) -> tuple[_Weights, Any]:
+        """Take one step for each of a few batches."""
+
+        def step(held: tuple[_Weights, Any], batch: tuple[Any, Any, Any]) -> tuple[tuple[_Weights, Any], None]:
+            gradient = jax.grad(loss)(held[0], *batch)
+            updates, moved = optimizer.update(gradient, held[1], held[0])
+            return (optax.apply_updates(held[0], updates), moved), None
+
+        return jax.lax.scan(step, held, (x, facts, y))[0]
+
+    held = weights, optimizer.init(weights)
+    numbers = targets.astype(np.int32)
+    for _ in range(epochs):
+        order = np.resize(rng.permutation(len(planes)), calls * _BATCH * _BATCHES)
         for some in order.reshape(-1, _BATCHES, _BATCH):
-            weights, state = _steps(weights, state, x[some], y[some])
-        loss = float(_checked(weights, seen, right))
-        if loss < least:
-            best, least = Network(weights, mean, deviation, epoch), loss
-        elif epoch - best.epochs >= _PATIENCE:
-            break
-    return best
+            held = steps(held, planes[some], known[some], numbers[some])
+    return Network(held[0], sizes[0])

@@ -65,14 +65,14 @@ class Vision(Section):
     """Positions of the head along a pixel, over the CFA's tile."""
     seeds: int = Field(default=5, ge=2, le=20)
     """Seeds; each trains networks of its own."""
-    train_images: int = Field(default=2000, ge=50, le=MOST_IMAGES)
-    """Training images of each seed, order of lenses and CFA."""
+    train_images: int = Field(default=10_000, ge=50, le=MOST_IMAGES)
+    """Training images of each seed and CFA, lenses in any order."""
     check_images: int = Field(default=400, ge=20, le=MOST_IMAGES)
-    """Images for early stopping of each seed, order of lenses and CFA."""
+    """Images of each seed and CFA by which the network's confidence is calibrated, lenses in any order."""
     test_images: int = Field(default=400, ge=20, le=MOST_IMAGES)
     """Test images of each seed, order of lenses and CFA."""
-    epochs: int = Field(default=12, ge=1, le=1000)
-    """Largest number of passes over the training images."""
+    epochs: int = Field(default=5, ge=1, le=1000)
+    """Passes over the training images and, where the tile has any, their mirror images."""
     unknown_cost: Fraction = 0.2
     """Cost of the answer "unknown"; a wrong answer costs 1."""
     network: bool = True

@@ -1,0 +1,225 @@
+"""Labeled images of a design, block by block: what the readers of a run, exported files and Python get."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from ..base.types import FloatArray
+from .head import head_places_px, heights
+from .images import HeadCamera
+from .isp import developed, isp_matrix
+from .lamps import CHECK, TEST, TRAIN, Lamps
+from .planes import demosaicked
+from .scenes import ORDERS, SHUFFLED, Scenes, draw_scenes, orders_of_lenses, states_of
+from .section import Vision
+
+Form = Literal["raw", "demosaicked", "isp"]
+"""Raw mosaics (uint16 DN, float32 of HDR pixels), every channel at every pixel (float32 DN above the black level), or
+pictures of a plain ISP (uint8 sRGB)."""
+TOGETHER = 1024
+"""Images that are held at once."""
+_KEYS = {TEST: 0, TRAIN: 2, CHECK: 3}
+"""Last number of the seed of each split's scenes."""
+
+
+class Batch(NamedTuple):
+    """Images, ndarray of shape (n, rows, columns) or (n, rows, columns, n_channels), and a row of labels for each."""
+
+    images: NDArray[Any]
+    labels: pd.DataFrame
+
+
+def image_id(design_id: int, seed: int, order: str, split: str, number: int) -> str:
+    """Return the name of an image in manifests and predictions.
+
+    Parameters
+    ----------
+    design_id, seed : int
+        Row of the design, and number of the seed.
+    order, split : str
+        Order of the lenses, and split of the images.
+    number : int
+        Number of the image in its split.
+
+    Returns
+    -------
+    str
+        Name.
+    """
+    return f"{design_id}-{seed}-{order}-{split}-{number}"
+
+
+def scenes_of(vision: Vision, lamps: dict[str, Lamps], order: str, split: str, seed: tuple[int, int]) -> Scenes:
+    """Return the scenes of a split.
+
+    Parameters
+    ----------
+    vision : Vision
+        Benchmark.
+    lamps : dict of str to Lamps
+        Lamps of each split.
+    order : str
+        Order of the lenses.
+    split : str
+        One of `lamps.SPLITS`.
+    seed : tuple of int
+        Seed of the study, and number of this seed.
+
+    Returns
+    -------
+    Scenes
+        Scenes.
+    """
+    count = {TEST: vision.test_images, TRAIN: vision.train_images, CHECK: vision.check_images}[split]
+    return draw_scenes(vision, lamps[split], order, count, (*scene_key(seed, order), _KEYS[split]))
+
+
+def scene_key(seed: tuple[int, int], order: str) -> tuple[int, ...]:
+    """Return the start of the seed of scenes.
+
+    Parameters
+    ----------
+    seed : tuple of int
+        Seed of the study, and number of this seed.
+    order : str
+        Order of the lenses.
+
+    Returns
+    -------
+    tuple of int
+        Seed.
+    """
+    return (*seed, 10 + ORDERS.index(order))
+
+
+def batches(
+    camera: HeadCamera, scenes: Scenes, key: Mapping[str, Any], order: str, split: str, form: Form
+) -> Iterator[Batch]:
+    """Yield the images of scenes in blocks of `TOGETHER`.
+
+    Parameters
+    ----------
+    camera : HeadCamera
+        Design.
+    scenes : Scenes
+        Scenes of the split.
+    key : mapping
+        `design_id`, `name`, `cfa` and `seed`, for the labels.
+    order, split : str
+        Order of the lenses, and split of the images.
+    form : {'raw', 'demosaicked', 'isp'}
+        Form of the images.
+
+    Yields
+    ------
+    Batch
+        Images with labels.
+    """
+    for start in range(0, len(scenes), TOGETHER):
+        block = scenes.some(slice(start, start + TOGETHER))
+        numbers = np.arange(start, start + len(block))
+        ids = {"image_id": [image_id(key["design_id"], key["seed"], order, split, int(number)) for number in numbers]}
+        where = {"order": order, "split": split, "image": numbers}
+        labels = pd.DataFrame({**ids, **key, **where, **_labels(camera, block)})
+        yield Batch(formed(camera, block, form), labels)
+
+
+def images_of_split(
+    camera: HeadCamera, lamps: dict[str, Lamps], key: Mapping[str, Any], seed: int, split: str, form: Form
+) -> Iterator[Batch]:
+    """Yield the images of a split: of the test with lenses in the street's order, then in any; of others in any.
+
+    Parameters
+    ----------
+    camera : HeadCamera
+        Design.
+    lamps : dict of str to Lamps
+        Lamps of each split.
+    key : mapping
+        `design_id`, `name`, `cfa` and `seed`.
+    seed : int
+        Seed of the study.
+    split : str
+        One of `lamps.SPLITS`.
+    form : {'raw', 'demosaicked', 'isp'}
+        Form of the images.
+
+    Yields
+    ------
+    Batch
+        Images with labels.
+    """
+    for order in ORDERS if split == TEST else (SHUFFLED,):
+        scenes = scenes_of(camera.vision, lamps, order, split, (seed, key["seed"]))
+        yield from batches(camera, scenes, key, order, split, form)
+
+
+def _labels(camera: HeadCamera, scenes: Scenes) -> dict[str, Any]:
+    """Return state, geometry and light of each scene."""
+    vision, setup = camera.vision, camera.setup
+    lit, levels = scenes.lamp >= 0, vision.levels
+    kinds = orders_of_lenses(len(vision.lenses))
+    columns, rows = head_places_px(vision, setup.camera.mosaic).T
+    place = (scenes.place * camera.n_places()).astype(np.intp)
+    across_px = np.array([vision.target(distance).object_resolution_px for distance in vision.distances_m])
+    diameter_px = across_px[scenes.distance]
+    y_px = rows[place][:, None] + diameter_px[:, None] * heights(vision)
+    position = (kinds[scenes.order] == (scenes.state - 1)[:, None]).argmax(axis=1)
+    names_of_order = [[vision.lenses[kind] for kind in order] for order in kinds]
+    return {
+        "state": np.array(states_of(vision), dtype=object)[scenes.state],
+        "lamp": np.array([*setup.lights.names, None], dtype=object)[scenes.lamp],  # -1: none
+        "intensity_cd": np.where(lit, np.array(vision.intensities_cd)[scenes.intensity], np.nan),
+        "background": np.array(vision.backgrounds, dtype=object)[scenes.background],
+        "phantom": scenes.phantom.astype(bool),
+        "distance_m": np.array(vision.distances_m, dtype=float)[scenes.distance],
+        "level": np.array(list(levels), dtype=object)[scenes.level],
+        "exposure_s": np.array([level.exposure_s for level in levels.values()])[scenes.level],
+        "lens_diameter_px": diameter_px,
+        "lenses": [names_of_order[order] for order in scenes.order],
+        "lens_x_px": np.repeat(columns[place][:, None], len(vision.lenses), axis=1).tolist(),
+        "lens_y_px": y_px.tolist(),
+        "lit": pd.Series(position, dtype="Int64").where(lit),
+    }
+
+
+def formed(camera: HeadCamera, scenes: Scenes, form: Form) -> NDArray[Any]:
+    """Return images of scenes in a form.
+
+    Parameters
+    ----------
+    camera : HeadCamera
+        Design.
+    scenes : Scenes
+        Scenes.
+    form : {'raw', 'demosaicked', 'isp'}
+        Form of the images.
+
+    Returns
+    -------
+    ndarray of shape (n, rows, columns) or (n, rows, columns, n_channels)
+        Images.
+    """
+    values_dn, pixel = camera.table.values_dn, camera.pixel
+    dn = values_dn[camera.images(scenes)]
+    if form == "raw":
+        return dn.astype(np.float32) if pixel.captures else np.rint(dn).astype(np.uint16)
+    above_dn = demosaicked(dn, camera.setup.camera.mosaic) - pixel.offset_dn
+    if form == "demosaicked":
+        return above_dn.astype(np.float32)
+    return _pictures(camera, scenes, above_dn / (values_dn[-1] - pixel.offset_dn))
+
+
+def _pictures(camera: HeadCamera, scenes: Scenes, share: FloatArray) -> NDArray[np.uint8]:
+    """Develop each image under its scene's light."""
+    lights = [level.light for level in camera.levels]
+    pictures = np.empty((*share.shape[:3], 3), dtype=np.uint8)
+    for light in dict.fromkeys(lights):
+        here = np.flatnonzero([lights[level] == light for level in scenes.level])
+        pictures[here] = developed(share[here], isp_matrix(camera.setup.camera.grid, camera.qe, light))
+    return pictures
