@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ..report import Output
+    from ..vision.batches import Batch, Form
 
 
 class LoadedStudy:
@@ -408,6 +409,81 @@ class FinishedRun:
         from ..report import summary_lines
 
         return "\n".join(summary_lines(self.output))
+
+    def images(self, split: str = "test", designs: Sequence[str] | None = None, form: Form = "raw") -> Iterator[Batch]:
+        """Yield labeled images of the run's benchmark of vision, up to 1,024 at once, without files.
+
+        Parameters
+        ----------
+        split : {'train', 'check', 'test'}
+            Split. The readers of the run have read those of the test.
+        designs : sequence of str, optional
+            Names of designs, such as "RGGB"; all of them by default.
+        form : {'raw', 'demosaicked', 'isp'}
+            Raw mosaics (uint16 DN, float32 of HDR pixels), every channel at every pixel (float32 DN above the black
+            level), or pictures of a plain ISP (uint8 sRGB).
+
+        Yields
+        ------
+        Batch
+            `images`, ndarray of shape (n, rows, columns) or (n, rows, columns, n_channels), and `labels`, a table with
+            the columns of an exported manifest.
+
+        Raises
+        ------
+        SweepError
+            If the run has no images, or no such design, split or form.
+        """
+        from ..run.image_files import images_of_run
+        from ..vision.batches import FORMS
+        from ..vision.lamps import SPLITS
+
+        names = list(self._images_of_test()["name"].unique())
+        chosen = names if designs is None else list(designs)
+        for value, known in ((split, SPLITS), (form, FORMS), *((name, names) for name in chosen)):
+            if value not in known:
+                allowed, near = ", ".join(known), nearest(value, known)
+                raise SweepError(ValidationIssue("unknown", value=value, allowed=allowed, nearest=near))
+        return images_of_run(self.study.study, self.output.few, split, chosen, form)
+
+    def score(self, predictions: Path | str | pd.DataFrame) -> pd.DataFrame:
+        """Score a reader's answers to the test images of the run's benchmark of vision.
+
+        Parameters
+        ----------
+        predictions : Path, str or pandas.DataFrame
+            File, or table, of columns `image_id`, and `state` (or "unknown") or a probability of each state.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Errors of each design, by order of the lenses, distance and light level, with intervals; differences from
+            the first design and from the ideal observer, paired; calibration.
+
+        Raises
+        ------
+        SweepError
+            If the run has no images, and for other, double or missing images or answers.
+        """
+        from ..run.score import read_predictions, reader_of, scores_of
+        from ..vision.scenes import states_of
+
+        images, vision = self._images_of_test(), self.output.study.vision
+        assert vision is not None
+        states = states_of(vision)
+        if isinstance(predictions, (Path, str)):
+            reader = read_predictions(Path(predictions), images, states)
+        else:
+            reader = reader_of(predictions.reset_index(drop=True), Path("predictions"), images, states)
+        return scores_of(reader, images, vision.unknown_cost)
+
+    def _images_of_test(self) -> pd.DataFrame:
+        from ..results.tables import VISION
+        from ..run.score import images_of_test
+
+        if self.output.study.vision is None:
+            raise SweepError(ValidationIssue("the study has no `vision`", str(self.folder)))
+        return images_of_test(self.output.vision[VISION])
 
     def report(self) -> Path:
         """Draw figures and report again.

@@ -12,12 +12,11 @@ from ..results.inventory import Inventory
 from ..run.image_files import MANIFEST, ImageFiles, write_images
 from ..run.vision import vision_designs
 from ..run.workers import workers
-from .options import ImageForm
 
 
 def export_images(
     folder: Path,
-    how: tuple[Path, ImageForm, bool],
+    files: ImageFiles,
     data: Path | None,
     jobs: int | None,
     progress: Progress,
@@ -30,8 +29,8 @@ def export_images(
     ----------
     folder : Path
         Folder of the run.
-    how : tuple of (Path, ImageForm, bool)
-        Folder of the images, their form, and whether each is a PNG.
+    files : ImageFiles
+        Folder and form of the images.
     data : Path or None
         Folder of the study's files; without it, the curves that the run kept are taken.
     jobs : int or None
@@ -49,23 +48,23 @@ def export_images(
     Raises
     ------
     SweepError
-        If the study has no `vision`, or the form is no PNG.
+        If the study has no `vision`, or the form is no PNG, of which COCO's boxes are.
     OutputError
         As `read_output` and `write_images`.
     """
-    to, form, png = how
     output = read_output(folder)
     vision = output.study.vision
     if vision is None:
         raise SweepError(ValidationIssue("the study has no `vision`", str(folder), key="--images"))
-    if png and form is ImageForm.DEMOSAICKED:
+    if files.coco and not files.png:
+        raise SweepError(ValidationIssue("boxes are of one file for each image", key="--coco", allowed="with --png"))
+    if files.png and files.form == "demosaicked":
         raise SweepError(ValidationIssue("of more than three channels", key="--png", allowed="--form raw or isp"))
-    if png and form is ImageForm.RAW and output.study.pixel.captures:
+    if files.png and files.form == "raw" and output.study.pixel.captures:
         problem = "merged values of an HDR pixel are no whole numbers of 16 bits"
         raise SweepError(ValidationIssue(problem, key="--png", allowed="--form isp, or without --png"))
     study = study_of(output, data, allow_code=allow_code)
     designs = vision_designs(study, output.few)
-    files = ImageFiles(to, form.value, png)
     with workers(jobs or os.cpu_count() or 1) as parallel:
         fingerprint = Inventory(folder).fingerprint
         manifest = write_images(designs, vision, study.section.seed, fingerprint, files, parallel, progress)
@@ -74,5 +73,5 @@ def export_images(
     counts = ", ".join(f"{one['counts']:,} to {one['values']}" for one in splits)
     return [
         f"{len(manifest):,} images of {names}: {counts}; the same scenes, lamps and photons for every design.",
-        f"Files: {to}/: {MANIFEST}, images/.",
+        f"Files: {files.folder}/: {MANIFEST}, images/{', coco-*.json' if files.coco else ''}.",
     ]

@@ -134,6 +134,14 @@ DataFolder = Annotated[
 ]
 
 
+class ImageSplit(StrEnum):
+    """Splits of exported images."""
+
+    TRAIN = "train"
+    CHECK = "check"
+    TEST = "test"
+
+
 class ImageForm(StrEnum):
     """Forms of exported images."""
 

@@ -11,7 +11,7 @@ import pandas as pd
 from ..results.atomic import atomic, write_text
 from ..results.output import Output
 from ..results.tables import VISION
-from ..run.score import Reader, check_unique, images_of_test, read_predictions, score_lines, scores_of
+from ..run.score import Reader, check_unique, images_of_test, network_of, read_predictions, score_lines, scores_of
 from ..vision.scenes import states_of
 from .figures import CURVE_CYCLE, DASHES, canvas, legend_beside, rendered
 from .pages import inlined, page, rows
@@ -23,7 +23,7 @@ PAGE, TABLE = "scores.html", "scores.parquet"
 
 
 def score_readers(output: Output, predictions: Sequence[Path], to: Path) -> list[str]:
-    """Score files of predictions, and write `scores.parquet` and `scores.html`.
+    """Score files of predictions and the run's network, and write `scores.parquet` and `scores.html`.
 
     Parameters
     ----------
@@ -48,6 +48,8 @@ def score_readers(output: Output, predictions: Sequence[Path], to: Path) -> list
     assert vision is not None
     images = images_of_test(output.vision[VISION])
     readers: list[Reader] = [read_predictions(path, images, states_of(vision)) for path in predictions]
+    if vision.network:
+        readers.append(network_of(images))
     check_unique(readers)
     scores = pd.concat([scores_of(reader, images, vision.unknown_cost) for reader in readers], ignore_index=True)
     with atomic(to / TABLE) as hidden:

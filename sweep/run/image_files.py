@@ -7,7 +7,7 @@ have read, and its `image_id` names it in a file of predictions.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,10 +21,14 @@ from ..base.errors import OutputError, ValidationIssue
 from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..camera.setup import Setup
 from ..results.atomic import atomic, write_text
+from ..study import Study
 from ..vision.batches import Batch, Form, images_of_split
+from ..vision.head import housing_diameters
 from ..vision.images import HeadCamera
 from ..vision.lamps import SPLITS, split_lamps
+from ..vision.scenes import states_of
 from ..vision.section import Vision
+from .vision import vision_designs
 from .workers import run_with_progress
 
 MANIFEST, _SETTINGS, _PARTS_FOLDER = "manifest.parquet", "images.json", "parts"
@@ -54,12 +58,15 @@ class ImageFiles:
         A PNG for each image instead of arrays of 1,024.
     splits : tuple of str
         Splits to write.
+    coco : bool
+        True for boxes of COCO, too, for the PNGs of each design and split.
     """
 
     folder: Path
     form: Form
     png: bool
     splits: tuple[str, ...] = SPLITS
+    coco: bool = False
 
 
 def write_images(
@@ -121,7 +128,65 @@ def write_images(
     manifest = pa.concat_tables([pq.read_table(part) for part in parts])
     with atomic(files.folder / MANIFEST) as hidden:
         pq.write_table(manifest, hidden)
+    if files.coco:
+        for (design_id, split), part in manifest.to_pandas().groupby(["design_id", "split"]):
+            write_text(json.dumps(_coco(part, vision)), files.folder / f"coco-{design_id}-{split}.json")
     return manifest
+
+
+def _coco(labels: pd.DataFrame, vision: Vision) -> dict[str, Any]:
+    """Return COCO's object detection format: a box around each housing, cut at the image; the state is its category."""
+    states, side = states_of(vision), vision.crop_px
+    width, height = housing_diameters(vision)
+    images, boxes = [], []
+    for number, row in enumerate(labels.to_dict("records"), 1):
+        x, y, across = np.mean(row["lens_x_px"]), np.mean(row["lens_y_px"]), row["lens_diameter_px"]
+        # Positions are from the center of the first pixel, boxes from its edge.
+        ends = [
+            np.clip([at - size * across / 2 + 0.5, at + size * across / 2 + 0.5], 0, side)
+            for at, size in ((x, width), (y, height))
+        ]
+        (left, right), (top, bottom) = ((float(low), float(high)) for low, high in ends)
+        images.append({"id": number, "file_name": row["file"], "width": side, "height": side})
+        box = {"bbox": [left, top, right - left, bottom - top], "area": (right - left) * (bottom - top), "iscrowd": 0}
+        boxes.append({"id": number, "image_id": number, "category_id": states.index(row["state"]) + 1} | box)
+    categories = [{"id": at, "name": state} for at, state in enumerate(states, 1)]
+    return {"images": images, "annotations": boxes, "categories": categories}
+
+
+def images_of_run(study: Study, rows: pd.DataFrame, split: str, names: Sequence[str], form: Form) -> Iterator[Batch]:
+    """Yield the images of a run's benchmark, without files, design by design and seed by seed.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    rows : pandas.DataFrame
+        Rows of plain CFAs, named designs and the answer.
+    split : str
+        One of `SPLITS`.
+    names : sequence of str
+        Names of designs.
+    form : {'raw', 'demosaicked', 'isp'}
+        Form of the images.
+
+    Yields
+    ------
+    Batch
+        Images with labels.
+    """
+    vision = study.section.vision
+    assert vision is not None
+    for row, setup, curves in vision_designs(study, rows):
+        if row["name"] in names:
+            camera = HeadCamera(setup, curves, vision)
+            for number in range(vision.seeds):
+                lamps = split_lamps(setup.lights, vision, (study.section.seed, number))
+                yield from images_of_split(camera, lamps, _key(row, number), study.section.seed, split, form)
+
+
+def _key(row: Mapping[str, Any], seed: int) -> dict[str, Any]:
+    return {name: row[name] for name in ("design_id", "name", "cfa")} | {"seed": seed}
 
 
 def _write_part(
@@ -135,11 +200,10 @@ def _write_part(
 ) -> int:
     """Write the images of one design and seed, then their part of the manifest."""
     camera, lamps = HeadCamera(setup, curves, vision), split_lamps(setup.lights, vision, seed)
-    key = {name: row[name] for name in ("design_id", "name", "cfa")} | {"seed": seed[1]}
     labels = [
         _write_block(batch, files)
         for split in files.splits
-        for batch in images_of_split(camera, lamps, key, seed[0], split, files.form)
+        for batch in images_of_split(camera, lamps, _key(row, seed[1]), seed[0], split, files.form)
     ]
     table = pa.Table.from_pandas(pd.concat(labels), schema=_SCHEMA, preserve_index=False)
     with atomic(part) as hidden:

@@ -15,7 +15,7 @@ from ..base.errors import DataError, SweepError, ValidationIssue, nearest
 from ..base.types import FloatArray
 from ..vision.batches import image_id
 from ..vision.lamps import TEST
-from ..vision.scenes import UNSEEN
+from ..vision.scenes import UNSEEN, WHOLE
 from ..vision.scores import Interval, interval_of_seeds
 
 UNKNOWN = "unknown"
@@ -60,6 +60,23 @@ def images_of_test(images: pd.DataFrame) -> pd.DataFrame:
     return unseen.assign(**{_ID: [image_id(d, seed, order, TEST, at) for d, seed, order, at in keys]})
 
 
+def network_of(images: pd.DataFrame) -> Reader:
+    """Return the run's own network as a reader.
+
+    Parameters
+    ----------
+    images : pandas.DataFrame
+        Result of `images_of_test`, of a run with a network.
+
+    Returns
+    -------
+    Reader
+        Reader.
+    """
+    columns = {_ID: _ID, WHOLE: "answer", f"{WHOLE}_p": "confidence"}
+    return Reader(WHOLE, images[list(columns)].rename(columns=columns))
+
+
 def read_predictions(path: Path, images: pd.DataFrame, states: Sequence[str]) -> Reader:
     """Read a file of predictions: `image_id`, and a `state` (or `unknown`) or a probability of each state.
 
@@ -80,13 +97,39 @@ def read_predictions(path: Path, images: pd.DataFrame, states: Sequence[str]) ->
     Raises
     ------
     SweepError
-        For a file that cannot be read, other columns, other, double or missing images, other states, and numbers that
-        are no probabilities.
+        For a file that cannot be read, and as `reader_of`.
     """
     try:
         table = pd.read_parquet(path) if path.suffix == ".parquet" else pd.read_csv(path)
     except (OSError, ValueError) as error:
         raise DataError(ValidationIssue(f"cannot be read: {' '.join(str(error).split())[:200]}", str(path))) from None
+    return reader_of(table, path, images, states)
+
+
+def reader_of(table: pd.DataFrame, path: Path, images: pd.DataFrame, states: Sequence[str]) -> Reader:
+    """Return the reader of a table of predictions.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        Columns `image_id`, and `state` (or `unknown`) or a probability of each state.
+    path : Path
+        Where the table comes from; its stem is the reader's name.
+    images : pandas.DataFrame
+        Result of `images_of_test`.
+    states : sequence of str
+        States.
+
+    Returns
+    -------
+    Reader
+        Reader.
+
+    Raises
+    ------
+    DataError
+        For other columns, other, double or missing images, other states, and numbers that are no probabilities.
+    """
     columns = [_ID, *([_STATE] if _STATE in table else states)]
     missing = [name for name in columns if name not in table]
     if missing:

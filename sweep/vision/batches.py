@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 import pandas as pd
@@ -21,6 +21,7 @@ from .section import Vision
 Form = Literal["raw", "demosaicked", "isp"]
 """Raw mosaics (uint16 DN, float32 of HDR pixels), every channel at every pixel (float32 DN above the black level), or
 pictures of a plain ISP (uint8 sRGB)."""
+FORMS = get_args(Form)
 TOGETHER = 1024
 """Images that are held at once."""
 _KEYS = {TEST: 0, TRAIN: 2, CHECK: 3}

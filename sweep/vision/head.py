@@ -69,6 +69,22 @@ def heights(vision: Vision) -> FloatArray:
     return np.asarray(SPACING * (np.arange(n) - (n - 1) / 2), dtype=float)
 
 
+def housing_diameters(vision: Vision) -> tuple[float, float]:
+    """Return the width and height of the housing.
+
+    Parameters
+    ----------
+    vision : Vision
+        Benchmark.
+
+    Returns
+    -------
+    tuple of float
+        Diameters.
+    """
+    return _HOUSING[0], _HOUSING[1] + SPACING * (len(vision.lenses) - 1)
+
+
 def head_places_px(vision: Vision, mosaic: Mosaic) -> FloatArray:
     """Return the positions of the head's center from the image's first pixel.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -158,6 +159,31 @@ def test_pictures_are_files_that_viewers_open(run: Path, tmp_path: Path) -> None
         red, green, blue = np.moveaxis(np.asarray(picture, dtype=float), 2, 0)
     at = int(np.clip(round(row["lens_y_px"][int(row["lit"])]), 0, 23)), round(row["lens_x_px"][0])
     assert red[at] > 2 * max(green[at], blue[at])
+
+
+def test_coco_boxes_hold_the_lenses(run: Path, tmp_path: Path) -> None:
+    """Of the test alone; at night the brightest pixel is in the box of its image."""
+    manifest = exported(run, tmp_path / "coco", "--form", "raw", "--png", "--coco", "--split", "test")
+    assert set(manifest["split"]) == {"test"}
+    assert sorted(path.name for path in (tmp_path / "coco").glob("coco-*")) == ["coco-0-test.json", "coco-1-test.json"]
+    held = json.loads((tmp_path / "coco" / "coco-1-test.json").read_text())
+    files = {one["id"]: one["file_name"] for one in held["images"]}
+    assert sorted(files.values()) == sorted(manifest.query("design_id == 1")["file"])
+    names, by_file = {one["id"]: one["name"] for one in held["categories"]}, manifest.set_index("file")
+    for one in held["annotations"]:
+        row = by_file.loc[files[one["image_id"]]]
+        assert names[one["category_id"]] == row["state"]
+        left, top, width, height = one["bbox"]
+        if row["distance_m"] == 100:
+            across = row["lens_diameter_px"]
+            assert (width, height) == (pytest.approx(1.6 * across), pytest.approx(4.6 * across))
+        if row["level"] == "night" and row["state"] != "off":
+            with Image.open(tmp_path / "coco" / row.name) as picture:
+                brightest = np.unravel_index(np.asarray(picture).argmax(), picture.size)
+            assert top - 1 <= brightest[0] + 0.5 <= top + height + 1
+            assert left - 1 <= brightest[1] + 0.5 <= left + width + 1
+    code, _, err = commanded("export", run, "--images", tmp_path / "d", "--coco")
+    assert (code, "with --png" in err) == (2, True)
 
 
 @pytest.mark.parametrize("cfa", ["RGGB", "RYYCy", "RCCB"])

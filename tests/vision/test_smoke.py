@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from sweep import read_run
+from sweep.base.errors import SweepError
+from sweep.report import study_of
 from sweep.report.page import _vision_drawings
 from sweep.report.vision import NETWORK, OBSERVER, benchmark_of, ranks_of
 from sweep.report.vision_report import vision_sentences
 from sweep.results.inventory import Inventory
 from sweep.results.output import Output, read_output
 from sweep.results.tables import VISION, VISION_TABLES
+from sweep.run.vision import vision_designs
+from sweep.vision.batches import Batch
 from sweep.vision.lamps import spectrum_digest
+from sweep.vision.network_reader import NetworkReader
 from sweep.vision.scenes import ORDERS, UNSEEN
 from sweep.vision.scores import mean_of
 
@@ -132,3 +139,80 @@ def test_a_lost_table_comes_back_the_same(folder: Path) -> None:
     run = Warm("run", folder.parent / "smoke.yaml", "--output", folder.parent, "--jobs", 2, said=said)
     assert run.wait(timeout=600) == 0, said.read_text()
     assert {name: (folder / name).read_bytes() for name in VISION_TABLES} == before
+
+
+def files_of(folder: Path, manifest: pd.DataFrame) -> Iterator[Batch]:
+    """Images of exported files in the order of their manifest, as anyone reads them."""
+    for name, labels in manifest.groupby("file", sort=False):
+        with np.load(folder / str(name)) as held:
+            yield Batch(held["images"][labels["index"].to_numpy()], labels)
+
+
+@pytest.fixture(scope="module")
+def exported(folder: Path) -> tuple[Path, pd.DataFrame]:
+    to = folder.parent / "images"
+    done = sweep("export", str(folder), "--images", str(to), "--jobs", "1")
+    assert done.returncode == 0, done.stderr
+    return to, pd.read_parquet(to / "manifest.parquet")
+
+
+def reader_of_files(output: Output, exported: tuple[Path, pd.DataFrame], shuffled: bool) -> dict[str, np.ndarray]:
+    """Answers to the test images of RGGB and the first seed by a network that knows the files alone."""
+    study = study_of(output, None)
+    row, setup, _ = next(made for made in vision_designs(study, output.few) if made[0]["name"] == "RGGB")
+    to, manifest = exported
+    here = manifest[(manifest["design_id"] == row["design_id"]) & (manifest["seed"] == 0)]
+    training, check, test = (here[here["split"] == split] for split in ("train", "check", "test"))
+    batches = list(files_of(to, training))
+    if shuffled:
+        other = training.sample(frac=1, random_state=np.random.default_rng(4)).reset_index(drop=True)
+        keys = ["order", "image", "distance_m", "level", "background"]
+        starts = np.cumsum([0, *(len(batch.labels) for batch in batches)])
+        batches = [
+            Batch(images, other.iloc[start : start + len(labels)].assign(**{k: labels[k].to_numpy() for k in keys}))
+            for (images, labels), start in zip(batches, starts, strict=False)
+        ]
+    reader = NetworkReader(study.section.vision, setup.camera.mosaic, setup.camera.pixel)
+    reader.learn(batches, files_of(to, check), (study.section.seed, 0))
+    return reader.read(files_of(to, test))
+
+
+def test_the_network_reads_files_as_it_reads_in_the_run(output: Output, exported: tuple[Path, pd.DataFrame]) -> None:
+    answers = reader_of_files(output, exported, shuffled=False)
+    images = output.vision[VISION]
+    own = images[(images["name"] == "RGGB") & (images["seed"] == 0) & (images["lamps"] == UNSEEN)]
+    for name, probabilities in answers.items():
+        np.testing.assert_allclose(probabilities.max(axis=1), own[f"{name}_p"], rtol=1e-12)
+        states = np.array(["off", "red", "yellow", "green"])[probabilities.argmax(axis=1)]
+        assert list(states) == list(own[name])
+
+
+def test_a_network_of_shuffled_labels_errs_at_chance(output: Output, exported: tuple[Path, pd.DataFrame]) -> None:
+    """Of four states, 3 of 4 times: within 3.3 standard deviations of 200 images."""
+    answers = reader_of_files(output, exported, shuffled=True)
+    images = output.vision[VISION]
+    own = images[(images["name"] == "RGGB") & (images["seed"] == 0) & (images["lamps"] == UNSEEN)]
+    states = np.array(["off", "red", "yellow", "green"])[answers[NETWORK].argmax(axis=1)]
+    assert (states != own["state"]).mean() == pytest.approx(0.75, abs=0.1)
+
+
+def test_python_yields_and_scores_the_same_images(folder: Path, exported: tuple[Path, pd.DataFrame]) -> None:
+    run, (to, manifest) = read_run(folder), exported
+    batches = list(run.images("test", ["RCCC"]))
+    here = manifest[(manifest["name"] == "RCCC") & (manifest["split"] == "test")]
+    held = [batch.images for batch in files_of(to, here)]
+    np.testing.assert_array_equal(np.concatenate([batch.images for batch in batches]), np.concatenate(held))
+    labels = pd.concat([batch.labels for batch in batches], ignore_index=True)
+    shared = [name for name in manifest if name not in ("file", "index", "lenses", "lens_x_px", "lens_y_px")]
+    pd.testing.assert_frame_equal(labels[shared], here[shared].reset_index(drop=True), check_dtype=False)
+    predictions = manifest[manifest["split"] == "test"][["image_id"]].assign(state="red")
+    scores = run.score(predictions).set_index(["name", "order", "distance_m", "level"])
+    assert scores.loc[("RCCC", "shuffled", "all", "all"), "error"] == pytest.approx(0.75, abs=0.01)
+    predictions.to_csv(folder.parent / "red.csv", index=False)
+    done = sweep("score", str(folder), str(folder.parent / "red.csv"), "--output", str(folder.parent / "scores"))
+    assert done.returncode == 0, done.stderr
+    assert "red, RGGB: errs on 75.0 %" in done.stdout
+    assert "network, RGGB: errs on" in done.stdout
+    for wrong in ({"designs": ["RGBB"]}, {"split": "tset"}, {"form": "jpeg"}):
+        with pytest.raises(SweepError, match="unknown"):
+            run.images(**wrong)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ...base.errors import ErrorBoundExceededError, SweepError, ValidationIssue
-from ..options import OF_RESULTS, AllowCode, DataFolder, ExportFormat, ImageForm, RunFolder, run_folders
+from ..options import OF_RESULTS, AllowCode, DataFolder, ExportFormat, ImageForm, ImageSplit, RunFolder, run_folders
 from ..output import Json, ProgressDisplay, Quiet, print_result
 
 PANEL = OF_RESULTS
@@ -66,9 +66,15 @@ def export(
         typer.Option(help="Folder for the images of a study with `vision`, with labels.", show_default=False),
     ] = None,
     form: Annotated[
-        ImageForm, typer.Option(help="Images: raw mosaics, all channels at all pixels, or pictures of a plain ISP.")
+        ImageForm,
+        ImageSplit,
+        typer.Option(help="Images: raw mosaics, all channels at all pixels, or pictures of a plain ISP."),
     ] = ImageForm.RAW,
-    png: Annotated[bool, typer.Option("--png", help="A PNG for each image; without it, arrays (.npz) of 256.")] = False,
+    png: Annotated[bool, typer.Option("--png", help="A PNG for each image; without it, arrays (.npz).")] = False,
+    split: Annotated[
+        list[ImageSplit] | None, typer.Option(help="Images of this split; may be repeated.", show_default="all")
+    ] = None,
+    coco: Annotated[bool, typer.Option("--coco", help="Boxes in COCO's format beside PNGs.")] = False,
     jobs: Annotated[int | None, typer.Option(min=1, help="Workers for images.", show_default="all cores")] = None,
     data: Annotated[
         Path | None, typer.Option(help="Folder with the run's curve files, which are then read again and compared.")
@@ -91,12 +97,14 @@ def export(
 
         lines = export_design(folder, design, data, to, also or (), allow_code=allow_code)
     else:
+        from ...run.image_files import ImageFiles
         from ..export_images import export_images
 
         assert images is not None
         with ProgressDisplay(quiet=quiet) as display:
-            how = images, form, png
-            lines = export_images(folder, how, data, jobs, display.update, allow_code=allow_code)
+            splits = tuple(one.value for one in split or ImageSplit)
+            files = ImageFiles(images, form.value, png, splits, coco)
+            lines = export_images(folder, files, data, jobs, display.update, allow_code=allow_code)
     for line in [] if quiet else lines:
         typer.echo(line)
 
