@@ -9,7 +9,7 @@ from ..base.errors import SweepError, ValidationIssue
 from ..base.types import Progress
 from ..report import read_output, study_of
 from ..results.inventory import Inventory
-from ..run.image_files import MANIFEST, ImageFiles, write_images
+from ..run.image_files import MANIFEST, STREET_MANIFEST, ImageFiles, write_images
 from ..run.vision import vision_designs
 from ..run.workers import workers
 
@@ -71,7 +71,9 @@ def export_images(
     names = ", ".join(str(row["name"]) for row, *_ in designs)
     splits = manifest["split"].value_counts().to_pylist()
     counts = ", ".join(f"{one['counts']:,} to {one['values']}" for one in splits)
+    street = f"{STREET_MANIFEST} (streets), " if vision.street else ""
+    boxes = ", coco-*.json" if files.coco else ""
     return [
         f"{len(manifest):,} images of {names}: {counts}; the same scenes, lamps and photons for every design.",
-        f"Files: {files.folder}/: {MANIFEST}, images/{', coco-*.json' if files.coco else ''}.",
+        f"Files: {files.folder}/: {MANIFEST}, {street}images/{boxes}.",
     ]

@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from ..results.atomic import atomic, write_text
+from ..results.designs import study_of
 from ..results.output import Output
 from ..results.tables import VISION
 from ..run.score import Reader, check_unique, images_of_test, network_of, read_predictions, score_lines, scores_of
+from ..run.score_streets import is_of_streets, read_detections, street_labels, street_lines, street_scores
 from ..vision.scenes import states_of
 from .figures import CURVE_CYCLE, DASHES, canvas, legend_beside, rendered
 from .pages import inlined, page, rows
@@ -19,11 +21,13 @@ from .pages import inlined, page, rows
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PAGE, TABLE = "scores.html", "scores.parquet"
+PAGE, TABLE, STREETS = "scores.html", "scores.parquet", "street_scores.parquet"
 
 
 def score_readers(output: Output, predictions: Sequence[Path], to: Path) -> list[str]:
     """Score files of predictions and the run's network, and write `scores.parquet` and `scores.html`.
+
+    Files with positions are detections in streets, whose scores are in `street_scores.parquet`.
 
     Parameters
     ----------
@@ -46,6 +50,11 @@ def score_readers(output: Output, predictions: Sequence[Path], to: Path) -> list
     """
     vision = output.study.vision
     assert vision is not None
+    of_streets = [path for path in predictions if vision.street is not None and is_of_streets(path)]
+    predictions = [path for path in predictions if path not in of_streets]
+    lines = _score_streets(output, of_streets, to) if of_streets else []
+    if not predictions:
+        return [*lines, f"Files: {to}/: {STREETS}."]
     images = images_of_test(output.vision[VISION])
     readers: list[Reader] = [read_predictions(path, images, states_of(vision)) for path in predictions]
     if vision.network:
@@ -54,13 +63,26 @@ def score_readers(output: Output, predictions: Sequence[Path], to: Path) -> list
     scores = pd.concat([scores_of(reader, images, vision.unknown_cost) for reader in readers], ignore_index=True)
     with atomic(to / TABLE) as hidden:
         scores.to_parquet(hidden, index=False)
-    lines = [*score_lines(scores)]
+    lines += score_lines(scores)
     picture = inlined(rendered(draw_scores(scores), "png"))
     shown = scores.drop(columns=["design_id"]).round(4)
     name, folder = output.study.study, output.folder.name
     text = page("scores.html.j2", title=name, lines=lines, image=picture, table=rows(shown), folder=folder)
     write_text(text, to / PAGE)
-    return [*lines, f"Files: {to}/: {TABLE}, {PAGE}."]
+    files = ", ".join([TABLE, PAGE, *([STREETS] if of_streets else [])])
+    return [*lines, f"Files: {to}/: {files}."]
+
+
+def _score_streets(output: Output, predictions: Sequence[Path], to: Path) -> list[str]:
+    vision, study = output.study.vision, study_of(output, None)
+    assert vision is not None
+    labels = street_labels(study, output.few)
+    made = {path.stem: read_detections(path, labels, vision.lenses) for path in predictions}
+    parts = [street_scores(name, detections, labels, vision.lenses) for name, detections in made.items()]
+    scores = pd.concat(parts, ignore_index=True)
+    with atomic(to / STREETS) as hidden:
+        scores.to_parquet(hidden, index=False)
+    return [*street_lines(scores)]
 
 
 def draw_scores(scores: pd.DataFrame) -> Figure:

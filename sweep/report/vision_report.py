@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from ..metrics.share import format_share
 from ..results.output import Output
-from ..results.tables import VISION_MISREAD
+from ..results.tables import VISION_MISREAD, VISION_STREET, VISION_STREETS
 from ..vision.readers import OBSERVER
-from ..vision.scenes import FIXED, SEEN, SHUFFLED, UNSEEN
-from ..vision.scores import costs, macro_f1
-from .figures import CURVE_CYCLE, Drawing, canvas_grid, legend_beside, panel_grid
+from ..vision.scenes import FIXED, PARTS, SEEN, SHUFFLED, UNSEEN
+from ..vision.scores import Interval, costs, interval_of_seeds, macro_f1
+from .figures import CURVE_CYCLE, Drawing, canvas, canvas_grid, legend_beside, panel_grid
 from .vision import (
     NETWORK,
     PREDICTORS,
@@ -176,7 +176,7 @@ def vision_parts(output: Output) -> dict[str, pd.DataFrame]:
     ranks = ranks_of(benchmark)
     who = READER_NAMES[benchmark.main_reader]
     beside = ", in brackets by the ideal observer" if benchmark.main_reader == NETWORK else ""
-    return {
+    parts = {
         "Errors of each design, percent of the images, with 95 % intervals": _vision_table(benchmark),
         f"Percent of the images that the {who} reads wrongly{beside}; lenses shuffled": _vision_conditions_table(
             benchmark, ranks
@@ -184,6 +184,27 @@ def vision_parts(output: Output) -> dict[str, pd.DataFrame]:
         f"Rank correlation with how rarely the {who} errs, with 95 % intervals": _ranks_table(ranks),
         f"What the {who} says of each state; lenses shuffled": _confusion_table(benchmark),
     }
+    if VISION_STREET in output.vision:
+        title = "Streets: average precision of the simplest detector, with 95 % intervals, mean over signal types"
+        parts[title] = _street_table(output.vision[VISION_STREET], benchmark.reference)
+    return parts
+
+
+def _street_table(table: pd.DataFrame, reference: str) -> pd.DataFrame:
+    """Return one row per design: average precision of all light levels and each of them, and less the reference's."""
+    by_seed = table.pivot_table("average_precision", ["name", "seed"], "level", sort=False)
+    by_seed.insert(0, "all levels", by_seed.mean(axis=1))
+    rows = []
+    for name, values in by_seed.groupby(level="name", sort=False):
+        apart = values.droplevel("name") - by_seed.loc[reference]
+        row = {"design": str(name)} | {str(level): format_interval(_over_seeds(values[level])) for level in by_seed}
+        difference = "-" if str(name) == reference else format_interval(_over_seeds(apart["all levels"]))
+        rows.append(row | {f"less that of {reference}": difference})
+    return pd.DataFrame(rows)
+
+
+def _over_seeds(values: pd.Series[float]) -> Interval:
+    return interval_of_seeds(float(values.mean()), np.array(values, dtype=float))
 
 
 def vision_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
@@ -207,10 +228,70 @@ def vision_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
     yield "vision-errors", f"Images that the {who} reads wrongly, over the distance", errors
     if ranks.between:
         yield "vision-ranks", f"What predicts the {who}'s errors", partial(_draw_ranks, ranks, list(levels), who)
+    if benchmark.main_reader == NETWORK:
+        caption = "What more images would bring: errors of networks trained on a quarter, half and all of the images"
+        yield "vision-learning", caption, partial(_draw_learning, _learning(benchmark), benchmark.vision.train_images)
+    if VISION_STREETS in output.vision:
+        pictures = output.vision[VISION_STREETS]
+        caption = "One street for each light level through each design's plain ISP"
+        yield "vision-street", caption, partial(_draw_streets, _streets(pictures), pictures["name"].nunique())
     pictures = output.vision[VISION_MISREAD]
     if len(pictures):
         caption = f"Images that the {who} read wrongly, lenses shuffled, in false colors: what it is > what was said"
         yield "vision-misread", caption, partial(_draw_misread, _misread(benchmark, pictures))
+
+
+def _learning(benchmark: Benchmark) -> dict[str, tuple[list[Interval], Interval]]:
+    """Return the errors of the networks of a quarter, half and all of the images, and the observer's, by design."""
+    parts = sorted(PARTS, key=PARTS.__getitem__)
+    return {
+        design: (
+            [benchmark.error(design, part, SHUFFLED) for part in parts],
+            benchmark.error(design, OBSERVER, SHUFFLED),
+        )
+        for design in benchmark.designs
+    }
+
+
+def _draw_learning(errors: Mapping[str, tuple[list[Interval], Interval]], n_images: int) -> Figure:
+    """Draw errors over the number of training images, a line per design; thin the ideal observer's."""
+    figure, axes = canvas(7.0, 4.2)
+    images = [round(share * n_images) for share in sorted(PARTS.values())]
+    for (design, (of_parts, ideal)), color in zip(errors.items(), CURVE_CYCLE * 4, strict=False):
+        values, low, high = ([100 * getattr(one, end) for one in of_parts] for end in ("value", "low", "high"))
+        axes.plot(images, values, "o-", color=color, label=design, markersize=3.5)
+        axes.fill_between(images, low, high, color=color, alpha=0.12, linewidth=0)
+        axes.axhline(100 * ideal.value, color=color, linewidth=0.8, alpha=0.8)
+    axes.set(xscale="log", xlabel="training images", ylabel="images read wrongly / %", ylim=(0, None))
+    axes.set_xticks(images, [f"{n:,}" for n in images], minor=False)
+    axes.minorticks_off()
+    legend_beside(axes, "thin: ideal observer")
+    return figure
+
+
+def _streets(pictures: pd.DataFrame) -> list[tuple[str, NDArray[np.uint8]]]:
+    """Return title and picture of each street, one row of pictures per light level."""
+    rows = pictures.assign(order=pictures.groupby("name").cumcount()).sort_values("order", kind="stable")
+    return [
+        (f"{row['name']}, {row['level']}", _picture(row["pixels"], row["rows"], row["columns"]))
+        for row in rows.to_dict("records")
+    ]
+
+
+def _picture(pixels: bytes, rows: int, columns: int) -> NDArray[np.uint8]:
+    return np.frombuffer(pixels, dtype=np.uint8).reshape(rows, columns, 3)
+
+
+def _draw_streets(streets: Sequence[tuple[str, NDArray[np.uint8]]], n_designs: int) -> Figure:
+    """Draw one column per design, one row per light level."""
+    high, wide = streets[0][1].shape[:2]
+    width = 3.2 if n_designs <= 3 else 2.2
+    figure, panels = panel_grid(len(streets), n_designs, (width, width * high / wide + 0.25), (0, 0))
+    for axes, (title, pixels) in zip(panels, streets, strict=True):
+        axes.imshow(pixels, interpolation="nearest")
+        axes.set_axis_off()
+        axes.set_title(title, fontsize=7)
+    return figure
 
 
 def _misread(benchmark: Benchmark, pictures: pd.DataFrame) -> list[tuple[str, NDArray[np.uint8]]]:
@@ -225,7 +306,7 @@ def _misread(benchmark: Benchmark, pictures: pd.DataFrame) -> list[tuple[str, ND
     return [
         (
             f"{row['name']}\n{row['distance_m']:g} m, {row['level']}\n{row['state']} > {row[benchmark.main_reader]}",
-            np.frombuffer(row["pixels"], dtype=np.uint8).reshape(row["rows"], row["columns"], 3),
+            _picture(row["pixels"], row["rows"], row["columns"]),
         )
         for row in rows
     ]

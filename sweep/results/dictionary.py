@@ -173,10 +173,14 @@ FILES = {
     files.RENDERED: "there, too: colors (XYZ over white) and noise of the areas of two rendered pictures",
     files.VISION: "a row per image of the benchmark of vision: design_id, name, cfa, seed, order (of the lenses), "
     "lamps (seen in training or unseen), image, state, lamp, intensity_cd, background, phantom, distance_m, level, "
-    "and what each reader says with its probability: observer, network, half (a network that learned from half of the "
-    "images)",
+    "and what each reader says with its probability: observer, network, half and quarter (networks that learned from a "
+    "part of the images)",
     files.VISION_CONDITIONS: "of each design at each distance and level of light: csd (DN), dprime and pair_error, the "
     "smallest or the largest over the pairs of lenses",
+    files.VISION_STREET: "of streets: average_precision of the simplest detector for each design, seed, light level "
+    "and signal type (`state`), of `lit` lit lenses",
+    files.VISION_STREETS: "the first street of each light level through each design, sRGB: bytes of rows x columns x 3 "
+    "in `pixels`",
     files.VISION_MISREAD: "images that were read wrongly, in false colors: bytes of rows x columns x 3 in `pixels`",
     files.AUDIT: "rows of `sweep audit`: errors against the reference settings, and those that are allowed",
     files.RESOLVED: "the study with every default written out; a study file itself",

@@ -41,8 +41,10 @@ HANDOVERS, ANY_INTENSITY = "handovers.parquet", "any_intensity.parquet"
 VALIDATED, LEFT_OUT = "validated.parquet", "leave_one_out.parquet"
 VISION, VISION_CONDITIONS = "vision.parquet", "vision_conditions.parquet"
 VISION_MISREAD = "vision_misread.parquet"
-VISION_TABLES = (VISION, VISION_CONDITIONS, VISION_MISREAD)
-"""Tables of the benchmark of vision: a row per image, per distance and level, per picture that was read wrongly."""
+VISION_STREET, VISION_STREETS = "vision_street.parquet", "vision_street_pictures.parquet"
+VISION_TABLES = (VISION, VISION_CONDITIONS, VISION_MISREAD, VISION_STREET, VISION_STREETS)
+"""Tables of the benchmark of vision: a row per image, per distance and level, per picture that was read wrongly, per
+light level and state of detections in streets, and per picture of a street."""
 AUDIT, ALL_SENSORS = "audit.parquet", "all_sensors.parquet"
 PROVENANCE = "provenance.json"
 RESOLVED = "study.resolved.yaml"
@@ -59,7 +61,7 @@ MADE_BY_RUN = frozenset(
 _DRAWN = re.compile(
     r"report\.html|cfas\.(png|svg)|pareto(-\d+)?\.(png|svg)|paper_comparison\.(csv|parquet)"
     r"|figures/((filters|series|places)-\d+|tiles|sensor|signals|chart|scorecard|(color-noise|rendered)-\d+"
-    r"|regions-\d+|map|captures-\d+|clouds-(cfas|designs)|vision-(errors|ranks|misread))\.(png|svg)"
+    r"|regions-\d+|map|captures-\d+|clouds-(cfas|designs)|vision-(errors|learning|ranks|misread|street))\.(png|svg)"
 )
 _PARAMETERS = "cfa_sweep_parameters"
 _ROWS_AT_ONCE = 65_536

@@ -7,8 +7,9 @@ have read, and its `image_id` names it in a file of predictions.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -23,15 +24,16 @@ from ..camera.setup import Setup
 from ..results.atomic import atomic, write_text
 from ..study import Study
 from ..vision.batches import Batch, Form, images_of_split
-from ..vision.head import housing_diameters
 from ..vision.images import HeadCamera
-from ..vision.lamps import SPLITS, split_lamps
-from ..vision.scenes import states_of
+from ..vision.lamps import SPLITS, TEST, TRAIN, split_lamps
 from ..vision.section import Vision
+from ..vision.street import StreetCamera, draw_streets
+from .coco import coco
 from .vision import vision_designs
 from .workers import run_with_progress
 
-MANIFEST, _SETTINGS, _PARTS_FOLDER = "manifest.parquet", "images.json", "parts"
+MANIFEST, STREET_MANIFEST = "manifest.parquet", "street.parquet"
+_SETTINGS, _PARTS_FOLDER = "images.json", "parts"
 _TEXT, _NUMBER, _COUNT = pa.string(), pa.float64(), pa.int64()
 _KINDS: dict[pa.DataType, str] = {
     _TEXT: "image_id file name cfa order split state lamp background level",
@@ -42,6 +44,16 @@ _KINDS: dict[pa.DataType, str] = {
     pa.list_(_NUMBER): "lens_x_px lens_y_px",
 }
 _SCHEMA = pa.schema([(name, kind) for kind, names in _KINDS.items() for name in names.split()])
+_STREET_KINDS: dict[pa.DataType, str] = {
+    _TEXT: "image_id file name cfa order split background level",
+    _COUNT: "index design_id seed image",
+    pa.bool_(): "phantom",
+    pa.list_(_TEXT): "state",
+    pa.list_(
+        _NUMBER
+    ): "intensity_cd distance_m lens_diameter_px head_x_px head_y_px lit_y_px head_width_px head_height_px",
+}
+_STREET_SCHEMA = pa.schema([(name, kind) for kind, names in _STREET_KINDS.items() for name in names.split()])
 
 
 @dataclass(frozen=True)
@@ -125,33 +137,30 @@ def write_images(
                 calls.append(delayed(_write_part, row, setup, curves, vision, (seed, number), files, parts[-1]))
     for _ in run_with_progress(parallel, calls, "images written (designs x seeds)", progress):
         pass
-    manifest = pa.concat_tables([pq.read_table(part) for part in parts])
-    with atomic(files.folder / MANIFEST) as hidden:
-        pq.write_table(manifest, hidden)
+    manifest = _joined(parts, files.folder / MANIFEST)
+    manifests = [("coco", manifest)]
+    if vision.street is not None:
+        manifests.append(
+            ("coco-street", _joined([_of_streets(part) for part in parts], files.folder / STREET_MANIFEST))
+        )
     if files.coco:
-        for (design_id, split), part in manifest.to_pandas().groupby(["design_id", "split"]):
-            write_text(json.dumps(_coco(part, vision)), files.folder / f"coco-{design_id}-{split}.json")
+        tiles = {int(row["design_id"]): setup.camera.mosaic.indices.shape for row, setup, _ in designs}
+        for stem, table in manifests:
+            for (design_id, split), part in table.to_pandas().groupby(["design_id", "split"]):
+                boxes = json.dumps(coco(part, vision, tiles[int(design_id)]))
+                write_text(boxes, files.folder / f"{stem}-{design_id}-{split}.json")
     return manifest
 
 
-def _coco(labels: pd.DataFrame, vision: Vision) -> dict[str, Any]:
-    """Return COCO's object detection format: a box around each housing, cut at the image; the state is its category."""
-    states, side = states_of(vision), vision.crop_px
-    width, height = housing_diameters(vision)
-    images, boxes = [], []
-    for number, row in enumerate(labels.to_dict("records"), 1):
-        x, y, across = np.mean(row["lens_x_px"]), np.mean(row["lens_y_px"]), row["lens_diameter_px"]
-        # Positions are from the center of the first pixel, boxes from its edge.
-        ends = [
-            np.clip([at - size * across / 2 + 0.5, at + size * across / 2 + 0.5], 0, side)
-            for at, size in ((x, width), (y, height))
-        ]
-        (left, right), (top, bottom) = ((float(low), float(high)) for low, high in ends)
-        images.append({"id": number, "file_name": row["file"], "width": side, "height": side})
-        box = {"bbox": [left, top, right - left, bottom - top], "area": (right - left) * (bottom - top), "iscrowd": 0}
-        boxes.append({"id": number, "image_id": number, "category_id": states.index(row["state"]) + 1} | box)
-    categories = [{"id": at, "name": state} for at, state in enumerate(states, 1)]
-    return {"images": images, "annotations": boxes, "categories": categories}
+def _joined(parts: Sequence[Path], to: Path) -> pa.Table:
+    manifest = pa.concat_tables([pq.read_table(part) for part in parts])
+    with atomic(to) as hidden:
+        pq.write_table(manifest, hidden)
+    return manifest
+
+
+def _of_streets(part: Path) -> Path:
+    return part.with_name(f"{part.stem}-street.parquet")
 
 
 def images_of_run(study: Study, rows: pd.DataFrame, split: str, names: Sequence[str], form: Form) -> Iterator[Batch]:
@@ -200,15 +209,24 @@ def _write_part(
 ) -> int:
     """Write the images of one design and seed, then their part of the manifest."""
     camera, lamps = HeadCamera(setup, curves, vision), split_lamps(setup.lights, vision, seed)
-    labels = [
-        _write_block(batch, files)
-        for split in files.splits
-        for batch in images_of_split(camera, lamps, _key(row, seed[1]), seed[0], split, files.form)
+    key = _key(row, seed[1])
+    if vision.street is not None:
+        streets = StreetCamera(camera, vision.street)
+        drawn = {split: draw_streets(vision, vision.street, lamps[split], split, seed) for split in (TRAIN, TEST)}
+        batches = (streets.batches(drawn[split], key, split, files.form) for split in files.splits if split in drawn)
+        _write_batches(chain.from_iterable(batches), files, _STREET_SCHEMA, _of_streets(part))
+    batches = (images_of_split(camera, lamps, key, seed[0], split, files.form) for split in files.splits)
+    return _write_batches(chain.from_iterable(batches), files, _SCHEMA, part)
+
+
+def _write_batches(batches: Iterable[Batch], files: ImageFiles, schema: pa.Schema, part: Path) -> int:
+    """Write images, then their part of the manifest."""
+    tables = [
+        pa.Table.from_pandas(_write_block(batch, files), schema=schema, preserve_index=False) for batch in batches
     ]
-    table = pa.Table.from_pandas(pd.concat(labels), schema=_SCHEMA, preserve_index=False)
     with atomic(part) as hidden:
-        pq.write_table(table, hidden)
-    return len(table)
+        pq.write_table(pa.concat_tables([schema.empty_table(), *tables]), hidden)
+    return sum(map(len, tables))
 
 
 def _write_block(batch: Batch, files: ImageFiles) -> pd.DataFrame:

@@ -34,6 +34,8 @@ from ..results.tables import (
     RESOLVED,
     RESULTS,
     SEARCH_LOG,
+    VISION_STREET,
+    VISION_STREETS,
     VISION_TABLES,
     batches,
     json_of,
@@ -85,8 +87,9 @@ def files_of(study: Study) -> set[str]:
     set of str
         Names.
     """
-    vision = () if study.section.vision is None else VISION_TABLES
-    return {RESOLVED, *_whole(study), *row_tables(study), *vision}
+    vision, of_streets = study.section.vision, (VISION_STREET, VISION_STREETS)
+    of_vision = [name for name in VISION_TABLES if vision and (vision.street or name not in of_streets)]
+    return {RESOLVED, *_whole(study), *row_tables(study), *of_vision}
 
 
 def _whole(study: Study) -> set[str]:

@@ -77,6 +77,30 @@ def network_of(images: pd.DataFrame) -> Reader:
     return Reader(WHOLE, images[list(columns)].rename(columns=columns))
 
 
+def table_of(path: Path) -> pd.DataFrame:
+    """Return a file as a table.
+
+    Parameters
+    ----------
+    path : Path
+        CSV or Parquet.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Table.
+
+    Raises
+    ------
+    DataError
+        If it cannot be read.
+    """
+    try:
+        return pd.read_parquet(path) if path.suffix == ".parquet" else pd.read_csv(path)
+    except (OSError, ValueError) as error:
+        raise DataError(ValidationIssue(f"cannot be read: {' '.join(str(error).split())[:200]}", str(path))) from None
+
+
 def read_predictions(path: Path, images: pd.DataFrame, states: Sequence[str]) -> Reader:
     """Read a file of predictions: `image_id`, and a `state` (or `unknown`) or a probability of each state.
 
@@ -99,10 +123,7 @@ def read_predictions(path: Path, images: pd.DataFrame, states: Sequence[str]) ->
     SweepError
         For a file that cannot be read, and as `reader_of`.
     """
-    try:
-        table = pd.read_parquet(path) if path.suffix == ".parquet" else pd.read_csv(path)
-    except (OSError, ValueError) as error:
-        raise DataError(ValidationIssue(f"cannot be read: {' '.join(str(error).split())[:200]}", str(path))) from None
+    table = table_of(path)
     return reader_of(table, path, images, states)
 
 
@@ -142,13 +163,13 @@ def reader_of(table: pd.DataFrame, path: Path, images: pd.DataFrame, states: Seq
         other = answer[~answer.isin([*states, UNKNOWN])]
         if len(other):
             allowed, near = ", ".join([*states, UNKNOWN]), nearest(other.iloc[0], [*states, UNKNOWN])
-            issues.append(_issue("no state", path, other, _STATE, allowed, near))
+            issues.append(issue_of("no state", path, other, _STATE, allowed, near))
     else:
         probabilities = table[list(states)].apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
         known = (np.abs(probabilities.sum(axis=1) - 1) <= _SUM) & (probabilities >= 0).all(axis=1)
         shown = pd.Series([", ".join(f"{p:g}" for p in row) for row in probabilities[~known]], table.index[~known])
         if len(shown):
-            issues.append(_issue("no probabilities", path, shown, None, "numbers of 0 or more whose sum is 1"))
+            issues.append(issue_of("no probabilities", path, shown, None, "numbers of 0 or more whose sum is 1"))
         answer = pd.Series(np.array(states)[np.nan_to_num(probabilities).argmax(axis=1)], index=table.index)
         confidence = probabilities.max(axis=1)
     if issues:
@@ -161,14 +182,14 @@ def _id_issues(path: Path, ids: pd.Series[str], known: pd.Series[str]) -> Iterat
     others, double = ids[~ids.isin(known)], ids[ids.duplicated()]
     for problem, wrong in (("not an image of the test", others), ("an image stands twice", double)):
         if len(wrong):
-            yield _issue(problem, path, wrong, _ID)
+            yield issue_of(problem, path, wrong, _ID)
     absent = known[~known.isin(ids)]
     if len(absent):
         problem, allowed = f"{len(absent):,} images of the test have no answer", f"all {len(known):,}, or `{UNKNOWN}`"
         yield ValidationIssue(problem, str(path), None, _ID, absent.iloc[0], allowed)
 
 
-def _issue(
+def issue_of(
     problem: str,
     path: Path,
     wrong: pd.Series[str],
@@ -176,7 +197,26 @@ def _issue(
     allowed: str | None = None,
     near: str | None = None,
 ) -> ValidationIssue:
-    """Return an issue with the first of the wrong values, its line and how many more there are."""
+    """Return an issue with the first of the wrong values, its line and how many more there are.
+
+    Parameters
+    ----------
+    problem : str
+        Problem.
+    path : Path
+        File.
+    wrong : pandas.Series
+        Wrong values, by row.
+    key : str or None
+        Column.
+    allowed, near : str, optional
+        What is allowed, and the nearest of it.
+
+    Returns
+    -------
+    ValidationIssue
+        Issue.
+    """
     more = f" (and {len(wrong) - 1:,} more)" if len(wrong) > 1 else ""
     return ValidationIssue(f"{problem}{more}", str(path), int(wrong.index[0]) + 2, key, wrong.iloc[0], allowed, near)
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 
 from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..camera.forward import ForwardModel
@@ -17,7 +18,7 @@ from ..metrics.columns.confusion import D_PRIME, STATE_ERROR
 from ..metrics.evaluate import evaluate
 from ..metrics.separation import csd_name
 from ..results.designs import few_rows, row_curves
-from ..results.tables import FOUND, VISION, VISION_CONDITIONS, VISION_MISREAD
+from ..results.tables import FOUND, VISION, VISION_CONDITIONS, VISION_MISREAD, VISION_STREET, VISION_STREETS
 from ..spectra.lights import class_pairs, pair_name
 from ..study import Study
 from ..vision.images import setup_at
@@ -45,9 +46,12 @@ _CONDITIONS = pa.schema(
     [*_DESIGN, ("distance_m", _NUMBER), ("level", _TEXT)]
     + [(name, _NUMBER) for name in ("csd", "dprime", "pair_error")]
 )
-_MISREAD = pa.schema(
-    [*_DESIGN, ("seed", _COUNT), ("image", _COUNT), ("rows", _COUNT), ("columns", _COUNT), ("pixels", pa.binary())]
+_PIXELS = [("rows", _COUNT), ("columns", _COUNT), ("pixels", pa.binary())]
+_MISREAD = pa.schema([*_DESIGN, ("seed", _COUNT), ("image", _COUNT), *_PIXELS])
+_STREET = pa.schema(
+    [*_DESIGN, ("seed", _COUNT), ("level", _TEXT), ("state", _TEXT), ("lit", _COUNT), ("average_precision", _NUMBER)]
 )
+_STREETS = pa.schema([*_DESIGN, ("level", _TEXT), *_PIXELS])
 
 
 def vision_tables(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: Progress) -> dict[str, pa.Table]:
@@ -81,11 +85,18 @@ def vision_tables(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
     calls = [delayed(read_images, *setups[at], vision, (study.section.seed, seed)) for at, seed in pairs]
     images: list[dict[str, Any]] = []
     pictures: list[dict[str, Any]] = []
+    detected: list[dict[str, Any]] = []
+    streets: list[dict[str, Any]] = []
     readings = run_with_progress(parallel, calls, "images read (designs x seeds)", progress)
     for (at, seed), reading in zip(pairs, readings, strict=True):
         design = {name: designs[at][name] for name, _ in _DESIGN}
         images += _image_rows(study, vision, design | {"seed": seed}, reading)
         pictures += _picture_rows(design | {"seed": seed}, reading)
+        detected += _street_rows(design | {"seed": seed}, vision, reading)
+        if seed == 0:
+            streets += [
+                design | {"level": level} | _pixels(p) for level, p in zip(vision.levels, reading.streets, strict=False)
+            ]
     conditions: list[dict[str, Any]] = []
     known = parallel([delayed(predictors, *setup, vision) for setup in setups])
     for row, figures in zip(designs, known, strict=True):
@@ -93,11 +104,17 @@ def vision_tables(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
             conditions.append(
                 dict(zip(_CONDITIONS.names, (*(row[n] for n, _ in _DESIGN), *condition, *values), strict=True))
             )
-    return {
+    tables = {
         VISION: pa.Table.from_pylist(images, schema=_IMAGES),
         VISION_CONDITIONS: pa.Table.from_pylist(conditions, schema=_CONDITIONS),
         VISION_MISREAD: pa.Table.from_pylist(pictures, schema=_MISREAD),
     }
+    if vision.street is not None:
+        tables |= {
+            VISION_STREET: pa.Table.from_pylist(detected, schema=_STREET),
+            VISION_STREETS: pa.Table.from_pylist(streets, schema=_STREETS),
+        }
+    return tables
 
 
 def vision_designs(study: Study, rows: pd.DataFrame) -> list[tuple[dict[Any, Any], Setup, FloatArray]]:
@@ -154,8 +171,18 @@ def _rows_of(study: Study, vision: Vision, key: dict[str, Any], answers: Answers
 
 def _picture_rows(key: dict[str, Any], reading: SeedReading) -> Iterator[dict[str, Any]]:
     for at, picture in zip(reading.pictured, reading.pictures, strict=True):
-        pixels = np.rint(255 * picture).astype(np.uint8)
-        yield key | {"image": at, "rows": len(pixels), "columns": pixels.shape[1], "pixels": pixels.tobytes()}
+        yield key | {"image": at} | _pixels(np.rint(255 * picture).astype(np.uint8))
+
+
+def _street_rows(key: dict[str, Any], vision: Vision, reading: SeedReading) -> Iterator[dict[str, Any]]:
+    for level, precisions, lit in zip(vision.levels, reading.precision, reading.lit, strict=False):
+        for state, precision, count in zip(vision.lenses, precisions, lit, strict=True):
+            row = {"level": level, "state": state, "lit": int(count), "average_precision": float(precision)}
+            yield key | row
+
+
+def _pixels(picture: NDArray[np.uint8]) -> dict[str, Any]:
+    return {"rows": len(picture), "columns": picture.shape[1], "pixels": picture.tobytes()}
 
 
 def predictors(setup: Setup, curves: FloatArray, vision: Vision) -> list[tuple[float, float, float]]:

@@ -9,10 +9,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ..base.types import FloatArray
+from ..base.types import IndexArray
 from .head import head_places_px, heights
-from .images import HeadCamera
-from .isp import developed, isp_matrix
+from .images import HeadCamera, Numbers
+from .isp import isp_of
 from .lamps import CHECK, TEST, TRAIN, Lamps
 from .planes import demosaicked
 from .scenes import ORDERS, SHUFFLED, Scenes, draw_scenes, orders_of_lenses, states_of
@@ -206,21 +206,39 @@ def formed(camera: HeadCamera, scenes: Scenes, form: Form) -> NDArray[Any]:
     ndarray of shape (n, rows, columns) or (n, rows, columns, n_channels)
         Images.
     """
+    return in_form(camera, camera.images(scenes), scenes.level, form)
+
+
+def in_form(camera: HeadCamera, numbers: Numbers, levels: IndexArray, form: Form) -> NDArray[Any]:
+    """Return drawn images in a form.
+
+    Parameters
+    ----------
+    camera : HeadCamera
+        Design.
+    numbers : ndarray of shape (n, rows, columns)
+        Readings.
+    levels : ndarray of int, shape (n,)
+        Index of the light level of each.
+    form : {'raw', 'demosaicked', 'isp'}
+        Form of the images.
+
+    Returns
+    -------
+    ndarray of shape (n, rows, columns) or (n, rows, columns, n_channels)
+        Images.
+    """
     values_dn, pixel = camera.table.values_dn, camera.pixel
-    dn = values_dn[camera.images(scenes)]
+    dn = values_dn[numbers]
     if form == "raw":
         return dn.astype(np.float32) if pixel.captures else np.rint(dn).astype(np.uint16)
     above_dn = demosaicked(dn, camera.setup.camera.mosaic) - pixel.offset_dn
     if form == "demosaicked":
         return above_dn.astype(np.float32)
-    return _pictures(camera, scenes, above_dn / (values_dn[-1] - pixel.offset_dn))
-
-
-def _pictures(camera: HeadCamera, scenes: Scenes, share: FloatArray) -> NDArray[np.uint8]:
-    """Develop each image under its scene's light."""
-    lights = [level.light for level in camera.levels]
+    share = above_dn / (values_dn[-1] - pixel.offset_dn)
+    lights = np.array([level.light for level in camera.levels])[levels]
     pictures = np.empty((*share.shape[:3], 3), dtype=np.uint8)
-    for light in dict.fromkeys(lights):
-        here = np.flatnonzero([lights[level] == light for level in scenes.level])
-        pictures[here] = developed(share[here], isp_matrix(camera.setup.camera.grid, camera.qe, light))
+    for light in np.unique(lights):
+        isp = isp_of(camera.setup.camera.grid, camera.qe, light)
+        pictures[lights == light] = isp.developed(share[lights == light])
     return pictures

@@ -142,6 +142,27 @@ def head_maps(setup: Setup, vision: Vision) -> HeadMaps:
     )
 
 
+def lamp_maps(setup: Setup, vision: Vision) -> tuple[FloatArray, FloatArray]:
+    """Return the light of a disc as wide as a lens in the head's middle, relative to a uniform field of its radiance.
+
+    Parameters
+    ----------
+    setup : Setup
+        Scene and camera.
+    vision : Vision
+        Benchmark.
+
+    Returns
+    -------
+    knots_nm : ndarray of shape (n_knots,)
+        Wavelengths, nm.
+    discs : ndarray of shape (n_places, side, side, n_knots)
+        Light at each position.
+    """
+    knots_nm = psf.psf_knots_nm(setup.camera.grid.nodes_nm, _PSF_STEP_NM)
+    return knots_nm, _disc(setup, vision, head_places_px(vision, setup.camera.mosaic), knots_nm)
+
+
 def _made(setup: Setup, vision: Vision, target: Target) -> HeadMaps:
     knots = psf.psf_knots_nm(setup.camera.grid.nodes_nm, _PSF_STEP_NM)
     places, across = head_places_px(vision, setup.camera.mosaic), target.object_resolution_px

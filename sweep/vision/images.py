@@ -18,7 +18,7 @@ from ..camera.setup import Setup
 from ..spectra.color import luminance_per_photon_radiance
 from ..spectra.spectrum import linear_basis
 from .compiled_images import draw_numbers
-from .head import MARGIN, HeadMaps, head_maps
+from .head import MARGIN, HeadMaps, head_maps, lamp_maps
 from .materials import ambient_light, phantom, reflectance
 from .pixel_table import PixelTable, pixel_table
 from .scenes import Scenes, orders_of_lenses, uniforms
@@ -160,23 +160,72 @@ class HeadCamera:
     def _made(self, distance: int, level: int) -> HeadElectrons:
         setup, level_settings = self._setups[distance][level], self.levels[level]
         maps = head_maps(setup, self.vision)
-        time_s = level_settings.exposure_s
-        grid, factor = setup.camera.grid, irradiance_factor(self.vision.optics)
-        ambient = ambient_light(grid, level_settings.light)
-        radiance = level_settings.illuminance_lx / math.pi / luminance_per_photon_radiance(grid, ambient[None])[0]
-        arriving = ambient * (radiance * factor)
+        time_s, grid = level_settings.exposure_s, setup.camera.grid
+        arriving = self._of_white(level_settings)
         housing, plate, glass = (arriving * reflectance(grid, of) for of in ("dark gray", "black", "black"))
-        around = np.stack([arriving * reflectance(grid, background) for background in self.vision.backgrounds])
+        around = self._around(level_settings)
         uniform = np.ones((1, *maps.backplate.shape[1:]))
-        unlit = self._electrons(maps, uniform, around) + self._electrons(maps, maps.backplate, plate - around)
-        unlit += self._electrons(maps, maps.housing, (housing - plate)[None])
-        unlit += self._electrons(maps, maps.lenses.sum(axis=1), (glass - housing)[None])
+        knots = maps.knots_nm
+        unlit = self._electrons(knots, uniform, around) + self._electrons(knots, maps.backplate, plate - around)
+        unlit += self._electrons(knots, maps.housing, (housing - plate)[None])
+        unlit += self._electrons(knots, maps.lenses.sum(axis=1), (glass - housing)[None])
         return HeadElectrons(
             np.maximum(unlit, 0.0) * time_s + self.pixel.dark_e_per_s * time_s,
             self._phantoms(maps, setup, level_settings) * time_s,
             self._lamp_rates(distance, maps, setup),
             time_s,
         )
+
+    def _of_white(self, level: LightLevel) -> FloatArray:
+        """Return the photons that arrive from a surface of reflectance 1."""
+        grid = self.setup.camera.grid
+        ambient = ambient_light(grid, level.light)
+        radiance = level.illuminance_lx / math.pi / luminance_per_photon_radiance(grid, ambient[None])[0]
+        return np.asarray(ambient * (radiance * irradiance_factor(self.vision.optics)), dtype=float)
+
+    def _around(self, level: LightLevel) -> FloatArray:
+        """Return the photons that arrive from each background, ndarray of shape (n_backgrounds, n_wavelengths)."""
+        grid, white = self.setup.camera.grid, self._of_white(level)
+        return np.stack([white * reflectance(grid, background) for background in self.vision.backgrounds])
+
+    def background(self, level: int) -> FloatArray:
+        """Return expected electrons of images of each background without a head.
+
+        Parameters
+        ----------
+        level : int
+            Index of the light level.
+
+        Returns
+        -------
+        ndarray of shape (n_backgrounds, n_pixels)
+            Electrons.
+        """
+        settings = self.levels[level]
+        knots = head_maps(self._setups[0][level], self.vision).knots_nm
+        uniform = np.ones((1, *self._channel.shape, knots.size))
+        electrons = self._electrons(knots, uniform, self._around(settings))[0]
+        return np.asarray((electrons + self.pixel.dark_e_per_s) * settings.exposure_s, dtype=float)
+
+    def lamps(self, distance: int, spectra: FloatArray) -> FloatArray:
+        """Return electrons of other lamps, as wide as a lens, for one candela and second at each position.
+
+        Parameters
+        ----------
+        distance : int
+            Index of the distance.
+        spectra : ndarray of shape (n_lamps, n_wavelengths)
+            Photons of the lamps, of any unit.
+
+        Returns
+        -------
+        ndarray of shape (n_places, n_lamps, n_pixels)
+            Electrons.
+        """
+        setup = self._setups[distance][0]
+        knots, discs = lamp_maps(setup, self.vision)
+        per_cd = self._per_candela(setup) / luminance_per_photon_radiance(setup.camera.grid, spectra)
+        return np.maximum(self._electrons(knots, discs, spectra * per_cd[:, None]), 0.0)
 
     def _phantoms(self, maps: HeadMaps, setup: Setup, level: LightLevel) -> FloatArray:
         """Return electrons/s of sun on each lens, reflected with its color."""
@@ -199,16 +248,16 @@ class HeadCamera:
     def _of_lenses(self, maps: HeadMaps, spectra: FloatArray) -> FloatArray:
         """Return spectra on each lens, ndarray of shape (n_places, n_lenses, n_spectra, n_pixels)."""
         places, positions = maps.lenses.shape[:2]
-        lens_electrons = self._electrons(maps, maps.lenses.reshape(-1, *maps.lenses.shape[2:]), spectra)
+        lens_electrons = self._electrons(maps.knots_nm, maps.lenses.reshape(-1, *maps.lenses.shape[2:]), spectra)
         return np.maximum(lens_electrons.reshape(places, positions, *lens_electrons.shape[1:]), 0.0)
 
-    def _electrons(self, maps: HeadMaps, light: FloatArray, spectra: FloatArray) -> FloatArray:
+    def _electrons(self, knots_nm: FloatArray, light: FloatArray, spectra: FloatArray) -> FloatArray:
         """Return electrons/s of images with spectra, through each pixel's filter, with crosstalk.
 
         `light` has shape (n, side, side, n_knots), the result (n, n_spectra, n_pixels).
         """
         setup = self.setup
-        on_knots = linear_basis(setup.camera.grid.nodes_nm, maps.knots_nm)
+        on_knots = linear_basis(setup.camera.grid.nodes_nm, knots_nm)
         weight = np.einsum("cw,sw,kw->cks", self.qe, spectra, on_knots, optimize=True) * setup.camera.area_step_m2_nm
         electrons = np.empty((len(light), len(spectra), *self._channel.shape))
         for channel in range(len(self.qe)):
@@ -272,8 +321,25 @@ class HeadCamera:
         ndarray of shape (n, n_pixels)
             Digital numbers.
         """
-        electrons = self.expected(scenes)
+        numbers = self.drawn(self.expected(scenes), scenes.key)
+        return numbers.reshape(len(scenes), self.vision.crop_px, self.vision.crop_px)
+
+    def drawn(self, electrons: FloatArray, keys: IndexArray) -> Numbers:
+        """Return digital numbers with the photons of each image's key.
+
+        Parameters
+        ----------
+        electrons : ndarray of shape (n, n_pixels)
+            Expected electrons.
+        keys : ndarray of int, shape (n,)
+            Keys.
+
+        Returns
+        -------
+        ndarray of shape (n, n_pixels)
+            Digital numbers.
+        """
         node, share = self.table.at(electrons.ravel())
         numbers = np.empty(electrons.size, dtype=np.int16)
-        draw_numbers(node, share, self.table.below, uniforms(scenes, electrons.shape[1]).ravel(), numbers)
-        return numbers.reshape(len(scenes), self.vision.crop_px, self.vision.crop_px)
+        draw_numbers(node, share, self.table.below, uniforms(keys, electrons.shape[1]).ravel(), numbers)
+        return numbers.reshape(electrons.shape)

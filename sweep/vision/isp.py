@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.types import FloatArray
 from ..spectra.color import XYZ_TO_RGB, color_matching, srgb_gamma
@@ -14,11 +17,34 @@ _DISPLAY: Illuminant = "daylight"
 """D65, the white of sRGB."""
 
 
-def isp_matrix(grid: WavelengthGrid, qe: FloatArray, light: Illuminant) -> FloatArray:
-    """Return the color matrix of a camera under a light: least squares over the ColorChecker, white to white.
+class Isp(NamedTuple):
+    """White balance and color matrix: the channels of white, as shares of the largest, and the matrix after balance."""
 
-    The target of a patch is its linear sRGB under D65, so that the matrix balances white, too. White is the light on a
-    surface of reflectance 1; its brightest channel is taken as full scale.
+    white: FloatArray
+    matrix: FloatArray
+
+    def developed(self, share: FloatArray) -> NDArray[np.uint8]:
+        """Return pictures of demosaicked images: channels are balanced and cut at white, so that what clips is white.
+
+        Parameters
+        ----------
+        share : ndarray of shape (..., n_channels)
+            Channels above the black level, as share of full scale.
+
+        Returns
+        -------
+        ndarray of uint8, shape (..., 3)
+            sRGB.
+        """
+        balanced = np.minimum(share / self.white, 1.0)
+        return np.asarray(np.rint(255 * srgb_gamma(np.clip(balanced @ self.matrix.T, 0.0, 1.0))), dtype=np.uint8)
+
+
+def isp_of(grid: WavelengthGrid, qe: FloatArray, light: Illuminant) -> Isp:
+    """Return a camera's ISP under a light: a color matrix by least squares over the ColorChecker, white to white.
+
+    The target of a patch is its linear sRGB under D65. White is the light on a surface of reflectance 1; its brightest
+    channel is taken as full scale.
 
     Parameters
     ----------
@@ -31,36 +57,16 @@ def isp_matrix(grid: WavelengthGrid, qe: FloatArray, light: Illuminant) -> Float
 
     Returns
     -------
-    ndarray of shape (3, n_channels)
-        Linear sRGB per share of full scale.
+    Isp
+        ISP.
     """
     chart = chart_reflectances(grid)
     response = chart * ambient_light(grid, light) @ qe.T
     white = ambient_light(grid, light) @ qe.T
-    response, white = response / white.max(), white / white.max()
+    response, white = response / white, white / white.max()
     day = energy_from_photons(grid.nodes_nm, ambient_light(grid, _DISPLAY)[None])[0]
     matching = color_matching(grid)
     xyz = chart * day @ matching.T / (day @ matching[1])
     target = xyz @ XYZ_TO_RGB.T
     matrix = np.linalg.lstsq(response, target, rcond=None)[0].T
-    balanced: FloatArray = matrix / (matrix @ white)[:, None]
-    return balanced
-
-
-def developed(share: FloatArray, matrix: FloatArray) -> FloatArray:
-    """Return pictures of demosaicked images.
-
-    Parameters
-    ----------
-    share : ndarray of shape (..., n_channels)
-        Channels above the black level, as share of full scale.
-    matrix : ndarray of shape (3, n_channels)
-        Color matrix.
-
-    Returns
-    -------
-    ndarray of uint8, shape (..., 3)
-        sRGB.
-    """
-    linear = np.clip(share @ matrix.T, 0.0, 1.0)
-    return np.asarray(np.rint(255 * srgb_gamma(linear)), dtype=np.uint8)
+    return Isp(white, np.asarray(matrix / matrix.sum(axis=1, keepdims=True), dtype=float))

@@ -12,6 +12,7 @@ import math
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,8 @@ _WARM_UP = 0.05
 _BESIDE = 0.2
 """Weight of what is learned beside the state."""
 _AT_ONCE = 4096
+_OPTIMIZER = optax.chain(optax.scale_by_adam(), optax.add_decayed_weights(_DECAY))
+"""AdamW, whose rate is passed to each step."""
 _Weights = dict[str, Any]
 Inputs = tuple[NDArray[np.float32], NDArray[np.float32]]
 """Planes, ndarray of shape (n, rows, columns, planes), and what is known, (n, n_known)."""
@@ -78,6 +81,25 @@ def _outputs(weights: _Weights, x: Any, known: Any) -> Any:
         x = jax.nn.relu(x)
     x = x.reshape(len(x), -1) @ weights["dense"] + weights["dense_bias"] + known @ weights["known"]
     return jax.nn.relu(x) @ weights["last"] + weights["last_bias"]
+
+
+def _loss(weights: _Weights, x: Any, known: Any, y: Any, sizes: tuple[int, ...]) -> Any:
+    parts = jnp.split(_outputs(weights, x, known), np.cumsum(sizes)[:-1], axis=1)
+    losses = [optax.softmax_cross_entropy_with_integer_labels(part, y[:, at]).mean() for at, part in enumerate(parts)]
+    return losses[0] + _BESIDE * sum(losses[1:])
+
+
+@partial(jax.jit, static_argnames="sizes")
+def _steps(held: tuple[_Weights, Any], batches: tuple[Any, ...], sizes: tuple[int, ...]) -> tuple[_Weights, Any]:
+    """Take one step for each of a few batches of planes, what is known, targets and rate."""
+
+    def step(held: tuple[_Weights, Any], batch: tuple[Any, ...]) -> tuple[tuple[_Weights, Any], None]:
+        x, known, y, rate = batch
+        gradient = jax.grad(_loss)(held[0], x, known, y, sizes)
+        updates, moved = _OPTIMIZER.update(gradient, held[1], held[0])
+        return (optax.apply_updates(held[0], jax.tree.map(lambda u: -rate * u, updates)), moved), None
+
+    return jax.lax.scan(step, held, batches)[0]
 
 
 _outputs_compiled: Callable[..., Any] = jax.jit(_outputs)
@@ -147,31 +169,11 @@ def train(inputs: Inputs, targets: IndexArray, sizes: tuple[int, ...], epochs: i
     calls = max(1, math.ceil(len(planes) / (_BATCH * _BATCHES)))
     n_steps = epochs * calls * _BATCHES
     rate = optax.warmup_cosine_decay_schedule(_RATE / 20, _RATE, math.ceil(_WARM_UP * n_steps), n_steps, _RATE / 1000)
-    optimizer = optax.adamw(rate, weight_decay=_DECAY)
-    cuts = np.cumsum(sizes)[:-1]
-
-    def loss(held: _Weights, x: Any, facts: Any, y: Any) -> Any:
-        parts = jnp.split(_outputs(held, x, facts), cuts, axis=1)
-        losses = [
-            optax.softmax_cross_entropy_with_integer_labels(part, y[:, at]).mean() for at, part in enumerate(parts)
-        ]
-        return losses[0] + _BESIDE * sum(losses[1:])
-
-    @jax.jit
-    def steps(held: tuple[_Weights, Any], x: Any, facts: Any, y: Any) -> tuple[_Weights, Any]:
-        """Take one step for each of a few batches."""
-
-        def step(held: tuple[_Weights, Any], batch: tuple[Any, Any, Any]) -> tuple[tuple[_Weights, Any], None]:
-            gradient = jax.grad(loss)(held[0], *batch)
-            updates, moved = optimizer.update(gradient, held[1], held[0])
-            return (optax.apply_updates(held[0], updates), moved), None
-
-        return jax.lax.scan(step, held, (x, facts, y))[0]
-
-    held = weights, optimizer.init(weights)
+    rates = np.asarray(rate(np.arange(n_steps)), dtype=np.float32).reshape(epochs, calls, _BATCHES)
+    held = weights, _OPTIMIZER.init(weights)
     numbers = targets.astype(np.int32)
-    for _ in range(epochs):
-        order = np.resize(rng.permutation(len(planes)), calls * _BATCH * _BATCHES)
-        for some in order.reshape(-1, _BATCHES, _BATCH):
-            held = steps(held, planes[some], known[some], numbers[some])
+    for epoch in range(epochs):
+        order = np.resize(rng.permutation(len(planes)), calls * _BATCH * _BATCHES).reshape(-1, _BATCHES, _BATCH)
+        for some, of_steps in zip(order, rates[epoch], strict=True):
+            held = _steps(held, (planes[some], known[some], numbers[some], of_steps), sizes)
     return Network(held[0], sizes[0])

@@ -22,7 +22,7 @@ from ..camera.pixel import Pixel
 from .batches import Batch
 from .head import heights
 from .network import Network, train
-from .planes import demosaicked, tile_planes
+from .planes import demosaicked, in_noise, tile_planes
 from .scenes import FIXED, PARTS, orders_of_lenses, states_of
 from .section import Vision
 
@@ -32,7 +32,6 @@ _SOFT = 10.0
 """Deviations of more than so many times the noise are compressed."""
 _SHRINK = 10.0
 """Weight, in images, of the mean of a level and background in that of a distance."""
-_LEAST_PRNU = 1e-6
 Float32 = NDArray[np.float32]
 
 
@@ -104,9 +103,6 @@ class NetworkReader:
     def planes(self, images: NDArray[np.generic], *, mirrored: bool = False) -> Float32:
         """Return the middle of images in units of their noise, as planes.
 
-        With e electrons above the pedestal, (1/p) ln(1 + 2 p (sqrt(s^2 + e + p^2 e^2) + p e)) has a slope of 1 over the
-        noise, of shot noise, PRNU p and the rest s.
-
         Parameters
         ----------
         images : ndarray of shape (n, rows, columns)
@@ -120,12 +116,7 @@ class NetworkReader:
             A plane for each pixel of the tile, or each channel at every pixel, as the study asks.
         """
         columns = self._mirror if mirrored else self._columns
-        raw = images[:, self._rows[:, None], columns].astype(float)
-        gain, prnu = self.pixel.dn_per_e, max(self.pixel.prnu, _LEAST_PRNU)
-        rest = self.pixel.read_noise_e**2 + 1 / (12 * gain**2) + 3 / 8  # 3/8: Anscombe's, of few photons
-        electrons = np.maximum((raw - self.pixel.offset_dn) / gain, -rest / 2)
-        root = np.sqrt(rest + electrons + (prnu * electrons) ** 2)
-        scaled = np.log1p(2 * prnu * (root + prnu * electrons)) / prnu
+        scaled = in_noise(images[:, self._rows[:, None], columns], self.pixel)
         whole = self.vision.input == "demosaicked"
         planes = demosaicked(scaled, self.mosaic) if whole else tile_planes(scaled, self.mosaic)
         return planes.astype(np.float32)

@@ -3,10 +3,39 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import convolve1d
 
 from ..base.types import FloatArray
 from ..camera.mosaic import Mosaic
+from ..camera.pixel import Pixel
+
+_LEAST_PRNU = 1e-6
+
+
+def in_noise(raw: NDArray[np.generic], pixel: Pixel) -> FloatArray:
+    """Return raw values on a scale on which their noise is 1.
+
+    With e electrons above the pedestal, (1/p) ln(1 + 2 p (sqrt(s^2 + e + p^2 e^2) + p e)) has a slope of 1 over the
+    noise, of shot noise, PRNU p and the rest s.
+
+    Parameters
+    ----------
+    raw : ndarray
+        Values, DN.
+    pixel : Pixel
+        Pedestal, gain and noise.
+
+    Returns
+    -------
+    ndarray
+        Values in units of the noise.
+    """
+    gain, prnu = pixel.dn_per_e, max(pixel.prnu, _LEAST_PRNU)
+    rest = pixel.read_noise_e**2 + 1 / (12 * gain**2) + 3 / 8  # 3/8: Anscombe's, of few photons
+    electrons = np.maximum((raw.astype(float) - pixel.offset_dn) / gain, -rest / 2)
+    root = np.sqrt(rest + electrons + (prnu * electrons) ** 2)
+    return np.asarray(np.log1p(2 * prnu * (root + prnu * electrons)) / prnu, dtype=float)
 
 
 def tile_planes(images: FloatArray, mosaic: Mosaic) -> FloatArray:

@@ -6,16 +6,20 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..base.types import FloatArray
+from ..base.types import FloatArray, IndexArray
 from ..camera.setup import Setup
 from .batches import batches, images_of_split, scene_key, scenes_of
+from .detections import precisions
+from .detector import Detector
 from .images import HeadCamera, Numbers
 from .lamps import CHECK, TEST, TRAIN, Lamps, split_lamps
 from .observer import posteriors
 from .planes import false_colors
 from .scenes import ORDERS, WHOLE, Scenes, draw_scenes
 from .section import Vision
+from .street import StreetCamera, draw_streets
 
 if TYPE_CHECKING:
     from .network_reader import NetworkReader
@@ -41,13 +45,18 @@ class SeedReading:
     """Answers of one seed by order of the lenses, on lamps that the network has not seen, and on those it has.
 
     `pictures` are wrongly read images in false colors, [n, rows, columns, 3]; `pictured` their numbers among the
-    images with lenses in any order.
+    images with lenses in any order. `precision` is that of a detector in streets and `lit` the number of lit lenses,
+    [n_levels, n_lenses]; `streets` the first street of each light level, [n_levels, rows, columns, 3]. Without streets
+    they are empty.
     """
 
     unseen: dict[str, Answers]
     seen: dict[str, Answers]
     pictures: FloatArray
     pictured: list[int]
+    precision: FloatArray
+    lit: IndexArray
+    streets: NDArray[np.uint8]
 
 
 def read_images(setup: Setup, curves: FloatArray, vision: Vision, seed: tuple[int, int]) -> SeedReading:
@@ -87,7 +96,27 @@ def read_images(setup: Setup, curves: FloatArray, vision: Vision, seed: tuple[in
             answers |= reader.read(batches(camera, scenes, _KEY, order, TEST, "raw"))
             known = reader.read(batches(camera, known_scenes, _KEY, order, TEST, "raw"))
         unseen[order], seen[order] = Answers(scenes, answers), Answers(known_scenes, known)
-    return SeedReading(unseen, seen, *_pictures(camera, unseen[ORDERS[-1]], images))
+    pictures, pictured = _pictures(camera, unseen[ORDERS[-1]], images)
+    return SeedReading(unseen, seen, pictures, pictured, *_streets(camera, lamps, seed))
+
+
+def _streets(
+    camera: HeadCamera, lamps: dict[str, Lamps], seed: tuple[int, int]
+) -> tuple[FloatArray, IndexArray, NDArray[np.uint8]]:
+    """Return the precision of the simplest detector, the number of lit lenses, and pictures."""
+    vision, design = camera.vision, camera.setup.camera
+    if vision.street is None:
+        return np.empty((0, 0)), np.empty((0, 0), dtype=np.intp), np.empty((0, 0, 0, 3), dtype=np.uint8)
+    streets, key = StreetCamera(camera, vision.street), _KEY | {"seed": seed[1]}
+    learned, test = (draw_streets(vision, vision.street, lamps[split], split, seed) for split in (TRAIN, TEST))
+    detector = Detector(design.mosaic, camera.pixel, vision.lenses)
+    detector.learn(streets.batches(learned, key, TRAIN, "raw"))
+    made = detector.detect(streets.batches(test, key, TEST, "raw"))
+    first = test.some(slice(0, len(camera.levels)))  # levels take turns
+    pictures = next(streets.batches(first, key, TEST, "isp")).images
+    table, shape = precisions(streets.labels(test, key, TEST), made, vision.lenses), (-1, len(vision.lenses))
+    precision, lit = table["average_precision"].to_numpy(dtype=float), table["lit"].to_numpy(dtype=np.intp)
+    return precision.reshape(shape), lit.reshape(shape), pictures
 
 
 def observer_error(setup: Setup, curves: FloatArray, vision: Vision, seed: tuple[int, int]) -> float:

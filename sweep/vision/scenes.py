@@ -142,15 +142,15 @@ def draw_scenes(vision: Vision, lamps: Lamps, order: str, count: int, key: tuple
     )
 
 
-def uniforms(scenes: Scenes, n_pixels: int) -> FloatArray:
+def uniforms(keys: IndexArray, n_pixels: int) -> FloatArray:
     """Return a random number from 0 to 1 for each pixel of each scene, equal for all CFAs.
 
     Each scene has its own counter-based generator (Philox), so that earlier draws do not matter.
 
     Parameters
     ----------
-    scenes : Scenes
-        Scenes.
+    keys : ndarray of int, shape (n,)
+        Key of each scene.
     n_pixels : int
         Pixels.
 
@@ -159,4 +159,4 @@ def uniforms(scenes: Scenes, n_pixels: int) -> FloatArray:
     ndarray of shape (n, n_pixels)
         Numbers.
     """
-    return np.stack([np.random.Generator(np.random.Philox(key=int(key))).random(n_pixels) for key in scenes.key])
+    return np.stack([np.random.Generator(np.random.Philox(key=int(key))).random(n_pixels) for key in keys])

@@ -37,6 +37,38 @@ class LightLevel(Section):
     1 to 16); 0: no sun on the lens."""
 
 
+class Street(Section):
+    """Images of a street: several heads at different distances among brake lamps and street lamps.
+
+    Each stands at random in a cell of a grid, which has a width of `crop_px` and 12 pixels more. Lenses stand in the
+    street's order. A reader says where lit lenses are, and of which signal type.
+    """
+
+    columns: int = Field(default=6, ge=1, le=40)
+    """Cells side by side."""
+    rows: int = Field(default=3, ge=1, le=40)
+    """Cells one above the other."""
+    heads: int = Field(default=3, ge=1, le=100)
+    """Heads in each image."""
+    brake_lamps: int = Field(default=4, ge=0, le=100)
+    """Brake lamps in each image, of 60 to 260 cd (UN R7) and surrogate spectra."""
+    street_lamps: int = Field(default=2, ge=0, le=100)
+    """Street lamps in each image (LED and sodium, 500 to 5,000 cd); not lit in daylight."""
+    veiling_glare: Fraction = 0.0
+    """Share of the light that the lens spreads evenly over the image (integral of veiling glare, ISO 9358)."""
+    train_images: int = Field(default=100, ge=20, le=MOST_IMAGES)
+    """Training images of each seed and CFA."""
+    test_images: int = Field(default=100, ge=20, le=MOST_IMAGES)
+    """Test images of each seed and CFA."""
+
+    @model_validator(mode="after")
+    def _fits(self) -> Street:
+        lamps = self.heads + self.brake_lamps + self.street_lamps
+        if lamps > self.columns * self.rows:
+            raise ValueError(f"{lamps} heads and lamps do not fit into {self.columns} x {self.rows} cells")
+        return self
+
+
 class Vision(Section):
     """Benchmark of vision: images of signal heads, read by the ideal observer and by a small network.
 
@@ -77,6 +109,8 @@ class Vision(Section):
     """Cost of the answer "unknown"; a wrong answer costs 1."""
     network: bool = True
     """`false` leaves the network out; the ideal observer always reads the images."""
+    street: Street | None = None
+    """Images of a street, too."""
     input: Seen = "raw"
     """Input of the network: `raw` pixels, a plane for each pixel of the tile, or every channel at every pixel,
     `demosaicked` by a tent as wide as the tile."""

@@ -1,0 +1,107 @@
+"""Scores of detections of lit lenses: average precision of each signal type."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from ..base.types import BoolArray, FloatArray
+
+_LEAST_RADIUS_PX = 2.0
+
+
+def match_radius_px(diameter_px: FloatArray) -> FloatArray:
+    """Return how far a detection may be from the center of a lit lens: its diameter, and at least 2 pixels.
+
+    Parameters
+    ----------
+    diameter_px : ndarray
+        Diameters of lenses.
+
+    Returns
+    -------
+    ndarray
+        Radii, pixels.
+    """
+    return np.asarray(np.maximum(diameter_px, _LEAST_RADIUS_PX), dtype=float)
+
+
+def average_precision(right: BoolArray, score: FloatArray, n_targets: int) -> float:
+    """Return the area under the curve of precision over recall, of the largest precision at that recall or more.
+
+    As of PASCAL VOC since 2010 (Everingham et al., IJCV 2015), over all recalls.
+
+    Parameters
+    ----------
+    right : ndarray of bool, shape (n,)
+        True for detections of a target that no detection of a higher score has found.
+    score : ndarray of shape (n,)
+        Scores.
+    n_targets : int
+        Targets.
+
+    Returns
+    -------
+    float
+        0 to 1; NaN without targets.
+    """
+    if not n_targets:
+        return float("nan")
+    order = np.argsort(-score, kind="stable")
+    hits = np.cumsum(right[order])
+    precision = hits / np.arange(1, hits.size + 1)
+    best = np.maximum.accumulate(precision[::-1])[::-1]
+    return float(best[right[order]].sum() / n_targets)
+
+
+def precisions(labels: pd.DataFrame, detections: pd.DataFrame, lenses: Sequence[str]) -> pd.DataFrame:
+    """Return the average precision of each signal type in the images of each light level.
+
+    A detection is right within `match_radius_px` of a lit lens of its state that no detection of a higher score has
+    found; everything else, brake lamps and heads that are off among it, is wrong.
+
+    Parameters
+    ----------
+    labels : pandas.DataFrame
+        Labels of the images of one design and seed.
+    detections : pandas.DataFrame
+        Columns `image_id`, `x_px`, `y_px`, `state`, `score`.
+    lenses : sequence of str
+        Signal types.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns `level`, `state`, `lit` (number of lit lenses), `average_precision`.
+    """
+    names = ["state", "head_x_px", "lit_y_px", "lens_diameter_px"]
+    targets = labels[["image_id", "level", *names]].explode(names, ignore_index=True)
+    made = detections.merge(labels[["image_id", "level"]], on="image_id").reset_index(drop=True)
+    rows = []
+    for level in labels["level"].unique():
+        for state in lenses:
+            here, said = (part[(part["level"] == level) & (part["state"] == state)] for part in (targets, made))
+            said = said.sort_values("score", ascending=False, kind="stable")
+            ap = average_precision(_right(here, said), said["score"].to_numpy(dtype=float), len(here))
+            rows.append({"level": level, "state": state, "lit": len(here), "average_precision": ap})
+    return pd.DataFrame(rows)
+
+
+def _right(targets: pd.DataFrame, detections: pd.DataFrame) -> BoolArray:
+    """Return which detections, by falling score, have found a target."""
+    rows = {name: np.asarray(at, dtype=np.intp) for name, at in targets.groupby("image_id").indices.items()}
+    x_px, y_px, radius_px = (
+        targets[name].to_numpy(dtype=float) for name in ("head_x_px", "lit_y_px", "lens_diameter_px")
+    )
+    radius_px, found = match_radius_px(radius_px), np.zeros(len(targets), dtype=bool)
+    right = np.zeros(len(detections), dtype=bool)
+    for i, (name, x, y) in enumerate(zip(detections["image_id"], detections["x_px"], detections["y_px"], strict=True)):
+        here = rows.get(name, np.empty(0, dtype=np.intp))
+        away = np.hypot(x_px[here] - x, y_px[here] - y)
+        free = (away <= radius_px[here]) & ~found[here]
+        if free.any():
+            right[i] = True
+            found[here[np.where(free, away, np.inf).argmin()]] = True
+    return right

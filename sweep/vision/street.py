@@ -1,0 +1,354 @@
+"""Images of a street: several heads at different distances, among brake lamps and street lamps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ..base.types import FloatArray, IndexArray
+from ..spectra.builtin.task_sets import spectra_of_group, task_groups
+from .batches import Batch, Form, image_id, in_form
+from .head import head_places_px, heights, housing_diameters
+from .images import HeadCamera
+from .lamps import TEST, TRAIN, Lamps
+from .materials import ambient_light
+from .scenes import PHANTOM_SHARE, states_of
+from .section import Illuminant, Street, Vision
+
+STREET = "street"
+"""In place of the order of the lenses in the names of images."""
+_HEAD, _BRAKE, _STREET_LAMP = range(3)
+_JITTER_PX = 12
+_BRAKE_CD, _STREET_CD = (60.0, 260.0), (500.0, 5000.0)
+_KEY_OF_STREET = 20
+_AT_ONCE = 32
+_BRAKE_GROUP = "brake red"
+_STREET_LIGHTS: tuple[Illuminant, ...] = ("LED street light", "sodium street light")
+
+
+@dataclass(frozen=True)
+class StreetScenes:
+    """Streets, ndarray[n] each or [n, n_lamps], heads first.
+
+    `level`, `background`, `distance`: index into the study's lists; `phantom`: 1 with sun on the lenses; `cell`: cell
+    of the grid; `place`, `aside`, `below`: position in it, as shares; `state`: index into `states_of`; `lamp`: index of
+    the signal, or of the spectrum of another lamp; `candelas`: intensity, 0 for what is not lit; `key`: from which the
+    photons are drawn.
+    """
+
+    level: IndexArray
+    background: IndexArray
+    phantom: IndexArray
+    key: IndexArray
+    cell: IndexArray
+    place: FloatArray
+    aside: FloatArray
+    below: FloatArray
+    distance: IndexArray
+    state: IndexArray
+    lamp: IndexArray
+    candelas: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.level)
+
+    def some(self, which: slice) -> StreetScenes:
+        """Return some of the streets.
+
+        Parameters
+        ----------
+        which : slice
+            Selection.
+
+        Returns
+        -------
+        StreetScenes
+            Streets.
+        """
+        return StreetScenes(**{field.name: getattr(self, field.name)[which] for field in fields(self)})
+
+
+def draw_streets(vision: Vision, street: Street, lamps: Lamps, split: str, seed: tuple[int, int]) -> StreetScenes:
+    """Draw streets, evenly over the light levels, the rest at random; equal for all CFAs.
+
+    Parameters
+    ----------
+    vision : Vision
+        Benchmark.
+    street : Street
+        Its streets.
+    lamps : Lamps
+        Lamps of the split.
+    split : {'train', 'test'}
+        Split.
+    seed : tuple of int
+        Seed of the study, and number of this seed.
+
+    Returns
+    -------
+    StreetScenes
+        Streets.
+    """
+    rng = np.random.default_rng((*seed, _KEY_OF_STREET, (TRAIN, TEST).index(split)))
+    n = street.train_images if split == TRAIN else street.test_images
+    levels = list(vision.levels.values())
+    level = np.arange(n) % len(levels)
+    kinds = kinds_of(street)
+    shape = (n, kinds.size)
+    state = np.where(kinds == _HEAD, rng.integers(1 + len(vision.lenses), size=shape), 0)
+    share = rng.random(shape)
+    lamp = (share * np.where(kinds == _BRAKE, task_groups()[_BRAKE_GROUP], len(_STREET_LIGHTS))).astype(np.intp)
+    for kind, members in enumerate(lamps.of_lens):
+        lit = state == 1 + kind
+        lamp[lit] = members[(share[lit] * len(members)).astype(np.intp)]
+    daylight = np.array([one.light == "daylight" for one in levels])[level]
+    of_signals = np.array(vision.intensities_cd)[rng.integers(len(vision.intensities_cd), size=shape)]
+    u = rng.random(shape)
+    of_brake, of_street = (low * (high / low) ** u for low, high in (_BRAKE_CD, _STREET_CD))
+    candelas = np.select(
+        [kinds == _HEAD, kinds == _BRAKE],
+        [np.where(state > 0, of_signals, 0.0), of_brake],
+        np.where(daylight[:, None], 0.0, of_street),
+    )
+    sunny = np.array([one.phantom_cd > 0 for one in levels])[level]
+    cells = np.stack([rng.permutation(street.columns * street.rows)[: kinds.size] for _ in range(n)])
+    return StreetScenes(
+        level=level,
+        background=rng.integers(len(vision.backgrounds), size=n),
+        phantom=((rng.random(n) < PHANTOM_SHARE) & sunny).astype(np.intp),
+        key=rng.integers(2**62, size=n),
+        cell=cells,
+        place=rng.random(shape),
+        aside=rng.random(shape),
+        below=rng.random(shape),
+        distance=rng.integers(len(vision.distances_m), size=shape),
+        state=state,
+        lamp=lamp,
+        candelas=candelas,
+    )
+
+
+def kinds_of(street: Street) -> IndexArray:
+    """Return the kind of each head and lamp: 0 for heads, 1 for brake lamps, 2 for street lamps.
+
+    Parameters
+    ----------
+    street : Street
+        Streets.
+
+    Returns
+    -------
+    ndarray of int, shape (n_lamps,)
+        Kinds.
+    """
+    return np.repeat([_HEAD, _BRAKE, _STREET_LAMP], [street.heads, street.brake_lamps, street.street_lamps])
+
+
+def cell_shape(vision: Vision, tile: tuple[int, ...]) -> tuple[int, int]:
+    """Return the size of a cell: of the image of a head, and how far it may stand aside.
+
+    Parameters
+    ----------
+    vision : Vision
+        Benchmark.
+    tile : tuple of int
+        Rows and columns of the tile.
+
+    Returns
+    -------
+    tuple of int
+        Rows and columns, pixels.
+    """
+    rows, columns = (vision.crop_px + _JITTER_PX // size * size for size in tile)
+    return rows, columns
+
+
+def street_shape(vision: Vision, tile: tuple[int, ...]) -> tuple[int, int]:
+    """Return the size of an image of a street.
+
+    Parameters
+    ----------
+    vision : Vision
+        Benchmark with streets.
+    tile : tuple of int
+        Rows and columns of the tile.
+
+    Returns
+    -------
+    tuple of int
+        Rows and columns, pixels.
+    """
+    assert vision.street is not None
+    rows, columns = cell_shape(vision, tile)
+    return vision.street.rows * rows, vision.street.columns * columns
+
+
+class StreetCamera:
+    """One design before streets.
+
+    Parameters
+    ----------
+    camera : HeadCamera
+        The design before single heads.
+    street : Street
+        Streets.
+    """
+
+    def __init__(self, camera: HeadCamera, street: Street) -> None:
+        self.camera = camera
+        self.street = street
+        tile = camera.setup.camera.mosaic.indices.shape
+        self._tile, self._cell = tile, cell_shape(camera.vision, tile)
+        self._steps = [_JITTER_PX // size for size in tile]
+        self.shape = street_shape(camera.vision, tile)
+        grid = camera.setup.camera.grid
+        spectra = {_BRAKE: spectra_of_group(grid, _BRAKE_GROUP)}
+        spectra[_STREET_LAMP] = np.stack([ambient_light(grid, name) for name in _STREET_LIGHTS])
+        self._rates = cache(lambda distance, kind: camera.lamps(distance, spectra[kind]))
+        self._backgrounds = cache(camera.background)
+
+    def corners(self, scenes: StreetScenes) -> IndexArray:
+        """Return the first row and column of each head's or lamp's image.
+
+        Parameters
+        ----------
+        scenes : StreetScenes
+            Streets.
+
+        Returns
+        -------
+        ndarray of int, shape (n, n_lamps, 2)
+            Pixels.
+        """
+        at = np.stack(np.divmod(scenes.cell, self.street.columns), axis=2)
+        steps = np.stack([(scenes.below * (self._steps[0] + 1)), scenes.aside * (self._steps[1] + 1)], axis=2)
+        corners: IndexArray = at * np.array(self._cell) + steps.astype(np.intp) * np.array(self._tile)
+        return corners
+
+    def expected(self, scenes: StreetScenes) -> FloatArray:
+        """Return expected electrons.
+
+        Parameters
+        ----------
+        scenes : StreetScenes
+            Streets.
+
+        Returns
+        -------
+        ndarray of shape (n, rows, columns)
+            Electrons.
+        """
+        camera, side, kinds = self.camera, self.camera.vision.crop_px, kinds_of(self.street)
+        corners = self.corners(scenes)
+        images = np.empty((len(scenes), *self.shape))
+        repeats = [-(-size // side) for size in self.shape]
+        for i in range(len(scenes)):
+            level, behind = int(scenes.level[i]), int(scenes.background[i])
+            around = self._backgrounds(level)[behind]
+            images[i] = np.tile(around.reshape(side, side), repeats)[: self.shape[0], : self.shape[1]]
+            for j, kind in enumerate(kinds):
+                electrons = self._one(scenes, i, j, int(kind), around)
+                row, column = corners[i, j]
+                images[i, row : row + side, column : column + side] += electrons.reshape(side, side)
+            dark_e = camera.pixel.dark_e_per_s * camera.levels[level].exposure_s
+            images[i] = self._with_glare(np.maximum(images[i], dark_e) - dark_e) + dark_e
+        return images
+
+    def _one(self, scenes: StreetScenes, i: int, j: int, kind: int, around: FloatArray) -> FloatArray:
+        """Return what one head or lamp adds to the background."""
+        camera, level, distance = self.camera, int(scenes.level[i]), int(scenes.distance[i, j])
+        place, candelas = int(scenes.place[i, j] * camera.n_places()), float(scenes.candelas[i, j])
+        if kind != _HEAD:
+            rates = self._rates(distance, kind)[place, scenes.lamp[i, j]]
+            return np.asarray(rates * (candelas * camera.levels[level].exposure_s), dtype=float)
+        behind, phantom = scenes.background[i : i + 1], scenes.phantom[i : i + 1]
+        lit = (scenes.state[i, j : j + 1] - 1, scenes.lamp[i, j : j + 1], scenes.candelas[i, j : j + 1])
+        electrons = camera.electrons(distance, level)
+        head = electrons.of(np.array([place]), behind, np.zeros(1, dtype=np.intp), phantom, lit)[0]
+        return np.asarray(head - around, dtype=float)
+
+    def _with_glare(self, image: FloatArray) -> FloatArray:
+        """Spread a share of the mean light of each position of the tile evenly."""
+        share, (rows, columns) = self.street.veiling_glare, self._tile
+        if not share:
+            return image
+        means = image.reshape(self.shape[0] // rows, rows, self.shape[1] // columns, columns).mean(axis=(0, 2))
+        whole = np.tile(means, (self.shape[0] // rows, self.shape[1] // columns))
+        return np.asarray((1 - share) * image + share * whole, dtype=float)
+
+    def batches(self, scenes: StreetScenes, key: Mapping[str, Any], split: str, form: Form) -> Iterator[Batch]:
+        """Yield images with labels, some at once.
+
+        Parameters
+        ----------
+        scenes : StreetScenes
+            Streets of a split.
+        key : mapping
+            `design_id`, `name`, `cfa` and `seed`.
+        split : {'train', 'test'}
+            Split.
+        form : {'raw', 'demosaicked', 'isp'}
+            Form of the images.
+
+        Yields
+        ------
+        Batch
+            Images, and labels: lists with an entry for each head.
+        """
+        for start in range(0, len(scenes), _AT_ONCE):
+            block = scenes.some(slice(start, start + _AT_ONCE))
+            numbers = self.camera.drawn(self.expected(block).reshape(len(block), -1), block.key)
+            images = in_form(self.camera, numbers.reshape(-1, *self.shape), block.level, form)
+            yield Batch(images, self._labels(block, key, split, start))
+
+    def labels(self, scenes: StreetScenes, key: Mapping[str, Any], split: str) -> pd.DataFrame:
+        """Return the labels alone.
+
+        Parameters
+        ----------
+        scenes : StreetScenes
+            Streets of a split.
+        key : mapping
+            `design_id`, `name`, `cfa` and `seed`.
+        split : {'train', 'test'}
+            Split.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row per image, lists with an entry for each head.
+        """
+        return self._labels(scenes, key, split, 0)
+
+    def _labels(self, scenes: StreetScenes, key: Mapping[str, Any], split: str, start: int) -> pd.DataFrame:
+        vision, heads = self.camera.vision, slice(0, self.street.heads)
+        places = head_places_px(vision, self.camera.setup.camera.mosaic)
+        middle = places[(scenes.place[:, heads] * self.camera.n_places()).astype(np.intp)]
+        corners = self.corners(scenes)[:, heads]
+        across_px = np.array([vision.target(distance).object_resolution_px for distance in vision.distances_m])
+        diameter_px = across_px[scenes.distance[:, heads]]
+        x_px, y_px = corners[..., 1] + middle[..., 0], corners[..., 0] + middle[..., 1]
+        state = scenes.state[:, heads]
+        lit_y_px = y_px + diameter_px * np.append(0.0, heights(vision))[state]
+        wide, high = housing_diameters(vision)
+        numbers = np.arange(start, start + len(scenes))
+        ids = [image_id(key["design_id"], key["seed"], STREET, split, int(number)) for number in numbers]
+        return pd.DataFrame({"image_id": ids, **key, "order": STREET, "split": split, "image": numbers}).assign(
+            background=np.array(vision.backgrounds, dtype=object)[scenes.background],
+            level=np.array(list(vision.levels), dtype=object)[scenes.level],
+            phantom=scenes.phantom.astype(bool),
+            state=np.array(states_of(vision), dtype=object)[state].tolist(),
+            intensity_cd=np.where(state > 0, scenes.candelas[:, heads], np.nan).tolist(),
+            distance_m=np.array(vision.distances_m, dtype=float)[scenes.distance[:, heads]].tolist(),
+            lens_diameter_px=diameter_px.tolist(),
+            head_x_px=x_px.tolist(),
+            head_y_px=y_px.tolist(),
+            lit_y_px=np.where(state > 0, lit_y_px, np.nan).tolist(),
+            head_width_px=(wide * diameter_px).tolist(),
+            head_height_px=(high * diameter_px).tolist(),
+        )
