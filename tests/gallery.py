@@ -5,10 +5,16 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import pandas as pd
 from PIL import Image
+
+from sweep.report.figures import rendered
+from sweep.report.vision_report import street_drawing
+from sweep.results.tables import VISION_STREETS
 
 STUDIES = Path(__file__).parent.parent / "studies"
 
@@ -45,6 +51,8 @@ OTHERS = {
     "captures": ("hdr", "figures/captures-1"),
 }
 """Further picture of the documentation -> study, and picture of its run."""
+STREETS = ("RGGB", "RYYCy", "best stopband")
+"""Designs of the picture of streets."""
 ROW = re.compile(r"^\| `(\w+)` \| (.*) \| !\[(.*)\]\(figures/(\w+)\.png\) \| (.*) \|$", re.MULTILINE)
 
 
@@ -89,6 +97,13 @@ def main() -> None:
         for name, (study, picture) in pictures.items():
             if study in wanted:
                 copy_picture(Path(folder) / study / f"{picture}.png", STUDIES / "figures" / f"{name}.png")
+        if "vision" in wanted:
+            pictures_of = pd.read_parquet(Path(folder) / "vision" / VISION_STREETS)
+            drawn = street_drawing(pictures_of[pictures_of["name"].isin(STREETS)])
+            with Image.open(BytesIO(rendered(drawn(), "png"))) as picture:
+                small = picture.convert("RGB")
+                small.thumbnail((1200, 1200), Image.Resampling.LANCZOS)
+                small.save(STUDIES / "figures" / "streets.jpg", quality=85, subsampling=0)
     text = gallery((STUDIES / "README.md").read_text(encoding="utf-8"))
     (STUDIES / "guide" / "gallery.md").write_text(text, encoding="utf-8")
 

@@ -321,7 +321,7 @@ ERRORS_OF_IMAGES = table_below(GUIDE_TO_IMAGES, "| | network | ideal observer |"
 
 def tables_of_images(folder: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
     """The report's tables of errors by design, and of rank correlations by predictor."""
-    errors, _, ranks, _ = vision_parts(read_output(folder)).values()
+    errors, _, ranks, *_ = vision_parts(read_output(folder)).values()
     return errors.set_index("design"), ranks.set_index("predictor")
 
 
@@ -331,7 +331,7 @@ def test_the_errors_of_the_ideal_observer_are_those_of_their_command(
 ) -> None:
     """For some CFAs alone: the images of one do not depend on the others."""
     draw_nothing(monkeypatch)
-    changes = ("--set", "vision.network=false", "--set", "cfas=[RGGB, RYNCy]")
+    changes = ("--set", "vision.network=false", "--set", "vision.street=null", "--set", "cfas=[RGGB, RYNCy]")
     code, _, said = commanded("run", STUDIES / "vision.yaml", "--output", tmp_path, "--quiet", *changes)
     assert code == 0, said
     observed = dict(tables_of_images(tmp_path / "vision")[0]["error %: ideal observer, lenses shuffled"])
@@ -357,12 +357,22 @@ def test_the_errors_of_the_network_are_those_of_their_command() -> None:
     everywhere, within = (ranks[name].str.partition(" (") for name in ranks)
     csd, dprime, _, observer = within[0]
     low, high = within[2]["CSD"].strip(")").split(" to ")
+    images = pd.read_parquet(folder / "vision.parquet").query(
+        "order == 'shuffled' and lamps == 'unseen' and distance_m <= 300"
+    )
+    wrong = images[["network", "observer"]].ne(images["state"], axis=0).groupby(images["name"]).mean()
+    excess = wrong["network"] / wrong["observer"]
+    streets = list(vision_parts(read_output(folder)).values())[-1].set_index("design")["all levels"]
+    mean = streets.str.partition(" ")[0]
     figures = (
         f"rank correlation {csd}, from {low} to {high}",
         f"points the other way ({dprime})",
         f"says nothing ({observer}, from",
         f"the CSD's is {everywhere[0]['CSD']}.",
         f"reads {half.min():.1f} to {half.max():.1f} percent more",
+        f"it errs {excess.min():.1f} to {excess.max():.1f} times as often as the observer",
+        f"in `vision.yaml`: RGGB {streets['RGGB']}, RCCC {mean['RCCC']}, RCCB {mean['RCCB']}, RYYCy {mean['RYYCy']}, "
+        f"RYN4Cy {mean['RYN4Cy']}, best stopband {streets['best stopband']}, robust to lamps {mean['robust to lamps']}.",
     )
     text = " ".join(GUIDE_TO_IMAGES.split())
     assert [figure for figure in figures if figure not in text] == []

@@ -232,9 +232,8 @@ def vision_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
         caption = "What more images would bring: errors of networks trained on a quarter, half and all of the images"
         yield "vision-learning", caption, partial(_draw_learning, _learning(benchmark), benchmark.vision.train_images)
     if VISION_STREETS in output.vision:
-        pictures = output.vision[VISION_STREETS]
         caption = "One street for each light level through each design's plain ISP"
-        yield "vision-street", caption, partial(_draw_streets, _streets(pictures), pictures["name"].nunique())
+        yield "vision-street", caption, street_drawing(output.vision[VISION_STREETS])
     pictures = output.vision[VISION_MISREAD]
     if len(pictures):
         caption = f"Images that the {who} read wrongly, lenses shuffled, in false colors: what it is > what was said"
@@ -269,13 +268,25 @@ def _draw_learning(errors: Mapping[str, tuple[list[Interval], Interval]], n_imag
     return figure
 
 
-def _streets(pictures: pd.DataFrame) -> list[tuple[str, NDArray[np.uint8]]]:
-    """Return title and picture of each street, one row of pictures per light level."""
+def street_drawing(pictures: pd.DataFrame) -> Drawing:
+    """Return the drawing of streets, one column per design, one row per light level.
+
+    Parameters
+    ----------
+    pictures : pandas.DataFrame
+        Rows of `vision_street_pictures.parquet`.
+
+    Returns
+    -------
+    Drawing
+        Drawing.
+    """
     rows = pictures.assign(order=pictures.groupby("name").cumcount()).sort_values("order", kind="stable")
-    return [
+    streets = [
         (f"{row['name']}, {row['level']}", _picture(row["pixels"], row["rows"], row["columns"]))
         for row in rows.to_dict("records")
     ]
+    return partial(_draw_streets, streets, pictures["name"].nunique())
 
 
 def _picture(pixels: bytes, rows: int, columns: int) -> NDArray[np.uint8]:
@@ -283,7 +294,6 @@ def _picture(pixels: bytes, rows: int, columns: int) -> NDArray[np.uint8]:
 
 
 def _draw_streets(streets: Sequence[tuple[str, NDArray[np.uint8]]], n_designs: int) -> Figure:
-    """Draw one column per design, one row per light level."""
     high, wide = streets[0][1].shape[:2]
     width = 3.2 if n_designs <= 3 else 2.2
     figure, panels = panel_grid(len(streets), n_designs, (width, width * high / wide + 0.25), (0, 0))

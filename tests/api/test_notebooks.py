@@ -37,4 +37,6 @@ def test_a_notebook_runs(
 
 
 def test_there_is_a_notebook_for_each_way_in() -> None:
-    assert {path.stem for path in NOTEBOOKS} >= {"first_filter", "own_sensor_and_lights", "own_family", "calibrate"}
+    assert {path.stem for path in NOTEBOOKS} >= {
+        *("first_filter", "own_sensor_and_lights", "own_family", "own_detector", "calibrate")
+    }

@@ -42,6 +42,7 @@ vision:
   check_images: 20
   seeds: 2
   network: false
+  street: {columns: 3, rows: 2, heads: 2, brake_lamps: 2, street_lamps: 1, train_images: 20, test_images: 20}
 """
 
 
@@ -165,7 +166,8 @@ def test_coco_boxes_hold_the_lenses(run: Path, tmp_path: Path) -> None:
     """Of the test alone; at night the brightest pixel is in the box of its image."""
     manifest = exported(run, tmp_path / "coco", "--form", "raw", "--png", "--coco", "--split", "test")
     assert set(manifest["split"]) == {"test"}
-    assert sorted(path.name for path in (tmp_path / "coco").glob("coco-*")) == ["coco-0-test.json", "coco-1-test.json"]
+    names = [f"coco-{kind}{design}-test.json" for kind in ("", "street-") for design in (0, 1)]
+    assert sorted(path.name for path in (tmp_path / "coco").glob("coco-*")) == names
     held = json.loads((tmp_path / "coco" / "coco-1-test.json").read_text())
     files = {one["id"]: one["file_name"] for one in held["images"]}
     assert sorted(files.values()) == sorted(manifest.query("design_id == 1")["file"])
@@ -182,8 +184,35 @@ def test_coco_boxes_hold_the_lenses(run: Path, tmp_path: Path) -> None:
                 brightest = np.unravel_index(np.asarray(picture).argmax(), picture.size)
             assert top - 1 <= brightest[0] + 0.5 <= top + height + 1
             assert left - 1 <= brightest[1] + 0.5 <= left + width + 1
+    streets = json.loads((tmp_path / "coco" / "coco-street-0-test.json").read_text())
+    assert (len(streets["images"]), len(streets["annotations"])) == (40, 80)
+    with Image.open(tmp_path / "coco" / streets["images"][0]["file_name"]) as picture:
+        assert picture.size == (streets["images"][0]["width"], streets["images"][0]["height"]) == (108, 72)
     code, _, err = commanded("export", run, "--images", tmp_path / "d", "--coco")
     assert (code, "with --png" in err) == (2, True)
+
+
+def test_detections_in_streets_are_scored(run: Path, tmp_path: Path) -> None:
+    """Those of the labels are all right; of other images, states and numbers each has a line."""
+    exported(run, tmp_path / "raw", "--split", "test")
+    columns = ["state", "head_x_px", "lit_y_px"]
+    lit = pd.read_parquet(tmp_path / "raw" / "street.parquet")[["image_id", *columns]].explode(columns)
+    lit = lit[lit["state"] != "off"].rename(columns={"head_x_px": "x_px", "lit_y_px": "y_px"}).assign(score=0.9)
+    lit.to_csv(tmp_path / "right.csv", index=False)
+    code, out, err = commanded("score", run, tmp_path / "right.csv", "--output", tmp_path / "scores")
+    assert code == 0, err
+    assert "right, RGGB: average precision 1.000 (1.000 to 1.000)" in out
+    assert "not told apart" in out
+    table = pd.read_parquet(tmp_path / "scores" / "street_scores.parquet")
+    assert set(table["level"]) == {"all", "day", "night"}
+    for change, line in (
+        ({"image_id": "x"}, "not an image of a street of the test"),
+        ({"state": "yelow"}, "no signal type (and"),
+        ({"score": "much"}, "no number"),
+    ):
+        lit.assign(**change).to_csv(tmp_path / "wrong.csv", index=False)
+        code, _, err = commanded("score", run, tmp_path / "wrong.csv", "--output", tmp_path / "scores")
+        assert (code, line in err) == (2, True), err
 
 
 @pytest.mark.parametrize("cfa", ["RGGB", "RYYCy", "RCCB"])

@@ -1,0 +1,145 @@
+"""Streets: each head is that of its own image, lamps have their light, glare keeps it, and detections are counted."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from sweep.vision.detections import average_precision, precisions
+from sweep.vision.detector import Detector
+from sweep.vision.images import HeadCamera
+from sweep.vision.lamps import TEST, TRAIN, split_lamps
+from sweep.vision.scenes import Scenes
+from sweep.vision.section import Street
+from sweep.vision.street import StreetCamera, StreetScenes, draw_streets
+
+from .heads import NO_FILTERS, head_setup, vision
+
+KEY = {"design_id": 0, "name": "RGGB", "cfa": "RGGB", "seed": 0}
+
+
+def streets(cfa: str = "RGGB", **changes: Any) -> tuple[StreetCamera, StreetScenes]:
+    few = {"columns": 3, "rows": 2, "heads": 2, "brake_lamps": 2, "street_lamps": 1, "test_images": 20}
+    street = Street(**few | {"train_images": 40} | changes)
+    requested, setup = vision(distances_m=[60.0, 120.0], street=street), head_setup(cfa, crosstalk=0.0)
+    camera = StreetCamera(HeadCamera(setup, NO_FILTERS, requested), street)
+    lamps = split_lamps(setup.lights, requested, (1, 0))
+    return camera, draw_streets(requested, street, lamps[TEST], TEST, (1, 0))
+
+
+@pytest.mark.parametrize("cfa", ["RGGB", "RCCB"])
+def test_a_head_of_a_street_is_that_of_its_own_image(cfa: str) -> None:
+    """Alone it has the electrons of the benchmark's single head; around it is the background."""
+    camera, scenes = streets(cfa, heads=1, brake_lamps=0, street_lamps=0)
+    images, corners, heads = camera.expected(scenes), camera.corners(scenes), camera.camera
+    intensities = np.array(heads.vision.intensities_cd)
+    alone = Scenes(
+        state=scenes.state[:, 0],
+        lamp=np.where(scenes.state[:, 0] > 0, scenes.lamp[:, 0], -1),
+        intensity=np.abs(intensities - scenes.candelas).argmin(axis=1),
+        background=scenes.background,
+        distance=scenes.distance[:, 0],
+        level=scenes.level,
+        order=np.zeros(len(scenes), dtype=np.intp),
+        phantom=scenes.phantom,
+        place=scenes.place[:, 0],
+        key=scenes.key,
+    )
+    single = heads.expected(alone).reshape(-1, 24, 24)
+    for image, (row, column), own, level, behind in zip(
+        images, corners[:, 0], single, scenes.level, scenes.background, strict=True
+    ):
+        np.testing.assert_allclose(image[row : row + 24, column : column + 24], own, rtol=1e-9)
+        away = image.copy()
+        away[row : row + 24, column : column + 24] = np.nan
+        around = heads.background(int(level))[behind].reshape(24, 24)
+        np.testing.assert_allclose(np.unique(away[np.isfinite(away)]), np.unique(around), rtol=1e-9)
+
+
+def test_another_lamp_of_a_signal_s_spectrum_is_as_bright_as_the_signal() -> None:
+    """The middle lens stands where other lamps do: one candela has the same electrons."""
+    camera = streets()[0].camera
+    photons = camera.setup.lights.photons[:3]
+    lamps = camera.lamps(1, photons)
+    signals = camera.electrons(1, 0).lamps[:, 1, :3]
+    np.testing.assert_allclose(lamps, signals, rtol=1e-9, atol=1e-12)
+
+
+def test_glare_keeps_the_light_and_fills_the_dark() -> None:
+    plain, scenes = streets()
+    veiled, same = streets(veiling_glare=0.05)
+    np.testing.assert_array_equal(same.key, scenes.key)
+    without, behind = plain.expected(scenes), veiled.expected(same)
+    np.testing.assert_allclose(behind.sum(axis=(1, 2)), without.sum(axis=(1, 2)), rtol=1e-9)
+    assert (behind.min(axis=(1, 2)) > without.min(axis=(1, 2))).all()
+    assert (behind.max(axis=(1, 2)) < without.max(axis=(1, 2))).all()
+
+
+def test_the_lit_lens_is_where_the_label_says() -> None:
+    camera, scenes = streets(heads=1, brake_lamps=0, street_lamps=0)
+    labels, images = camera.labels(scenes, KEY, TEST), camera.expected(scenes)
+    here = [i for i in range(len(labels)) if labels.loc[i, "level"] == "night" and labels.loc[i, "state"][0] != "off"]
+    assert here
+    for i in here:
+        row, column = np.unravel_index(images[i].argmax(), images[i].shape)
+        reach = labels.loc[i, "lens_diameter_px"][0] / 2 + 1
+        assert abs(column - labels.loc[i, "head_x_px"][0]) < reach
+        assert abs(row - labels.loc[i, "lit_y_px"][0]) < reach
+
+
+def test_images_do_not_depend_on_how_many_are_made_at_once() -> None:
+    camera, scenes = streets(test_images=50)
+    together = np.concatenate([batch.images for batch in camera.batches(scenes, KEY, TEST, "raw")])
+    alone = next(camera.batches(scenes.some(slice(40, 41)), KEY, TEST, "raw")).images
+    np.testing.assert_array_equal(together[40], alone[0])
+
+
+def test_average_precision_is_the_mean_of_the_best_precisions() -> None:
+    """By the definition: over targets, the largest precision of a threshold that finds as many or more."""
+    assert average_precision(np.array([True, False, True]), np.array([0.9, 0.8, 0.7]), 2) == pytest.approx(
+        (1 + 2 / 3) / 2
+    )
+    rng = np.random.default_rng(6)
+    for _ in range(50):
+        right, score, more = rng.random(12) < 0.4, rng.random(12), int(rng.integers(3))
+        targets = int(right.sum()) + more
+        order = np.argsort(-score)
+        wanted = 0.0
+        for found in range(1, int(right.sum()) + 1):
+            hits = [right[order[:n]].sum() for n in range(1, 13)]
+            wanted += max(hit / (n + 1) for n, hit in enumerate(hits) if hit >= found)
+        assert average_precision(right, score, max(targets, 1)) == pytest.approx(wanted / max(targets, 1))
+    assert np.isnan(average_precision(np.array([False]), np.array([1.0]), 0))
+
+
+def test_a_lens_is_found_once_and_near() -> None:
+    labels = pd.DataFrame(
+        {"image_id": ["a"], "level": ["day"], "state": [["red", "off"]], "head_x_px": [[10.0, 40.0]]}
+        | {"lit_y_px": [[10.0, np.nan]], "lens_diameter_px": [[4.0, 4.0]]}
+    )
+    rows = [("a", 11.0, 10.0, "red", 0.9), ("a", 10.0, 10.0, "red", 0.8), ("a", 40.0, 10.0, "red", 0.7)]
+    made = pd.DataFrame(rows, columns=["image_id", "x_px", "y_px", "state", "score"])
+    (red,) = precisions(labels, made, ["red"]).to_dict("records")
+    assert (red["lit"], red["average_precision"]) == (1, 1.0)
+    (red,) = precisions(labels, made.assign(x_px=made["x_px"] + 4), ["red"]).to_dict("records")
+    assert red["average_precision"] == pytest.approx(0.5)  # the first is too far away, the second is not
+    (red,) = precisions(labels, made.assign(state="green"), ["red"]).to_dict("records")
+    assert red["average_precision"] == 0.0
+
+
+def test_the_detector_finds_lamps_at_night() -> None:
+    """Without other lamps it finds nearly all green and yellow ones; the colors are learned from other lamps."""
+    camera, test = streets(heads=2, brake_lamps=0, street_lamps=0, test_images=40, train_images=60)
+    requested, setup = camera.camera.vision, camera.camera.setup
+    lamps = split_lamps(setup.lights, requested, (1, 0))
+    learned = draw_streets(requested, camera.street, lamps[TRAIN], TRAIN, (1, 0))
+    detector = Detector(setup.camera.mosaic, camera.camera.pixel, requested.lenses)
+    detector.learn(camera.batches(learned, KEY, TRAIN, "raw"))
+    made = detector.detect(camera.batches(test, KEY, TEST, "raw"))
+    table = precisions(camera.labels(test, KEY, TEST), made, requested.lenses).set_index(["level", "state"])
+    assert table.loc[("night", "green"), "average_precision"] > 0.9
+    assert table.loc[("night", "yellow"), "average_precision"] > 0.9
+    assert table.loc[("day", "green"), "average_precision"] < table.loc[("night", "green"), "average_precision"]
