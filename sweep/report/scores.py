@@ -12,7 +12,16 @@ from ..results.atomic import atomic, write_text
 from ..results.designs import study_of
 from ..results.output import Output
 from ..results.tables import VISION
-from ..run.score import Reader, check_unique, images_of_test, network_of, read_predictions, score_lines, scores_of
+from ..run.score import (
+    Reader,
+    check_unique,
+    images_of_test,
+    network_of,
+    read_predictions,
+    score_lines,
+    scores_of,
+    whole_scores,
+)
 from ..run.score_streets import is_of_streets, read_detections, street_labels, street_lines, street_scores
 from ..vision.scenes import states_of
 from .figures import CURVE_CYCLE, DASHES, canvas, legend_beside, rendered
@@ -67,7 +76,8 @@ def score_readers(output: Output, predictions: Sequence[Path], to: Path) -> list
     picture = inlined(rendered(draw_scores(scores), "png"))
     shown = scores.drop(columns=["design_id"]).round(4)
     name, folder = output.study.study, output.folder.name
-    text = page("scores.html.j2", title=name, lines=lines, image=picture, table=rows(shown), folder=folder)
+    summary = rows(summary_table(scores))
+    text = page("scores.html.j2", title=name, summary=summary, image=picture, table=rows(shown), folder=folder)
     write_text(text, to / PAGE)
     files = ", ".join([TABLE, PAGE, *([STREETS] if of_streets else [])])
     return [*lines, f"Files: {to}/: {files}."]
@@ -83,6 +93,30 @@ def _score_streets(output: Output, predictions: Sequence[Path], to: Path) -> lis
     with atomic(to / STREETS) as hidden:
         scores.to_parquet(hidden, index=False)
     return [*street_lines(scores)]
+
+
+def summary_table(scores: pd.DataFrame) -> pd.DataFrame:
+    """Return errors over all distances and light levels, lenses in any order where there are such images.
+
+    Parameters
+    ----------
+    scores : pandas.DataFrame
+        Result of `scores_of`, of one reader or more.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per reader and design: error, and difference from the first design and from the ideal observer, percent.
+    """
+    whole = whole_scores(scores)
+    first = str(whole["name"].iloc[0])
+    columns = {"error": "errs on / %", "apart": f"less that of {first}", "above_observer": "less the ideal observer's"}
+    table = whole[["reader", "name"]].rename(columns={"name": "design"})
+    for column, title in columns.items():
+        ends = [whole[name].mul(100).map("{:.1f}".format) for name in (column, f"{column}_low", f"{column}_high")]
+        table[title] = ends[0] + " (" + ends[1] + " to " + ends[2] + ")"
+    table.loc[table["design"] == first, columns["apart"]] = "-"
+    return table
 
 
 def draw_scores(scores: pd.DataFrame) -> Figure:

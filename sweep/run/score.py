@@ -15,7 +15,7 @@ from ..base.errors import DataError, SweepError, ValidationIssue, nearest
 from ..base.types import FloatArray
 from ..vision.batches import image_id
 from ..vision.lamps import TEST
-from ..vision.scenes import UNSEEN, WHOLE
+from ..vision.scenes import SHUFFLED, UNSEEN, WHOLE
 from ..vision.scores import Interval, interval_of_seeds
 
 UNKNOWN = "unknown"
@@ -299,6 +299,23 @@ def _calibration(answers: pd.DataFrame) -> float:
     return float(gaps.sum() / len(known))
 
 
+def whole_scores(scores: pd.DataFrame) -> pd.DataFrame:
+    """Return the scores of all distances and light levels, lenses in any order where there are such images.
+
+    Parameters
+    ----------
+    scores : pandas.DataFrame
+        Result of `scores_of`, of one reader or more.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per reader and design.
+    """
+    order = SHUFFLED if (scores["order"] == SHUFFLED).any() else str(scores["order"].iloc[0])
+    return scores[(scores["order"] == order) & (scores["distance_m"] == _ALL) & (scores["level"] == _ALL)]
+
+
 def score_lines(scores: pd.DataFrame) -> Iterator[str]:
     """Yield a line per reader and design, of all test images with lenses in any order.
 
@@ -312,8 +329,7 @@ def score_lines(scores: pd.DataFrame) -> Iterator[str]:
     str
         Line.
     """
-    order = "shuffled" if (scores["order"] == "shuffled").any() else str(scores["order"].iloc[0])
-    whole = scores[(scores["order"] == order) & (scores["distance_m"] == _ALL) & (scores["level"] == _ALL)]
+    whole = whole_scores(scores)
     first = str(whole["name"].iloc[0])
     for row in whole.to_dict("records"):
         text = f"{row['reader']}, {row['name']}: errs on {_percent(row, 'error')} of {row['images']:,} images"

@@ -8,6 +8,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from sklearn.base import ClassifierMixin
+from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
+from sklearn.linear_model import LogisticRegression
+from sklearn.neighbors import KNeighborsClassifier
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
 
 from sweep import read_run
 from sweep.base.errors import SweepError
@@ -49,6 +55,7 @@ vision:
   check_images: 100
   test_images: 100
   epochs: 4
+  street: {columns: 3, rows: 2, heads: 1, brake_lamps: 1, street_lamps: 1, train_images: 20, test_images: 20}
 """
 
 
@@ -120,12 +127,14 @@ def test_the_report_has_its_figures(folder: Path) -> None:
     page = (folder / "report.html").read_text()
     assert "Images of traffic lights" in page
     assert "Rank correlation" in page
-    assert {f"figures/vision-{name}.png" for name in ("errors", "ranks", "misread")} <= Inventory(folder).files.keys()
+    assert {f"figures/vision-{name}.png" for name in ("errors", "learning", "ranks", "misread", "street")} <= Inventory(
+        folder
+    ).files.keys()
 
 
 def test_its_drawings_are_plain_values(output: Output) -> None:
     drawings = list(_vision_drawings(output))
-    assert len(drawings) == 3
+    assert len(drawings) == 5
     for name, _, draw in drawings:
         assert pickled_size(draw) < MOST_BYTES, name
 
@@ -216,3 +225,35 @@ def test_python_yields_and_scores_the_same_images(folder: Path, exported: tuple[
     for wrong in ({"designs": ["RGBB"]}, {"split": "tset"}, {"form": "jpeg"}):
         with pytest.raises(SweepError, match="unknown"):
             run.images(**wrong)
+
+
+@pytest.mark.parametrize(
+    "classifier",
+    [
+        make_pipeline(StandardScaler(), LogisticRegression(C=0.01, max_iter=1000)),
+        LinearDiscriminantAnalysis(),
+        KNeighborsClassifier(15),
+    ],
+    ids=["logistic", "discriminant", "neighbors"],
+)
+def test_no_reader_beats_the_observer(folder: Path, classifier: ClassifierMixin) -> None:
+    """By more than three standard errors of the paired difference, for any design and order of the lenses."""
+    run, parts = read_run(folder), []
+    training, test = (list(run.images(split)) for split in ("train", "test"))
+    for key in {(batch.labels["design_id"].iloc[0], batch.labels["seed"].iloc[0]) for batch in test}:
+        here = [
+            [batch for batch in batches if (batch.labels[["design_id", "seed"]] == key).all(axis=None)]
+            for batches in (training, test)
+        ]
+        learned, seen = (np.concatenate([np.sqrt(one.images.reshape(len(one.images), -1)) for one in b]) for b in here)
+        classifier.fit(learned, np.concatenate([batch.labels["state"] for batch in here[0]]))
+        labels = pd.concat([batch.labels for batch in here[1]])
+        parts.append(labels.assign(said=classifier.predict(seen)))
+    answers, images = pd.concat(parts), run.output.vision[VISION]
+    keys = ["design_id", "seed", "order", "image"]
+    both = answers.merge(images[images["lamps"] == UNSEEN][[*keys, OBSERVER]], on=keys, validate="one_to_one")
+    more = (both["said"] != both["state"]).astype(float) - (both[OBSERVER] != both["state"])
+    for _, of_design in more.groupby([both["name"], both["order"]]):
+        assert of_design.mean() > -3 * of_design.std() / np.sqrt(len(of_design))
+    scores = run.score(answers[["image_id"]].assign(state=answers["said"]))
+    assert (scores["above_observer_high"] >= 0).all()
