@@ -53,6 +53,7 @@ OTHERS = {
 """Further picture of the documentation -> study, and picture of its run."""
 STREETS = ("RGGB", "RYYCy", "best stopband")
 """Designs of the picture of streets."""
+STREETS_SHOWN = "\n![The same streets through RGGB, RYYCy and the best stopband](../figures/streets.jpg)"
 ROW = re.compile(r"^\| `(\w+)` \| (.*) \| !\[(.*)\]\(figures/(\w+)\.png\) \| (.*) \|$", re.MULTILINE)
 
 
@@ -74,6 +75,7 @@ def gallery(rows: str) -> str:
             f"![{caption}](../figures/{picture}.png)",
             "",
             finding,
+            *([STREETS_SHOWN] if study == "vision" else []),
         ]
     return "\n".join(parts) + "\n"
 
