@@ -33,9 +33,9 @@ study = sweep.make_study(
         "distances_m": [100],
         "levels": {"night": {"illuminance_lx": 10, "light": "sodium street light", "exposure_s": 2e-5}},
         "intensities_cd": [45, 200],
-        "seeds": 3,
+        "seeds": 2,
         "train_images": 1000,
-        "test_images": 200,
+        "test_images": 100,
         "network": False,
     },
 )
@@ -55,7 +55,7 @@ def inputs(batch):
 answers = []
 for cfa in ("RGGB", "RCCB"):
     training, test = (list(run.images(split, [cfa])) for split in ("train", "test"))
-    for seed in range(3):  # each has lamps of its own to learn from
+    for seed in range(2):  # each has lamps of its own to learn from
         learned = [(inputs(batch), batch.labels["state"]) for batch in training if batch.labels["seed"].iloc[0] == seed]
         classifier = make_pipeline(StandardScaler(), LogisticRegression(max_iter=300, C=0.01))
         classifier.fit(np.concatenate([x for x, _ in learned]), np.concatenate([y for _, y in learned]))

@@ -31,7 +31,7 @@ from sweep.vision.network_reader import NetworkReader
 from sweep.vision.scenes import ORDERS, UNSEEN
 from sweep.vision.scores import mean_of
 
-from ..commanded import sweep
+from ..commanded import commanded, sweep
 from ..plain_values import MOST_BYTES, pickled_size
 from ..warm import Warm
 
@@ -160,8 +160,8 @@ def files_of(folder: Path, manifest: pd.DataFrame) -> Iterator[Batch]:
 @pytest.fixture(scope="module")
 def exported(folder: Path) -> tuple[Path, pd.DataFrame]:
     to = folder.parent / "images"
-    done = sweep("export", str(folder), "--images", str(to), "--jobs", "1")
-    assert done.returncode == 0, done.stderr
+    code, _, said = commanded("export", folder, "--images", to, "--jobs", 1)
+    assert code == 0, said
     return to, pd.read_parquet(to / "manifest.parquet")
 
 
@@ -218,10 +218,10 @@ def test_python_yields_and_scores_the_same_images(folder: Path, exported: tuple[
     scores = run.score(predictions).set_index(["name", "order", "distance_m", "level"])
     assert scores.loc[("RCCC", "shuffled", "all", "all"), "error"] == pytest.approx(0.75, abs=0.01)
     predictions.to_csv(folder.parent / "red.csv", index=False)
-    done = sweep("score", str(folder), str(folder.parent / "red.csv"), "--output", str(folder.parent / "scores"))
-    assert done.returncode == 0, done.stderr
-    assert "red, RGGB: errs on 75.0 %" in done.stdout
-    assert "network, RGGB: errs on" in done.stdout
+    code, out, said = commanded("score", folder, folder.parent / "red.csv", "--output", folder.parent / "scores")
+    assert code == 0, said
+    assert "red, RGGB: errs on 75.0 %" in out
+    assert "network, RGGB: errs on" in out
     for wrong in ({"designs": ["RGBB"]}, {"split": "tset"}, {"form": "jpeg"}):
         with pytest.raises(SweepError, match="unknown"):
             run.images(**wrong)
