@@ -9,21 +9,22 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from ..results.atomic import atomic, write_text
-from ..results.designs import study_of
 from ..results.output import Output
 from ..results.tables import VISION
 from ..run.score import (
     Reader,
     check_unique,
     images_of_test,
+    in_any_order,
     network_of,
     read_predictions,
     score_lines,
     scores_of,
     whole_scores,
 )
-from ..run.score_streets import is_of_streets, read_detections, street_labels, street_lines, street_scores
-from ..vision.scenes import states_of
+from ..run.score_streets import is_of_streets, labels_of_test, read_detections, street_lines, street_scores
+from ..vision.detections import ALL
+from ..vision.scenes import WHOLE, states_of
 from .figures import CURVE_CYCLE, DASHES, canvas, legend_beside, rendered
 from .pages import inlined, page, rows
 
@@ -59,6 +60,7 @@ def score_readers(output: Output, predictions: Sequence[Path], to: Path) -> list
     """
     vision = output.study.vision
     assert vision is not None
+    check_unique([path.stem for path in predictions] + ([WHOLE] if vision.network else []))
     of_streets = [path for path in predictions if vision.street is not None and is_of_streets(path)]
     predictions = [path for path in predictions if path not in of_streets]
     lines = _score_streets(output, of_streets, to) if of_streets else []
@@ -68,7 +70,6 @@ def score_readers(output: Output, predictions: Sequence[Path], to: Path) -> list
     readers: list[Reader] = [read_predictions(path, images, states_of(vision)) for path in predictions]
     if vision.network:
         readers.append(network_of(images))
-    check_unique(readers)
     scores = pd.concat([scores_of(reader, images, vision.unknown_cost) for reader in readers], ignore_index=True)
     with atomic(to / TABLE) as hidden:
         scores.to_parquet(hidden, index=False)
@@ -84,9 +85,9 @@ def score_readers(output: Output, predictions: Sequence[Path], to: Path) -> list
 
 
 def _score_streets(output: Output, predictions: Sequence[Path], to: Path) -> list[str]:
-    vision, study = output.study.vision, study_of(output, None)
+    vision = output.study.vision
     assert vision is not None
-    labels = street_labels(study, output.few)
+    labels = labels_of_test(output)
     made = {path.stem: read_detections(path, labels, vision.lenses) for path in predictions}
     parts = [street_scores(name, detections, labels, vision.lenses) for name, detections in made.items()]
     scores = pd.concat(parts, ignore_index=True)
@@ -132,8 +133,8 @@ def draw_scores(scores: pd.DataFrame) -> Figure:
     matplotlib.figure.Figure
         Figure.
     """
-    order = "shuffled" if (scores["order"] == "shuffled").any() else str(scores["order"].iloc[0])
-    by_distance = scores[(scores["order"] == order) & (scores["level"] == "all") & (scores["distance_m"] != "all")]
+    shown = in_any_order(scores)
+    by_distance = shown[(shown["level"] == ALL) & (shown["distance_m"] != ALL)]
     figure, axes = canvas(9.0, 5.0)
     names, readers = [*dict.fromkeys(by_distance["name"])], [*dict.fromkeys(by_distance["reader"])]
     for name, color in zip(names, CURVE_CYCLE * 4, strict=False):

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from ..metrics.share import format_share
 from ..results.output import Output
 from ..results.tables import VISION_MISREAD, VISION_STREET, VISION_STREETS
+from ..vision.detections import ALL, precision_scores
 from ..vision.readers import OBSERVER
 from ..vision.scenes import FIXED, PARTS, SEEN, SHUFFLED, UNSEEN
-from ..vision.scores import Interval, costs, interval_of_seeds, macro_f1
+from ..vision.scores import Interval, costs, macro_f1
 from .figures import CURVE_CYCLE, Drawing, canvas, canvas_grid, legend_beside, panel_grid
 from .vision import (
     NETWORK,
@@ -192,19 +193,18 @@ def vision_parts(output: Output) -> dict[str, pd.DataFrame]:
 
 def _street_table(table: pd.DataFrame, reference: str) -> pd.DataFrame:
     """Return one row per design: average precision of all light levels and each of them, and less the reference's."""
-    by_seed = table.pivot_table("average_precision", ["name", "seed"], "level", sort=False)
-    by_seed.insert(0, "all levels", by_seed.mean(axis=1))
-    rows = []
-    for name, values in by_seed.groupby(level="name", sort=False):
-        apart = values.droplevel("name") - by_seed.loc[reference]
-        row = {"design": str(name)} | {str(level): format_interval(_over_seeds(values[level])) for level in by_seed}
-        difference = "-" if str(name) == reference else format_interval(_over_seeds(apart["all levels"]))
-        rows.append(row | {f"less that of {reference}": difference})
-    return pd.DataFrame(rows)
+    scores, rows = precision_scores(table, reference), dict[str, dict[str, str]]()
+    for score in scores.to_dict("records"):
+        name, level = score["name"], "all levels" if score["level"] == ALL else score["level"]
+        rows.setdefault(name, {"design": name})[level] = _of_columns(score, "average_precision")
+    for score in scores[scores["level"] == ALL].to_dict("records"):
+        apart = "-" if score["name"] == reference else _of_columns(score, "apart")
+        rows[score["name"]][f"less that of {reference}"] = apart
+    return pd.DataFrame([*rows.values()])
 
 
-def _over_seeds(values: pd.Series[float]) -> Interval:
-    return interval_of_seeds(float(values.mean()), np.array(values, dtype=float))
+def _of_columns(row: Mapping[Any, Any], name: str) -> str:
+    return format_interval(Interval(row[name], row[f"{name}_low"], row[f"{name}_high"]))
 
 
 def vision_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:

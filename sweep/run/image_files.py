@@ -212,8 +212,12 @@ def _write_part(
     key = _key(row, seed[1])
     if vision.street is not None:
         streets = StreetCamera(camera, vision.street)
-        drawn = {split: draw_streets(vision, vision.street, lamps[split], split, seed) for split in (TRAIN, TEST)}
-        batches = (streets.batches(drawn[split], key, split, files.form) for split in files.splits if split in drawn)
+        drawn = {split: draw_streets(vision, vision.street, split, seed) for split in (TRAIN, TEST)}
+        batches = (
+            streets.batches(drawn[split], lamps[split], key, split, files.form)
+            for split in files.splits
+            if split in drawn
+        )
         _write_batches(chain.from_iterable(batches), files, _STREET_SCHEMA, _of_streets(part))
     batches = (images_of_split(camera, lamps, key, seed[0], split, files.form) for split in files.splits)
     return _write_batches(chain.from_iterable(batches), files, _SCHEMA, part)

@@ -14,6 +14,7 @@ import pandas as pd
 from ..base.errors import DataError, SweepError, ValidationIssue, nearest
 from ..base.types import FloatArray
 from ..vision.batches import image_id
+from ..vision.detections import ALL
 from ..vision.lamps import TEST
 from ..vision.scenes import SHUFFLED, UNSEEN, WHOLE
 from ..vision.scores import Interval, interval_of_seeds
@@ -23,7 +24,6 @@ _ID, _STATE = "image_id", "state"
 _SUM = 1e-3
 """By how much the sum of probabilities may differ from 1."""
 _BINS = 10
-_ALL = "all"
 
 
 @dataclass(frozen=True)
@@ -249,30 +249,26 @@ def scores_of(reader: Reader, images: pd.DataFrame, unknown_cost: float) -> pd.D
     table["cost"] = np.where(table["unknown"], unknown_cost, table["wrong"].astype(float))
     table["observer_wrong"] = table["observer"] != table["state"]
     rows = []
-    whole: list[tuple[Any, Any]] = [(_ALL, _ALL), *((d, _ALL) for d in table["distance_m"].unique())]
-    whole += [*((_ALL, level) for level in table["level"].unique())]
+    whole: list[tuple[Any, Any]] = [(ALL, ALL), *((d, ALL) for d in table["distance_m"].unique())]
+    whole += [*((ALL, level) for level in table["level"].unique())]
     whole += [*product(table["distance_m"].unique(), table["level"].unique())]
     for order, (distance, level) in product(table["order"].unique(), whole):
         answers = table[table["order"] == order]
-        answers = answers if distance == _ALL else answers[answers["distance_m"] == distance]
-        answers = answers if level == _ALL else answers[answers["level"] == level]
+        answers = answers if distance == ALL else answers[answers["distance_m"] == distance]
+        answers = answers if level == ALL else answers[answers["level"] == level]
         first = answers[answers["design_id"] == answers["design_id"].iloc[0]]
         for (design_id, name), part in answers.groupby(["design_id", "name"], sort=False):
             rows.append(
                 {"reader": reader.name, "order": order, "distance_m": str(distance), "level": level}
                 | {"design_id": design_id, "name": name, "images": len(part), "unknown": part["unknown"].mean()}
-                | _shown("error", _mean(part, "wrong"))
-                | _shown("cost", _mean(part, "cost"))
-                | _shown("apart", _difference(part, first, "wrong", "wrong"))
-                | _shown("observer_error", _mean(part, "observer_wrong"))
-                | _shown("above_observer", _difference(part, part, "wrong", "observer_wrong"))
+                | _mean(part, "wrong").columns("error")
+                | _mean(part, "cost").columns("cost")
+                | _difference(part, first, "wrong", "wrong").columns("apart")
+                | _mean(part, "observer_wrong").columns("observer_error")
+                | _difference(part, part, "wrong", "observer_wrong").columns("above_observer")
                 | {"calibration_error": _calibration(part)}
             )
     return pd.DataFrame(rows)
-
-
-def _shown(name: str, interval: Interval) -> dict[str, Any]:
-    return {name: interval.value, f"{name}_low": interval.low, f"{name}_high": interval.high}
 
 
 def _by_seed(answers: pd.DataFrame, column: str) -> FloatArray:
@@ -312,8 +308,25 @@ def whole_scores(scores: pd.DataFrame) -> pd.DataFrame:
     pandas.DataFrame
         A row per reader and design.
     """
-    order = SHUFFLED if (scores["order"] == SHUFFLED).any() else str(scores["order"].iloc[0])
-    return scores[(scores["order"] == order) & (scores["distance_m"] == _ALL) & (scores["level"] == _ALL)]
+    shown = in_any_order(scores)
+    return shown[(shown["distance_m"] == ALL) & (shown["level"] == ALL)]
+
+
+def in_any_order(scores: pd.DataFrame) -> pd.DataFrame:
+    """Return the scores of lenses in any order, or where there are none of those there are.
+
+    Parameters
+    ----------
+    scores : pandas.DataFrame
+        Result of `scores_of`, of one reader or more.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Scores.
+    """
+    order = SHUFFLED if (scores["order"] == SHUFFLED).any() else scores["order"].iloc[0]
+    return scores[scores["order"] == order]
 
 
 def score_lines(scores: pd.DataFrame) -> Iterator[str]:
@@ -350,19 +363,18 @@ def _percent(row: Mapping[Any, Any], name: str) -> str:
     return f"{value} % ({low} to {high})"
 
 
-def check_unique(readers: Sequence[Reader]) -> None:
+def check_unique(names: Sequence[str]) -> None:
     """Raise an error if two readers have one name.
 
     Parameters
     ----------
-    readers : sequence of Reader
-        Readers.
+    names : sequence of str
+        Names of the readers.
 
     Raises
     ------
     SweepError
         If they have.
     """
-    names = [reader.name for reader in readers]
     if len(set(names)) < len(names):
         raise SweepError(ValidationIssue("two files of predictions have one name", value=", ".join(names)))

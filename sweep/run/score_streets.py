@@ -4,23 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from ..base.errors import DataError, ValidationIssue, nearest
-from ..study import Study
-from ..vision.detections import precisions
-from ..vision.images import HeadCamera
-from ..vision.lamps import TEST, split_lamps
-from ..vision.scores import interval_of_seeds
-from ..vision.street import StreetCamera, draw_streets
+from ..results.output import Output
+from ..results.tables import VISION
+from ..vision.detections import ALL, precision_scores, precisions
+from ..vision.lamps import TEST
+from ..vision.street import draw_streets, street_labels
 from .score import issue_of, table_of
-from .vision import vision_designs
 
 COLUMNS = ("image_id", "x_px", "y_px", "state", "score")
-_ALL = "all"
 
 
 def is_of_streets(path: Path) -> bool:
@@ -39,32 +35,29 @@ def is_of_streets(path: Path) -> bool:
     return "x_px" in table_of(path)
 
 
-def street_labels(study: Study, rows: pd.DataFrame) -> pd.DataFrame:
+def labels_of_test(output: Output) -> pd.DataFrame:
     """Return the labels of a run's test images of streets.
 
     Parameters
     ----------
-    study : Study
-        Study of the run.
-    rows : pandas.DataFrame
-        Rows of plain CFAs, named designs and the answer.
+    output : Output
+        Finished run with streets.
 
     Returns
     -------
     pandas.DataFrame
-        A row per image, see `StreetCamera.labels`.
+        A row per image, see `street_labels`.
     """
-    vision = study.section.vision
+    vision = output.study.vision
     assert vision is not None
     assert vision.street is not None
+    designs = output.vision[VISION][["design_id", "name", "cfa"]].drop_duplicates().to_dict("records")
     tables = []
-    for row, setup, curves in vision_designs(study, rows):
-        streets = StreetCamera(HeadCamera(setup, curves, vision), vision.street)
-        for number in range(vision.seeds):
-            seed = study.section.seed, number
-            scenes = draw_streets(vision, vision.street, split_lamps(setup.lights, vision, seed)[TEST], TEST, seed)
-            key = {name: row[name] for name in ("design_id", "name", "cfa")} | {"seed": number}
-            tables.append(streets.labels(scenes, key, TEST))
+    for number in range(vision.seeds):
+        scenes = draw_streets(vision, vision.street, TEST, (output.study.seed, number))
+        for design in designs:
+            key, mosaic = {str(name): value for name, value in design.items()}, output.mosaic(design["cfa"])
+            tables.append(street_labels(vision, mosaic, scenes, key | {"seed": number}, TEST))
     return pd.concat(tables, ignore_index=True)
 
 
@@ -76,7 +69,7 @@ def read_detections(path: Path, labels: pd.DataFrame, lenses: Sequence[str]) -> 
     path : Path
         CSV or Parquet; positions are from the center of the first pixel.
     labels : pandas.DataFrame
-        Result of `street_labels`.
+        Result of `labels_of_test`.
     lenses : sequence of str
         Signal types.
 
@@ -122,7 +115,7 @@ def street_scores(reader: str, detections: pd.DataFrame, labels: pd.DataFrame, l
     detections : pandas.DataFrame
         Result of `read_detections`.
     labels : pandas.DataFrame
-        Result of `street_labels`.
+        Result of `labels_of_test`.
     lenses : sequence of str
         Signal types.
 
@@ -133,30 +126,12 @@ def street_scores(reader: str, detections: pd.DataFrame, labels: pd.DataFrame, l
         the first design, paired; both with `_low` and `_high`.
     """
     parts = [
-        precisions(images, detections, lenses).assign(name=name, seed=seed_number)
-        for (name, seed_number), images in _by_design_and_seed(labels)
+        precisions(images, detections, lenses).assign(name=images["name"].iloc[0], seed=images["seed"].iloc[0])
+        for _, images in labels.groupby(["name", "seed"], sort=False)
     ]
-    table = pd.concat(parts, ignore_index=True)
-    by_seed = table.pivot_table("average_precision", ["name", "level"], "seed", sort=False)
-    whole = by_seed.groupby(level="name", sort=False).mean()
-    by_level = {_ALL: whole} | {str(v): by_seed.xs(v, level="level") for v in table["level"].unique()}
-    rows = []
-    for level, values in by_level.items():
-        for name in values.index:
-            row: dict[str, Any] = {"reader": reader, "name": str(name), "level": level}
-            for column, of_seeds in (
-                ("average_precision", values.loc[name]),
-                ("apart", values.loc[name] - values.iloc[0]),
-            ):
-                interval = interval_of_seeds(float(of_seeds.mean()), of_seeds.to_numpy(dtype=float))
-                row |= {column: interval.value, f"{column}_low": interval.low, f"{column}_high": interval.high}
-            rows.append(row)
-    return pd.DataFrame(rows)
-
-
-def _by_design_and_seed(labels: pd.DataFrame) -> Iterator[tuple[tuple[str, int], pd.DataFrame]]:
-    for (name, seed), images in labels.groupby(["name", "seed"], sort=False):
-        yield (str(name), int(str(seed))), images
+    scores = precision_scores(pd.concat(parts, ignore_index=True), str(labels["name"].iloc[0]))
+    scores.insert(0, "reader", reader)
+    return scores
 
 
 def street_lines(scores: pd.DataFrame) -> Iterator[str]:
@@ -172,7 +147,7 @@ def street_lines(scores: pd.DataFrame) -> Iterator[str]:
     str
         Line.
     """
-    whole = scores[scores["level"] == _ALL]
+    whole = scores[scores["level"] == ALL]
     first = whole["name"].iloc[0]
     for row in whole.to_dict("records"):
         text = f"{row['reader']}, {row['name']}: average precision {row['average_precision']:.3f}"

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from ..base.types import BoolArray, FloatArray
+from .scores import interval_of_seeds
 
+ALL = "all"
+"""In place of a light level or distance: all of them."""
 _LEAST_RADIUS_PX = 2.0
 
 
@@ -86,6 +90,37 @@ def precisions(labels: pd.DataFrame, detections: pd.DataFrame, lenses: Sequence[
             said = said.sort_values("score", ascending=False, kind="stable")
             ap = average_precision(_right(here, said), said["score"].to_numpy(dtype=float), len(here))
             rows.append({"level": level, "state": state, "lit": len(here), "average_precision": ap})
+    return pd.DataFrame(rows)
+
+
+def precision_scores(table: pd.DataFrame, reference: str) -> pd.DataFrame:
+    """Return average precisions, mean over signal types, with 95 % intervals over the seeds.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        Results of `precisions` with the `name` of the design and the `seed`.
+    reference : str
+        Design from which differences are taken.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per light level (first all of them) and design: `name`, `level`, `average_precision`, and `apart`, the
+        paired difference from the reference; both with `_low` and `_high`.
+    """
+    by_level = {
+        str(level): part.pivot_table("average_precision", "name", "seed", sort=False)
+        for level, part in ((ALL, table), *table.groupby("level", sort=False))
+    }
+    rows = []
+    for level, values in by_level.items():
+        for name in values.index:
+            row: dict[str, Any] = {"name": str(name), "level": level}
+            apart = values.loc[name] - values.loc[reference]
+            for column, of_seeds in (("average_precision", values.loc[name]), ("apart", apart)):
+                row |= interval_of_seeds(float(of_seeds.mean()), np.array(of_seeds, dtype=float)).columns(column)
+            rows.append(row)
     return pd.DataFrame(rows)
 
 

@@ -19,7 +19,7 @@ from .observer import posteriors
 from .planes import false_colors
 from .scenes import ORDERS, WHOLE, Scenes, draw_scenes
 from .section import Vision
-from .street import StreetCamera, draw_streets
+from .street import StreetCamera, draw_streets, street_labels
 
 if TYPE_CHECKING:
     from .network_reader import NetworkReader
@@ -108,13 +108,14 @@ def _streets(
     if vision.street is None:
         return np.empty((0, 0)), np.empty((0, 0), dtype=np.intp), np.empty((0, 0, 0, 3), dtype=np.uint8)
     streets, key = StreetCamera(camera, vision.street), _KEY | {"seed": seed[1]}
-    learned, test = (draw_streets(vision, vision.street, lamps[split], split, seed) for split in (TRAIN, TEST))
+    learned, test = (draw_streets(vision, vision.street, split, seed) for split in (TRAIN, TEST))
     detector = Detector(design.mosaic, camera.pixel, vision.lenses)
-    detector.learn(streets.batches(learned, key, TRAIN, "raw"))
-    made = detector.detect(streets.batches(test, key, TEST, "raw"))
+    detector.learn(streets.batches(learned, lamps[TRAIN], key, TRAIN, "raw"))
+    made = detector.detect(streets.batches(test, lamps[TEST], key, TEST, "raw"))
     first = test.some(slice(0, len(camera.levels)))  # levels take turns
-    pictures = next(streets.batches(first, key, TEST, "isp")).images
-    table, shape = precisions(streets.labels(test, key, TEST), made, vision.lenses), (-1, len(vision.lenses))
+    pictures = next(streets.batches(first, lamps[TEST], key, TEST, "isp")).images
+    labels, shape = street_labels(vision, design.mosaic, test, key, TEST), (-1, len(vision.lenses))
+    table = precisions(labels, made, vision.lenses)
     precision, lit = table["average_precision"].to_numpy(dtype=float), table["lit"].to_numpy(dtype=np.intp)
     return precision.reshape(shape), lit.reshape(shape), pictures
 

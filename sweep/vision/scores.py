@@ -24,6 +24,21 @@ class Interval:
         """True if the interval is on one side of 0."""
         return self.low > 0 or self.high < 0
 
+    def columns(self, name: str) -> dict[str, float]:
+        """Return value and ends as columns of a table.
+
+        Parameters
+        ----------
+        name : str
+            Name of the quantity.
+
+        Returns
+        -------
+        dict of str to float
+            `name`, and with `_low` and `_high`.
+        """
+        return {name: self.value, f"{name}_low": self.low, f"{name}_high": self.high}
+
     def within(self, least: float, most: float) -> Interval:
         """Return the interval cut at the ends of a quantity.
 

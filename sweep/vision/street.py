@@ -11,7 +11,8 @@ import numpy as np
 import pandas as pd
 
 from ..base.types import FloatArray, IndexArray
-from ..spectra.builtin.task_sets import spectra_of_group, task_groups
+from ..camera.mosaic import Mosaic
+from ..spectra.builtin.task_sets import spectra_of_group
 from .batches import Batch, Form, image_id, in_form
 from .head import head_places_px, heights, housing_diameters
 from .images import HeadCamera
@@ -36,8 +37,8 @@ class StreetScenes:
     """Streets, ndarray[n] each or [n, n_lamps], heads first.
 
     `level`, `background`, `distance`: index into the study's lists; `phantom`: 1 with sun on the lenses; `cell`: cell
-    of the grid; `place`, `aside`, `below`: position in it, as shares; `state`: index into `states_of`; `lamp`: index of
-    the signal, or of the spectrum of another lamp; `candelas`: intensity, 0 for what is not lit; `key`: from which the
+    of the grid; `place`, `aside`, `below`: position in it, as shares; `state`: index into `states_of`; `lamp`: which of
+    the lamps of that type, as a share of all; `candelas`: intensity, 0 for what is not lit; `key`: from which the
     photons are drawn.
     """
 
@@ -51,7 +52,7 @@ class StreetScenes:
     below: FloatArray
     distance: IndexArray
     state: IndexArray
-    lamp: IndexArray
+    lamp: FloatArray
     candelas: FloatArray
 
     def __len__(self) -> int:
@@ -73,7 +74,7 @@ class StreetScenes:
         return StreetScenes(**{field.name: getattr(self, field.name)[which] for field in fields(self)})
 
 
-def draw_streets(vision: Vision, street: Street, lamps: Lamps, split: str, seed: tuple[int, int]) -> StreetScenes:
+def draw_streets(vision: Vision, street: Street, split: str, seed: tuple[int, int]) -> StreetScenes:
     """Draw streets, evenly over the light levels, the rest at random; equal for all CFAs.
 
     Parameters
@@ -82,8 +83,6 @@ def draw_streets(vision: Vision, street: Street, lamps: Lamps, split: str, seed:
         Benchmark.
     street : Street
         Its streets.
-    lamps : Lamps
-        Lamps of the split.
     split : {'train', 'test'}
         Split.
     seed : tuple of int
@@ -101,11 +100,7 @@ def draw_streets(vision: Vision, street: Street, lamps: Lamps, split: str, seed:
     kinds = kinds_of(street)
     shape = (n, kinds.size)
     state = np.where(kinds == _HEAD, rng.integers(1 + len(vision.lenses), size=shape), 0)
-    share = rng.random(shape)
-    lamp = (share * np.where(kinds == _BRAKE, task_groups()[_BRAKE_GROUP], len(_STREET_LIGHTS))).astype(np.intp)
-    for kind, members in enumerate(lamps.of_lens):
-        lit = state == 1 + kind
-        lamp[lit] = members[(share[lit] * len(members)).astype(np.intp)]
+    lamp = rng.random(shape)
     daylight = np.array([one.light == "daylight" for one in levels])[level]
     of_signals = np.array(vision.intensities_cd)[rng.integers(len(vision.intensities_cd), size=shape)]
     u = rng.random(shape)
@@ -203,8 +198,7 @@ class StreetCamera:
         self.camera = camera
         self.street = street
         tile = camera.setup.camera.mosaic.indices.shape
-        self._tile, self._cell = tile, cell_shape(camera.vision, tile)
-        self._steps = [_JITTER_PX // size for size in tile]
+        self._tile = tile
         self.shape = street_shape(camera.vision, tile)
         grid = camera.setup.camera.grid
         spectra = {_BRAKE: spectra_of_group(grid, _BRAKE_GROUP)}
@@ -212,31 +206,15 @@ class StreetCamera:
         self._rates = cache(lambda distance, kind: camera.lamps(distance, spectra[kind]))
         self._backgrounds = cache(camera.background)
 
-    def corners(self, scenes: StreetScenes) -> IndexArray:
-        """Return the first row and column of each head's or lamp's image.
-
-        Parameters
-        ----------
-        scenes : StreetScenes
-            Streets.
-
-        Returns
-        -------
-        ndarray of int, shape (n, n_lamps, 2)
-            Pixels.
-        """
-        at = np.stack(np.divmod(scenes.cell, self.street.columns), axis=2)
-        steps = np.stack([(scenes.below * (self._steps[0] + 1)), scenes.aside * (self._steps[1] + 1)], axis=2)
-        corners: IndexArray = at * np.array(self._cell) + steps.astype(np.intp) * np.array(self._tile)
-        return corners
-
-    def expected(self, scenes: StreetScenes) -> FloatArray:
+    def expected(self, scenes: StreetScenes, lamps: Lamps) -> FloatArray:
         """Return expected electrons.
 
         Parameters
         ----------
         scenes : StreetScenes
             Streets.
+        lamps : Lamps
+            Lamps of the heads.
 
         Returns
         -------
@@ -244,7 +222,7 @@ class StreetCamera:
             Electrons.
         """
         camera, side, kinds = self.camera, self.camera.vision.crop_px, kinds_of(self.street)
-        corners = self.corners(scenes)
+        corners = corners_px(camera.vision, self._tile, scenes)
         images = np.empty((len(scenes), *self.shape))
         repeats = [-(-size // side) for size in self.shape]
         for i in range(len(scenes)):
@@ -252,22 +230,26 @@ class StreetCamera:
             around = self._backgrounds(level)[behind]
             images[i] = np.tile(around.reshape(side, side), repeats)[: self.shape[0], : self.shape[1]]
             for j, kind in enumerate(kinds):
-                electrons = self._one(scenes, i, j, int(kind), around)
+                electrons = self._one(scenes, lamps, (i, j, int(kind)), around)
                 row, column = corners[i, j]
                 images[i, row : row + side, column : column + side] += electrons.reshape(side, side)
             dark_e = camera.pixel.dark_e_per_s * camera.levels[level].exposure_s
             images[i] = self._with_glare(np.maximum(images[i], dark_e) - dark_e) + dark_e
         return images
 
-    def _one(self, scenes: StreetScenes, i: int, j: int, kind: int, around: FloatArray) -> FloatArray:
-        """Return what one head or lamp adds to the background."""
+    def _one(self, scenes: StreetScenes, lamps: Lamps, which: tuple[int, int, int], around: FloatArray) -> FloatArray:
+        """Return electrons that one head or lamp (image, number, kind) adds to the background."""
+        i, j, kind = which
         camera, level, distance = self.camera, int(scenes.level[i]), int(scenes.distance[i, j])
-        place, candelas = int(scenes.place[i, j] * camera.n_places()), float(scenes.candelas[i, j])
+        place, share = int(scenes.place[i, j] * camera.n_places()), float(scenes.lamp[i, j])
         if kind != _HEAD:
-            rates = self._rates(distance, kind)[place, scenes.lamp[i, j]]
-            return np.asarray(rates * (candelas * camera.levels[level].exposure_s), dtype=float)
+            rates = self._rates(distance, kind)[place]
+            of_lamp = rates[int(share * len(rates))]
+            return np.asarray(of_lamp * (scenes.candelas[i, j] * camera.levels[level].exposure_s), dtype=float)
+        state = scenes.state[i, j : j + 1] - 1
+        members = lamps.of_lens[max(int(state[0]), 0)]
+        lit = state, members[[int(share * len(members))]], scenes.candelas[i, j : j + 1]
         behind, phantom = scenes.background[i : i + 1], scenes.phantom[i : i + 1]
-        lit = (scenes.state[i, j : j + 1] - 1, scenes.lamp[i, j : j + 1], scenes.candelas[i, j : j + 1])
         electrons = camera.electrons(distance, level)
         head = electrons.of(np.array([place]), behind, np.zeros(1, dtype=np.intp), phantom, lit)[0]
         return np.asarray(head - around, dtype=float)
@@ -281,13 +263,17 @@ class StreetCamera:
         whole = np.tile(means, (self.shape[0] // rows, self.shape[1] // columns))
         return np.asarray((1 - share) * image + share * whole, dtype=float)
 
-    def batches(self, scenes: StreetScenes, key: Mapping[str, Any], split: str, form: Form) -> Iterator[Batch]:
+    def batches(
+        self, scenes: StreetScenes, lamps: Lamps, key: Mapping[str, Any], split: str, form: Form
+    ) -> Iterator[Batch]:
         """Yield images with labels, some at once.
 
         Parameters
         ----------
         scenes : StreetScenes
             Streets of a split.
+        lamps : Lamps
+            Lamps of the split.
         key : mapping
             `design_id`, `name`, `cfa` and `seed`.
         split : {'train', 'test'}
@@ -298,57 +284,86 @@ class StreetCamera:
         Yields
         ------
         Batch
-            Images, and labels: lists with an entry for each head.
+            Images with labels, see `street_labels`.
         """
+        labels = street_labels(self.camera.vision, self.camera.setup.camera.mosaic, scenes, key, split)
         for start in range(0, len(scenes), _AT_ONCE):
             block = scenes.some(slice(start, start + _AT_ONCE))
-            numbers = self.camera.drawn(self.expected(block).reshape(len(block), -1), block.key)
+            numbers = self.camera.drawn(self.expected(block, lamps).reshape(len(block), -1), block.key)
             images = in_form(self.camera, numbers.reshape(-1, *self.shape), block.level, form)
-            yield Batch(images, self._labels(block, key, split, start))
+            yield Batch(images, labels.iloc[start : start + len(block)].reset_index(drop=True))
 
-    def labels(self, scenes: StreetScenes, key: Mapping[str, Any], split: str) -> pd.DataFrame:
-        """Return the labels alone.
 
-        Parameters
-        ----------
-        scenes : StreetScenes
-            Streets of a split.
-        key : mapping
-            `design_id`, `name`, `cfa` and `seed`.
-        split : {'train', 'test'}
-            Split.
+def corners_px(vision: Vision, tile: tuple[int, ...], scenes: StreetScenes) -> IndexArray:
+    """Return the first row and column of each head's or lamp's image.
 
-        Returns
-        -------
-        pandas.DataFrame
-            A row per image, lists with an entry for each head.
-        """
-        return self._labels(scenes, key, split, 0)
+    Parameters
+    ----------
+    vision : Vision
+        Benchmark with streets.
+    tile : tuple of int
+        Rows and columns of the tile.
+    scenes : StreetScenes
+        Streets.
 
-    def _labels(self, scenes: StreetScenes, key: Mapping[str, Any], split: str, start: int) -> pd.DataFrame:
-        vision, heads = self.camera.vision, slice(0, self.street.heads)
-        places = head_places_px(vision, self.camera.setup.camera.mosaic)
-        middle = places[(scenes.place[:, heads] * self.camera.n_places()).astype(np.intp)]
-        corners = self.corners(scenes)[:, heads]
-        across_px = np.array([vision.target(distance).object_resolution_px for distance in vision.distances_m])
-        diameter_px = across_px[scenes.distance[:, heads]]
-        x_px, y_px = corners[..., 1] + middle[..., 0], corners[..., 0] + middle[..., 1]
-        state = scenes.state[:, heads]
-        lit_y_px = y_px + diameter_px * np.append(0.0, heights(vision))[state]
-        wide, high = housing_diameters(vision)
-        numbers = np.arange(start, start + len(scenes))
-        ids = [image_id(key["design_id"], key["seed"], STREET, split, int(number)) for number in numbers]
-        return pd.DataFrame({"image_id": ids, **key, "order": STREET, "split": split, "image": numbers}).assign(
-            background=np.array(vision.backgrounds, dtype=object)[scenes.background],
-            level=np.array(list(vision.levels), dtype=object)[scenes.level],
-            phantom=scenes.phantom.astype(bool),
-            state=np.array(states_of(vision), dtype=object)[state].tolist(),
-            intensity_cd=np.where(state > 0, scenes.candelas[:, heads], np.nan).tolist(),
-            distance_m=np.array(vision.distances_m, dtype=float)[scenes.distance[:, heads]].tolist(),
-            lens_diameter_px=diameter_px.tolist(),
-            head_x_px=x_px.tolist(),
-            head_y_px=y_px.tolist(),
-            lit_y_px=np.where(state > 0, lit_y_px, np.nan).tolist(),
-            head_width_px=(wide * diameter_px).tolist(),
-            head_height_px=(high * diameter_px).tolist(),
-        )
+    Returns
+    -------
+    ndarray of int, shape (n, n_lamps, 2)
+        Pixels.
+    """
+    assert vision.street is not None
+    at = np.stack(np.divmod(scenes.cell, vision.street.columns), axis=2)
+    steps = [share * (_JITTER_PX // size + 1) for share, size in zip((scenes.below, scenes.aside), tile, strict=True)]
+    corners: IndexArray = at * np.array(cell_shape(vision, tile)) + np.stack(steps, axis=2).astype(np.intp) * tile
+    return corners
+
+
+def street_labels(
+    vision: Vision, mosaic: Mosaic, scenes: StreetScenes, key: Mapping[str, Any], split: str
+) -> pd.DataFrame:
+    """Return the labels of streets.
+
+    Parameters
+    ----------
+    vision : Vision
+        Benchmark with streets.
+    mosaic : Mosaic
+        Tile of the design.
+    scenes : StreetScenes
+        Streets of a split.
+    key : mapping
+        `design_id`, `name`, `cfa` and `seed`.
+    split : {'train', 'test'}
+        Split.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per image, lists with an entry for each head.
+    """
+    assert vision.street is not None
+    heads, places = slice(0, vision.street.heads), head_places_px(vision, mosaic)
+    middle = places[(scenes.place[:, heads] * len(places)).astype(np.intp)]
+    corners = corners_px(vision, mosaic.indices.shape, scenes)[:, heads]
+    across_px = np.array([vision.target(distance).object_resolution_px for distance in vision.distances_m])
+    diameter_px = across_px[scenes.distance[:, heads]]
+    x_px, y_px = corners[..., 1] + middle[..., 0], corners[..., 0] + middle[..., 1]
+    state = scenes.state[:, heads]
+    lit_y_px = y_px + diameter_px * np.append(0.0, heights(vision))[state]
+    wide, high = housing_diameters(vision)
+    ids = [image_id(key["design_id"], key["seed"], STREET, split, number) for number in range(len(scenes))]
+    where = {"image_id": ids, **key, "order": STREET, "split": split, "image": np.arange(len(scenes))}
+    return pd.DataFrame(where).assign(
+        background=np.array(vision.backgrounds, dtype=object)[scenes.background],
+        level=np.array(list(vision.levels), dtype=object)[scenes.level],
+        phantom=scenes.phantom.astype(bool),
+        state=np.array(states_of(vision), dtype=object)[state].tolist(),
+        intensity_cd=np.where(state > 0, scenes.candelas[:, heads], np.nan).tolist(),
+        distance_m=np.array(vision.distances_m, dtype=float)[scenes.distance[:, heads]].tolist(),
+        lens_diameter_px=diameter_px.tolist(),
+        head_x_px=x_px.tolist(),
+        head_y_px=y_px.tolist(),
+        lit_y_px=np.where(state > 0, lit_y_px, np.nan).tolist(),
+        head_width_px=(wide * diameter_px).tolist(),
+        head_height_px=(high * diameter_px).tolist(),
+    )

@@ -67,7 +67,6 @@ def export(
     ] = None,
     form: Annotated[
         ImageForm,
-        ImageSplit,
         typer.Option(help="Images: raw mosaics, all channels at all pixels, or pictures of a plain ISP."),
     ] = ImageForm.RAW,
     png: Annotated[bool, typer.Option("--png", help="A PNG for each image; without it, arrays (.npz).")] = False,
