@@ -363,6 +363,12 @@ def test_the_errors_of_the_network_are_those_of_their_command() -> None:
     )
     wrong = images[["network", "observer"]].ne(images["state"], axis=0).groupby(images["name"]).mean()
     excess = wrong["network"] / wrong["observer"]
+    misread = pd.read_parquet(folder / "vision.parquet").query(
+        "order == 'shuffled' and lamps == 'unseen' and network != state"
+    )
+    assert 0.7 < (misread["level"] == "day").mean() < 0.8
+    assert "Three of four errors of the network are by day; lamps of 10 cd are hardest" in GUIDE_TO_IMAGES
+    assert misread["intensity_cd"].value_counts().idxmax() == 10
     streets = list(vision_parts(read_output(folder)).values())[-1].set_index("design")["all levels"]
     mean = streets.str.partition(" ")[0]
     figures = (

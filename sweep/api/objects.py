@@ -446,13 +446,13 @@ class FinishedRun:
                 raise SweepError(ValidationIssue("unknown", value=value, allowed=allowed, nearest=near))
         return images_of_run(self.study.study, self.output.few, split, chosen, form)
 
-    def score(self, predictions: Path | str | pd.DataFrame) -> pd.DataFrame:
+    def score(self, predictions: pd.DataFrame) -> pd.DataFrame:
         """Score a reader's answers to the test images of the run's benchmark of vision.
 
         Parameters
         ----------
-        predictions : Path, str or pandas.DataFrame
-            File, or table, of columns `image_id`, and `state` (or "unknown") or a probability of each state.
+        predictions : pandas.DataFrame
+            Columns `image_id`, and `state` (or "unknown") or a probability of each state.
 
         Returns
         -------
@@ -465,17 +465,13 @@ class FinishedRun:
         SweepError
             If the run has no images, and for other, double or missing images or answers.
         """
-        from ..run.score import read_predictions, reader_of, scores_of
+        from ..run.score import reader_of, scores_of
         from ..vision.scenes import states_of
 
         images, vision = self._images_of_test(), self.output.study.vision
         assert vision is not None
-        states = states_of(vision)
-        if isinstance(predictions, (Path, str)):
-            reader = read_predictions(Path(predictions), images, states)
-        else:
-            reader = reader_of(predictions.reset_index(drop=True), Path("predictions"), images, states)
-        return scores_of(reader, images, vision.unknown_cost)
+        table = predictions.reset_index(drop=True)
+        return scores_of(reader_of(table, Path("predictions"), images, states_of(vision)), images, vision.unknown_cost)
 
     def _images_of_test(self) -> pd.DataFrame:
         from ..results.tables import VISION

@@ -130,13 +130,13 @@ def _right(targets: pd.DataFrame, detections: pd.DataFrame) -> BoolArray:
     x_px, y_px, radius_px = (
         targets[name].to_numpy(dtype=float) for name in ("head_x_px", "lit_y_px", "lens_diameter_px")
     )
-    radius_px, found = match_radius_px(radius_px), np.zeros(len(targets), dtype=bool)
+    radius_px, is_taken = match_radius_px(radius_px), np.zeros(len(targets), dtype=bool)
     right = np.zeros(len(detections), dtype=bool)
     for i, (name, x, y) in enumerate(zip(detections["image_id"], detections["x_px"], detections["y_px"], strict=True)):
         here = rows.get(name, np.empty(0, dtype=np.intp))
         away = np.hypot(x_px[here] - x, y_px[here] - y)
-        free = (away <= radius_px[here]) & ~found[here]
+        free = (away <= radius_px[here]) & ~is_taken[here]
         if free.any():
             right[i] = True
-            found[here[np.where(free, away, np.inf).argmin()]] = True
+            is_taken[here[np.where(free, away, np.inf).argmin()]] = True
     return right

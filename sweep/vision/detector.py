@@ -79,8 +79,8 @@ class Detector:
         """
         features, classes = [], []
         for images, labels in batches:
-            number, at_px, found = self._places(images)
-            features.append(found)
+            number, at_px, colors = self._places(images)
+            features.append(colors)
             classes.append(self._classes_at(number, at_px, labels))
         x, y = np.concatenate(features), np.concatenate(classes)
         counts = np.bincount(y, minlength=len(self.classes))
@@ -115,8 +115,8 @@ class Detector:
         """
         parts = []
         for images, labels in batches:
-            number, at_px, found = self._places(images)
-            shares = softmax(found @ self._weights + self._offsets, axis=1)
+            number, at_px, colors = self._places(images)
+            shares = softmax(colors @ self._weights + self._offsets, axis=1)
             best = shares[:, :-1].argmax(axis=1)
             part = pd.DataFrame(
                 {"image_id": labels["image_id"].to_numpy()[number], "x_px": at_px[:, 0], "y_px": at_px[:, 1]}

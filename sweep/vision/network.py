@@ -174,6 +174,6 @@ def train(inputs: Inputs, targets: IndexArray, sizes: tuple[int, ...], epochs: i
     numbers = targets.astype(np.int32)
     for epoch in range(epochs):
         order = np.resize(rng.permutation(len(planes)), calls * _BATCH * _BATCHES).reshape(-1, _BATCHES, _BATCH)
-        for some, of_steps in zip(order, rates[epoch], strict=True):
-            held = _steps(held, (planes[some], known[some], numbers[some], of_steps), sizes)
+        for batch, of_steps in zip(order, rates[epoch], strict=True):
+            held = _steps(held, (planes[batch], known[batch], numbers[batch], of_steps), sizes)
     return Network(held[0], sizes[0])

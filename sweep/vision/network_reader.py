@@ -27,7 +27,7 @@ from .scenes import FIXED, PARTS, orders_of_lenses, states_of
 from .section import Vision
 
 _LEAST_REACH_PX = 6.0
-"""How far the network looks from the middle at least; up to the centers of the outer lenses of the nearest head."""
+"""Reach of the network from the middle, at least; up to the centers of the outer lenses of the nearest head."""
 _SOFT = 10.0
 """Deviations of more than so many times the noise are compressed."""
 _SHRINK = 10.0
@@ -159,8 +159,8 @@ class NetworkReader:
         by_chance = examples.some(examples.targets[:, 2] == 0)
         examples = _Examples.joined([examples, replace(by_chance, fixed=np.ones_like(by_chance.fixed))])
         for part, share in PARTS.items():
-            some = examples.some(examples.image < share * self.vision.train_images)
-            self._fitted[part] = self._fit(some, seed).calibrated(checked)
+            learned = examples.some(examples.image < share * self.vision.train_images)
+            self._fitted[part] = self._fit(learned, seed).calibrated(checked)
 
     def _fit(self, training: _Examples, seed: tuple[int, ...]) -> _Fitted:
         inputs = _Inputs(training, (-1, len(self.vision.distances_m)), len(self._conditions))

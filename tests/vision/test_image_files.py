@@ -163,7 +163,7 @@ def test_pictures_are_files_that_viewers_open(run: Path, tmp_path: Path) -> None
 
 
 def test_coco_boxes_hold_the_lenses(run: Path, tmp_path: Path) -> None:
-    """Of the test alone; at night the brightest pixel is in the box of its image."""
+    """Images of the test alone; at night the brightest pixel is in the box of its image."""
     manifest = exported(run, tmp_path / "coco", "--form", "raw", "--png", "--coco", "--split", "test")
     assert set(manifest["split"]) == {"test"}
     names = [f"coco-{kind}{design}-test.json" for kind in ("", "street-") for design in (0, 1)]
@@ -193,7 +193,7 @@ def test_coco_boxes_hold_the_lenses(run: Path, tmp_path: Path) -> None:
 
 
 def test_detections_in_streets_are_scored(run: Path, tmp_path: Path) -> None:
-    """Those of the labels are all right; of other images, states and numbers each has a line."""
+    """The labels themselves are all right; of other images, states and numbers each has a line."""
     exported(run, tmp_path / "raw", "--split", "test")
     columns = ["state", "head_x_px", "lit_y_px"]
     lit = pd.read_parquet(tmp_path / "raw" / "street.parquet")[["image_id", *columns]].explode(columns)

@@ -197,7 +197,7 @@ def test_the_network_reads_files_as_it_reads_in_the_run(output: Output, exported
 
 
 def test_a_network_of_shuffled_labels_errs_at_chance(output: Output, exported: tuple[Path, pd.DataFrame]) -> None:
-    """Of four states, 3 of 4 times: within 3.3 standard deviations of 200 images."""
+    """With four states, 3 of 4 times: within 3.3 standard deviations of 200 images."""
     answers = reader_of_files(output, exported, shuffled=True)
     images = output.vision[VISION]
     own = images[(images["name"] == "RGGB") & (images["seed"] == 0) & (images["lamps"] == UNSEEN)]
