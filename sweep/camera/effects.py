@@ -95,6 +95,14 @@ class Box:
         return math.sqrt(len(self.setup.camera.mosaic.channels))
 
 
+def any_filter(setup: Setup) -> Box:
+    """Return the box of all filters in the modified channels, up to the largest QE of the sensor, at least 1."""
+    low, high = setup.camera.qe.copy(), setup.camera.qe.copy()
+    low[list(setup.camera.modified)] = 0.0
+    high[list(setup.camera.modified)] = max(1.0, float(setup.camera.qe.max()))
+    return Box(setup, low, high)
+
+
 @dataclass(frozen=True)
 class Effect:
     """One effect.

@@ -254,6 +254,11 @@ class Electrons:
         rates *= exposure_s[:, None, None, None]
         return rates
 
+    def without_lamps(self, curves: FloatArray, scales: FloatArray, exposure_s: FloatArray) -> FloatArray:
+        """Return what `expected` has without the lamps, in the shape of one signal."""
+        electrons = np.repeat(self.unlit(curves), scales.shape[1], axis=1) * exposure_s[:, None, None]
+        return np.asarray(electrons[:, :, None], dtype=float)
+
     def unlit(self, curves: FloatArray) -> FloatArray:
         """Return electrons/s of the elements without the lamps: of the background, and dark current.
 

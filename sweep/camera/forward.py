@@ -20,12 +20,14 @@ from ..base.cache import Cache
 from ..base.errors import SweepError, ValidationIssue
 from ..base.types import FloatArray, IndexArray
 from ..designs.block import Block
+from .brightness import LampReadings, of_case
 from .electrons import Changing, Electrons
 from .exposure import SceneLight
 from .field import over_field
 from .memory import blocks
 from .phases import Phases, different_phases, scene_phases
 from .pixel import unquantized
+from .pixel_curve import is_noisy
 from .pixel_response import ChannelResponses, PixelResponse, channel_responses, kept_response, pixel_response
 from .readout import NoisyReadout, Readout
 from .setup import Setup
@@ -268,18 +270,52 @@ class ForwardModel:
             block = slice(start, start + step)
             yield self._captured(curves[block], scales[..., block, :], exposure_s[block])
 
-    def _captured(self, curves: FloatArray, scales: FloatArray, exposure_s: FloatArray) -> FloatArray:
-        """Return expected electrons; of an HDR pixel those of each exposure, on the first axis."""
+    def lamps(self, curves: FloatArray) -> Iterator[LampReadings]:
+        """Yield the readings of one design's lamps over their brightness, in each case.
+
+        Parameters
+        ----------
+        curves : ndarray of shape (1, n_modified, n_wavelengths)
+            QE of the modified channels.
+
+        Yields
+        ------
+        LampReadings
+            Electrons of each lamp, and how they are read.
+        """
+        if self._in_parts:
+            for part in self._parts():
+                yield from part.lamps(curves)
+            return
+        exposure_s = self.light.exposure_s(curves)
+        scales = self.light.scales(exposure_s)
+        electrons = self._captured(curves, scales, exposure_s)
+        dark = self._captured(curves, scales, exposure_s, lit=False)
         if not self.setup.camera.pixel.captures:
-            return self.electrons.expected(curves, scales, exposure_s)
+            electrons, dark = electrons[None], dark[None]
+        for case in range(electrons.shape[2]):
+            readout = self.readout.at(case // scales.shape[-1])
+            yield of_case(electrons[:, 0, case], dark[:, 0, case, 0], readout, noisy=is_noisy(self.setup))
+
+    def _captured(
+        self, curves: FloatArray, scales: FloatArray, exposure_s: FloatArray, *, lit: bool = True
+    ) -> FloatArray:
+        """Return expected electrons, or those without lamps; of an HDR pixel of each exposure, on the first axis."""
+
+        def of(model: ForwardModel, curves: FloatArray, scales: FloatArray) -> FloatArray:
+            electrons = model.electrons
+            return (electrons.expected if lit else electrons.without_lamps)(curves, scales, exposure_s)
+
+        if not self.setup.camera.pixel.captures:
+            return of(self, curves, scales)
         modified, captured = list(self.setup.camera.modified), []
         for (factors, model), scale, exposure in zip(
             self._of_exposures, scales, self.setup.camera.pixel.exposures, strict=True
         ):
-            electrons = model.electrons.expected(curves * factors[modified, None], scale, exposure_s)
+            electrons = of(model, curves * factors[modified, None], scale)
             electrons *= exposure.capture.light
             captured.append(
-                model._of_pixels(electrons) if model.readout.by_channel and not self.readout.by_channel else electrons
+                model.readout.of_pixels(electrons) if model.readout.by_channel and not self.readout.by_channel else electrons
             )
         return np.stack(captured)
 
@@ -325,13 +361,7 @@ class ForwardModel:
         if self._in_parts:
             return np.concatenate([part.pixel_electrons(curves) for part in self._parts()], axis=-3)
         exposure_s = self.light.exposure_s(curves)
-        return self._of_pixels(self._captured(curves, self.light.scales(exposure_s), exposure_s))
-
-    def _of_pixels(self, electrons: FloatArray) -> FloatArray:
-        """Return the electrons of the pixels of a tile from those of channels that fill the field."""
-        if self.readout.by_channel and self.setup.scene.target is None:
-            return electrons[..., self.setup.camera.mosaic.indices.ravel()]
-        return electrons
+        return self.readout.of_pixels(self._captured(curves, self.light.scales(exposure_s), exposure_s))
 
     def channels_of(self, pixels: FloatArray, case: int) -> FloatArray:
         """Return the channels from their pixels at one phase and field position.
@@ -357,7 +387,7 @@ class ForwardModel:
     @property
     def capture_light(self) -> FloatArray | None:
         """Relative light of exposures on `pixel_electrons`, [n_exposures, n_pixels]; None for a pixel read once."""
-        return self._of_pixels(self.readout.capture_light) if self.setup.camera.pixel.captures else None
+        return self.readout.of_pixels(self.readout.capture_light) if self.setup.camera.pixel.captures else None
 
     @property
     def few_pixels(self) -> tuple[IndexArray, ...] | None:

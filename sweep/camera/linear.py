@@ -16,16 +16,15 @@ import numpy as np
 from ..base.cache import Cache
 from ..base.errors import SweepError, ValidationIssue
 from ..base.types import BoolArray, FloatArray, IndexArray
+from .brightness import LampReadings, LampSlopes, room_dn
 from .exposure import relative_slope
 from .forward import ForwardModel
-from .merged_curve import merged_curve
 from .pixel import Pixel, unquantized
+from .pixel_curve import STEPS_DN2, pixel_curve
 from .pixel_response import SplitLight
-from .readout import capture_light
+from .readout import Readout, capture_light
 from .setup import READOUT, Setup
 
-_STEPS_DN2 = 1 / 12
-"""Variance of rounding to whole digital numbers, DN^2."""
 _FIELD_POSITIONS = 9
 """Field positions at which a search looks where all field positions count; its best design is read out at more."""
 
@@ -127,7 +126,7 @@ class LinearModel(ForwardModel):
         """
         electrons, pixel = self.by_pixel._expected(curves), self.readout.pixel
         variance_e2 = electrons + (pixel.prnu * electrons) ** 2 + pixel.read_noise_e**2
-        return self.by_pixel.readout.spread(pixel.dn_per_e**2 * variance_e2 + _STEPS_DN2)
+        return self.by_pixel.readout.spread(pixel.dn_per_e**2 * variance_e2 + STEPS_DN2)
 
     def variance_gradient(self, curves: FloatArray, curves_gradient: FloatArray) -> FloatArray:
         """Return the exact derivative of `variance` at one design.
@@ -176,8 +175,10 @@ class LinearModel(ForwardModel):
         light = capture_light(self.setup.with_camera(pixel=self.hdr), by_pixel.electrons.response)
         moments = np.empty((4, *whole.shape))
         for of_exposures, which in zip(*_distinct_columns(light), strict=True):
-            moments[..., which] = merged_curve(self.hdr, tuple(of_exposures)).at(whole[..., which])
+            curve = pixel_curve(self.hdr, tuple(of_exposures), noisy=True)
+            moments[..., which] = *curve.moments(whole[..., which]), *curve.slopes(whole[..., which])
         mean, variance, mean_per_e, variance_per_e = moments
+        variance = np.maximum(variance, STEPS_DN2)
         folded, spread = by_pixel.readout.folded, by_pixel.readout.spread
         return (
             folded(mean[None])[0],
@@ -185,6 +186,44 @@ class LinearModel(ForwardModel):
             folded(mean_per_e * slope),
             spread(variance_per_e * slope),
         )
+
+    @cached_property
+    def linear_over_brightness(self) -> bool:
+        """True if chromatic distances of filters like the base curve have their closed form, with a margin of two."""
+        base = self.setup.camera.base_qe[None]
+        response, unlit = self.smooth(base)[0], self.unlit(base, self.light.exposure_s(base))[0]
+        longest_dn = np.sqrt(response.shape[-1]) * (response - unlit[:, None]).max(initial=0.0)
+        return self.hdr is None and bool((room_dn(self.setup, response, unlit) >= 2 * longest_dn).all())
+
+    def lamps_over_brightness(self, curves: FloatArray, curves_gradient: FloatArray) -> list[LampSlopes]:
+        """Return the readings of the lamps of one design over their brightness in each case, with derivatives.
+
+        Parameters
+        ----------
+        curves : ndarray of shape (n_modified, n_wavelengths)
+            QE of the modified channels.
+        curves_gradient : ndarray of shape (n_free, n_modified, n_wavelengths)
+            Their derivatives.
+
+        Returns
+        -------
+        list of LampSlopes
+            One for each case.
+        """
+        by_pixel = self.by_pixel
+        pixel = by_pixel.readout.pixel if self.hdr is None else self.hdr
+        whole, slope = by_pixel._with_slope(curves, curves_gradient)
+        lit, lit_by_u = by_pixel._with_slope(curves, curves_gradient, lamps_only=True)
+        readout = Readout(by_pixel.setup.with_camera(pixel=pixel), by_pixel.electrons.response)
+        light = readout.capture_light if pixel.captures else np.ones((1, whole.shape[-1]))
+        dark, dark_by_u = whole[:, 0] - lit[:, 0], slope[:, :, 0] - lit_by_u[:, :, 0]
+        moments, noisy = len(whole) // readout.n_cases, self.setup.scene.noise is not None
+        result = []
+        for case in range(len(whole)):
+            here = readout.at(case // moments)
+            lamps = LampReadings(lit[case] * light[:, None], dark[case] * light, light, here, noisy)
+            result.append(LampSlopes(lamps, lit_by_u[:, case], dark_by_u[:, case]))
+        return result
 
     def spread_electrons(self, curves: FloatArray) -> FloatArray:
         """Return expected electrons of the pixels, weighted by their shares of a channel's variance.

@@ -24,7 +24,7 @@ from ..base.types import BoolArray, FloatArray
 from .noise.moments import DRAWN, LinearRange
 from .noise.subsets import Subset, SubsetMoments, subset_table, threshold_dn
 from .noise.table import unclipped_e
-from .pixel import Pixel
+from .pixel import Pixel, unquantized
 from .rounding import DITHERED_DN, MANY_STEPS, MOST_POISSON_E, rounded
 
 _PER_DEVIATION = 1.3
@@ -308,7 +308,7 @@ def _read_noise_e2(pixel: Pixel) -> float:
     return float(pixel.read_noise_e**2 + 1 / (12 * pixel.dn_per_e**2))
 
 
-def without_noise(electrons: FloatArray, light: FloatArray, pixel: Pixel) -> FloatArray:
+def without_noise(electrons: FloatArray, light: FloatArray, pixel: Pixel, *, rounds: bool = True) -> FloatArray:
     """Merge captures that are clipped and rounded, without noise.
 
     Parameters
@@ -319,17 +319,20 @@ def without_noise(electrons: FloatArray, light: FloatArray, pixel: Pixel) -> Flo
         Relative light.
     pixel : Pixel
         HDR pixel.
+    rounds : bool
+        Round to digital numbers, and to codes.
 
     Returns
     -------
     ndarray of shape (...)
         Merged values, DN of the first capture.
     """
-    read = [
-        rounded(np.minimum(electrons[at], one.saturation_e) * one.dn_per_e, one)
-        for at, one in zip(exposure_of(pixel), pixel.read_as, strict=True)
-    ]
-    return merged_readings(read, electrons, light, pixel)
+    read = []
+    for at, one in zip(exposure_of(pixel), pixel.read_as, strict=True):
+        held = np.minimum(electrons[at], one.saturation_e)
+        read.append(rounded(held * one.dn_per_e, one) if rounds else unquantized(held, one))
+    values = merged_readings(read, electrons, light, pixel)
+    return coded(values, pixel) if rounds else values
 
 
 def draws(electrons: FloatArray, light: FloatArray, pixel: Pixel, rng: np.random.Generator) -> FloatArray:
@@ -357,7 +360,7 @@ def draws(electrons: FloatArray, light: FloatArray, pixel: Pixel, rng: np.random
     for at, one in zip(exposure_of(pixel), pixel.read_as, strict=True):
         noisy_e = np.minimum(held[at], one.well_e) + one.read_noise_e * rng.standard_normal(gain.shape)
         read.append(rounded(noisy_e * one.dn_per_e, one))
-    return merged_readings(read, electrons, light, pixel)
+    return coded(merged_readings(read, electrons, light, pixel), pixel)
 
 
 def merged_readings(
@@ -393,7 +396,7 @@ def merged_readings(
             number = pixel.exposures[at].numbers[place]
             estimate = (read_dn[number] - pixel.offset_dn) / (pixel.read_as[number].dn_per_e * light[at])
             result += here * weight * estimate
-    return coded(np.asarray(pixel.dn_per_e * result + pixel.offset_dn, dtype=float), pixel)
+    return np.asarray(pixel.dn_per_e * result + pixel.offset_dn, dtype=float)
 
 
 def _subsets(pixel: Pixel) -> Iterator[tuple[Subset, ...]]:

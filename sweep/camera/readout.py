@@ -6,6 +6,7 @@ A channel is the mean over the disc, or the demosaicked center.
 from __future__ import annotations
 
 import math
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -180,10 +181,17 @@ class Readout:
     def __init__(self, setup: Setup, response: PixelResponse) -> None:
         self.setup = setup
         self.n_cases = response.shape[0]
-        self._weights, self._spread = response.readout, response.spread
+        self.weights, self.spread_weights = response.readout, response.spread
         self.pixel = setup.camera.pixel
         self.capture_light = capture_light(setup, response)
         self.by_channel = response.by_channel
+
+    def at(self, place: int) -> Readout:
+        """Return the readout of one sampling phase or field position alone."""
+        one = copy(self)
+        one.n_cases = 1
+        one.weights, one.spread_weights = self.weights[place][None], self.spread_weights[place][None]
+        return one
 
     def transfer(self, electrons: FloatArray) -> FloatArray:
         """Convert expected electrons to digital numbers; under noise, to their means.
@@ -271,7 +279,7 @@ class Readout:
         ndarray of shape (n_designs, n_cases, n_signals, n_channels)
             Digital numbers of the channels, DN.
         """
-        return dn if self.by_channel else self._weighed(dn, self._weights)
+        return dn if self.by_channel else self._weighed(dn, self.weights)
 
     def spread(self, variance: FloatArray) -> FloatArray:
         """Combine variances of the elements to those of the channels.
@@ -286,7 +294,7 @@ class Readout:
         ndarray of shape (n_designs, n_cases, n_signals, n_channels)
             Variance of the channels, DN^2.
         """
-        return self._weighed(variance, self._spread)
+        return self._weighed(variance, self.spread_weights)
 
     def with_noise(self, electrons: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray, FloatArray]:
         """Read out a block with noise.
@@ -332,7 +340,13 @@ class Readout:
         if setup.scene.target is None:
             in_channel = setup.camera.mosaic.indices.ravel()[:, None] == np.arange(len(setup.camera.mosaic.channels))
             return np.asarray(pixels @ (in_channel / setup.camera.mosaic.counts), dtype=float)
-        return np.asarray(pixels @ self._weights[phase_index], dtype=float)
+        return np.asarray(pixels @ self.weights[phase_index], dtype=float)
+
+    def of_pixels(self, values: FloatArray) -> FloatArray:
+        """Return values of the pixels of a tile, row by row, from those of channels that fill the field."""
+        if self.by_channel and self.setup.scene.target is None:
+            return values[..., self.setup.camera.mosaic.indices.ravel()]
+        return values
 
     @property
     def few_pixels(self) -> tuple[IndexArray, ...] | None:
@@ -351,7 +365,7 @@ class Readout:
     def _shape_of_noise(self, electrons: FloatArray, variance: FloatArray) -> tuple[BoolArray, FloatArray]:
         """Return `gaussian` and `reach_dn` of `NoisyReadout`."""
         heaviest = self._heaviest(variance)
-        cut = self._weighed(is_cut(electrons, self.pixel), (self._weights > 0).astype(float)) > 0
+        cut = self._weighed(is_cut(electrons, self.pixel), (self.weights > 0).astype(float)) > 0
         return is_gaussian(variance, heaviest, cut, self.pixel), reach_dn(electrons, self.pixel) * heaviest
 
     def _shape_of_merged(
@@ -360,11 +374,11 @@ class Readout:
         """Return `gaussian` and `reach_dn` of `NoisyReadout` for HDR pixels."""
         light = self.capture_light_of(electrons)
         gaussian, reach_dn = merge.shape_of_noise(electrons, light, self.pixel, pixels.certain)
-        others = self._weighed((~gaussian).astype(float), (self._weights > 0).astype(float))
+        others = self._weighed((~gaussian).astype(float), (self.weights > 0).astype(float))
         return others == 0, reach_dn.max(axis=-1, keepdims=True) * self._heaviest(variance)
 
     def _heaviest(self, variance: FloatArray) -> FloatArray:
         """Return the largest weight of a pixel in each channel, broadcast to the cases."""
         repeats = variance.shape[1] // self.n_cases
-        heaviest = self._weights.max(axis=1) if self.setup.scene.target else 1 / self.setup.camera.mosaic.counts[None]
+        heaviest = self.weights.max(axis=1) if self.setup.scene.target else 1 / self.setup.camera.mosaic.counts[None]
         return np.repeat(np.broadcast_to(heaviest, (self.n_cases, variance.shape[-1])), repeats, axis=0)[:, None]

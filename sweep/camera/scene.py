@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from ..base.types import Meters, Ratio, Seconds, Section, Share
+from ..base.types import Meters, NonNegative, Ratio, Seconds, Section, Share, from_to
 from .captures import ReadNoise
 from .pixel import DarkCurrent, Optics, Pixel, Prnu
 from .sensor_field import SensorField
@@ -175,6 +175,9 @@ class Scene(Section):
     intensity_cd: float | None = Field(default=None, ge=1e-12, le=1e15)
     """Luminous intensity of every signal instead of equal photons, cd; its luminance follows from the target's diameter
     (0.2 m without a target)."""
+    brightness: Annotated[tuple[NonNegative, NonNegative] | None, BeforeValidator(from_to)] = None
+    """Least and most brightness of the other lamp in chromatic figures, relative to the scene's; left out, from dark to
+    beyond saturation."""
     exposure: Annotated[WhitePatchExposure | FixedExposure, Field(discriminator="kind")] = WhitePatchExposure()
     """Exposure time, set by a white patch or fixed."""
     optics: Optics = Optics()
@@ -203,6 +206,8 @@ class Scene(Section):
 
     @model_validator(mode="after")
     def _goes_together(self) -> Scene:
+        if self.brightness is not None and not self.brightness[0] <= self.brightness[1]:
+            raise ValueError(f"brightness: {self.brightness[0]:g} must be at most {self.brightness[1]:g}")
         if self.intensity_cd is not None and isinstance(self.exposure, WhitePatchExposure):
             raise ValueError("intensity_cd needs a fixed exposure: the white patch is given in photons")
         if self.field is not None and self.optics.cra_deg:

@@ -88,6 +88,12 @@ class Setup:
         return replace(self, left_out=frozenset())
 
     @property
+    def over_brightness(self) -> Setup:
+        """The setup in which lamps of any brightness are read: pixels may fill, and without noise nothing is rounded."""
+        left_out = self.left_out - {"saturation", "noise"}
+        return replace(self, left_out=left_out if self.scene.noise is not None else left_out | {"quantization"})
+
+    @property
     def linear(self) -> bool:
         """True if digital numbers are linear in electrons: neither clipped nor rounded."""
         return self.left_out >= READOUT

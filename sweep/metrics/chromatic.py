@@ -4,24 +4,30 @@ For responses y1 and y2 to the lamps alone (less black level, dark current and b
 min |y1 - a y2| and min |a y1 - y2| over a > 0. At an angle t of less than 90 degrees that is min(|y1|, |y2|) sin t,
 otherwise min(|y1|, |y2|). The parallelogram |y1|^2 |y2|^2 sin^2 t is summed from the 2 x 2 determinants of the
 channels (Lagrange's identity), so that nearly parallel responses lose no digits.
+
+That holds while readings are linear in the light; `brightness` has what holds where pixels fill or captures merge.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
 from ..base.types import FloatArray, IndexArray
+from ..camera.brightness import LampSlopes
 from ..camera.linear import linear_model
+from ..camera.pixel_curve import STEPS_DN2
 from ..camera.setup import Setup
 from ..spectra.lights import Pair, class_pairs
+from .brightness import DARK_TO_FULL, BrightnessCurves, chromatic_distance
 from .separation import packed_response, pair_blocks
 from .smooth import Rows, SmoothDesign
 from .tasks.colorimetry import COMPLEX_STEP, Smooth
 
-_LEAST_VARIANCE = 1e-12
-"""Smallest variance that counts, DN^2: a channel without noise fixes the relative brightness."""
+_SEARCH_ROUNDS = 1
+"""Refinements of the nearest points that a search sees."""
 
 
 def parallelogram(first: Smooth, second: Smooth) -> Smooth:
@@ -119,41 +125,11 @@ def chromatic_separations(response: FloatArray, members: Mapping[str, IndexArray
     return dict(zip(pairs, np.sqrt(squared.T), strict=True))
 
 
-def noise_referred(mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
-    """Compute the smallest chromatic distance in units of the noise.
+def chromatic_rows(design: SmoothDesign, *, pairs: Sequence[Pair], noise: bool, decades: bool = False) -> Rows:
+    """Return rows of each two signals, in every case of the scene: squared chromatic distances in both orders.
 
-    As for d', the inner product is the inverse of the mean covariance of both signals (Mahalanobis distance).
-
-    Parameters
-    ----------
-    mean, variance : ndarray of shape (n_designs, n_signals, n_channels)
-        Mean less the response without lamps, DN, and variance, DN^2.
-    first, second : ndarray of int
-        Signals of each type.
-
-    Returns
-    -------
-    ndarray of shape (n_designs,)
-        Distance.
-    """
-    smallest = np.empty(len(mean))
-    for block, one, other in pair_blocks(mean.shape, first, second):
-        deviation = _deviation(variance[block][:, one], variance[block][:, other])
-        squared = squared_distance(mean[block][:, one] / deviation, mean[block][:, other] / deviation)
-        smallest[block] = squared.min(axis=1)
-    return np.sqrt(smallest)
-
-
-def _deviation(one: Smooth, other: Smooth) -> Smooth:
-    """Return the root of the mean variance of two signals."""
-    mean = (one + other) / 2
-    return np.sqrt(np.where(mean.real > _LEAST_VARIANCE, mean, _LEAST_VARIANCE))
-
-
-def chromatic_rows(design: SmoothDesign, *, pairs: Sequence[Pair], noise: bool) -> Rows:
-    """Return both squared orders of the chromatic distance of each two signals, in every case of the scene.
-
-    The smallest row is the squared distance: min over a of |y1 - a y2| and of |a y1 - y2|, each smooth.
+    The smallest row is the squared distance, each smooth. In closed form where readings are linear, by the nearest point
+    of the brightness curve elsewhere; that point moves with the design, which adds nothing to the derivative.
 
     Parameters
     ----------
@@ -163,23 +139,54 @@ def chromatic_rows(design: SmoothDesign, *, pairs: Sequence[Pair], noise: bool) 
         Pairs of signal types.
     noise : bool
         In units of the noise, otherwise in DN.
+    decades : bool
+        Return -log10 of the errors of Gaussians at these distances.
 
     Returns
     -------
     Rows
         Values and derivatives.
     """
+    if not noise and design.linear_over_brightness:
+        return _closed_rows(design, pairs)
+    parts = []
+    for number, (lamps, curves) in enumerate(design.over_brightness):
+        for pair in pairs:
+            first, second = (design.setup.members[kind] for kind in pair)
+            key = f"{'noise' if noise else 'DN'} of {' and '.join(pair)} in case {number}"
+            parts.append(design.once(key, partial(_nearest_rows, lamps, curves, first, second, noise=noise)))
+    rows = Rows.joined(parts)
+    return rows.gaussian_decades() if decades else rows
+
+
+def _nearest_rows(
+    lamps: LampSlopes, curves: BrightnessCurves, first: IndexArray, second: IndexArray, *, noise: bool
+) -> Rows:
+    """Return squared distances of readings from the nearest points of curves."""
+    near = curves.refined(curves.nearest(first, second, noise=noise), noise=noise, rounds=_SEARCH_ROUNDS)
+    one = lamps.moments(near.reading, np.ones(near.reading.size))
+    other = lamps.moments(near.curve, near.factor)
+
+    (mean, variance, by_mean, by_variance), (mean_2, variance_2, by_mean_2, by_variance_2) = one, other
+    apart, spread = mean - mean_2, np.maximum(variance, STEPS_DN2) + np.maximum(variance_2, STEPS_DN2)
+    apart_along = apart + 1j * COMPLEX_STEP * (by_mean - by_mean_2)
+    spread_along = spread + 1j * COMPLEX_STEP * (by_variance + by_variance_2)
+    if not noise:
+        spread, spread_along = np.array(2.0), np.array(2.0)
+    along = (2 * apart_along**2 / spread_along).sum(axis=-1)
+    return Rows((2 * apart**2 / spread).sum(axis=-1), along.imag.T / COMPLEX_STEP)
+
+
+def _closed_rows(design: SmoothDesign, pairs: Sequence[Pair]) -> Rows:
+    """Return both squared orders of the chromatic distance of each two signals: min |y1 - a y2| and min |a y1 - y2|."""
     members = design.setup.members
 
-    def of(response: Smooth, variance: Smooth | None) -> Smooth:
+    def of(response: Smooth) -> Smooth:
         parts = []
         for a, b in pairs:
             shape = (*response.shape[:-2], len(members[a]), len(members[b]), response.shape[-1])
-            one, other = response[..., members[a], None, :], response[..., None, members[b], :]
-            if variance is not None:
-                deviation = _deviation(variance[..., members[a], None, :], variance[..., None, members[b], :])
-                one, other = one / deviation, other / deviation
-            one, other = np.broadcast_to(one, shape), np.broadcast_to(other, shape)
+            one = np.broadcast_to(response[..., members[a], None, :], shape)
+            other = np.broadcast_to(response[..., None, members[b], :], shape)
             area = parallelogram(one, other)
             for vector in (one, other):
                 squared = (vector**2).sum(axis=-1)
@@ -188,13 +195,7 @@ def chromatic_rows(design: SmoothDesign, *, pairs: Sequence[Pair], noise: bool) 
         return np.concatenate(parts, axis=-1)
 
     response, by_u = design.lamps
-    if not noise:
-        return Rows(of(response, None), of(response + 1j * COMPLEX_STEP * by_u, None).imag.T / COMPLEX_STEP)
-    mean, variance, mean_by_u, variance_by_u = design.noisy
-    # What saturation takes away from an HDR pixel's mean; else nothing.
-    response, by_u = response + (mean - design.response), by_u + (mean_by_u - design.response_by_u)
-    along = of(response + 1j * COMPLEX_STEP * by_u, variance + 1j * COMPLEX_STEP * variance_by_u)
-    return Rows(of(response, variance), along.imag.T / COMPLEX_STEP)
+    return Rows(of(response), of(response + 1j * COMPLEX_STEP * by_u).imag.T / COMPLEX_STEP)
 
 
 def smooth_chromatic(setup: Setup, curves: FloatArray, pair: Pair) -> FloatArray:
@@ -215,7 +216,20 @@ def smooth_chromatic(setup: Setup, curves: FloatArray, pair: Pair) -> FloatArray
         Distance, DN.
     """
     model = linear_model(setup)
-    response = model.smooth(curves) - model.unlit(curves, model.light.exposure_s(curves))[:, :, None]
     first, second = (setup.members[name] for name in pair)
+    if not model.linear_over_brightness:
+        limits, none = setup.scene.brightness or DARK_TO_FULL, np.empty((0, *curves.shape[1:]))
+        return np.array(
+            [
+                chromatic_distance(
+                    [BrightnessCurves(case.lamps, limits) for case in model.lamps_over_brightness(one, none)],
+                    first,
+                    second,
+                    noise=False,
+                )
+                for one in curves
+            ]
+        )
+    response = model.smooth(curves) - model.unlit(curves, model.light.exposure_s(curves))[:, :, None]
     over = [chromatic_separation(response[:, case], first, second) for case in range(response.shape[1])]
     return np.asarray(np.min(over, axis=0), dtype=float)

@@ -16,11 +16,13 @@ from ..camera.pwm import phases_of
 from ..camera.setup import Setup
 from ..designs.block import Block, CurveBlock
 from ..designs.family import Family
-from ..spectra.lights import class_pairs
+from ..spectra.lights import class_pairs, pair_name
 from ..vision.section import Vision
+from .brightness import DARK_TO_FULL, BrightnessCurves
+from .columns.chromatic import CHROMATIC_CSD, with_equal_brightness
 from .columns.color_separation import ColorSeparation
 from .columns.exposure import EXPOSURE
-from .metric import DesignMetric, FamilyMetric, NoiseMetric, PulseMetric, ReadoutMetric, VisionMetric
+from .metric import DesignMetric, FamilyMetric, LampMetric, NoiseMetric, PulseMetric, ReadoutMetric, VisionMetric
 from .quantity import BEST_PLACE, Columns, RequestedQuantities
 from .registry import METRICS, quantities_of
 from .separation import csd_name, separations, separations_along
@@ -359,6 +361,7 @@ def evaluate(
             {name: _merged(changing.which, along[name], rest[name]) for name in along}
             for along, rest in zip(*parts, strict=True)
         )
+    columns |= _over_brightness(setup, block, columns, states)
     if setup.all_phases:
         _refine_phases(model, block, columns)
     elif _nonlinear_over_pulse(setup) and setup.scene.field is None:
@@ -366,6 +369,33 @@ def evaluate(
     if setup.all_heights:
         _refine_heights(model, block, cases, columns)
     return columns | designed_quantities(setup, block)
+
+
+def _over_brightness(setup: Setup, block: Block, columns: Columns, states: Sequence[str]) -> Columns:
+    """Return columns of lamps of unknown brightness by their brightness curves: of noise, and where no closed form holds.
+
+    That is where a column is missing.
+    """
+    names = [pair_name(CHROMATIC_CSD, pair) for pair in class_pairs(setup.lights.classes)]
+    walked = np.any([np.isnan(columns[name]) for name in names], axis=0)
+    metrics = [metric for metric in METRICS if isinstance(metric, LampMetric)]
+    if not (walked.any() or states):
+        return {}
+    model = forward_model(setup.over_brightness)
+    made: Columns = {}
+    for design in range(len(walked)):
+        wanted = [metric for metric in metrics if (states if metric.of_states else walked[design])]
+        curves = block.some(slice(design, design + 1)).curves()
+        if not (wanted and np.isfinite(curves).all() and np.isfinite(columns[EXPOSURE][design])):
+            continue
+        brightness = setup.scene.brightness or DARK_TO_FULL
+        cases = [BrightnessCurves(lamps, brightness) for lamps in model.lamps(curves)]
+        for metric in wanted:
+            for name, value in metric.of_lamps(cases, setup.members, states).items():
+                if name not in made:
+                    made[name] = columns[name].copy() if name in columns else np.full(len(walked), np.nan)
+                made[name][design] = value
+    return made | (with_equal_brightness(columns | made, states) if states else {})
 
 
 def _merged(which: BoolArray, some: FloatArray, others: FloatArray) -> FloatArray:

@@ -13,6 +13,7 @@ from ..camera.setup import Setup
 from ..designs.block import Block
 from ..designs.family import Family
 from ..vision.section import Vision
+from .brightness import BrightnessCurves
 from .quantity import Columns, Quantity, RequestedQuantities
 
 
@@ -107,6 +108,33 @@ class NoiseMetric(Metric):
         -------
         dict of str to ndarray of shape (n_designs,)
             Column name -> values.
+        """
+
+
+class LampMetric(Metric):
+    """Metric of lamps of unknown brightness; `of_states`: only if a study names states that noise may confuse."""
+
+    of_states: ClassVar[bool] = False
+
+    @abstractmethod
+    def of_lamps(
+        self, cases: Sequence[BrightnessCurves], members: Mapping[str, IndexArray], states: Sequence[str]
+    ) -> dict[str, float]:
+        """Compute the columns of one design, the worst over all phases and moments.
+
+        Parameters
+        ----------
+        cases : sequence of BrightnessCurves
+            Readings of the lamps over their brightness in each case.
+        members : mapping of str to ndarray of int
+            Signals of each type.
+        states : sequence of str
+            Signal types that noise may confuse.
+
+        Returns
+        -------
+        dict of str to float
+            Column name -> value.
         """
 
 

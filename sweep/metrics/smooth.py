@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from ..base.types import FloatArray, IndexArray
+from ..camera.brightness import LampSlopes
 from ..camera.linear import LinearModel, linear_model
 from ..camera.setup import Setup
 from ..designs.family import Family
 from ..spectra.lights import Pair
 from ..vision.section import SeededVision
+from .brightness import DARK_TO_FULL, BrightnessCurves
 from .separation import separation
 
 if TYPE_CHECKING:
@@ -111,6 +113,15 @@ class Rows:
         """True if all values and derivatives are finite."""
         return bool(np.isfinite(self.values).all() and np.isfinite(self.by_u).all())
 
+    def gaussian_decades(self) -> Rows:
+        """Return -log10 of the errors Q(d / 2) of Gaussians at squared distances d^2 in units of their noise."""
+        from scipy.special import log_ndtr  # noqa: PLC0415  (slow to import: kept off the start-up path)
+
+        z = self.roots().scaled(0.5)
+        tail = log_ndtr(-z.values)
+        per = np.exp(-(z.values**2) / 2 - tail) / (np.sqrt(2 * np.pi) * np.log(10))
+        return Rows(-tail / np.log(10), per[:, None] * z.by_u)
+
     def without_nan(self) -> Rows:
         """Return the rows with zeros for NaN and infinity.
 
@@ -195,6 +206,18 @@ class SmoothDesign:
             return self._imager.merged_with_gradient(self.curves, self.by_u)
         variance = np.asarray(self._imager.variance(self.curves[None])[0], dtype=float)
         return self.response, variance, self.response_by_u, self._imager.variance_gradient(self.curves, self.by_u)
+
+    @property
+    def linear_over_brightness(self) -> bool:
+        """True if chromatic distances have their closed form."""
+        return self._imager.linear_over_brightness
+
+    @cached_property
+    def over_brightness(self) -> list[tuple[LampSlopes, BrightnessCurves]]:
+        """Readings and brightness curves of the lamps in each case."""
+        limits = self.setup.scene.brightness or DARK_TO_FULL
+        cases = self._imager.lamps_over_brightness(self.curves, self.by_u)
+        return [(lamps, BrightnessCurves(lamps.lamps, limits)) for lamps in cases]
 
     def linear(self, matrix: FloatArray) -> Rows:
         """Return linear functions of the parameters.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -11,27 +11,43 @@ from ...base.types import FloatArray, IndexArray
 from ..pixel import Pixel
 from . import moments
 
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
+
 _CUT = 1e-5
 _LEAST_PRNU = 1e-9
 """A smaller PRNU spaces nodes as evenly, but for rounding."""
 
 
 class MomentTable(NamedTuple):
-    """Cubics over the root of the expected electrons.
+    """Cubics over the root of the expected electrons: several values at once.
 
-    Parameters
-    ----------
-    nodes : ndarray of shape (n + 1,)
-        At least `moments.STEP` apart.
-    coefficients : ndarray of shape (3, n, 4)
-        Coefficients of each of `moments.moments`.
-    piece : ndarray of int
-        Piece at each multiple of `moments.STEP` from 0 up.
+    `nodes`, ndarray of shape (n + 1,), are at least `step` apart; `coefficients`, (n_values, n, 4), are of the pieces
+    between them; `piece` is that at each multiple of `step` from 0 up. From `last_e` electrons on values are constant.
     """
 
     nodes: FloatArray
     coefficients: FloatArray
     piece: IndexArray
+    last_e: float
+    step: float
+
+    @classmethod
+    def of(cls, spline: CubicSpline, last_e: float, step: float) -> MomentTable:
+        """Return the table of a spline with the values on axis 1."""
+        multiples = step * np.arange(int(spline.x[-1] / step) + 1)
+        piece = np.minimum(np.searchsorted(spline.x, multiples, side="right") - 1, spline.x.size - 2)
+        return cls(spline.x, np.ascontiguousarray(spline.c.T), piece, last_e, step)
+
+    def look_up(self, electrons: FloatArray, row: int) -> FloatArray:
+        """Return one of the values at some electrons."""
+        from .compiled import cubic_of_electrons  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+        values = np.empty(electrons.shape)
+        of_row = self.nodes, self.coefficients[row], self.piece, self.step
+        flat = np.ascontiguousarray(electrons, dtype=float).ravel()
+        cubic_of_electrons(flat, self.last_e, *of_row, values.ravel())
+        return values
 
 
 def mean_unrounded(electrons: FloatArray, pixel: Pixel) -> FloatArray:
@@ -49,7 +65,7 @@ def mean_unrounded(electrons: FloatArray, pixel: Pixel) -> FloatArray:
     ndarray of the same shape
         Mean, DN.
     """
-    return _looked_up(electrons, pixel, moments.UNROUNDED)
+    return tables(pixel).look_up(electrons, moments.UNROUNDED)
 
 
 def mean_rounded(electrons: FloatArray, pixel: Pixel) -> FloatArray:
@@ -67,7 +83,7 @@ def mean_rounded(electrons: FloatArray, pixel: Pixel) -> FloatArray:
     ndarray of the same shape
         Mean, DN.
     """
-    return _looked_up(electrons, pixel, moments.ROUNDED)
+    return tables(pixel).look_up(electrons, moments.ROUNDED)
 
 
 def variance(electrons: FloatArray, pixel: Pixel) -> FloatArray:
@@ -85,7 +101,7 @@ def variance(electrons: FloatArray, pixel: Pixel) -> FloatArray:
     ndarray of the same shape
         Variance, DN^2.
     """
-    return np.maximum(_looked_up(electrons, pixel, moments.VARIANCE), 0.0)
+    return np.maximum(tables(pixel).look_up(electrons, moments.VARIANCE), 0.0)
 
 
 @lru_cache(maxsize=64)
@@ -107,16 +123,6 @@ def unclipped_e(pixel: Pixel) -> tuple[float, float]:
     off = mean_unrounded(electrons, pixel) - pixel.dn_per_e * electrons - pixel.offset_dn
     kept = electrons[np.abs(off) <= _CUT * sigma + 1e-9]
     return (float(kept[0]), float(kept[-1])) if kept.size else (1.0, 0.0)
-
-
-def _looked_up(electrons: FloatArray, pixel: Pixel, row: int) -> FloatArray:
-    from .compiled import cubic_of_electrons  # noqa: PLC0415  (compiled: kept off the start-up path)
-
-    table, values = tables(pixel), np.empty(electrons.shape)
-    of = table.nodes, table.coefficients[row], table.piece
-    last_e = moments.LinearRange.of(pixel).last_e
-    cubic_of_electrons(np.ascontiguousarray(electrons, dtype=float).ravel(), last_e, *of, moments.STEP, values.ravel())
-    return values
 
 
 @lru_cache(maxsize=8)
@@ -145,6 +151,4 @@ def tables(pixel: Pixel) -> MomentTable:
         whole = CubicSpline(nodes, moments.moments(nodes**2, pixel), axis=1)
     else:
         whole = moments.table_without_prnu(pixel)
-    multiples = moments.STEP * np.arange(int(whole.x[-1] / moments.STEP) + 1)
-    piece = np.minimum(np.searchsorted(whole.x, multiples, side="right") - 1, whole.x.size - 2)
-    return MomentTable(whole.x, np.ascontiguousarray(whole.c.T), piece)
+    return MomentTable.of(whole, moments.LinearRange.of(pixel).last_e, moments.STEP)

@@ -1,24 +1,27 @@
-"""Chromatic separation of two signal types: without the part that is brightness."""
+"""Chromatic separation of two signal types: that of lamps of unknown brightness, in DN and under noise."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 
+import numpy as np
+
 from ...base.types import FloatArray, IndexArray
-from ...camera.forward import ForwardModel
-from ...camera.readout import NoisyReadout
+from ...camera.brightness import room_dn
 from ...camera.setup import Setup
 from ...spectra.lights import class_pairs, pair_name
-from ..chromatic import chromatic_rows, chromatic_separations, noise_referred
-from ..metric import NoiseMetric, ReadoutMetric
+from ..brightness import BrightnessCurves, chromatic_distance, error_of
+from ..chromatic import chromatic_rows, chromatic_separations
+from ..metric import LampMetric, ReadoutMetric
 from ..quantity import DN, Columns, Quantity, RequestedQuantities
+from .confusion import ERROR
 
-CHROMATIC_CSD, CHROMATIC_DPRIME = "chromatic_csd", "chromatic_dprime"
+CHROMATIC_CSD, CHROMATIC_DPRIME, CHROMATIC_ERROR = "chromatic_csd", "chromatic_dprime", "chromatic_error"
 
 
-class ChromaticSeparation(ReadoutMetric):
-    """Chromatic CSD of each pair of signal types."""
+class ChromaticSeparation(ReadoutMetric, LampMetric):
+    """Chromatic CSD of each pair of signal types: in closed form where readings are linear in the light."""
 
     order = 1
 
@@ -27,9 +30,9 @@ class ChromaticSeparation(ReadoutMetric):
             Quantity(
                 name=pair_name(CHROMATIC_CSD, pair),
                 metric=CHROMATIC_CSD,
-                meaning="chromatic separation: the distance of the two nearest lights of two types if either may have "
-                "any brightness, min(|y1|, |y2|) sin(angle) of their responses less those without lamps (black level, "
-                "dark current, background)",
+                meaning="chromatic separation: the smallest distance between the reading of a light and that of one of "
+                "another type of any brightness, from dark to beyond saturation, or within `brightness`; "
+                "min(|y1|, |y2|) sin(angle) of the responses less those without lamps where nothing saturates",
                 unit=DN,
                 label=f"chromatic {pair[0]}/{pair[1]} CSD",
                 digits=1,
@@ -45,46 +48,87 @@ class ChromaticSeparation(ReadoutMetric):
         )
 
     def of_readout(self, setup: Setup, response: FloatArray, unlit: FloatArray) -> Columns:
-        """Compute the columns; see `chromatic.chromatic_separations`."""
-        distances = chromatic_separations(response - unlit[:, None], setup.members)
-        return {pair_name(CHROMATIC_CSD, pair): distance_dn for pair, distance_dn in distances.items()}
-
-
-class ChromaticDetectability(NoiseMetric):
-    """Chromatic distance of each pair of states in units of the noise, the worst over sampling phases and moments."""
-
-    order = 5
-
-    def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
-        return tuple(
-            Quantity(
-                name=pair_name(CHROMATIC_DPRIME, pair),
-                metric=CHROMATIC_DPRIME,
-                meaning="chromatic separation in units of the noise: as `dprime_<a>_<b>`, if either lamp may have any "
-                "brightness",
-                label=f"chromatic {pair[0]}/{pair[1]} d'",
-                wanted="more",
-                ends=("min",),
-                goal=True,
-                nominal=True,  # each shift would take an evaluation with noise
-                pair=pair,
-                states=pair,
-                rows="squares",
-                smooth=partial(chromatic_rows, pairs=(pair,), noise=True),
-            )
-            for pair in class_pairs(requested.states)
-        )
-
-    def of_noise(
-        self, imager: ForwardModel, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
-    ) -> Columns:
-        """Compute the columns from mean and variance of the digital numbers."""
-        shape = (-1, *read.mean.shape[2:])
-        mean = (read.mean - imager.unlit(curves, read.exposure_s)[:, :, None]).reshape(shape)
-        variance = read.variance.reshape(shape)
+        """Compute the columns in closed form; NaN where a pixel may fill before lamps look most alike."""
+        room = room_dn(setup, response, unlit)
+        if not (room > 0).any():
+            distances = {pair: np.full(len(response), np.nan) for pair in class_pairs(list(setup.members))}
+        else:
+            distances = chromatic_separations(response - unlit[:, None], setup.members)
         return {
-            pair_name(CHROMATIC_DPRIME, (a, b)): noise_referred(mean, variance, members[a], members[b])
-            .reshape(read.mean.shape[:2])
-            .min(axis=1)
+            pair_name(CHROMATIC_CSD, pair): np.where(distance <= room, distance, np.nan)
+            for pair, distance in distances.items()
+        }
+
+    def of_lamps(
+        self, cases: Sequence[BrightnessCurves], members: Mapping[str, IndexArray], states: Sequence[str]
+    ) -> dict[str, float]:
+        """Compute the columns from brightness curves."""
+        return {
+            pair_name(CHROMATIC_CSD, (a, b)): chromatic_distance(cases, members[a], members[b], noise=False)
             for a, b in class_pairs(list(members))
         }
+
+
+class ChromaticConfusion(LampMetric):
+    """d' and error of each pair of states of lamps of unknown brightness, the worst over sampling phases and moments."""
+
+    order = 5
+    of_states = True
+
+    def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
+        of_noise = {"goal": True, "nominal": True}  # each shift would take an evaluation with noise
+        return tuple(
+            quantity
+            for pair in class_pairs(requested.states)
+            for quantity in (
+                Quantity(
+                    name=pair_name(CHROMATIC_DPRIME, pair),
+                    metric=CHROMATIC_DPRIME,
+                    meaning="smallest distance between the reading of a light and that of one of another type of any "
+                    "brightness, in units of the noise of both readings",
+                    label=f"chromatic {pair[0]}/{pair[1]} d'",
+                    wanted="more",
+                    ends=("min",),
+                    pair=pair,
+                    states=pair,
+                    rows="squares",
+                    smooth=partial(chromatic_rows, pairs=(pair,), noise=True),
+                    **of_noise,
+                ),
+                Quantity(
+                    name=pair_name(CHROMATIC_ERROR, pair),
+                    metric=CHROMATIC_ERROR,
+                    meaning="how often noise turns a light into one of another type of any brightness, for the worst "
+                    "two: the error of Gaussians at the smallest chromatic d', Q(d'/2), and at least that of equal "
+                    "brightness, `error_<a>_<b>`",
+                    label=f"chromatic {pair[0]}/{pair[1]} error",
+                    wanted="less",
+                    ends=("max",),
+                    pair=pair,
+                    states=pair,
+                    rows="decades",
+                    smooth=partial(chromatic_rows, pairs=(pair,), noise=True, decades=True),
+                    **of_noise,
+                ),
+            )
+        )
+
+    def of_lamps(
+        self, cases: Sequence[BrightnessCurves], members: Mapping[str, IndexArray], states: Sequence[str]
+    ) -> dict[str, float]:
+        """Compute the columns from brightness curves; see `with_equal_brightness`."""
+        columns = {}
+        for pair in class_pairs(list(states)):
+            dprime = chromatic_distance(cases, members[pair[0]], members[pair[1]], noise=True)
+            columns[pair_name(CHROMATIC_DPRIME, pair)] = dprime
+            columns[pair_name(CHROMATIC_ERROR, pair)] = float(error_of(np.array(dprime)))
+        return columns
+
+
+def with_equal_brightness(columns: Columns, states: Sequence[str]) -> Columns:
+    """Return errors of lamps of unknown brightness that are at least those of equal brightness."""
+    return {
+        name: np.maximum(columns[name], columns[pair_name(ERROR, pair)])
+        for pair in class_pairs(list(states))
+        for name in (pair_name(CHROMATIC_ERROR, pair),)
+    }

@@ -1,0 +1,218 @@
+"""Brightness curves: the readings of each lamp over its brightness, in one case of a scene.
+
+A lamp of brightness a, relative to that of the scene, sends a times its electrons to each pixel; full well, captures,
+merge and noise follow. The curve is smooth but for a knee wherever a pixel fills or hands over to its next capture.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.types import FloatArray, IndexArray
+from .effects import any_filter
+from .merge import merged, without_noise
+from .noise.table import unclipped_e
+from .pixel import unquantized
+from .pixel_curve import PixelCurve, pixel_curve
+from .readout import Readout
+from .setup import Setup
+
+_LEAST_E = 0.05
+"""Electrons of the brightest pixel at the dimmest node beside dark."""
+_RATIO, _RATIO_OF_MANY = 1.25, 1.06
+"""Ratio of neighboring nodes, and from where the first of many pixels is full."""
+_AROUND_KNEE = np.arange(-6.0, 6.1, 0.5)
+"""Nodes around a knee, standard deviations of the noise."""
+_BESIDE = 1e-9
+"""Nodes beside a knee without noise, where the reading may jump, relative."""
+_FEW = 16
+"""Pixels whose knees are each among the nodes."""
+_EQUAL = 1e-9
+_SEEN = 1e-4
+"""Weight of a pixel in a channel, relative to the largest, below which its knees are not waited for."""
+_MOST_RATIO = 1e9
+"""A pixel that so much more light would not fill is not waited for."""
+
+
+@dataclass(frozen=True)
+class LampReadings:
+    """Electrons of the lamps of a design in one case, and how they are read.
+
+    `lit_e`, [n_exposures, n_signals, n_elements], and `dark_e`, [n_exposures, n_elements]: electrons of the lamps at
+    the brightness of the scene, and without lamps. `light`: of the exposures on the elements, relative to a pixel of
+    full sensitivity. `readout`: that of the case alone.
+    """
+
+    lit_e: FloatArray
+    dark_e: FloatArray
+    light: FloatArray
+    readout: Readout
+    noisy: bool
+
+    @property
+    def n_signals(self) -> int:
+        """Number of lamps."""
+        return self.lit_e.shape[1]
+
+    @property
+    def _groups(self) -> list[tuple[tuple[float, ...], IndexArray]]:
+        """Elements with equal light of the exposures, in one group each."""
+        columns, which = np.unique(self.light, axis=1, return_inverse=True)
+        return [(tuple(column), np.flatnonzero(which.ravel() == at)) for at, column in enumerate(columns.T)]
+
+    @property
+    def proportional(self) -> bool:
+        """True if all exposures have their fixed share of the electrons: no pulse, crosstalk or QE tells them apart."""
+        full = [self.lit_e / self.light[:, None], self.dark_e / self.light]
+        return all(bool(np.allclose(one, one[:1], rtol=_EQUAL, atol=1e-12)) for one in full)
+
+    @property
+    def straight(self) -> bool:
+        """True if curves are straight between nodes: few pixels without noise, whose knees are all nodes."""
+        return not self.noisy and self.lit_e.shape[2] <= _FEW and self.proportional
+
+    @property
+    def full_e(self) -> tuple[FloatArray, FloatArray]:
+        """Electrons of a pixel of full sensitivity, of the lamps and without them."""
+        return self.lit_e[0] / self.light[0], self.dark_e[0] / self.light[0]
+
+    def pixel_curves(self) -> list[tuple[PixelCurve, IndexArray]]:
+        """Return what pixels read over their electrons, for groups of elements."""
+        return [(pixel_curve(self.readout.pixel, light, noisy=self.noisy), at) for light, at in self._groups]
+
+    def electrons(self, signals: IndexArray, factors: FloatArray) -> FloatArray:
+        """Return the electrons of some lamps, each at some brightnesses: [n_exposures, n, n_factors, n_elements]."""
+        return self.lit_e[:, signals, None] * factors[..., None] + self.dark_e[:, None, None]
+
+    def moments(self, signals: IndexArray, factors: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return mean, DN, and variance, DN^2, of each channel: [n, n_factors, n_channels].
+
+        `factors`: brightnesses of each of the `signals`, [n, n_factors].
+        """
+        if self.proportional:
+            lit_e, dark_e = self.full_e
+            full_e = lit_e[signals, None] * factors[..., None] + dark_e
+            mean, variance = np.empty(full_e.shape), np.empty(full_e.shape)
+            for curve, at in self.pixel_curves():
+                mean[..., at], variance[..., at] = curve.moments(full_e[..., at])
+        else:
+            electrons, pixel = self.electrons(signals, factors), self.readout.pixel
+            light = self.light[:, None, None]
+            if self.noisy:
+                values = merged(electrons, light, pixel)
+                mean, variance = values.mean, values.variance
+            else:
+                mean = without_noise(electrons, light, pixel, rounds=False)
+                variance = np.zeros(mean.shape)
+        return mean @ self.readout.weights[0], variance @ self.readout.spread_weights[0]
+
+    def nodes(self, least: float, most: float) -> FloatArray:
+        """Return brightnesses between which curves are nearly straight: [n_signals, n_nodes], from dark to all full.
+
+        `least`, `most`: ends of the brightness, relative to that of the scene.
+        """
+        lit_e, dark_e = self.full_e
+        weights = self.readout.weights[0]
+        seen = weights.max(axis=1) > _SEEN * weights.max()
+        lit_e, dark_e = lit_e[:, seen], dark_e[seen]
+        curves = [(curve, np.flatnonzero(np.isin(np.flatnonzero(seen), at))) for curve, at in self.pixel_curves()]
+        knees, widths = [], []
+        brightest_e = np.maximum(lit_e.max(axis=1, keepdims=True), 1e-300)
+        for curve, at in curves:
+            for knee_e, width in zip(curve.knees_e, curve.knee_widths, strict=True):
+                lit = np.maximum(lit_e[:, at], brightest_e / _MOST_RATIO)
+                knees.append(np.maximum(knee_e - dark_e[at], 0.0) / lit)
+                widths.append(np.full(knees[-1].shape, width))
+        at_knees, width = np.concatenate(knees, axis=1), np.concatenate(widths, axis=1)
+        last = at_knees.max(axis=1, keepdims=True) * (1 + 12 * width.max())
+        first = np.minimum(_LEAST_E / brightest_e, last / 2)
+        parts = [np.zeros_like(last), last, last * 1e3]
+        many = lit_e.shape[1] > _FEW
+        if self.noisy or many:
+            parts.append(_geometric(first, last, _RATIO))
+        if many:
+            parts.append(_geometric(0.9 * at_knees.min(axis=1, keepdims=True), last, _RATIO_OF_MANY))
+        elif self.noisy:
+            around = at_knees[..., None] * np.maximum(1 + width[..., None] * _AROUND_KNEE, 0.0)
+            parts.append(around.reshape(len(lit_e), -1))
+        else:
+            parts += [at_knees * (1 - _BESIDE), at_knees * (1 + _BESIDE)]
+        return np.sort(np.clip(np.concatenate(parts, axis=1), least, most), axis=1)
+
+
+def _geometric(first: FloatArray, last: FloatArray, ratio: float) -> FloatArray:
+    """Return steps of at most a ratio from the first to the last number of each row, equally many."""
+    decades = np.log(np.maximum(last / np.maximum(first, 1e-300), 1.0))
+    steps = max(1, int(np.ceil(decades.max() / np.log(ratio))))
+    return np.asarray(first * np.exp(decades * np.arange(steps + 1) / steps), dtype=float)
+
+
+def of_case(electrons: FloatArray, dark: FloatArray, readout: Readout, *, noisy: bool) -> LampReadings:
+    """Return the readings of a case from electrons with and without lamps.
+
+    `electrons`: [n_exposures, n_signals, n_elements], `dark` the same without lamps, [n_exposures, n_elements].
+    """
+    light = readout.capture_light if readout.pixel.captures else np.ones((1, dark.shape[1]))
+    return LampReadings(electrons - dark[:, None], dark, light, readout, noisy)
+
+
+def room_dn(setup: Setup, response: FloatArray, unlit: FloatArray) -> FloatArray:
+    """Return the chromatic distance up to which the closed form holds, DN; none of an HDR pixel or a range of brightness.
+
+    The closed form takes a lamp that is dimmer than it is. A brighter one has its fullest channel at least where its
+    brightest pixel is full, so that it is no nearer to a reading than that channel lies above the reading.
+
+    Parameters
+    ----------
+    setup : Setup
+        Scene and camera.
+    response : ndarray of shape (n_designs, n_signals, n_channels)
+        Readout, DN.
+    unlit : ndarray of shape (n_designs, n_channels)
+        Response without the lamps, DN.
+
+    Returns
+    -------
+    ndarray of shape (n_designs,)
+        Distance, DN; negative where no closed form holds.
+    """
+    pixel, scene = setup.camera.pixel, setup.scene
+    if pixel.captures or scene.brightness is not None:
+        return np.full(len(response), -np.inf)
+    full_e = pixel.saturation_e if scene.noise is None else unclipped_e(pixel)[1]
+    full_dn = unquantized(np.array(full_e), pixel) - unlit.max(axis=1)
+    above_dn = response.max(axis=(1, 2)) - unlit.min(axis=1)
+    if scene.target is not None or pixel.crosstalk:
+        # The mean of a channel is below its brightest pixel, and that is at most what a light has that fills the field.
+        least_dn = (response - unlit[:, None]).max(axis=2).min(axis=1)
+        full_dn = full_dn * least_dn / any_filter(setup).brightest_signal_dn
+    return np.asarray(full_dn - above_dn, dtype=float)
+
+
+@dataclass(frozen=True)
+class LampSlopes:
+    """Readings of the lamps of a design in one case, with derivatives by its free parameters.
+
+    `lit_by_u`, [n_free, n_signals, n_elements], and `dark_by_u`, [n_free, n_elements]: those of the electrons of a pixel
+    of full sensitivity.
+    """
+
+    lamps: LampReadings
+    lit_by_u: FloatArray
+    dark_by_u: FloatArray
+
+    def moments(
+        self, signals: IndexArray, factors: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return mean and variance of lamps, each at one brightness, [n, n_channels], and their derivatives first by u."""
+        readout, (lit_e, dark_e) = self.lamps.readout, self.lamps.full_e
+        mean, variance = (values[:, 0] for values in self.lamps.moments(signals, factors[:, None]))
+        full_e = lit_e[signals] * factors[:, None] + dark_e
+        by_mean, by_variance = np.empty(full_e.shape), np.empty(full_e.shape)
+        for curve, at in self.lamps.pixel_curves():
+            by_mean[:, at], by_variance[:, at] = curve.slopes(full_e[:, at])
+        by_u = self.lit_by_u[:, signals] * factors[:, None] + self.dark_by_u[:, None]
+        mean_by_u, variance_by_u = (by_mean * by_u) @ readout.weights[0], (by_variance * by_u) @ readout.spread_weights[0]
+        return mean, variance, mean_by_u, variance_by_u

@@ -1,0 +1,129 @@
+"""What a pixel reads over its expected electrons: mean and variance with slopes, and where it bends.
+
+Electrons are those of a pixel of full sensitivity; the captures of an HDR pixel have a fixed share of them each.
+Without noise the reading is that before rounding.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..base.types import FloatArray
+from . import merge
+from .noise import moments, table
+from .pixel import Pixel, unquantized
+from .readings import ROOT_STEP, nodes_of
+from .setup import Setup
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
+
+_LEAST_ROOT = 1e-3
+STEPS_DN2 = 1 / 12
+"""Least variance that a search takes, DN^2, as of rounding: a saturated pixel has none, and no direction to go."""
+
+
+@dataclass(frozen=True)
+class PixelCurve:
+    """A pixel, `light` of its exposures relative to full sensitivity (1 if it is read once), with noise or without."""
+
+    pixel: Pixel
+    light: tuple[float, ...]
+    noisy: bool
+
+    @cached_property
+    def knees_e(self) -> FloatArray:
+        """Electrons at which a capture hands over to the next, and from which on the last one is full."""
+        pixel = self.pixel
+        if not pixel.captures:
+            return np.array([pixel.saturation_e])
+        ends = [
+            (one.saturation_e if limit is None else (limit - one.offset_dn) / one.dn_per_e) / self.light[exposure]
+            for exposure, one, limit in zip(
+                merge.exposure_of(pixel), pixel.read_as, merge.limits_dn(pixel), strict=True
+            )
+        ]
+        return np.array(ends)
+
+    @cached_property
+    def knee_widths(self) -> FloatArray:
+        """Noise at each knee relative to its electrons; 0 without noise."""
+        if not self.noisy:
+            return np.zeros(self.knees_e.size)
+        pixel = self.pixel
+        shares = [self.light[at] for at in merge.exposure_of(pixel)] if pixel.captures else [1.0]
+        counts = self.knees_e * shares
+        read_e = np.array([one.read_noise_e for one in pixel.read_as or (pixel,)])
+        return np.asarray(np.sqrt(counts + read_e**2) / np.maximum(counts, 1e-9) + pixel.prnu, dtype=float)
+
+    def moments(self, electrons: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return mean, DN, and variance, DN^2."""
+        if self.noisy:
+            mean, variance = (self._table.look_up(electrons, row) for row in (0, 1))
+            return mean, np.maximum(variance, 0.0)
+        return self._noiseless(electrons), np.zeros(electrons.shape)
+
+    def slopes(self, electrons: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the derivatives of mean and variance by the electrons; of a variance below rounding, 0."""
+        if not self.noisy:
+            linear = unquantized(electrons, self.pixel.read_once)
+            inside = np.abs(self._noiseless(electrons) - linear) <= 1e-9 * np.maximum(linear, 1.0)
+            return self.pixel.dn_per_e * inside, np.zeros(electrons.shape)
+        last = np.sqrt(self._table.last_e)
+        root = np.clip(np.sqrt(np.maximum(electrons, 0.0)), _LEAST_ROOT, last)
+        by_mean, by_variance = np.where(root < last, np.moveaxis(self._by_root(root), -1, 0) / (2 * root), 0.0)
+        return by_mean, np.where(self.moments(electrons)[1] > STEPS_DN2, by_variance, 0.0)
+
+    def _noiseless(self, electrons: FloatArray) -> FloatArray:
+        pixel = self.pixel
+        if not pixel.captures:
+            return unquantized(np.minimum(electrons, pixel.saturation_e), pixel)
+        light = np.reshape(self.light, (-1, *(1,) * electrons.ndim))
+        return merge.without_noise(electrons * light, light, pixel, rounds=False)
+
+    @property
+    def _table(self) -> table.MomentTable:
+        return _merged(self.pixel, self.light) if self.pixel.captures else _read_once(self.pixel)
+
+    @cached_property
+    def _by_root(self) -> PPoly:
+        """Derivatives of both moments by the root of the electrons, on the last axis."""
+        from scipy.interpolate import PPoly  # noqa: PLC0415  (slow to import: kept off the start-up path)
+
+        pieces = self._table.coefficients.T
+        return PPoly(pieces, self._table.nodes).derivative()
+
+
+@lru_cache(maxsize=16)
+def _merged(pixel: Pixel, light: tuple[float, ...]) -> table.MomentTable:
+    """Tabulate mean and variance of merged values."""
+    from scipy.interpolate import CubicSpline  # noqa: PLC0415  (slow to import: kept off the start-up path)
+
+    of_exposure = np.array(light)
+    roots_e, is_node = nodes_of(pixel, of_exposure)
+    nodes_e = roots_e[is_node]
+    at_nodes = merge.merged(nodes_e * of_exposure[:, None], of_exposure[:, None], pixel)
+    spline = CubicSpline(np.sqrt(nodes_e), np.stack([at_nodes.mean, at_nodes.variance]), axis=1)
+    return table.MomentTable.of(spline, float(nodes_e[-1]), ROOT_STEP)
+
+
+@lru_cache(maxsize=16)
+def _read_once(pixel: Pixel) -> table.MomentTable:
+    """Take mean and variance of the digital number from the table of a pixel that is read once."""
+    whole = table.tables(pixel)
+    return whole._replace(coefficients=np.ascontiguousarray(whole.coefficients[[moments.ROUNDED, moments.VARIANCE]]))
+
+
+@lru_cache(maxsize=64)
+def pixel_curve(pixel: Pixel, light: tuple[float, ...], *, noisy: bool) -> PixelCurve:
+    """Return the curve of a pixel; cached with its tables."""
+    return PixelCurve(pixel, light, noisy)
+
+
+def is_noisy(setup: Setup) -> bool:
+    """Return whether readings are means under noise."""
+    return setup.scene.noise is not None and setup.computes("noise")
