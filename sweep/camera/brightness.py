@@ -7,6 +7,7 @@ merge and noise follow. The curve is smooth but for a knee wherever a pixel fill
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -56,13 +57,13 @@ class LampReadings:
         """Number of lamps."""
         return self.lit_e.shape[1]
 
-    @property
+    @cached_property
     def _groups(self) -> list[tuple[tuple[float, ...], IndexArray]]:
         """Elements with equal light of the exposures, in one group each."""
         columns, which = np.unique(self.light, axis=1, return_inverse=True)
         return [(tuple(column), np.flatnonzero(which.ravel() == at)) for at, column in enumerate(columns.T)]
 
-    @property
+    @cached_property
     def proportional(self) -> bool:
         """True if all exposures have their fixed share of the electrons: no pulse, crosstalk or QE tells them apart."""
         full = [self.lit_e / self.light[:, None], self.dark_e / self.light]
@@ -82,9 +83,15 @@ class LampReadings:
         """Return what pixels read over their electrons, for groups of elements."""
         return [(pixel_curve(self.readout.pixel, light, noisy=self.noisy), at) for light, at in self._groups]
 
-    def electrons(self, signals: IndexArray, factors: FloatArray) -> FloatArray:
-        """Return the electrons of some lamps, each at some brightnesses: [n_exposures, n, n_factors, n_elements]."""
-        return self.lit_e[:, signals, None] * factors[..., None] + self.dark_e[:, None, None]
+    def means(self, signals: IndexArray, factors: FloatArray) -> FloatArray:
+        """Return the mean of each channel, DN: [n, n_factors, n_channels], as of `moments`."""
+        if not self.proportional:
+            return self.moments(signals, factors)[0]
+        full_e, curves = self._full_e_at(signals, factors), self.pixel_curves()
+        mean = curves[0][0].mean(full_e)
+        for curve, at in curves[1:]:
+            mean[..., at] = curve.mean(full_e[..., at])
+        return np.asarray(mean @ self.readout.weights[0], dtype=float)
 
     def moments(self, signals: IndexArray, factors: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return mean, DN, and variance, DN^2, of each channel: [n, n_factors, n_channels].
@@ -92,14 +99,13 @@ class LampReadings:
         `factors`: brightnesses of each of the `signals`, [n, n_factors].
         """
         if self.proportional:
-            lit_e, dark_e = self.full_e
-            full_e = lit_e[signals, None] * factors[..., None] + dark_e
-            mean, variance = np.empty(full_e.shape), np.empty(full_e.shape)
-            for curve, at in self.pixel_curves():
+            full_e, curves = self._full_e_at(signals, factors), self.pixel_curves()
+            mean, variance = curves[0][0].moments(full_e)
+            for curve, at in curves[1:]:
                 mean[..., at], variance[..., at] = curve.moments(full_e[..., at])
         else:
-            electrons, pixel = self.electrons(signals, factors), self.readout.pixel
-            light = self.light[:, None, None]
+            electrons = self.lit_e[:, signals, None] * factors[..., None] + self.dark_e[:, None, None]
+            pixel, light = self.readout.pixel, self.light[:, None, None]
             if self.noisy:
                 values = merged(electrons, light, pixel)
                 mean, variance = values.mean, values.variance
@@ -107,6 +113,11 @@ class LampReadings:
                 mean = without_noise(electrons, light, pixel, rounds=False)
                 variance = np.zeros(mean.shape)
         return mean @ self.readout.weights[0], variance @ self.readout.spread_weights[0]
+
+    def _full_e_at(self, signals: IndexArray, factors: FloatArray) -> FloatArray:
+        """Return electrons of a pixel of full sensitivity, [n, n_factors, n_elements]."""
+        lit_e, dark_e = self.full_e
+        return np.asarray(lit_e[signals, None] * factors[..., None] + dark_e)
 
     def nodes(self, least: float, most: float) -> FloatArray:
         """Return brightnesses between which curves are nearly straight: [n_signals, n_nodes], from dark to all full.

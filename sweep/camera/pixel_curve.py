@@ -60,12 +60,14 @@ class PixelCurve:
         read_e = np.array([one.read_noise_e for one in pixel.read_as or (pixel,)])
         return np.asarray(np.sqrt(counts + read_e**2) / np.maximum(counts, 1e-9) + pixel.prnu, dtype=float)
 
+    def mean(self, electrons: FloatArray) -> FloatArray:
+        """Return the mean, DN."""
+        return self._table.look_up(electrons, 0) if self.noisy else self._noiseless(electrons)
+
     def moments(self, electrons: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return mean, DN, and variance, DN^2."""
-        if self.noisy:
-            mean, variance = (self._table.look_up(electrons, row) for row in (0, 1))
-            return mean, np.maximum(variance, 0.0)
-        return self._noiseless(electrons), np.zeros(electrons.shape)
+        spread = self._table.look_up(electrons, 1) if self.noisy else np.zeros(electrons.shape)
+        return self.mean(electrons), np.maximum(spread, 0.0)
 
     def slopes(self, electrons: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the derivatives of mean and variance by the electrons; of a variance below rounding, 0."""

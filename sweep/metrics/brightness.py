@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -18,11 +19,11 @@ from ..camera.noise.gaussian import share_below
 
 LEAST_DN2 = 1e-9
 """Least variance in units of which a distance is taken, DN^2."""
-_MARGIN = 2.25
-"""Pairs are refined that come as near as this times the nearest squared distance of all."""
-_MOST_PAIRS = 48
-_ROUNDS, _FINER = 3, 8
-"""Rounds of refinement, and the nodes in each segment around the nearest point."""
+_MARGINS = (1.7, 1.05)
+"""Pairs are refined, once and again, that come as near as this times the nearest squared distance of all."""
+_MOST_PAIRS = 200
+_FINER = 12
+"""Finer segments in the place of the nearest one and its neighbors."""
 DARK_TO_FULL = (0.0, np.inf)
 """Brightness from no light to where all pixels are full."""
 
@@ -49,37 +50,47 @@ class BrightnessCurves:
 
     def __init__(self, lamps: LampReadings, brightness: tuple[float, float] = DARK_TO_FULL) -> None:
         self.lamps = lamps
-        every = np.arange(lamps.n_signals)
         self._nodes = lamps.nodes(*brightness)
-        self._curves = lamps.moments(every, self._nodes)
-        mean, variance = lamps.moments(every, np.ones((every.size, 1)))
-        self.mean, self.variance = mean[:, 0], variance[:, 0]
+
+    @cached_property
+    def _readings(self) -> tuple[FloatArray, FloatArray]:
+        """Mean and variance of each lamp at the brightness of the scene, [n_signals, n_channels]."""
+        every = np.arange(self.lamps.n_signals)
+        mean, variance = self.lamps.moments(every, np.ones((every.size, 1)))
+        return np.ascontiguousarray(mean[:, 0]), np.ascontiguousarray(variance[:, 0])
+
+    @cached_property
+    def _means(self) -> FloatArray:
+        return self.lamps.means(np.arange(self.lamps.n_signals), self._nodes)
+
+    @cached_property
+    def _variances(self) -> FloatArray:
+        return self.lamps.moments(np.arange(self.lamps.n_signals), self._nodes)[1]
 
     def nearest(
-        self, first: IndexArray, second: IndexArray, *, noise: bool, margin: float = np.inf, within: float = np.inf
+        self, first: IndexArray, second: IndexArray, *, noise: bool, margin: float = np.inf, nearest: float = np.inf
     ) -> Nearest:
         """Return the points of curves that are nearest to readings, for each reading of one type and curve of the other.
 
-        Both orders of the types are taken. With a `margin`, those alone that are within it of the nearest one, and of
-        a squared distance `within`.
+        Both orders of the types are taken; pairs that are farther than `margin` times the nearest squared distance, or
+        times one that is known, may be at an infinite one.
         """
         reading = np.concatenate([np.repeat(first, second.size), np.repeat(second, first.size)])
         curve = np.concatenate([np.tile(second, first.size), np.tile(first, second.size)])
-        found = self._on(self._curves, self._nodes, reading, curve, curve, noise=noise, margin=margin)
-        if np.isfinite(margin):
-            most = margin * min(float(found.squared.min()), within)
-            order = np.argsort(found.squared, kind="stable")[:_MOST_PAIRS]
-            found = found.subset(order[found.squared[order] <= most])
-        return found
+        curves = self._means, self._variances if noise else self._means
+        return self._on(curves, self._nodes, reading, curve, curve, noise=noise, margin=margin, nearest=nearest)
 
-    def refined(self, found: Nearest, *, noise: bool, rounds: int = _ROUNDS) -> Nearest:
+    def refined(self, found: Nearest, *, noise: bool) -> Nearest:
         """Refine nearest points between finer nodes; curves that are straight between nodes need none."""
-        for _ in range(0 if self.lamps.straight and not noise else rounds):
-            low, high = found.bracket.T
-            nodes = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, 3 * _FINER + 1)
-            curves, rows = self.lamps.moments(found.curve, nodes), np.arange(found.curve.size)
-            found = self._on(curves, nodes, found.reading, found.curve, rows, noise=noise, margin=np.inf)
-        return found
+        if self.lamps.straight and not noise:
+            return found
+        (low, high), rows = found.bracket.T, np.arange(found.curve.size)
+        nodes = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, _FINER + 1)
+        if noise:
+            curves = self.lamps.moments(found.curve, nodes)
+        else:
+            curves = (self.lamps.means(found.curve, nodes),) * 2
+        return self._on(curves, nodes, found.reading, found.curve, rows, noise=noise)
 
     def _on(
         self,
@@ -90,7 +101,8 @@ class BrightnessCurves:
         rows: IndexArray,
         *,
         noise: bool,
-        margin: float,
+        margin: float = np.inf,
+        nearest: float = np.inf,
     ) -> Nearest:
         """Return the nearest points on curves between nodes; `rows`: the row of `curves` and `nodes` of each."""
         from .compiled_brightness import nearest_on_curves  # noqa: PLC0415  (compiled: kept off the start-up path)
@@ -98,8 +110,7 @@ class BrightnessCurves:
         squared, share = np.empty(rows.size), np.zeros(rows.size)
         segment = np.zeros(rows.size, dtype=np.intp)
         least = LEAST_DN2 if noise else 0.0
-        points = np.ascontiguousarray(self.mean), np.ascontiguousarray(self.variance)
-        nearest_on_curves(*points, *curves, reading, rows, least, margin, squared, segment, share)
+        nearest_on_curves(*self._readings, *curves, reading, rows, least, margin, nearest, squared, segment, share)
         low, high = nodes[rows, segment], nodes[rows, segment + 1]
         before = nodes[rows, np.maximum(segment - 1, 0)]
         after = nodes[rows, np.minimum(segment + 2, nodes.shape[1] - 1)]
@@ -110,14 +121,16 @@ def chromatic_distance(
     cases: Sequence[BrightnessCurves], first: IndexArray, second: IndexArray, *, noise: bool
 ) -> float:
     """Return the smallest distance of two types over all cases, in units of the noise or in DN."""
-    found, smallest = [], np.inf
+    found: list[Nearest] = []
+    least = np.inf
     for case in cases:
-        found.append(case.nearest(first, second, noise=noise, margin=_MARGIN, within=smallest))
-        smallest = min(smallest, float(found[-1].squared.min(initial=np.inf)))
-    for case, points in zip(cases, found, strict=True):
-        near = case.refined(points.subset(points.squared <= _MARGIN * smallest), noise=noise)
-        smallest = min(smallest, float(near.squared.min(initial=np.inf)))
-    return float(np.sqrt(smallest))
+        found.append(case.nearest(first, second, noise=noise, margin=_MARGINS[0], nearest=least))
+        least = min(least, float(found[-1].squared.min(initial=np.inf)))
+    for margin in _MARGINS:
+        most = margin * min(float(points.squared.min(initial=np.inf)) for points in found)
+        near = [points.subset(np.flatnonzero(points.squared <= most)[:_MOST_PAIRS]) for points in found]
+        found = [case.refined(points, noise=noise) for case, points in zip(cases, near, strict=True)]
+    return float(np.sqrt(min(float(points.squared.min(initial=np.inf)) for points in found)))
 
 
 def error_of(dprime: FloatArray) -> FloatArray:

@@ -26,8 +26,10 @@ from .separation import packed_response, pair_blocks
 from .smooth import Rows, SmoothDesign
 from .tasks.colorimetry import COMPLEX_STEP, Smooth
 
-_SEARCH_ROUNDS = 1
-"""Refinements of the nearest points that a search sees."""
+
+_SEEN, _REFINED = 16.0, 4.0
+"""A search sees the nearest points of pairs whose squared distance is at most so many times the smallest, and refines
+those of fewer; it sees others at the darkest point of the curve, which is no nearer."""
 
 
 def parallelogram(first: Smooth, second: Smooth) -> Smooth:
@@ -163,7 +165,9 @@ def _nearest_rows(
     lamps: LampSlopes, curves: BrightnessCurves, first: IndexArray, second: IndexArray, *, noise: bool
 ) -> Rows:
     """Return squared distances of readings from the nearest points of curves."""
-    near = curves.refined(curves.nearest(first, second, noise=noise), noise=noise, rounds=_SEARCH_ROUNDS)
+    near = curves.nearest(first, second, noise=noise, margin=_SEEN)
+    active = np.flatnonzero(near.squared <= _REFINED * near.squared.min())
+    near.factor[active] = curves.refined(near.subset(active), noise=noise).factor
     one = lamps.moments(near.reading, np.ones(near.reading.size))
     other = lamps.moments(near.curve, near.factor)
 

@@ -32,6 +32,7 @@ def nearest_on_curves(
     second: IndexArray,
     least: float,
     margin: float,
+    nearest: float,
     squared: FloatArray,
     segment: IndexArray,
     share: FloatArray,
@@ -40,7 +41,7 @@ def nearest_on_curves(
 
     Between two nodes mean and variance are straight. With `least` above 0 distances are in units of the noise, the
     mean of both variances, at least so much; else in DN. Pairs that are farther than `margin` times the nearest squared
-    distance of all may be left out: their distance is infinite.
+    distance of all, or times `nearest`, may be left out: their distance is infinite.
 
     Parameters
     ----------
@@ -59,7 +60,9 @@ def nearest_on_curves(
     n_blocks = (n_nodes - 2) // _BLOCK + 1
     low, high = np.empty((n_curves, n_blocks, n_channels)), np.empty((n_curves, n_blocks, n_channels))
     noise = np.empty((n_curves, n_blocks, n_channels))
-    for curve in range(n_curves):
+    wanted = np.zeros(n_curves, np.bool_)
+    wanted[second] = True
+    for curve in np.flatnonzero(wanted):
         for block in range(n_blocks):
             begin, end = block * _BLOCK, min(block * _BLOCK + _BLOCK, n_nodes - 1)
             for c in range(n_channels):
@@ -69,7 +72,6 @@ def nearest_on_curves(
                     low[curve, block, c] = min(low[curve, block, c], curve_mean[curve, node, c])
                     high[curve, block, c] = max(high[curve, block, c], curve_mean[curve, node, c])
                     noise[curve, block, c] = max(noise[curve, block, c], curve_variance[curve, node, c])
-    nearest = np.inf
     for pair in range(first.size):
         point, spread, curve = mean[first[pair]], variance[first[pair]], second[pair]
         best = np.inf
