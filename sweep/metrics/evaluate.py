@@ -19,11 +19,11 @@ from ..designs.family import Family
 from ..spectra.lights import class_pairs, pair_name
 from ..vision.section import Vision
 from .brightness import DARK_TO_FULL, BrightnessCurves
-from .columns.chromatic import CHROMATIC_CSD, with_equal_brightness
+from .columns.chromatic import CHROMATIC_CSD, CHROMATIC_DPRIME, with_equal_brightness
 from .columns.color_separation import ColorSeparation
 from .columns.exposure import EXPOSURE
 from .metric import DesignMetric, FamilyMetric, LampMetric, NoiseMetric, PulseMetric, ReadoutMetric, VisionMetric
-from .quantity import BEST_PLACE, Columns, RequestedQuantities
+from .quantity import BEST_PLACE, Columns, Quantity, RequestedQuantities
 from .registry import METRICS, quantities_of
 from .separation import csd_name, separations, separations_along
 from .user_metrics import UserMetric, user_quantities
@@ -42,6 +42,7 @@ _Part = Callable[[slice], FloatArray]
 _Extra = Callable[[int, _Part, _Part], Columns]
 """Columns of n designs from the whole readout of parts of them, and from the response without lamps."""
 _CSD = [metric for metric in METRICS if isinstance(metric, ColorSeparation)]
+_LAMPS = [metric for metric in METRICS if isinstance(metric, LampMetric)]
 
 
 def designed_quantities(setup: Setup, designs: FloatArray | Block) -> Columns:
@@ -378,24 +379,40 @@ def _over_brightness(setup: Setup, block: Block, columns: Columns, states: Seque
     """
     names = [pair_name(CHROMATIC_CSD, pair) for pair in class_pairs(setup.lights.classes)]
     walked = np.any([np.isnan(columns[name]) for name in names], axis=0)
-    metrics = [metric for metric in METRICS if isinstance(metric, LampMetric)]
     if not (walked.any() or states):
         return {}
-    model = forward_model(setup.over_brightness)
     made: Columns = {}
     for design in range(len(walked)):
-        wanted = [metric for metric in metrics if (states if metric.of_states else walked[design])]
+        wanted = [metric for metric in _LAMPS if (states if metric.of_states else walked[design])]
         curves = block.some(slice(design, design + 1)).curves()
         if not (wanted and np.isfinite(curves).all() and np.isfinite(columns[EXPOSURE][design])):
             continue
-        brightness = setup.scene.brightness or DARK_TO_FULL
-        cases = [BrightnessCurves(lamps, brightness) for lamps in model.lamps(curves)]
-        for metric in wanted:
-            for name, value in metric.of_lamps(cases, setup.members, states).items():
-                if name not in made:
-                    made[name] = columns[name].copy() if name in columns else np.full(len(walked), np.nan)
-                made[name][design] = value
+        for name, value in of_lamps(setup, curves, states, wanted).items():
+            if name not in made:
+                made[name] = columns[name].copy() if name in columns else np.full(len(walked), np.nan)
+            made[name][design] = value
     return made | (with_equal_brightness(columns | made, states) if states else {})
+
+
+def of_lamps(
+    setup: Setup, curves: FloatArray, states: Sequence[str], metrics: Sequence[LampMetric]
+) -> dict[str, float]:
+    """Return columns of lamps of unknown brightness of one design, ndarray of shape (1, n_modified, n_wavelengths)."""
+    brightness = setup.scene.brightness or DARK_TO_FULL
+    lamps = forward_model(setup.over_brightness).lamps(curves)
+    cases = [BrightnessCurves(of_case, brightness) for of_case in lamps]
+    return {k: v for metric in metrics for k, v in metric.of_lamps(cases, setup.members, states).items()}
+
+
+def evaluate_one(model: ForwardModel, curves: FloatArray, quantity: Quantity, states: Sequence[str]) -> float:
+    """Return one quantity of one design, by no more than its own metric where that needs none of the other columns."""
+    if quantity.metric == CHROMATIC_DPRIME:
+        metrics = [metric for metric in _LAMPS if metric.of_states]
+        return of_lamps(model.setup, curves, states, metrics)[quantity.name]
+    for metric in METRICS:
+        if isinstance(metric, PulseMetric) and quantity.metric in metric.names:
+            return float(metric.of_pulses(model, curves)[quantity.name][0])
+    return float(evaluate(model, curves, states)[quantity.name][0])
 
 
 def _merged(which: BoolArray, some: FloatArray, others: FloatArray) -> FloatArray:

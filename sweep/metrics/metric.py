@@ -139,7 +139,9 @@ class LampMetric(Metric):
 
 
 class PulseMetric(Metric):
-    """Metric of a pulsed lamp in an HDR pixel."""
+    """Metric of a pulsed lamp in an HDR pixel; `names`: of its columns."""
+
+    names: ClassVar[tuple[str, ...]]
 
     @abstractmethod
     def of_pulses(self, model: ForwardModel, curves: FloatArray) -> Columns:

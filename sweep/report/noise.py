@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from ..base.types import BoolArray, FloatArray
+from ..metrics.columns.chromatic import CHROMATIC_ERROR
 from ..metrics.columns.confusion import D_PRIME, STATE_ERROR, STATE_ERROR_BOUND
 from ..metrics.recognition import CLASSIFIERS, MOST_LIKELY
 from ..results.output import Output
@@ -26,10 +27,11 @@ _COMPUTED = (
     "passes it."
 )
 _LEAST_DPRIME, _DRAWN_DPRIME = "d' of the worst pair of states", (0.1, 1e4)
-_ANY = "error, lamps of unknown intensity"
+_ANY = "error, lamps of unknown brightness"
 _ANY_NOTE = (
-    "A camera does not know how bright a lamp is: each signal is compared with those of other states at all "
-    "intensities of the axis. Noise is taken as Gaussian."
+    "A camera does not know how bright a lamp is: each signal is compared with those of other states of any brightness, "
+    "by Gaussians with the noise of both. The dashed line is the error that the study allows; a ring marks where a "
+    "design passes it."
 )
 _COUNTED = (
     "Counted: of raw patches drawn with noise, of all signals, the share whose state a classifier says that was "
@@ -77,19 +79,15 @@ def _noise_figures(output: Output) -> Iterator[SeriesFigure]:
     for (base, key), scenarios in series_of(output.scenarios).items():
         draw = partial(SeriesFigure, key=key, x=np.array(list(scenarios.values())), band="", base=base)
         where = f"{output.study.study}, {base}"
-        passes = _crossings(output, base, key)
-        errors = {
-            name: Line(np.maximum(error, _LEAST), None, passes.get(name))
-            for name, error in over_series(output.few, scenarios, STATE_ERROR).items()
-        }
         allowed = output.study.recognition.error_max
-        of_any = _any_intensity(output, base, key)
-        if of_any:
-            lines = {name: Line(np.maximum(error, _LEAST), None) for name, error in of_any.items()}
-            y_label = f"{_ANY} ({_LEAST:g}: or less)"
-            yield draw(f"{where}: {_ANY}", y_label=y_label, lines=lines, log_y=True, level=allowed, note=_ANY_NOTE)
-        y_label = f"{_ERROR} ({_LEAST:g}: or less)"
-        yield draw(f"{where}: {_ERROR}", y_label=y_label, lines=errors, log_y=True, level=allowed, note=_COMPUTED)
+        for quantity, title, note in ((CHROMATIC_ERROR, _ANY, _ANY_NOTE), (STATE_ERROR, _ERROR, _COMPUTED)):
+            passes = _crossings(output, base, key, quantity)
+            lines = {
+                name: Line(np.maximum(error, _LEAST), None, tuple((at, allowed) for at in passes.get(name, ())))
+                for name, error in over_series(_with_worst_error(output), scenarios, quantity).items()
+            }
+            y_label = f"{title} ({_LEAST:g}: or less)"
+            yield draw(f"{where}: {title}", y_label=y_label, lines=lines, log_y=True, level=allowed, note=note)
         if output.study.pixel.captures:
             least = output.few[_dprimes(output)].min(axis=1).clip(*_DRAWN_DPRIME)
             dprimes = over_series(output.few.assign(**{D_PRIME: least}), scenarios, D_PRIME)
@@ -122,21 +120,21 @@ def usable_lines(output: Output) -> Iterator[str]:
     allowed = output.study.recognition.error_max
     for (base, key), scenarios in series_of(output.scenarios).items():
         name, unit = quantity_of(key)
-        x, passes = np.array(list(scenarios.values())), _crossings(output, base, key)
-        ranges: dict[str, list[str]] = {}
-        for design, errors in over_series(output.few, scenarios, STATE_ERROR).items():
-            where = _range(x, errors <= allowed, unit, passes.get(design))
-            ranges.setdefault(where, []).append(design)
-        of_any: dict[str, list[str]] = {}
-        for design, errors in _any_intensity(output, base, key).items():
-            of_any.setdefault(_range(x, errors <= allowed, unit, None), []).append(design)
-        if of_any:
-            usable = "; ".join(f"{', '.join(designs)} {where}" for where, designs in of_any.items())
-            yield f"With lamps of unknown intensity, at most {_rate(allowed)} over {name}: {usable}."
-        if ranges:
-            usable = "; ".join(f"{', '.join(designs)} {where}" for where, designs in ranges.items())
-            equal = " of equal intensity" if of_any else ""
-            yield f"At most {_rate(allowed)} between the worst two states{equal}, over {name}: {usable}."
+        x = np.array(list(scenarios.values()))
+        for quantity, of in ((CHROMATIC_ERROR, "with lamps of unknown brightness"), (STATE_ERROR, "of equal brightness")):
+            passes, ranges = _crossings(output, base, key, quantity), dict[str, list[str]]()
+            for design, errors in over_series(_with_worst_error(output), scenarios, quantity).items():
+                where = usable_range(x, errors <= allowed, unit, passes.get(design))
+                ranges.setdefault(where, []).append(design)
+            if ranges:
+                usable = "; ".join(f"{', '.join(designs)} {where}" for where, designs in ranges.items())
+                yield f"At most {_rate(allowed)} between the worst two states {of}, over {name}: {usable}."
+
+
+def _with_worst_error(output: Output) -> pd.DataFrame:
+    """Return the rows with the worst error of any two states of lamps of unknown brightness."""
+    of_pairs = [name for name, column in output.columns.items() if column.metric == CHROMATIC_ERROR]
+    return output.few.assign(**{CHROMATIC_ERROR: output.few[of_pairs].max(axis=1)})
 
 
 def _rate(allowed: float) -> str:
@@ -145,26 +143,38 @@ def _rate(allowed: float) -> str:
     return f"1 error in {one_in:,}" if math.isclose(one_in * allowed, 1, rel_tol=1e-9) else f"{allowed:g} errors"
 
 
-def _range(x: FloatArray, usable: BoolArray, unit: str, passes: tuple[float, float] | None) -> str:
-    """Return the usable range of a design in words, by the computed crossing if there is one."""
-    if usable.all():
-        return "everywhere"
-    if not usable.any():
-        return "nowhere"
-    ends = np.flatnonzero(np.diff(usable))
+def usable_range(x: FloatArray, usable: BoolArray, unit: str, passes: FloatArray | None) -> str:
+    """Return the usable range of a design in words, by the computed crossings if there are any."""
     of = f" of {unit}" if " " in unit else f" {unit}".rstrip()
-    if len(ends) > 1:
-        runs = [run for run in np.split(np.arange(x.size), ends + 1) if usable[run[0]]]
-        spans = [f"{x[run[0]]:.3g}" + (f" to {x[run[-1]]:.3g}" if run.size > 1 else "") for run in runs]
-        return f"at {', '.join(spans)}{of}"
-    word = "up to" if usable[0] else "from"
-    if passes is None:
+    if passes is None or passes.size % 2 != int(usable[0] != usable[-1]):
+        ends = np.flatnonzero(np.diff(usable))
+        if not ends.size:
+            return "everywhere" if usable.all() else "nowhere"
+        if ends.size > 1:
+            runs = [run for run in np.split(np.arange(x.size), ends + 1) if usable[run[0]]]
+            return f"at {', '.join(_span(x[run[0]], x[run[-1]]) for run in runs)}{of}"
         low, high = (float(f"{end:.3g}") for end in x[ends[0] : ends[0] + 2])
-        return f"{word} a number between {low:g} and {high:g}{of}"
-    return f"{word} {_rounded(passes[0], up=not usable[0])}{of}"
+        return f"{'up to' if usable[0] else 'from'} a number between {low:g} and {high:g}{of}"
+    if not passes.size:
+        return "everywhere" if usable[0] else "nowhere"
+    edges = [-math.inf, *passes.tolist()] if usable[0] else passes.tolist()
+    edges += [math.inf] if usable[-1] else []
+    parts = []
+    for low, high in zip(edges[::2], edges[1::2], strict=True):
+        if math.isinf(low):
+            parts.append(f"up to {rounded(high, up=False)}")
+        elif math.isinf(high):
+            parts.append(f"from {rounded(low, up=True)}")
+        else:
+            parts.append(f"from {rounded(low, up=True)} to {rounded(high, up=False)}")
+    return f"{' and '.join([', '.join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)}{of}"
 
 
-def _rounded(value: float, *, up: bool) -> str:
+def _span(low: float, high: float) -> str:
+    return f"{low:.3g}" + (f" to {high:.3g}" if high > low else "")
+
+
+def rounded(value: float, *, up: bool) -> str:
     """Return a number with three digits, rounded to one side."""
     unit = 10.0 ** (math.floor(math.log10(abs(value))) - 2) if value else 1.0
     rounded = (math.ceil if up else math.floor)(value / unit * (1 - 1e-12)) * unit
@@ -172,21 +182,14 @@ def _rounded(value: float, *, up: bool) -> str:
     return f"{float(text):g}" if "e" in text else text
 
 
-def _crossings(output: Output, series: str, key: str) -> dict[str, tuple[float, float]]:
-    """Return the number at which each design has the allowed error, and that error."""
+def _crossings(output: Output, series: str, key: str, quantity: str) -> dict[str, FloatArray]:
+    """Return the numbers at which each design has the allowed error, in order; empty for those that have it nowhere."""
     if output.crossings is None:
         return {}
-    known = output.crossings.dropna(subset=["at", "error"])
-    known = known[(known["series"] == series) & (known["key"] == key)]
-    return dict(zip(known["name"], zip(known["at"], known["error"], strict=True), strict=True))
-
-
-def _any_intensity(output: Output, series: str, key: str) -> dict[str, FloatArray]:
-    """Return errors with signals of any intensity, over the series, by design."""
-    if output.any_intensity is None or key not in output.any_intensity:
-        return {}
-    known = output.any_intensity[output.any_intensity["series"] == series].sort_values(key, kind="stable")
-    return {str(name): part["error"].to_numpy(dtype=float) for name, part in known.groupby("name", sort=False)}
+    known = output.crossings[(output.crossings["series"] == series) & (output.crossings["key"] == key)]
+    known = known[known["quantity"] == quantity]
+    names = output.few["name"].dropna().unique()
+    return {str(name): np.sort(known.loc[known["name"] == name, "at"].to_numpy(dtype=float)) for name in names}
 
 
 def _dprimes(output: Output) -> list[str]:

@@ -49,13 +49,13 @@ class Line:
         Values.
     upper : ndarray of shape (n,) or None
         Upper end of its band.
-    passes : tuple of float, optional
-        Number at which it passes the level of the figure, and its value there.
+    passes : tuple of (float, float)
+        Numbers at which it passes the level of the figure, and its value there.
     """
 
     y: FloatArray
     upper: FloatArray | None
-    passes: tuple[float, float] | None = None
+    passes: tuple[tuple[float, float], ...] = ()
 
     def over(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return numbers and values as drawn, with the crossing among them.
@@ -70,10 +70,10 @@ class Line:
         x, y : ndarray
             Points of the line.
         """
-        if self.passes is None:
-            return x, self.y
-        at = np.searchsorted(x, self.passes[0])
-        return np.insert(x, at, self.passes[0]), np.insert(self.y, at, self.passes[1])
+        numbers = np.concatenate([x, [number for number, _ in self.passes]])
+        values = np.concatenate([self.y, [value for _, value in self.passes]])
+        order = np.argsort(numbers, kind="stable")
+        return numbers[order], values[order]
 
 
 @dataclass(frozen=True)
@@ -360,8 +360,8 @@ def draw_series(series: SeriesFigure) -> Figure:
         axes.plot(*line.over(series.x), linestyle=dash, color=color, linewidth=next(widths))
         axes.plot(series.x, line.y, "o", color=color, markersize=3.5)
         axes.plot([], [], "o", linestyle=dash, color=color, label=name, linewidth=1.5, markersize=3.5)
-        if line.passes is not None:
-            axes.plot(*line.passes, "o", markerfacecolor="none", markeredgecolor=color, markersize=9)
+        for passed in line.passes:
+            axes.plot(*passed, "o", markerfacecolor="none", markeredgecolor=color, markersize=9)
         if (marks := series.marks.get(name)) is not None:
             x, y = line.over(series.x)
             axes.plot(marks, _between(marks, x, y, series), "|", color=color, markersize=11, markeredgewidth=1.2)

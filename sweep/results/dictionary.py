@@ -158,12 +158,13 @@ FILES = {
     files.CURVES: "a row per curve and wavelength: " + ", ".join(SCHEMA.names),
     files.POINTS: "points of the clouds: design_id, signal_type, signal, channel, dn",
     files.RECOGNITION: "raw patches classified, where a study asks for them, with 95 % intervals",
-    files.CROSSINGS: "where a study with `recognition` has scenarios that differ in one number: the number `at` which "
-    "a plain CFA, named design or answer of the search has the allowed error, between those of two scenarios (`low`, "
-    "`high`), with everything on, and the `error` there; null where no study may have a scene between the two",
-    files.ANY_INTENSITY: "where a study with `recognition` has scenarios that differ in `intensity_cd`: for each plain "
-    "CFA, named design and answer of the search (`name`) and intensity, the smallest d' of a signal from one of "
-    "another state at any intensity of the series (`other_cd`), and the `error` of Gaussians at it",
+    files.CROSSINGS: "where a study with `recognition` has scenarios that differ in one number: the numbers `at` which "
+    "the error of a plain CFA, named design or answer of the search is the allowed one, with everything on, the `error` "
+    "there, and whether it `rises` beyond; `quantity`: `state_error` of lamps of equal brightness, or `chromatic_error` "
+    "of lamps of any",
+    files.WORST: "where scenarios differ in one number, and lamps are pulsed or the search maximizes the worst of the "
+    "scenarios: for each plain CFA, named design and answer of the search the worst `value` of a `quantity`, and the "
+    "number `at` which it is, also between two scenarios, with everything on",
     files.HANDOVERS: "where the pixel has captures and scenarios differ in one number: for each plain CFA, named "
     "design and answer of the search (`name`), channel and signal type, the number `at` which the median signal "
     "reaches the threshold of each capture (from 1 on), or saturation of the last one; inf: at none of the series, "

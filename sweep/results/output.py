@@ -58,7 +58,7 @@ class Output:
     evaluations. `audited`: rows of `sweep audit`; `left_out`: a row per light that was left out of a search; `regions`:
     cells of the maps of color regions. `error_against_noise`: color error against noise, `rendered`: areas of pictures;
     `places`: separations over the sensor; `map`: the best objective over two parameters; `handovers`: where captures of
-    an HDR pixel are full; `any_intensity`: lamps of unknown intensity; `uncertainty`: quantiles over random sensors;
+    an HDR pixel are full; `worst`: worst values over series; `uncertainty`: quantiles over random sensors;
     `vision`: tables of the benchmark of vision by their files' names.
     """
 
@@ -83,7 +83,7 @@ class Output:
     places: pd.DataFrame | None
     map: pd.DataFrame | None
     handovers: pd.DataFrame | None
-    any_intensity: pd.DataFrame | None
+    worst: pd.DataFrame | None
     uncertainty: pd.DataFrame | None
     vision: Mapping[str, pd.DataFrame]
     profiles: Mapping[str, Sequence[ParameterProfile]]
@@ -312,7 +312,7 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         places=more.get(files.SENSOR_MAP),
         map=more.get(files.MAP),
         handovers=more.get(files.HANDOVERS),
-        any_intensity=more.get(files.ANY_INTENSITY),
+        worst=more.get(files.WORST),
         uncertainty=more.get(files.UNCERTAINTY),
         vision={name: more[name] for name in files.VISION_TABLES if name in more},
         profiles=profiles.found if all(made.grid is not None for made in study.sweeps.values()) else {},

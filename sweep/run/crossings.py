@@ -1,25 +1,24 @@
-"""Usable range of designs: the number between two scenarios at which the state error is the allowed one."""
+"""Usable ranges of designs: the numbers between two scenarios at which an error is the allowed one."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
-from functools import partial, reduce
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pyarrow as pa
-from pydantic import ValidationError
 
 from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..camera.forward import ForwardModel
-from ..camera.scene import Scene
-from ..camera.setup import Setup
+from ..metrics.columns.chromatic import CHROMATIC_ERROR
 from ..metrics.columns.confusion import STATE_ERROR, state_errors
-from ..results.designs import few_rows, row_curves
+from ..metrics.evaluate import evaluate
+from ..results.designs import rows_of_series
+from ..spectra.lights import class_pairs, pair_name
 from ..study import Study
-from ..study.axes import series_of
+from .between import Between, between, inner_numbers, or_nan
 from .workers import run_with_progress
 
 if TYPE_CHECKING:
@@ -27,22 +26,22 @@ if TYPE_CHECKING:
 
 _LEAST = 1e-300
 _CLOSE = 1e-3
-"""Relative tolerance of the number."""
+"""Tolerance of the number: relative, or of the interval."""
+_NEAR = 3.0
+"""Between two scenarios whose d' are both so many times the allowed one, or less, errors are not looked for."""
 _SCHEMA = pa.schema(
     [("design_id", pa.int64())]
-    + [(name, pa.string()) for name in ("name", "series", "key")]
-    + [(name, pa.float64()) for name in ("low", "high", "at", "error")]
+    + [(name, pa.string()) for name in ("name", "series", "key", "quantity")]
+    + [(name, pa.float64()) for name in ("at", "error")]
+    + [("rises", pa.bool_())]
 )
-_Path = tuple[str, ...]
-"""Keys to a number of a scene."""
 
 
 def crossings_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: Progress) -> pa.Table:
-    """Find where the error of designs passes the allowed one, with all effects.
+    """Find all numbers at which an error of a design passes the allowed one, with all effects.
 
-    One row per series of scenarios (`series`, `key`) and design whose error passes the limit once: `low` and `high`
-    are the numbers of the two scenarios, `at` is the crossing, `error` the error there; `design_id` is that of the row
-    at `low`.
+    One row per series of scenarios (`series`, `key`), design, kind of error (`quantity`: lamps of equal brightness, or of
+    any) and crossing: `rises` if the error is larger beyond `at`.
 
     Parameters
     ----------
@@ -62,150 +61,77 @@ def crossings_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progre
     """
     recognition = study.section.recognition
     assert recognition is not None
-    few, allowed = few_rows(rows), recognition.error_max
-    made: list[dict[str, Any]] = []
-    calls = []
-    for (series, key), scenarios in series_of(study.scenarios).items():
-        for row, ends, errors in _passing(few, scenarios, allowed):
-            numbers = (scenarios[ends[0]], scenarios[ends[1]])
-            path = _differing(study, ends, numbers)
-            if path is not None:
-                space, curves = row_curves(study, row)
-                between = partial(setup_between, study, study.setup(space, ends[0]), ends[0], path)
-                calls.append(delayed(_crossing, between, curves, study.states, numbers, errors, allowed))
-                design = {"design_id": row["design_id"], "name": row["name"], "series": series, "key": key}
-                made.append(design | {"low": numbers[0], "high": numbers[1]})
+    keys, calls = [], []
+    for series, key, scenarios, row, curves, space in rows_of_series(study, rows):
+        scenes = between(study, study.setup(space, next(iter(scenarios))), scenarios)
+        of_design = rows[(rows["name"] == row["name"]) & rows["scenario"].isin(list(scenarios))].set_index("scenario")
+        of_any = of_design[[pair_name(CHROMATIC_ERROR, pair) for pair in class_pairs(study.states)]].max(axis=1)
+        for quantity, errors in ((STATE_ERROR, of_design[STATE_ERROR]), (CHROMATIC_ERROR, of_any)):
+            known = errors.reindex(list(scenarios)).to_numpy(dtype=float)
+            if scenes is not None and np.isfinite(known).all():
+                keys.append({"design_id": row["design_id"], "name": row["name"], "series": series, "key": key})
+                keys[-1]["quantity"] = quantity
+                numbers = dict(zip(scenarios.values(), known.tolist(), strict=True))
+                calls.append(delayed(_crossings, scenes, curves, study.states, quantity, numbers, recognition.error_max))
     answers = run_with_progress(parallel, calls, "where designs stop being usable", progress)
-    return pa.Table.from_pylist([row | at for row, at in zip(made, answers, strict=True)], schema=_SCHEMA)
+    made = [key | at for key, found in zip(keys, answers, strict=True) for at in found]
+    return pa.Table.from_pylist(made, schema=_SCHEMA)
 
 
-def _passing(
-    few: Sequence[Mapping[Any, Any]], scenarios: Mapping[str, float], allowed: float
-) -> Iterator[tuple[Mapping[Any, Any], tuple[str, str], tuple[float, float]]]:
-    """Yield designs whose error passes the allowed one once: the row before, both scenarios, and their errors."""
-    designs: dict[str, dict[str, Mapping[Any, Any]]] = {}
-    for row in few:
-        if row["scenario"] in scenarios:
-            designs.setdefault(row["name"], {})[row["scenario"]] = row
-    for by_scene in designs.values():
-        if by_scene.keys() != scenarios.keys():
-            continue
-        errors = {name: float(by_scene[name][STATE_ERROR]) for name in scenarios}
-        turns = [(a, b) for a, b in pairwise(scenarios) if (errors[a] <= allowed) != (errors[b] <= allowed)]
-        if len(turns) == 1:
-            a, b = turns[0]
-            yield by_scene[a], (a, b), (errors[a], errors[b])
+def worst_error(scenes: Between, curves: FloatArray, states: tuple[str, ...], quantity: str, number: float) -> float:
+    """Return the error of the worst pair of states, for lamps of equal brightness or of any."""
+    model = ForwardModel(scenes.at(number), once=True)
+    if quantity == STATE_ERROR:
+        return float(state_errors(model, curves, states)[0])
+    columns = evaluate(model, curves, states)
+    return max(float(columns[pair_name(CHROMATIC_ERROR, pair)][0]) for pair in class_pairs(states))
 
 
-def _differing(study: Study, ends: tuple[str, str], numbers: tuple[float, float]) -> _Path | None:
-    """Return the only number in which two scenarios differ, if it is the one in their names, else None."""
-    one, other = (dict(_leaves(_section(study, name))) for name in ends)
-    paths = [path for path in {**one, **other} if one.get(path) != other.get(path)]
-    values = [leaves.get(path) for path in paths for leaves in (one, other)]
-    if len(paths) == 1 and all(
-        isinstance(value, int | float) and math.isclose(value, number, rel_tol=1e-9)
-        for value, number in zip(values, numbers, strict=True)
-    ):
-        return paths[0]
-    return None
-
-
-def _section(study: Study, scenario: str) -> dict[str, Any]:
-    section: dict[str, Any] = study.scenarios[scenario].model_dump(mode="json", by_alias=True, exclude_none=True)
-    return section
-
-
-def _leaves(section: Any, path: _Path = ()) -> Iterator[tuple[_Path, Any]]:
-    if isinstance(section, Mapping):
-        for key, inner in section.items():
-            yield from _leaves(inner, (*path, key))
-    else:
-        yield path, section
-
-
-def setup_between(study: Study, setup: Setup, scenario: str, path: _Path, number: float) -> Setup:
-    """Return the setup of a scenario with another number and all effects.
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    setup : Setup
-        Scene and camera.
-    scenario : str
-        Scenario.
-    path : tuple
-        Key of the number.
-    number : float
-        Its value.
-
-    Returns
-    -------
-    Setup
-        Setup.
-
-    Raises
-    ------
-    ValidationError
-        If no study may have such a scene.
-    """
-    section = _section(study, scenario)
-    reduce(lambda inner, key: inner[key], path[:-1], section)[path[-1]] = number
-    scene = Scene.model_validate(section)
-    return replace(setup, scene=scene, left_out=frozenset()).with_camera(pixel=study.pixel_in(scene))
-
-
-def state_error_of(setup: Setup, curves: FloatArray, states: tuple[str, ...]) -> float:
-    """Return the error of the worst pair of states.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-    curves : ndarray of shape (1, n_modified, n_wavelengths)
-        QE of the modified channels.
-    states : tuple of str
-        Signal types.
-
-    Returns
-    -------
-    float
-        Error probability.
-    """
-    return float(state_errors(ForwardModel(setup, once=True), curves, states)[0])
-
-
-def _crossing(
-    between: Callable[[float], Setup],
+def _crossings(
+    scenes: Between,
     curves: FloatArray,
     states: tuple[str, ...],
-    ends: tuple[float, float],
-    errors: tuple[float, float],
+    quantity: str,
+    known: Mapping[float, float],
     allowed: float,
-) -> dict[str, float]:
-    """Return the number with the allowed error, and the error there; empty if no scene in between exists.
+) -> list[dict[str, Any]]:
+    """Return the numbers at which the error is the allowed one, in order.
 
-    The logarithms of both numbers are nearly on a line.
+    The logarithms of both are nearly on a line between two neighboring ones.
     """
     from scipy.optimize import brentq  # noqa: PLC0415  (few studies ask for it)
+    from scipy.special import ndtri  # noqa: PLC0415
 
-    by_ratio = min(ends) > 0
-    positions = tuple(math.log(end) if by_ratio else end for end in ends)
-    known = dict(zip(positions, errors, strict=True))
+    by_ratio = min(known) > 0
+    computed = or_nan(lambda number: worst_error(scenes, curves, states, quantity, number))
 
-    def number_at(position: float) -> float:
+    def decades(number: float) -> float:
+        error = known[number] if number in known else computed(number)
+        return math.log10(max(error, _LEAST) / allowed)
+
+    def at(position: float) -> float:
         return math.exp(position) if by_ratio else position
 
-    def error_at(position: float) -> float:
-        if position not in known:
-            known[position] = state_error_of(between(number_at(position)), curves, states)
-        return known[position]
+    found = []
+    for low, high in pairwise(known):
+        dprimes = -ndtri(np.clip([known[low], known[high], allowed], _LEAST, 0.5))
+        passes = (known[low] <= allowed) != (known[high] <= allowed)
+        if not passes and (dprimes[:2].min() > _NEAR * dprimes[2] or dprimes[:2].max() * _NEAR < dprimes[2]):
+            continue
+        grid = [low, *inner_numbers([low, high])[1:-1], high]
+        grid = [number for number in grid if not math.isnan(decades(number))]
+        for one, other in pairwise(grid):
+            if (decades(one) <= 0) == (decades(other) <= 0):
+                continue
+            ends = (math.log(one), math.log(other)) if by_ratio else (one, other)
+            tolerance = _CLOSE * (1.0 if by_ratio else abs(other - one))
+            number = at(brentq(lambda position: _snapped(decades, at(position), one, other), *ends, xtol=tolerance))
+            error = allowed * 10 ** decades(number)
+            found.append({"at": number, "error": error, "rises": decades(other) > 0})
+    return found
 
-    def decades(position: float) -> float:
-        return math.log10(max(error_at(position), _LEAST) / allowed)
 
-    try:
-        position = brentq(decades, *positions, xtol=_CLOSE * (1.0 if by_ratio else abs(ends[1] - ends[0])))
-        return {"at": number_at(position), "error": error_at(position)}
-    except ValidationError:
-        return {}
+def _snapped(decades: Any, number: float, low: float, high: float) -> float:
+    """Return the decades at a number, at an end itself where rounding has moved it there."""
+    ends: Sequence[float] = (low, high)
+    return float(decades(next((end for end in ends if math.isclose(end, number, rel_tol=1e-14)), number)))

@@ -13,7 +13,6 @@ from ..base.types import IndexArray, Parallel, Progress
 from ..results.curves import FilterCurves, KeptCurves
 from ..results.designs import computed_rows, row_curves, row_space
 from ..results.tables import (
-    ANY_INTENSITY,
     CROSSINGS,
     CURVES,
     FOUND,
@@ -28,12 +27,12 @@ from ..results.tables import (
     TRADED,
     UNCERTAINTY,
     VALIDATED,
+    WORST,
 )
 from ..search.limit import Limit
 from ..study import Study
 from ..study.axes import series_of
 from .allowed_lamps import regions_table
-from .any_intensity import INTENSITY, any_intensity_table
 from .colors import error_against_noise_table, rendered_table
 from .crossings import crossings_table
 from .details import Details, limited_by_table, recognition_table, sensor_map_table
@@ -41,6 +40,7 @@ from .handovers import handovers_table
 from .held_out import held_out_table
 from .robustness import robustness_table
 from .uncertainty import uncertainty_table
+from .worst import has_worst, worst_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -130,8 +130,8 @@ def row_tables(study: Study) -> dict[str, Callable[[DerivedInput], pa.Table]]:
         tables[SENSOR_MAP] = lambda s: sensor_map_table(s.study, s.rows, s.parallel, s.progress)
     if study.section.pixel.captures and series_of(study.scenarios):
         tables[HANDOVERS] = lambda s: handovers_table(s.study, s.rows, s.parallel, s.progress)
-    if recognition is not None and any(key == INTENSITY for _, key in series_of(study.scenarios)):
-        tables[ANY_INTENSITY] = lambda s: any_intensity_table(s.study, s.rows, s.parallel, s.progress)
+    if has_worst(study):
+        tables[WORST] = lambda s: worst_table(s.study, s.rows, s.parallel, s.progress)
     if recognition is not None and series_of(study.scenarios):
         tables[CROSSINGS] = lambda s: crossings_table(s.study, s.rows, s.parallel, s.progress)
     if recognition is not None and recognition.patches:

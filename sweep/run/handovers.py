@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
 
-from ..base.types import FloatArray, Parallel, Progress, delayed
+from ..base.types import FloatArray, IndexArray, Parallel, Progress, delayed
 from ..camera.linear import linear_model
 from ..camera.merge import limits_dn
 from ..camera.setup import Setup
 from ..results.designs import rows_of_series
 from ..study import Study
+from .between import Between, between
 from .workers import run_with_progress
 
 if TYPE_CHECKING:
     import pandas as pd
 
+_CLOSE = 1e-6
 _SCHEMA = pa.schema(
     [(name, pa.string()) for name in ("name", "series", "key", "channel", "signal_type")]
     + [("capture", pa.int64()), ("at", pa.float64())]
@@ -30,8 +32,7 @@ def handovers_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progre
 
     One row per series of scenarios (`series`, `key`), design, channel, signal type and capture (from 1 on): `at` is the
     number at which the expected reading reaches the capture's threshold, or saturation for the last one; -inf or inf if
-    it is below or above all numbers of the series. Between two scenarios it is interpolated in the logarithms, which is
-    exact for intensity and exposure without background and dark current.
+    it is below or above all numbers of the series.
 
     Parameters
     ----------
@@ -51,26 +52,34 @@ def handovers_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progre
     """
     keys, calls = [], []
     for series, key, scenarios, row, curves, space in rows_of_series(study, rows):
-        setups = [study.setup(space, scenario) for scenario in scenarios]
-        keys.append({"name": row["name"], "series": series, "key": key})
-        calls.append(delayed(_handovers, setups, curves, np.array([*scenarios.values()])))
+        first = study.setup(space, next(iter(scenarios)))
+        scenes = between(study, first, scenarios)
+        if scenes is not None:
+            keys.append({"name": row["name"], "series": series, "key": key})
+            calls.append(delayed(_handovers, first, scenes, curves, np.array([*scenarios.values()])))
     answers = run_with_progress(parallel, calls, "handovers of captures", progress)
     made = [key | row for key, rows_of_design in zip(keys, answers, strict=True) for row in rows_of_design]
     return pa.Table.from_pylist(made, schema=_SCHEMA)
 
 
-def _handovers(setups: Sequence[Setup], curves: FloatArray, numbers: FloatArray) -> list[dict[str, Any]]:
+def _handovers(setup: Setup, scenes: Between, curves: FloatArray, numbers: FloatArray) -> list[dict[str, Any]]:
     """Return rows of the table without their keys."""
-    setup, pixel = setups[0], setups[0].camera.pixel
-    expected_e = []
-    for scene in setups:
-        model = linear_model(scene)
-        dn = model.smooth(curves)[0].mean(axis=0)  # over sampling phases, field positions and moments of a pulse
-        expected_e.append((dn - model.setup.camera.pixel.offset_dn) / model.setup.camera.pixel.dn_per_e)
-    of_scenes, made = np.stack(expected_e), []
+    pixel, known, made = setup.camera.pixel, dict[float, FloatArray](), []
+
+    def electrons(number: float) -> FloatArray:
+        """Return expected electrons, the mean over phases, field positions and moments, [n_signals, n_channels]."""
+        if number not in known:
+            model = linear_model(scenes.at(number))
+            dn, once = model.smooth(curves)[0].mean(axis=0), model.setup.camera.pixel
+            known[number] = (dn - once.offset_dn) / once.dn_per_e
+        return known[number]
+
     for at, channel in enumerate(setup.camera.mosaic.channels):
         for kind, members in setup.members.items():
-            typical_e = np.median(of_scenes[:, members, at], axis=1)
+
+            def typical_e(number: float, at: int = at, members: IndexArray = members) -> float:
+                return float(np.median(electrons(number)[members, at]))
+
             for number, (capture, one, limit) in enumerate(
                 zip(pixel.captures, pixel.read_as, limits_dn(pixel), strict=True), 1
             ):
@@ -81,16 +90,19 @@ def _handovers(setups: Sequence[Setup], curves: FloatArray, numbers: FloatArray)
     return made
 
 
-def _reached(numbers: FloatArray, values: FloatArray, limit: float) -> float:
+def _reached(numbers: FloatArray, value: Callable[[float], float], limit: float) -> float:
     """Return the first number at which ascending values reach a limit."""
-    above = values >= limit
+    from scipy.optimize import brentq  # noqa: PLC0415  (few studies ask for it)
+
+    above = np.array([value(number) >= limit for number in numbers])
     if not above.any():
         return float("inf")
     at = int(above.argmax())
     if at == 0:
         return float("-inf")
-    if min(values[at - 1], numbers[at - 1]) > 0:
-        share = np.log(limit / values[at - 1]) / np.log(values[at] / values[at - 1])
-        return float(numbers[at - 1] * (numbers[at] / numbers[at - 1]) ** share)
-    share = (limit - values[at - 1]) / (values[at] - values[at - 1])
-    return float(numbers[at - 1] + share * (numbers[at] - numbers[at - 1]))
+    low, high = (float(number) for number in numbers[at - 1 : at + 1])
+    if min(low, value(low)) > 0:  # on a line in the logarithms without background and dark current
+        number = low * (high / low) ** (np.log(limit / value(low)) / np.log(value(high) / value(low)))
+        if abs(value(number) / limit - 1) < _CLOSE:
+            return float(number)
+    return float(brentq(lambda number: value(number) - limit, low, high, rtol=_CLOSE))

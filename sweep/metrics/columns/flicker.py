@@ -21,6 +21,7 @@ class Flicker(PulseMetric):
     """Changes of a lamp's readout with the phase of its pulses, which is uniform."""
 
     order = 6
+    names = (MODULATION, LAMP_SEEN, FALSE_HUE)
 
     def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
         if not requested.flicker:

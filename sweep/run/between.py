@@ -1,0 +1,115 @@
+"""Scenes between the scenarios of a series, and the worst value of a quantity over them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from ..base.types import FloatArray
+from ..camera.scene import Scene
+from ..camera.setup import Setup
+from ..study import Study
+
+STEPS = 8
+"""Numbers between two neighboring scenarios at which a quantity is computed before its worst one is refined."""
+_STARTS, _ROUNDS, _FINER = 5, 3, 6
+"""Numbers from which the worst is refined, rounds, and steps in each."""
+_Path = tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Between:
+    """Scenes of a series with any number between those of its scenarios, with all effects."""
+
+    study: Study
+    setup: Setup
+    scenario: str
+    path: _Path
+
+    def at(self, number: float) -> Setup:
+        """Return the setup with a number; raises pydantic's ValidationError if no study may have such a scene."""
+        section = _section(self.study, self.scenario)
+        reduce(lambda inner, key: inner[key], self.path[:-1], section)[self.path[-1]] = number
+        scene = Scene.model_validate(section)
+        return replace(self.setup, scene=scene, left_out=frozenset()).with_camera(pixel=self.study.pixel_in(scene))
+
+
+def between(study: Study, setup: Setup, scenarios: Mapping[str, float]) -> Between | None:
+    """Return the scenes between scenarios that differ in the number of their names alone, else None."""
+    names = list(scenarios)
+    leaves = [dict(_leaves(_section(study, name))) for name in names]
+    paths = {path for of in leaves for path in of if of.get(path) != leaves[0].get(path)}
+    if len(paths) != 1:
+        return None
+    path = paths.pop()
+    values = [of.get(path) for of in leaves]
+    same = all(
+        isinstance(value, int | float) and math.isclose(value, number, rel_tol=1e-9)
+        for value, number in zip(values, scenarios.values(), strict=True)
+    )
+    return Between(study, setup, names[0], path) if same else None
+
+
+def _section(study: Study, scenario: str) -> dict[str, Any]:
+    section: dict[str, Any] = study.scenarios[scenario].model_dump(mode="json", by_alias=True, exclude_none=True)
+    return section
+
+
+def _leaves(section: Any, path: _Path = ()) -> Iterator[tuple[_Path, Any]]:
+    if isinstance(section, Mapping):
+        for key, inner in section.items():
+            yield from _leaves(inner, (*path, key))
+    else:
+        yield path, section
+
+
+def inner_numbers(numbers: Sequence[float], steps: int = STEPS) -> FloatArray:
+    """Return numbers with some between each two: of equal ratio where all are above 0, else of equal difference."""
+    positions = np.log(numbers) if min(numbers) > 0 else np.array(numbers, dtype=float)
+    fine = np.interp(np.arange((len(numbers) - 1) * (steps + 1) + 1) / (steps + 1), np.arange(len(numbers)), positions)
+    return np.asarray(np.exp(fine) if min(numbers) > 0 else fine, dtype=float)
+
+
+def least_between(value: Callable[[float], float], numbers: Sequence[float]) -> tuple[float, float]:
+    """Return the number with the least value, and that value: by steps between the numbers, then refined.
+
+    Values may be NaN where there is no scene.
+    """
+    grid = inner_numbers(numbers)
+    values = np.array([value(number) for number in grid])
+    if np.isnan(values).all():
+        return math.nan, math.nan
+    known = np.where(np.isnan(values), np.inf, values)
+    lower = (known <= np.concatenate([[np.inf], known[:-1]])) & (known <= np.concatenate([known[1:], [np.inf]]))
+    starts = np.flatnonzero(lower)[np.argsort(known[lower], kind="stable")][:_STARTS]
+    best = min((float(known[at]), float(grid[at])) for at in starts)
+    for start in starts:
+        low, high = grid[max(start - 1, 0)], grid[min(start + 1, grid.size - 1)]
+        for _ in range(_ROUNDS):
+            finer = inner_numbers([low, high], _FINER)
+            of_finer = np.nan_to_num([value(number) for number in finer], nan=np.inf)
+            at = int(of_finer.argmin())
+            best = min(best, (float(of_finer[at]), float(finer[at])))
+            low, high = finer[max(at - 1, 0)], finer[min(at + 1, finer.size - 1)]
+    return best[1], best[0]
+
+
+def or_nan(value: Callable[[float], float]) -> Callable[[float], float]:
+    """Return a cached function that is NaN where no study may have the scene."""
+    known: dict[float, float] = {}
+
+    def cached(number: float) -> float:
+        if number not in known:
+            try:
+                known[number] = value(number)
+            except ValidationError:
+                known[number] = math.nan
+        return known[number]
+
+    return cached

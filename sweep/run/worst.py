@@ -1,0 +1,87 @@
+"""Worst values of quantities over the numbers of a series, also between its scenarios."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pyarrow as pa
+
+from ..base.types import FloatArray, Parallel, Progress, delayed
+from ..camera.forward import ForwardModel
+from ..metrics.columns.flicker import FALSE_HUE, LAMP_SEEN, MODULATION
+from ..metrics.evaluate import evaluate_one
+from ..metrics.quantity import Quantity
+from ..results.designs import rows_of_series
+from ..study import Study
+from ..study.axes import series_of
+from .between import Between, between, least_between, or_nan
+from .workers import run_with_progress
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_SCHEMA = pa.schema(
+    [(name, pa.string()) for name in ("name", "series", "key", "quantity")]
+    + [(name, pa.float64()) for name in ("at", "value")]
+)
+
+
+def refined_quantities(study: Study) -> list[Quantity]:
+    """Return the quantities whose worst value over a series is told: those of flicker, and what a search of a series
+    maximizes."""
+    names = [FALSE_HUE, LAMP_SEEN, MODULATION]
+    if study.search is not None and len(study.search.scenarios) > 1:
+        names += study.objective.weights
+    return [study.quantities[name] for name in names if name in study.quantities]
+
+
+def worst_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: Progress) -> pa.Table:
+    """Find the worst values of designs over each series, with all effects.
+
+    One row per series of scenarios (`series`, `key`), design and quantity: the worst `value`, and the number `at` which
+    it is, also between two scenarios.
+
+    Parameters
+    ----------
+    study : Study
+        Study of the run.
+    rows : pandas.DataFrame
+        Rows of plain CFAs, named designs and the answer.
+    parallel : callable
+        Runs calls on the cores.
+    progress : callable
+        Called with a phase, work done and work in total.
+
+    Returns
+    -------
+    pyarrow.Table
+        Table.
+    """
+    keys, calls = [], []
+    for series, key, scenarios, row, curves, space in rows_of_series(study, rows):
+        scenes = between(study, study.setup(space, next(iter(scenarios))), scenarios)
+        for quantity in refined_quantities(study):
+            if scenes is not None and rows[rows["name"] == row["name"]][quantity.name].notna().any():
+                keys.append({"name": row["name"], "series": series, "key": key, "quantity": quantity.name})
+                calls.append(delayed(worst_over, scenes, curves, quantity, study.states, [*scenarios.values()]))
+    answers = run_with_progress(parallel, calls, "worst values between scenarios", progress)
+    made = [key | {"at": at, "value": value} for key, (at, value) in zip(keys, answers, strict=True)]
+    return pa.Table.from_pylist(made, schema=_SCHEMA)
+
+
+def worst_over(
+    scenes: Between, curves: FloatArray, quantity: Quantity, states: tuple[str, ...], numbers: list[float]
+) -> tuple[float, float]:
+    """Return the number with the worst value of a design, and that value."""
+    sign = -1.0 if quantity.wanted == "less" else 1.0
+
+    def value(number: float) -> float:
+        return sign * evaluate_one(ForwardModel(scenes.at(number), once=True), curves, quantity, states)
+
+    at, least = least_between(or_nan(value), numbers)
+    return at, sign * least
+
+
+def has_worst(study: Study) -> bool:
+    """Return whether a study has series with quantities whose worst value is told."""
+    return bool(refined_quantities(study)) and bool(series_of(study.scenarios))
