@@ -151,6 +151,7 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
     notes = [
         *_colorants(output, best),
         *([edges] if (edges := _edges(best)) else []),
+        *_convergence(output, best),
         *([] if stated is None else [stated.description]),
     ]
     who = full_name(best) + (f" ({'; '.join(notes)})" if notes else "")
@@ -179,11 +180,18 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
         yield limits
     yield from unseen_lines(output)
     for row in leaders.others:
-        name = full_name(row)
+        name = " ".join([full_name(row), *(f"({note})" for note in _convergence(output, row))])
         if row["kind"] != FOUND:
             same = " that meets the same" if output.constraints else ""
             name = f"the best of {row['cfa']}{same}, {label(row)},"
         yield f"{capital(name)} {_format_separation(output, row)}{_format_limit(output, row)}."
+
+
+def _convergence(output: Output, row: Row) -> Iterator[str]:
+    """Yield a note on the answer of a search that did not converge."""
+    search = output.provenance.search
+    if row["kind"] == FOUND and search is not None and not search.converged:
+        yield "best found; no start converged"
 
 
 def _equal(output: Output, best: Row) -> str:

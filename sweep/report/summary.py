@@ -77,7 +77,8 @@ def summary_lines(output: Output, took_s: float | None = None) -> list[str]:
         starts, evaluations = _count(facts.search.starts, "start"), _count(facts.search.evaluations, "evaluation")
         if facts.search.combinations:
             lines.append(f"Tried: {', '.join(facts.search.combinations)} of colorants.")
-        lines.append(f"Search: {facts.search.algorithm}, {starts}, {evaluations}: {reached}.")
+        algorithms = " and ".join(filter(None, (facts.search.algorithm, facts.search.refinement)))
+        lines.append(f"Search: {algorithms}, {starts}, {evaluations}: {reached}.")
         lines.append(_limit_line(output, facts.search))
     if facts.hypervolume:
         areas = ", ".join(f"{name} {area:.3f}" for name, area in facts.hypervolume.items() if area > 0)

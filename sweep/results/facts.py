@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from ..base.errors import OutputError, ValidationIssue
 from ..metrics.quantity import Column
+from ..search.problem import CONVERGED
 
 _MOST_SHOWN = 10
 _Model = TypeVar("_Model", bound=BaseModel)
@@ -91,6 +92,7 @@ class SearchFacts(_Facts):
 
     `scenario`: of several (`scenarios`) the one in which the answer is worst. `cfa`, `channel`: the searched ones.
     `bounded`: kind and name of the spaces whose feasible filters the limit holds for, in that scenario.
+    `refinement`: the algorithm that continued from the best point of all starts; `endings` has its status at the end.
     """
 
     algorithm: str
@@ -116,6 +118,12 @@ class SearchFacts(_Facts):
     no_limit: str | None
     front_evaluations: int
     combinations: tuple[str, ...] = ()
+    refinement: str | None = None
+
+    @property
+    def converged(self) -> bool:
+        """True if a start or the refinement has converged."""
+        return any(ending in CONVERGED for ending in self.endings)
 
 
 class Provenance(_Facts):

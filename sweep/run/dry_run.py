@@ -10,6 +10,7 @@ from ..results.folder import run_in
 from ..results.identity import fingerprint
 from ..results.parts import Parts
 from ..results.tables import PLAIN, RESULTS
+from ..search.solver import refinement_of
 from ..search.trade_off import most_searches
 from ..study import Study
 from .held_out import most_evaluations_left_out
@@ -94,9 +95,13 @@ def remaining_work_lines(todo: RemainingWork, output: Path) -> Iterator[str]:
     elif search is not None:
         starts = min(search.starts, search.max_evaluations)
         per_start = search.max_evaluations // starts
-        yield f"Search: {_count(starts, 'start')}, {_count(starts * per_start, 'evaluation')} at most."
+        refinement = refinement_of(study.problem(search), search.algorithm)
+        refined = refinement is not None
+        then = f", then {refinement}" if refined else ""
+        most = (starts + refined) * per_start
+        yield f"Search: {_count(starts, 'start')}{then}, {_count(most, 'evaluation')} at most."
         if search.levels:
-            most = most_searches(len(search.levels), starts) * per_start
+            most = most_searches(len(search.levels), starts, refined=refined) * per_start
             yield f"Its front: {_count(len(search.levels), 'level')}, {_count(most, 'evaluation')} at most."
         if study.leaves_one_out:
             most = most_evaluations_left_out(study, search)

@@ -44,6 +44,7 @@ from ..results.tables import (
 from ..results.thinning import swept_points
 from ..search.combinations import numbers_of
 from ..search.limit import Limit
+from ..search.problem import CONVERGED
 from ..study import Study
 from ..study.goals import unreachable_constraints
 from ..vision.installed import require_network
@@ -325,6 +326,8 @@ class _Run:
             warnings.append(UNCLIPPED)
         if answer is not None:
             facts["search"] = search_facts(study, answer)
+            if not any(run.status in CONVERGED for run in answer.runs):
+                warnings.append("no start of the search converged: more `max_evaluations` may find a better design")
             if "saturation" in study.plans[answer.scenario].computed and not study.searches_merged:
                 warnings.append("pixels may saturate: the search sees them before clipping, its row after")
             if answer.front:

@@ -21,7 +21,7 @@ from ..search.combinations import Choice, choose, numbers_of, with_members
 from ..search.held import search_cells
 from ..search.limit import Limit, limit_of, reason_without_bound
 from ..search.problem import Evaluation, Problem, SearchRun, best_feasible, starting_points
-from ..search.solver import extreme_value, search_from, smooth_objective
+from ..search.solver import extreme_value, refinement_of, search_from, smooth_objective
 from ..search.trade_off import Effort, FrontPoint, calls_at_levels, check_proof, gap_of, trade_off
 from ..study import Search, Study
 from .routes import Rules
@@ -38,7 +38,8 @@ _MOST_HELD = 60
 class SearchAnswer:
     """All starts of a search, the best feasible evaluation, its upper bound and the front.
 
-    `scenario`: the one in which the best is worst, if several are searched.
+    `scenario`: the one in which the best is worst, if several are searched. `refinement`: the algorithm of the last
+    of `runs`, which continues from the best point of the others.
     """
 
     search: Search
@@ -49,6 +50,7 @@ class SearchAnswer:
     no_limit: str | None
     front: tuple[FrontPoint, ...]
     choice: Choice | None = None
+    refinement: str | None = None
 
     @property
     def gap(self) -> float | None:
@@ -58,6 +60,9 @@ class SearchAnswer:
 
 def run_search(study: Study, search: Search, parallel: Parallel, progress: Progress) -> SearchAnswer:
     """Search from Sobol points and the best combination; the evaluations are shared evenly among the starts.
+
+    A derivative-free search ends near its optimum at best: where derivatives exist, SLSQP continues from there, with
+    as many evaluations as a start.
 
     Parameters
     ----------
@@ -83,7 +88,7 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
         If a design exceeds its upper bound.
     """
     problem = study.problem(search)
-    n_starts = min(search.starts, search.max_evaluations)
+    n_starts, refinement = min(search.starts, search.max_evaluations), refinement_of(problem, search.algorithm)
     choice = None
     if len(numbers_of(problem)) > 1:
         most = min(_MOST_HELD, search.max_evaluations)
@@ -93,7 +98,7 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
     if choice is not None:
         starts[0] = problem.to_unit(choice.tried[choice.best].x)
     per_start = search.max_evaluations // n_starts
-    effort = Effort(search.algorithm, starts, per_start, study.section.seed)
+    effort = Effort(search.algorithm, starts, per_start, study.section.seed, refinement)
     no_limit, series = reason_without_bound(problem), len(search.scenarios) > 1
     limited = no_limit is None and not series
     # All at once, so that no core waits for another: few of these calls need results of others.
@@ -106,6 +111,9 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
     for run in islice(answers, n_starts):
         runs.append(run)
         progress("search starts", len(runs), n_starts)
+    if refinement is not None:
+        nearest = max((e for run in runs for e in run.log), key=lambda evaluation: evaluation.rank)
+        runs.append(search_from(problem, n_starts, problem.to_unit(nearest.x), refinement, per_start, effort.seed))
     best = best_feasible([e for run in runs for e in run.log])
     if best is None:
         raise _infeasible(study, problem, starts[:_REACH_STARTS], per_start)
@@ -118,7 +126,7 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
         limit = next(iter(parallel([delayed(limit_of, alone[worst])]))) if no_limit is None else None
     check_proof(best, limit)
     front = trade_off(problem, search.levels, effort, answers, parallel, progress, limited=limited)
-    return SearchAnswer(search, search.scenarios[worst], tuple(runs), best, limit, no_limit, front, choice)
+    return SearchAnswer(search, search.scenarios[worst], tuple(runs), best, limit, no_limit, front, choice, refinement)
 
 
 def limit_alone(study: Study, search: Search) -> Limit | None:
@@ -214,7 +222,8 @@ def search_facts(study: Study, answer: SearchAnswer) -> dict[str, Any]:
         "cfa": space.cfa,
         "channel": " and ".join(space.filter.channels) if space.filter else "",
         "bounded": [] if limit is None else bounded_spaces(study, search),
-        "starts": len(answer.runs),
+        "starts": len(answer.runs) - (answer.refinement is not None),
+        "refinement": answer.refinement,
         "evaluations": sum(len(run.log) for run in answer.runs),
         "endings": [run.status for run in answer.runs],
         "objective": str(study.objective),

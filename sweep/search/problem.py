@@ -263,6 +263,10 @@ class Evaluation:
         return self.feasible, self.objective if self.feasible else -self.violation
 
 
+CONVERGED = ("success", "ftol_reached", "xtol_reached", "settled", "roundoff_limited")
+"""Final status of a start that has converged."""
+
+
 @dataclass
 class SearchRun:
     """Log of one start: all evaluations, and nlopt's final status."""

@@ -30,6 +30,9 @@ DIRECT = {
 """Derivative-free algorithms that take inequality constraints, for the objective itself."""
 ALGORITHMS = (*GRADIENT, *DIRECT)
 """Every algorithm that a study can name."""
+ONE_START = ("ORIG_DIRECT_L", "AGS")
+"""Deterministic global algorithms: their search is the same from every starting point."""
+_REFINEMENT = "SLSQP"
 _ENDINGS = {
     nlopt.SUCCESS: "success",
     nlopt.FTOL_REACHED: "ftol_reached",
@@ -92,6 +95,26 @@ def search_from(
     except (RuntimeError, nlopt.runtime_error):  # its own class; what it carries cannot leave this process
         run.status = "failed"
     return run
+
+
+def refinement_of(problem: Problem, algorithm: str) -> str | None:
+    """Return the gradient algorithm that continues from the best point of a derivative-free search.
+
+    Parameters
+    ----------
+    problem : Problem
+        Search problem.
+    algorithm : str
+        Algorithm of the search.
+
+    Returns
+    -------
+    str or None
+        None for a search by gradients, and where a quantity has no derivatives.
+    """
+    names = (*problem.objective.weights, *problem.constraints)
+    refined = algorithm in DIRECT and all(problem.quantities[name].slopes for name in names)
+    return _REFINEMENT if refined else None
 
 
 def smooth_evaluation(problem: Problem, x: FloatArray) -> Evaluation:

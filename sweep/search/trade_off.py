@@ -65,12 +65,15 @@ class Effort:
         Simulations of each start at most.
     seed : int
         Seed of random algorithms.
+    refinement : str, optional
+        Algorithm that continues from the best points.
     """
 
     algorithm: str
     starts: FloatArray
     evaluations: int
     seed: int
+    refinement: str | None = None
 
 
 def check_proof(best: Evaluation | None, limit: Limit | None, where: str = "") -> None:
@@ -148,20 +151,22 @@ def calls_at_levels(problem: Problem, levels: Sequence[float], effort: Effort, *
     ]
 
 
-def most_searches(n_levels: int, n_starts: int) -> int:
+def most_searches(n_levels: int, n_starts: int, *, refined: bool) -> int:
     """Return the largest number of searches of `trade_off`.
 
     Parameters
     ----------
     n_levels, n_starts : int
         Numbers of levels and starts.
+    refined : bool
+        Another algorithm continues from the best points.
 
     Returns
     -------
     int
         Searches.
     """
-    return n_levels * min(n_starts, _FRONT_STARTS) + 2 * max(0, n_levels - 1)
+    return n_levels * (min(n_starts, _FRONT_STARTS) + refined) + 2 * max(0, n_levels - 1)
 
 
 def trade_off(
@@ -175,6 +180,8 @@ def trade_off(
     limited: bool,
 ) -> tuple[FrontPoint, ...]:
     """Search at each level of sensitivity: from a few points, then from the answers of neighboring levels.
+
+    A refinement begins at the level's own answer, too.
 
     Parameters
     ----------
@@ -219,8 +226,10 @@ def trade_off(
 
     first = len(effort.starts[:_FRONT_STARTS])
     taken(answers, [first] * len(levels))
-    neighbors_of = [(best(k - 1), best(k + 1)) for k in range(len(levels))]
+    own = [best(k) if effort.refinement else None for k in range(len(levels))]
+    neighbors_of = [(best(k - 1), own[k], best(k + 1)) for k in range(len(levels))]
     points = [[problem.to_unit(e.x) for e in neighbors if e is not None] for neighbors in neighbors_of]
+    effort = replace(effort, algorithm=effort.refinement or effort.algorithm)
     at_level = [with_least(problem, SENSITIVITY, level) for level in levels]
     calls = [_searches(calls_of_level, effort, first, us) for calls_of_level, us in zip(at_level, points, strict=True)]
     taken(

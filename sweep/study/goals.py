@@ -17,7 +17,7 @@ from ..designs.space import Space
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY, SENSITIVITY
 from ..metrics.quantity import DN, OF_A_SHARE, WORST_CASE, Quantity, RequestedQuantities
 from ..metrics.registry import quantities_of
-from ..search.solver import ALGORITHMS, DIRECT, GRADIENT
+from ..search.solver import ALGORITHMS, DIRECT, GRADIENT, ONE_START
 from .axes import Axis
 from .document import KeyPath
 from .model import Search, Study
@@ -168,7 +168,8 @@ def search_of(section: StudySection, spaces: Sequence[Space], sources: Sources) 
         sources.add(("search", "name"), "a CFA or design has that name", requested.name, "another name")
     name = requested.name or f"best {kind_in_words(space.filter.family.kind)}"
     name += " (search)" if name in others else ""
-    effort = requested.algorithm, requested.starts, requested.max_evaluations
+    starts = 1 if requested.algorithm in ONE_START else requested.starts
+    effort = requested.algorithm, starts, requested.max_evaluations
     return Search(
         name, space, searched[0], tuple(searched), *effort, levels, _map_of(requested.map or {}, space, sources)
     )

@@ -221,11 +221,13 @@ class SearchSection(Section):
     """Scenario of the search, or one with `each`, of whose scenarios the worst counts; may be left out where there is
     one."""
     algorithm: Name = "SLSQP"
-    """SLSQP, MMA, CCSAQ; without gradients COBYLA, ISRES, ORIG_DIRECT_L, AGS."""
+    """SLSQP, MMA, CCSAQ; without gradients COBYLA, ISRES, ORIG_DIRECT_L, AGS, whose best point SLSQP refines where
+    derivatives exist."""
     starts: int = Field(default=16, ge=1, le=10_000)
-    """Starting points."""
+    """Starting points; ORIG_DIRECT_L and AGS, the same from everywhere, take one."""
     max_evaluations: int = Field(default=2000, ge=10, le=10_000_000)
-    """Largest number of evaluations of each start."""
+    """Largest number of evaluations, shared evenly by the starts; SLSQP after another algorithm has as many as a
+    start."""
 
 
 def _cfas(value: Any) -> Any:

@@ -11,8 +11,10 @@ import pytest
 from sweep.base.errors import StudyError
 from sweep.metrics.evaluate import image_quantities
 from sweep.search.problem import best_feasible, starting_points
-from sweep.search.solver import search_from
+from sweep.search.solver import refinement_of, search_from
 from sweep.study.load import study_of_keys
+
+from .problems import PROBLEM
 
 VISION = {
     "fov_deg": 120,
@@ -54,6 +56,13 @@ def test_the_least_error_of_the_observer_is_searched_for() -> None:
     found = best_feasible([e for i, u in enumerate(points) for e in search_from(problem, i, u, "COBYLA", 12).log])
     assert 10**-found.objective == pytest.approx(errors(found.x[None])[0], rel=1e-9)
     assert 10**-found.objective <= 1.02 * over.min()
+
+
+def test_only_a_search_with_derivatives_is_refined() -> None:
+    study = study_of_keys(KEYS, Path())
+    assert refinement_of(study.problem(study.search), "COBYLA") is None
+    assert refinement_of(PROBLEM, "COBYLA") == "SLSQP"
+    assert refinement_of(PROBLEM, "SLSQP") is None
 
 
 @pytest.mark.parametrize("change", [{}, {"objective": "csd_yellow_red", "constraints": {"vision_error": {"max": 0.1}}}])
