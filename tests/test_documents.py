@@ -284,8 +284,8 @@ def test_the_figures_of_single_bands_are_those_of_a_search(finished: FinishedFol
         *first, last = best[form]
         assert said.format(f"{', '.join(first)} and {last}") in text
     lines = " ".join(map_lines(read_output(finished("band"))))
-    assert "is of 44 nm FWHM, at 636 nm, with an absorbance of 0.39" in lines
-    assert "44 nm, at 636 nm with an absorbance of 0.39, to have the 139 DN of RGGB" in text
+    assert "is of 45 nm FWHM (rounded down), near 638 nm, with an absorbance of 0.38" in lines
+    assert "45 nm, near 638 nm with an absorbance of 0.38, to have the 139 DN of RGGB" in text
     color = pd.read_parquet(finished("band") / "results.parquet").set_index("name")["color_delta_e_mean_d65"]
     said = "of {:.1f} for the best band and for the best stopband, {:.1f} for RYYCy, and {:.1f} for RGGB"
     assert said.format(color["best band"], color["RYYCy"], color["RGGB"]) in text

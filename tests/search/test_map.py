@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.optimize import brentq
 
 from sweep.base.errors import StudyError
 from sweep.report import read_output
-from sweep.report.parameter_map import _peak_and_width, map_drawing, map_figure, map_lines
+from sweep.report.parameter_map import _peak_and_width, _widest, _width_at, map_drawing, map_figure, map_lines
 from sweep.search.gradients import Model
+from sweep.search.held import held_at, search_held
 from sweep.search.problem import SearchRun
 from sweep.study import load_study
 
@@ -71,10 +75,54 @@ def test_the_report_says_how_wide_a_band_may_be(folder: Path) -> None:
     assert name == "map"
     assert [text.get_text() for text in draw().axes[0].get_legend().get_texts()] == ["as RGGB (139)"]
     (line,) = map_lines(output)
-    cells = pd.read_parquet(folder / "out" / "map.parquet")
+    found = re.search(r"\(139 DN\) is of (\d+) nm FWHM \(rounded down\), near (\d+) nm, with an absorbance of 0", line)
+    assert found is not None
+    fwhm_nm, peak_nm = map(float, found.groups())
+    assert (fwhm_nm, peak_nm) == (44, 636)
+    study = load_study(folder / "band.yaml")
+    assert study.search is not None
+    problem, names = study.problem(study.search), study.search.space.parameters
+    held = held_at(problem, {names.index("peak_nm"): peak_nm, names.index("fwhm_nm"): fwhm_nm})
     rggb = output.table[output.table["name"] == "RGGB"]["csd_yellow_red"].iloc[0]
-    assert cells[cells["objective"] >= rggb]["fwhm_nm"].max() == 44
-    assert "(139 DN) is of 44 nm FWHM, at 636 nm, with an absorbance of 0." in line
+    assert search_held(held, "SLSQP", 60, 1).objective >= rggb
+
+
+@pytest.mark.parametrize("curve", [lambda nm: 300 * np.exp(-nm / 50), lambda nm: 200 - (nm / 4) ** 2])
+@pytest.mark.parametrize("level", [81.0, 100.0, 120.0, 123.0])
+def test_a_width_between_cells_reaches_the_level(curve: Callable[[np.ndarray], np.ndarray], level: float) -> None:
+    """Of a convex and a concave objective, on coarse and on fine maps; the fine one is within 0.1 nm of the end."""
+    exact = brentq(lambda nm: curve(nm) - level, 10, 80)
+    for step_nm in (2.0, 7.0, 20.0):
+        nm = np.arange(2.0, 120.0, step_nm)
+        width_nm = _width_at(nm, curve(nm), level)
+        assert exact - (0.1 if step_nm == 2 else step_nm) <= width_nm <= exact + 1e-9
+
+
+def test_a_width_on_the_edge_of_the_map_is_that_of_a_cell() -> None:
+    widths_nm = np.array([20.0, 30.0, 40.0])
+    assert _width_at(widths_nm, np.array([90.0, 80.0, 70.0]), 60.0) == 40
+    assert _width_at(widths_nm, np.array([90.0, 50.0, 40.0]), 60.0) == 20
+    assert _width_at(widths_nm, np.array([90.0, 80.0, np.nan]), 60.0) == 30
+    assert np.isnan(_width_at(widths_nm, np.array([50.0, 40.0, 30.0]), 60.0))
+
+
+@pytest.mark.parametrize("top_nm", [634.0, 637.0, 638.0, 639.7])
+@pytest.mark.parametrize("slopes", [(0.4, 0.6), (1.5, 0.2), (0.2, 1.5)], ids=str)
+def test_the_widest_band_is_no_wider_than_that_of_any_peak(top_nm: float, slopes: tuple[float, float]) -> None:
+    """Of two lines that meet at the top, and of a cubic."""
+    peaks_nm = np.arange(620.0, 661.0, 4.0)
+
+    def tent(nm: np.ndarray) -> np.ndarray:
+        return 45 - np.where(nm < top_nm, slopes[0], slopes[1]) * np.abs(nm - top_nm)
+
+    def cubic(nm: np.ndarray) -> np.ndarray:
+        return 45 - slopes[0] * (nm - top_nm) ** 2 / 10 * (1 - slopes[1] * (nm - top_nm) / 100)
+
+    _, fwhm_nm = _widest(peaks_nm, tent(peaks_nm), 80.0)
+    assert tent(peaks_nm).max() <= fwhm_nm <= 45 + 1e-9
+    peak_nm, fwhm_nm = _widest(peaks_nm, cubic(peaks_nm), 80.0)
+    assert 44.9 <= fwhm_nm <= 45 + 1e-9
+    assert peak_nm == pytest.approx(top_nm, abs=0.5)
 
 
 def test_the_specification_has_amounts_for_every_width(folder: Path, tmp_path: Path) -> None:
