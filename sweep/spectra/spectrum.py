@@ -292,6 +292,25 @@ def resample(
     return np.divide(area, width, out=np.zeros_like(area), where=width > 0)
 
 
+def integral_between(wavelength_nm: FloatArray, values: FloatArray, low_nm: float, high_nm: float) -> float:
+    """Return the integral of a curve, linear between its samples and 0 beyond them.
+
+    Parameters
+    ----------
+    wavelength_nm, values : ndarray of shape (n,)
+        Samples.
+    low_nm, high_nm : float
+        Range.
+
+    Returns
+    -------
+    float
+        Integral.
+    """
+    ends = np.clip(np.array([low_nm, high_nm]), wavelength_nm[0], wavelength_nm[-1])
+    return float(np.diff(_integral_to(wavelength_nm, values, ends))[0])
+
+
 def _integral_to(wave: FloatArray, data: FloatArray, at: FloatArray) -> FloatArray:
     """Return the integral of the piecewise linear interpolant from the first sample to `at`."""
     whole = np.concatenate([[0.0], np.cumsum(np.diff(wave) * (data[1:] + data[:-1]) / 2)])

@@ -20,7 +20,7 @@ from ..spectra.colorants import BUILTIN_COLORANTS, Colorants, read_colorants
 from ..spectra.files import digest, read_curves
 from ..spectra.lens_files import ChiefRays, read_chief_rays
 from ..spectra.lights import Lights
-from ..spectra.spectrum import Curves, WavelengthGrid, photons_from_energy
+from ..spectra.spectrum import Curves, WavelengthGrid, integral_between, photons_from_energy
 from .document import Document, KeyPath, by_line
 from .schema_curves import ColorantsSection, CurveFile, LightFile, TaskFile
 
@@ -30,6 +30,8 @@ _MOST_REFUSED = 5
 """Spectra that were not read and that a note names."""
 _CUT_OFF = 0.01
 """Share of a light's photons outside the grid from which on the user gets a warning."""
+_MISCOUNTED = 0.01
+"""The same of photons that sampling at the nodes loses or adds."""
 _Made = TypeVar("_Made", SensorCurves, Lights)
 _Content = TypeVar("_Content", Curves, ChiefRays)
 _Key = TypeVar("_Key")
@@ -201,7 +203,7 @@ class Sources:
     def photons(
         self, path: KeyPath, curves: Curves | None, column: str, entry: LightFile | TaskFile
     ) -> FloatArray | None:
-        """Return the photon spectrum of a light, and warn about photons outside the wavelength grid.
+        """Return the photon spectrum of a light; warn about photons outside the wavelength grid or between its nodes.
 
         Parameters
         ----------
@@ -226,14 +228,25 @@ class Sources:
         if entry.quantity == "energy":
             raw = photons_from_energy(wave, raw)
             values = photons_from_energy(self.grid.nodes_nm, values)
+        first_nm, last_nm, step_nm = self.grid.start_nm, self.grid.stop_nm, self.grid.step_nm
+        inside = integral_between(wave, raw, first_nm, last_nm)
         if not values.any():
-            self.add(path, "the light has no photons on the wavelength grid", column)
+            between = f", but between its nodes, {step_nm:g} nm apart" if inside > 0 else ""
+            finer = "a finer `wavelengths: {step_nm: ...}`, or `resampling: mean`" if inside > 0 else None
+            self.add(path, f"the light has no photons on the wavelength grid{between}", column, finer)
             return None
-        total = float(((raw[1:] + raw[:-1]) / 2 * (wave[1:] - wave[:-1])).sum())
-        lost = 1 - float(self.grid.integrate(values)) / total
-        if lost > _CUT_OFF:
+        total = integral_between(wave, raw, wave[0], wave[-1])
+        outside = 1 - inside / total
+        if outside > _CUT_OFF:
             self.warnings.append(
-                f"{entry.file}: {column}: {lost:.1%} of its photons lie outside the wavelength grid and are cut off"
+                f"{entry.file}: {column}: {outside:.1%} of its photons lie outside the wavelength grid and are cut off"
+            )
+        sampled = float(self.grid.integrate(values)) - step_nm * float(values[0] + values[-1]) / 2
+        if abs(sampled - inside) > _MISCOUNTED * total:
+            self.warnings.append(
+                f"{entry.file}: {column}: sampled every {step_nm:g} nm it has {sampled / total:.1%} of its photons "
+                f"instead of {inside / total:.1%}, since its features are narrower: choose a finer "
+                "`wavelengths: {step_nm: ...}`, or `resampling: mean`"
             )
         return values
 

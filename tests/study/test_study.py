@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from sweep.results.identity import fingerprint
@@ -241,6 +243,54 @@ def test_lights_from_files(tmp_path: Path) -> None:
     assert red[235] / red[240] == pytest.approx(35 / 40 * 635 / 640, rel=1e-3)
     (tmp_path / "led.csv").write_text("wavelength_nm,r,g\n400,0,1\n700,0,0\n")
     assert "no photons" in issues(tmp_path, text)[0]
+
+
+@pytest.mark.parametrize("quantity", ["energy", "photons"])
+@pytest.mark.parametrize(
+    ("line_nm", "said"),
+    [
+        (
+            602.4,
+            r"led.csv: r: sampled every 5 nm it has 0\.0% of its photons instead of 100\.0%, .*finer `wavelengths: ",
+        ),
+        (600.0, r"led.csv: r: sampled every 5 nm it has 4[67]\d\.\d% of its photons instead of 100\.0%"),
+        (720.0, r"led.csv: r: 100\.0% of its photons lie outside the wavelength grid"),
+        (None, None),
+    ],
+)
+def test_a_line_between_nodes_is_not_outside_the_grid(
+    tmp_path: Path, line_nm: float | None, said: str | None, quantity: str
+) -> None:
+    """A line 1 nm wide, 5 nm / (1.064 * 1 nm) of its photons where it is on a node, or a smooth light."""
+    nm = np.arange(380.0, 750.0, 0.1)
+    smooth = np.exp(-4 * np.log(2) * ((nm - 550) / 30) ** 2)
+    line = smooth if line_nm is None else 1e-6 * smooth + np.exp(-4 * np.log(2) * (nm - line_nm) ** 2)
+    rows = [f"{at:.1f},{r:.9g},{g:.9g}" for at, r, g in zip(nm, line, smooth, strict=True)]
+    (tmp_path / "led.csv").write_text("\n".join(["wavelength_nm,r,g", *rows]) + "\n")
+
+    def notes(step_nm: float, resampling: str = "linear") -> list[str]:
+        lights = LIGHT_FILE.replace("energy", f"{quantity}, resampling: {resampling}")
+        grid = f"wavelengths: {{step_nm: {step_nm:g}}}\n"
+        study = load(tmp_path, f"study: s\nsensor: ar0820\n{lights}{grid}cfas: [RGGB]\nobjective: csd_red_green\n")
+        return [warning for warning in study.warnings if "photons" in warning]
+
+    if said is None:
+        assert notes(5) == []
+        return
+    (note,) = notes(5)
+    assert re.search(said, note)
+    for others in (notes(0.5), notes(5, "mean")):
+        assert others == ([note] if line_nm == 720 else [])
+
+
+def test_a_light_between_nodes_is_refused_with_the_way_out(tmp_path: Path) -> None:
+    (tmp_path / "led.csv").write_text("wavelength_nm,r,g\n390,0,1\n602,0,1\n602.5,1,1\n603,0,1\n710,0,1\n")
+    text = (
+        f"study: s\nsensor: ar0820\n{LIGHT_FILE}wavelengths: {{step_nm: 5}}\ncfas: [RGGB]\nobjective: csd_red_green\n"
+    )
+    (said,) = issues(tmp_path, text)
+    assert "no photons on the wavelength grid, but between its nodes, 5 nm apart" in said
+    assert "allowed: a finer `wavelengths: {step_nm: ...}`, or `resampling: mean`" in said
 
 
 def test_resolved_study_is_a_study_with_the_same_rows(tmp_path: Path) -> None:
