@@ -114,6 +114,19 @@ class LampReadings:
                 variance = np.zeros(mean.shape)
         return mean @ self.readout.weights[0], variance @ self.readout.spread_weights[0]
 
+    def means_of_exposures(self, factors: FloatArray) -> FloatArray:
+        """Return the means of all lamps, each exposure with its own share of their light, [n, n_signals, n_channels].
+
+        `factors`: light of each exposure relative to that of the scene, [n_exposures, n].
+        """
+        every = np.arange(self.n_signals)
+        if np.ptp(factors, axis=0).max(initial=0.0) <= _EQUAL:
+            return np.moveaxis(self.means(every, np.broadcast_to(factors[0], (every.size, factors.shape[1]))), 0, 1)
+        electrons = self.lit_e[:, None] * factors[:, :, None, None] + self.dark_e[:, None, None]
+        pixel, light = self.readout.pixel, self.light[:, None, None]
+        dn = merged(electrons, light, pixel).mean if self.noisy else without_noise(electrons, light, pixel)
+        return np.asarray(dn @ self.readout.weights[0], dtype=float)
+
     def _full_e_at(self, signals: IndexArray, factors: FloatArray) -> FloatArray:
         """Return electrons of a pixel of full sensitivity, [n, n_factors, n_elements]."""
         lit_e, dark_e = self.full_e

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...base.types import FloatArray
-from ...camera.forward import ForwardModel
-from ...camera.pwm import phases_of
+from ...camera.brightness import LampReadings
+from ...camera.forward import ForwardModel, forward_model
+from ...camera.pwm import exposure_scales, phases_of
+from ...camera.setup import Setup
 from ..chromatic import squared_distance
 from ..metric import PulseMetric
 from ..quantity import DN, Columns, Quantity, RequestedQuantities
 
 MODULATION, LAMP_SEEN, FALSE_HUE = "flicker_modulation", "lamp_seen", "false_hue_dn"
-_BETWEEN = 7
-"""Phases between two at which an exposure begins or ends with a pulse."""
+_BETWEEN, _FINER = 127, 33
+"""Phases between two at which an exposure begins or ends with a pulse, so many that a capture's handover is seen, which
+is as narrow as its noise; phases around that with the largest hue."""
 _SEEN_DN = 1.0
 
 
@@ -59,35 +64,52 @@ class Flicker(PulseMetric):
 
     def of_pulses(self, model: ForwardModel, curves: FloatArray) -> Columns:
         """Compute the columns, design by design, since phases depend on the exposure."""
+        setup = model.setup
+        steady = forward_model(replace(setup, scene=setup.scene.model_copy(update={"drive": None})))
         exposure_s, rows = model.light.exposure_s(curves), []
         for one, time_s in zip(curves, exposure_s, strict=True):
-            pulsed = model.setup.computes("flicker")
-            phases = phases_of(model.setup, np.array([time_s]), _BETWEEN)[0] if pulsed else np.zeros(1)
-            response = model.at(model.phases, phases).read(one[None])[0][0]
-            dark = model.unlit(one[None], np.array([time_s]))[0]
-            lit = response.reshape(model.n_cases, phases.size, *response.shape[1:])
-            lit = lit - dark.reshape(model.n_cases, -1, dark.shape[-1])[:, :1, None]
-            rows.append(_of_phases(lit, phases))
+            of_places = [_of_lamps(lamps, setup, time_s) for lamps in steady.lamps(one[None])]
+            rows.append(
+                {
+                    MODULATION: max(place[MODULATION] for place in of_places),
+                    LAMP_SEEN: min(place[LAMP_SEEN] for place in of_places),
+                    FALSE_HUE: max(place[FALSE_HUE] for place in of_places),
+                }
+            )
         return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
-def _of_phases(lit: FloatArray, phases: FloatArray) -> dict[str, float]:
-    """Return columns from the readout above that without lamps, [n_places, n_phases, n_signals, n_channels]."""
-    widths = np.diff(np.concatenate([phases, phases[:1] + 1]))
-    after = np.roll(lit, -1, axis=1)
-    mean = ((lit + after) / 2 * widths[:, None, None]).sum(axis=1)
-    brightest = mean.argmax(axis=-1)
-    of_lamp = np.take_along_axis(lit, brightest[:, None, :, None], axis=-1)[..., 0]  # [n_places, n_phases, n_signals]
-    most, least = of_lamp.max(axis=1), np.maximum(of_lamp.min(axis=1), 0.0)
+def _of_lamps(lamps: LampReadings, setup: Setup, time_s: float) -> dict[str, float]:
+    """Return the columns at one sampling phase and field position, with the largest hue refined between the phases."""
+
+    def lit(phases: FloatArray) -> FloatArray:
+        scales = exposure_scales(setup, np.array([time_s]), phases)[:, 0]
+        return lamps.means_of_exposures(scales) - dark
+
+    dark = lamps.means_of_exposures(np.zeros((len(lamps.lit_e), 1)))
+    pulsed = setup.computes("flicker")
+    phases = phases_of(setup, np.array([time_s]), _BETWEEN)[0] if pulsed else np.zeros(1)
+    readings, widths = lit(phases), np.diff(np.concatenate([phases, phases[:1] + 1]))
+    after = np.roll(readings, -1, axis=0)
+    mean = ((readings + after) / 2 * widths[:, None, None]).sum(axis=0)
+    brightest = np.take_along_axis(readings, mean.argmax(axis=-1)[None, :, None], axis=-1)[..., 0]
+    most, least = brightest.max(axis=0), np.maximum(brightest.min(axis=0), 0.0)
     modulation = np.divide(most - least, most + least, out=np.ones_like(most), where=most > 0)
-    next_lamp = np.roll(of_lamp, -1, axis=1)
-    step = np.abs(next_lamp - of_lamp)
-    higher, lower = np.maximum(of_lamp, next_lamp), np.minimum(of_lamp, next_lamp)
+    following = np.roll(brightest, -1, axis=0)
+    step = np.abs(following - brightest)
+    higher, lower = np.maximum(brightest, following), np.minimum(brightest, following)
     part = np.divide(higher - _SEEN_DN, step, out=(higher >= _SEEN_DN).astype(float), where=step > 0)
     part = np.where(lower >= _SEEN_DN, 1.0, np.clip(part, 0.0, 1.0))
-    hue = np.sqrt(squared_distance(lit, np.broadcast_to(mean[:, None], lit.shape)))
+
+    def hue(of_phases: FloatArray) -> FloatArray:
+        return np.sqrt(squared_distance(of_phases, np.broadcast_to(mean, of_phases.shape))).max(axis=1)
+
+    hues = hue(readings)
+    worst = int(hues.argmax())
+    low, high = phases[worst] - widths[worst - 1], phases[worst] + widths[worst]
+    finer = hue(lit(np.linspace(low, high, _FINER))) if pulsed else hues
     return {
         MODULATION: float(modulation.max()),
-        LAMP_SEEN: float((part * widths[:, None]).sum(axis=1).min()),
-        FALSE_HUE: float(hue.max()),
+        LAMP_SEEN: float((part * widths[:, None]).sum(axis=0).min()),
+        FALSE_HUE: float(max(hues.max(), finer.max())),
     }

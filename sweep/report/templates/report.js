@@ -403,10 +403,10 @@ function drawSeries(series, box) {
       found.push(Object.assign({mode: "lines", y: line.y, line: {width: 0}, showlegend: false, hoverinfo: "skip"}, shared));
       found.push(Object.assign({mode: "lines", y: line.upper, line: {width: 0}, fill: "tonexty", fillcolor: `${color}33`, showlegend: false, hoverinfo: "skip"}, shared));
     }
-    const [x, y] = line.drawn, ring = line.passes ? x.indexOf(line.passes[0]) : -1;
+    const [x, y] = line.drawn, passed = new Set(line.passes.map(([number]) => number)), rings = x.map((number) => passed.has(number));
     const symbol = ["circle", "square", "diamond", "triangle-up", "x", "star"][i % 6];
-    const marker = ring < 0 ? {size: 6, symbol} : {color, opacity: 1, line: {color, width: x.map((_, at) => at === ring ? 2 : 0)},
-      size: x.map((_, at) => at === ring ? 13 : 6), symbol: x.map((_, at) => at === ring ? "circle-open" : symbol)};
+    const marker = !passed.size ? {size: 6, symbol} : {color, opacity: 1, line: {color, width: rings.map((ring) => ring ? 2 : 0)},
+      size: rings.map((ring) => ring ? 13 : 6), symbol: rings.map((ring) => ring ? "circle-open" : symbol)};
     found.push(Object.assign({}, shared, {mode: "lines+markers", x, y, name: plain(name), line: {color, width: Math.max(1.5, 4 - 0.4 * i), dash: dashes[i % 4]}, marker}));
   });
   const values = Object.values(series.lines).flatMap((line) => line.y).filter((value) => value > 0);
