@@ -98,9 +98,10 @@ class ForwardModel:
         ForwardModel
             The model at these phases and moments.
         """
-        model, light = ForwardModel(self.setup, phases, once=True), copy(self.light)
-        light.moments = moments
-        model.__dict__["light"] = light
+        model = ForwardModel(self.setup, phases, once=True)
+        for part, light in ((model, self.light), *((position, position.light) for position in model._positions)):
+            part.__dict__["light"] = copy(light)
+            part.light.moments = moments
         if self._of_channels:
             model.__dict__["_channels"] = self._channels
         return model

@@ -134,17 +134,19 @@ def _csds(model: ForwardModel, curves: FloatArray) -> FloatArray:
 
 
 def _nonlinear_over_pulse(setup: Setup) -> bool:
-    """Return whether a CSD may be smallest at any moment of a pulse: behind a readout that clips without rounding."""
-    drive, steps = setup.scene.drive, setup.scene.noise is None and setup.computes("quantization")
-    return drive is not None and setup.computes("flicker") and not setup.linear and not steps
+    """Return whether a CSD may be smallest at any moment of a pulse: not where a readout rounds, but does not clip."""
+    drive, rounds = setup.scene.drive, setup.scene.noise is None and setup.computes("quantization")
+    bends = not setup.linear and (not rounds or setup.computes("saturation"))
+    return drive is not None and setup.computes("flicker") and bends
 
 
 def _over_pulse(model: ForwardModel, curves: FloatArray, pairs: Sequence[int], phases: Phases | None) -> FloatArray:
-    """Return the smallest CSDs of some pairs of one design at one phase over the moments of a pulse."""
+    """Return the smallest CSDs of some pairs of one design at one phase over field positions and moments of a pulse."""
 
     def distances(moments: FloatArray) -> list[FloatArray]:
         response = model.at(phases, moments).read(curves)[0][0]
-        return list(separations(response, model.setup.members).values())
+        at_places = separations(response, model.setup.members).values()
+        return [values.reshape(-1, moments.size).min(axis=0) for values in at_places]
 
     finer = _FINER_MOMENTS * (model.setup.accuracy.pwm_moments - 1)
     first = np.linspace(0.0, 1.0, finer + 1)
@@ -170,7 +172,7 @@ def _refine_moments(model: ForwardModel, block: Block, columns: Columns) -> None
     for design in np.flatnonzero(np.isfinite(columns[names[0]])):
         curves = block.some(slice(design, design + 1)).curves()
         for name, least in zip(names, _over_pulse(model, curves, range(len(names)), model.phases), strict=True):
-            for column in {name, BEST_PLACE + name} & columns.keys():
+            for column in {name, BEST_PLACE + name if model.n_cases == 1 else name} & columns.keys():
                 columns[column][design] = min(columns[column][design], least)
 
 
@@ -365,7 +367,7 @@ def evaluate(
     columns |= _over_brightness(setup, block, columns, states)
     if setup.all_phases:
         _refine_phases(model, block, columns)
-    elif _nonlinear_over_pulse(setup) and setup.scene.field is None:
+    elif _nonlinear_over_pulse(setup) and not setup.all_heights:
         _refine_moments(model, block, columns)
     if setup.all_heights:
         _refine_heights(model, block, cases, columns)
