@@ -17,8 +17,9 @@ class Accuracy(Section):
     phases_per_px: Literal[1, 4, 16, 64] = 16
     """Sampling phases of a light that may fall anywhere, on a square lattice in each pixel of the tile; phases that are
     equal by symmetry are computed once."""
-    finest_phase_px: float = Field(default=1 / 128, ge=0, le=0.25)
-    """Step to which the worst phases of a lattice four times as fine are refined, pixels; 0: no refinement."""
+    finest_phase_px: float = Field(default=1 / 8192, ge=0, le=0.25)
+    """Finest step to which the worst phases of a lattice four times as fine are refined, pixels, unless CSDs hardly
+    differ before; 0: no refinement."""
     field_positions: int = Field(default=33, ge=2, le=257)
     """Image heights where all field positions count; the worst are refined, unless `finest_phase_px` is 0."""
     rays: Annotated[int, Field(ge=1, le=64)] | None = None
@@ -41,7 +42,7 @@ PRESETS: dict[str, Accuracy] = {
     "fast": Accuracy(finest_phase_px=0.0, field_positions=9, rays=16, psf_step_nm=10.0, pwm_moments=5),
     "standard": STANDARD,
     "reference": Accuracy(
-        phases_per_px=64, finest_phase_px=1 / 512, field_positions=129, psf_step_nm=1e-3, pwm_moments=17
+        phases_per_px=64, finest_phase_px=1 / 32768, field_positions=129, psf_step_nm=1e-3, pwm_moments=17
     ),
 }
 REFERENCE = PRESETS["reference"]

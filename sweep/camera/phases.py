@@ -2,7 +2,7 @@
 
 A scene names a phase, or asks for the worst of `any`. Then a lattice of phases over the tile is computed, phases that
 are equal by symmetry once. For CSDs the lattice is four times as fine, and its worst phases are refined: neighbors at
-half the step are compared, down to the finest one.
+half the step are compared, down to the finest one, or until they differ by little.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ _FINER, _MOST_FINE = 4, 1200
 """Factor by which the lattice is finer from which extremes are refined; its different phases, at most."""
 _STARTS = 2
 """Phases from which each extreme is refined at the first step, then one."""
-_FLAT_DN = 0.02
-"""A start whose neighbors on the lattice all differ from it by less is not refined."""
+_FLAT_DN, _FLAT_STEPS_DN = 0.05, 1.0
+"""A start whose neighbors all differ from it by less is refined no further; the second where whole numbers step."""
 _NEIGHBORS = np.array([[x, y] for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)])
 
 
@@ -232,8 +232,9 @@ def refined_minima(
     """Refine the smallest values over all sampling phases.
 
     A pattern search: from each of the best known phases to the best neighbor at half the step of the lattice; then
-    again, from the best of all known phases, at half the step before; at the finest step as long as values fall. It
-    finds minima near good phases; it does not prove that no lower one lies elsewhere.
+    again, from the best of all known phases, at half the step before; at the finest step as long as values fall. Where
+    pixels saturate, extremes are kinks, which are missed by slope times step: steps are halved until neighbors
+    differ by little. It finds minima near good phases; it does not prove that no lower one lies elsewhere.
 
     Parameters
     ----------
@@ -259,27 +260,27 @@ def refined_minima(
     assert target is not None
     known = dict(zip(lattice.keys, values.T, strict=True))
     period = np.array(setup.camera.mosaic.indices.shape[::-1])
+    steps = setup.scene.noise is None and setup.computes("quantization")
+    flat_dn = _FLAT_STEPS_DN if steps else _FLAT_DN
     step = step_px / 2
     while step >= finest:
         places, so_far = np.array(list(known))[:, :2], np.stack(list(known.values()), axis=1)
-        starts = np.stack([_apart(places, row, n_starts, 2 * step, period) for row in so_far])
+        starts = _apart(places, so_far, n_starts, 2 * step, period)
         centers, at_start = places[starts], np.take_along_axis(so_far, starts, axis=1)  # [n_values, n_starts, ...]
         apart_px = np.abs(np.mod(places[None, None] - centers[:, :, None] + period / 2, period) - period / 2)
         known_around = (apart_px <= 2 * step * (1 + 1e-9)).all(axis=3)
         off = np.abs(so_far[:, None] - at_start[..., None])
-        moving = np.max(off, axis=2, where=known_around, initial=0.0) > _FLAT_DN
+        moving = np.max(off, axis=2, where=known_around, initial=0.0) > flat_dn
         while moving.any():
             around = np.unique((centers[moving][:, None] + step * _NEIGHBORS).reshape(-1, 2), axis=0)
             read = read_at(target, around)
             phases, which = different_phases(setup, read)
             at_phases = _known_or_evaluated(phases, known, evaluate)[:, which]
-            for value, start in np.argwhere(moving):
-                off = np.abs(read.center_px - centers[value, start])
-                close = np.flatnonzero((off <= step * (1 + 1e-9)).all(axis=1))
-                lowest = close[int(at_phases[value, close].argmin())]
-                moving[value, start] = at_phases[value, lowest] < at_start[value, start]
-                if moving[value, start]:
-                    at_start[value, start], centers[value, start] = at_phases[value, lowest], read.center_px[lowest]
+            close = (np.abs(read.center_px - centers[:, :, None]) <= step * (1 + 1e-9)).all(axis=3)
+            at_close = np.where(close & moving[..., None], at_phases[:, None], np.inf)
+            moving = at_close.min(axis=2) < at_start
+            lowest = at_close.argmin(axis=2)[moving]
+            at_start[moving], centers[moving] = at_close.min(axis=2)[moving], read.center_px[lowest]
             moving &= step < 2 * finest  # elsewhere the next step reaches as far
         step, n_starts = step / 2, 1
     places, so_far = np.array(list(known)), np.stack(list(known.values()), axis=1)
@@ -289,14 +290,13 @@ def refined_minima(
 def _apart(
     centers_px: FloatArray, values: FloatArray, n_starts: int, step_px: float, period_px: IndexArray
 ) -> IndexArray:
-    """Return the indices of the smallest values that are more than a step apart, ndarray of shape (n_starts,)."""
-    starts: list[int] = []
-    order = np.argsort(values, kind="stable")
-    while len(starts) < n_starts and order.size:
-        starts.append(int(order[0]))
-        off = np.mod(centers_px[order] - centers_px[order[0]], period_px)
-        order = order[np.minimum(off, period_px - off).max(axis=1) > step_px * (1 + 1e-9)]
-    return np.array((starts * n_starts)[:n_starts])
+    """Return the indices of the smallest values that are more than a step apart, shape (n_values, n_starts)."""
+    starts, left = [values.argmin(axis=1)], values.copy()
+    while len(starts) < n_starts:
+        off = np.mod(centers_px - centers_px[starts[-1]][:, None], period_px)
+        left[np.minimum(off, period_px - off).max(axis=2) <= step_px * (1 + 1e-9)] = np.inf
+        starts.append(np.where(np.isfinite(left).any(axis=1), left.argmin(axis=1), starts[0]))
+    return np.stack(starts, axis=1)
 
 
 def _known_or_evaluated(

@@ -39,7 +39,7 @@ from .accuracy_report import make_accuracy_report, read_hard_cases, summary
 
 SETTINGS: Mapping[str, Sequence[Any]] = {
     "phases_per_px": (1, 4, 16, 64),
-    "finest_phase_px": (1 / 32, 1 / 128, 1 / 512),
+    "finest_phase_px": (1 / 32, 1 / 128, 1 / 512, 1 / 8192),
     "field_positions": (5, 9, 17, 33, 129),
     "rays": (1, 4, 16, None),
     "psf_step_nm": (20.0, 10.0, 5.0, 2.0, 1.0),

@@ -9,7 +9,7 @@ from itertools import cycle, product
 import numpy as np
 import pytest
 
-from sweep.camera.accuracy import STANDARD
+from sweep.camera.accuracy import REFERENCE, STANDARD
 from sweep.camera.forward import AllPhases, ForwardModel
 from sweep.camera.phases import (
     Phases,
@@ -26,7 +26,7 @@ from sweep.metrics.quantity import BEST_PLACE
 from sweep.metrics.separation import csd_name, separations
 
 from ..cases import thinned
-from ..hard.scenes import DARK, F2, FAR, HARD, DesignScene, scene, target
+from ..hard.scenes import DARK, F2, FAR, HARD, DesignScene, columns, scene, target
 from ..hard.scenes_alone import ALONE
 
 STEPS_PER_PX = 32
@@ -92,11 +92,11 @@ def allowed_dn(made: DesignScene, how: str) -> float:
 
 def missed_dn(made: DesignScene, how: str) -> tuple[float, float]:
     """By how much the smallest CSDs are above, and the largest ones below, those of all phases, at most."""
-    columns = evaluate(ForwardModel(setup_of(made, how)), made.curves)
+    found = evaluate(ForwardModel(setup_of(made, how)), made.curves)
     above = below = -math.inf
     for name, (smallest, largest) in brute_force(made, how).items():
-        above = max(above, float(columns[name][0]) - smallest)
-        below = max(below, largest - float(columns[BEST_PLACE + name][0]))
+        above = max(above, float(found[name][0]) - smallest)
+        below = max(below, largest - float(found[BEST_PLACE + name][0]))
     return above, below
 
 
@@ -175,3 +175,30 @@ def test_finer_steps_find_no_worse_an_extreme_of_a_smooth_function(finest_phase_
     assert 0 <= found[0] <= 1000 * finest_phase_px**2 / 2 * (1 + 1e-9)
     on_lattice = float(value(lattice).min())
     assert found[0] < on_lattice if finest_phase_px < step_px else found[0] == on_lattice
+
+
+def test_a_kink_is_found_as_exactly_as_a_smooth_extreme() -> None:
+    """A function that rises by 3000 DN a pixel on all sides of its minimum."""
+    made = scene("any", "RGGB", {"target": FAR | {"phase_px": "any", "readout": "center"}, "noise": True})
+    setup = replace(made.setup, accuracy=STANDARD)
+
+    def value(phases: Phases) -> np.ndarray:
+        return 3000 * np.abs(np.mod(phases.center_px - [0.8337, 1.3713] + 1, 2) - 1).max(axis=1)[None]
+
+    lattice, step_px = fine_lattice(setup)
+    assert refined_minima(setup, lattice, step_px, value(lattice), value)[0][0] < 0.2
+
+
+def test_standard_is_near_the_reference_at_the_phases_where_pixels_saturate() -> None:
+    """The extreme is a kink, where one pixel is just full; 0.6 DN off at a step of 1/128 pixel."""
+    given = {
+        "intensity_cd": 800.0,
+        "exposure": {"kind": "fixed", "exposure_s": 0.0243},
+        "optics": {"f_number": 3.18},
+        "target": target(765, 107, phase_px="any"),
+        "noise": True,
+    }
+    pixel = {"fill_factor": 0.337, "well_e": 6700.0, "bits": 8, "gain_dn_per_e": 0.076, "read_noise_e": 7.5}
+    made = scene("small and full", "1x3", given, pixel | {"offset_dn": 12.0, "prnu": 0.034})
+    standard, reference = (columns(made, accuracy=accuracy) for accuracy in (STANDARD, REFERENCE))
+    np.testing.assert_allclose(standard, reference, rtol=0, atol=0.1)
