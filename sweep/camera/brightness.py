@@ -55,7 +55,7 @@ class LampReadings:
     @property
     def n_signals(self) -> int:
         """Number of lamps."""
-        return self.lit_e.shape[1]
+        return len(self.lit_e[0])
 
     @cached_property
     def _groups(self) -> list[tuple[tuple[float, ...], IndexArray]]:
@@ -183,10 +183,11 @@ def of_case(electrons: FloatArray, dark: FloatArray, readout: Readout, *, noisy:
 
 
 def room_dn(setup: Setup, response: FloatArray, unlit: FloatArray) -> FloatArray:
-    """Return the chromatic distance up to which the closed form holds, DN; none of an HDR pixel or a range of brightness.
+    """Return the chromatic distance up to which the closed form holds, DN.
 
-    The closed form takes a lamp that is dimmer than it is. A brighter one has its fullest channel at least where its
-    brightest pixel is full, so that it is no nearer to a reading than that channel lies above the reading.
+    It holds for no HDR pixel, and within no limits of the brightness. The closed form takes a lamp that is dimmer than
+    it is. A brighter one has its fullest channel at least where its brightest pixel is full, so that it is no nearer to
+    a reading than that channel lies above the reading.
 
     Parameters
     ----------
@@ -219,8 +220,8 @@ def room_dn(setup: Setup, response: FloatArray, unlit: FloatArray) -> FloatArray
 class LampSlopes:
     """Readings of the lamps of a design in one case, with derivatives by its free parameters.
 
-    `lit_by_u`, [n_free, n_signals, n_elements], and `dark_by_u`, [n_free, n_elements]: those of the electrons of a pixel
-    of full sensitivity.
+    `lit_by_u`, [n_free, n_signals, n_elements], and `dark_by_u`, [n_free, n_elements]: those of the electrons of a
+    pixel of full sensitivity.
     """
 
     lamps: LampReadings
@@ -230,7 +231,7 @@ class LampSlopes:
     def moments(
         self, signals: IndexArray, factors: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Return mean and variance of lamps, each at one brightness, [n, n_channels], and their derivatives first by u."""
+        """Return mean and variance of lamps, each at one brightness, [n, n_channels], and their derivatives."""
         readout, (lit_e, dark_e) = self.lamps.readout, self.lamps.full_e
         mean, variance = (values[:, 0] for values in self.lamps.moments(signals, factors[:, None]))
         full_e = lit_e[signals] * factors[:, None] + dark_e
@@ -238,5 +239,8 @@ class LampSlopes:
         for curve, at in self.lamps.pixel_curves():
             by_mean[:, at], by_variance[:, at] = curve.slopes(full_e[:, at])
         by_u = self.lit_by_u[:, signals] * factors[:, None] + self.dark_by_u[:, None]
-        mean_by_u, variance_by_u = (by_mean * by_u) @ readout.weights[0], (by_variance * by_u) @ readout.spread_weights[0]
+        mean_by_u, variance_by_u = (
+            (by_mean * by_u) @ readout.weights[0],
+            (by_variance * by_u) @ readout.spread_weights[0],
+        )
         return mean, variance, mean_by_u, variance_by_u

@@ -316,7 +316,9 @@ class ForwardModel:
             electrons = of(model, curves * factors[modified, None], scale)
             electrons *= exposure.capture.light
             captured.append(
-                model.readout.of_pixels(electrons) if model.readout.by_channel and not self.readout.by_channel else electrons
+                model.readout.of_pixels(electrons)
+                if model.readout.by_channel and not self.readout.by_channel
+                else electrons
             )
         return np.stack(captured)
 

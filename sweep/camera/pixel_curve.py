@@ -74,7 +74,7 @@ class PixelCurve:
         if not self.noisy:
             linear = unquantized(electrons, self.pixel.read_once)
             inside = np.abs(self._noiseless(electrons) - linear) <= 1e-9 * np.maximum(linear, 1.0)
-            return self.pixel.dn_per_e * inside, np.zeros(electrons.shape)
+            return np.asarray(self.pixel.dn_per_e * inside, dtype=float), np.zeros(electrons.shape)
         last = np.sqrt(self._table.last_e)
         root = np.clip(np.sqrt(np.maximum(electrons, 0.0)), _LEAST_ROOT, last)
         by_mean, by_variance = np.where(root < last, np.moveaxis(self._by_root(root), -1, 0) / (2 * root), 0.0)

@@ -89,7 +89,7 @@ class Setup:
 
     @property
     def over_brightness(self) -> Setup:
-        """The setup in which lamps of any brightness are read: pixels may fill, and without noise nothing is rounded."""
+        """The setup in which lamps of any brightness are read: pixels may fill; without noise, unrounded."""
         left_out = self.left_out - {"saturation", "noise"}
         return replace(self, left_out=left_out if self.scene.noise is not None else left_out | {"quantization"})
 

@@ -41,8 +41,9 @@ class Nearest:
 
     def subset(self, which: IndexArray | BoolArray) -> Nearest:
         """Return some of the points."""
-        parts = self.reading, self.curve, self.factor, self.squared, self.bracket
-        return Nearest(*(part[which] for part in parts))
+        return Nearest(
+            self.reading[which], self.curve[which], self.factor[which], self.squared[which], self.bracket[which]
+        )
 
 
 class BrightnessCurves:
@@ -70,7 +71,7 @@ class BrightnessCurves:
     def nearest(
         self, first: IndexArray, second: IndexArray, *, noise: bool, margin: float = np.inf, nearest: float = np.inf
     ) -> Nearest:
-        """Return the points of curves that are nearest to readings, for each reading of one type and curve of the other.
+        """Return the points of curves that are nearest to readings, of each reading of one type and curve of the other.
 
         Both orders of the types are taken; pairs that are farther than `margin` times the nearest squared distance, or
         times one that is known, may be at an infinite one.
@@ -86,11 +87,8 @@ class BrightnessCurves:
             return found
         (low, high), rows = found.bracket.T, np.arange(found.curve.size)
         nodes = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, _FINER + 1)
-        if noise:
-            curves = self.lamps.moments(found.curve, nodes)
-        else:
-            curves = (self.lamps.means(found.curve, nodes),) * 2
-        return self._on(curves, nodes, found.reading, found.curve, rows, noise=noise)
+        means = self.lamps.moments(found.curve, nodes) if noise else (self.lamps.means(found.curve, nodes),) * 2
+        return self._on(means, nodes, found.reading, found.curve, rows, noise=noise)
 
     def _on(
         self,

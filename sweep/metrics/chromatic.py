@@ -26,7 +26,6 @@ from .separation import packed_response, pair_blocks
 from .smooth import Rows, SmoothDesign
 from .tasks.colorimetry import COMPLEX_STEP, Smooth
 
-
 _SEEN, _REFINED = 16.0, 4.0
 """A search sees the nearest points of pairs whose squared distance is at most so many times the smallest, and refines
 those of fewer; it sees others at the darkest point of the curve, which is no nearer."""
@@ -130,8 +129,8 @@ def chromatic_separations(response: FloatArray, members: Mapping[str, IndexArray
 def chromatic_rows(design: SmoothDesign, *, pairs: Sequence[Pair], noise: bool, decades: bool = False) -> Rows:
     """Return rows of each two signals, in every case of the scene: squared chromatic distances in both orders.
 
-    The smallest row is the squared distance, each smooth. In closed form where readings are linear, by the nearest point
-    of the brightness curve elsewhere; that point moves with the design, which adds nothing to the derivative.
+    The smallest row is the squared distance, each smooth. In closed form where readings are linear, by the nearest
+    point of the brightness curve elsewhere; that point moves with the design, which adds nothing to the derivative.
 
     Parameters
     ----------

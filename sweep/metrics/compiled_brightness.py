@@ -23,7 +23,7 @@ def _weight(first: float, second: float, least: float) -> float:
 
 
 @njit(cache=True, nogil=True)
-def nearest_on_curves(
+def nearest_on_curves(  # noqa: PLR0912  (one pass over pairs, blocks, segments and channels)
     mean: FloatArray,
     variance: FloatArray,
     curve_mean: FloatArray,

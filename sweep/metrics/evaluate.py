@@ -375,9 +375,9 @@ def evaluate(
 
 
 def _over_brightness(setup: Setup, block: Block, columns: Columns, states: Sequence[str]) -> Columns:
-    """Return columns of lamps of unknown brightness by their brightness curves: of noise, and where no closed form holds.
+    """Return columns of lamps of unknown brightness by their brightness curves.
 
-    That is where a column is missing.
+    Those of noise, and others where a column is missing: no closed form holds there.
     """
     names = [pair_name(CHROMATIC_CSD, pair) for pair in class_pairs(setup.lights.classes)]
     walked = np.any([np.isnan(columns[name]) for name in names], axis=0)

@@ -20,6 +20,7 @@ from ..study.axes import series_of
 from .series import Line, SeriesFigure, over_series, quantity_of, series_figures
 
 _LEAST = 1e-12
+_BRIGHTNESS = {CHROMATIC_ERROR: "with lamps of unknown brightness", STATE_ERROR: "of equal brightness"}
 _ERROR = "error of the worst pair of states"
 _COMPUTED = (
     "Computed, not drawn: how often noise makes one of two signals of different states look like the other, for the "
@@ -29,9 +30,9 @@ _COMPUTED = (
 _LEAST_DPRIME, _DRAWN_DPRIME = "d' of the worst pair of states", (0.1, 1e4)
 _ANY = "error, lamps of unknown brightness"
 _ANY_NOTE = (
-    "A camera does not know how bright a lamp is: each signal is compared with those of other states of any brightness, "
-    "by Gaussians with the noise of both. The dashed line is the error that the study allows; a ring marks where a "
-    "design passes it."
+    "A camera does not know how bright a lamp is: each signal is compared with those of other states of any "
+    "brightness, by Gaussians with the noise of both. The dashed line is the error that the study allows; a ring marks "
+    "where a design passes it."
 )
 _COUNTED = (
     "Counted: of raw patches drawn with noise, of all signals, the share whose state a classifier says that was "
@@ -121,7 +122,10 @@ def usable_lines(output: Output) -> Iterator[str]:
     for (base, key), scenarios in series_of(output.scenarios).items():
         name, unit = quantity_of(key)
         x = np.array(list(scenarios.values()))
-        for quantity, of in ((CHROMATIC_ERROR, "with lamps of unknown brightness"), (STATE_ERROR, "of equal brightness")):
+        for quantity, of in (
+            (CHROMATIC_ERROR, "with lamps of unknown brightness"),
+            (STATE_ERROR, "of equal brightness"),
+        ):
             passes, ranges = _crossings(output, base, key, quantity), dict[str, list[str]]()
             for design, errors in over_series(_with_worst_error(output), scenarios, quantity).items():
                 where = usable_range(x, errors <= allowed, unit, passes.get(design))

@@ -159,9 +159,9 @@ FILES = {
     files.POINTS: "points of the clouds: design_id, signal_type, signal, channel, dn",
     files.RECOGNITION: "raw patches classified, where a study asks for them, with 95 % intervals",
     files.CROSSINGS: "where a study with `recognition` has scenarios that differ in one number: the numbers `at` which "
-    "the error of a plain CFA, named design or answer of the search is the allowed one, with everything on, the `error` "
-    "there, and whether it `rises` beyond; `quantity`: `state_error` of lamps of equal brightness, or `chromatic_error` "
-    "of lamps of any",
+    "the error of a plain CFA, named design or answer of the search is the allowed one, with everything on, the "
+    "`error` there, and whether it `rises` beyond; `quantity`: `state_error` of lamps of equal brightness, or "
+    "`chromatic_error` of lamps of any",
     files.WORST: "where scenarios differ in one number, and lamps are pulsed or the search maximizes the worst of the "
     "scenarios: for each plain CFA, named design and answer of the search the worst `value` of a `quantity`, and the "
     "number `at` which it is, also between two scenarios, with everything on",

@@ -93,6 +93,7 @@ class SearchFacts(_Facts):
     `scenario`: of several (`scenarios`) the one in which the answer is worst. `cfa`, `channel`: the searched ones.
     `bounded`: kind and name of the spaces whose feasible filters the limit holds for, in that scenario.
     `refinement`: the algorithm that continued from the best point of all starts; `endings` has its status at the end.
+    `scenes_added`: of a series, between its scenarios, where the worst value was found.
     """
 
     algorithm: str
@@ -119,6 +120,7 @@ class SearchFacts(_Facts):
     front_evaluations: int
     combinations: tuple[str, ...] = ()
     refinement: str | None = None
+    scenes_added: int = 0
 
     @property
     def converged(self) -> bool:

@@ -18,7 +18,7 @@ from ..study import Study
 
 STEPS = 8
 """Numbers between two neighboring scenarios at which a quantity is computed before its worst one is refined."""
-_STARTS, _ROUNDS, _FINER = 5, 3, 6
+_STARTS, _ROUNDS, _FINER = 4, 3, 6
 """Numbers from which the worst is refined, rounds, and steps in each."""
 _Path = tuple[str, ...]
 
@@ -76,28 +76,26 @@ def inner_numbers(numbers: Sequence[float], steps: int = STEPS) -> FloatArray:
     return np.asarray(np.exp(fine) if min(numbers) > 0 else fine, dtype=float)
 
 
-def least_between(value: Callable[[float], float], numbers: Sequence[float]) -> tuple[float, float]:
-    """Return the number with the least value, and that value: by steps between the numbers, then refined.
+def minima_between(value: Callable[[float], float], numbers: Sequence[float]) -> list[tuple[float, float]]:
+    """Return the lowest minima, each as the number and its value, least first: by steps between the numbers, refined.
 
     Values may be NaN where there is no scene.
     """
     grid = inner_numbers(numbers)
-    values = np.array([value(number) for number in grid])
-    if np.isnan(values).all():
-        return math.nan, math.nan
-    known = np.where(np.isnan(values), np.inf, values)
+    known = np.nan_to_num([value(number) for number in grid], nan=np.inf)
     lower = (known <= np.concatenate([[np.inf], known[:-1]])) & (known <= np.concatenate([known[1:], [np.inf]]))
-    starts = np.flatnonzero(lower)[np.argsort(known[lower], kind="stable")][:_STARTS]
-    best = min((float(known[at]), float(grid[at])) for at in starts)
-    for start in starts:
-        low, high = grid[max(start - 1, 0)], grid[min(start + 1, grid.size - 1)]
+    lower &= np.isfinite(known)
+    minima = []
+    for start in np.flatnonzero(lower)[np.argsort(known[lower], kind="stable")][:_STARTS]:
+        low, high, best = grid[max(start - 1, 0)], grid[min(start + 1, grid.size - 1)], (known[start], grid[start])
         for _ in range(_ROUNDS):
             finer = inner_numbers([low, high], _FINER)
             of_finer = np.nan_to_num([value(number) for number in finer], nan=np.inf)
             at = int(of_finer.argmin())
-            best = min(best, (float(of_finer[at]), float(finer[at])))
+            best = min(best, (of_finer[at], finer[at]))
             low, high = finer[max(at - 1, 0)], finer[min(at + 1, finer.size - 1)]
-    return best[1], best[0]
+        minima.append((float(best[0]), float(best[1])))
+    return [(number, least) for least, number in sorted(minima)]
 
 
 def or_nan(value: Callable[[float], float]) -> Callable[[float], float]:

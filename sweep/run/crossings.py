@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -40,8 +40,8 @@ _SCHEMA = pa.schema(
 def crossings_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: Progress) -> pa.Table:
     """Find all numbers at which an error of a design passes the allowed one, with all effects.
 
-    One row per series of scenarios (`series`, `key`), design, kind of error (`quantity`: lamps of equal brightness, or of
-    any) and crossing: `rises` if the error is larger beyond `at`.
+    One row per series of scenarios (`series`, `key`), design, kind of error (`quantity`: lamps of equal brightness, or
+    of any) and crossing: `rises` if the error is larger beyond `at`.
 
     Parameters
     ----------
@@ -66,13 +66,14 @@ def crossings_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progre
         scenes = between(study, study.setup(space, next(iter(scenarios))), scenarios)
         of_design = rows[(rows["name"] == row["name"]) & rows["scenario"].isin(list(scenarios))].set_index("scenario")
         of_any = of_design[[pair_name(CHROMATIC_ERROR, pair) for pair in class_pairs(study.states)]].max(axis=1)
+        allowed = recognition.error_max
         for quantity, errors in ((STATE_ERROR, of_design[STATE_ERROR]), (CHROMATIC_ERROR, of_any)):
             known = errors.reindex(list(scenarios)).to_numpy(dtype=float)
             if scenes is not None and np.isfinite(known).all():
                 keys.append({"design_id": row["design_id"], "name": row["name"], "series": series, "key": key})
                 keys[-1]["quantity"] = quantity
                 numbers = dict(zip(scenarios.values(), known.tolist(), strict=True))
-                calls.append(delayed(_crossings, scenes, curves, study.states, quantity, numbers, recognition.error_max))
+                calls.append(delayed(_crossings, scenes, curves, study.states, quantity, numbers, allowed))
     answers = run_with_progress(parallel, calls, "where designs stop being usable", progress)
     made = [key | at for key, found in zip(keys, answers, strict=True) for at in found]
     return pa.Table.from_pylist(made, schema=_SCHEMA)
@@ -112,6 +113,10 @@ def _crossings(
     def at(position: float) -> float:
         return math.exp(position) if by_ratio else position
 
+    def of_ends(number: float, ends: tuple[float, float]) -> float:
+        """Return the decades at a number, at an end itself where rounding has moved it there."""
+        return decades(next((end for end in ends if math.isclose(end, number, rel_tol=1e-14)), number))
+
     found = []
     for low, high in pairwise(known):
         dprimes = -ndtri(np.clip([known[low], known[high], allowed], _LEAST, 0.5))
@@ -125,13 +130,7 @@ def _crossings(
                 continue
             ends = (math.log(one), math.log(other)) if by_ratio else (one, other)
             tolerance = _CLOSE * (1.0 if by_ratio else abs(other - one))
-            number = at(brentq(lambda position: _snapped(decades, at(position), one, other), *ends, xtol=tolerance))
+            number = at(brentq(lambda position, ends=(one, other): of_ends(at(position), ends), *ends, xtol=tolerance))
             error = allowed * 10 ** decades(number)
             found.append({"at": number, "error": error, "rises": decades(other) > 0})
     return found
-
-
-def _snapped(decades: Any, number: float, low: float, high: float) -> float:
-    """Return the decades at a number, at an end itself where rounding has moved it there."""
-    ends: Sequence[float] = (low, high)
-    return float(decades(next((end for end in ends if math.isclose(end, number, rel_tol=1e-14)), number)))

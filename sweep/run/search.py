@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import islice, product
 from typing import Any
 
@@ -24,12 +25,16 @@ from ..search.problem import Evaluation, Problem, SearchRun, best_feasible, star
 from ..search.solver import extreme_value, refinement_of, search_from, smooth_objective
 from ..search.trade_off import Effort, FrontPoint, calls_at_levels, check_proof, gap_of, trade_off
 from ..study import Search, Study
+from ..study.axes import series_of
+from .between import Between, between, minima_between, or_nan
 from .routes import Rules
 from .rows import Job, run_job
 
 _CM_PER_UM = 1e-4
 _CELLS_AT_ONCE = 16
 _REACH_STARTS = 8
+_MOST_CUTS, _CUT = 8, 1e-3
+"""Times that scenes are added between those of a series, and by how much an answer must be worse there, relative."""
 _MOST_HELD = 60
 """Evaluations of each start where some parameters are held: of a combination of colorants, or a cell of a map."""
 
@@ -38,8 +43,9 @@ _MOST_HELD = 60
 class SearchAnswer:
     """All starts of a search, the best feasible evaluation, its upper bound and the front.
 
-    `scenario`: the one in which the best is worst, if several are searched. `refinement`: the algorithm of the last
-    of `runs`, which continues from the best point of the others.
+    `scenario`: the one in which the best is worst, if several are searched. The first `starts` of `runs` are from
+    starting points; `refinement`: the algorithm that continues from the best of these. `added`: scenes between the
+    scenarios of a series, whose worst is that of the best.
     """
 
     search: Search
@@ -51,6 +57,8 @@ class SearchAnswer:
     front: tuple[FrontPoint, ...]
     choice: Choice | None = None
     refinement: str | None = None
+    added: int = 0
+    starts: int = 1
 
     @property
     def gap(self) -> float | None:
@@ -117,7 +125,10 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
     best = best_feasible([e for run in runs for e in run.log])
     if best is None:
         raise _infeasible(study, problem, starts[:_REACH_STARTS], per_start)
-    limit, worst = next(answers) if limited else None, 0
+    limit, worst, added = next(answers) if limited else None, 0, 0
+    if series and (scenes := _series(study, search)) is not None:
+        best, more, added = _over_series(problem, scenes, best, runs, effort, parallel, progress)
+        runs += more
     if series:
         alone = [problem.in_scenario(number) for number in range(len(search.scenarios))]
         worst = int(np.argmin([smooth_objective(one, best.x) for one in alone]))
@@ -126,7 +137,73 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
         limit = next(iter(parallel([delayed(limit_of, alone[worst])]))) if no_limit is None else None
     check_proof(best, limit)
     front = trade_off(problem, search.levels, effort, answers, parallel, progress, limited=limited)
-    return SearchAnswer(search, search.scenarios[worst], tuple(runs), best, limit, no_limit, front, choice, refinement)
+    return SearchAnswer(
+        search, search.scenarios[worst], tuple(runs), best, limit, no_limit, front, choice, refinement, added, n_starts
+    )
+
+
+def _series(study: Study, search: Search) -> tuple[Between, list[float]] | None:
+    """Return the scenes between the scenarios of a search, and their numbers; None if they are no series."""
+    for scenarios in series_of(study.scenarios).values():
+        if [*scenarios] == [*search.scenarios]:
+            scenes = between(study, study.setup(search.space, search.scenarios[0]), scenarios)
+            return None if scenes is None else (scenes, [*scenarios.values()])
+    return None
+
+
+def _over_series(
+    problem: Problem,
+    series: tuple[Between, list[float]],
+    best: Evaluation,
+    runs: Sequence[SearchRun],
+    effort: Effort,
+    parallel: Parallel,
+    progress: Progress,
+) -> tuple[Evaluation, list[SearchRun], int]:
+    """Search for the worst value over all numbers of a series: add the scenes where the answer is worse, and go on.
+
+    Returns
+    -------
+    best : Evaluation
+        Best design, whose objective is that over all scenes.
+    runs : list of SearchRun
+        Further searches: from the best design, and from that of another start.
+    added : int
+        Number of scenes between the scenarios.
+    """
+    algorithm, more, added = effort.refinement or effort.algorithm, list[SearchRun](), 0
+    others = [e for run in runs if (e := best_feasible(run.log)) is not None and e.objective < best.objective]
+    other = max(others, key=lambda e: e.objective, default=best)
+    evaluations = min(effort.evaluations, _MOST_HELD)
+    for number in range(_MOST_CUTS):
+        minima = next(iter(parallel([delayed(_worst_scenes, problem, *series, best.x)])))
+        worse = [at for at, value in minima if value < best.objective - _CUT * abs(best.objective)]
+        progress("scenes between scenarios", number + 1, _MOST_CUTS if worse else number + 1)
+        if not worse:
+            break
+        scenes = [(series[0].at(at), problem.family) for at in worse]
+        problem, added = replace(problem, others=(*problem.others, *scenes)), added + len(scenes)
+        starts = [problem.to_unit(design.x) for design in (best, other)]
+        first = len(runs) + len(more)
+        calls = [
+            delayed(search_from, problem, first + at, u, algorithm, evaluations, effort.seed)
+            for at, u in enumerate(starts)
+        ]
+        more += parallel(calls)
+        found = best_feasible([e for run in more[-len(calls) :] for e in run.log])
+        best = best if found is None else found
+    return best, more, added
+
+
+def _worst_scenes(
+    problem: Problem, scenes: Between, numbers: Sequence[float], x: FloatArray
+) -> list[tuple[float, float]]:
+    """Return the numbers of a series at which the objective of a design is lowest, and its values."""
+
+    def value(number: float) -> float:
+        return smooth_objective(replace(problem, setup=scenes.at(number), others=()), x)
+
+    return minima_between(or_nan(value), numbers)
 
 
 def limit_alone(study: Study, search: Search) -> Limit | None:
@@ -222,7 +299,8 @@ def search_facts(study: Study, answer: SearchAnswer) -> dict[str, Any]:
         "cfa": space.cfa,
         "channel": " and ".join(space.filter.channels) if space.filter else "",
         "bounded": [] if limit is None else bounded_spaces(study, search),
-        "starts": len(answer.runs) - (answer.refinement is not None),
+        "starts": answer.starts,
+        "scenes_added": answer.added,
         "refinement": answer.refinement,
         "evaluations": sum(len(run.log) for run in answer.runs),
         "endings": [run.status for run in answer.runs],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import pyarrow as pa
@@ -14,7 +15,7 @@ from ..metrics.quantity import Quantity
 from ..results.designs import rows_of_series
 from ..study import Study
 from ..study.axes import series_of
-from .between import Between, between, least_between, or_nan
+from .between import Between, between, minima_between, or_nan
 from .workers import run_with_progress
 
 if TYPE_CHECKING:
@@ -27,8 +28,7 @@ _SCHEMA = pa.schema(
 
 
 def refined_quantities(study: Study) -> list[Quantity]:
-    """Return the quantities whose worst value over a series is told: those of flicker, and what a search of a series
-    maximizes."""
+    """Return quantities whose worst value over a series is told: of flicker, and what a search of it maximizes."""
     names = [FALSE_HUE, LAMP_SEEN, MODULATION]
     if study.search is not None and len(study.search.scenarios) > 1:
         names += study.objective.weights
@@ -78,7 +78,7 @@ def worst_over(
     def value(number: float) -> float:
         return sign * evaluate_one(ForwardModel(scenes.at(number), once=True), curves, quantity, states)
 
-    at, least = least_between(or_nan(value), numbers)
+    at, least = next(iter(minima_between(or_nan(value), numbers)), (math.nan, math.nan))
     return at, sign * least
 
 

@@ -70,13 +70,12 @@ class ChromaticSeparation(ReadoutMetric, LampMetric):
 
 
 class ChromaticConfusion(LampMetric):
-    """d' and error of each pair of states of lamps of unknown brightness, the worst over sampling phases and moments."""
+    """d' and error of each pair of states of lamps of unknown brightness, the worst over phases and moments."""
 
     order = 5
     of_states = True
 
     def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
-        of_noise = {"goal": True, "nominal": True}  # each shift would take an evaluation with noise
         return tuple(
             quantity
             for pair in class_pairs(requested.states)
@@ -93,7 +92,8 @@ class ChromaticConfusion(LampMetric):
                     states=pair,
                     rows="squares",
                     smooth=partial(chromatic_rows, pairs=(pair,), noise=True),
-                    **of_noise,
+                    goal=True,
+                    nominal=True,  # each shift would take an evaluation with noise
                 ),
                 Quantity(
                     name=pair_name(CHROMATIC_ERROR, pair),
@@ -108,7 +108,8 @@ class ChromaticConfusion(LampMetric):
                     states=pair,
                     rows="decades",
                     smooth=partial(chromatic_rows, pairs=(pair,), noise=True, decades=True),
-                    **of_noise,
+                    goal=True,
+                    nominal=True,  # each shift would take an evaluation with noise
                 ),
             )
         )

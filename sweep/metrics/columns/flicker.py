@@ -84,7 +84,7 @@ def _of_lamps(lamps: LampReadings, setup: Setup, time_s: float) -> dict[str, flo
 
     def lit(phases: FloatArray) -> FloatArray:
         scales = exposure_scales(setup, np.array([time_s]), phases)[:, 0]
-        return lamps.means_of_exposures(scales) - dark
+        return np.asarray(lamps.means_of_exposures(scales) - dark, dtype=float)
 
     dark = lamps.means_of_exposures(np.zeros((len(lamps.lit_e), 1)))
     pulsed = setup.computes("flicker")
@@ -102,7 +102,8 @@ def _of_lamps(lamps: LampReadings, setup: Setup, time_s: float) -> dict[str, flo
     part = np.where(lower >= _SEEN_DN, 1.0, np.clip(part, 0.0, 1.0))
 
     def hue(of_phases: FloatArray) -> FloatArray:
-        return np.sqrt(squared_distance(of_phases, np.broadcast_to(mean, of_phases.shape))).max(axis=1)
+        distances = np.sqrt(squared_distance(of_phases, np.broadcast_to(mean, of_phases.shape)))
+        return np.asarray(distances.max(axis=1), dtype=float)
 
     hues = hue(readings)
     worst = int(hues.argmax())
