@@ -16,7 +16,7 @@ from .effects import any_filter
 from .merge import merged, without_noise
 from .noise.table import unclipped_e
 from .pixel import unquantized
-from .pixel_curve import PixelCurve, pixel_curve
+from .pixel_curve import EQUAL, PixelCurve, groups_of, pixel_curve
 from .readout import Readout
 from .setup import Setup
 
@@ -30,7 +30,6 @@ _BESIDE = 1e-9
 """Nodes beside a knee without noise, where the reading may jump, relative."""
 _FEW = 16
 """Pixels whose knees are each among the nodes."""
-_EQUAL = 1e-9
 _SEEN = 1e-4
 """Weight of a pixel in a channel, relative to the largest, below which its knees are not waited for."""
 _MOST_RATIO = 1e9
@@ -58,16 +57,10 @@ class LampReadings:
         return len(self.lit_e[0])
 
     @cached_property
-    def _groups(self) -> list[tuple[tuple[float, ...], IndexArray]]:
-        """Elements with equal light of the exposures, in one group each."""
-        columns, which = np.unique(self.light, axis=1, return_inverse=True)
-        return [(tuple(column), np.flatnonzero(which.ravel() == at)) for at, column in enumerate(columns.T)]
-
-    @cached_property
     def proportional(self) -> bool:
         """True if all exposures have their fixed share of the electrons: no pulse, crosstalk or QE tells them apart."""
         full = [self.lit_e / self.light[:, None], self.dark_e / self.light]
-        return all(bool(np.allclose(one, one[:1], rtol=_EQUAL, atol=1e-12)) for one in full)
+        return all(bool(np.allclose(one, one[:1], rtol=EQUAL, atol=1e-12)) for one in full)
 
     @property
     def straight(self) -> bool:
@@ -81,7 +74,7 @@ class LampReadings:
 
     def pixel_curves(self) -> list[tuple[PixelCurve, IndexArray]]:
         """Return what pixels read over their electrons, for groups of elements."""
-        return [(pixel_curve(self.readout.pixel, light, noisy=self.noisy), at) for light, at in self._groups]
+        return [(pixel_curve(self.readout.pixel, light, noisy=self.noisy), at) for light, at in groups_of(self.light)]
 
     def means(self, signals: IndexArray, factors: FloatArray) -> FloatArray:
         """Return the mean of each channel, DN: [n, n_factors, n_channels], as of `moments`."""
@@ -120,7 +113,7 @@ class LampReadings:
         `factors`: light of each exposure relative to that of the scene, [n_exposures, n].
         """
         every = np.arange(self.n_signals)
-        if np.ptp(factors, axis=0).max(initial=0.0) <= _EQUAL:
+        if np.ptp(factors, axis=0).max(initial=0.0) <= EQUAL:
             return np.moveaxis(self.means(every, np.broadcast_to(factors[0], (every.size, factors.shape[1]))), 0, 1)
         electrons = self.lit_e[:, None] * factors[:, :, None, None] + self.dark_e[:, None, None]
         pixel, light = self.readout.pixel, self.light[:, None, None]

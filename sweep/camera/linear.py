@@ -15,12 +15,12 @@ import numpy as np
 
 from ..base.cache import Cache
 from ..base.errors import SweepError, ValidationIssue
-from ..base.types import BoolArray, FloatArray, IndexArray
+from ..base.types import FloatArray, IndexArray
 from .brightness import LampReadings, LampSlopes, room_dn
 from .exposure import relative_slope
 from .forward import ForwardModel
 from .pixel import Pixel, unquantized
-from .pixel_curve import STEPS_DN2, pixel_curve
+from .pixel_curve import STEPS_DN2, groups_of, pixel_curve
 from .pixel_response import SplitLight
 from .readout import Readout, capture_light
 from .setup import READOUT, Setup
@@ -174,8 +174,8 @@ class LinearModel(ForwardModel):
         whole, slope = by_pixel._with_slope(curves, curves_gradient)
         light = capture_light(self.setup.with_camera(pixel=self.hdr), by_pixel.electrons.response)
         moments = np.empty((4, *whole.shape))
-        for of_exposures, which in zip(*_distinct_columns(light), strict=True):
-            curve = pixel_curve(self.hdr, tuple(of_exposures), noisy=True)
+        for of_exposures, which in groups_of(light):
+            curve = pixel_curve(self.hdr, of_exposures, noisy=True)
             moments[..., which] = *curve.moments(whole[..., which]), *curve.slopes(whole[..., which])
         mean, variance, mean_per_e, variance_per_e = moments
         variance = np.maximum(variance, STEPS_DN2)
@@ -351,12 +351,6 @@ class LinearModel(ForwardModel):
         background = electrons.background[electrons.position, modified][:, None, None, None]
         total = signal_light * scales[None, :, None, None, None] + uniform[:, None, None, :, None] * background
         return np.asarray(total.reshape(-1, *total.shape[2:]) * exposure_s[0], dtype=float)
-
-
-def _distinct_columns(light: FloatArray) -> tuple[list[FloatArray], list[BoolArray]]:
-    """Return the distinct columns, and where each of them is."""
-    columns, which = np.unique(light, axis=1, return_inverse=True)
-    return list(columns.T), [which.ravel() == at for at in range(columns.shape[1])]
 
 
 class _ByPixel(LinearModel):

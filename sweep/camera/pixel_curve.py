@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.types import FloatArray
+from ..base.types import FloatArray, IndexArray
 from . import merge
 from .noise import moments, table
 from .pixel import Pixel, unquantized
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from scipy.interpolate import PPoly
 
 _LEAST_ROOT = 1e-3
+EQUAL = 1e-9
+"""Relative difference of electrons that are the same."""
 STEPS_DN2 = 1 / 12
 """Least variance that a search takes, DN^2, as of rounding: a saturated pixel has none, and no direction to go."""
 
@@ -124,6 +126,12 @@ def _read_once(pixel: Pixel) -> table.MomentTable:
 def pixel_curve(pixel: Pixel, light: tuple[float, ...], *, noisy: bool) -> PixelCurve:
     """Return the curve of a pixel; cached with its tables."""
     return PixelCurve(pixel, light, noisy)
+
+
+def groups_of(light: FloatArray) -> list[tuple[tuple[float, ...], IndexArray]]:
+    """Return the distinct columns of the light of exposures, [n_exposures, n_elements], and the elements of each."""
+    columns, which = np.unique(light, axis=1, return_inverse=True)
+    return [(tuple(column), np.flatnonzero(which.ravel() == at)) for at, column in enumerate(columns.T)]
 
 
 def is_noisy(setup: Setup) -> bool:

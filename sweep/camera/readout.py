@@ -15,6 +15,7 @@ from ..base.types import BoolArray, FloatArray, IndexArray
 from . import merge
 from .noise import table
 from .pixel import Pixel, unquantized
+from .pixel_curve import EQUAL, groups_of, pixel_curve
 from .pixel_response import PixelResponse
 from .rounding import DITHERED_DN, MANY_STEPS, MOST_POISSON_E, rounded
 from .setup import Setup
@@ -210,7 +211,7 @@ class Readout:
         noisy = setup.scene.noise is not None
         if pixel.captures:
             light = self.capture_light_of(electrons)
-            return merge.merged(electrons, light, pixel).mean if noisy else merge.without_noise(electrons, light, pixel)
+            return self._merged_means(electrons) if noisy else merge.without_noise(electrons, light, pixel)
         clips, rounds = setup.computes("saturation"), setup.computes("quantization")
         if noisy and setup.computes("noise"):
             return (table.mean_rounded if rounds else table.mean_unrounded)(electrons, pixel)
@@ -223,6 +224,16 @@ class Readout:
             dn = unquantized(held, pixel)
             return dn + table.mean_rounded(electrons, pixel) - table.mean_unrounded(electrons, pixel)
         return rounded(held * pixel.dn_per_e, pixel)
+
+    def _merged_means(self, electrons: FloatArray) -> FloatArray:
+        """Return means of merged values: from a table where exposures have their fixed share of the electrons."""
+        full_e = electrons / self.capture_light_of(electrons)
+        if not np.allclose(full_e, full_e[:1], rtol=EQUAL, atol=1e-12):
+            return merge.merged(electrons, self.capture_light_of(electrons), self.pixel).mean
+        means = np.empty(full_e.shape[1:])
+        for light, at in groups_of(self.capture_light):
+            means[..., at] = pixel_curve(self.pixel, light, noisy=True).mean(full_e[0][..., at])
+        return means
 
     def _whole_numbers(self, electrons: FloatArray, clips: bool) -> FloatArray:
         """Convert electrons to whole digital numbers without noise, in one pass."""

@@ -406,15 +406,18 @@ def of_lamps(
     return {k: v for metric in metrics for k, v in metric.of_lamps(cases, setup.members, states).items()}
 
 
-def evaluate_one(model: ForwardModel, curves: FloatArray, quantity: Quantity, states: Sequence[str]) -> float:
-    """Return one quantity of one design, by no more than its own metric where that needs none of the other columns."""
-    if quantity.metric == CHROMATIC_DPRIME:
-        metrics = [metric for metric in _LAMPS if metric.of_states]
-        return of_lamps(model.setup, curves, states, metrics)[quantity.name]
-    for metric in METRICS:
-        if isinstance(metric, PulseMetric) and quantity.metric in metric.names:
-            return float(metric.of_pulses(model, curves)[quantity.name][0])
-    return float(evaluate(model, curves, states)[quantity.name][0])
+def evaluate_some(
+    model: ForwardModel, curves: FloatArray, quantities: Sequence[Quantity], states: Sequence[str]
+) -> dict[str, float]:
+    """Return quantities of one design, by no more than their own metrics where these need none of the other columns."""
+    wanted = {quantity.metric for quantity in quantities}
+    if wanted == {CHROMATIC_DPRIME}:
+        found = of_lamps(model.setup, curves, states, [metric for metric in _LAMPS if metric.of_states])
+    else:
+        pulses = [metric for metric in METRICS if isinstance(metric, PulseMetric) and wanted <= {*metric.names}]
+        columns = pulses[0].of_pulses(model, curves) if pulses else evaluate(model, curves, states)
+        found = {name: float(values[0]) for name, values in columns.items()}
+    return {quantity.name: found[quantity.name] for quantity in quantities}
 
 
 def _merged(which: BoolArray, some: FloatArray, others: FloatArray) -> FloatArray:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -12,9 +13,9 @@ import pyarrow as pa
 
 from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..camera.forward import ForwardModel
-from ..metrics.columns.chromatic import CHROMATIC_ERROR
+from ..metrics.columns.chromatic import CHROMATIC_ERROR, ChromaticConfusion
 from ..metrics.columns.confusion import STATE_ERROR, state_errors
-from ..metrics.evaluate import evaluate
+from ..metrics.evaluate import of_lamps
 from ..results.designs import rows_of_series
 from ..spectra.lights import class_pairs, pair_name
 from ..study import Study
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 _LEAST = 1e-300
 _CLOSE = 1e-3
 """Tolerance of the number: relative, or of the interval."""
-_NEAR = 3.0
+_NEAR = 2.5
 """Between two scenarios whose d' are both so many times the allowed one, or less, errors are not looked for."""
 _SCHEMA = pa.schema(
     [("design_id", pa.int64())]
@@ -65,46 +66,61 @@ def crossings_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progre
     for series, key, scenarios, row, curves, space in rows_of_series(study, rows):
         scenes = between(study, study.setup(space, next(iter(scenarios))), scenarios)
         of_design = rows[(rows["name"] == row["name"]) & rows["scenario"].isin(list(scenarios))].set_index("scenario")
-        of_any = of_design[[pair_name(CHROMATIC_ERROR, pair) for pair in class_pairs(study.states)]].max(axis=1)
-        allowed = recognition.error_max
-        for quantity, errors in ((STATE_ERROR, of_design[STATE_ERROR]), (CHROMATIC_ERROR, of_any)):
-            known = errors.reindex(list(scenarios)).to_numpy(dtype=float)
-            if scenes is not None and np.isfinite(known).all():
-                keys.append({"design_id": row["design_id"], "name": row["name"], "series": series, "key": key})
-                keys[-1]["quantity"] = quantity
-                numbers = dict(zip(scenarios.values(), known.tolist(), strict=True))
-                calls.append(delayed(_crossings, scenes, curves, study.states, quantity, numbers, allowed))
+        of_any = [pair_name(CHROMATIC_ERROR, pair) for pair in class_pairs(study.states)]
+        errors = of_design[[STATE_ERROR]].assign(**{CHROMATIC_ERROR: of_design[of_any].max(axis=1)})
+        errors = errors.reindex(list(scenarios)).set_axis(list(scenarios.values()))
+        if scenes is not None and np.isfinite(errors.to_numpy()).all():
+            keys.append({"design_id": row["design_id"], "name": row["name"], "series": series, "key": key})
+            known = {name: errors[name].to_dict() for name in errors}
+            calls.append(delayed(_of_design, ErrorsBetween(scenes, curves, study.states), known, recognition.error_max))
     answers = run_with_progress(parallel, calls, "where designs stop being usable", progress)
     made = [key | at for key, found in zip(keys, answers, strict=True) for at in found]
     return pa.Table.from_pylist(made, schema=_SCHEMA)
 
 
-def worst_error(scenes: Between, curves: FloatArray, states: tuple[str, ...], quantity: str, number: float) -> float:
-    """Return the error of the worst pair of states, for lamps of equal brightness or of any."""
-    model = ForwardModel(scenes.at(number), once=True)
-    if quantity == STATE_ERROR:
-        return float(state_errors(model, curves, states)[0])
-    columns = evaluate(model, curves, states)
-    return max(float(columns[pair_name(CHROMATIC_ERROR, pair)][0]) for pair in class_pairs(states))
+class ErrorsBetween:
+    """Errors of the worst pair of states of a design over the numbers of a series."""
+
+    def __init__(self, scenes: Between, curves: FloatArray, states: tuple[str, ...]) -> None:
+        self._scenes, self._curves, self._states = scenes, curves, states
+        self._of_equal: dict[float, float] = {}
+
+    def at(self, number: float, quantity: str) -> float:
+        """Return the error of lamps of equal brightness, or of any, which is no smaller."""
+        setup = self._scenes.at(number)
+        if number not in self._of_equal:
+            model = ForwardModel(setup, once=True)
+            self._of_equal[number] = float(state_errors(model, self._curves, self._states)[0])
+        if quantity == STATE_ERROR:
+            return self._of_equal[number]
+        columns = of_lamps(setup, self._curves, self._states, [ChromaticConfusion()])
+        of_any = [columns[pair_name(CHROMATIC_ERROR, pair)] for pair in class_pairs(self._states)]
+        return max(self._of_equal[number], *of_any)
 
 
-def _crossings(
-    scenes: Between,
-    curves: FloatArray,
-    states: tuple[str, ...],
-    quantity: str,
-    known: Mapping[float, float],
-    allowed: float,
+def _of_design(
+    errors: ErrorsBetween, known: Mapping[str, Mapping[float, float]], allowed: float
 ) -> list[dict[str, Any]]:
-    """Return the numbers at which the error is the allowed one, in order.
+    """Return the crossings of both kinds of errors."""
+    return [
+        {"quantity": quantity} | crossing
+        for quantity, numbers in known.items()
+        for crossing in crossings_of(or_nan(partial(errors.at, quantity=quantity)), numbers, allowed)
+    ]
 
-    The logarithms of both are nearly on a line between two neighboring ones.
+
+def crossings_of(
+    computed: Callable[[float], float], known: Mapping[float, float], allowed: float
+) -> list[dict[str, Any]]:
+    """Return the numbers at which an error is the allowed one, in order.
+
+    `known`: errors at the numbers of a series, `computed` between them. The logarithms of both are nearly on a line
+    between two neighboring ones.
     """
     from scipy.optimize import brentq  # noqa: PLC0415  (few studies ask for it)
     from scipy.special import ndtri  # noqa: PLC0415
 
     by_ratio = min(known) > 0
-    computed = or_nan(lambda number: worst_error(scenes, curves, states, quantity, number))
 
     def decades(number: float) -> float:
         error = known[number] if number in known else computed(number)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING
 
 import pyarrow as pa
@@ -10,7 +11,7 @@ import pyarrow as pa
 from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..camera.forward import ForwardModel
 from ..metrics.columns.flicker import FALSE_HUE, LAMP_SEEN, MODULATION
-from ..metrics.evaluate import evaluate_one
+from ..metrics.evaluate import evaluate_some
 from ..metrics.quantity import Quantity
 from ..results.designs import rows_of_series
 from ..study import Study
@@ -60,26 +61,34 @@ def worst_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: 
     keys, calls = [], []
     for series, key, scenarios, row, curves, space in rows_of_series(study, rows):
         scenes = between(study, study.setup(space, next(iter(scenarios))), scenarios)
-        for quantity in refined_quantities(study):
-            if scenes is not None and rows[rows["name"] == row["name"]][quantity.name].notna().any():
-                keys.append({"name": row["name"], "series": series, "key": key, "quantity": quantity.name})
-                calls.append(delayed(worst_over, scenes, curves, quantity, study.states, [*scenarios.values()]))
+        known = rows[rows["name"] == row["name"]]
+        quantities = [one for one in refined_quantities(study) if known[one.name].notna().any()]
+        if scenes is not None and quantities:
+            keys.append({"name": row["name"], "series": series, "key": key})
+            calls.append(delayed(worst_over, scenes, curves, quantities, study.states, [*scenarios.values()]))
     answers = run_with_progress(parallel, calls, "worst values between scenarios", progress)
-    made = [key | {"at": at, "value": value} for key, (at, value) in zip(keys, answers, strict=True)]
+    made = [key | row for key, found in zip(keys, answers, strict=True) for row in found]
     return pa.Table.from_pylist(made, schema=_SCHEMA)
 
 
 def worst_over(
-    scenes: Between, curves: FloatArray, quantity: Quantity, states: tuple[str, ...], numbers: list[float]
-) -> tuple[float, float]:
-    """Return the number with the worst value of a design, and that value."""
-    sign = -1.0 if quantity.wanted == "less" else 1.0
+    scenes: Between, curves: FloatArray, quantities: list[Quantity], states: tuple[str, ...], numbers: list[float]
+) -> list[dict[str, str | float]]:
+    """Return the worst value of each quantity of a design, and the number at which it is."""
+    known: dict[float, dict[str, float]] = {}
 
-    def value(number: float) -> float:
-        return sign * evaluate_one(ForwardModel(scenes.at(number), once=True), curves, quantity, states)
+    def value(quantity: Quantity, number: float) -> float:
+        if number not in known:
+            model = ForwardModel(scenes.at(number), once=True)
+            known[number] = evaluate_some(model, curves, quantities, states)
+        return known[number][quantity.name] * (-1.0 if quantity.wanted == "less" else 1.0)
 
-    at, least = next(iter(minima_between(or_nan(value), numbers)), (math.nan, math.nan))
-    return at, sign * least
+    found: list[dict[str, str | float]] = []
+    for quantity in quantities:
+        minima = minima_between(or_nan(partial(value, quantity)), numbers)
+        at = minima[0][0] if minima else math.nan
+        found.append({"quantity": quantity.name, "at": at, "value": known[at][quantity.name] if minima else math.nan})
+    return found
 
 
 def has_worst(study: Study) -> bool:

@@ -23,6 +23,7 @@ from ..spectra.single_leds import RegionMap
 from ..spectra.spectrum import WavelengthGrid
 from ..vision.section import Vision
 from .axes import ScenarioTemplate, Span, Values, expanded
+from .cameras import CameraName, with_camera
 from .schema_curves import (
     LIGHTS_NAME,
     ColorantsSection,
@@ -270,6 +271,9 @@ class StudySection(Section):
     mapping with `files`."""
     sensors: list[named(BUILT_IN_SENSORS) | SensorSection] | None = None  # type: ignore[valid-type]
     """Several sensors instead of `sensor`: one run for each, and their comparison."""
+    camera: CameraName | None = None
+    """Pixel and lens of a camera for the road, where `pixel` and `optics` of the scenarios state nothing else: `road`,
+    f/2 and a split pixel of 2.8 um; `road_read_once`, its large photodiode alone, read once."""
     pixel: Pixel = Pixel()
     """The pixel and its readout."""
     lights: Annotated[
@@ -341,6 +345,11 @@ class StudySection(Section):
     """How designs do on lights that they have not seen."""
     published: dict[Name, dict[Name, dict[Name, Number]]] = {}
     """Printed figures to compare with: table -> CFA, design or geometry -> quantity -> value."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_camera(cls, value: Any) -> Any:
+        return with_camera(value)
 
     @property
     def wanted_yield(self) -> float:
