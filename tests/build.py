@@ -10,6 +10,8 @@ import pytest
 
 from sweep.base.errors import StudyError, SweepError
 from sweep.cli.new import new_study
+from sweep.report.answer import answer_parts
+from sweep.results.output import Output
 from sweep.run import run_study
 from sweep.study import Study, load_study
 
@@ -158,3 +160,9 @@ def one_line(*said: str, alone: bool = True) -> Iterator[None]:
 def made(folder: Path, name: str = "mine", qe: Path | None = None, lights: Path | None = None) -> Path:
     new_study(name, folder / "studies", qe, lights, "energy")
     return folder / "studies" / f"{name}.yaml"
+
+
+def sentences_of(output: Output) -> list[str]:
+    """The answer of a run, and what else was found."""
+    answer, further = answer_parts(output)
+    return answer + further

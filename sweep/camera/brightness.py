@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import BoolArray, FloatArray, IndexArray
 from .effects import any_filter
 from .merge import merged, without_noise
 from .noise.table import unclipped_e
@@ -71,6 +71,16 @@ class LampReadings:
     def full_e(self) -> tuple[FloatArray, FloatArray]:
         """Electrons of a pixel of full sensitivity, of the lamps and without them."""
         return self.lit_e[0] / self.light[0], self.dark_e[0] / self.light[0]
+
+    @property
+    def full(self) -> BoolArray:
+        """True for lamps that fill a pixel of any channel, of an HDR pixel all its captures, [n_signals]."""
+        lit_e, dark_e = self.full_e
+        full = np.zeros(self.n_signals, dtype=bool)
+        for curve, at in self.pixel_curves():
+            seen = at[self.readout.weights[0].max(axis=1)[at] > _SEEN * self.readout.weights[0].max()]
+            full |= (lit_e[:, seen] + dark_e[seen] >= curve.knees_e[-1]).any(axis=1)
+        return full
 
     def pixel_curves(self) -> list[tuple[PixelCurve, IndexArray]]:
         """Return what pixels read over their electrons, for groups of elements."""

@@ -15,10 +15,10 @@ from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
 from ..results.thinning import per_exposure
 from ..study.axes import series_of
-from .captures import flicker_lines
 from .lamps import cost_of_worst_case, lamp_lines, over_population, robustness_lines
 from .leaders import Leaders, Row, capital, full_name, label, leaders_of, of_reference, upper_bound_beside
 from .noise import usable_lines
+from .over_series import flicker_lines, worst_words
 from .parameter_map import map_lines
 from .scorecard import score_lines, scorecard
 from .series import lead_sentence, leads_of, series_figures, vanishing_line
@@ -38,23 +38,6 @@ _MOST_SCENARIOS = 6
 """Scenarios beside the leading one whose best design the answer names."""
 _BY_NOISE = (D_PRIME, CNR)
 """Metrics of separations in units of the noise."""
-
-
-def answer_sentences(output: Output) -> list[str]:
-    """Return the answer to the study's question, and then what else was found.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    list of str
-        Lines.
-    """
-    answer, further = answer_parts(output)
-    return answer + further
 
 
 def answer_parts(output: Output) -> tuple[list[str], list[str]]:
@@ -140,7 +123,7 @@ def _in(output: Output, scenario: str) -> str:
     return f" in {scenario}" if len(output.scenarios) > 1 else ""
 
 
-def _best(output: Output, leaders: Leaders) -> Iterator[str]:
+def _best(output: Output, leaders: Leaders) -> Iterator[str]:  # noqa: PLR0912  (one sentence after another)
     """Yield the best design beside the plain CFA with the largest separation, its limits, and others."""
     best, plain, separation = leaders.chosen, leaders.plain, output.trade_off[0]
     if best is None:
@@ -160,6 +143,8 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
     text = f"With {under}, {who}" if under else capital(who)
     if output.goal.name not in (separation.name, separation.of):
         text += f" has the best {output.goal.words}, {output.goal.amount(best[output.goal.name])}, and"
+    if over := worst_words(output, best):
+        yield f"{text} {over}."
     text += f" {_format_separation(output, best)}"
     held_out = float(best.get(HELD_OUT + (separation.of or separation.name), np.nan))
     if np.isfinite(held_out):
@@ -167,7 +152,8 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
     yield f"{text}{_in(output, leaders.scenario)}{_times(output, best, plain)}.{_equal(output, best)}"
     search = output.provenance.search
     if search is not None and search.scenarios > 1 and best["kind"] == FOUND:
-        yield f"It was searched for its worst value over {search.scenarios} scenarios, which it has there."
+        more = f" and {search.scenes_added} scenes between them" if search.scenes_added else ""
+        yield f"It was searched for its worst value over {search.scenarios} scenarios{more}."
     if output.objective.rule.wanted != "more":  # decades of what is to be the least, in its own unit
         for name in output.objective.weights:
             rows = [row for row in (best, plain) if row is not None]

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.types import FloatArray
-from ..metrics.columns.flicker import FALSE_HUE, LAMP_SEEN, MODULATION
 from ..results.output import Output
 from ..study.axes import series_of
 from .figures import TYPE_COLORS, Drawing, canvas, legend_beside
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
 _SHADES = ("#08519c", "#3182bd", "#9ecae1", "#deebf7")
 _SATURATED = "#d62728"
 _TYPES = 2
-_ALL = 1 - 1e-9
 
 
 @dataclass(frozen=True)
@@ -70,36 +68,6 @@ def capture_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
             title = f"{output.study.study}, {base}: capture that reads the median signal"
             series = SeriesFigure(title, key, "", np.array([*scenarios.values()]), {}, "")
             yield f"captures-{number}", title, partial(draw_captures, CapturesFigure(series, ends))
-
-
-def flicker_lines(output: Output) -> Iterator[str]:
-    """Yield how pulsed lamps look in an HDR pixel, in the worst scenario of each figure.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Yields
-    ------
-    str
-        Sentence.
-    """
-    rows = output.few
-    if LAMP_SEEN not in rows or rows[LAMP_SEEN].isna().all():
-        return
-    pulsed = rows.dropna(subset=[LAMP_SEEN])
-    seen, modulated, hue = (
-        pulsed.loc[getattr(pulsed[column], which)()]
-        for column, which in ((LAMP_SEEN, "idxmin"), (MODULATION, "idxmax"), (FALSE_HUE, "idxmax"))
-    )
-    least = seen[LAMP_SEEN]
-    share = f"as few as {least:.1%} of the phases ({seen['name']} in {seen['scenario']})"
-    yield (
-        f"Pulsed lamps are seen in {'all phases' if least > _ALL else share}; their modulation is at most "
-        f"{modulated[MODULATION]:.2f} ({modulated['scenario']}), their false hue at most {hue[FALSE_HUE]:.3g} DN "
-        f"({hue['name']} in {hue['scenario']})."
-    )
 
 
 def draw_captures(figure: CapturesFigure) -> Figure:

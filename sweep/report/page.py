@@ -35,6 +35,7 @@ from .scenes import effect_table, scene_groups, scene_table
 from .scorecard import draw_scorecard, scorecard
 from .sensor_map import map_drawings
 from .series import draw_series
+from .stated import stated_lines
 from .summary import counts_line, summary_lines
 from .tables import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
 from .terms import format_constraints, term_definitions
@@ -124,6 +125,7 @@ def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
         "most_series": _MOST_SERIES,
         "terms_first": series_first and drawn["series"][0]["y_label"] == output.trade_off[0].axis,
         "answer": answer,
+        "stated": stated_lines(output),
         "further": further,
         "numbers": headline_numbers(output),
         "price": rows(price_table(output)),

@@ -7,10 +7,11 @@ from ..results.facts import SearchFacts
 from ..results.output import Output
 from ..results.tables import PLAIN
 from ..study.axes import series_of
-from .answer import answer_sentences
+from .answer import answer_parts
 from .leaders import capital, of_reference
 from .price import price_line
 from .scorecard import score_lines, scorecard
+from .stated import stated_lines
 from .tables import comparison_lines, comparison_with_published
 from .terms import assumptions_line
 from .values import drawn_rows
@@ -58,7 +59,8 @@ def summary_lines(output: Output, took_s: float | None = None) -> list[str]:
         Lines.
     """
     facts = output.provenance
-    lines = [*answer_sentences(output), *_scene_lines(output)]
+    answer, further = answer_parts(output)
+    lines = [*answer, *stated_lines(output), *further, *_scene_lines(output)]
     if not output.best.empty:
         best = output.best.iloc[0]
         names = [name for name in output.parameters if best[name] == best[name]]

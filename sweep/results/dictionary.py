@@ -162,6 +162,8 @@ FILES = {
     "the error of a plain CFA, named design or answer of the search is the allowed one, with everything on, the "
     "`error` there, and whether it `rises` beyond; `quantity`: `state_error` of lamps of equal brightness, or "
     "`chromatic_error` of lamps of any",
+    files.SATURATED: "for each plain CFA, named design and answer of the search (`design_id`), how many of the "
+    "`signals` fill a pixel of any channel (`full_signals`), of an HDR pixel all its captures",
     files.WORST: "where scenarios differ in one number, and lamps are pulsed or the search maximizes the worst of the "
     "scenarios: for each plain CFA, named design and answer of the search the worst `value` of a `quantity`, and the "
     "number `at` which it is, also between two scenarios, with everything on",

@@ -34,13 +34,14 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _Made = TypeVar("_Made")
-_ALWAYS = (RESULTS, files.CURVES, files.POINTS, files.LIMITED_BY, RESOLVED, PROVENANCE)
+_ALWAYS = (RESULTS, files.CURVES, files.POINTS, files.LIMITED_BY, files.SATURATED, RESOLVED, PROVENANCE)
 """Files of every run; others are of some runs alone."""
 _ALWAYS_WRITTEN = ("study", "seed", "wavelengths", "scenarios", "objective")
 """Keys of every resolved study: it has its defaults, too, so that one that lacks them was cut."""
 _COLUMNS: dict[str, Sequence[str]] = {
     files.CURVES: CURVES_SCHEMA.names,
     files.LIMITED_BY: ["design_id"],
+    files.SATURATED: ["design_id", "full_signals", "signals"],
     files.POINTS: ["design_id", "signal_type", "signal", "channel", "dn"],
     files.FRONT: files.front_schema(()).names,
     files.LEFT_OUT: ["objective", "signal_type", "signal", "fall"],
@@ -58,7 +59,8 @@ class Output:
     evaluations. `audited`: rows of `sweep audit`; `left_out`: a row per light that was left out of a search; `regions`:
     cells of the maps of color regions. `error_against_noise`: color error against noise, `rendered`: areas of pictures;
     `places`: separations over the sensor; `map`: the best objective over two parameters; `handovers`: where captures of
-    an HDR pixel are full; `worst`: worst values over series; `uncertainty`: quantiles over random sensors;
+    an HDR pixel are full; `worst`: worst values over series;
+    `saturated`: signals that fill a pixel; `uncertainty`: quantiles over random sensors;
     `vision`: tables of the benchmark of vision by their files' names.
     """
 
@@ -84,6 +86,7 @@ class Output:
     map: pd.DataFrame | None
     handovers: pd.DataFrame | None
     worst: pd.DataFrame | None
+    saturated: pd.DataFrame
     uncertainty: pd.DataFrame | None
     vision: Mapping[str, pd.DataFrame]
     profiles: Mapping[str, Sequence[ParameterProfile]]
@@ -282,7 +285,10 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
     points = swept_points(folder / RESULTS)
     order = [objective, *provenance.trade_off]
     table, counts = thinned(folder / RESULTS, order, provenance.trade_off[0], points, profiles.add)
-    more = {name: read_table(folder / name).to_pandas() for name in (files.POINTS, files.LIMITED_BY, *optional)}
+    more = {
+        name: read_table(folder / name).to_pandas()
+        for name in (files.POINTS, files.LIMITED_BY, files.SATURATED, *optional)
+    }
     for name in (files.LIMITED_BY, files.VALIDATED, files.ROBUSTNESS):
         if name in more:
             table = table.merge(more[name].drop(columns="filter_id", errors="ignore"), on="design_id", how="left")
@@ -313,6 +319,7 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         map=more.get(files.MAP),
         handovers=more.get(files.HANDOVERS),
         worst=more.get(files.WORST),
+        saturated=more[files.SATURATED],
         uncertainty=more.get(files.UNCERTAINTY),
         vision={name: more[name] for name in files.VISION_TABLES if name in more},
         profiles=profiles.found if all(made.grid is not None for made in study.sweeps.values()) else {},

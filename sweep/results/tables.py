@@ -37,7 +37,7 @@ TRADED, RENDERED = "color_noise.parquet", "rendered.parquet"
 CHART, NIGHT = "chart", "night"
 """Pictures of which `rendered.parquet` has the areas."""
 COMBINATIONS, MAP = "combinations.parquet", "map.parquet"
-HANDOVERS, WORST = "handovers.parquet", "worst.parquet"
+HANDOVERS, WORST, SATURATED = "handovers.parquet", "worst.parquet", "saturated.parquet"
 VALIDATED, LEFT_OUT = "validated.parquet", "leave_one_out.parquet"
 VISION, VISION_CONDITIONS = "vision.parquet", "vision_conditions.parquet"
 VISION_MISREAD = "vision_misread.parquet"
@@ -53,7 +53,8 @@ REPORT, FIGURES, VISION_FIGURES = "report.html", "figures", "vision-"
 MADE_BY_RUN = frozenset(
     (
         *(RESULTS, SEARCH_LOG, FRONT, CURVES, POINTS, RECOGNITION, CROSSINGS, LIMITED_BY, ROBUSTNESS, REGIONS_MAP),
-        *(SENSOR_MAP, TRADED, RENDERED, VALIDATED, LEFT_OUT, COMBINATIONS, MAP, HANDOVERS, WORST, UNCERTAINTY),
+        *(SENSOR_MAP, TRADED, RENDERED, VALIDATED, LEFT_OUT, COMBINATIONS, MAP, HANDOVERS, WORST, SATURATED),
+        UNCERTAINTY,
         *(*VISION_TABLES, PROVENANCE, RESOLVED),
     )
 )

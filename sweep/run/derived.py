@@ -23,6 +23,7 @@ from ..results.tables import (
     REGIONS_MAP,
     RENDERED,
     ROBUSTNESS,
+    SATURATED,
     SENSOR_MAP,
     TRADED,
     UNCERTAINTY,
@@ -39,6 +40,7 @@ from .details import Details, limited_by_table, recognition_table, sensor_map_ta
 from .handovers import handovers_table
 from .held_out import held_out_table
 from .robustness import robustness_table
+from .saturated import saturated_table
 from .uncertainty import uncertainty_table
 from .worst import has_worst, worst_table
 
@@ -116,6 +118,7 @@ def row_tables(study: Study) -> dict[str, Callable[[DerivedInput], pa.Table]]:
     tables: dict[str, Callable[[DerivedInput], pa.Table]] = {
         CURVES: _curves_table,
         POINTS: _points_table,
+        SATURATED: lambda s: saturated_table(s.study, s.rows, s.parallel, s.progress),
         LIMITED_BY: lambda s: limited_by_table(s.study, s.details, s.points, s.parallel, s.progress),
     }
     if study.held_out is not None:

@@ -12,7 +12,6 @@ import pytest
 
 from sweep.metrics.bound import Bound
 from sweep.report import make_report, read_output
-from sweep.report.answer import answer_sentences
 from sweep.report.page_data import payload
 from sweep.report.summary import counts_line
 from sweep.report.trade_off import pareto_figure, traded_cfas
@@ -20,7 +19,7 @@ from sweep.results.designs import find_design_row
 from sweep.results.output import Output
 from sweep.study import load_study
 
-from ..build import ran
+from ..build import ran, sentences_of
 from ..conftest import STUDIES, FinishedFolder
 
 UNKNOWN = """\
@@ -75,7 +74,7 @@ def test_a_design_without_a_constrained_figure_is_not_feasible_and_the_figure_is
     output = read_output(tmp_path / "out")
     assert not output.table["feasible"].any()
     assert output.table["violation"].isna().all()
-    said = answer_sentences(output)
+    said = sentences_of(output)
     assert said[0] == "No design meets every constraint: band width at least 10 nm."
     assert said[1] == "Designs of free_form have no band width: unknown is not feasible."
     assert ", 0 feasible (every constraint is met)" in counts_line(output)
@@ -137,14 +136,14 @@ def test_pandas_alone_reads_units_and_meanings(scenes: Output) -> None:
 
 
 def test_the_answer_names_the_best_of_every_scenario(scenes: Output) -> None:
-    said = " ".join(answer_sentences(scenes))
+    said = " ".join(sentences_of(scenes))
     for scenario in scenes.scenarios:
         best = scenes.best[scenes.best["scenario"] == scenario].iloc[0]
         assert f"by {best['csd_yellow_red']:.0f} DN" in said
         assert f"in {scenario}" in said.lower()
     leading = scenes.best.iloc[0]
     assert leading["scenario"] == "bright"  # the search's, though not the first one
-    assert f"by {leading['csd_yellow_red']:.0f} DN" in answer_sentences(scenes)[0]
+    assert f"by {leading['csd_yellow_red']:.0f} DN" in sentences_of(scenes)[0]
     make_report(scenes)
     assert "27 rows" in (scenes.folder / "report.html").read_text()
 
@@ -153,7 +152,7 @@ def test_a_leading_scenario_without_a_feasible_design_is_reported(tmp_path: Path
     text = SCENES.replace("{sensitivity: {min: 0.9}}", "{csd_yellow_red: {min: 100}}").split("search:")[0]
     (tmp_path / "scenes.yaml").write_text(text)
     ran(load_study(tmp_path / "scenes.yaml"), tmp_path / "out", 1)
-    said = answer_sentences(read_output(tmp_path / "out"))
+    said = sentences_of(read_output(tmp_path / "out"))
     assert said[0] == "In dim, no design meets every constraint."
     assert said[1].startswith("In bright, filter ")
     assert " separates most of all in dim: " in said[2]

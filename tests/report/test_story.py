@@ -15,7 +15,7 @@ from sweep.designs.block import edges_of
 from sweep.metrics.columns.sensitivity import cfa_sensitivity_at
 from sweep.metrics.limiting import limiting_lights
 from sweep.report import make_report, read_output
-from sweep.report.answer import answer_sentences, headline_numbers
+from sweep.report.answer import headline_numbers
 from sweep.report.leaders import capital, full_name, leaders_of
 from sweep.report.page_data import payload
 from sweep.report.series import Line, SeriesFigure, lead_sentence
@@ -23,7 +23,7 @@ from sweep.report.trade_off import overview_figure
 from sweep.results.tables import REPORT
 from sweep.study import load_study
 
-from ..build import ran
+from ..build import ran, sentences_of
 from ..conftest import STUDIES, FinishedFolder
 from .shipped import EVERY, SEARCHED
 
@@ -46,7 +46,7 @@ def test_the_headline_names_the_best_of_all_rows(finished: FinishedFolder, name:
     assert leaders.chosen[output.goal.name] == allowed[output.goal.name].max()
     assert leaders.separates is not None
     assert leaders.separates[separation] == rows[separation].max()
-    text = " ".join(answer_sentences(output))
+    text = " ".join(sentences_of(output))
     if " leads" not in text:
         assert output.trade_off[0].formatted(leaders.chosen[separation]) in text
 
@@ -56,7 +56,7 @@ def test_designs_beyond_the_best_one_are_named(finished: FinishedFolder, name: s
     """Every plain CFA or named design that separates more than the best one is beaten by one that the answer names."""
     folder = finished(name)
     output, table = read_output(folder), whole(folder)
-    text, leaders, separation = " ".join(answer_sentences(output)), leaders_of(output), output.trade_off[0].name
+    text, leaders, separation = " ".join(sentences_of(output)), leaders_of(output), output.trade_off[0].name
     if " leads" in text:
         return  # a series has its own test
     assert leaders.chosen is not None
@@ -143,7 +143,7 @@ def test_who_separates_most_names_its_lights_whatever_the_constraints(finished: 
     limited, table = pd.read_parquet(folder / "limited_by.parquet").set_index("design_id"), whole(folder)
     most = table.loc[table["csd_yellow_red"].idxmax()]
     assert not most["feasible"]
-    said = " ".join(answer_sentences(read_output(folder)))
+    said = " ".join(sentences_of(read_output(folder)))
     lights = limited.loc[most["design_id"], "limited_by_yellow_red"]
     assert f"Filter {most['filter_id']} of RYNCy separates most of all: {most['csd_yellow_red']:.0f} DN" in said
     assert f"(limited by {lights}), but its sensitivity is below 0.9 and its slope above 0.06 per nm." in said
@@ -197,7 +197,7 @@ def test_a_study_of_plain_cfas_has_an_answer(tmp_path: Path) -> None:
     output = read_output(tmp_path / "out")
     make_report(output)
     told = "The best CFA of this study, RGGB, separates yellow from red by 139 DN at 0.352 of a clear sensor's light: 4.48 "
-    assert answer_sentences(output)[0].startswith(told)
+    assert sentences_of(output)[0].startswith(told)
     assert (tmp_path / "out" / REPORT).is_file()
     assert (tmp_path / "out" / "cfas.png").is_file()
     assert not (tmp_path / "out" / "pareto.png").exists()
@@ -224,7 +224,7 @@ def test_a_plain_cfa_that_is_better_is_named_first(tmp_path: Path) -> None:
     path = tmp_path / "better.yaml"
     path.write_text(BETTER)
     ran(load_study(path), tmp_path / "out", 1)
-    said = answer_sentences(read_output(tmp_path / "out"))
+    said = sentences_of(read_output(tmp_path / "out"))
     ratio = re.search(r"([\d.]+) times the separation of RGGB", said[0])
     assert ratio is not None
     assert float(ratio[1]) < 1
@@ -252,7 +252,7 @@ def test_the_best_of_each_other_cfa_is_named(tmp_path: Path) -> None:
     most = made.loc[made.groupby("cfa", observed=True)["csd_yellow_red"].idxmax()].sort_values("csd_yellow_red")
     assert len(most) == 2
     other, best = most.iloc[0], most.iloc[1]
-    said = answer_sentences(read_output(tmp_path / "out"))
+    said = sentences_of(read_output(tmp_path / "out"))
     assert re.search(
         rf"filter {best['filter_id']} of {best['cfa']} \(edges at \d+ and \d+ nm\) separates yellow from red by",
         said[0],
@@ -268,7 +268,7 @@ def test_headline_star_and_details_name_one_filter(finished: FinishedFolder, nam
     output = read_output(finished(name))
     best, data = leaders_of(output).chosen, payload(output)
     assert best is not None
-    sentence = answer_sentences(output)[0]
+    sentence = sentences_of(output)[0]
     assert full_name(best) in sentence or sentence.startswith(capital(full_name(best)))
     star = overview_figure(output, output.scenario).groups["best"].labels
     at = data["chosen"][output.scenario]

@@ -11,13 +11,13 @@ import pytest
 
 from sweep.base.errors import UpperBoundExceededError
 from sweep.report import read_output, summary_lines
-from sweep.report.answer import answer_sentences, headline_numbers
+from sweep.report.answer import headline_numbers
 from sweep.report.leaders import leaders_of, upper_bound_beside
 from sweep.report.page_data import payload
 from sweep.results.output import Output
 from sweep.study import load_study
 
-from ..build import ran
+from ..build import ran, sentences_of
 
 SHOWN = re.compile(
     r"Upper bound for any filter in (?P<channel>\w+) of (?P<cfa>\w+) under (?:the same constraints|no constraint)"
@@ -67,7 +67,7 @@ def check_shown_bounds(output: Output) -> int:
     assert search is not None
     leaders, goal = leaders_of(output), output.goal.name
     table, shown = output.table, 0
-    for text in answer_sentences(output):
+    for text in sentences_of(output):
         for match in SHOWN.finditer(text):
             assert leaders.chosen is not None
             own = match["scenario"] or output.scenarios[0]
@@ -106,7 +106,7 @@ def test_the_bound_of_one_scenario_is_not_shown_beside_the_design_of_another(tmp
     text = study_text({"day": 2e-4, "night": 5e-3}, ["RYNCy"], {"RYNCy": GRID}, "RYNCy", "day", 0.9)
     output = finished_output(tmp_path, text)
     assert check_shown_bounds(output) == 1
-    answer = " ".join(answer_sentences(output))
+    answer = " ".join(sentences_of(output))
     assert leaders_of(output).scenario == "day"  # the search's
     bright = leaders_of(output, "night").chosen
     assert bright is not None

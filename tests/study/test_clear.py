@@ -9,7 +9,7 @@ import pytest
 
 import sweep
 from sweep.camera.sensor import make_sensor
-from sweep.report.answer import answer_sentences, headline_numbers
+from sweep.report.answer import headline_numbers
 from sweep.report.compare_tables import curve_notes
 from sweep.report.summary import summary_lines
 from sweep.report.trade_off import around_designs
@@ -17,6 +17,7 @@ from sweep.results.output import Output, read_output
 from sweep.run import run_study
 from sweep.study import load_study
 
+from ..build import sentences_of
 from ..commanded import commanded
 
 NM = np.arange(390.0, 711, 5)
@@ -48,7 +49,7 @@ def output_of(folder: Path, more: str = "") -> Output:
 def texts_of(output: Output) -> list[str]:
     """Texts that say what the light is a share of."""
     return [
-        *answer_sentences(output)[:1],
+        *sentences_of(output)[:1],
         next(line for line in summary_lines(output) if "and their share" in line),
         headline_numbers(output)[1][1],
         around_designs(output, "chart").x_label,
