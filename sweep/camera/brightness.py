@@ -16,7 +16,7 @@ from .effects import any_filter
 from .merge import merged, without_noise
 from .noise.table import unclipped_e
 from .pixel import unquantized
-from .pixel_curve import EQUAL, PixelCurve, groups_of, pixel_curve
+from .pixel_curve import PixelCurve, groups_of, pixel_curve, same_electrons
 from .readout import Readout
 from .setup import Setup
 
@@ -28,8 +28,8 @@ _AROUND_KNEE = np.arange(-6.0, 6.1, 0.5)
 """Nodes around a knee, standard deviations of the noise."""
 _BESIDE = 1e-9
 """Nodes beside a knee without noise, where the reading may jump, relative."""
-_FEW = 16
-"""Pixels whose knees are each among the nodes."""
+_FEW, _MOST_KNEES = 16, 300
+"""Pixels around whose knees nodes are, and knees of many pixels that are nodes."""
 _SEEN = 1e-4
 """Weight of a pixel in a channel, relative to the largest, below which its knees are not waited for."""
 _MOST_RATIO = 1e9
@@ -60,12 +60,18 @@ class LampReadings:
     def proportional(self) -> bool:
         """True if all exposures have their fixed share of the electrons: no pulse, crosstalk or QE tells them apart."""
         full = [self.lit_e / self.light[:, None], self.dark_e / self.light]
-        return all(bool(np.allclose(one, one[:1], rtol=EQUAL, atol=1e-12)) for one in full)
+        return all(same_electrons(of_exposure, one[0]) for one in full for of_exposure in one[1:])
+
+    def alike(self, other: LampReadings, scale: float) -> bool:
+        """Return whether these are the lamps of another case with a scale of their light."""
+        same = self.dark_e.shape == other.dark_e.shape and same_electrons(self.dark_e, other.dark_e)
+        same = same and bool(np.array_equal(self.readout.weights, other.readout.weights))
+        return same and same_electrons(self.lit_e, scale * other.lit_e)
 
     @property
     def straight(self) -> bool:
-        """True if curves are straight between nodes: few pixels without noise, whose knees are all nodes."""
-        return not self.noisy and self.lit_e.shape[2] <= _FEW and self.proportional
+        """True if curves are straight between nodes: without noise, where nodes are the knees of all pixels."""
+        return not self.noisy and self.lit_e.shape[2] <= _MOST_KNEES and self.proportional
 
     @property
     def full_e(self) -> tuple[FloatArray, FloatArray]:
@@ -117,13 +123,32 @@ class LampReadings:
                 variance = np.zeros(mean.shape)
         return mean @ self.readout.weights[0], variance @ self.readout.spread_weights[0]
 
+    def by_electrons(self, signals: IndexArray, factors: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return derivatives of mean and variance of lamps, each at one brightness, by the electrons of each element.
+
+        Of a pixel of full sensitivity, [n, n_elements]; all exposures have their fixed share of the light.
+        """
+        lit_e, dark_e = self.full_e
+        full_e = lit_e[signals] * factors[:, None] + dark_e
+        by_mean, by_variance = np.empty(full_e.shape), np.empty(full_e.shape)
+        for curve, at in self.pixel_curves():
+            by_mean[:, at], by_variance[:, at] = curve.slopes(full_e[:, at])
+        return by_mean, by_variance
+
+    def along(self, signals: IndexArray, factors: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return mean and variance of lamps, each at one brightness, [n, n_channels], and their derivatives by it."""
+        mean, variance = (values[:, 0] for values in self.moments(signals, factors[:, None]))
+        lit_e = self.full_e[0][signals]
+        by_mean, by_variance = (slopes * lit_e for slopes in self.by_electrons(signals, factors))
+        return mean, variance, by_mean @ self.readout.weights[0], by_variance @ self.readout.spread_weights[0]
+
     def means_of_exposures(self, factors: FloatArray) -> FloatArray:
         """Return the means of all lamps, each exposure with its own share of their light, [n, n_signals, n_channels].
 
         `factors`: light of each exposure relative to that of the scene, [n_exposures, n].
         """
         every = np.arange(self.n_signals)
-        if np.ptp(factors, axis=0).max(initial=0.0) <= EQUAL:
+        if same_electrons(factors, np.broadcast_to(factors[:1], factors.shape)):
             return np.moveaxis(self.means(every, np.broadcast_to(factors[0], (every.size, factors.shape[1]))), 0, 1)
         electrons = self.lit_e[:, None] * factors[:, :, None, None] + self.dark_e[:, None, None]
         pixel, light = self.readout.pixel, self.light[:, None, None]
@@ -145,27 +170,29 @@ class LampReadings:
         seen = weights.max(axis=1) > _SEEN * weights.max()
         lit_e, dark_e = lit_e[:, seen], dark_e[seen]
         curves = [(curve, np.flatnonzero(np.isin(np.flatnonzero(seen), at))) for curve, at in self.pixel_curves()]
-        knees, widths = [], []
         brightest_e = np.maximum(lit_e.max(axis=1, keepdims=True), 1e-300)
+        full, others, widths = [], [], []
         for curve, at in curves:
-            for knee_e, width in zip(curve.knees_e, curve.knee_widths, strict=True):
-                lit = np.maximum(lit_e[:, at], brightest_e / _MOST_RATIO)
-                knees.append(np.maximum(knee_e - dark_e[at], 0.0) / lit)
-                widths.append(np.full(knees[-1].shape, width))
-        at_knees, width = np.concatenate(knees, axis=1), np.concatenate(widths, axis=1)
-        last = at_knees.max(axis=1, keepdims=True) * (1 + 12 * width.max())
+            lit = np.maximum(lit_e[:, at], np.maximum(brightest_e / _MOST_RATIO, 1e-30))
+            at_knees = np.maximum(curve.knees_e[:, None, None] - dark_e[at], 0.0) / lit  # [n_knees, n_signals, n]
+            full.append(at_knees[-1])
+            others += [*at_knees[:-1]]
+            widths.append(float(curve.knee_widths.max()))
+        at_full, at_knees = np.concatenate(full, axis=1), np.concatenate([*full, *others], axis=1)
+        last = at_knees.max(axis=1, keepdims=True) * (1 + 12 * max(widths))
         first = np.minimum(_LEAST_E / brightest_e, last / 2)
         parts = [np.zeros_like(last), last, last * 1e3]
-        many = lit_e.shape[1] > _FEW
-        if self.noisy or many:
-            parts.append(_geometric(first, last, _RATIO))
-        if many:
-            parts.append(_geometric(0.9 * at_knees.min(axis=1, keepdims=True), last, _RATIO_OF_MANY))
-        elif self.noisy:
-            around = at_knees[..., None] * np.maximum(1 + width[..., None] * _AROUND_KNEE, 0.0)
-            parts.append(around.reshape(len(lit_e), -1))
+        if self.straight:
+            parts.append(at_full)
+        elif not self.noisy:
+            parts += [at_knees * (1 - _BESIDE), at_knees * (1 + _BESIDE), _geometric(first, last, _RATIO)]
+        elif lit_e.shape[1] <= _FEW:
+            around = at_knees[..., None] * np.maximum(1 + max(widths) * _AROUND_KNEE, 0.0)
+            parts += [around.reshape(len(lit_e), -1), _geometric(first, last, _RATIO)]
         else:
-            parts += [at_knees * (1 - _BESIDE), at_knees * (1 + _BESIDE)]
+            some = np.linspace(0, at_knees.shape[1] - 1, min(at_knees.shape[1], _MOST_KNEES)).round().astype(int)
+            parts += [np.sort(at_knees, axis=1)[:, some], _geometric(first, last, _RATIO)]
+            parts.append(_geometric(0.9 * at_knees.min(axis=1, keepdims=True), last, _RATIO_OF_MANY))
         return np.sort(np.clip(np.concatenate(parts, axis=1), least, most), axis=1)
 
 
@@ -235,12 +262,9 @@ class LampSlopes:
         self, signals: IndexArray, factors: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return mean and variance of lamps, each at one brightness, [n, n_channels], and their derivatives."""
-        readout, (lit_e, dark_e) = self.lamps.readout, self.lamps.full_e
+        readout = self.lamps.readout
         mean, variance = (values[:, 0] for values in self.lamps.moments(signals, factors[:, None]))
-        full_e = lit_e[signals] * factors[:, None] + dark_e
-        by_mean, by_variance = np.empty(full_e.shape), np.empty(full_e.shape)
-        for curve, at in self.lamps.pixel_curves():
-            by_mean[:, at], by_variance[:, at] = curve.slopes(full_e[:, at])
+        by_mean, by_variance = self.lamps.by_electrons(signals, factors)
         by_u = self.lit_by_u[:, signals] * factors[:, None] + self.dark_by_u[:, None]
         mean_by_u, variance_by_u = (
             (by_mean * by_u) @ readout.weights[0],

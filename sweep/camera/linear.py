@@ -178,6 +178,7 @@ class LinearModel(ForwardModel):
             curve = pixel_curve(self.hdr, of_exposures, noisy=True)
             moments[..., which] = *curve.moments(whole[..., which]), *curve.slopes(whole[..., which])
         mean, variance, mean_per_e, variance_per_e = moments
+        variance_per_e = np.where(variance > STEPS_DN2, variance_per_e, 0.0)
         variance = np.maximum(variance, STEPS_DN2)
         folded, spread = by_pixel.readout.folded, by_pixel.readout.spread
         return (

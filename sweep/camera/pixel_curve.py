@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from scipy.interpolate import PPoly
 
 _LEAST_ROOT = 1e-3
-EQUAL = 1e-9
-"""Relative difference of electrons that are the same."""
+_EQUAL, _NONE = 1e-9, 1e-12
+"""Relative difference of electrons that are the same, and electrons that are none."""
 STEPS_DN2 = 1 / 12
 """Least variance that a search takes, DN^2, as of rounding: a saturated pixel has none, and no direction to go."""
 
@@ -72,7 +72,7 @@ class PixelCurve:
         return self.mean(electrons), np.maximum(spread, 0.0)
 
     def slopes(self, electrons: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the derivatives of mean and variance by the electrons; of a variance below rounding, 0."""
+        """Return the derivatives of mean and variance by the electrons."""
         if not self.noisy:
             linear = unquantized(electrons, self.pixel.read_once)
             inside = np.abs(self._noiseless(electrons) - linear) <= 1e-9 * np.maximum(linear, 1.0)
@@ -80,7 +80,7 @@ class PixelCurve:
         last = np.sqrt(self._table.last_e)
         root = np.clip(np.sqrt(np.maximum(electrons, 0.0)), _LEAST_ROOT, last)
         by_mean, by_variance = np.where(root < last, np.moveaxis(self._by_root(root), -1, 0) / (2 * root), 0.0)
-        return by_mean, np.where(self.moments(electrons)[1] > STEPS_DN2, by_variance, 0.0)
+        return by_mean, by_variance
 
     def _noiseless(self, electrons: FloatArray) -> FloatArray:
         pixel = self.pixel
@@ -126,6 +126,12 @@ def _read_once(pixel: Pixel) -> table.MomentTable:
 def pixel_curve(pixel: Pixel, light: tuple[float, ...], *, noisy: bool) -> PixelCurve:
     """Return the curve of a pixel; cached with its tables."""
     return PixelCurve(pixel, light, noisy)
+
+
+def same_electrons(one: FloatArray, other: FloatArray) -> bool:
+    """Return whether electrons are the same but for rounding."""
+    apart = np.abs(one - other)
+    return bool((apart <= _EQUAL * np.abs(other) + _NONE).all())
 
 
 def groups_of(light: FloatArray) -> list[tuple[tuple[float, ...], IndexArray]]:

@@ -15,7 +15,7 @@ from ..base.types import BoolArray, FloatArray, IndexArray
 from . import merge
 from .noise import table
 from .pixel import Pixel, unquantized
-from .pixel_curve import EQUAL, groups_of, pixel_curve
+from .pixel_curve import groups_of, pixel_curve, same_electrons
 from .pixel_response import PixelResponse
 from .rounding import DITHERED_DN, MANY_STEPS, MOST_POISSON_E, rounded
 from .setup import Setup
@@ -228,7 +228,7 @@ class Readout:
     def _merged_means(self, electrons: FloatArray) -> FloatArray:
         """Return means of merged values: from a table where exposures have their fixed share of the electrons."""
         full_e = electrons / self.capture_light_of(electrons)
-        if not np.allclose(full_e, full_e[:1], rtol=EQUAL, atol=1e-12):
+        if not all(same_electrons(of_exposure, full_e[0]) for of_exposure in full_e[1:]):
             return merge.merged(electrons, self.capture_light_of(electrons), self.pixel).mean
         means = np.empty(full_e.shape[1:])
         for light, at in groups_of(self.capture_light):
@@ -322,7 +322,7 @@ class Readout:
         """
         if self.pixel.captures:
             merged = merge.merged(electrons, self.capture_light_of(electrons), self.pixel)
-            mean, variance = self.folded(merged.mean), self.spread(merged.variance)
+            mean, variance = self.folded(self._merged_means(electrons)), self.spread(merged.variance)
             return (mean, variance, *self._shape_of_merged(merged, electrons, variance))
         dn, variance_dn = self.transfer(electrons), self.variance_dn(electrons)
         # A digital number that is the same in all but one of a billion readouts: what is left of its noise is

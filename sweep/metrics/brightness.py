@@ -7,7 +7,7 @@ is that of two Gaussians at the smallest d'. Curves are taken at nodes, and refi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -22,6 +22,7 @@ LEAST_DN2 = 1e-9
 _MARGINS = (1.7, 1.05)
 """Pairs are refined, once and again, that come as near as this times the nearest squared distance of all."""
 _MOST_PAIRS = 200
+_NEWTON_STEPS, _NEWTON_STEP = 3, 1e-5
 _FINER = 12
 """Finer segments in the place of the nearest one and its neighbors."""
 DARK_TO_FULL = (0.0, np.inf)
@@ -47,18 +48,33 @@ class Nearest:
 
 
 class BrightnessCurves:
-    """Readings and brightness curves of all lamps in one case."""
+    """Readings and brightness curves of all lamps in one case, or in several that differ in brightness alone.
 
-    def __init__(self, lamps: LampReadings, brightness: tuple[float, float] = DARK_TO_FULL) -> None:
+    `scales`: brightness of the lamps that are read in each of these, as of the moments of a pulse.
+    """
+
+    def __init__(
+        self,
+        lamps: LampReadings,
+        brightness: tuple[float, float] = DARK_TO_FULL,
+        scales: Sequence[float] | FloatArray = (1.0,),
+    ) -> None:
         self.lamps = lamps
+        self._scales = np.array(scales, dtype=float)
         self._nodes = lamps.nodes(*brightness)
+
+    @property
+    def darkest(self) -> float:
+        """Least brightness."""
+        return float(self._nodes.min())
 
     @cached_property
     def _readings(self) -> tuple[FloatArray, FloatArray]:
-        """Mean and variance of each lamp at the brightness of the scene, [n_signals, n_channels]."""
+        """Mean and variance of each lamp at each scale, [n_scales x n_signals, n_channels]."""
         every = np.arange(self.lamps.n_signals)
-        mean, variance = self.lamps.moments(every, np.ones((every.size, 1)))
-        return np.ascontiguousarray(mean[:, 0]), np.ascontiguousarray(variance[:, 0])
+        moments = self.lamps.moments(every, np.broadcast_to(self._scales, (every.size, self._scales.size)))
+        mean, variance = (np.ascontiguousarray(np.swapaxes(values, 0, 1)) for values in moments)
+        return mean.reshape(-1, mean.shape[-1]), variance.reshape(-1, mean.shape[-1])
 
     @cached_property
     def _means(self) -> FloatArray:
@@ -77,7 +93,8 @@ class BrightnessCurves:
         times one that is known, may be at an infinite one.
         """
         reading = np.concatenate([np.repeat(first, second.size), np.repeat(second, first.size)])
-        curve = np.concatenate([np.tile(second, first.size), np.tile(first, second.size)])
+        curve = np.tile([*np.tile(second, first.size), *np.tile(first, second.size)], self._scales.size)
+        reading = (reading + self.lamps.n_signals * np.arange(self._scales.size)[:, None]).ravel()
         curves = self._means, self._variances if noise else self._means
         return self._on(curves, self._nodes, reading, curve, curve, noise=noise, margin=margin, nearest=nearest)
 
@@ -89,6 +106,30 @@ class BrightnessCurves:
         nodes = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, _FINER + 1)
         means = self.lamps.moments(found.curve, nodes) if noise else (self.lamps.means(found.curve, nodes),) * 2
         return self._on(means, nodes, found.reading, found.curve, rows, noise=noise)
+
+    def polished(self, found: Nearest, *, noise: bool, least: float) -> FloatArray:
+        """Return the brightnesses of nearest points by Newton's method, from where they are known between nodes.
+
+        `least`: variance in units of which distances are taken at least, DN^2.
+        """
+        (mean, variance), factor = (values[found.reading] for values in self._readings), found.factor.copy()
+
+        def slope(factors: FloatArray) -> FloatArray:
+            there, spread, by_mean, by_spread = self.lamps.along(found.curve, factors)
+            if not noise:
+                return np.asarray((-(mean - there) * by_mean).sum(axis=1))
+            total = np.maximum((variance + spread) / 2, least)
+            moving = by_spread * (total > least)
+            apart = mean - there
+            return np.asarray((-apart * by_mean / total - apart**2 * moving / (4 * total**2)).sum(axis=1))
+
+        for _ in range(_NEWTON_STEPS):
+            step = _NEWTON_STEP * np.maximum(factor, 1e-300)
+            here = slope(factor)
+            bend = (slope(factor + step) - here) / step
+            moved = factor - np.divide(here, bend, out=np.zeros_like(here), where=bend > 0)
+            factor = np.clip(moved, found.bracket[:, 0], found.bracket[:, 1])
+        return factor
 
     def _on(
         self,
@@ -113,6 +154,21 @@ class BrightnessCurves:
         before = nodes[rows, np.maximum(segment - 1, 0)]
         after = nodes[rows, np.minimum(segment + 2, nodes.shape[1] - 1)]
         return Nearest(reading, curve, low + share * (high - low), squared, np.stack([before, after], axis=1))
+
+
+def curves_of(cases: Iterable[LampReadings], brightness: tuple[float, float] | None) -> list[BrightnessCurves]:
+    """Return the curves of all cases; cases that differ in the brightness of all lamps alone share theirs."""
+    if brightness is not None:
+        return [BrightnessCurves(lamps, brightness) for lamps in cases]
+    groups: list[tuple[LampReadings, list[float]]] = []
+    for lamps in cases:
+        first, scales = groups[-1] if groups else (lamps, [])
+        scale = float(lamps.lit_e.max() / first.lit_e.max()) if first.lit_e.max() > 0 else 0.0
+        if groups and lamps.alike(first, scale):
+            scales.append(scale)
+        else:
+            groups.append((lamps, [1.0]))
+    return [BrightnessCurves(lamps, scales=np.unique(np.round(scales, 12))) for lamps, scales in groups]
 
 
 def chromatic_distance(

@@ -26,9 +26,9 @@ from .separation import packed_response, pair_blocks
 from .smooth import Rows, SmoothDesign
 from .tasks.colorimetry import COMPLEX_STEP, Smooth
 
-_SEEN, _REFINED = 16.0, 4.0
-"""A search sees the nearest points of pairs whose squared distance is at most so many times the smallest, and refines
-those of fewer; it sees others at the darkest point of the curve, which is no nearer."""
+_SEEN = 4.0
+"""A search sees the nearest points of pairs whose squared distance is at most so many times the smallest, and others at
+the darkest point of the curve, which is no nearer."""
 
 
 def parallelogram(first: Smooth, second: Smooth) -> Smooth:
@@ -165,15 +165,19 @@ def _nearest_rows(
 ) -> Rows:
     """Return squared distances of readings from the nearest points of curves."""
     near = curves.nearest(first, second, noise=noise, margin=_SEEN)
-    active = np.flatnonzero(near.squared <= _REFINED * near.squared.min())
-    near.factor[active] = curves.refined(near.subset(active), noise=noise).factor
+    active = np.flatnonzero(near.squared <= _SEEN * near.squared.min())
+    refined = curves.refined(near.subset(active), noise=noise)
+    factor = np.full(near.factor.size, curves.darkest)
+    factor[active] = curves.polished(refined, noise=noise, least=STEPS_DN2)
     one = lamps.moments(near.reading, np.ones(near.reading.size))
-    other = lamps.moments(near.curve, near.factor)
+    other = lamps.moments(near.curve, factor)
 
     (mean, variance, by_mean, by_variance), (mean_2, variance_2, by_mean_2, by_variance_2) = one, other
-    apart, spread = mean - mean_2, np.maximum(variance, STEPS_DN2) + np.maximum(variance_2, STEPS_DN2)
+    apart, spread = mean - mean_2, variance + variance_2
+    by_spread = np.where(spread > 2 * STEPS_DN2, by_variance + by_variance_2, 0.0)
+    spread = np.maximum(spread, 2 * STEPS_DN2)
     apart_along = apart + 1j * COMPLEX_STEP * (by_mean - by_mean_2)
-    spread_along = spread + 1j * COMPLEX_STEP * (by_variance + by_variance_2)
+    spread_along = spread + 1j * COMPLEX_STEP * by_spread
     if not noise:
         spread, spread_along = np.array(2.0), np.array(2.0)
     along = (2 * apart_along**2 / spread_along).sum(axis=-1)

@@ -10,6 +10,7 @@ import numpy as np
 from ..base.machine_code import njit
 from ..base.types import FloatArray, IndexArray
 
+_STEPS = 2
 _BLOCK = 8
 """Segments that are skipped together where none of them can be near."""
 
@@ -91,6 +92,16 @@ def nearest_on_curves(  # noqa: PLR0912  (one pass over pairs, blocks, segments 
                     along += (point[c] - curve_mean[curve, node, c]) * step * weight
                     length += step * step * weight
                 inside = min(max(along / length, 0.0), 1.0) if length > 0.0 else 0.0
+                for _ in range(_STEPS if least > 0.0 and length > 0.0 else 0):  # the noise changes along the segment
+                    slope = bend = 0.0
+                    for c in range(n_channels):
+                        step = curve_mean[curve, node + 1, c] - curve_mean[curve, node, c]
+                        apart = point[c] - curve_mean[curve, node, c] - inside * step
+                        grows = curve_variance[curve, node + 1, c] - curve_variance[curve, node, c]
+                        weight = _weight(spread[c], curve_variance[curve, node, c] + inside * grows, least)
+                        slope -= 2.0 * apart * step * weight + 0.5 * apart * apart * grows * weight * weight
+                        bend += 2.0 * step * step * weight
+                    inside = min(max(inside - slope / bend, 0.0), 1.0) if bend > 0.0 else inside
                 for place in (inside, 0.0, 1.0) if least > 0.0 and 0.0 < inside < 1.0 else (inside, inside, inside):
                     total = 0.0
                     for c in range(n_channels):

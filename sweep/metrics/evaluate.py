@@ -18,7 +18,7 @@ from ..designs.block import Block, CurveBlock
 from ..designs.family import Family
 from ..spectra.lights import class_pairs, pair_name
 from ..vision.section import Vision
-from .brightness import DARK_TO_FULL, BrightnessCurves
+from .brightness import curves_of
 from .columns.chromatic import CHROMATIC_CSD, CHROMATIC_DPRIME, with_equal_brightness
 from .columns.color_separation import ColorSeparation
 from .columns.exposure import EXPOSURE
@@ -400,9 +400,7 @@ def of_lamps(
     setup: Setup, curves: FloatArray, states: Sequence[str], metrics: Sequence[LampMetric]
 ) -> dict[str, float]:
     """Return columns of lamps of unknown brightness of one design, ndarray of shape (1, n_modified, n_wavelengths)."""
-    brightness = setup.scene.brightness or DARK_TO_FULL
-    lamps = forward_model(setup.over_brightness).lamps(curves)
-    cases = [BrightnessCurves(of_case, brightness) for of_case in lamps]
+    cases = curves_of(forward_model(setup.over_brightness).lamps(curves), setup.scene.brightness)
     return {k: v for metric in metrics for k, v in metric.of_lamps(cases, setup.members, states).items()}
 
 

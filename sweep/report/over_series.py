@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+import pandas as pd
 
 from ..metrics.columns.flicker import FALSE_HUE, LAMP_SEEN, MODULATION
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
@@ -70,23 +71,36 @@ def worst_words(output: Output, best: Row) -> str:
 
 
 def flicker_lines(output: Output) -> Iterator[str]:
-    """Yield how pulsed lamps look in an HDR pixel, at the worst of all numbers of each series."""
-    if output.worst is None or not (output.worst["quantity"] == LAMP_SEEN).any():
+    """Yield how pulsed lamps look in an HDR pixel, at the worst of all numbers of each series, or of all scenarios."""
+    known = _of_pulses(output)
+    if known is None:
         return
-    known = output.worst.dropna()
     seen, modulated, hue = (
         known.loc[getattr(known[known["quantity"] == name]["value"], which)()]
         for name, which in ((LAMP_SEEN, "idxmin"), (MODULATION, "idxmax"), (FALSE_HUE, "idxmax"))
     )
-
-    def where(row: Row) -> str:
-        name, unit = quantity_of(str(row["key"]))
-        return f"{row['name']} at {'' if unit else f'a {name} of '}{row['at']:.3g} {unit}".rstrip()
-
-    share = f"as few as {np.floor(1000 * seen['value']) / 10:.1f} % of the phases ({where(seen)})"
-    hues = known[(known["quantity"] == FALSE_HUE)].groupby("name", sort=False)["value"].max()
+    share = f"as few as {np.floor(1000 * seen['value']) / 10:.1f} % of the phases ({seen['where']})"
+    hues = known[known["quantity"] == FALSE_HUE].groupby("name", sort=False)["value"].max()
+    others = ", ".join(f"{name} {value:.3g} DN" for name, value in hues.items() if name != hue["name"])
     yield (
         f"Pulsed lamps are seen in {'all phases' if seen['value'] > _ALL else share}; their modulation is at most "
-        f"{modulated['value']:.2f} ({where(modulated)}), their false hue at most {hue['value']:.3g} DN ({where(hue)}; "
-        f"{', '.join(f'{name} {value:.3g} DN' for name, value in hues.items() if name != hue['name'])})."
+        f"{modulated['value']:.2f} ({modulated['where']}), their false hue at most {hue['value']:.3g} DN "
+        f"({'; '.join(part for part in (hue['where'], others) if part)})."
     )
+
+
+def _of_pulses(output: Output) -> pd.DataFrame | None:
+    """Return quantities of pulsed lamps by design, with the place of each in words; None if there are none."""
+    if output.worst is not None and (output.worst["quantity"] == LAMP_SEEN).any():
+        known = output.worst.dropna().reset_index(drop=True)
+        units = [quantity_of(str(key)) for key in known["key"]]
+        places = [
+            f"{row.name} at {f'{row.at:.3g} {unit}' if unit else f'a {key} of {row.at:.3g}'}"
+            for row, (key, unit) in zip(known.itertuples(index=False), units, strict=True)
+        ]
+        return known.assign(where=places)
+    if LAMP_SEEN not in output.few or output.few[LAMP_SEEN].isna().all():
+        return None
+    pulsed = output.few.dropna(subset=[LAMP_SEEN])
+    rows = pulsed.melt(["name", "scenario"], [LAMP_SEEN, MODULATION, FALSE_HUE], "quantity", "value")
+    return rows.assign(where=rows["name"].astype(str) + " in " + rows["scenario"].astype(str))

@@ -22,15 +22,17 @@ from .workers import run_with_progress
 if TYPE_CHECKING:
     import pandas as pd
 
+_OF_PULSES = ("frequency_hz", "duty")
+"""Numbers of a pulsed lamp, over which its modulation and hue are refined."""
 _SCHEMA = pa.schema(
     [(name, pa.string()) for name in ("name", "series", "key", "quantity")]
     + [(name, pa.float64()) for name in ("at", "value")]
 )
 
 
-def refined_quantities(study: Study) -> list[Quantity]:
-    """Return quantities whose worst value over a series is told: of flicker, and what a search of it maximizes."""
-    names = [FALSE_HUE, LAMP_SEEN, MODULATION]
+def refined_quantities(study: Study, key: str) -> list[Quantity]:
+    """Return quantities whose worst value over a series is told: of pulses, and what a search of it maximizes."""
+    names = [FALSE_HUE, LAMP_SEEN, MODULATION] if key in _OF_PULSES else []
     if study.search is not None and len(study.search.scenarios) > 1:
         names += study.objective.weights
     return [study.quantities[name] for name in names if name in study.quantities]
@@ -61,8 +63,8 @@ def worst_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: 
     keys, calls = [], []
     for series, key, scenarios, row, curves, space in rows_of_series(study, rows):
         scenes = between(study, study.setup(space, next(iter(scenarios))), scenarios)
-        known = rows[rows["name"] == row["name"]]
-        quantities = [one for one in refined_quantities(study) if known[one.name].notna().any()]
+        known = rows[(rows["name"] == row["name"]) & rows["scenario"].isin(list(scenarios))]
+        quantities = [one for one in refined_quantities(study, key) if known[one.name].notna().any()]
         if scenes is not None and quantities:
             keys.append({"name": row["name"], "series": series, "key": key})
             calls.append(delayed(worst_over, scenes, curves, quantities, study.states, [*scenarios.values()]))
@@ -93,4 +95,4 @@ def worst_over(
 
 def has_worst(study: Study) -> bool:
     """Return whether a study has series with quantities whose worst value is told."""
-    return bool(refined_quantities(study)) and bool(series_of(study.scenarios))
+    return any(refined_quantities(study, key) for _, key in series_of(study.scenarios))

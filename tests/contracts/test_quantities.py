@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from scipy.optimize import minimize_scalar
 from scipy.spatial.distance import cdist
 from scipy.stats import norm
 
@@ -84,17 +85,43 @@ def chromatic(made: Made, quantity: Quantity) -> list[float]:
     return [min(of_any_brightness(case[first], case[second]) for case in design) for design in lamps]
 
 
+def readings_of(made: Made, design: int, brightness: float) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and variance of real lamps that are so much brighter, in the exposure of a design."""
+    exposure = FixedExposure(kind="fixed", exposure_s=made.exposure_s[design])
+    light = {"photon_radiance": brightness * made.setup.scene.photon_radiance, "exposure": exposure}
+    setup = replace(made.setup, scene=made.setup.scene.model_copy(update=light))
+    read = ForwardModel(setup).read_with_noise(made.curves[design : design + 1])
+    return read.mean[0, 0], read.variance[0, 0]
+
+
 def chromatic_in_noise(made: Made, quantity: Quantity) -> list[float]:
+    """The least d' of a reading and one of a real lamp of any brightness."""
     found = []
-    for at, (m, v, n, w) in enumerate(made.pairs(*(quantity.pair or ("", "")))):
-        dark = unlit(made, at)
-        each = [
-            of_any_brightness((a - dark)[None] / np.sqrt((s + t) / 2), (b - dark)[None] / np.sqrt((s + t) / 2))
-            for a, s in zip(m, v, strict=True)
-            for b, t in zip(n, w, strict=True)
-        ]
+    for design in range(len(made.curves)):
+        mean, variance = readings_of(made, design, 1.0)
+
+        def dprimes(brightness: float, first: str, second: str) -> np.ndarray:
+            there, spread = readings_of(made, design, brightness)  # noqa: B023
+            one, other = (made.setup.members[name] for name in (first, second))
+            apart = mean[one][:, None] - there[other][None]  # noqa: B023
+            total = (variance[one][:, None] + spread[other][None]) / 2  # noqa: B023
+            return np.sqrt((apart**2 / total).sum(axis=2)).min()
+
+        each = []
+        for order in (quantity.pair or ("", ""), (quantity.pair or ("", ""))[::-1]):
+            grid = np.geomspace(0.05, 20, 60)
+            worst = int(np.argmin([dprimes(a, *order) for a in grid]))
+            ends = grid[max(worst - 1, 0)], grid[min(worst + 1, 59)]
+            each.append(
+                minimize_scalar(dprimes, bounds=ends, args=order, method="bounded", options={"xatol": 1e-7}).fun
+            )
         found.append(min(each))
     return found
+
+
+def chromatic_error(made: Made, quantity: Quantity) -> list[float]:
+    """Of Gaussians at that distance, and no less than of equal brightness."""
+    return list(np.maximum(norm.sf(np.array(chromatic_in_noise(made, quantity)) / 2), gaussian_error(made, quantity)))
 
 
 def sensitivity(made: Made, _: Quantity) -> list[float]:
@@ -214,7 +241,8 @@ DEFINITIONS: dict[str, tuple[Callable[[Made, Quantity], list[float]], float]] = 
     "csd": (csd, 1e-12),
     "best_place_csd": (best_place, 1e-12),
     "chromatic_csd": (chromatic, 1e-9),
-    "chromatic_dprime": (chromatic_in_noise, 1e-9),
+    "chromatic_dprime": (chromatic_in_noise, 1e-5),
+    "chromatic_error": (chromatic_error, 0.1),  # those of equal brightness: exact sums over digital numbers
     "sensitivity": (sensitivity, 1e-12),
     "cfa_sensitivity": (cfa_sensitivity, 1e-12),
     "slope_per_nm": (slope, 1e-12),

@@ -16,9 +16,11 @@ from ..metric import PulseMetric
 from ..quantity import DN, Columns, Quantity, RequestedQuantities
 
 MODULATION, LAMP_SEEN, FALSE_HUE = "flicker_modulation", "lamp_seen", "false_hue_dn"
-_BETWEEN, _FINER = 127, 33
+_BETWEEN, _OF_MANY, _FINER = 127, 15, 33
 """Phases between two at which an exposure begins or ends with a pulse, so many that a capture's handover is seen, which
-is as narrow as its noise; phases around that with the largest hue."""
+is as narrow as its noise; for the mean of many pixels, of which each hands over elsewhere; and phases around that with
+the largest hue."""
+_MANY = 16
 _SEEN_DN = 1.0
 
 
@@ -88,7 +90,8 @@ def _of_lamps(lamps: LampReadings, setup: Setup, time_s: float) -> dict[str, flo
 
     dark = lamps.means_of_exposures(np.zeros((len(lamps.lit_e), 1)))
     pulsed = setup.computes("flicker")
-    phases = phases_of(setup, np.array([time_s]), _BETWEEN)[0] if pulsed else np.zeros(1)
+    between = _OF_MANY if lamps.lit_e.shape[2] > _MANY else _BETWEEN
+    phases = phases_of(setup, np.array([time_s]), between)[0] if pulsed else np.zeros(1)
     readings, widths = lit(phases), np.diff(np.concatenate([phases, phases[:1] + 1]))
     after = np.roll(readings, -1, axis=0)
     mean = ((readings + after) / 2 * widths[:, None, None]).sum(axis=0)

@@ -1,0 +1,213 @@
+"""Lamps of unknown brightness against scans of lamps of every brightness, and against what pixels that fill must read."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sweep.camera import merge
+from sweep.camera.forward import ForwardModel, forward_model
+from sweep.camera.noise import table
+from sweep.camera.pixel import Pixel
+from sweep.camera.pixel_curve import pixel_curve
+from sweep.camera.setup import Setup
+from sweep.metrics.evaluate import evaluate
+from sweep.study import Study, load_study
+
+from ..hard.scenes import scene, target
+
+PAIR = ("yellow", "red")
+_BASINS = 16
+STUDY = """\
+study: full
+sensor: ar0820
+lights: tl16
+scenarios:
+  lamp:
+    optics: {f_number: 2}
+    exposure: {kind: fixed, exposure_s: 0.001}
+    each: {intensity_cd: [1, 10, 100, 1000, 3000]}
+cfas: [RGGB, RYYCy]
+"""
+
+
+def chromatic(study: Study, cfa: str, scenario: str, name: str = "chromatic_csd_yellow_red", **changes: Any) -> float:
+    """A chromatic figure of a plain CFA, in a scene with some changes."""
+    space = next(space for space in study.spaces if space.name == cfa)
+    setup = study.setup(space, scenario)
+    setup = replace(setup, scene=setup.scene.model_copy(update=changes))
+    return float(
+        evaluate(forward_model(setup), space.curves(space.points(0, 1), study.grid.size), study.states)[name][0]
+    )
+
+
+@pytest.fixture(scope="module")
+def full(tmp_path_factory: pytest.TempPathFactory) -> Study:
+    path = tmp_path_factory.mktemp("full") / "full.yaml"
+    path.write_text(STUDY)
+    return load_study(path)
+
+
+@pytest.mark.parametrize(("cfa", "intensity_cd"), [("RGGB", 1000), ("RGGB", 3000), ("RYYCy", 100)])
+def test_full_pixels_do_not_tell_lamps_of_unknown_brightness_apart(full: Study, cfa: str, intensity_cd: int) -> None:
+    assert chromatic(full, cfa, f"lamp intensity_cd={intensity_cd}") < 1e-6
+
+
+@pytest.mark.parametrize(("intensity_cd", "expected"), [(1, 6.9245), (10, 69.245), (100, 139.62)])
+def test_a_pixel_that_is_not_full_has_the_distance_of_a_scan(full: Study, intensity_cd: int, expected: float) -> None:
+    """Expected: a scan of 20,001 brightnesses of either lamp, by a clip and a product alone, before rounding."""
+    found = chromatic(full, "RGGB", f"lamp intensity_cd={intensity_cd}")
+    assert found == pytest.approx(expected, abs=0.35)  # two whole numbers in each of three channels
+    curves = chromatic(full, "RGGB", f"lamp intensity_cd={intensity_cd}", brightness=(0.0, np.inf))
+    assert curves == pytest.approx(expected, rel=2e-4)
+
+
+def test_a_range_of_brightness_leaves_out_other_lamps(full: Study) -> None:
+    study, at = full, "lamp intensity_cd=1000"
+    known = chromatic(study, "RGGB", at, brightness=(1.0, 1.0))
+    assert known == pytest.approx(chromatic(study, "RGGB", at, "csd_yellow_red"), abs=1)
+    some = [chromatic(study, "RGGB", at, brightness=(1 / most, most)) for most in (1.5, 2.0, 4.0, 8.0)]
+    assert known >= some[0] > some[1] > some[2] >= some[3]
+    assert some[3] == pytest.approx(0, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("cfa", "intensity_cd", "expected"), [("RYYCy", 133.0, 6.8e-3), ("RCCB", 3.16, 1.6e-2), ("RYYCy", 1.0, 1.7e-2)]
+)
+def test_errors_of_lamps_of_unknown_brightness(cfa: str, intensity_cd: float, expected: float) -> None:
+    """Beside a handover, and against lamps that are dimmer than any of a series; expected: dense scans by others."""
+    study = load_study(Path(__file__).parents[2] / "studies" / "hdr.yaml")
+    found = chromatic(study, cfa, "lamp intensity_cd=1", "chromatic_error_yellow_red", intensity_cd=intensity_cd)
+    assert found == pytest.approx(expected, rel=0.1)
+
+
+@pytest.mark.parametrize("captures", ["split_pixel", "dual_gain", "staggered"])
+@pytest.mark.parametrize("prnu", [0.0, 0.005])
+def test_the_curve_of_a_pixel_is_that_of_exact_sums(captures: str, prnu: float) -> None:
+    pixel = Pixel(pitch_um=2.8, captures=captures, offset_dn=64, read_noise_e=2.0, prnu=prnu)
+    light = merge.light_of(pixel)
+    curve = pixel_curve(pixel, tuple(light), noisy=True)
+    knees = [knee * np.linspace(0.9, 1.1, 50) for knee in curve.knees_e]
+    electrons = np.sort(np.concatenate([np.geomspace(0.1, 1e6, 200), *knees]))
+    exact = merge.merged(electrons * light[:, None], light[:, None], pixel)
+    mean, variance = curve.moments(electrons)
+    assert (np.abs(mean - exact.mean) <= 2e-3 * np.sqrt(exact.variance) + 1e-5).all()
+    np.testing.assert_allclose(variance, exact.variance, rtol=5e-3, atol=1e-3)
+    step = 1e-4 * electrons
+    by_mean = (curve.mean(electrons + step) - curve.mean(electrons - step)) / (2 * step)
+    np.testing.assert_allclose(curve.slopes(electrons)[0], by_mean, rtol=1e-3, atol=1e-4 * np.abs(by_mean).max())
+
+
+class Lamps:
+    """Lamps of any brightness in a scene: electrons of two brightnesses, and what pixels read of their multiples."""
+
+    def __init__(self, setup: Setup, curves: np.ndarray) -> None:
+        self.setup = setup
+        self.noisy = setup.scene.noise is not None
+        models = [
+            ForwardModel(replace(setup, scene=setup.scene.model_copy(update={"intensity_cd": cd}), left_out=left_out))
+            for cd in (setup.scene.intensity_cd, 2 * setup.scene.intensity_cd)
+            for left_out in [frozenset() if self.noisy else frozenset({"quantization"})]
+        ]
+        once, twice = (model.pixel_electrons(curves)[..., 0, 0, :, :] for model in models)
+        self.lit, self.dark, self.model = twice - once, 2 * once - twice, models[0]
+        self.weights = self.model.channels_of(np.eye(once.shape[-1]), 0)
+
+    def read(self, signals: np.ndarray, factors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and variance of the channels, [n_signals, n_factors, n_channels]."""
+        pixel = self.setup.camera.pixel
+        electrons = self.dark[..., signals, None, :] + factors[:, None] * self.lit[..., signals, None, :]
+        if pixel.captures and self.noisy:
+            merged = merge.merged(electrons, self.model.capture_light[:, None, None], pixel)
+            mean, variance = merged.mean, merged.variance
+        elif pixel.captures:
+            mean = self.first_usable(electrons, pixel)
+            variance = np.zeros(mean.shape)
+        elif self.noisy:
+            mean, variance = table.mean_rounded(electrons, pixel), table.variance(electrons, pixel)
+        else:
+            mean = np.minimum(electrons, pixel.saturation_e) * pixel.dn_per_e + pixel.offset_dn
+            variance = np.zeros(mean.shape)
+        return mean @ self.weights, variance @ self.weights**2
+
+    def first_usable(self, electrons: np.ndarray, pixel: Pixel) -> np.ndarray:
+        """The first capture below its threshold, in electrons of full sensitivity."""
+        light = self.model.capture_light
+        result = np.full(electrons.shape[1:], np.nan)
+        for capture, one in enumerate(pixel.read_as):
+            exposure = next(at for at, of in enumerate(pixel.exposures) if capture in of.numbers)
+            held = np.minimum(electrons[exposure], one.saturation_e)
+            last = capture == len(pixel.captures) - 1
+            usable = np.isnan(result) & (
+                last | (held * one.dn_per_e < pixel.threshold * one.saturation_e * one.dn_per_e)
+            )
+            result = np.where(usable, held / light[exposure], result)
+        return result * pixel.dn_per_e + pixel.offset_dn
+
+
+def scanned(lamps: Lamps, *, noise: bool) -> float:
+    """The smallest distance to a lamp of 2,000 brightnesses; of the nearest of these, again between their neighbors."""
+    members, least = lamps.setup.members, np.inf
+    for own, other in (PAIR, PAIR[::-1]):
+        mean, variance = (values[:, None] for values in lamps.read(members[own], np.ones(1)))
+
+        def squared(factors: np.ndarray) -> np.ndarray:
+            there, spread = lamps.read(members[other], factors)  # noqa: B023
+            weight = 1 / np.maximum((variance + spread) / 2, 1e-9) if noise else 1.0  # noqa: B023
+            return ((mean - there) ** 2 * weight).sum(axis=-1).min(axis=(0, 1))  # noqa: B023
+
+        coarse = np.concatenate([[0.0], np.geomspace(1e-4, 1e7, 1999)])
+        distances = squared(coarse)
+        for start in np.argsort(distances)[:_BASINS]:
+            ends = coarse[max(start - 1, 0)], coarse[min(start + 1, coarse.size - 1)]
+            for _ in range(4):
+                finer = np.linspace(*ends, 101)
+                of_finer = squared(finer)
+                worst = int(of_finer.argmin())
+                ends = finer[max(worst - 1, 0)], finer[min(worst + 1, finer.size - 1)]
+                least = min(least, float(of_finer[worst]))
+    return float(np.sqrt(least))
+
+
+def random_scene(seed: int) -> tuple[Setup, np.ndarray]:
+    """A scene in which some lamps fill pixels, plain or HDR, near or far, with noise or without."""
+    rng = np.random.default_rng([seed, 62])
+    hdr, noise, far = rng.random(3) < (0.5, 0.5, 0.3)
+    pixel: dict[str, Any] = {"offset_dn": float(rng.choice([0, 64, 168])), "well_e": float(rng.choice([2e3, 1e4, 3e4]))}
+    pixel |= {"crosstalk": float(rng.choice([0, 0, 0.02])), "read_noise_e": float(rng.uniform(0.5, 5))}
+    if hdr:
+        pixel |= {"captures": str(rng.choice(["split_pixel", "dual_gain", "staggered"]))}
+    if noise and not far:
+        pixel |= {"prnu": float(rng.choice([0, 0.005]))}
+    at: dict[str, Any] = {"optics": {"f_number": 2}, "exposure": {"kind": "fixed", "exposure_s": 2e-3}}
+    at |= {"intensity_cd": float(np.exp(rng.uniform(np.log(20), np.log(20_000))))}
+    at |= {"noise": True} if noise else {}
+    at |= {"target": target(float(rng.uniform(60, 200)), 60.0)} if far else {}
+    at |= {"background_cd_m2": float(rng.choice([0, 0, 20]))}
+    made = scene(f"seed {seed}", str(rng.choice(["RGGB", "RCCC", "RYNCy"])), at, pixel)
+    return made.setup, made.curves
+
+
+@pytest.mark.parametrize(
+    "first", [pytest.param(first, marks=[] if first < 10 else [pytest.mark.slow]) for first in range(0, 200, 10)]
+)
+def test_no_chromatic_figure_is_above_a_scan_nor_below(first: int) -> None:
+    for seed in range(first, first + 10):
+        setup, curves = random_scene(seed)
+        lamps = Lamps(setup, curves)
+        found = evaluate(forward_model(setup), curves, PAIR if lamps.noisy else ())
+        channels = len(setup.camera.mosaic.channels)
+        rounding = 0.0 if lamps.noisy or setup.camera.pixel.captures else np.sqrt(channels)
+        for name, noise in (("chromatic_csd_yellow_red", False), ("chromatic_dprime_yellow_red", True)):
+            if name in found and (lamps.noisy or not noise):
+                expected, value = scanned(lamps, noise=noise), float(found[name][0])
+                # Of an HDR pixel, means are those of a table, good for 0.002 of their noise.
+                slack = (
+                    0.005 if noise else 1e-3 + rounding + (0.02 if lamps.noisy and setup.camera.pixel.captures else 0)
+                )
+                assert value <= expected * 1.001 + slack, (seed, name, value, expected)
+                assert value >= expected * 0.99 - slack, (seed, name, value, expected)
