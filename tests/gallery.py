@@ -1,4 +1,7 @@
-"""The pictures of the studies: `make gallery` runs every study and writes studies/figures and studies/guide/gallery.md."""
+"""The pictures and answers of the studies: `make gallery` runs every study, and writes what its report says and shows.
+
+Into studies/figures, the tables of README.md and studies/README.md, lists of the guide, and studies/guide/gallery.md.
+"""
 
 from __future__ import annotations
 
@@ -51,10 +54,25 @@ OTHERS = {
     "captures": ("hdr", "figures/captures-1"),
 }
 """Further picture of the documentation -> study, and picture of its run."""
+ANSWERED = (STUDIES.parent / "README.md", STUDIES / "README.md", STUDIES / "guide" / "11-hdr-and-flicker.md")
+"""Documents with the answers of studies."""
 STREETS = ("RGGB", "RYYCy", "best stopband")
 """Designs of the picture of streets."""
 STREETS_SHOWN = "\n![The same streets through RGGB, RYYCy and the best stopband](../figures/streets.jpg)"
 ROW = re.compile(r"^\| `(\w+)` \| (.*) \| !\[(.*)\]\(figures/(\w+)\.png\) \| (.*) \|$", re.MULTILINE)
+
+
+def answer_of(said: str) -> str:
+    """The answer that a run prints: what stands before its camera, the first line if there is none, and its warnings."""
+    lines = said.splitlines()
+    stated = next((at for at, line in enumerate(lines) if line.startswith("Camera: ")), 1)
+    return " ".join([*lines[:stated], *(line for line in lines[stated:] if line.startswith("Warning: "))])
+
+
+def with_answer(text: str, study: str, answer: str) -> str:
+    """A document with the answer of a study in the last cell of its row, or in its item of a list."""
+    text = re.sub(rf"^(\| `{study}` \|.*\|) [^|]* \|$", lambda row: f"{row[1]} {answer} |", text, flags=re.MULTILINE)
+    return re.sub(rf"^- `{study}`: .*$", lambda _: f"- `{study}`: {answer}", text, flags=re.MULTILINE)
 
 
 def gallery(rows: str) -> str:
@@ -95,7 +113,10 @@ def main() -> None:
     with TemporaryDirectory() as folder:
         for study in wanted:
             command = [Path(sys.executable).with_name("sweep"), "run", STUDIES / f"{study}.yaml", "--output", folder]
-            subprocess.run([*command, "--quiet"], check=True)
+            said = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
+            answer = answer_of(said)
+            for document in ANSWERED:
+                document.write_text(with_answer(document.read_text(encoding="utf-8"), study, answer), encoding="utf-8")
         for name, (study, picture) in pictures.items():
             if study in wanted:
                 copy_picture(Path(folder) / study / f"{picture}.png", STUDIES / "figures" / f"{name}.png")

@@ -23,7 +23,8 @@ from sweep.run.search import run_search
 from sweep.study import load_study
 
 from .commanded import commanded
-from .conftest import ROOT, STUDIES, FinishedFolder, draw_nothing
+from .conftest import FEWER, ROOT, STUDIES, FinishedFolder, draw_nothing
+from .gallery import ANSWERED, PICTURES, answer_of, with_answer
 from .printed import PRINTED, with_printed
 
 README = (ROOT / "README.md").read_text()
@@ -59,24 +60,13 @@ def anchors(text: str) -> set[str]:
     return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
-FINDINGS = dict(
-    re.findall(r"^\| `(\w+)` \|.*\| (.*\d (?:DN|m|e|times)\b.*) \|$", (STUDIES / "README.md").read_text(), re.MULTILINE)
-)
-"""Name of a study -> its finding, where that has figures."""
-
-
-SCENES = dict(re.findall(r"^\| `(\w+)` \| .* \| (.*\d.*) \|$", README, re.MULTILINE))
-"""Studies of the README's table of scenes, and their findings."""
 WHOLE = ("fog", "noise", "exposure")
-"""Studies whose findings need all of their scenarios."""
-FIGURE = re.compile(
-    r"(?:RGGB|RC+B?|RYYCy|RYN4Cy|best stopband) \d[\d.]* DN|\d[\d.]* (?:DN|m|nm|e|times)\b|\d+ of \d+ figures"
-)
+"""Studies that are run with all of their scenarios here."""
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name in FINDINGS | SCENES if name != "stopband"])
-def test_figures_of_a_finding_are_in_the_output_of_its_study(
+@pytest.mark.parametrize("name", [name for name in PICTURES if name in WHOLE or name not in {"vision", "sensors", *FEWER}])
+def test_an_answer_in_the_documents_is_that_of_its_run(
     finished: FinishedFolder, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if name in WHOLE:
@@ -85,8 +75,9 @@ def test_figures_of_a_finding_are_in_the_output_of_its_study(
         assert code == 0
     else:
         output = finished(name).with_name(f"{name}.said.txt").read_text()
-    for figure in FIGURE.findall(f"{FINDINGS.get(name, '')}; {SCENES.get(name, '')}"):
-        assert figure in output, figure
+    for document in ANSWERED:
+        text = document.read_text()
+        assert with_answer(text, name, answer_of(output)) == text, document
 
 
 def stopband(finished: FinishedFolder) -> dict[str, pd.Series]:
@@ -398,34 +389,6 @@ def test_the_figures_of_hdr_pixels_are_those_of_their_commands(
         in text
     )
     assert f"saturated from {at['R', 3]:.0f}, {at['N', 3]:.0f} and {at['Cy', 3]:,.0f} cd on" in text
-    unknown = pd.read_parquet(folder / "any_intensity.parquet")
-    usable = unknown[unknown["error"] <= 1e-3].groupby("name")["intensity_cd"]
-    crossed = pd.read_parquet(folder / "crossings.parquet").set_index("name")["at"]
-    cells = table_below(
-        (STUDIES / "guide" / "11-hdr-and-flicker.md").read_text(), "| at most 1 error in 1,000 from 1 cd up to |"
-    )
-    assert len(cells) == 6
-    for name, (equal, shown) in cells.items():
-        assert equal == ("10,000 cd" if name not in crossed else f"{math.floor(crossed[name])} cd")
-        if name == "RYYCy":
-            some = usable.get_group(name)
-            last, again = some[some < 10].max(), some[some > 10]
-            assert shown == f"{last:.3g} cd, and again from {again.min():.3g} to {again.max():.3g} cd"
-        else:
-            assert shown == f"{usable.max()[name]:.3g} cd"
-    folder = finished("hdr_filter")
-    worst = pd.read_parquet(folder / "results.parquet").groupby("name")["chromatic_dprime_yellow_red"].min()
-    unknown = pd.read_parquet(folder / "any_intensity.parquet").groupby("name")["dprime"].min()
-    cells = table_below((STUDIES / "guide" / "11-hdr-and-flicker.md").read_text(), "| at the worst intensity |")
-    assert cells == {name: [f"{worst[name]:.1f}", f"{unknown[name]:.1f}"] for name in cells}
-    d = {name: f"{value:.1f}" for name, value in worst.items()}
-    assert SCENES["hdr_filter"] == (
-        f"chromatic d' {d['stopband for HDR']}, RGGB {d['RGGB']}, the best stopband for a pixel that is read once {d['best stopband']}"
-    )
-    assert f"d' is {d['stopband for HDR']} at the worst of 17" in (STUDIES / "README.md").read_text()
-    flicker = pd.read_parquet(finished("flicker") / "results.parquet")
-    assert (flicker["lamp_seen"] > 1 - 1e-9).all()
-    assert f"the false hue is at most {flicker['false_hue_dn'].max():.1f} DN" in text
     draw_nothing(monkeypatch)
     changed = ("--set", "pixel.captures=staggered", "--quiet")
     commanded("run", STUDIES / "flicker.yaml", "--output", tmp_path, *changed)  # 5: its check finds a difference
@@ -451,9 +414,6 @@ def test_the_figures_of_several_sensors_are_those_of_their_command(finished: Fin
     assert f"On {yellow[0]} of the {yellow[0]} sensors here that have yellow pixels" in readme
     assert f"{yellow[2]} times RGGB's separation at {yellow[3]} times its light" in readme
     assert f"{clear[2]} times the separation at {clear[3]} times the light" in readme
-    finding = FINDINGS["sensors"]
-    assert f"{yellow[2]} times RGGB's separation at {yellow[3]} times its light" in finding
-    assert f"none of 2: {clear[2]} times" in finding
     for sensor, lights in list(rows.index.unique())[:4]:
         known = pd.read_parquet(folder / f"{sensor}_{lights}" / "uncertainty.parquet")
         best = known[(known["name"] == "best stopband") & (known["quantity"] == "csd_yellow_red")].iloc[0]

@@ -73,15 +73,16 @@ def _of_designs(output: Output) -> tuple[list[str], list[str]]:
         under = format_constraints(output)
         none = f"No design meets every constraint{f': {under}' if under else ''}."
         return [none], [*unknown_lines(output), *largest_separation_elsewhere(output)]
-    usable = [*flicker_lines(output), *usable_lines(output)]
+    usable = [*usable_lines(output)]
+    pulses = [*flicker_lines(output)]
     if usable:  # where the question is of noise, separations matter where another CFA begins to lead
         series = [lead_sentence(drawn) for drawn in series_figures(output) if len(leads_of(drawn)) > 1]
     else:
         series = [line for drawn in series_figures(output) for line in (*vanishing_line(drawn), lead_sentence(drawn))]
     if output.best.empty and usable:
-        return usable, series
+        return [*pulses, *usable], series
     if output.best.empty and series:
-        return series[:_MOST_ANSWERS], series[_MOST_ANSWERS:]
+        return [*pulses, *series[:_MOST_ANSWERS]], series[_MOST_ANSWERS:]
     leaders = leaders_of(output)
     if output.best.empty and (scores := score_lines(scorecard(output))):
         return scores, list(_best(output, leaders))
@@ -97,6 +98,7 @@ def _of_designs(output: Output) -> tuple[list[str], list[str]]:
         *robustness_lines(output, leaders.chosen),
         *lamp_lines(output),
         *largest_separation_elsewhere(output),
+        *pulses,
         *usable,
         *series,
     ]

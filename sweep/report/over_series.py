@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from ..metrics.columns.flicker import FALSE_HUE, LAMP_SEEN, MODULATION
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
@@ -15,6 +15,9 @@ from ..study.axes import series_of
 from .leaders import Row, label, of_reference
 from .noise import rounded
 from .series import over_series, quantity_of
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _ALL = 1 - 1e-9
 
@@ -71,36 +74,37 @@ def worst_words(output: Output, best: Row) -> str:
 
 
 def flicker_lines(output: Output) -> Iterator[str]:
-    """Yield how pulsed lamps look in an HDR pixel, at the worst of all numbers of each series, or of all scenarios."""
-    known = _of_pulses(output)
-    if known is None:
+    """Yield how pulsed lamps look in an HDR pixel: at the worst of all numbers of a series of pulses, or by scenario."""
+    if LAMP_SEEN not in output.few or output.few[LAMP_SEEN].isna().all():
         return
+    worst = output.worst
+    if worst is None or not (worst["quantity"] == LAMP_SEEN).any():
+        pulsed = output.few.dropna(subset=[LAMP_SEEN])
+        least = min(pulsed.to_dict("records"), key=lambda row: float(row[LAMP_SEEN]))
+        share = f"{_percent(least[LAMP_SEEN])} of the phases ({least['name']} in {least['scenario']})"
+        yield f"Pulsed lamps are seen in {'all phases' if least[LAMP_SEEN] > _ALL else f'as few as {share}'}."
+        return
+    known = worst.dropna().reset_index(drop=True)
     seen, modulated, hue = (
         known.loc[getattr(known[known["quantity"] == name]["value"], which)()]
         for name, which in ((LAMP_SEEN, "idxmin"), (MODULATION, "idxmax"), (FALSE_HUE, "idxmax"))
     )
-    share = f"as few as {np.floor(1000 * seen['value']) / 10:.1f} % of the phases ({seen['where']})"
+    share = f"as few as {_percent(seen['value'])} of the phases ({_where(seen)})"
     hues = known[known["quantity"] == FALSE_HUE].groupby("name", sort=False)["value"].max()
-    others = ", ".join(f"{name} {value:.3g} DN" for name, value in hues.items() if name != hue["name"])
+    others = [f"{name} {value:,.3g} DN" for name, value in hues.items() if name != hue["name"]]
     yield (
         f"Pulsed lamps are seen in {'all phases' if seen['value'] > _ALL else share}; their modulation is at most "
-        f"{modulated['value']:.2f} ({modulated['where']}), their false hue at most {hue['value']:.3g} DN "
-        f"({'; '.join(part for part in (hue['where'], others) if part)})."
+        f"{modulated['value']:.2f} ({_where(modulated)}), their false hue at most {hue['value']:.3g} DN "
+        f"({'; '.join([_where(hue), *others])})."
     )
 
 
-def _of_pulses(output: Output) -> pd.DataFrame | None:
-    """Return quantities of pulsed lamps by design, with the place of each in words; None if there are none."""
-    if output.worst is not None and (output.worst["quantity"] == LAMP_SEEN).any():
-        known = output.worst.dropna().reset_index(drop=True)
-        units = [quantity_of(str(key)) for key in known["key"]]
-        places = [
-            f"{row.name} at {f'{row.at:.3g} {unit}' if unit else f'a {key} of {row.at:.3g}'}"
-            for row, (key, unit) in zip(known.itertuples(index=False), units, strict=True)
-        ]
-        return known.assign(where=places)
-    if LAMP_SEEN not in output.few or output.few[LAMP_SEEN].isna().all():
-        return None
-    pulsed = output.few.dropna(subset=[LAMP_SEEN])
-    rows = pulsed.melt(["name", "scenario"], [LAMP_SEEN, MODULATION, FALSE_HUE], "quantity", "value")
-    return rows.assign(where=rows["name"].astype(str) + " in " + rows["scenario"].astype(str))
+def _percent(share: float) -> str:
+    """Return a share, rounded down."""
+    return f"{np.floor(1000 * share) / 10:.1f} %"
+
+
+def _where(row: pd.Series[Any]) -> str:
+    name, unit = quantity_of(str(row["key"]))
+    number = f"{row['at']:.3g}"
+    return f"{row['name']} at {f'{number} {unit}' if unit else f'a {name} of {number}'}"

@@ -107,7 +107,11 @@ def saturation_lines(output: Output) -> Iterator[str]:
                     where = f"up to {x[np.flatnonzero(full > 0)[-1]]:g}{f' {unit}' if unit else ''}"
                 ranges.setdefault("everywhere" if (full > 0).all() else where, []).append(name)
         if ranges:
-            of_designs = "; ".join(f"{', '.join(names)} {where}" for where, names in ranges.items())
+            every = len(over_series(rows, scenarios, _FULL))
+            of_designs = "; ".join(
+                f"{'every design' if len(names) == every else ', '.join(names)} {where}"
+                for where, names in ranges.items()
+            )
             yield f"Warning: in {base}, signals fill pixels: {of_designs}."
     others = rows[~rows["scenario"].isin(told) & (rows[_FULL] > 0)]
     for scenario, some in others.groupby("scenario", sort=False):

@@ -283,7 +283,7 @@ def reason_without_bound(problem: Problem) -> str | None:
     reasons: tuple[tuple[Callable[[], bool], str], ...] = (
         (lambda: family.n_modified != 1, "more than one modified channel"),
         (lambda: not problem.objective.rule.smallest, f"the objective is a {problem.objective.rule.name}"),
-        (lambda: _merges(problem), "the noise of merged captures has no bound"),
+        (lambda: _merges(problem), "merged captures under noise, or as codes, are not linear in the filter"),
         (lambda: bool(unknown), f"{', '.join(unknown)} {why}"),
         (lambda: problem.setup.camera.pixel.crosstalk > 0, "crosstalk mixes the modified channel into others"),
         (
@@ -308,16 +308,17 @@ def reason_without_bound(problem: Problem) -> str | None:
 
 
 def _merges(problem: Problem) -> bool:
-    """Return whether the objective has the noise of an HDR pixel."""
-    noisy = any(problem.quantities[name].states for name in problem.objective.weights)
-    return noisy and bool(problem.setup.camera.pixel.captures)
+    """Return whether readings are merged and not linear: noise shifts their mean where a capture hands over."""
+    pixel, noisy = problem.setup.camera.pixel, problem.setup.scene.noise is not None
+    return bool(pixel.captures) and (noisy or bool(pixel.companding))
 
 
 def _mixes_chromatic(problem: Problem) -> bool:
-    """Return whether a chromatic separation stands beside a worst case, or all field positions count."""
-    names = (*problem.objective.weights, *problem.constraints)
+    """Return whether a chromatic separation has a worst case beside it, all field positions, or limited brightness."""
+    names, setup = (*problem.objective.weights, *problem.constraints), problem.setup
     chromatic = any(problem.quantities[name].apart == "chromatic" for name in names)
-    return chromatic and (problem.setup.all_heights or any(problem.worst_distance(name) for name in names))
+    others = setup.all_heights or setup.scene.brightness is not None
+    return chromatic and (others or any(problem.worst_distance(name) for name in names))
 
 
 def _most_sensitive(problem: Problem) -> float:

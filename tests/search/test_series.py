@@ -94,7 +94,7 @@ def test_a_search_over_intensities_is_for_the_worst() -> None:
         assert smooth_objective(problem, of_one.x) <= best.objective * (1 + 1e-6)
     assert reason_without_bound(alone[0]) is not None
     distance = replace(problem, objective=Objective(minimum={"dprime_yellow_red": 1.0}))
-    assert reason_without_bound(distance) == "the noise of merged captures has no bound"
+    assert reason_without_bound(distance) == "merged captures under noise, or as codes, are not linear in the filter"
 
 
 SERIES = """\
