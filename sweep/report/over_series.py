@@ -74,7 +74,7 @@ def worst_words(output: Output, best: Row) -> str:
 
 
 def flicker_lines(output: Output) -> Iterator[str]:
-    """Yield how pulsed lamps look in an HDR pixel: at the worst of all numbers of a series of pulses, or by scenario."""
+    """Yield how pulsed lamps look in an HDR pixel: over series of pulses at their worst number, or by scenario."""
     if LAMP_SEEN not in output.few or output.few[LAMP_SEEN].isna().all():
         return
     worst = output.worst
