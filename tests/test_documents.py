@@ -65,7 +65,9 @@ WHOLE = ("fog", "noise", "exposure")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name in PICTURES if name in WHOLE or name not in {"vision", "sensors", *FEWER}])
+@pytest.mark.parametrize(
+    "name", [name for name in PICTURES if name in WHOLE or name not in {"vision", "sensors", *FEWER}]
+)
 def test_an_answer_in_the_documents_is_that_of_its_run(
     finished: FinishedFolder, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

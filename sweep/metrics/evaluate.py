@@ -379,8 +379,9 @@ def _over_brightness(setup: Setup, block: Block, columns: Columns, states: Seque
 
     Those of noise, and others where a column is missing: no closed form holds there.
     """
-    names = [pair_name(CHROMATIC_CSD, pair) for pair in class_pairs(setup.lights.classes)]
-    walked = np.any([np.isnan(columns[name]) for name in names], axis=0)
+    walked = np.zeros(len(columns[EXPOSURE]), dtype=bool)
+    for name in {pair_name(CHROMATIC_CSD, pair) for pair in class_pairs(setup.lights.classes)} & columns.keys():
+        walked |= np.isnan(columns[name])
     if not (walked.any() or states):
         return {}
     made: Columns = {}
