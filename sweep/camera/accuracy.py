@@ -28,6 +28,9 @@ class Accuracy(Section):
     """Wavelength step of the point spread function, linear in between; a coarser grid is not refined."""
     pwm_moments: int = Field(default=9, ge=2, le=1000)
     """Moments of a pulse behind a nonlinear readout, eight times as many at the worst phase."""
+    brightness_steps: int = Field(default=1, ge=1, le=64)
+    """Nodes of the brightness curves of lamps that fill or merge pixels, relative to those of `standard`; chromatic
+    figures are refined between them."""
     single_precision: bool = False
     """Single precision for the product of filters and light."""
 
@@ -42,7 +45,12 @@ PRESETS: dict[str, Accuracy] = {
     "fast": Accuracy(finest_phase_px=0.0, field_positions=9, rays=16, psf_step_nm=10.0, pwm_moments=5),
     "standard": STANDARD,
     "reference": Accuracy(
-        phases_per_px=64, finest_phase_px=1 / 32768, field_positions=129, psf_step_nm=1e-3, pwm_moments=17
+        phases_per_px=64,
+        finest_phase_px=1 / 32768,
+        field_positions=129,
+        psf_step_nm=1e-3,
+        pwm_moments=17,
+        brightness_steps=4,
     ),
 }
 REFERENCE = PRESETS["reference"]

@@ -24,8 +24,8 @@ _LEAST_E = 0.05
 """Electrons of the brightest pixel at the dimmest node beside dark."""
 _RATIO, _RATIO_OF_MANY = 1.25, 1.06
 """Ratio of neighboring nodes, and from where the first of many pixels is full."""
-_AROUND_KNEE = np.arange(-6.0, 6.1, 0.5)
-"""Nodes around a knee, standard deviations of the noise."""
+_AROUND_KNEE = 6
+"""Standard deviations of the noise on either side of a knee, of which each half has a node."""
 _BESIDE = 1e-9
 """Nodes beside a knee without noise, where the reading may jump, relative."""
 _FEW, _MOST_KNEES = 16, 300
@@ -160,10 +160,10 @@ class LampReadings:
         lit_e, dark_e = self.full_e
         return np.asarray(lit_e[signals, None] * factors[..., None] + dark_e)
 
-    def nodes(self, least: float, most: float) -> FloatArray:
+    def nodes(self, least: float, most: float, steps: int) -> FloatArray:
         """Return brightnesses between which curves are nearly straight: [n_signals, n_nodes], from dark to all full.
 
-        `least`, `most`: ends of the brightness, relative to that of the scene.
+        `least`, `most`: ends of the brightness, relative to that of the scene. `steps`: in the place of each step.
         """
         lit_e, dark_e = self.full_e
         weights = self.readout.weights[0]
@@ -185,14 +185,19 @@ class LampReadings:
         if self.straight:
             parts.append(at_full)
         elif not self.noisy:
-            parts += [at_knees * (1 - _BESIDE), at_knees * (1 + _BESIDE), _geometric(first, last, _RATIO)]
+            parts += [
+                at_knees * (1 - _BESIDE),
+                at_knees * (1 + _BESIDE),
+                _geometric(first, last, _RATIO ** (1 / steps)),
+            ]
         elif lit_e.shape[1] <= _FEW:
-            around = at_knees[..., None] * np.maximum(1 + max(widths) * _AROUND_KNEE, 0.0)
-            parts += [around.reshape(len(lit_e), -1), _geometric(first, last, _RATIO)]
+            deviations = np.linspace(-_AROUND_KNEE, _AROUND_KNEE, 4 * _AROUND_KNEE * steps + 1)
+            around = at_knees[..., None] * np.maximum(1 + max(widths) * deviations, 0.0)
+            parts += [around.reshape(len(lit_e), -1), _geometric(first, last, _RATIO ** (1 / steps))]
         else:
             some = np.linspace(0, at_knees.shape[1] - 1, min(at_knees.shape[1], _MOST_KNEES)).round().astype(int)
-            parts += [np.sort(at_knees, axis=1)[:, some], _geometric(first, last, _RATIO)]
-            parts.append(_geometric(0.9 * at_knees.min(axis=1, keepdims=True), last, _RATIO_OF_MANY))
+            parts += [np.sort(at_knees, axis=1)[:, some], _geometric(first, last, _RATIO ** (1 / steps))]
+            parts.append(_geometric(0.9 * at_knees.min(axis=1, keepdims=True), last, _RATIO_OF_MANY ** (1 / steps)))
         return np.sort(np.clip(np.concatenate(parts, axis=1), least, most), axis=1)
 
 

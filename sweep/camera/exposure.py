@@ -189,5 +189,12 @@ class SceneLight:
             Relative light; of an HDR pixel (n_exposures, n_designs, n_moments).
         """
         if self.setup.camera.pixel.captures:
-            return pwm.exposure_scales(self.setup, exposure_s, self.moments)
+            scales = pwm.exposure_scales(self.setup, exposure_s, self.moments)
+            return _different_moments(scales) if self.moments is None else scales
         return pwm.scales(self.setup, exposure_s, self.moments)
+
+
+def _different_moments(scales: FloatArray) -> FloatArray:
+    """Return scales, [n_exposures, n_designs, n_moments], without moments of the same light in all of them."""
+    flat = np.round(scales.reshape(-1, scales.shape[-1]), 12)
+    return scales[..., np.sort(np.unique(flat, axis=1, return_index=True)[1])]

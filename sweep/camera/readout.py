@@ -227,12 +227,16 @@ class Readout:
 
     def _merged_means(self, electrons: FloatArray) -> FloatArray:
         """Return means of merged values: from a table where exposures have their fixed share of the electrons."""
-        full_e = electrons / self.capture_light_of(electrons)
-        if not all(same_electrons(of_exposure, full_e[0]) for of_exposure in full_e[1:]):
-            return merge.merged(electrons, self.capture_light_of(electrons), self.pixel).mean
-        means = np.empty(full_e.shape[1:])
-        for light, at in groups_of(self.capture_light):
-            means[..., at] = pixel_curve(self.pixel, light, noisy=True).mean(full_e[0][..., at])
+        light = self.capture_light_of(electrons)
+        full_e = electrons[0] / light[0]
+        if not all(
+            same_electrons(of_one, full_e * share) for of_one, share in zip(electrons[1:], light[1:], strict=True)
+        ):
+            return merge.merged(electrons, light, self.pixel).mean
+        (first, _), *others = groups_of(self.capture_light)
+        means = pixel_curve(self.pixel, first, noisy=True).mean(full_e)
+        for of_elements, at in others:
+            means[..., at] = pixel_curve(self.pixel, of_elements, noisy=True).mean(full_e[..., at])
         return means
 
     def _whole_numbers(self, electrons: FloatArray, clips: bool) -> FloatArray:

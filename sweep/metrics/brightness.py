@@ -16,11 +16,12 @@ import numpy as np
 from ..base.types import BoolArray, FloatArray, IndexArray
 from ..camera.brightness import LampReadings
 from ..camera.noise.gaussian import share_below
+from ..camera.setup import Setup
 
 LEAST_DN2 = 1e-9
 """Least variance in units of which a distance is taken, DN^2."""
-_MARGINS = (1.7, 1.05)
-"""Pairs are refined, once and again, that come as near as this times the nearest squared distance of all."""
+_MARGINS = (1.7, 1.05, 1.01)
+"""Pairs are refined, again and again, that come as near as this times the nearest squared distance of all."""
 _MOST_PAIRS = 200
 _NEWTON_STEPS, _NEWTON_STEP = 3, 1e-5
 _FINER = 12
@@ -56,12 +57,13 @@ class BrightnessCurves:
     def __init__(
         self,
         lamps: LampReadings,
-        brightness: tuple[float, float] = DARK_TO_FULL,
+        brightness: tuple[float, float] | None = None,
         scales: Sequence[float] | FloatArray = (1.0,),
+        steps: int = 1,
     ) -> None:
         self.lamps = lamps
         self._scales = np.array(scales, dtype=float)
-        self._nodes = lamps.nodes(*brightness)
+        self._nodes = lamps.nodes(*(DARK_TO_FULL if brightness is None else brightness), steps)
 
     @property
     def darkest(self) -> float:
@@ -156,10 +158,11 @@ class BrightnessCurves:
         return Nearest(reading, curve, low + share * (high - low), squared, np.stack([before, after], axis=1))
 
 
-def curves_of(cases: Iterable[LampReadings], brightness: tuple[float, float] | None) -> list[BrightnessCurves]:
+def curves_of(cases: Iterable[LampReadings], setup: Setup) -> list[BrightnessCurves]:
     """Return the curves of all cases; cases that differ in the brightness of all lamps alone share theirs."""
+    brightness, steps = setup.scene.brightness, setup.accuracy.brightness_steps
     if brightness is not None:
-        return [BrightnessCurves(lamps, brightness) for lamps in cases]
+        return [BrightnessCurves(lamps, brightness, steps=steps) for lamps in cases]
     groups: list[tuple[LampReadings, list[float]]] = []
     for lamps in cases:
         first, scales = groups[-1] if groups else (lamps, [])
@@ -168,7 +171,7 @@ def curves_of(cases: Iterable[LampReadings], brightness: tuple[float, float] | N
             scales.append(scale)
         else:
             groups.append((lamps, [1.0]))
-    return [BrightnessCurves(lamps, scales=np.unique(np.round(scales, 12))) for lamps, scales in groups]
+    return [BrightnessCurves(lamps, scales=np.unique(np.round(scales, 12)), steps=steps) for lamps, scales in groups]
 
 
 def chromatic_distance(

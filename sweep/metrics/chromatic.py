@@ -21,7 +21,7 @@ from ..camera.linear import linear_model
 from ..camera.pixel_curve import STEPS_DN2
 from ..camera.setup import Setup
 from ..spectra.lights import Pair, class_pairs
-from .brightness import DARK_TO_FULL, BrightnessCurves, chromatic_distance
+from .brightness import BrightnessCurves, chromatic_distance
 from .separation import packed_response, pair_blocks
 from .smooth import Rows, SmoothDesign
 from .tasks.colorimetry import COMPLEX_STEP, Smooth
@@ -225,7 +225,7 @@ def smooth_chromatic(setup: Setup, curves: FloatArray, pair: Pair) -> FloatArray
     model = linear_model(setup)
     first, second = (setup.members[name] for name in pair)
     if not model.linear_over_brightness:
-        limits, none = setup.scene.brightness or DARK_TO_FULL, np.empty((0, *curves.shape[1:]))
+        limits, none = setup.scene.brightness, np.empty((0, *curves.shape[1:]))
         return np.array(
             [
                 chromatic_distance(

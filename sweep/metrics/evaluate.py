@@ -401,7 +401,7 @@ def of_lamps(
     setup: Setup, curves: FloatArray, states: Sequence[str], metrics: Sequence[LampMetric]
 ) -> dict[str, float]:
     """Return columns of lamps of unknown brightness of one design, ndarray of shape (1, n_modified, n_wavelengths)."""
-    cases = curves_of(forward_model(setup.over_brightness).lamps(curves), setup.scene.brightness)
+    cases = curves_of(forward_model(setup.over_brightness).lamps(curves), setup)
     return {k: v for metric in metrics for k, v in metric.of_lamps(cases, setup.members, states).items()}
 
 

@@ -16,7 +16,7 @@ from ..camera.setup import Setup
 from ..designs.family import Family
 from ..spectra.lights import Pair
 from ..vision.section import SeededVision
-from .brightness import DARK_TO_FULL, BrightnessCurves
+from .brightness import BrightnessCurves
 from .separation import separation
 
 if TYPE_CHECKING:
@@ -215,7 +215,7 @@ class SmoothDesign:
     @cached_property
     def over_brightness(self) -> list[tuple[LampSlopes, BrightnessCurves]]:
         """Readings and brightness curves of the lamps in each case."""
-        limits = self.setup.scene.brightness or DARK_TO_FULL
+        limits = self.setup.scene.brightness
         cases = self._imager.lamps_over_brightness(self.curves, self.by_u)
         return [(lamps, BrightnessCurves(lamps.lamps, limits)) for lamps in cases]
 

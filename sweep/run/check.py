@@ -17,6 +17,7 @@ from ..camera.accuracy import REFERENCE
 from ..camera.forward import ForwardModel
 from ..camera.setup import Setup
 from ..designs.space import Space
+from ..metrics.columns.chromatic import CHROMATIC_CSD
 from ..metrics.evaluate import evaluate
 from ..metrics.quantity import WORST_CASE
 from ..results.designs import row_space
@@ -65,6 +66,8 @@ def _compared(study: Study, space: Space, scenario: str, rows: Sequence[Row]) ->
     model = ForwardModel(replace(setup.with_all_effects, accuracy=REFERENCE))
     nominal = evaluate(model, space.curves(points, study.grid.size))
     csds = [quantity for quantity in study.quantities.values() if quantity.has_error_bound]
+    if not (setup.all_phases or setup.all_heights or setup.scene.drive is not None):  # elsewhere of a lattice alone
+        csds += [quantity for quantity in study.quantities.values() if quantity.metric == CHROMATIC_CSD]
     worst = [quantity for quantity in csds if quantity.extreme == WORST_CASE]
     exact = {quantity.name: nominal[quantity.name] for quantity in csds if quantity not in worst}
     if worst:
