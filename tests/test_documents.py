@@ -119,7 +119,15 @@ CHROMATIC = ("RYN4Cy stays below RGGB (122 DN to 138 DN)", "finds 197 DN", "is 2
 """Figures of the README that `test_the_chromatic_figures_of_the_readme_are_those_of_their_command` compares."""
 OF_SENSORS = ("On 2 of the 2 sensors", "1.19 to 1.68", "1.45 to 1.68", "0.75 to 0.96", "1.34 to 1.36")
 """Figures of the README that `test_the_figures_of_several_sensors_are_those_of_their_command` compares."""
-NO_RESULTS = ("Python 3.11", "cos^4", "EN 12368", "RYN4Cy", "f/2", "(`fast`) to seven (`standard`) to 35 (`reference`)")
+NO_RESULTS = (
+    "Python 3.11",
+    "cos^4",
+    "EN 12368",
+    "RYN4Cy",
+    "f/2",
+    "2.8 um",
+    "(`fast`) to seven (`standard`) to 35 (`reference`)",
+)
 """Numbers of the README's prose that are no results."""
 
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from ..base.types import Meters, NonNegative, Ratio, Seconds, Section, Share, from_to
+from ..base.types import Meters, Ratio, Seconds, Section, Share, from_to
 from .captures import ReadNoise
 from .pixel import DarkCurrent, Optics, Pixel, Prnu
 from .sensor_field import SensorField
@@ -17,6 +17,9 @@ DIAMETER_M = 0.2
 """Diameter of a usual traffic light, EN 12368."""
 OBJECT_RESOLUTION = "object_resolution_px"
 """Name of the quantity that a geometry gives."""
+
+
+_Brightness = Annotated[float, Field(ge=0, le=1e12)]
 
 
 class WhitePatchExposure(Section):
@@ -175,7 +178,7 @@ class Scene(Section):
     intensity_cd: float | None = Field(default=None, ge=1e-12, le=1e15)
     """Luminous intensity of every signal instead of equal photons, cd; its luminance follows from the target's diameter
     (0.2 m without a target)."""
-    brightness: Annotated[tuple[NonNegative, NonNegative] | None, BeforeValidator(from_to)] = None
+    brightness: Annotated[tuple[_Brightness, _Brightness] | None, BeforeValidator(from_to)] = None
     """Least and most brightness of the other lamp in chromatic figures, relative to the scene's; left out, from dark to
     beyond saturation."""
     exposure: Annotated[WhitePatchExposure | FixedExposure, Field(discriminator="kind")] = WhitePatchExposure()

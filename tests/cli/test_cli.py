@@ -30,6 +30,7 @@ def test_stopband_makes_its_files(stopband: tuple[Path, list[str]]) -> None:
         "curves.parquet",
         "points.parquet",
         "limited_by.parquet",
+        "saturated.parquet",
         "rendered.parquet",
         "color_noise.parquet",
         "cfas.png",
@@ -52,7 +53,7 @@ def test_summary_is_true_and_short(stopband: tuple[Path, list[str]]) -> None:
     frame = pd.read_parquet(folder / "results.parquet")
     best = frame[frame["feasible"] & frame["kind"].isin(["sweep", "search"])]["csd_yellow_red"].max()
     rggb = frame[frame["cfa"] == "RGGB"]["csd_yellow_red"].iloc[0]
-    assert len(lines) <= 14
+    assert len(lines) <= 15
     assert f"by {best:.0f} DN" in lines[0]
     assert f"RGGB ({rggb:.0f} DN)" in lines[0]
     assert str(folder) in lines[-1]

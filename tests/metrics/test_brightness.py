@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sweep.base.errors import StudyError
 from sweep.camera import merge
 from sweep.camera.forward import ForwardModel, forward_model
 from sweep.camera.noise import table
@@ -73,6 +74,13 @@ def test_a_range_of_brightness_leaves_out_other_lamps(full: Study) -> None:
     some = [chromatic(study, "RGGB", at, brightness=(1 / most, most)) for most in (1.5, 2.0, 4.0, 8.0)]
     assert known >= some[0] > some[1] > some[2] >= some[3]
     assert some[3] == pytest.approx(0, abs=1e-6)
+
+
+def test_a_range_of_brightness_ascends(tmp_path: Path) -> None:
+    path = tmp_path / "full.yaml"
+    path.write_text(STUDY.replace("    optics:", "    brightness: [2, 1]\n    optics:"))
+    with pytest.raises(StudyError, match="brightness: 2 must be at most 1"):
+        load_study(path)
 
 
 @pytest.mark.parametrize(

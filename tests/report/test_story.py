@@ -204,7 +204,7 @@ def test_a_study_of_plain_cfas_has_an_answer(tmp_path: Path) -> None:
 
 
 def test_where_a_line_passes_the_level_is_drawn_among_its_values() -> None:
-    line = Line(np.array([1e-6, 1e-2]), None, (8.0, 1e-3))
+    line = Line(np.array([1e-6, 1e-2]), None, ((8.0, 1e-3),))
     x, y = line.over(np.array([1.0, 10.0]))
     assert (x.tolist(), y.tolist()) == ([1.0, 8.0, 10.0], [1e-6, 1e-3, 1e-2])
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
 import sweep
 from sweep.metrics.columns.confusion import STATE_ERROR
 from sweep.run import run_study
+from sweep.run.crossings import crossings_of
 from sweep.study import load_study
 
 STUDY = """
@@ -35,13 +37,28 @@ def crossings(folder: Path, *scenes: str) -> pd.DataFrame:
 
 def test_where_an_allowed_error_ends_the_error_is_the_allowed_one(tmp_path: Path) -> None:
     scenes = "dim: {noise: true, exposure: {kind: white_patch}, each: {exposure.level: [0.5, 0.02]}}"
-    found = crossings(tmp_path, scenes).iloc[0]
-    assert (found["low"], found["high"]) == (0.02, 0.5)
-    assert found["error"] == pytest.approx(1e-3, rel=0.05)
-    alone = STUDY.replace("SCENES", f"there: {{{LEVEL % found['at']}}}")
-    path = tmp_path / "there.yaml"
-    path.write_text(alone)
-    assert sweep.load_study(path).evaluate()[STATE_ERROR].iloc[0] == pytest.approx(found["error"], rel=1e-9)
+    found = crossings(tmp_path, scenes).set_index("quantity")
+    assert (found["rises"] == False).all()  # noqa: E712  (less light has more errors)
+    for quantity, row in found.iterrows():
+        assert row["error"] == pytest.approx(1e-3, rel=0.05)
+        alone = STUDY.replace("SCENES", f"there: {{{LEVEL % row['at']}}}")
+        path = tmp_path / "there.yaml"
+        path.write_text(alone)
+        column = {"state_error": STATE_ERROR, "chromatic_error": "chromatic_error_yellow_red"}[str(quantity)]
+        assert sweep.load_study(path).evaluate()[column].iloc[0] == pytest.approx(row["error"], rel=1e-6)
+
+
+def test_an_error_that_comes_back_between_two_numbers_is_found() -> None:
+    """Two of its ends are between neighboring numbers at which the error is allowed."""
+
+    def error(number: float) -> float:
+        return 1e-3 * 10 ** (1 - ((np.log(number) - np.log(3.0)) / 0.2) ** 2)
+
+    known = {number: error(number) for number in (1.0, 2.4, 3.8, 10.0)}
+    assert max(known.values()) < 1e-3
+    found = crossings_of(error, known, 1e-3)
+    assert [row["rises"] for row in found] == [True, False]
+    assert [row["at"] for row in found] == pytest.approx([3 * np.exp(-0.2), 3 * np.exp(0.2)], rel=2e-3)
 
 
 def test_numbers_of_names_are_those_of_the_scenes_or_nothing_is_looked_for(tmp_path: Path) -> None:

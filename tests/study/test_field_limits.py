@@ -141,7 +141,7 @@ def test_the_study_says_every_number_that_the_schema_knows(tmp_path: Path) -> No
         if '"number"' in json.dumps(prop) or '"integer"' in json.dumps(prop)
     }
     said = {part for path in NUMBERS for part in path if isinstance(part, str)}
-    assert known <= said | {"phase_px", "each", "threshold", "companding"}  # of HDR pixels: see below
+    assert known <= said | {"phase_px", "each", "threshold", "companding", "brightness"}  # of HDR pixels: see below
 
 
 def test_every_physical_figure_has_limits_that_editors_know() -> None:
