@@ -18,7 +18,7 @@ from ..study.axes import series_of
 from .lamps import cost_of_worst_case, lamp_lines, over_population, robustness_lines
 from .leaders import Leaders, Row, capital, full_name, label, leaders_of, of_reference, upper_bound_beside
 from .noise import usable_lines
-from .over_series import flicker_lines, worst_words
+from .over_series import flicker_lines, worst_of_series
 from .parameter_map import map_lines
 from .scorecard import score_lines, scorecard
 from .series import lead_sentence, leads_of, series_figures, vanishing_line
@@ -145,13 +145,14 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:  # noqa: PLR0912  
     text = f"With {under}, {who}" if under else capital(who)
     if output.goal.name not in (separation.name, separation.of):
         text += f" has the best {output.goal.words}, {output.goal.amount(best[output.goal.name])}, and"
-    if over := worst_words(output, best):
-        yield f"{text} {over}."
-    text += f" {_format_separation(output, best)}"
-    held_out = float(best.get(HELD_OUT + (separation.of or separation.name), np.nan))
-    if np.isfinite(held_out):
-        text += f" ({separation.formatted(held_out)} on lights that it has not seen)"
-    yield f"{text}{_in(output, leaders.scenario)}{_times(output, best, plain)}.{_equal(output, best)}"
+    if (over := worst_of_series(output, best)) is not None:
+        yield f"{text} {over.words}."
+    else:
+        text += f" {_format_separation(output, best)}"
+        held_out = float(best.get(HELD_OUT + (separation.of or separation.name), np.nan))
+        if np.isfinite(held_out):
+            text += f" ({separation.formatted(held_out)} on lights that it has not seen)"
+        yield f"{text}{_in(output, leaders.scenario)}{_times(output, best, plain)}.{_equal(output, best)}"
     search = output.provenance.search
     if search is not None and search.scenarios > 1 and best["kind"] == FOUND:
         more = f" and {search.scenes_added} scenes between them" if search.scenes_added else ""
@@ -411,6 +412,8 @@ def headline_numbers(output: Output) -> list[tuple[str, str, str]]:
     best, plain, separation = leaders.chosen, leaders.plain, output.trade_off[0]
     if best is None:
         return []
+    if (over := worst_of_series(output, best)) is not None:
+        return over.numbers
 
     def beside(column: str, formatted: Callable[[float], str]) -> str:
         """Return a value as a multiple of that of a plain CFA."""

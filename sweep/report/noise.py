@@ -70,6 +70,8 @@ def _with_handovers(figure: SeriesFigure, handovers: pd.DataFrame, pair: Pair | 
     kind = known["signal_type"].iloc[-1] if pair is None else pair[-1]
     known = known[(known["signal_type"] == kind) & known["at"].between(figure.x[0], figure.x[-1])]
     marks = {str(name): np.unique(part["at"]) for name, part in known.groupby("name", sort=False)}
+    if not marks:
+        return figure
     return replace(figure, marks=marks, note=f"{figure.note} {_HANDOVERS.format(kind=kind)}".strip())
 
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..metrics.columns.flicker import FALSE_HUE, LAMP_SEEN, MODULATION
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
+from ..metrics.quantity import Column
 from ..results.output import Output
 from ..results.tables import FOUND, PLAIN
 from ..study.axes import series_of
@@ -32,45 +34,83 @@ def searched_series(output: Output) -> tuple[str, str] | None:
     return series[0] if series and (known["series"] == series[0][0]).any() else None
 
 
-def worst_words(output: Output, best: Row) -> str:
-    """Return the worst value of the answer over its series, beside the worst of others; empty if there is none."""
+@dataclass(frozen=True)
+class WorstOfSeries:
+    """The answer's worst value over its series beside that of the plain CFA with the largest one, and of others.
+
+    `least`: worst value, and the number at which it is, by design. `light`: of each CFA. `loses`: numbers of scenarios
+    at which the rival has more. `of`: what the light is a share of.
+    """
+
+    column: Column
+    series: str
+    unit: str
+    name: str
+    rival: str | None
+    least: Mapping[str, tuple[float, float]]
+    light: Mapping[str, float]
+    loses: tuple[float, ...]
+    of: str
+
+    def value(self, design: str) -> str:
+        """Worst value of a design, rounded down."""
+        value = self.least[design][0]
+        return f"{rounded(value, up=False) if value > 0 else 0} {self.column.unit}".rstrip()
+
+    def _beside(self, design: str) -> str:
+        return f"{self.value(design)} (at {self.least[design][1]:.3g} {self.unit})"
+
+    @property
+    def ratio(self) -> str:
+        """The answer's worst as a multiple of the rival's."""
+        assert self.rival is not None
+        return f"{self.least[self.name][0] / self.least[self.rival][0]:.2f}"
+
+    @property
+    def words(self) -> str:
+        """Sentence without its subject."""
+        text = f"has a {self.column.words} of at least {self._beside(self.name)} {self.series}"
+        text += f", at {self.light[self.name]:.3f} {self.of}"
+        if self.rival is not None:
+            text += (
+                f". {self.rival} has at least {self._beside(self.rival)} at {self.light[self.rival]:.3f}: {self.ratio} "
+            )
+            text += f"times its worst and {self.light[self.name] / self.light[self.rival]:.2f} times its light"
+            more = ", ".join(f"{number:.3g}" for number in self.loses)
+            text += f"; {self.rival} has more at {more} {self.unit}" if self.loses else ""
+        others = [f"{other} {self._beside(other)}" for other in self.least if other not in (self.name, self.rival)]
+        return text + (f". Others: {', '.join(others)}" if others else "")
+
+    @property
+    def numbers(self) -> list[tuple[str, str, str]]:
+        """Value, name and comparison of the first screen."""
+        beside = "" if self.rival is None else f"{self.ratio} times {self.rival}'s worst ({self.value(self.rival)})"
+        light = "" if self.rival is None else f"{self.light[self.name] / self.light[self.rival]:.2f} times {self.rival}"
+        light += "" if self.rival is None else f" ({self.light[self.rival]:.3f})"
+        return [
+            (self.value(self.name), f"worst {self.column.words} {self.series}", beside),
+            (f"{self.light[self.name]:.3f}", self.of, light),
+        ]
+
+
+def worst_of_series(output: Output, best: Row) -> WorstOfSeries | None:
+    """Return the worst of the answer over its series; None if its refined values are not known."""
     group = searched_series(output)
     if group is None or best["kind"] != FOUND or output.worst is None:
-        return ""
+        return None
     goal, scenarios, (_, unit) = output.goal, series_of(output.scenarios)[group], quantity_of(group[1])
-    known = output.worst[(output.worst["series"] == group[0]) & (output.worst["quantity"] == goal.name)]
-    known = known.dropna().set_index("name")
-    light = output.few.drop_duplicates("name").set_index("name")[CFA_SENSITIVITY]
-    plain = [name for name in output.kind(PLAIN)["name"].unique() if name in known.index]
-    numbers = list(scenarios.values())
-
-    least_of = dict(
-        zip(known.index, zip(known["value"].astype(float), known["at"].astype(float), strict=True), strict=True)
-    )
-
-    def least(name: str) -> str:
-        value, at = least_of[name]
-        return f"{rounded(value, up=False) if value > 0 else 0} {goal.unit}".rstrip() + f" (at {at:.3g} {unit})"
-
-    name = label(best)
-    text = (
-        f"has a {goal.words} of at least {least(name)} from {numbers[0]:g} to {numbers[-1]:g} {unit}, "
-        f"at {light[name]:.3f} {of_reference(output)}"
-    )
-    rival = max(plain, key=lambda other: known.loc[other, "value"], default=None)
-    if rival is not None and known.loc[rival, "value"] > 0:
-        ratio = known.loc[name, "value"] / known.loc[rival, "value"]
-        text += f". {rival} has at least {least(rival)} at {light[rival]:.3f}: {ratio:.2f} times its worst and "
-        text += f"{light[name] / light[rival]:.2f} times its light"
+    known = output.worst[(output.worst["series"] == group[0]) & (output.worst["quantity"] == goal.name)].dropna()
+    least = {str(row["name"]): (float(row["value"]), float(row["at"])) for row in known.to_dict("records")}
+    light = {str(row["name"]): float(row[CFA_SENSITIVITY]) for row in output.few.to_dict("records")}
+    plain = [name for name in output.kind(PLAIN)["name"].unique() if least.get(name, (0.0, 0.0))[0] > 0]
+    rival, name, numbers = max(plain, key=lambda one: least[one][0], default=None), label(best), [*scenarios.values()]
+    loses: tuple[float, ...] = ()
+    if rival is not None:
         values = over_series(output.few, scenarios, goal.name)
-        loses = [
-            f"{number:.3g}"
-            for number, mine, its in zip(numbers, values[name], values[rival], strict=True)
-            if its > mine
-        ]
-        text += f"; {rival} has more at {', '.join(loses)} {unit}" if loses else ""
-    others = [f"{other} {least(other)}" for other in known.index if other not in (name, rival)]
-    return text + (f". Others: {', '.join(others)}" if others else "")
+        pairs = zip(numbers, values[name], values[rival], strict=True)
+        loses = tuple(number for number, mine, its in pairs if its > mine)
+    series = f"from {numbers[0]:g} to {numbers[-1]:g} {unit}"
+    return WorstOfSeries(goal, series, unit, name, rival, least, light, loses, of_reference(output))
 
 
 def flicker_lines(output: Output) -> Iterator[str]:

@@ -27,6 +27,7 @@ from .figures import Drawing, draw_curves, pictures_of
 from .lamps import lamp_drawings, lamp_table
 from .leaders import leaders_of
 from .noise import all_series, recognition_table
+from .over_series import searched_series
 from .page_data import payload
 from .pages import inlined, page, rows, script
 from .parameter_map import map_drawing
@@ -112,6 +113,7 @@ def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
     """Return the content of the page without its pictures."""
     drawn, groups = payload(output), scene_groups(output)
     answer, further = answer_parts(output)
+    over_all = len(output.scenarios) == 1 or searched_series(output) is not None
     series_first = bool(drawn["series"]) and output.best.empty
     return {
         "output": output,
@@ -120,7 +122,9 @@ def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
         "card_first": output.best.empty and not series_first and output.study.tasks is not None,
         "groups": [(group, rows(effect_table(group.effects))) for group in groups],
         "objective": _objective(output),
-        "numbers_in": "" if len(output.scenarios) == 1 else f"in {leaders_of(output).scenario}",
+        "numbers_in": ""
+        if len(output.scenarios) == 1 or searched_series(output)
+        else f"in {leaders_of(output).scenario}",
         "series_first": series_first,
         "most_series": _MOST_SERIES,
         "terms_first": series_first and drawn["series"][0]["y_label"] == output.trade_off[0].axis,

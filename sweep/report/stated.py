@@ -102,9 +102,9 @@ def saturation_lines(output: Output) -> Iterator[str]:
         x, (_, unit), ranges = np.array(list(scenarios.values())), quantity_of(key), dict[str, list[str]]()
         for name, full in over_series(rows, scenarios, _FULL).items():
             if (full > 0).any():
-                where = f"from {x[np.flatnonzero(full > 0)[0]]:g}{f' {unit}' if unit else ''} on"
+                where = f"from {x[np.flatnonzero(full > 0)[0]]:.3g}{f' {unit}' if unit else ''} on"
                 if full[0] > 0 and not full[-1] > 0:
-                    where = f"up to {x[np.flatnonzero(full > 0)[-1]]:g}{f' {unit}' if unit else ''}"
+                    where = f"up to {x[np.flatnonzero(full > 0)[-1]]:.3g}{f' {unit}' if unit else ''}"
                 ranges.setdefault("everywhere" if (full > 0).all() else where, []).append(name)
         if ranges:
             every = len(over_series(rows, scenarios, _FULL))
