@@ -122,9 +122,7 @@ def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
         "card_first": output.best.empty and not series_first and output.study.tasks is not None,
         "groups": [(group, rows(effect_table(group.effects))) for group in groups],
         "objective": _objective(output),
-        "numbers_in": ""
-        if len(output.scenarios) == 1 or searched_series(output)
-        else f"in {leaders_of(output).scenario}",
+        "numbers_in": "" if over_all else f"in {leaders_of(output).scenario}",
         "series_first": series_first,
         "most_series": _MOST_SERIES,
         "terms_first": series_first and drawn["series"][0]["y_label"] == output.trade_off[0].axis,
