@@ -26,6 +26,8 @@ _RATIO, _RATIO_OF_MANY = 1.25, 1.06
 """Ratio of neighboring nodes, and from where the first of many pixels is full."""
 _AROUND_KNEE = 6
 """Standard deviations of the noise on either side of a knee, of which each half has a node."""
+_BEYOND = 1.1
+"""Brightness of the last node, relative to those around the last knee."""
 _BESIDE = 1e-9
 """Nodes beside a knee without noise, where the reading may jump, relative."""
 _FEW, _MOST_KNEES = 16, 300
@@ -171,15 +173,16 @@ class LampReadings:
         lit_e, dark_e = lit_e[:, seen], dark_e[seen]
         curves = [(curve, np.flatnonzero(np.isin(np.flatnonzero(seen), at))) for curve, at in self.pixel_curves()]
         brightest_e = np.maximum(lit_e.max(axis=1, keepdims=True), 1e-300)
-        full, others, widths = [], [], []
+        full, knees, around = [], [], []
+        deviations = np.linspace(-_AROUND_KNEE, _AROUND_KNEE, 4 * _AROUND_KNEE * steps + 1)
         for curve, at in curves:
             lit = np.maximum(lit_e[:, at], np.maximum(brightest_e / _MOST_RATIO, 1e-30))
-            at_knees = np.maximum(curve.knees_e[:, None, None] - dark_e[at], 0.0) / lit  # [n_knees, n_signals, n]
-            full.append(at_knees[-1])
-            others += [*at_knees[:-1]]
-            widths.append(float(curve.knee_widths.max()))
-        at_full, at_knees = np.concatenate(full, axis=1), np.concatenate([*full, *others], axis=1)
-        last = at_knees.max(axis=1, keepdims=True) * (1 + 12 * max(widths))
+            for knee_e, width in zip(curve.knees_e, curve.knee_widths, strict=True):
+                knees.append(np.maximum(knee_e - dark_e[at], 0.0) / lit)
+                around.append(knees[-1][..., None] * np.maximum(1 + width * deviations, 0.0))
+            full.append(knees[-1])
+        at_full, at_knees = np.concatenate(full, axis=1), np.concatenate(knees, axis=1)
+        last = np.concatenate(around, axis=1).max(axis=(1, 2))[:, None] * _BEYOND
         first = np.minimum(_LEAST_E / brightest_e, last / 2)
         parts = [np.zeros_like(last), last, last * 1e3]
         if self.straight:
@@ -191,9 +194,8 @@ class LampReadings:
                 _geometric(first, last, _RATIO ** (1 / steps)),
             ]
         elif lit_e.shape[1] <= _FEW:
-            deviations = np.linspace(-_AROUND_KNEE, _AROUND_KNEE, 4 * _AROUND_KNEE * steps + 1)
-            around = at_knees[..., None] * np.maximum(1 + max(widths) * deviations, 0.0)
-            parts += [around.reshape(len(lit_e), -1), _geometric(first, last, _RATIO ** (1 / steps))]
+            parts += [np.concatenate(around, axis=1).reshape(len(lit_e), -1)]
+            parts.append(_geometric(first, last, _RATIO ** (1 / steps)))
         else:
             some = np.linspace(0, at_knees.shape[1] - 1, min(at_knees.shape[1], _MOST_KNEES)).round().astype(int)
             parts += [np.sort(at_knees, axis=1)[:, some], _geometric(first, last, _RATIO ** (1 / steps))]
