@@ -24,6 +24,7 @@ from ..run.uncertainty import REFERENCE, UNCLIPPED
 from ..study import SensorAndLights, folder_name
 from .figures import CURVE_CYCLE, canvas, legend_beside, rendered
 from .pages import inlined, page, rows
+from .stated import camera_and_scene
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -104,7 +105,7 @@ def report_sensors(folder: Path, runs: Sequence[SensorRun]) -> list[str]:
     words, summary = outputs[0][1].trade_off[0].words, _summary(figures)
     n_found = figures.loc[figures["kind"] == FOUND, "cfa"].nunique()
     lines = [*_answer(summary, n_found, str(figures["reference"].iloc[0]), words)]
-    answer = lines[: max(n_found, 1)]
+    answer, stated = lines[: max(n_found, 1)], f"{camera_and_scene(outputs[0][1])}."
     together = pd.read_parquet(folder / ALL_SENSORS) if (folder / ALL_SENSORS).exists() else pd.DataFrame()
     if len(together):
         lines += _together(together, outputs[0][1].goal)
@@ -115,6 +116,7 @@ def report_sensors(folder: Path, runs: Sequence[SensorRun]) -> list[str]:
         title=folder.name,
         question=outputs[0][1].study.question,
         answer=answer,
+        stated=stated,
         further=lines[len(answer) :],
         summary=rows(summary),
         image=inlined(images["png"]),
@@ -123,6 +125,7 @@ def report_sensors(folder: Path, runs: Sequence[SensorRun]) -> list[str]:
         links=links,
     )
     write_text(text, folder / REPORT)
+    lines.insert(len(answer), stated)
     return [*lines, f"Files: {folder}/: {RESULTS}, {REPORT}, {PICTURE}.png; a run and its report in each folder."]
 
 

@@ -28,9 +28,23 @@ def stated_lines(output: Output) -> list[str]:
     list of str
         Lines.
     """
-    scenes = list(output.study.scenarios.values())
-    parts = [f"Camera: {_camera(output)}", f"scene: {_scene(scenes)}", _curves(output)]
-    return [f"{'; '.join(parts)}.", *saturation_lines(output)]
+    return [f"{camera_and_scene(output)}; {_curves(output)}.", *saturation_lines(output)]
+
+
+def camera_and_scene(output: Output) -> str:
+    """Return camera and scene of a run in words.
+
+    Parameters
+    ----------
+    output : Output
+        Finished run.
+
+    Returns
+    -------
+    str
+        Text.
+    """
+    return f"Camera: {_camera(output)}; scene: {_scene(list(output.study.scenarios.values()))}"
 
 
 def _camera(output: Output) -> str:
