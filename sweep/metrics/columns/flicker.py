@@ -18,8 +18,8 @@ from ..quantity import DN, Columns, Quantity, RequestedQuantities
 MODULATION, LAMP_SEEN, FALSE_HUE = "flicker_modulation", "lamp_seen", "false_hue_dn"
 _BETWEEN, _OF_MANY, _FINER = 127, 15, 33
 """Phases between two at which an exposure begins or ends with a pulse, so many that a capture's handover is seen, which
-is as narrow as its noise; for the mean of many pixels, of which each hands over elsewhere; and phases around that with
-the largest hue."""
+is as narrow as its noise; where many pixels hand over one after the other, or windows differ, whose pulses tell more
+than handovers; and phases around that with the largest hue."""
 _MANY = 16
 _SEEN_DN = 1.0
 
@@ -90,7 +90,8 @@ def _of_lamps(lamps: LampReadings, setup: Setup, time_s: float) -> dict[str, flo
 
     dark = lamps.means_of_exposures(np.zeros((len(lamps.lit_e), 1)))
     pulsed = setup.computes("flicker")
-    between = _OF_MANY if lamps.lit_e.shape[2] > _MANY else _BETWEEN
+    windows = {(of.capture.start_ratio, of.capture.exposure_ratio) for of in setup.camera.pixel.exposures}
+    between = _OF_MANY if lamps.lit_e.shape[2] > _MANY or len(windows) > 1 else _BETWEEN
     phases = phases_of(setup, np.array([time_s]), between)[0] if pulsed else np.zeros(1)
     readings, widths = lit(phases), np.diff(np.concatenate([phases, phases[:1] + 1]))
     after = np.roll(readings, -1, axis=0)
