@@ -134,9 +134,13 @@ def _csds(model: ForwardModel, curves: FloatArray) -> FloatArray:
 
 
 def _nonlinear_over_pulse(setup: Setup) -> bool:
-    """Return whether a CSD may be smallest at any moment of a pulse: not where a readout rounds, but does not clip."""
+    """Return whether a CSD may be smallest at any moment of a pulse.
+
+    Of whole numbers: only where they may clip, too, and the worst places are refined.
+    """
     drive, rounds = setup.scene.drive, setup.scene.noise is None and setup.computes("quantization")
-    bends = not setup.linear and (not rounds or setup.computes("saturation"))
+    clips = setup.computes("saturation") and setup.accuracy.finest_phase_px > 0
+    bends = not setup.linear and (not rounds or clips)
     return drive is not None and setup.computes("flicker") and bends
 
 
