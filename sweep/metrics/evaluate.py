@@ -19,7 +19,7 @@ from ..designs.family import Family
 from ..spectra.lights import class_pairs, pair_name
 from ..vision.section import Vision
 from .brightness import curves_of
-from .columns.chromatic import CHROMATIC_CSD, CHROMATIC_DPRIME, with_equal_brightness
+from .columns.chromatic import CHROMATIC_CSD, CHROMATIC_DPRIME, CHROMATIC_ERROR, with_equal_brightness
 from .columns.color_separation import ColorSeparation
 from .columns.exposure import EXPOSURE
 from .metric import DesignMetric, FamilyMetric, LampMetric, NoiseMetric, PulseMetric, ReadoutMetric, VisionMetric
@@ -383,20 +383,20 @@ def _over_brightness(setup: Setup, block: Block, columns: Columns, states: Seque
 
     Those of noise, and others where a column is missing: no closed form holds there.
     """
-    walked = np.zeros(len(columns[EXPOSURE]), dtype=bool)
+    walked, made = np.zeros(len(columns[EXPOSURE]), dtype=bool), Columns()
     for name in {pair_name(CHROMATIC_CSD, pair) for pair in class_pairs(setup.lights.classes)} & columns.keys():
         walked |= np.isnan(columns[name])
+        made[name] = columns[name].copy()
     if not (walked.any() or states):
         return {}
-    made: Columns = {}
+    for pair in class_pairs(list(states)):
+        made |= {pair_name(of, pair): np.full(len(walked), np.nan) for of in (CHROMATIC_DPRIME, CHROMATIC_ERROR)}
     for design in range(len(walked)):
         wanted = [metric for metric in _LAMPS if (states if metric.of_states else walked[design])]
         curves = block.some(slice(design, design + 1)).curves()
         if not (wanted and np.isfinite(curves).all() and np.isfinite(columns[EXPOSURE][design])):
             continue
         for name, value in of_lamps(setup, curves, states, wanted).items():
-            if name not in made:
-                made[name] = columns[name].copy() if name in columns else np.full(len(walked), np.nan)
             made[name][design] = value
     return made | (with_equal_brightness(columns | made, states) if states else {})
 

@@ -19,6 +19,7 @@ from sweep.camera.setup import Setup
 from sweep.metrics.evaluate import evaluate
 from sweep.study import Study, load_study
 
+from ..hard import random_scenes
 from ..hard.scenes import scene, target
 
 PAIR = ("yellow", "red")
@@ -219,3 +220,11 @@ def test_no_chromatic_figure_is_above_a_scan_nor_below(first: int) -> None:
                 )
                 assert value <= expected * 1.001 + slack, (seed, name, value, expected)
                 assert value >= expected * 0.99 - slack, (seed, name, value, expected)
+
+
+def test_designs_without_curves_have_no_chromatic_figures() -> None:
+    setup = random_scenes.random_scene(3).setup
+    assert setup.scene.noise is not None
+    columns = evaluate(ForwardModel(setup), np.full((2, 1, setup.camera.grid.size), np.nan), setup.lights.classes[:2])
+    assert all(np.isnan(values).all() for name, values in columns.items() if name.startswith("chromatic_"))
+    assert "chromatic_error_green_yellow" in columns

@@ -128,8 +128,5 @@ class ChromaticConfusion(LampMetric):
 
 def with_equal_brightness(columns: Columns, states: Sequence[str]) -> Columns:
     """Return errors of lamps of unknown brightness that are at least those of equal brightness."""
-    return {
-        name: np.maximum(columns[name], columns[pair_name(ERROR, pair)])
-        for pair in class_pairs(list(states))
-        for name in (pair_name(CHROMATIC_ERROR, pair),)
-    }
+    names = {pair_name(CHROMATIC_ERROR, pair): pair_name(ERROR, pair) for pair in class_pairs(list(states))}
+    return {chromatic: np.maximum(columns[chromatic], columns[equal]) for chromatic, equal in names.items()}
