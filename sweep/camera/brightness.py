@@ -220,25 +220,12 @@ def of_case(electrons: FloatArray, dark: FloatArray, readout: Readout, *, noisy:
 
 
 def room_dn(setup: Setup, response: FloatArray, unlit: FloatArray) -> FloatArray:
-    """Return the chromatic distance up to which the closed form holds, DN.
+    """Return the chromatic distance up to which the closed form holds, DN, [n_designs]; negative: nowhere.
 
+    `response`: readout, DN, [n_designs, n_signals, n_channels]; `unlit`: without lamps, DN, [n_designs, n_channels].
     It holds for no HDR pixel, and within no limits of the brightness. The closed form takes a lamp that is dimmer than
     it is. A brighter one has its fullest channel at least where its brightest pixel is full, so that it is no nearer to
     a reading than that channel lies above the reading.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-    response : ndarray of shape (n_designs, n_signals, n_channels)
-        Readout, DN.
-    unlit : ndarray of shape (n_designs, n_channels)
-        Response without the lamps, DN.
-
-    Returns
-    -------
-    ndarray of shape (n_designs,)
-        Distance, DN; negative where no closed form holds.
     """
     pixel, scene = setup.camera.pixel, setup.scene
     if pixel.captures or scene.brightness is not None:

@@ -272,18 +272,7 @@ class ForwardModel:
             yield self._captured(curves[block], scales[..., block, :], exposure_s[block])
 
     def lamps(self, curves: FloatArray) -> Iterator[LampReadings]:
-        """Yield the readings of one design's lamps over their brightness, in each case.
-
-        Parameters
-        ----------
-        curves : ndarray of shape (1, n_modified, n_wavelengths)
-            QE of the modified channels.
-
-        Yields
-        ------
-        LampReadings
-            Electrons of each lamp, and how they are read.
-        """
+        """Yield the readings of one design's lamps over their brightness, in each case; `curves` as of `read`."""
         if self._in_parts:
             for part in self._parts():
                 yield from part.lamps(curves)

@@ -197,19 +197,9 @@ class LinearModel(ForwardModel):
         return self.hdr is None and bool((room_dn(self.setup, response, unlit) >= 2 * longest_dn).all())
 
     def lamps_over_brightness(self, curves: FloatArray, curves_gradient: FloatArray) -> list[LampSlopes]:
-        """Return the readings of the lamps of one design over their brightness in each case, with derivatives.
+        """Return the readings of the lamps of one design over their brightness, one for each case, with derivatives.
 
-        Parameters
-        ----------
-        curves : ndarray of shape (n_modified, n_wavelengths)
-            QE of the modified channels.
-        curves_gradient : ndarray of shape (n_free, n_modified, n_wavelengths)
-            Their derivatives.
-
-        Returns
-        -------
-        list of LampSlopes
-            One for each case.
+        `curves`: QE of the modified channels, [n_modified, n_wavelengths]; `curves_gradient`: its derivatives.
         """
         by_pixel = self.by_pixel
         pixel = by_pixel.readout.pixel if self.hdr is None else self.hdr

@@ -16,34 +16,12 @@ _MOST_NAMED = 3
 
 
 def stated_lines(output: Output) -> list[str]:
-    """Return camera, scene and curves that an answer is of in one line, and a warning where signals fill pixels.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    list of str
-        Lines.
-    """
+    """Return camera, scene and curves that an answer is of in one line, and a warning where signals fill pixels."""
     return [f"{camera_and_scene(output)}; {_curves(output)}.", *saturation_lines(output)]
 
 
 def camera_and_scene(output: Output) -> str:
-    """Return camera and scene of a run in words.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    str
-        Text.
-    """
+    """Return camera and scene of a run in words."""
     return f"Camera: {_camera(output)}; scene: {_scene(list(output.study.scenarios.values()))}"
 
 

@@ -43,22 +43,6 @@ def crossings_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progre
 
     One row per series of scenarios (`series`, `key`), design, kind of error (`quantity`: lamps of equal brightness, or
     of any) and crossing: `rises` if the error is larger beyond `at`.
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    rows : pandas.DataFrame
-        Rows of plain CFAs, named designs and the answer.
-    parallel : callable
-        Runs calls on the cores.
-    progress : callable
-        Called with a phase, work done and work in total.
-
-    Returns
-    -------
-    pyarrow.Table
-        Table.
     """
     recognition = study.section.recognition
     assert recognition is not None

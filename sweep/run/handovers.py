@@ -33,22 +33,6 @@ def handovers_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progre
     One row per series of scenarios (`series`, `key`), design, channel, signal type and capture (from 1 on): `at` is the
     number at which the expected reading reaches the capture's threshold, or saturation for the last one; -inf or inf if
     it is below or above all numbers of the series.
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run, of an HDR pixel.
-    rows : pandas.DataFrame
-        Rows of plain CFAs, named designs and the answer.
-    parallel : callable
-        Runs calls on the cores.
-    progress : callable
-        Called with a phase, work done and work in total.
-
-    Returns
-    -------
-    pyarrow.Table
-        Table.
     """
     keys, calls = [], []
     for series, key, scenarios, row, curves, space in rows_of_series(study, rows):

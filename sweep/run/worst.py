@@ -43,22 +43,6 @@ def worst_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: 
 
     One row per series of scenarios (`series`, `key`), design and quantity: the worst `value`, and the number `at` which
     it is, also between two scenarios.
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    rows : pandas.DataFrame
-        Rows of plain CFAs, named designs and the answer.
-    parallel : callable
-        Runs calls on the cores.
-    progress : callable
-        Called with a phase, work done and work in total.
-
-    Returns
-    -------
-    pyarrow.Table
-        Table.
     """
     keys, calls = [], []
     for series, key, scenarios, row, curves, space in rows_of_series(study, rows):
