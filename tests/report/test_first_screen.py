@@ -228,7 +228,7 @@ def test_no_figure_is_shown_twice(finished: FinishedFolder, standing: Any) -> No
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["stopband", "distance", "dual"])
+@pytest.mark.parametrize("name", ["stopband", "distance", "noise", "dual"])
 def test_on_paper_the_first_figure_stands_below_the_answer_and_no_legend_is_cut(
     finished: FinishedFolder, opened: Any, name: str
 ) -> None:
