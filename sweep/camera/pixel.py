@@ -32,6 +32,8 @@ MOST_PRNU = 0.1
 """Largest relative deviation of gains: a Gaussian gain is then positive within ten of them. Sensors have 0.01."""
 Prnu = Annotated[float, Field(ge=0, le=MOST_PRNU)]
 _Captures = Annotated[list[Capture], Field(max_length=MOST_CAPTURES)]
+_MOST_FULL_E = 1e9
+"""Largest light of a pixel of full sensitivity that the captures tell apart, electrons, which are tabulated."""
 _MOST_WELL_E = 1e6
 """Largest full well of a capture, electrons, which are counted one by one."""
 _Knee = Annotated[tuple[NonNegative, NonNegative], BeforeValidator(from_to)]
@@ -106,6 +108,11 @@ class Pixel(Section):
             raise ValueError("crosstalk of a capture needs a crosstalk of the pixel above 0")
         if (np.diff(self.knees) <= 0).any():
             raise ValueError("companding: knees must ascend in DN and in code, from above 0")
+        for number, (capture, pixel) in enumerate(zip(self.captures, self.read_as, strict=True)):
+            certain_e = pixel.saturation_e + 100 + 10 * math.sqrt(pixel.saturation_e + pixel.read_noise_e**2)
+            if (full_e := certain_e / (capture.light * min([1.0, *capture.qe_factor.values()]))) > _MOST_FULL_E:
+                problem = f"is full for certain where a pixel of full sensitivity has {full_e:.3g} electrons"
+                raise ValueError(f"captures.{number} {problem}; allowed: at most {_MOST_FULL_E:.0e}")
         top_dn = self.saturation_e * self.dn_per_e + self.offset_dn
         if self.companding and self.knees[0, -1] < top_dn * (1 - 1e-9):
             raise ValueError(f"companding: the last knee must be at {top_dn:.6g} DN or more, where all are saturated")

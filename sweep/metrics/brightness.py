@@ -23,7 +23,7 @@ LEAST_DN2 = 1e-9
 _MARGINS = (1.7, 1.05, 1.01)
 """Pairs are refined, again and again, that come as near as this times the nearest squared distance of all."""
 _MOST_PAIRS = 200
-_NEWTON_STEPS, _NEWTON_STEP = 3, 1e-5
+_NEWTON_STEPS, _NEWTON_STEP, _CONVERGED = 12, 1e-5, 1e-10
 _FINER = 12
 """Finer segments in the place of the nearest one and its neighbors."""
 DARK_TO_FULL = (0.0, np.inf)
@@ -51,7 +51,8 @@ class Nearest:
 class BrightnessCurves:
     """Readings and brightness curves of all lamps in one case, or in several that differ in brightness alone.
 
-    `scales`: brightness of the lamps that are read in each of these, as of the moments of a pulse.
+    `scales`: brightness of the lamps that are read in each of these, as of the moments of a pulse. `least_dn2`: variance
+    in units of which distances are taken at least.
     """
 
     def __init__(
@@ -60,8 +61,10 @@ class BrightnessCurves:
         brightness: tuple[float, float] | None = None,
         scales: Sequence[float] | FloatArray = (1.0,),
         steps: int = 1,
+        least_dn2: float = LEAST_DN2,
     ) -> None:
         self.lamps = lamps
+        self._least_dn2 = least_dn2
         self._scales = np.array(scales, dtype=float)
         self._nodes = lamps.nodes(*(DARK_TO_FULL if brightness is None else brightness), steps)
 
@@ -109,28 +112,30 @@ class BrightnessCurves:
         means = self.lamps.moments(found.curve, nodes) if noise else (self.lamps.means(found.curve, nodes),) * 2
         return self._on(means, nodes, found.reading, found.curve, rows, noise=noise)
 
-    def polished(self, found: Nearest, *, noise: bool, least: float) -> FloatArray:
-        """Return the brightnesses of nearest points by Newton's method, from where they are known between nodes.
-
-        `least`: variance in units of which distances are taken at least, DN^2.
-        """
+    def polished(self, found: Nearest, *, noise: bool) -> FloatArray:
+        """Return the brightnesses of nearest points by Newton's method, from where they are known between nodes."""
         (mean, variance), factor = (values[found.reading] for values in self._readings), found.factor.copy()
 
         def slope(factors: FloatArray) -> FloatArray:
             there, spread, by_mean, by_spread = self.lamps.along(found.curve, factors)
             if not noise:
                 return np.asarray((-(mean - there) * by_mean).sum(axis=1))
-            total = np.maximum((variance + spread) / 2, least)
-            moving = by_spread * (total > least)
+            total = np.maximum((variance + spread) / 2, self._least_dn2)
+            moving = by_spread * (total > self._least_dn2)
             apart = mean - there
             return np.asarray((-apart * by_mean / total - apart**2 * moving / (4 * total**2)).sum(axis=1))
 
+        (low, high), (darkest, brightest) = found.bracket.T, (self._nodes[found.curve, end] for end in (0, -1))
+        low, high = np.maximum(2 * low - high, darkest), np.minimum(2 * high - low, brightest)
         for _ in range(_NEWTON_STEPS):
             step = _NEWTON_STEP * np.maximum(factor, 1e-300)
             here = slope(factor)
+            low, high = np.where(here < 0, factor, low), np.where(here > 0, factor, high)
             bend = (slope(factor + step) - here) / step
-            moved = factor - np.divide(here, bend, out=np.zeros_like(here), where=bend > 0)
-            factor = np.clip(moved, found.bracket[:, 0], found.bracket[:, 1])
+            moved = factor - np.divide(here, bend, out=np.full_like(here, np.inf), where=bend > 0)
+            before, factor = factor, np.where((low <= moved) & (moved <= high), moved, (low + high) / 2)
+            if (np.abs(factor - before) <= _CONVERGED * before).all():
+                break
         return factor
 
     def _on(
@@ -150,7 +155,7 @@ class BrightnessCurves:
 
         squared, share = np.empty(rows.size), np.zeros(rows.size)
         segment = np.zeros(rows.size, dtype=np.intp)
-        least = LEAST_DN2 if noise else 0.0
+        least = self._least_dn2 if noise else 0.0
         nearest_on_curves(*self._readings, *curves, reading, rows, least, margin, nearest, squared, segment, share)
         low, high = nodes[rows, segment], nodes[rows, segment + 1]
         before = nodes[rows, np.maximum(segment - 1, 0)]

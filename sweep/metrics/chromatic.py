@@ -168,7 +168,7 @@ def _nearest_rows(
     active = np.flatnonzero(near.squared <= _SEEN * near.squared.min())
     refined = curves.refined(near.subset(active), noise=noise)
     factor = np.full(near.factor.size, curves.darkest)
-    factor[active] = curves.polished(refined, noise=noise, least=STEPS_DN2)
+    factor[active] = curves.polished(refined, noise=noise)
     one = lamps.moments(near.reading, np.ones(near.reading.size))
     other = lamps.moments(near.curve, factor)
 

@@ -12,6 +12,7 @@ import numpy as np
 from ..base.types import FloatArray, IndexArray
 from ..camera.brightness import LampSlopes
 from ..camera.linear import LinearModel, linear_model
+from ..camera.pixel_curve import STEPS_DN2
 from ..camera.setup import Setup
 from ..designs.family import Family
 from ..spectra.lights import Pair
@@ -217,7 +218,7 @@ class SmoothDesign:
         """Readings and brightness curves of the lamps in each case."""
         limits = self.setup.scene.brightness
         cases = self._imager.lamps_over_brightness(self.curves, self.by_u)
-        return [(lamps, BrightnessCurves(lamps.lamps, limits)) for lamps in cases]
+        return [(lamps, BrightnessCurves(lamps.lamps, limits, least_dn2=STEPS_DN2)) for lamps in cases]
 
     def linear(self, matrix: FloatArray) -> Rows:
         """Return linear functions of the parameters.

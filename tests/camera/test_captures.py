@@ -266,6 +266,7 @@ def test_equal_captures_one_electron_and_other_hard_pixels() -> None:
         ({"captures": [{}], "companding": [[100.0, 50.0]]}, "the last knee must be at 4095 DN or more"),
         ({"companding": [[5000.0, 50.0]]}, "companding needs captures"),
         ({"captures": [{"crosstalk": 0.1}]}, "needs a crosstalk of the pixel"),
+        ({"captures": [{}, {"sensitivity": 1e-6}]}, "full sensitivity has 1.11e.10 electrons; allowed: at most 1e.09"),
         ({"captures": [{"bits": 4}], "offset_dn": 20.0}, "captures.0: offset_dn 20 must be below full scale, 15"),
     ],
 )

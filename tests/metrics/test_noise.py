@@ -175,7 +175,7 @@ def test_a_noisy_study_from_file_to_report(tmp_path: Path) -> None:
     output = read_output(tmp_path / "1")
     make_report(output)
     said = "\n".join(summary_lines(output))
-    told = re.search(r"RGGB from ([\d.]+) of full scale", said)
+    told = re.search(r"of equal brightness, .*: RGGB from ([\d.]+) of full scale", said)
     assert told is not None
     # Computed again there, a little brighter and a little dimmer.
     brighter, dimmer = (_worst_error(path, float(told[1]) * share) for share in (1.005, 0.985))
