@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,43 +12,47 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import DataError, ValidationIssue
-from ..spectra.facts import Curve, qe_scale
+from ..spectra.facts import Curve
 from ..spectra.filter_files import HINTS
 from ..spectra.light_files import MOST_LETTERS, clean_curves
+from ..spectra.spectrum import Curves
+from ..spectra.units import Quantity, folded, name_of, used_as
 
 _WORDS = {
-    "red": "R",
-    "green": "G",
-    "blue": "B",
-    "white": "W",
-    "clear": "C",
-    "mono": "C",
-    "panchromatic": "C",
-    "yellow": "Y",
+    **dict.fromkeys(("red", "rot", "rouge"), "R"),
+    **dict.fromkeys(("green", "grun", "gruen", "vert", "verte"), "G"),
+    **dict.fromkeys(("blue", "blau", "bleu", "bleue"), "B"),
+    **dict.fromkeys(("white", "weiss", "blanc", "blanche"), "W"),
+    **dict.fromkeys(("clear", "klar", "clair", "claire", "mono", "panchromatic", "panchromatisch"), "C"),
+    **dict.fromkeys(("yellow", "gelb", "jaune"), "Y"),
     "cyan": "Cy",
     "magenta": "M",
 }
+"""Words of English, German and French, without accents."""
 _LETTERS = {"r": "R", "g": "G", "gr": "G", "gb": "G", "b": "B", "w": "W", "c": "C", "y": "Y", "ye": "Y", "cy": "Cy"}
 _LETTERS |= {"m": "M", "mg": "M"}
 _ORDER = ("R", "G", "B", "W", "C", "Y", "Cy", "M")
-_TOKEN = re.compile(r"[A-Z]?[a-z]+|[A-Z]+")
+_HUMP = re.compile(r"(?<=[^\W\d_A-Z])(?=[A-Z])")
+_TOKEN = re.compile(r"[^\W\d_]+")
 _CLEAR_NM = 180.0
 """Equivalent width above which a curve is taken for a clear pixel."""
-_RATIO = "_over_"
+RATIO = "_over_"
 """Part of the column names that `sweep export` gives to transmissions."""
 _NEEDED_NM = (450.0, 680.0)
 """Range that QE curves must cover to see every signal color."""
+_UNKNOWN = "the name says no channel, and its shape is that of another"
+_FEWEST = 3
 NEW = "N"
 """Name of the modified channel."""
 
 
 @dataclass(frozen=True)
 class Channels:
-    """Columns of each channel, other columns with the reason they are left out, and whether shapes were used."""
+    """Columns of each channel, other columns with the reason they are left out, and columns that shapes tell alone."""
 
     columns: Mapping[str, str]
     left_out: Mapping[str, str]
-    guessed: bool
+    guessed: frozenset[str]
 
 
 @dataclass(frozen=True)
@@ -86,10 +90,11 @@ def channel_of(column: str) -> str | None:
     str or None
         The channel; None if the name states none, and for N, the modified channel.
     """
+    column = name_of(column)
     whole = column[1:] if column[:1] in tuple(HINTS) and column[1:] in (*_ORDER, NEW) else column
     if whole in (*_ORDER, NEW):
         return None if whole == NEW else whole
-    tokens = [token.casefold() for token in _TOKEN.findall(column)]
+    tokens = _TOKEN.findall(folded(_HUMP.sub(" ", column)))
     for known in (_WORDS, _LETTERS):
         stated = {known[token] for token in tokens if token in known}
         if len(stated) == 1:
@@ -98,7 +103,7 @@ def channel_of(column: str) -> str | None:
 
 
 def channels_of(curves: Mapping[str, Curve]) -> Channels:
-    """Assign columns to channels by their names, or by the shapes of the curves if no name states a channel.
+    """Assign columns to channels by their names, and those that no name explains by the shapes of their curves.
 
     Parameters
     ----------
@@ -115,23 +120,25 @@ def channels_of(curves: Mapping[str, Curve]) -> Channels:
     left_out |= {column: reason for column in lit if (reason := _no_channel(column))}
     lit = {column: curve for column, curve in lit.items() if column not in left_out}
     named = {column: channel for column in lit if (channel := channel_of(column)) is not None}
-    assigned = named or {column: _by_shape(curve) for column, curve in lit.items()}
+    shapes = {column: _by_shape(curve) for column, curve in lit.items() if column not in named}
+    guessed = {column: shape for column, shape in shapes.items() if shape not in named.values()}
+    assigned = named | guessed
     columns: dict[str, str] = {}
     for column in sorted(lit, key=lambda column: column != assigned.get(column)):  # a whole name before a part of one
         channel = assigned.get(column)
         if channel is None:
-            left_out[column] = "the name says no channel"
+            left_out[column] = _UNKNOWN
         elif channel in columns:
             left_out[column] = f"a second {channel}"
         else:
             columns[channel] = column
     ordered = {channel: columns[channel] for channel in _ORDER if channel in columns}
-    return Channels(ordered, left_out, guessed=not named)
+    return Channels(ordered, left_out, frozenset(guessed) & frozenset(columns.values()))
 
 
 def _no_channel(column: str) -> str:
     """Return the reason why a column of `sweep export` is no channel; empty for other columns."""
-    if _RATIO in column:
+    if RATIO in column:
         return "a transmission, no QE"
     hinted = column[:1] in tuple(HINTS) and column[1:] == NEW
     return f"{NEW} is the channel that the study designs" if column == NEW or hinted else ""
@@ -150,8 +157,8 @@ def _by_shape(curve: Curve) -> str:
 def layout_of(channels: Mapping[str, float]) -> Layout:
     """Choose CFAs of 2 x 2 pixels and the modified channel.
 
-    RYYCy with red, yellow and cyan; else a clear pixel beside R, G and B; else RGGB; else all channels around the most
-    sensitive one. The last CFA that fits gets the channel N.
+    A yellow pixel beside red and cyan, or red and blue; else a clear pixel beside R, G and B; else RGGB; else all
+    channels around the most sensitive one. The last CFA that fits gets the channel N.
 
     Parameters
     ----------
@@ -171,7 +178,7 @@ def layout_of(channels: Mapping[str, float]) -> Layout:
             (clear, ["R", clear, clear, "B"]),
             (clear, ["R", "G", "B", clear]),
         ]
-    known.append(("Y", ["R", "Y", "Y", "Cy"]))
+    known += [("Y", ["R", "Y", "Y", "B"]), ("Y", ["R", "Y", "Y", "Cy"])]
     fitting = [(base, tile) for base, tile in known if set(tile) <= set(channels)]
     if not fitting:
         base = clear or max(channels, key=lambda name: channels[name])
@@ -186,72 +193,82 @@ def layout_of(channels: Mapping[str, float]) -> Layout:
 
 @dataclass(frozen=True)
 class SensorFile:
-    """QE file of a sensor: channels, sum of each curve, scale of the values, and the range of a grid in whole nm."""
+    """Files of a sensor's curves: channels, sum of the QE of each, and the range of a grid in whole nm.
+
+    `entries`: path, columns, quantity and scale of each file, as a study states them. `notes`: how they were read.
+    """
 
     name: str
     channels: Channels
     totals: Mapping[str, float]
-    scale: float
     range_nm: tuple[int, int]
+    entries: tuple[Mapping[str, Any], ...]
+    notes: tuple[str, ...]
 
-    def keys(self, file: str) -> dict[str, Any]:
-        """Return the keys of a study for this sensor.
-
-        Parameters
-        ----------
-        file : str
-            Path of the file as the study names it.
-
-        Returns
-        -------
-        dict
-            Name and files.
-        """
-        entry = {"file": file, "columns": dict(self.channels.columns), "scale": self.scale}
-        return {"name": self.name, "files": [entry]}
+    def keys(self, path_in_study: Callable[[Path], str]) -> dict[str, Any]:
+        """Return the keys of a study for this sensor."""
+        return {"name": self.name, "files": [{**entry, "file": path_in_study(entry["file"])} for entry in self.entries]}
 
 
-def sensor_file(path: Path) -> SensorFile:
-    """Read the channels of a file of QE curves.
+def sensor_file(paths: Path | Sequence[Path], quantity: Quantity | None = None) -> SensorFile:
+    """Read the channels of one or more files or folders of QE curves.
 
-    Parameters
-    ----------
-    path : Path
-        File of curves.
-
-    Returns
-    -------
-    SensorFile
-        Channels, scale and range.
-
-    Raises
-    ------
-    DataError
-        If the file has no QE curve, or too short a range.
+    Raises DataError if the files have no QE curve, too short a range, or fewer than three channels beside columns that
+    were not understood.
     """
-    curves = clean_curves(path)
+    places = [paths] if isinstance(paths, Path) else list(paths)
+    curves: dict[str, Curve] = {}
+    owner: dict[str, tuple[Path, str, Curves]] = {}
+    notes: list[str] = []
+    for path in places:
+        read = clean_curves(path)
+        known = [name for name in read.values if not _no_channel(name)]
+        made = used_as(read, known, "sensor", quantity)
+        notes += [f"{path.name}: {note}" for note in made.notes[len(read.notes) :]]
+        for name in known:
+            own = name if len(places) == 1 else f"{path.stem} {name}" if len(known) > 1 else path.stem
+            own = own if own not in curves else f"{path.stem} {name}"
+            curves[own] = Curve(own, *made.samples(name))
+            owner[own] = (path, name, made)
+        left = {name: _no_channel(name) for name in read.values if name not in known}
+        curves |= {name: Curve(name, np.empty(0), np.empty(0)) for name in left}
     channels = channels_of(curves)
+    shown = places[0]
+    unknown = [name for name, reason in channels.left_out.items() if reason == _UNKNOWN]
     if not channels.columns:
         raise DataError(
-            ValidationIssue("no curve that could be QE", str(path), allowed="values above 0 between 400 and 700 nm")
+            ValidationIssue("no curve that could be QE", str(shown), allowed="values above 0 between 400 and 700 nm")
         )
-    wavelength_nm = next(iter(curves.values())).wavelength_nm
-    if wavelength_nm[0] > _NEEDED_NM[0] or wavelength_nm[-1] < _NEEDED_NM[1]:
+    if len(channels.columns) < _FEWEST and (unknown or len(channels.columns) == 1):
+        problem = f"only {' and '.join(channels.columns)} {'was' if len(channels.columns) == 1 else 'were'} understood"
+        allowed = (
+            "columns named by channels (R, G, B, W, C, Y, Cy, M) or colors, three or more; `sensor.files` of a study"
+        )
+        raise DataError(ValidationIssue(problem, str(shown), None, None, ", ".join(unknown) or None, allowed))
+    samples = [curves[column].wavelength_nm for column in channels.columns.values()]
+    low, high = max(float(wave[0]) for wave in samples), min(float(wave[-1]) for wave in samples)
+    if low > _NEEDED_NM[0] or high < _NEEDED_NM[1]:
         allowed = f"{_NEEDED_NM[0]:g} to {_NEEDED_NM[1]:g} nm or more"
         raise DataError(
-            ValidationIssue(
-                "QE of too few wavelengths",
-                str(path),
-                None,
-                None,
-                f"{wavelength_nm[0]:g} to {wavelength_nm[-1]:g} nm",
-                allowed,
-            )
+            ValidationIssue("QE of too few wavelengths", str(shown), None, None, f"{low:g} to {high:g} nm", allowed)
         )
     return SensorFile(
-        name=path.stem[:MOST_LETTERS],
+        name=shown.stem[:MOST_LETTERS],
         channels=channels,
         totals={channel: float(curves[column].values.sum()) for channel, column in channels.columns.items()},
-        scale=qe_scale(max(curves[column].peak for column in channels.columns.values())),
-        range_nm=(max(400, math.ceil(wavelength_nm[0])), min(700, math.floor(wavelength_nm[-1]))),
+        range_nm=(max(400, math.ceil(low)), min(700, math.floor(high))),
+        entries=tuple(_entries(channels, owner)),
+        notes=tuple(dict.fromkeys(notes)),
     )
+
+
+def _entries(channels: Channels, owner: Mapping[str, tuple[Path, str, Curves]]) -> Iterator[dict[str, Any]]:
+    """Yield the keys of each file, and of each quantity in it."""
+    groups: dict[tuple[Path, str, float], dict[str, str]] = {}
+    for channel, own in channels.columns.items():
+        path, column, made = owner[own]
+        unit = made.units[column]
+        assert unit.quantity is not None
+        groups.setdefault((path, unit.quantity, unit.factor or 1.0), {})[channel] = column
+    for (path, quantity, factor), columns in groups.items():
+        yield {"file": path, "columns": columns, "quantity": quantity} | ({} if factor == 1 else {"scale": factor})

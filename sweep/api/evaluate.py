@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..base.disk import is_file, is_folder
+from ..base.disk import is_folder
 from ..base.errors import DataError, ValidationIssue, nearest
 from ..base.types import FloatArray
 from ..camera.mosaic import Mosaic
 from ..camera.sensor import SensorCurves
 from ..spectra import LightUnit
-from ..spectra.facts import qe_scale
-from ..spectra.files import read_curves
+from ..spectra.formats import files_in, read_curves
 from ..spectra.lights import Lights
 from ..spectra.spectrum import Curves
-from .channels import NEW, Layout, layout_of, sensor_file
+from ..spectra.units import FITTING, Quantity, Use, used_as
+from .channels import NEW, RATIO, Layout, layout_of, sensor_file
 from .filter_evaluation import (
     PLAIN_TILE,
     USER_CURVE,
@@ -29,7 +30,7 @@ from .filter_evaluation import (
 )
 from .loading import CurveSource, lights, make_study, sensor_source
 
-_PERCENT = 0.01
+_OF_A_RUN = ("run.json", "provenance.json")
 
 
 @dataclass(frozen=True)
@@ -48,10 +49,12 @@ class EvaluateOptions:
         A built-in sensor, or a file of QE curves.
     lights : str, optional
         A built-in data set, or a file of spectra.
-    quantity : {'energy', 'photons'}
-        Unit of the spectra in a file.
+    quantity : str or sequence of str, optional
+        Units where the heads of files do not tell them: of the filter ``qe``, ``responsivity``,
+        ``relative_responsivity``, ``transmission``, ``density`` or ``decibel``; of lights ``energy`` or ``photons``.
     relative_to : str, optional
-        The file holds transmissions, to be multiplied by this curve.
+        The file holds transmissions, to be multiplied by this curve; left out, transmissions are those of a filter on
+        the curve that it replaces.
     transmission : bool
         The file holds transmissions of the clear pixel.
     data : path-like, optional
@@ -66,11 +69,21 @@ class EvaluateOptions:
     base: str | None = None
     sensor: str = "ar0820"
     lights: str | None = None
-    quantity: LightUnit = "energy"
+    quantity: Quantity | Sequence[Quantity] | None = None
     relative_to: str | None = None
     transmission: bool = False
     data: Path | str | None = None
     allow_code: bool = False
+
+    def stated(self, *uses: Use) -> Quantity | None:
+        """Return the unit that is stated for a use."""
+        stated = [self.quantity] if isinstance(self.quantity, str) else list(self.quantity or ())
+        return next((one for one in stated if any(one in FITTING[use] for use in uses)), None)
+
+    @property
+    def of_lights(self) -> LightUnit | None:
+        """Unit that is stated for lights."""
+        return "photons" if (stated := self.stated("light")) == "photons" else stated and "energy"
 
 
 def evaluate(source: Path | str, *, design: str | None = None, **options: Any) -> FilterEvaluation:
@@ -104,7 +117,7 @@ def evaluate(source: Path | str, *, design: str | None = None, **options: Any) -
     0.876
     """
     path = Path(source)
-    if is_folder(path):
+    if is_folder(path) and not _holds_curves(path):
         return evaluate_filter(filter_of_run(path, design, EvaluateOptions(**options)))
     for key, value in (("design", design), ("data", options.get("data")), ("allow-code", options.get("allow_code"))):
         if value:
@@ -112,6 +125,14 @@ def evaluate(source: Path | str, *, design: str | None = None, **options: Any) -
                 ValidationIssue(f"`{key}` goes with a run's folder", str(path), None, f"--{key}", str(value))
             )
     return evaluate_filter(filter_of_file(path, EvaluateOptions(**options)))
+
+
+def _holds_curves(folder: Path) -> bool:
+    """Return whether a folder holds files of curves, and no run."""
+    try:
+        return not any(os.path.lexists(folder / name) for name in _OF_A_RUN) and bool(files_in(folder))
+    except DataError:
+        return False
 
 
 def filter_of_file(path: Path, options: EvaluateOptions) -> FilterUnderTest:
@@ -136,7 +157,7 @@ def filter_of_file(path: Path, options: EvaluateOptions) -> FilterUnderTest:
     """
     sensor = sensor_source(options.sensor, {})
     keys: dict[str, Any] = {}
-    if is_file(Path(options.sensor)):
+    if os.path.lexists(options.sensor):
         start_nm, stop_nm = sensor_file(Path(options.sensor)).range_nm
         keys["wavelengths"] = {"start_nm": start_nm, "stop_nm": stop_nm}
     qe = _curves_of(sensor, keys)
@@ -153,22 +174,33 @@ def filter_of_file(path: Path, options: EvaluateOptions) -> FilterUnderTest:
     default = layout.base if (name, channel) == (layout.changed, NEW) else None
     base = options.base or default or diagonal_curve(mosaic, channel, qe.qe)
     qe.curve(base)
-    factor = options.relative_to or (qe.clear if options.transmission else None)
     curves = read_curves(path)
     column = _find_column(path, curves, options.column, channel)
-    top = float(curves.values[column].max())
-    scale = qe_scale(top)
-    if scale not in (1, _PERCENT):
-        raise DataError(ValidationIssue("values above 1", str(path), None, column, top, "0 to 1, or percent up to 100"))
-    entry: dict[str, Any] = {"file": str(path.absolute()), "columns": {USER_CURVE + channel: column}, "scale": scale}
+    use, stated = _use_of(curves, column, options)
+    factor = options.relative_to or (qe.clear if options.transmission else base if use == "filter" else None)
+    made = used_as(curves, [column], use, stated)
+    unit = made.units[column]
+    assert unit.quantity is not None
+    entry: dict[str, Any] = {"file": str(path.absolute()), "columns": {USER_CURVE + channel: column}}
+    entry |= {"quantity": unit.quantity, "scale": unit.factor or 1.0}
     entry |= {} if factor is None else {"relative_to": factor}
-    read_as = "QE" if factor is None else f"a transmission, times {factor}"
-    percent = "; values in percent" if scale == _PERCENT else ""
-    note = f"{path}: {column} read as {read_as}{percent}; it is {channel} of {name}, in place of {base}"
+    times = "" if factor is None else f", times {factor}"
+    note = f"{path}: {made.notes[-1]}{times}; it is {channel} of {name}, in place of {base}"
     with_filter = CurveSource({**sensor.keys, "files": [*sensor.keys["files"], entry]}, sensor.curves)
-    spectra, types = _lights_and_types(options.lights or "tl16", options.quantity)
+    spectra, types = _lights_and_types(options.lights or "tl16", options.of_lights)
     curve_names = _curve_names(qe, with_base(mosaic, {channel: base}).name, mosaic)
     return FilterUnderTest(mosaic, {channel: base}, with_filter, spectra, types, curve_names, keys, (note,))
+
+
+def _use_of(curves: Curves, column: str, options: EvaluateOptions) -> tuple[Use, Quantity | None]:
+    """Return whether a column is QE or transmissions, and its quantity where it is stated or known."""
+    stated = options.stated("sensor", "filter")
+    told = stated or curves.units[column].quantity
+    if told is not None and not (options.relative_to or options.transmission):
+        return ("sensor" if told in FITTING["sensor"] else "filter"), stated
+    if told is None and any(name.startswith(f"{column}{RATIO}") for name in curves.values):
+        return "sensor", "qe"  # of `sweep export`, whose transmissions stand beside it
+    return "filter", stated
 
 
 def filter_of_run(folder: Path, design: str | None, options: EvaluateOptions) -> FilterUnderTest:
@@ -214,7 +246,7 @@ def filter_of_run(folder: Path, design: str | None, options: EvaluateOptions) ->
     if options.lights is None:
         spectra, types = _lights_of_run(study.lights, nodes_nm), study.lights.classes
     else:
-        spectra, types = _lights_and_types(options.lights, options.quantity)
+        spectra, types = _lights_and_types(options.lights, options.of_lights)
         if "files" in spectra.keys:  # as bright as the run's lights
             spectra = CurveSource({**spectra.keys, "photon_ratio": study.lights.photon_ratio}, spectra.curves)
     scene = {str(row["scenario"]): study.section.scenarios[str(row["scenario"])]}
@@ -230,11 +262,11 @@ def _curves_of(source: CurveSource, keys: Mapping[str, Any]) -> SensorCurves:
     return make_study(sensor=source, cfas={"any": {"tile": [[channel]]}}, **keys).study.sensor
 
 
-def _lights_and_types(source: str, quantity: LightUnit) -> tuple[CurveSource, tuple[str, ...]]:
+def _lights_and_types(source: str, quantity: LightUnit | None) -> tuple[CurveSource, tuple[str, ...]]:
     """Return lights of a built-in data set or a file, and their signal types in order."""
     spectra = lights(source, quantity=quantity)
     if "files" in spectra.keys:
-        return spectra, tuple(spectra.keys["files"][0]["signals"])
+        return spectra, tuple(dict.fromkeys(kind for entry in spectra.keys["files"] for kind in entry["signals"]))
     return spectra, make_study(lights=spectra, cfas=[PLAIN_TILE]).study.lights.classes
 
 

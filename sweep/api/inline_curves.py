@@ -10,8 +10,9 @@ import numpy as np
 
 from ..base.errors import DataError, ValidationIssue
 from ..base.types import FloatArray
-from ..spectra import files
+from ..spectra import formats
 from ..spectra.spectrum import Curves, WavelengthGrid, check_samples, resample
+from ..spectra.units import Use, used_as
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,12 +28,14 @@ def read_curves(file: Path | str) -> pd.DataFrame:
     Parameters
     ----------
     file : path-like
-        A table (CSV and similar text, or ISETCam ``.mat``) with wavelengths and one or more curves.
+        A file with one or more curves (text of any table or instrument, spreadsheet, ISETCam ``.mat``, rawtoaces
+        ``.json``, IES ``.spdx``), or a folder of such files.
 
     Returns
     -------
     pandas.DataFrame
-        One column per curve; the index is the wavelength, nm. Values are those of the file, without scaling.
+        One column per curve; the index is the wavelength, nm. Values are those of the file, without scaling, and NaN
+        beyond the samples of a curve; ``attrs["units"]`` has what the heads say, ``attrs["notes"]`` how it was read.
 
     Raises
     ------
@@ -46,8 +49,11 @@ def read_curves(file: Path | str) -> pd.DataFrame:
     >>> curves["N"].max()  # doctest: +SKIP
     0.61
     """
-    curves = files.read_curves(Path(file))
-    return wavelength_table(curves.wavelength_nm, curves.values)
+    curves = formats.read_curves(Path(file))
+    table = wavelength_table(curves.wavelength_nm, curves.values)
+    table.attrs["units"] = {name: unit.words for name, unit in curves.units.items()}
+    table.attrs["notes"] = list(curves.notes)
+    return table
 
 
 def wavelength_table(wavelength_nm: FloatArray, columns: Mapping[Any, FloatArray]) -> pd.DataFrame:
@@ -133,7 +139,7 @@ def table_to_curves(table: pd.DataFrame) -> Curves:
     return Curves(nodes_nm, {name: curves.values[name] for name, curves in columns.items()}, "table")
 
 
-def on_grid(name: str, curve: CurveLike, grid: WavelengthGrid) -> FloatArray:
+def on_grid(name: str, curve: CurveLike, grid: WavelengthGrid, use: Use = "sensor") -> FloatArray:
     """Bring one or more curves to a study's wavelength grid.
 
     Parameters
@@ -145,6 +151,8 @@ def on_grid(name: str, curve: CurveLike, grid: WavelengthGrid) -> FloatArray:
         linearly.
     grid : WavelengthGrid
         Wavelengths of the study.
+    use : {'sensor', 'filter'}
+        Whether a file's numbers become QE or transmissions.
 
     Returns
     -------
@@ -167,8 +175,10 @@ def on_grid(name: str, curve: CurveLike, grid: WavelengthGrid) -> FloatArray:
             _checked(name, grid.nodes_nm, row)
         return rows
     curves = to_curves(name, curve)
+    if curves.units:
+        curves = used_as(curves, [name], use)
     try:
-        return resample(curves.wavelength_nm, curves.values[name], grid)[None]
+        return resample(*curves.samples(name), grid)[None]
     except DataError as error:
         raise _named(error, name) from None
 
@@ -186,10 +196,10 @@ def _named(error: DataError, name: str) -> DataError:
 
 
 def _curve_in_file(name: str, path: Path) -> Curves:
-    curves = files.read_curves(path)
+    curves = formats.read_curves(path)
     if len(curves.values) != 1:
         shown = ", ".join(list(curves.values)[:10])
         allowed = f'one of them: sweep.read_curves("{path}")["NAME"]'
         raise DataError(ValidationIssue("a file of several curves", str(path), None, name, shown, allowed))
-    (values,) = curves.values.values()
-    return Curves(curves.wavelength_nm, {name: values}, str(path))
+    (column,) = curves.values
+    return Curves(curves.wavelength_nm, {name: curves.values[column]}, str(path), units={name: curves.units[column]})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,7 +12,6 @@ import numpy as np
 from pydantic import BaseModel
 
 from .. import study as studies_of_files
-from ..base.disk import is_file
 from ..base.errors import DataError, ValidationIssue
 from ..spectra import LightUnit
 from ..spectra.light_files import lights_file
@@ -237,8 +237,8 @@ def sensor_source(
         If a curve cannot be used.
     """
     keys: dict[str, Any] = {"files": []}
-    if source is not None and is_file(Path(source)):
-        keys = sensor_file(Path(source)).keys(str(Path(source).absolute()))
+    if source is not None and os.path.lexists(source):
+        keys = sensor_file(Path(source)).keys(lambda path: str(path.absolute()))
     elif source is not None:
         keys["builtin"] = str(source)
     curves = {f"curve {channel}": to_curves(channel, curve) for channel, curve in channels.items()}
@@ -251,7 +251,10 @@ def sensor_source(
 
 
 def lights(
-    source: Path | str | pd.DataFrame, *, quantity: LightUnit = "energy", types: Mapping[str, list[str]] | None = None
+    source: Path | str | pd.DataFrame,
+    *,
+    quantity: LightUnit | None = None,
+    types: Mapping[str, list[str]] | None = None,
 ) -> CurveSource:
     """Describe traffic lights for `make_study`.
 
@@ -259,8 +262,8 @@ def lights(
     ----------
     source : path-like or pandas.DataFrame
         A built-in data set, a file of spectra, or a table with one column per light and nm as its index.
-    quantity : {'energy', 'photons'}
-        Unit of the values: energy or photons per nm, relative.
+    quantity : {'energy', 'photons'}, optional
+        Unit of the values: energy or photons per nm, relative. Left out, what the heads of a file say, else energy.
     types : mapping of str to list of str, optional
         Columns of each signal type. Left out, columns of a file are assigned by their chromaticity.
 
@@ -290,17 +293,18 @@ def lights(
             raise DataError(
                 ValidationIssue("signal types of a table are missing", key="types", allowed="{type: [column, ...]}")
             )
-        entry = {"file": "lights given", "quantity": quantity, "signals": signals}
+        entry = {"file": "lights given", "quantity": quantity or "energy", "signals": signals}
         return CurveSource({"files": [entry]}, {"lights given": table_to_curves(source)})
     if not isinstance(source, Path | str):
         allowed = "built-in lights, a file, or a table with nm as its index"
         raise DataError(ValidationIssue("no lights", value=type(source).__name__, allowed=allowed))
     path = Path(source)
-    if not is_file(path):
+    if not os.path.lexists(path):
         return CurveSource({"builtin": str(source)})
     if signals is None:
-        return CurveSource(lights_file(path, quantity).keys(str(path.absolute())))
-    return CurveSource({"files": [{"file": str(path.absolute()), "quantity": quantity, "signals": signals}]})
+        return CurveSource(lights_file(path, quantity).keys(lambda place: str(place.absolute())))
+    stated = {} if quantity is None else {"quantity": quantity}
+    return CurveSource({"files": [{"file": str(path.absolute()), **stated, "signals": signals}]})
 
 
 def _is_table(source: object) -> TypeGuard[pd.DataFrame]:

@@ -15,6 +15,7 @@ from ..designs.space import Space
 from ..metrics.bound import total_violation
 from ..metrics.quantity import Column, Quantity
 from ..search.limit import Limit
+from ..spectra.units import Use
 from ..study import Study, folder_name
 from .inline_curves import CurveLike, on_grid, wavelength_table
 from .user_filters import (
@@ -157,7 +158,8 @@ class LoadedStudy:
         if not channels:
             return self._plain_and_named(cfa, scenarios)
         factor = 1.0 if relative_to is None else study.sensor.curve(relative_to)
-        rows = {name: on_grid(name, curve, study.grid) * factor for name, curve in channels.items()}
+        use: Use = "sensor" if relative_to is None else "filter"
+        rows = {name: on_grid(name, curve, study.grid, use) * factor for name, curve in channels.items()}
         counts = {name: len(curves) for name, curves in rows.items()}
         if len(set(counts.values())) > 1:
             raise SweepError(ValidationIssue("different numbers of filters", value=counts))

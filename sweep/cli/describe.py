@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-import shlex
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from io import BytesIO
 from itertools import chain
 from pathlib import Path
@@ -15,16 +14,23 @@ from typing import Any
 import numpy as np
 
 from ..base.disk import read_input
-from ..base.errors import DataError, OutputError, ValidationIssue
-from ..results.atomic import write_bytes, write_text
-from ..spectra import LightUnit
-from ..spectra.facts import Curve, Facts, facts_of, merge_equal_issues, notes, repair_curves
-from ..spectra.files import scan_curves
+from ..base.errors import OutputError, ValidationIssue
+from ..results.atomic import write_bytes
+from ..spectra.facts import Curve, Facts, facts_of, merge_equal_issues, notes
+from ..spectra.formats import read_curves, scan_curves
 from ..spectra.signal_color import LightColor
+from ..spectra.units import FITTING, Quantity, Use, used_as
 from .describe_picture import draw
 
 _MOST_NAMES = 12
 _MOST_PICTURE = 100_000_000
+_KINDS: dict[str, tuple[Use, ...]] = {
+    "qe": ("sensor",),
+    "filters": ("filter",),
+    "surfaces": ("surface",),
+    "lights": ("light",),
+}
+_NAMES = {"qe": "QE of a sensor", "filters": "filters", "surfaces": "surfaces", "lights": "light spectra"}
 _SOFTWARE = "sweep describe"
 """Software that a picture names in its first bytes: by this it is known to be a description's."""
 
@@ -38,8 +44,8 @@ class Description:
     facts: Mapping[str, Any]
 
 
-def described(path: Path, folder: Path, quantity: LightUnit | None = None) -> Description:
-    """Describe a CSV or `.mat` file of curves and plot it as `<folder>/<stem>.png`.
+def described(path: Path, folder: Path, quantity: Quantity | None = None) -> Description:
+    """Describe a file or folder of curves and plot it as `<folder>/<stem>.png`.
 
     Parameters
     ----------
@@ -47,8 +53,8 @@ def described(path: Path, folder: Path, quantity: LightUnit | None = None) -> De
         The file.
     folder : Path
         Folder of the picture.
-    quantity : LightUnit, optional
-        Lights in energy or photons; by default lights (in energy) or QE are guessed.
+    quantity : str, optional
+        Unit of the numbers; left out, what the heads say, else lights (in energy) or QE are guessed.
 
     Returns
     -------
@@ -70,26 +76,33 @@ def described(path: Path, folder: Path, quantity: LightUnit | None = None) -> De
     if not any(curve.values.size for curve in facts.curves):
         return Description((*lines, "Nothing in it can be drawn."), issues, {"curves": []})
     lines += [f"Read: {note}." for note in scan.notes]
-    as_qe = facts.is_likely_qe and quantity is None
-    colors = {} if as_qe else facts.colors(quantity or "energy")
-    lines += [_range(facts), _guess(facts, quantity)]
+    kind = _kind(facts, quantity)
+    colors: dict[str, LightColor | None] = {}
+    for unit in ("energy", "photons") if kind == "lights" else ():
+        of_unit = facts.colors(unit)
+        colors |= {
+            curve.name: of_unit[curve.name]
+            for curve in facts.curves
+            if unit == (quantity or curve.unit.quantity or "energy")
+        }
+    lines += [_range(facts), _guess(facts, quantity, kind)]
     width = min(max(map(len, names)), 40)
     lines += [f"  {curve.name:<{width}}  {_curve(curve, colors)}" for curve in facts.curves]
     if quantity == "photons":
         energy = facts.colors("energy").items()
         words = [f"{name} {color.xy[0]:.4f} {color.xy[1]:.4f}" for name, color in energy if color is not None]
         lines += [f"  the same numbers as energy would be at xy: {'; '.join(words)}"] if words else []
-    lines += [f"Note: {note}." for note in notes(facts, as_qe=as_qe)]
+    read = None if issues else _used(path, kind, quantity)
+    lines += [f"Read: {note}." for note in (read or ())]
+    lines += [f"Note: {note}." for note in notes(facts, as_qe=kind == "qe")]
     if not issues:
         lines.append("Its samples are clean: a study can read it.")
-    elif repair_curves(scan).issues == ():
-        lines.append(f"`sweep describe {shlex.quote(str(path))} --clean NEW.csv` writes a file that a study can read.")
     picture = folder / f"{path.stem}.png"
     if os.path.lexists(picture) and _SOFTWARE.encode() not in read_input(picture, _MOST_PICTURE, OutputError)[:200]:
         raise OutputError(ValidationIssue("holds something else already", str(picture), allowed="another --output"))
     write_bytes(_png(path.name, facts, colors), picture)
     values = {
-        "kind": "qe" if as_qe else "lights",
+        "kind": kind,
         "picture": str(picture),
         "curves": [_curve_facts(curve, colors.get(curve.name)) for curve in facts.curves],
     }
@@ -111,39 +124,6 @@ def _curve_facts(curve: Curve, color: LightColor | None) -> dict[str, Any]:
     return {"name": curve.name, **peak, **hue}
 
 
-def clean_file(path: Path, to: Path) -> list[str]:
-    """Write the curves of a file as clean CSV.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    to : Path
-        The file to write.
-
-    Returns
-    -------
-    list of str
-        What was changed.
-
-    Raises
-    ------
-    DataError
-        If the file has a problem that no rule solves.
-    OutputError
-        If `to` exists or cannot be written.
-    """
-    scan = scan_curves(path)
-    clean = repair_curves(scan)
-    if clean.issues:
-        raise DataError(merge_equal_issues([replace(issue, file=str(path)) for issue in clean.issues]))
-    if os.path.lexists(to):
-        raise OutputError(ValidationIssue("is there already, and stays as it is", str(to), allowed="another --clean"))
-    write_text(clean.text(path.name, scan.notes), to)
-    changes = clean.changes or ("nothing",)
-    return [*(f"Read: {n}." for n in scan.notes), *(f"Changed: {change}." for change in changes), f"Clean: {to}"]
-
-
 def _shown(names: Sequence[str]) -> str:
     if len(names) <= _MOST_NAMES:
         return ", ".join(names)
@@ -158,28 +138,46 @@ def _range(facts: Facts) -> str:
     step = f"step {steps.min():g} nm"
     if steps.max() > steps.min():
         step = f"steps of {steps.min():g} to {steps.max():g} nm"
-    read_as = f" ({facts.read_as})" if facts.read_as else ""
-    return f"Wavelengths: {wave[0]:g} to {wave[-1]:g} nm{read_as}, {step}, {wave.size:,} samples."
+    return f"Wavelengths: {wave[0]:g} to {wave[-1]:g} nm, {step}, {wave.size:,} samples."
 
 
-def _guess(facts: Facts, quantity: LightUnit | None) -> str:
+def _kind(facts: Facts, quantity: Quantity | None) -> str:
+    """Return what curves are: as stated, as heads say, or as their shapes look."""
+    told = {quantity} if quantity else {curve.unit.quantity for curve in facts.curves} - {None}
+    for kind, uses in _KINDS.items():
+        if told and all(any(one in FITTING[use] for use in uses) for one in told):
+            return kind
+    return "qe" if facts.is_likely_qe else "lights"
+
+
+def _used(path: Path, kind: str, quantity: Quantity | None) -> tuple[str, ...]:
+    """Return how the numbers are taken. Raises DataError for units that are unclear."""
+    curves = read_curves(path)
+    use = _KINDS[kind][0]
+    return used_as(curves, list(curves.values), use, quantity).notes[len(curves.notes) :]
+
+
+def _guess(facts: Facts, quantity: Quantity | None, kind: str) -> str:
     if quantity is not None:
-        return f"Read as light spectra in {quantity}, as --quantity says."
+        return f"Read as {_NAMES[kind]}, as --quantity {quantity} says."
+    if any(curve.unit.quantity for curve in facts.curves):
+        return f"By the heads of its columns: {_NAMES[kind]}."
     broad, top = np.median([c.width_nm for c in facts.curves]), max(c.peak for c in facts.curves)
     reason = (
         f"a typical curve is {broad:.0f} nm wide (integral over peak, 400 to 700 nm), the largest value is {top:.6g}"
     )
-    if facts.is_likely_qe:
+    if kind == "qe":
         return f"A guess: QE of a sensor, for {reason}. `--quantity energy` reads it as lights."
     return f"A guess: light spectra, for {reason}. Read as energy; `--quantity photons` reads photons."
 
 
 def _curve(curve: Curve, colors: Mapping[str, LightColor | None]) -> str:
-    """Largest value of a curve, and its color where it is a light."""
+    """Largest value of a curve and where it is, its mean, and its color where it is a light."""
     if not curve.values.size:
         return "no sample can be used"
-    text = f"largest {curve.values.max():<9.6g} at {curve.peak_nm:g} nm"
-    return f"{text}  {_color_words(colors[curve.name])}" if colors else text
+    unit = f" {curve.unit.words}" if curve.unit.words else ""
+    text = f"largest {curve.values.max():<9.6g} at {curve.peak_nm:g} nm, mean {curve.mean:.4g}{unit}"
+    return f"{text}  {_color_words(colors.get(curve.name))}" if colors else text
 
 
 def _color_words(color: LightColor | None) -> str:

@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from ..base.disk import read_input
 from ..base.errors import DataError, ValidationIssue
 from ..camera.pixel import Pixel
-from ..spectra.text_tables import MOST_BYTES
+from ..spectra.read_text import MOST_BYTES
 
 _RESULTS = {
     "u_e_sat": ("well_e", ("e-", "e"), 1.0),

@@ -6,19 +6,19 @@ import json
 import os
 import re
 import shlex
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 from ..api.channels import sensor_file
 from ..base.disk import read_input
 from ..base.errors import DataError, OutputError, StudyError, SweepError, ValidationIssue
-from ..base.user_code import is_code
-from ..results.atomic import atomic, write_bytes, write_text
+from ..results.atomic import atomic, write_text
 from ..spectra import LightUnit
 from ..spectra.light_files import lights_file
-from ..spectra.text_tables import MOST_BYTES
+from ..spectra.read_text import MOST_BYTES
+from ..spectra.units import FITTING, Quantity
 from ..study import Study, folder_name, load_study
 from ..study.editors import SCHEMA_FILE, TITLE, schema_text
 from ..study.schema import StudySection
@@ -30,7 +30,12 @@ _MOST_STUDY = 500_000
 
 
 def new_study(
-    name: str, folder: Path, qe: Path | None, lights: Path | None, quantity: LightUnit, pixel: Path | None = None
+    name: str,
+    folder: Path,
+    qe: Sequence[Path],
+    lights: Sequence[Path],
+    quantities: Sequence[Quantity] = (),
+    pixel: Path | None = None,
 ) -> list[str]:
     """Write `folder`/<name>.yaml, and the schema that editors complete it with where the folder has none.
 
@@ -38,10 +43,10 @@ def new_study(
     ----------
     name, folder : str, Path
         Name of the study, and its folder, which is made where it is not there.
-    qe, lights : Path or None
-        Files of curves, which stay where they are; None takes built-in curves.
-    quantity : {'energy', 'photons'}
-        Quantity of the lights.
+    qe, lights : sequence of Path
+        Files or folders of curves, which stay where they are; none takes built-in curves.
+    quantities : sequence of str
+        Stated units of the curves and of the lights.
     pixel : Path or None
         EMVA 1288 results, whose figures go into the study.
 
@@ -61,12 +66,14 @@ def new_study(
     """
     path = _new_path(name, folder)
     sources = Sources()
-    if qe is not None:
-        sources = replace(sources, sensor=sensor_file(qe), sensor_path=_path_in_study(qe, folder))
-    if lights is not None:
+    sources = replace(sources, path_in_study=lambda file: _path_in_study(file, folder))
+    if qe:
+        stated = next((one for one in FITTING["sensor"] if one in quantities), None)
+        sources = replace(sources, sensor=sensor_file(qe, stated))
+    if lights:
         start_nm, stop_nm = (400, 700) if sources.sensor is None else sources.sensor.range_nm
-        taken = lights_file(lights, quantity, start_nm, stop_nm)
-        sources = replace(sources, lights=taken, lights_path=_path_in_study(lights, folder))
+        unit: LightUnit | None = "photons" if "photons" in quantities else "energy" if "energy" in quantities else None
+        sources = replace(sources, lights=lights_file(lights, unit, start_nm, stop_nm))
     if pixel is not None:
         figures, missing = pixel_figures(pixel)
         sources = replace(sources, pixel=figures, pixel_file=pixel, not_in_pixel=missing)
@@ -167,11 +174,15 @@ def _source_lines(sources: Sources) -> list[str]:
     if sources.sensor is not None:
         channels = sources.sensor.channels
         taken = ", ".join(f"{channel} from {one_line(column)}" for channel, column in channels.columns.items())
-        lines.append(f"Channels{' (guessed by shape, check them)' if channels.guessed else ''}: {taken}.")
+        lines.append(f"Channels: {taken}.")
+        if channels.guessed:
+            lines.append(f"Guessed by shape, check them: {', '.join(map(one_line, sorted(channels.guessed)))}.")
+        lines += [f"Read: {note}." for note in sources.sensor.notes]
         left_out |= channels.left_out
     if sources.lights is not None:
         types = [f"{kind}: {', '.join(map(one_line, names))}" for kind, names in sources.lights.types.items()]
         lines.append(f"Lights: {'; '.join(types)}.")
+        lines += [f"Read: {note}." for note in sources.lights.notes]
         left_out |= sources.lights.left_out
     if left_out:
         lines.append(f"Left out, see the file: {', '.join(map(one_line, left_out))}.")
@@ -179,67 +190,6 @@ def _source_lines(sources: Sources) -> list[str]:
         missing = ", ".join(sources.not_in_pixel)
         lines.append(f"Pixel: {', '.join(sources.pixel)} from {sources.pixel_file}; not in it: {missing}.")
     return lines
-
-
-def curve_files_of(source: Path) -> list[str]:
-    """Return the curve files that a study names by relative paths.
-
-    Parameters
-    ----------
-    source : Path
-        The study file.
-
-    Returns
-    -------
-    list of str
-        The files; absolute paths are left out, as they stay valid.
-
-    Raises
-    ------
-    StudyError
-        If the study cannot be loaded or a path leads out of its folder.
-    """
-    names = [name for name in load_study(source).digests if not is_code(name) and not Path(name).is_absolute()]
-    for name in names:
-        if ".." in Path(name).parts:
-            raise StudyError(
-                ValidationIssue("lies outside the folder of the study", str(source), value=name, allowed="a whole path")
-            )
-    return names
-
-
-@contextmanager
-def copied(pairs: Iterable[tuple[Path, Path]]) -> Iterator[None]:
-    """Copy files, and remove the copies if the block fails.
-
-    Parameters
-    ----------
-    pairs : iterable of tuple of Path
-        Source and destination.
-
-    Yields
-    ------
-    None
-
-    Raises
-    ------
-    OutputError
-        If a different file exists at a destination.
-    """
-    copies: list[Path] = []
-    try:
-        for file, to in pairs:
-            content = read_input(file, MOST_BYTES, DataError)
-            if not os.path.lexists(to):
-                write_bytes(content, to)
-                copies.append(to)
-            elif read_input(to, MOST_BYTES, OutputError) != content:
-                raise OutputError(ValidationIssue("holds something else already", str(to), allowed="another --folder"))
-        yield
-    except SweepError:
-        for path in copies:
-            path.unlink(missing_ok=True)
-        raise
 
 
 def write_schema(path: Path) -> None:

@@ -6,11 +6,12 @@ import os
 from enum import StrEnum
 from glob import escape
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from ..base.errors import StudyError, ValidationIssue
+from ..base.errors import StudyError, ValidationIssue, nearest
+from ..spectra.units import FITTING
 
 OF_STUDIES = "Studies"
 OF_RESULTS = "Results"
@@ -26,6 +27,16 @@ class ExportFormat(StrEnum):
     SPEOS = "speos"
     RGB = "rgb"
     SPECIFICATION = "specification"
+
+
+def quantity_of(word: str | None) -> Any:
+    """Return a unit that is stated on the command line. Raises StudyError for an unknown one."""
+    known = [quantity for of_use in FITTING.values() for quantity in of_use]
+    if word is not None and word not in known:
+        raise StudyError(
+            ValidationIssue("unknown quantity", None, None, "--quantity", word, ", ".join(known), nearest(word, known))
+        )
+    return word
 
 
 def study_files(incomplete: str) -> list[str]:

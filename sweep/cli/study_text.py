@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
@@ -23,14 +23,13 @@ _TYPICAL_NM = {"green": 505, "yellow": 590, "orange": 605, "red": 635}
 class Sources:
     """Files that a study takes its curves and its pixel from; None for built-in curves, or for the defaults.
 
-    `sensor_path`, `lights_path`: paths as the study says them; `pixel_file`: the EMVA 1288 results, of which
-    `pixel` has the keys of `pixel:` and `not_in_pixel` the keys that are missing.
+    `path_in_study`: path of a file as the study says it; `pixel_file`: the EMVA 1288 results, of which `pixel` has the
+    keys of `pixel:` and `not_in_pixel` those that are missing.
     """
 
     sensor: SensorFile | None = None
-    sensor_path: str = ""
     lights: LightsFile | None = None
-    lights_path: str = ""
+    path_in_study: Callable[[Path], str] = str
     pixel: Mapping[str, float] | None = None
     pixel_file: Path | None = None
     not_in_pixel: Sequence[str] = ()
@@ -74,8 +73,8 @@ question: >-
   {pair[1]} lights separate best while the pixel keeps 90 % of its sensitivity?
 seed: 1
 
-{_sensor(sensor, sources.sensor_path, layout.clear)}
-{_lights(lights, sources.lights_path, photon_ratio)}{_pixel(sources)}
+{_sensor(sources, layout.clear)}
+{_lights(sources, photon_ratio)}{_pixel(sources)}
 scenarios:
   chart:                # every signal fills the field; exposed for a white patch, per CFA
     exposure: {{kind: white_patch, level: 0.95}}
@@ -112,17 +111,23 @@ search:
 """
 
 
-def _sensor(sensor: SensorFile | None, path: str, clear: str | None) -> str:
+def _sensor(sources: Sources, clear: str | None) -> str:
+    sensor = sources.sensor
     if sensor is None:
         return "sensor: ar0820          # built-in surrogate curves; `sweep new NAME --qe FILE` takes your own\n"
     lines = ["sensor:", f"  name: {scalar(sensor.name)}", "  files:"]
-    lines += [f"    - file: {scalar(path)}", "      columns:          # channel: column of the file"]
-    guess = "        # guessed by its shape: check" if sensor.channels.guessed else ""
-    lines += [f"        {channel}: {scalar(column)}{guess}" for channel, column in sensor.channels.columns.items()]
+    known = {own: channel for channel, own in sensor.channels.columns.items()}
+    guessed = {known[own] for own in sensor.channels.guessed}
+    for entry in sensor.entries:
+        lines += [f"    - file: {scalar(sources.path_in_study(entry['file']))}"]
+        lines.append(f"      quantity: {entry['quantity']}      # unit of the file's numbers")
+        if "scale" in entry:
+            lines.append(f"      scale: {entry['scale']:.6g}       # brings them to plain numbers")
+        lines.append("      columns:          # channel: column of the file")
+        for channel, column in entry["columns"].items():
+            guess = "        # guessed by its shape: check" if channel in guessed else ""
+            lines.append(f"        {channel}: {scalar(column)}{guess}")
     lines += _left_out(sensor.channels.left_out)
-    if sensor.scale != 1:
-        reason = "the file is in percent" if sensor.scale == 0.01 else "the file's largest value becomes 1"
-        lines.append(f"      scale: {sensor.scale:.6g}       # {reason}")
     if clear:
         lines.append(f"  clear: {clear}              # the unfiltered pixel")
     if sensor.range_nm != (400, 700):
@@ -132,25 +137,29 @@ def _sensor(sensor: SensorFile | None, path: str, clear: str | None) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _lights(lights: LightsFile | None, path: str, photon_ratio: float | None) -> str:
+def _lights(sources: Sources, photon_ratio: float | None) -> str:
+    lights = sources.lights
     if lights is None:
         return "lights: tl16            # built-in surrogate; `sweep new NAME --lights FILE` takes your own\n"
     lines = ["lights:", f"  name: {scalar(lights.name)}"]
     if photon_ratio is not None:
         meaning = "photons of a light over a white patch's, from these spectra"
         lines.append(f"  photon_ratio: {photon_ratio:.6g}   # {meaning}")
-    other = "photons" if lights.quantity == "energy" else "energy"
-    lines += ["  files:", f"    - file: {scalar(path)}"]
-    lines.append(f"      quantity: {lights.quantity}  # unit of the numbers; or {other}")
-    if lights.ends_early:
-        lines.append("      outside: zero     # the file ends inside the wavelength range")
-    if lights.fine:
-        lines.append("      resampling: mean  # the file is finer than 1 nm")
-    lines.append("      signals:          # signal type: columns of the file, by CIE 1931 x, y")
-    for kind, columns in lights.types.items():
-        lines.append(f"        {kind}:")
-        width = min(max(len(scalar(column)) for column in columns), 40)
-        lines += [f"          - {scalar(name):<{width}}  # {_reason(c)}" for name, c in columns.items() if c]
+    lines.append("  files:")
+    for entry in lights.entries:
+        lines.append(f"    - file: {scalar(sources.path_in_study(entry.path))}")
+        if entry.quantity is not None:
+            other = "photons" if entry.quantity == "energy" else "energy"
+            lines.append(f"      quantity: {entry.quantity}  # unit of the numbers; or {other}")
+        if entry.ends_early:
+            lines.append("      outside: zero     # the file ends inside the wavelength range")
+        if entry.fine:
+            lines.append("      resampling: mean  # the file is finer than 1 nm")
+        lines.append("      signals:          # signal type: columns of the file, by CIE 1931 x, y")
+        for kind, columns in entry.types.items():
+            lines.append(f"        {kind}:")
+            width = min(max(len(scalar(column)) for column in columns), 40)
+            lines += [f"          - {scalar(name):<{width}}  # {_reason(color)}" for name, color in columns.items()]
     return "\n".join([*lines, *_left_out(lights.left_out)]) + "\n"
 
 

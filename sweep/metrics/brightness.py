@@ -51,8 +51,8 @@ class Nearest:
 class BrightnessCurves:
     """Readings and brightness curves of all lamps in one case, or in several that differ in brightness alone.
 
-    `scales`: brightness of the lamps that are read in each of these, as of the moments of a pulse. `least_dn2`: variance
-    in units of which distances are taken at least.
+    `scales`: brightness of the lamps that are read in each of these, as of the moments of a pulse. `least_dn2`:
+    variance in units of which distances are taken at least.
     """
 
     def __init__(

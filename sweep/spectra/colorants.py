@@ -12,8 +12,7 @@ import numpy as np
 
 from ..base.errors import DataError, ValidationIssue
 from ..base.types import FloatArray
-from .facts import repair_curves
-from .files import is_curve_file, scan_curves
+from .formats import is_curve_file, scan_curves
 from .spectrum import WavelengthGrid
 
 _PEAKS_NM = range(560, 701, 10)
@@ -132,17 +131,21 @@ def read_colorants(places: Sequence[Path], grid: WavelengthGrid) -> Colorants:
     notes: list[str] = []
     for file in [file for place in places for file in _files(place)]:
         try:
-            curves = repair_curves(scan_curves(file))
+            curves = scan_curves(file)
         except DataError as error:
             refused.append(f"{file.name}: {error.issues[0].problem}")
             continue
         if not curves.names:
             refused.append(f"{file.name}: no curves")
-        notes += [f"{file.name}: {change}" for change in curves.changes]
-        wrong = {issue.key: issue.problem for issue in curves.issues}
-        for name, values in zip(curves.names, curves.values.T, strict=True):
+        notes += [f"{file.name}: {note}" for note in curves.notes]
+        wrong = {issue.key: issue.problem for group in curves.issues for issue in group}
+        for name, unit, column in zip(curves.names, curves.units, curves.values.T, strict=True):
+            known = np.isfinite(column)
+            wave_nm, values = curves.wavelength_nm[known], column[known]
             own = file.stem if len(curves.names) == 1 else f"{file.stem} {name}"
-            problem = wrong.get(name) or wrong.get(None) or _unsuitable(curves.wavelength_nm, values, grid)
+            problem = wrong.get(name) or wrong.get(None) or _unsuitable(wave_nm, values, grid)
+            if unit.quantity not in (None, "density"):
+                problem = f"a column of {unit.quantity}, no absorbance"
             if own in names:
                 problem = "a colorant of this name was read before"
             if problem:
@@ -151,7 +154,7 @@ def read_colorants(places: Sequence[Path], grid: WavelengthGrid) -> Colorants:
             peak = float(values.max())
             names.append(own)
             peaks.append(peak)
-            rows.append(np.interp(grid.nodes_nm, curves.wavelength_nm, values / peak, left=0.0, right=0.0))
+            rows.append(np.interp(grid.nodes_nm, wave_nm, values / peak, left=0.0, right=0.0))
     if not rows or len(rows) > _MOST_COLORANTS:
         problem = "no colorants" if not rows else "too many colorants"
         allowed = f"1 to {_MOST_COLORANTS:,} spectra of absorbance or molar extinction"
@@ -168,7 +171,7 @@ def _files(place: Path) -> list[Path]:
 
 def _unsuitable(wave_nm: FloatArray, values: FloatArray, grid: WavelengthGrid) -> str:
     """Return why a spectrum is not taken; empty if it is."""
-    peak = values.max()
+    peak = values.max(initial=0.0)
     if not peak > 0:
         return "it absorbs nothing"
     for end, inside in ((0, wave_nm[0] > grid.start_nm), (-1, wave_nm[-1] < grid.stop_nm)):

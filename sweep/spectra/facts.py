@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import chain
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ..base.errors import ValidationIssue
 from ..base.types import FloatArray
 from . import LightUnit
-from .cells import distinct, unit_by_size
-from .filter_files import csv_text
+from .read_table import Scan
 from .signal_color import VISIBLE, LightColor, light_color
-from .spectrum import WavelengthGrid, photons_from_energy, resample, sample_issues
-from .text_tables import Scan
+from .spectrum import WavelengthGrid, photons_from_energy, resample
+from .units import Unit
 
 _NEEDED = WavelengthGrid()
 _BROAD_NM = 70.0
@@ -26,11 +23,9 @@ _FEWEST_IN_PEAK = 4
 _PERCENT = 100.0
 _MOST_LETTERS = 100
 _NEARLY = 1e-6
-_SMALL = 0.02
-"""Negatives up to this share of a curve's largest value are noise around 0."""
 NORMALIZED = (
-    "the curves have a maximum of 1: they look normalized, and are taken as QE; electrons, noise, SNR and what a "
-    "stated exposure gives are then those of a pixel with that QE; `scale` brings them to the pixel's own"
+    "the curves are relative (their maximum is 1, or their unit says so), and are taken as QE; electrons, noise, SNR "
+    "and what a stated exposure gives are then those of a pixel with that QE; `scale` brings them to the pixel's own"
 )
 """A note of curves that `is_normalized_response`."""
 
@@ -45,11 +40,21 @@ class Curve:
         Name.
     wavelength_nm, values : ndarray of shape (n,)
         Samples, wavelengths increasing; n >= 0.
+    unit : Unit
+        What its head says.
     """
 
     name: str
     wavelength_nm: FloatArray
     values: FloatArray
+    unit: Unit = field(default_factory=Unit)
+
+    @property
+    def mean(self) -> float:
+        """Mean from 400 to 700 nm, or where it has samples there; NaN without."""
+        inside = (self.wavelength_nm >= _NEEDED.start_nm) & (self.wavelength_nm <= _NEEDED.stop_nm)
+        wave, values = self.wavelength_nm[inside], self.values[inside]
+        return float(np.trapezoid(values, wave) / np.ptp(wave)) if wave.size > 1 else float("nan")
 
     @property
     def peak(self) -> float:
@@ -95,10 +100,9 @@ class Curve:
 
 @dataclass(frozen=True)
 class Facts:
-    """Curves of a file, and a note on the unit of wavelengths that are not in nm."""
+    """Curves of a file."""
 
     curves: tuple[Curve, ...]
-    read_as: str
 
     @property
     def samples_nm(self) -> FloatArray:
@@ -107,12 +111,14 @@ class Facts:
 
     @property
     def is_likely_qe(self) -> bool:
-        """True if most names say QE, or if half of the curves are as broad as a pixel's and none exceeds 100 %."""
+        """True if heads say so, or if half of the curves are as broad as a pixel's and none exceeds 100 %."""
         lit = [curve for curve in self.curves if curve.peak > 0]
+        told = {curve.unit.quantity for curve in lit} - {None}
+        if told:
+            return bool(told & {"qe", "responsivity", "relative_responsivity"})
         broad = sum(curve.width_nm >= _BROAD_NM for curve in lit)
-        named = sum("qe" in re.split(r"[\W_]+", curve.name.casefold()) for curve in lit)
         fits = 2 * broad >= len(lit) and max((curve.peak for curve in lit), default=0.0) <= _PERCENT
-        return bool(lit) and (2 * named > len(lit) or fits)
+        return bool(lit) and fits
 
     def colors(self, quantity: LightUnit) -> Mapping[str, LightColor | None]:
         """Return the color of each curve read as a light.
@@ -136,30 +142,15 @@ class Facts:
 
 
 def facts_of(scan: Scan) -> Facts:
-    """Return the curves of a file with their usable samples: finite, sorted, each wavelength once.
-
-    Parameters
-    ----------
-    scan : Scan
-        File.
-
-    Returns
-    -------
-    Facts
-        Facts.
-    """
-    factor = unit_by_size(scan.wavelength_nm)
-    read_as = {1e9: "read as m", 1e3: "read as um"}.get(factor, "")
-    usable = np.isfinite(scan.wavelength_nm)
-    curves = []
-    # Nothing that steers a terminal or fills it; two names that then look the same stay two.
+    """Return the curves of a file with their usable samples."""
     cut = [name if len(name) <= _MOST_LETTERS else f"{name[: _MOST_LETTERS - 3]}..." for name in scan.names]
-    shown = distinct([name if name.isprintable() else repr(name)[1:-1] for name in cut])
-    for name, column in zip(shown, scan.values.T, strict=True):
-        kept = usable & np.isfinite(column)
-        wave, at = np.unique(scan.wavelength_nm[kept] * factor, return_index=True)
-        curves.append(Curve(name, wave, column[kept][at]))
-    return Facts(tuple(curves), read_as)
+    # Nothing that steers a terminal or fills it; two names that then look the same stay two.
+    shown: list[str] = []
+    for at, name in enumerate(name if name.isprintable() else repr(name)[1:-1] for name in cut):
+        shown.append(name if name and name not in shown else f"{name or 'column'} ({at + 2})")
+    known = np.isfinite(scan.values)
+    columns = zip(shown, known.T, scan.values.T, scan.units, strict=True)
+    return Facts(tuple(Curve(name, scan.wavelength_nm[at], values[at], unit) for name, at, values, unit in columns))
 
 
 def notes(facts: Facts, *, as_qe: bool) -> list[str]:
@@ -196,14 +187,8 @@ def notes(facts: Facts, *, as_qe: bool) -> list[str]:
     dark = [curve.name for curve in facts.curves if not curve.peak > 0]
     if dark:
         lines.append(f"no value is above 0: {', '.join(dark)}")
-    if as_qe:
-        top = max(curve.peak for curve in facts.curves)
-        if top > 1 + _NEARLY:
-            scale = qe_scale(top)
-            reason = "percent" if scale == 1 / _PERCENT else "a relative scale"
-            lines.append(f"values up to {top:.6g} are above 1, so no QE: {reason}? Then set `scale: {scale:.4g}`")
-        elif is_normalized_response(top):
-            lines.append(NORMALIZED)
+    if as_qe and is_normalized_response(max(curve.peak for curve in facts.curves)):
+        lines.append(NORMALIZED)
     return lines
 
 
@@ -221,24 +206,6 @@ def is_normalized_response(top: float) -> bool:
         True if they are.
     """
     return abs(top - 1) <= _NEARLY
-
-
-def qe_scale(top: float) -> float:
-    """Return the factor that brings QE curves to 0..1: 0.01 for percent.
-
-    Parameters
-    ----------
-    top : float
-        Largest value.
-
-    Returns
-    -------
-    float
-        Factor.
-    """
-    if top <= 1:
-        return 1.0
-    return 1 / _PERCENT if 2 < top <= _PERCENT else float(f"{1 / top * (1 - 5e-4):.4g}")
 
 
 def merge_equal_issues(issues: Sequence[ValidationIssue]) -> list[ValidationIssue]:
@@ -268,84 +235,3 @@ def _joined(group: Sequence[ValidationIssue]) -> ValidationIssue:
     names = [issue.key or "" for issue in group]
     shown = ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
     return replace(group[0], key=shown or None)
-
-
-@dataclass(frozen=True)
-class RepairedCurves:
-    """Repaired curves in rising order, with the changes and the remaining issues."""
-
-    wavelength_nm: FloatArray
-    names: tuple[str, ...]
-    values: FloatArray
-    changes: tuple[str, ...]
-    issues: tuple[ValidationIssue, ...]
-
-    def text(self, file: str, notes: tuple[str, ...]) -> str:
-        """Return a clean CSV with the changes in its first lines.
-
-        Parameters
-        ----------
-        file : str
-            Name of the original file.
-        notes : tuple of str
-            Further notes.
-
-        Returns
-        -------
-        str
-            Text.
-        """
-        lines = [f"from {file}", *(f"read: {note}" for note in notes), *(f"changed: {c}" for c in self.changes)]
-        head = "".join(f"# {' '.join(line.split())}\n" for line in lines)
-        return head + csv_text(self.wavelength_nm, dict(zip(self.names, self.values.T, strict=True)))
-
-
-def repair_curves(scan: Scan) -> RepairedCurves:
-    """Repair the curves of a scan where that is possible in one way only.
-
-    Negatives of up to 2 % of the peak become 0, single gaps between two samples are interpolated linearly, and
-    duplicate rows are removed. Everything else stays, and is an issue.
-
-    Parameters
-    ----------
-    scan : Scan
-        File.
-
-    Returns
-    -------
-    RepairedCurves
-        Repaired curves.
-    """
-    changes: list[str] = []
-    order = np.argsort(scan.wavelength_nm, kind="stable")  # puts NaN last
-    kept = order[np.isfinite(scan.wavelength_nm[order])]
-    if kept.size < order.size:
-        changes.append(f"{order.size - kept.size} rows without a wavelength were left out")
-    if (np.diff(kept) < 0).any():
-        changes.append("rows were sorted by wavelength")
-    wave, values = scan.wavelength_nm[kept], scan.values[kept]
-    again = np.zeros(wave.size, dtype=bool)
-    again[1:] = (wave[1:] == wave[:-1]) & (values[1:] == values[:-1]).all(axis=1)
-    if again.any():
-        changes.append(f"{np.count_nonzero(again)} rows that repeat another were left out")
-    wave, values = wave[~again], values[~again]
-    for name, column in zip(scan.names, values.T, strict=True):
-        changes += _repair_curve(wave, column, name)
-    groups = (
-        sample_issues("", wave, scan.names, values) if wave.size > 1 else [[ValidationIssue("fewer than two samples")]]
-    )
-    return RepairedCurves(wave, scan.names, values, tuple(changes), tuple(chain.from_iterable(groups)))
-
-
-def _repair_curve(wave: FloatArray, column: FloatArray, name: str) -> list[str]:
-    """Change a curve in place, and return the changes."""
-    changes = []
-    finite = np.isfinite(column)
-    low = finite & (column < 0) & (column >= -_SMALL * column[finite].max(initial=0.0))
-    if low.any():
-        changes.append(f"{name}: {np.count_nonzero(low)} negatives down to {column[low].min():.3g} were set to 0")
-        column[low] = 0.0
-    for at in np.flatnonzero(~finite[1:-1] & finite[:-2] & finite[2:]) + 1:
-        column[at] = np.interp(wave[at], wave[[at - 1, at + 1]], column[[at - 1, at + 1]])
-        changes.append(f"{name}: the missing value at {wave[at]:g} nm is {column[at]:.6g}, by a straight line")
-    return changes

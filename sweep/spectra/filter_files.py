@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.types import FloatArray, IndexArray
-from .text_tables import WAVELENGTH
+from .read_table import WAVELENGTH
 
 HINTS = "rgbcymwiuxzok"
 """First letters of filter names that ISETCam has a color for (its `sensorColorOrder`)."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base.errors import DataError, ValidationIssue
 from ..base.types import FloatArray
-from .text_tables import TextTable, lens_table, table_numbers
+from .read_text import Sheet, number_of, text_sheet
 
 _FIRST = "height_mm"
 _ALLOWED = "`height_mm`, `height_percent` or `height_relative`, and `cra_deg`"
@@ -56,31 +56,41 @@ def read_chief_rays(path: Path, corner_mm: float | None = None) -> ChiefRays:
     DataError
         If the file cannot be read or is not clean, with file, line, column and value.
     """
-    table = lens_table(path, _FIRST)
-    if table.issues:
-        raise DataError(table.issues[0])
+    table = text_sheet(path)
     unit, column = _columns(table)
-    names = [_FIRST.replace("mm", unit), table.header[column]]
-    if len(table.rows) > _MOST_ROWS:
+    names = [_FIRST.replace("mm", unit), table.rows[0][1][column]]
+    if len(table.rows) - 1 > _MOST_ROWS:
         raise DataError(
-            ValidationIssue("too many rows", table.file, None, None, len(table.rows), f"at most {_MOST_ROWS}")
+            ValidationIssue("too many rows", table.file, None, None, len(table.rows) - 1, f"at most {_MOST_ROWS}")
         )
-    for line, row in table.rows:
-        if len(row) != len(table.header):
-            raise DataError(
-                ValidationIssue("wrong number of columns", table.file, line, None, len(row), str(len(table.header)))
-            )
-    rows = [(line, [row[0], row[column]]) for line, row in table.rows]
-    values, issues = table_numbers(table.file, names, rows, table.decimal, noun="image height")
-    if issues:
-        raise DataError(issues[0])
-    return _to_corner(table, unit, values, names, corner_mm)
+    return _to_corner(table, unit, _numbers(table, names, column), names, corner_mm)
 
 
-def _columns(table: TextTable) -> tuple[str, int]:
+def _numbers(table: Sheet, names: list[str], column: int) -> FloatArray:
+    """Return heights and angles, [n_rows, 2]. Raises DataError for other cells, and for heights that do not rise."""
+    values: list[list[float]] = []
+    for line, row in table.rows[1:]:
+        if len(row) != len(table.rows[0][1]):
+            problem = "wrong number of columns"
+            raise DataError(ValidationIssue(problem, table.file, line, None, len(row), str(len(table.rows[0][1]))))
+        numbers = []
+        for name, cell in zip(names, (row[0], row[column]), strict=True):
+            number = number_of(cell.replace(table.decimal, "."))
+            if number is None or number < 0:
+                problem = "not a usable number" if number is None else "negative value"
+                raise DataError(ValidationIssue(problem, table.file, line, name, cell, "finite, >= 0"))
+            numbers.append(number)
+        if values and numbers[0] <= values[-1][0]:
+            problem = "image height occurs twice" if numbers[0] == values[-1][0] else "image heights are not sorted"
+            raise DataError(ValidationIssue(problem, table.file, line, names[0], numbers[0], "strictly increasing"))
+        values.append(numbers)
+    return np.array(values).reshape(-1, 2)
+
+
+def _columns(table: Sheet) -> tuple[str, int]:
     """Return the unit of the heights, and the index of the column of angles."""
-    file, line, header = table.file, table.line, table.header
-    if table.unit == 0:
+    file, (line, header) = table.file, table.rows[0]
+    if all(number_of(cell.replace(table.decimal, ".")) is not None for cell in header):
         raise DataError(ValidationIssue("there is no header", file, line, None, None, _ALLOWED))
     plain = [re.sub(r"[\s_.,/]+", " ", cell).casefold().strip() for cell in header]
     units = [unit for unit, pattern in _UNITS.items() if pattern.search(plain[0])]
@@ -100,12 +110,12 @@ def _columns(table: TextTable) -> tuple[str, int]:
     return units[0], angles[0]
 
 
-def _to_corner(table: TextTable, unit: str, values: FloatArray, names: list[str], corner_mm: float | None) -> ChiefRays:
+def _to_corner(table: Sheet, unit: str, values: FloatArray, names: list[str], corner_mm: float | None) -> ChiefRays:
     """Return the rays from the center of the sensor to its corner."""
 
     def check(passes: bool, problem: str, row: int, column: int, allowed: str | None = None) -> None:
         if not passes:
-            line, value = table.rows[row][0], values[row, column].item()
+            line, value = table.rows[1:][row][0], values[row, column].item()
             raise DataError(ValidationIssue(problem, table.file, line, names[column], value, allowed))
 
     heights, cra_deg = values.T
@@ -117,7 +127,7 @@ def _to_corner(table: TextTable, unit: str, values: FloatArray, names: list[str]
     whole = {"percent": 100.0, "relative": 1.0}.get(unit)
     if whole is not None and corner_mm is not None:
         raise DataError(
-            ValidationIssue(f"`corner_mm` needs heights in mm, not {unit}", table.file, table.line, names[0])
+            ValidationIssue(f"`corner_mm` needs heights in mm, not {unit}", table.file, table.rows[0][0], names[0])
         )
     corner = float(heights[-1]) if corner_mm is None else corner_mm
     check(heights[0] == 0, "image heights begin in the middle of the sensor", 0, 0, "0")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -12,10 +12,11 @@ import numpy as np
 
 from ..base.errors import DataError, ValidationIssue
 from . import LightUnit
-from .facts import Curve, Facts, facts_of, merge_equal_issues
-from .files import scan_curves
-from .signal_color import LightColor
-from .spectrum import WavelengthGrid
+from .facts import Curve, merge_equal_issues
+from .formats import read_curves, scan_curves
+from .signal_color import VISIBLE, LightColor, light_color
+from .spectrum import Curves, WavelengthGrid, photons_from_energy
+from .units import used_as
 
 _SIGNAL_COLORS = ("green", "yellow", "orange", "red")
 """Signal types in the order of a study."""
@@ -25,103 +26,93 @@ _USUAL = WavelengthGrid()
 
 
 @dataclass(frozen=True)
-class LightsFile:
-    """Lights of a file: columns of each signal type with their colors, other columns with the reason.
+class LightsEntry:
+    """Lights of one file or folder: columns of each signal type with their colors.
 
-    `ends_early`: the file ends inside the wavelengths of the study; `fine`: it is finer than 1 nm.
+    `quantity`: that of all columns, None if they differ. `ends_early`: a curve ends inside the wavelengths of the
+    study; `fine`: it is finer than 1 nm.
     """
 
-    name: str
-    quantity: LightUnit
-    types: Mapping[str, Mapping[str, LightColor | None]]
-    left_out: Mapping[str, str]
+    path: Path
+    quantity: LightUnit | None
+    types: Mapping[str, Mapping[str, LightColor]]
     ends_early: bool
     fine: bool
 
     def keys(self, file: str) -> dict[str, Any]:
-        """Return the keys of a study for these lights.
-
-        Parameters
-        ----------
-        file : str
-            Path as the study names it.
-
-        Returns
-        -------
-        dict
-            Keys.
-        """
-        entry: dict[str, Any] = {"file": file, "quantity": self.quantity}
+        """Return the keys of a study for these lights, by the path that the study has."""
+        entry: dict[str, Any] = {"file": file} | ({} if self.quantity is None else {"quantity": self.quantity})
         entry["signals"] = {kind: list(columns) for kind, columns in self.types.items()}
         entry |= {"outside": "zero"} if self.ends_early else {}
-        entry |= {"resampling": "mean"} if self.fine else {}
-        return {"name": self.name, "files": [entry]}
+        return entry | ({"resampling": "mean"} if self.fine else {})
 
 
-def clean_curves(path: Path) -> dict[str, Curve]:
-    """Return clean curves by column name.
+@dataclass(frozen=True)
+class LightsFile:
+    """Lights of files, other columns with the reason why they are left out, and notes on how files were read."""
 
-    Parameters
-    ----------
-    path : Path
-        File.
+    name: str
+    entries: tuple[LightsEntry, ...]
+    left_out: Mapping[str, str]
+    notes: tuple[str, ...]
 
-    Returns
-    -------
-    dict of str to Curve
-        Curves.
+    @property
+    def types(self) -> dict[str, list[str]]:
+        """Columns of each signal type, in the order of a study."""
+        known = {kind: [name for one in self.entries for name in one.types.get(kind, ())] for kind in _SIGNAL_COLORS}
+        return {kind: names for kind, names in known.items() if names}
 
-    Raises
-    ------
-    DataError
-        If curves are not clean, with all issues.
-    """
+    def keys(self, path_in_study: Callable[[Path], str]) -> dict[str, Any]:
+        """Return the keys of a study for these lights."""
+        return {"name": self.name, "files": [one.keys(path_in_study(one.path)) for one in self.entries]}
+
+
+def clean_curves(path: Path) -> Curves:
+    """Return the curves of a file or folder. Raises DataError with all issues where they are not clean."""
     scan = scan_curves(path)
     if scan.issues:
         raise DataError(merge_equal_issues(list(chain.from_iterable(scan.issues))))
-    return dict(zip(scan.names, facts_of(scan).curves, strict=True))
+    return read_curves(path)
 
 
-def lights_file(path: Path, quantity: LightUnit, start_nm: float = 400, stop_nm: float = 700) -> LightsFile:
-    """Return the lights of a file by their colors.
+def lights_file(
+    paths: Path | Sequence[Path], quantity: LightUnit | None = None, start_nm: float = 400, stop_nm: float = 700
+) -> LightsFile:
+    """Return the lights of files or folders by their colors, for a study between two wavelengths.
 
-    Parameters
-    ----------
-    path : Path
-        File.
-    quantity : {'energy', 'photons'}
-        Unit of the values.
-    start_nm, stop_nm : float
-        Wavelengths of the study, nm.
-
-    Returns
-    -------
-    LightsFile
-        Lights.
-
-    Raises
-    ------
-    DataError
-        If there are fewer than two signal colors.
+    `quantity`: that of the values; left out, what the heads say, else energy. Raises DataError if there are fewer than
+    two signal colors.
     """
-    curves = clean_curves(path)
-    colors = dict(zip(curves, Facts(tuple(curves.values()), "").colors(quantity).values(), strict=True))
-    signals = {name: None if color is None else color.signal for name, color in colors.items()}
-    types = {kind: {name: colors[name] for name in curves if signals[name] == kind} for kind in _SIGNAL_COLORS}
-    used = {kind: columns for kind, columns in types.items() if columns}
-    left_out = {}
-    for name, color in colors.items():
-        if color is None:
-            left_out[name] = "no visible light"
-        elif signals[name] is None:
-            left_out[name] = f"xy {color.xy[0]:.3f} {color.xy[1]:.3f} is near no signal color"
-    if len(used) < 2:
-        listed = "; ".join(f"{kind}: {', '.join(columns)}" for kind, columns in used.items()) or "none"
-        problem = f"lights of one signal color or none (`sweep describe {path}` shows where they lie)"
-        raise DataError(
-            ValidationIssue(problem, str(path), None, None, listed, "two of green, yellow, orange, red, or more")
-        )
-    wave = next(iter(curves.values())).wavelength_nm
-    ends_early = bool(wave[0] > start_nm or wave[-1] < stop_nm)
-    fine = bool(np.diff(wave).min() < _USUAL.step_nm)
-    return LightsFile(path.stem[:MOST_LETTERS], quantity, used, left_out, ends_early, fine)
+    places = [paths] if isinstance(paths, Path) else list(paths)
+    left_out: dict[str, str] = {}
+    entries, notes = [], []
+    for path in places:
+        read = clean_curves(path)
+        curves = used_as(read, list(read.values), "light", quantity)
+        types: dict[str, dict[str, LightColor]] = {}
+        for name in curves.values:
+            relative = Curve(name, *curves.samples(name)).on(VISIBLE)
+            energy = curves.units[name].quantity == "energy"
+            color = light_color(photons_from_energy(VISIBLE.nodes_nm, relative) if energy else relative)
+            if color is not None and color.signal is not None:
+                types.setdefault(color.signal, {})[name] = color
+            elif color is None:
+                left_out[name] = "no visible light"
+            else:
+                left_out[name] = f"xy {color.xy[0]:.3f} {color.xy[1]:.3f} is near no signal color"
+        ends = [curves.samples(name)[0] for of_type in types.values() for name in of_type]
+        early = any(wave[0] > start_nm or wave[-1] < stop_nm for wave in ends)
+        fine = any(bool(np.diff(wave).min() < _USUAL.step_nm) for wave in ends)
+        known = {curves.units[name].quantity for of_type in types.values() for name in of_type}
+        of_all: LightUnit | None = "photons" if known == {"photons"} else "energy" if known == {"energy"} else None
+        ordered = {kind: types[kind] for kind in _SIGNAL_COLORS if kind in types}
+        if ordered:
+            entries.append(LightsEntry(path, of_all, ordered, early, fine))
+        notes += [note if len(places) == 1 else f"{path.name}: {note}" for note in curves.notes[len(read.notes) :]]
+    found = LightsFile(places[0].stem[:MOST_LETTERS], tuple(entries), left_out, tuple(notes))
+    if len(found.types) < 2:
+        listed = "; ".join(f"{kind}: {', '.join(columns)}" for kind, columns in found.types.items()) or "none"
+        problem = f"lights of one signal color or none (`sweep describe {places[0]}` shows where they lie)"
+        allowed = "two of green, yellow, orange, red, or more"
+        raise DataError(ValidationIssue(problem, str(places[0]), None, None, listed, allowed))
+    return found

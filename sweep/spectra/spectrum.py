@@ -5,9 +5,9 @@ A curve that is not clean (NaN, negative, unsorted, duplicated or truncated data
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Container, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +15,9 @@ from pydantic import model_validator
 
 from ..base.errors import DataError, ValidationIssue
 from ..base.types import FloatArray, Positive, Section
+
+if TYPE_CHECKING:
+    from .units import Unit
 
 Resampling = Literal["linear", "mean"]
 Outside = Literal["refuse", "zero"]
@@ -87,20 +90,9 @@ class WavelengthGrid(Section):
 
 @dataclass(frozen=True)
 class Curves:
-    """Named curves on common wavelengths, as they came from their source.
+    """Named curves on common wavelengths, nm, as they came from `source`; NaN beyond the samples of a curve.
 
-    Parameters
-    ----------
-    wavelength_nm : ndarray of shape (n,)
-        Wavelengths, strictly increasing, nm.
-    values : mapping of str to ndarray of shape (n,)
-        Finite values >= 0.
-    source : str
-        File or maker.
-    surrogate : bool
-        True for modeled curves.
-    notes : tuple of str
-        Notes on the way a file was read.
+    `notes`: on the way a file was read. `units`: what the heads of its columns say.
     """
 
     wavelength_nm: FloatArray
@@ -108,6 +100,12 @@ class Curves:
     source: str
     surrogate: bool = False
     notes: tuple[str, ...] = ()
+    units: Mapping[str, Unit] = field(default_factory=dict)
+
+    def samples(self, name: str) -> tuple[FloatArray, FloatArray]:
+        """Return wavelengths, nm, and values of a curve between its first and last sample."""
+        known = np.isfinite(self.values[name])
+        return self.wavelength_nm[known], self.values[name][known]
 
     def on(
         self, grid: WavelengthGrid, name: str, method: Resampling = "linear", outside: Outside = "refuse"
@@ -131,7 +129,7 @@ class Curves:
             Values.
         """
         try:
-            return resample(self.wavelength_nm, self.values[name], grid, method, outside)
+            return resample(*self.samples(name), grid, method, outside)
         except DataError as error:
             raise DataError(
                 [ValidationIssue(f.problem, self.source, None, name, f.value, f.allowed) for f in error.issues]
@@ -174,13 +172,17 @@ def _value_issues(wave: FloatArray, data: FloatArray) -> Iterator[ValidationIssu
         yield ValidationIssue("the largest value is too small", value=float(data.max()), allowed=allowed)
 
 
-def check_samples(wavelength_nm: ArrayLike, values: ArrayLike) -> tuple[FloatArray, FloatArray]:
+def check_samples(
+    wavelength_nm: ArrayLike, values: ArrayLike, *, signed: bool = False
+) -> tuple[FloatArray, FloatArray]:
     """Check samples of a curve.
 
     Parameters
     ----------
     wavelength_nm, values : array-like of shape (n,)
         Samples.
+    signed : bool
+        Values may be negative.
 
     Returns
     -------
@@ -200,35 +202,21 @@ def check_samples(wavelength_nm: ArrayLike, values: ArrayLike) -> tuple[FloatArr
                 "a curve needs two or more samples, one value per wavelength", value=(wave.shape, data.shape)
             )
         )
-    issues = [*_wavelength_issues(wave), *_value_issues(wave, data)]
+    issues = [*_wavelength_issues(wave), *_value_issues(wave, np.abs(data) if signed else data)]
     if issues:
         raise DataError(issues)
     return wave, data
 
 
-def sample_issues(file: str, wave: FloatArray, names: Sequence[str], data: FloatArray) -> list[list[ValidationIssue]]:
-    """Return the issues of the curves of a file by `check_samples`.
-
-    Parameters
-    ----------
-    file : str
-        File, for the messages.
-    wave : ndarray of shape (n_samples,)
-        Wavelengths, nm.
-    names : sequence of str
-        Names of the curves.
-    data : ndarray of shape (n_samples, n_curves)
-        Values.
-
-    Returns
-    -------
-    list of list of Fault
-        Faults of each curve.
-    """
+def sample_issues(
+    file: str, wave: FloatArray, names: Sequence[str], data: FloatArray, signed: Container[int] = ()
+) -> list[list[ValidationIssue]]:
+    """Return the issues of the curves of a file, [n_samples, n_curves], by `check_samples`; `signed`: curves in dB."""
     groups = []
     for index, name in enumerate(names):
         try:
-            check_samples(wave, data[:, index])
+            known = np.isfinite(data[:, index])
+            check_samples(wave[known], data[known, index], signed=index in signed)
         except DataError as error:
             groups.append([ValidationIssue(f.problem, file, None, name, f.value, f.allowed) for f in error.issues])
     return groups

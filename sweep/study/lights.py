@@ -7,12 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
+from ..base.disk import is_folder
 from ..base.errors import DataError
 from ..base.types import FloatArray
 from ..camera.pixel import unquantized
 from ..spectra.builtin.registry import BUILT_IN_LIGHTS
 from ..spectra.color import VISIBLE_NM
-from ..spectra.files import is_curve_file
+from ..spectra.formats import is_curve_file
 from ..spectra.light_files import lights_file
 from ..spectra.lights import Lights, make_lights
 from ..spectra.population import DRIFT_NM_PER_K
@@ -51,21 +52,22 @@ def with_light_files(section: StudySection, sources: Sources) -> StudySection:
 
     def read(lights: LightsSection, path: KeyPath) -> LightsSection:
         name = lights.builtin
-        if name is None or name in BUILT_IN_LIGHTS or not is_curve_file(name):
+        folder = name is not None and any(is_folder(where / name) for where in sources.folders)
+        if name is None or name in BUILT_IN_LIGHTS or not (folder or is_curve_file(name)):
             return lights
         place = sources.file(path, name)
         if place is None:
             return lights
         try:
-            taken = lights_file(place, "energy", section.wavelengths.start_nm, section.wavelengths.stop_nm)
+            taken = lights_file(place, None, section.wavelengths.start_nm, section.wavelengths.stop_nm)
         except DataError as error:
             sources.issues.extend(error.issues)
             return lights
         kinds = [f"{kind}: {', '.join(columns)}" for kind, columns in taken.types.items()]
         left_out = [f"{column} is left out ({reason})" for column, reason in taken.left_out.items()]
-        sources.warnings.append(f"{name}: read as energy; {'; '.join([*kinds, *left_out])}")
+        sources.warnings.append(f"{name}: {'; '.join([*taken.notes[-1:], *kinds, *left_out])}")
         stated = lights.model_dump(exclude_unset=True, exclude={"builtin", "files"})
-        return LightsSection.model_validate(taken.keys(name) | stated)
+        return LightsSection.model_validate(taken.keys(lambda _: name) | stated)
 
     before = len(sources.issues)
     changed: dict[str, object] = {"lights": read(section.lights, ("lights",))}
@@ -102,19 +104,23 @@ def lights_of(section: LightsSection, sources: Sources, at: KeyPath = ("lights",
     """
     section = offered_curves(sources, at, section, "sweep.lights", BUILT_IN_LIGHTS)
     if section.builtin is not None:
-        excess = sorted(section.model_fields_set - {"builtin", "files"})
+        excess = sorted(section.model_fields_set - {"builtin", "files", "outside"})
         for key in excess:
             value = getattr(section, key)
             sources.add((*at, key), "a built-in data set has its own", value, "this key beside `files`")
-        return None if excess else sources.built_in(at, section.builtin, BUILT_IN_LIGHTS)
+        return None if excess else sources.built_in(at, section.builtin, BUILT_IN_LIGHTS, section.outside)
     before = len(sources.issues)
     files = (*at, "files")
     count = sum(len(columns) for entry in section.files for columns in entry.signals.values())
     if not sources.fits(files, "lights", count):
         return None
     by_type: dict[str, list[tuple[str, str, FloatArray]]] = {}
-    for index, entry in enumerate(section.files):
-        curves = sources.curves((*files, index), entry)
+    for index, stated in enumerate(section.files):
+        entry = (
+            stated if "outside" in stated.model_fields_set else stated.model_copy(update={"outside": section.outside})
+        )
+        columns = [column for names in entry.signals.values() for column in names]
+        curves = sources.used((*files, index), entry, "light", columns, entry.quantity, scaled=True)
         for signal_type, columns in entry.signals.items():
             for position, column in enumerate(columns):
                 found_path = (*files, index, "signals", signal_type, position)

@@ -11,9 +11,10 @@ from ..base.types import Ratio, Seconds, Section
 from ..camera.captures import ReadNoise
 from ..designs.technology import Stated
 from ..spectra.builtin.registry import BUILT_IN_LIGHTS
+from ..spectra.read_table import MOST_CURVES
 from ..spectra.spectrum import Outside, Resampling
 from ..spectra.tasks import SHIPPED
-from ..spectra.text_tables import MOST_CURVES
+from ..spectra.units import SensorQuantity
 
 _MOST_TASKS = 20
 _MOST_CLASSES = 40
@@ -40,8 +41,12 @@ class CurveFile(Section):
     At most 40 MB, 2,000 curves, 100,000 samples of each and 2,000,000 values; values are 0 to 1e100."""
     columns: Annotated[dict[Name, Name], Field(min_length=1)]
     """Channel of the sensor -> column of the file."""
+    quantity: SensorQuantity | None = None
+    """Unit of the file's numbers, where the heads of its columns do not tell it, or tell it wrong: `qe`,
+    `responsivity` (A/W), `relative_responsivity` (per energy, in any scale); `transmission`, `density` (optical
+    density, absorbance) and `decibel` with `relative_to`."""
     scale: Ratio = 1.0
-    """Factor on the file's values: 0.01 for percent."""
+    """Factor on the file's values, in the place of what their heads say: 0.01 for percent."""
     relative_to: Name | None = None
     """A curve of the sensor that the file's values are relative to: they are transmissions, and are multiplied by it.
 
@@ -64,6 +69,8 @@ class SensorSection(Section):
 
     Left out, it is the built-in sensor's own, or the largest curve, which counts as clear only if it is called C, W,
     clear, white, mono or panchromatic."""
+    ir_cut: _Path | None = None
+    """File of one curve: the transmission of an IR cut in front of the sensor, which multiplies every curve."""
     technology: dict[Name, Stated] = {}
     """Curve -> `pigment`, or `interference: {effective_index: 1.8}`, whose transmission over the clear curve moves with
     the angle of the light; a curve that is left out, as on axis."""
@@ -72,7 +79,7 @@ class SensorSection(Section):
     def _some_source(self) -> SensorSection:
         if self.builtin is None and not self.files:
             raise ValueError("a sensor is the name of a built-in one, or a mapping with `builtin`, `files` or both")
-        if self.builtin is not None and not self.files and (self.name or self.clear):
+        if self.builtin is not None and not self.files and (self.name or self.clear) and self.ir_cut is None:
             raise ValueError("a built-in sensor alone has its own `name` and `clear`; leave these out, or add `files`")
         return self
 
@@ -81,8 +88,8 @@ class LightFile(Section):
     """Lights from one file."""
 
     file: FilePath
-    quantity: Annotated[str, Field(pattern="^(energy|photons)$"), WithJsonSchema({"enum": ["energy", "photons"]})]
-    """Unit of the file's numbers."""
+    quantity: Literal["energy", "photons"] | None = None
+    """Unit of the file's numbers; left out, what the heads of its columns say, else energy."""
     signals: Annotated[dict[Name, FileColumns], Field(min_length=1)]
     """Signal type -> columns of the file."""
     resampling: ResamplingRule = "linear"
@@ -114,6 +121,7 @@ class LightsSection(Section):
     """Name of the lights in the report."""
     files: list[LightFile] = []
     """Files of spectra; exclude `builtin`."""
+    outside: OutsideRule = "refuse"
     photon_ratio: Ratio | None = None
     """K: photons of a signal patch over those of the white patch; from the spectra where it is left out."""
 

@@ -14,6 +14,7 @@ from ..camera.sensor import BUILT_IN_SENSORS, SensorCurves, make_sensor
 from ..camera.sensor_field import PLACES, SensorField
 from ..designs.space import Space
 from ..spectra.facts import NORMALIZED, is_normalized_response
+from ..spectra.units import FITTING, Use
 from .document import KeyPath
 from .schema import StudySection
 from .schema_curves import CurveFile, SensorSection
@@ -48,6 +49,27 @@ def sensor_of(section: SensorSection, sources: Sources) -> SensorCurves | None:
         With every issue so far, if the study cannot be used.
     """
     section = offered_curves(sources, ("sensor",), section, "sweep.sensors", BUILT_IN_SENSORS)
+    made = _sensor(section, sources)
+    if made is None or section.ir_cut is None or sources.kept is not None:
+        return made
+    entry = CurveFile(file=section.ir_cut, columns={"ir_cut": "ir_cut"})
+    curves = sources.curves(("sensor", "ir_cut"), entry)
+    if curves is None:
+        return None
+    if len(curves.values) > 1:
+        sources.add(("sensor", "ir_cut"), "a file of several curves", ", ".join(curves.values), "a file of one curve")
+        return None
+    (column,) = curves.values
+    cut = sources.used(("sensor", "ir_cut"), entry, "filter", [column])
+    values = sources.column(("sensor", "ir_cut"), cut, column, entry)
+    if values is None:
+        return None
+    qe = {name: curve * values for name, curve in made.qe.items()}
+    return replace(made, qe=qe, source=f"{made.source}, behind {section.ir_cut}")
+
+
+def _sensor(section: SensorSection, sources: Sources) -> SensorCurves | None:
+    """Return the curves of a sensor without its IR cut."""
     built_in: SensorCurves | None = None
     if section.builtin is not None:
         built_in = sources.built_in(("sensor",), section.builtin, BUILT_IN_SENSORS)
@@ -104,10 +126,22 @@ def _curves_of_files(
 
 def _columns(sources: Sources, path: KeyPath, entry: CurveFile, factor: float | FloatArray) -> dict[str, FloatArray]:
     """Return the curves of one file on the grid, times a factor; those that a finished run kept have it already."""
-    curves = sources.curves(path, entry)
-    if curves is not None and entry.relative_to is None:
-        top = max((float(curves.values[c].max()) for c in entry.columns.values() if c in curves.values), default=0.0)
-        if is_normalized_response(entry.scale * top):
+    use: Use = "sensor" if entry.relative_to is None else "filter"
+    given = FITTING[use][0] if entry.file in sources.given and not sources.given[entry.file].units else None
+    known = sources.used(
+        (*path, "columns"),
+        entry,
+        use,
+        entry.columns.values(),
+        entry.quantity or given,
+        scaled="scale" in entry.model_fields_set or given is not None,
+    )
+    if sources.kept is None and known is None:
+        return {}
+    if known is not None and entry.relative_to is None:
+        top = max(float(known.samples(column)[1].max()) for column in entry.columns.values())
+        relative = any(known.units[column].quantity == "relative_responsivity" for column in entry.columns.values())
+        if relative or is_normalized_response(entry.scale * top):
             sources.warnings.append(f"{entry.file}: {NORMALIZED}")
     scaled = {}
     for name, column in entry.columns.items():
@@ -115,7 +149,7 @@ def _columns(sources: Sources, path: KeyPath, entry: CurveFile, factor: float | 
         if sources.kept is not None:
             values = sources.kept_curve(place, sources.kept.sensor, name)
         else:
-            values = sources.column(place, curves, column, entry)
+            values = sources.column(place, known, column, entry)
             values = None if values is None else values * factor
         if values is not None:
             scaled[name] = values

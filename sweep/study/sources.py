@@ -5,9 +5,9 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeVar, cast
 
 import numpy as np
 
@@ -17,10 +17,11 @@ from ..base.types import FloatArray
 from ..camera.sensor import SensorCurves
 from ..spectra.builtin.surrogate import BUILT_IN_RANGE_NM
 from ..spectra.colorants import BUILTIN_COLORANTS, Colorants, read_colorants
-from ..spectra.files import digest, read_curves
+from ..spectra.formats import digest, read_curves
 from ..spectra.lens_files import ChiefRays, read_chief_rays
 from ..spectra.lights import Lights
-from ..spectra.spectrum import Curves, WavelengthGrid, integral_between, photons_from_energy
+from ..spectra.spectrum import Curves, Outside, WavelengthGrid, integral_between, photons_from_energy
+from ..spectra.units import Quantity, Use, used_as
 from .document import Document, KeyPath, by_line
 from .schema_curves import ColorantsSection, CurveFile, LightFile, TaskFile
 
@@ -36,6 +37,12 @@ _Made = TypeVar("_Made", SensorCurves, Lights)
 _Content = TypeVar("_Content", Curves, ChiefRays)
 _Key = TypeVar("_Key")
 _Entry = CurveFile | LightFile | TaskFile
+
+
+def _padded(made: Lights, before: int, size: int) -> Lights:
+    """Return lights with zeros up to the ends of the grid."""
+    padding = ((0, 0), (before, size - before - made.photons.shape[1]))
+    return replace(made, photons=np.pad(made.photons, padding))
 
 
 @dataclass(frozen=True)
@@ -151,29 +158,30 @@ class Sources:
             self.add(path, f"too many {what} for a grid of {self.grid.size:,} wavelengths", count, f"at most {most:,}")
         return count <= most
 
-    def built_in(self, at: KeyPath, name: str, known: Mapping[str, Callable[[WavelengthGrid], _Made]]) -> _Made | None:
-        """Return a built-in sensor or built-in lights on the study's wavelength grid.
+    def built_in(
+        self,
+        at: KeyPath,
+        name: str,
+        known: Mapping[str, Callable[[WavelengthGrid], _Made]],
+        outside: Outside = "refuse",
+    ) -> _Made | None:
+        """Return a built-in sensor or built-in lights on the study's wavelengths; None after adding issues.
 
-        Parameters
-        ----------
-        at : sequence of str and int
-            Keys that lead to the value.
-        name : str
-            Name of the curves.
-        known : mapping of str to callable
-            Built-in curves.
-
-        Returns
-        -------
-        SensorCurves, Lights or None
-            None after adding issues.
+        `outside`: lights may be 0 beyond their wavelengths.
         """
         if name not in known:
             allowed = f"{', '.join(known)}, or a mapping with `files`"
             self.add(at, f"unknown built-in {at[-1]}", name, allowed, nearest(name, known))
             return None
+        grid, nodes = self.grid, self.grid.nodes_nm
         try:
-            return known[name](self.grid) if self.in_built_in_range("the built-in curves") else None
+            if outside == "zero":
+                inside = np.flatnonzero((nodes >= BUILT_IN_RANGE_NM[0]) & (nodes <= BUILT_IN_RANGE_NM[1]))
+                if inside.size > 1:
+                    ends = {"start_nm": float(nodes[inside[0]]), "stop_nm": float(nodes[inside[-1]])}
+                    made = known[name](grid.model_copy(update=ends))
+                    return cast(_Made, _padded(made, int(inside[0]), grid.size))
+            return known[name](grid) if self.in_built_in_range("the built-in curves") else None
         except DataError as error:
             (first, *_) = error.issues
             self.add(("wavelengths",), f"{name} has curves from {first.value}", None, "wavelengths within them")
@@ -224,8 +232,8 @@ class Sources:
         values = self.column(path, curves, column, entry)
         if values is None or curves is None:
             return None
-        wave, raw = curves.wavelength_nm, curves.values[column]
-        if entry.quantity == "energy":
+        wave, raw = curves.samples(column)
+        if curves.units[column].quantity == "energy":
             raw = photons_from_energy(wave, raw)
             values = photons_from_energy(self.grid.nodes_nm, values)
         first_nm, last_nm, step_nm = self.grid.start_nm, self.grid.stop_nm, self.grid.step_nm
@@ -329,6 +337,36 @@ class Sources:
             self._read[entry.file] = self._content((*path, "file"), entry.file, read_curves)
         return self._read[entry.file]
 
+    def used(
+        self,
+        path: KeyPath,
+        entry: _Entry,
+        use: Use,
+        columns: Iterable[str] | None = None,
+        stated: Quantity | None = None,
+        *,
+        scaled: bool = False,
+    ) -> Curves | None:
+        """Return columns of a file, by default all, in the quantity of their use, as `used_as`; None after issues."""
+        curves = self.curves(path, entry)
+        if curves is None:
+            return None
+        wanted = list(dict.fromkeys(curves.values if columns is None else columns))
+        for column in wanted:
+            if column not in curves.values:
+                self.unknown(path, f"column of {entry.file}", column, curves.values)
+        if not set(wanted) <= curves.values.keys():
+            return None
+        try:
+            made = used_as(curves, wanted, use, stated, scaled=scaled)
+        except DataError as error:
+            for issue in error.issues:
+                self.add(path, f"{entry.file}, column {issue.key}: {issue.problem}", issue.value, issue.allowed)
+            return None
+        if entry.file not in self.given and stated is None:
+            self.warnings += [f"{entry.file}: {note}" for note in made.notes[len(curves.notes) :]]
+        return made
+
     def colorants(self, section: ColorantsSection) -> Colorants | None:
         """Read the catalog of colorants.
 
@@ -421,7 +459,7 @@ class Sources:
         Path or None
             None after adding an issue.
         """
-        place = next((folder / file for folder in self.folders if is_file(folder / file)), None)
+        place = next((where / file for where in self.folders if is_file(where / file) or is_folder(where / file)), None)
         if place is None:
             names: list[str] = []
             for folder in self.folders:

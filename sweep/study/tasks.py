@@ -12,8 +12,9 @@ from ..camera.scene import Scene
 from ..camera.sensor import SensorCurves
 from ..designs.space import Space
 from ..spectra.builtin.task_sets import is_surface, separation_task, shipped, spectra_of_group, task_groups
-from ..spectra.files import is_curve_file
+from ..spectra.formats import is_curve_file
 from ..spectra.tasks import ILLUMINANTS, SHIPPED, Conditions, GriddedTask, StudyTasks
+from ..spectra.units import Use
 from .document import KeyPath
 from .schema import StudySection
 from .schema_curves import TaskFile, TasksSection, UserTask
@@ -136,7 +137,8 @@ def _kept(owner: str, path: KeyPath, entry: TaskFile, sources: Sources) -> dict[
 
 def _read(path: KeyPath, entry: TaskFile, sources: Sources) -> dict[str, FloatArray]:
     """Return column -> reflectance or relative photons on the grid; a column that is 0 there adds an issue."""
-    curves = sources.curves(path, entry)
+    use: Use = "surface" if entry.quantity == "reflectance" else "light"
+    curves = sources.used(path, entry, use, entry.columns, entry.quantity, scaled=True)
     if curves is None:
         return {}
     names = list(curves.values) if entry.columns is None else entry.columns

@@ -8,42 +8,35 @@ from typing import Annotated, Any
 import typer
 
 from ...base.errors import DataError
-from ...spectra import LightUnit
-from ..options import OF_CURVES, AllowCode, DataFolder
+from ..options import OF_CURVES, AllowCode, DataFolder, quantity_of
 from ..output import Json, Quiet, print_result
 
 PANEL = OF_CURVES
 
 
 def describe(
-    file: Annotated[Path, typer.Argument(help="A file of curves, or EMVA 1288 results (.xml).", show_default=False)],
+    file: Annotated[
+        Path, typer.Argument(help="A file or folder of curves, or EMVA 1288 results (.xml).", show_default=False)
+    ],
     output: Annotated[Path, typer.Option(help="Folder for the picture.")] = Path("outputs/describe"),
     quantity: Annotated[
-        LightUnit | None,
-        typer.Option(help="Of light spectra; without it, lights or QE is guessed.", show_default=False),
-    ] = None,
-    clean: Annotated[
-        Path | None,
-        typer.Option(help="Write clean CSV here; changes are listed.", show_default=False),
+        str | None,
+        typer.Option(help="Unit of the numbers; without it, what the heads say, or a guess.", show_default=False),
     ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
     """Plot and check a file of curves: contents, issues, colors of its lights."""
     facts: dict[str, Any] = {"file": str(file)}
-    if file.suffix.casefold() == ".xml" and clean is None and quantity is None:
+    if file.suffix.casefold() == ".xml" and quantity is None:
         from ..emva1288 import pixel_lines
 
         lines = pixel_lines(file)
         print_result(lines, facts | {"lines": lines}, as_json=as_json, quiet=quiet)
         return
-    from ..describe import clean_file, described
+    from ..describe import described
 
-    if clean is not None:
-        lines = clean_file(file, clean)
-        print_result(lines, facts | {"clean": str(clean), "lines": lines}, as_json=as_json, quiet=quiet)
-        return
-    description = described(file, output, quantity)
+    description = described(file, output, quantity_of(quantity))
     facts |= {**description.facts, "faults": [str(issue) for issue in description.issues]}
     print_result(description.lines, facts, as_json=as_json, quiet=quiet)
     if description.issues:
@@ -52,7 +45,10 @@ def describe(
 
 def evaluate_(
     source: Annotated[
-        Path, typer.Argument(help="A file with the filter's curve, or a run's folder.", show_default=False)
+        Path,
+        typer.Argument(
+            help="A file with the filter's curve, a folder of such files, or that of a run.", show_default=False
+        ),
     ],
     channel: Annotated[
         str | None, typer.Option(help="Channel of the filter.", show_default="the one without a curve")
@@ -70,7 +66,10 @@ def evaluate_(
     lights: Annotated[
         str | None, typer.Option(help="tl16, or a file of spectra.", show_default="tl16, or the run's")
     ] = None,
-    quantity: Annotated[LightUnit, typer.Option(help="Unit of the numbers of the lights.")] = "energy",
+    quantity: Annotated[
+        list[str] | None,
+        typer.Option(help="Unit of the filter's numbers, or of the lights', where their heads do not tell it."),
+    ] = None,
     transmission: Annotated[
         bool,
         typer.Option(
@@ -98,7 +97,7 @@ def evaluate_(
         column=column,
         sensor=sensor,
         lights=lights,
-        quantity=quantity,
+        quantity=[quantity_of(one) for one in quantity or ()],
         transmission=transmission,
         relative_to=relative_to,
         data=data,

@@ -11,9 +11,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ...base.errors import InterruptedRunError, StudyError, SweepError, ValidationIssue
-from ...spectra import LightUnit
 from ..endings import print_issues
-from ..options import OF_STUDIES, AllowCode, Changes, DataFolder, Outputs, StudyPath, StudyPaths, changes_of
+from ..options import (
+    OF_STUDIES,
+    AllowCode,
+    Changes,
+    DataFolder,
+    Outputs,
+    StudyPath,
+    StudyPaths,
+    changes_of,
+    quantity_of,
+)
 from ..output import Json, Quiet, print_result
 
 if TYPE_CHECKING:
@@ -64,38 +73,37 @@ def list_(
 
 def new(
     name: Annotated[str, typer.Argument(help="Name of the study and of its file.", show_default=False)],
-    qe: Annotated[Path | None, typer.Option(help="A file of QE curves of a sensor.", show_default=False)] = None,
-    lights: Annotated[Path | None, typer.Option(help="A file of spectra of lights.", show_default=False)] = None,
+    qe: Annotated[
+        list[Path] | None,
+        typer.Option(help="A file or folder of QE curves of a sensor; may be repeated.", show_default=False),
+    ] = None,
+    lights: Annotated[
+        list[Path] | None,
+        typer.Option(help="A file or folder of spectra of lights; may be repeated.", show_default=False),
+    ] = None,
     pixel: Annotated[
         Path | None, typer.Option(help="EMVA 1288 results (XML) of the sensor's pixel.", show_default=False)
     ] = None,
-    quantity: Annotated[LightUnit, typer.Option(help="Unit of the lights' numbers.")] = "energy",
+    quantity: Annotated[
+        list[str] | None, typer.Option(help="Unit of the curves' or the lights' numbers, where heads do not tell it.")
+    ] = None,
     folder: Annotated[Path, typer.Option(help="Folder of the studies.")] = Path("studies"),
     source: Annotated[
         str | None, typer.Option("--from", help="A study, or the name of one, to begin with.", show_default=False)
     ] = None,
-    copy: Annotated[
-        bool, typer.Option("--copy", help="Copy the files of curves beside the study, so that all can be moved.")
-    ] = False,
 ) -> None:
     """Write a commented study that runs as it is, for the built-in curves or for files of your own."""
     from ...study.shipped import study_path
-    from ..new import copied, curve_files_of, new_study, study_from
+    from ..new import new_study, study_from
 
-    if source is not None:
-        if qe or lights or pixel:
-            raise StudyError(
-                ValidationIssue("a study that is copied has its own curves and pixel", key="--from", value=source)
-            )
-        begun = study_path(Path(source))
-        with copied((begun.parent / file, folder / file) for file in (curve_files_of(begun) if copy else ())):
-            lines = study_from(name, folder, begun)
-    elif copy:
-        with copied((file, folder / file.name) for file in (qe, lights) if file is not None):
-            qe, lights = (None if file is None else folder / file.name for file in (qe, lights))
-            lines = new_study(name, folder, qe, lights, quantity, pixel)
+    if source is None:
+        lines = new_study(name, folder, qe or [], lights or [], [quantity_of(one) for one in quantity or ()], pixel)
+    elif qe or lights or pixel:
+        raise StudyError(
+            ValidationIssue("a study that is copied has its own curves and pixel", key="--from", value=source)
+        )
     else:
-        lines = new_study(name, folder, qe, lights, quantity, pixel)
+        lines = study_from(name, folder, study_path(Path(source)))
     for line in lines:
         typer.echo(line)
 

@@ -8,7 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from ...base.types import FloatArray
-from ..files import digest, read_curves
+from ..formats import digest, read_curves
 from ..spectrum import Curves, WavelengthGrid, photons_from_energy
 
 _FOLDER = Path(__file__).parent / "measured"

@@ -1,0 +1,642 @@
+"""Rows of cells as curves: where the wavelengths are, which cells are names and units, and numbers that are cleaned.
+
+Wavelengths stand down the first column, or in one beside each curve, or along a row; a list may have them in its words.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..base.errors import DataError, ValidationIssue
+from ..base.types import FloatArray, IndexArray
+from .read_text import MISSING, Rows, Sheet, number_of
+from .spectrum import LARGEST, sample_issues
+from .units import Unit, folded, symbol_unit, unit_of
+
+WAVELENGTH = "wavelength_nm"
+"""Name of the first column of the package's own files."""
+MOST_CURVES = 2_000
+MOST_SAMPLES = 100_000
+MOST_VALUES = 2_000_000
+"""Limits of a file of curves: 2,000 curves of 1,000 samples are read in a second or two."""
+_FEWEST_ALONG = 20
+_RANGE_NM = (100.0, 20_000.0)
+_MOST_CELL_FAULTS = 10_000
+_NOISE_SHARE = 0.02
+"""Negatives up to this share of a curve's largest value are noise around 0."""
+_ALIKE_SHARE = 0.05
+"""Repeated samples that are mostly farther apart, relative to the peak, are of two spectra."""
+_WAVE = re.compile(
+    r"wave ?lengths?|wave|wvl|wl|lambda|\u03bb|wellenlange|wellenlaenge|longueurs? d'onde|longitud(es)? de onda"
+    r"|lunghezz[ae] d'onda|comprimentos? de onda"
+)
+_UNITS_NM = {
+    **dict.fromkeys(("nm", "nanometer", "nanometers", "nanometre", "nanometres"), 1.0),
+    **dict.fromkeys(("um", "micron", "microns", "micrometer", "micrometers", "micrometre"), 1e3),
+    **dict.fromkeys(("a", "angstrom", "angstroms"), 0.1),
+    "m": 1e9,
+}
+_UNIT_WORDS = {1.0: "nm", 1e3: "um", 0.1: "angstrom", 1e9: "m"}
+_NAME_AND_UNIT = re.compile(r"(.*?)[\s_/,.\-]*[\[(]?\s*([^\W\d_]+)\s*[\])]?")
+_X = re.compile(r"(.*?[\s_\-.])?x(_?\d+)?|")
+_Y = re.compile(r"(y(_?\d+)?|values?)|")
+_INDEX = ("", "#", "no", "no.", "nr", "nr.", "n", "id", "index", "row", "pixel", "unnamed: 0")
+_KEYED = re.compile(r"(.*?[^\d.\s])?\s*(\d+(?:\.\d+)?)\s*[\[(]?\s*(nm)?\s*[\])]?")
+
+
+@dataclass(frozen=True)
+class Scan:
+    """File of curves, read as far as possible.
+
+    `values`, [n_samples, n_curves]: NaN beyond the samples of a curve, and for what is none. `issues` in groups:
+    `read_curves` stops at the first.
+    """
+
+    wavelength_nm: FloatArray
+    names: tuple[str, ...]
+    values: FloatArray
+    units: tuple[Unit, ...]
+    issues: tuple[tuple[ValidationIssue, ...], ...]
+    notes: tuple[str, ...] = ()
+
+
+class _Column(NamedTuple):
+    """A curve in a table: its name, unit, and the columns of its wavelengths and values."""
+
+    name: str
+    unit: Unit
+    wave: int
+    at: int
+
+
+@dataclass
+class _Table:
+    """A table under work: rows of numbers, and of the texts above them."""
+
+    sheet: Sheet
+    head: Rows
+    body: Rows
+    width: int
+    factor_nm: float = 0.0
+    issues: list[ValidationIssue] = field(default_factory=list)
+
+    def fault(self, problem: str, line: int | None, key: str | None, value: object, allowed: str | None = None) -> None:
+        self.issues.append(ValidationIssue(problem, self.sheet.file, line, key, value, allowed))
+
+
+def curves_of(sheet: Sheet) -> Scan:
+    """Return the curves of a sheet. Raises DataError where there is no table."""
+    rows = [(line, _trimmed(cells)) for line, cells in sheet.rows]
+    sheet = replace(sheet, rows=[(line, cells) for line, cells in rows if cells])
+    table = _table_of(_down(sheet) or sheet)
+    columns = _columns(table)
+    check_size(sheet.file, None, len(table.body), len(columns))
+    numbers, bad = _numbers(table, {at for column in columns for at in (column.wave, column.at)})
+    return _scan(table, columns, numbers, bad)
+
+
+def _trimmed(cells: list[str]) -> list[str]:
+    cells = [cell.strip() for cell in cells]
+    while cells and not cells[-1]:
+        cells.pop()
+    return cells
+
+
+def _number(cell: str, decimal: str) -> float | None:
+    """Return a number, also one with a percent sign; NaN for a missing one; None for a text."""
+    if cell.casefold() in MISSING:
+        return np.nan
+    return number_of(cell.replace(decimal, ".").rstrip("%").rstrip())
+
+
+def _rising(values: Sequence[float | None]) -> bool:
+    """Return whether numbers rise or fall within the range of wavelengths in nm."""
+    known = np.array([np.nan if value is None else value for value in values])
+    steps = np.diff(known)
+    inside = (known >= _RANGE_NM[0]) & (known <= _RANGE_NM[1])
+    return bool(known.size > 1 and inside.all() and ((steps > 0).all() or (steps < 0).all()))
+
+
+def _down(sheet: Sheet) -> Sheet | None:
+    """Return a sheet with wavelengths along a row, or in the words of a list, turned; None for others."""
+    for index, (line, cells) in enumerate(sheet.rows):
+        plain = [_KEYED.fullmatch(cell.replace(sheet.decimal, ".")) for cell in cells]
+        at_number = [at for at, match in enumerate(plain) if match is not None]
+        if len(at_number) < _FEWEST_ALONG:
+            continue
+        run = max(np.split(at_number, 1 + np.flatnonzero(np.diff(at_number) != 1)), key=len)
+        waves = [float(match[2]) for at in run if (match := plain[at]) is not None]
+        at, below = int(run[0]), sheet.rows[index + 1 :]
+        if len(waves) < _FEWEST_ALONG or not _rising(waves) or not below or _is_down(sheet, cells, below, at):
+            break
+        turned = [(line, [WAVELENGTH, *(_row_name(row[:at], sheet, k) for k, (_, row) in enumerate(below, 1))])]
+        for column, wave in zip(run, waves, strict=True):
+            values = [row[column] if column < len(row) else "" for _, row in below]
+            turned.append((line, [f"{wave:.12g}".replace(".", sheet.decimal), *values]))
+        if (longest := max(below, key=lambda row: len(row[1])))[1][len(cells) :]:
+            problem = ValidationIssue(
+                "wrong number of columns", sheet.file, longest[0], None, len(longest[1]), str(len(cells))
+            )
+            raise DataError(problem)
+        notes = [*sheet.notes, "wavelengths are along a row: the table was turned"]
+        remarks = [*sheet.remarks, *(" ".join(row) for _, row in sheet.rows[:index])]
+        return replace(sheet, rows=turned, notes=notes, remarks=remarks)
+    return _listed(sheet)
+
+
+def _is_down(sheet: Sheet, head: Sequence[str], below: Rows, at: int) -> bool:
+    """Return whether numbers in a head are names, since wavelengths stand down the column before them.
+
+    Raises DataError where both may be wavelengths.
+    """
+    before = max(at - 1, 0)
+    column = [_number(row[before], sheet.decimal) if before < len(row) else None for _, row in below]
+    if len(column) < 3 or not _rising(column):
+        return False
+    if at and not head[before]:
+        raise DataError(
+            ValidationIssue("wavelengths down or along?", sheet.file, below[0][0], allowed=f"a head `{WAVELENGTH}`")
+        )
+    return at == 0 or _wave_unit(head[before]) is not None
+
+
+def _row_name(cells: Sequence[str], sheet: Sheet, number: int) -> str:
+    """Return the name of a row: its texts before the numbers, else its number."""
+    texts = [cell for cell in cells if cell and _number(cell, sheet.decimal) is None]
+    return " ".join(texts) or (cells[0] if cells and cells[0] else f"curve_{number}")
+
+
+def _listed(sheet: Sheet) -> Sheet | None:
+    """Return a list of `Spectral Data 380[nm],0.001` as a table."""
+    series: dict[str, list[tuple[int, list[str]]]] = {}
+    names: list[str] = []
+    for line, cells in sheet.rows:
+        match = _KEYED.fullmatch(cells[0])
+        if match is not None and match[1] and len(cells) > 1 and _number(cells[1], sheet.decimal) is not None:
+            series.setdefault(match[1], []).append((line, [match[2], *cells[1:]]))
+        elif folded(cells[0]) in ("title", "name", "sample", "sample name", "titel") and len(cells) > 1:
+            names = cells[1:]
+    found = [
+        rows for rows in series.values() if len(rows) >= _FEWEST_ALONG and _rising([float(row[0]) for _, row in rows])
+    ]
+    if not found:
+        return None
+    rows = max(found, key=len)
+    count = max(len(row) for _, row in rows) - 1
+    names = (
+        names
+        if len(names) == count
+        else [sheet.name or "values"]
+        if count == 1
+        else [f"curve_{k + 1}" for k in range(count)]
+    )
+    table = [
+        (rows[0][0], [WAVELENGTH, *names]),
+        *((n, [row[0].replace(".", sheet.decimal), *row[1:]]) for n, row in rows),
+    ]
+    others = [" ".join(cells) for _, cells in sheet.rows if _KEYED.fullmatch(cells[0]) is None]
+    note = "wavelengths are in the words of a list"
+    return replace(sheet, rows=table, notes=[*sheet.notes, note], remarks=[*sheet.remarks, *others])
+
+
+def _table_of(sheet: Sheet) -> _Table:
+    """Split a sheet into the rows of numbers and the texts above them. DataError for none, or two tables."""
+    shares = []
+    for _, cells in sheet.rows:
+        numbers = [_number(cell, sheet.decimal) for cell in cells]
+        given = [number for number in numbers if number is None or not np.isnan(number)]
+        count = sum(number is not None for number in given)
+        shares.append((count, count / max(len(given), 1)))
+    whole = [at for at, (count, share) in enumerate(shares) if count > 1 and share == 1]
+    empty = ValidationIssue(
+        "no rows of numbers", sheet.file, allowed="a header `wavelength_nm,...` and rows of numbers"
+    )
+    if not whole:
+        if sheet.rows and len(sheet.rows[0][1]) == 1 and _wave_unit(sheet.rows[0][1][0]) is not None:
+            raise DataError(
+                ValidationIssue(
+                    "the file has no curve",
+                    sheet.file,
+                    sheet.rows[0][0],
+                    allowed="one column or more beside the wavelength",
+                )
+            )
+        raise DataError(empty)
+    blocks: list[list[int]] = [[]]
+    for at in range(whole[0], whole[-1] + 1):
+        if shares[at][0] == 0 and len(sheet.rows[at][1]) == 1:
+            blocks.append([])
+        else:
+            blocks[-1].append(at)
+    block = max(blocks, key=lambda rows: sum(shares[at][1] == 1 for at in rows))
+    others = [rows for rows in blocks if rows is not block and 5 * len(rows) > len(block) and len(rows) > 1]
+    if others:
+        line = sheet.rows[others[0][0]][0]
+        raise DataError(ValidationIssue("two tables in one file", sheet.file, line, allowed="one table"))
+    first, last = block[0], block[-1]
+    while first and shares[first - 1][1] >= 0.5 and not _is_head(sheet.rows[first - 1][1]):
+        first -= 1
+    while last + 1 < len(sheet.rows) and shares[last + 1][1] >= 0.5:
+        last += 1
+    body = sheet.rows[first : last + 1]
+    widths = [len(cells) for _, cells in body]
+    width = max(set(widths), key=widths.count)
+    table = _Table(sheet, sheet.rows[:first], body, width)
+    if table.head and len(table.head[-1][1]) > width and any(_wave_unit(c) is not None for c in table.head[-1][1]):
+        table.width = len(table.head[-1][1])  # columns that are empty at the end of rows
+    return table
+
+
+def _is_head(cells: Sequence[str]) -> bool:
+    return any(_wave_unit(cell) is not None for cell in cells) or not cells[0]
+
+
+def _wave_unit(cell: str) -> float | None:
+    """Return the factor from wavelengths under a head to nm; 0 without a unit; None if it is none of wavelengths."""
+    text = folded(cell.replace("\u212b", "a").replace("\u00c5", "a").replace("\u00e5", "a")).replace("_", " ")
+    if _WAVE.fullmatch(text):
+        return 0.0
+    match = _NAME_AND_UNIT.fullmatch(text)
+    if match is None or match[2] not in _UNITS_NM or (not match[1] and len(match[2]) == 1):
+        return None
+    return _UNITS_NM[match[2]] if not match[1] or _WAVE.fullmatch(match[1].strip()) else None
+
+
+def _columns(table: _Table) -> list[_Column]:
+    """Return the curves of a table from its heads, units and numbers; adds issues where they are unclear."""
+    sheet, units = table.sheet, [""] * table.width
+    head = list(table.head)
+    if head and len(head[-1][1]) <= table.width and _is_unit_row(head[-1][1], len(head) > 1):
+        cells = head.pop()[1]
+        units[: len(cells)] = [cell.strip("[]()") for cell in cells]
+        sheet.notes.append("a row of units was read")
+    line, names = _names(table, head)
+    waves = [_wave_unit(cell) if cell else None for cell in names]
+    waves = [_UNITS_NM.get(folded(units[at]), 0.0) if wave == 0 else wave for at, wave in enumerate(waves)]
+    if any(units) and not any(wave is not None for wave in waves):
+        waves = [_UNITS_NM.get(folded(unit)) for unit in units]
+    series = [
+        [_number(row[at], sheet.decimal) if at < len(row) else np.nan for _, row in table.body]
+        for at in range(table.width)
+    ]
+    at_x = [at for at, wave in enumerate(waves) if wave is not None] or _unnamed_waves(table, names, series)
+    if not at_x:
+        first = names[0] if names else ""
+        table.issues.append(
+            ValidationIssue(
+                "no column wavelength", sheet.file, line, first, first, f"`{WAVELENGTH}` as the first column"
+            )
+        )
+        at_x = [0]
+    table.factor_nm = waves[at_x[0]] or 0.0
+    if len({waves[at] or 0.0 for at in at_x}) > 1:
+        table.fault("wavelengths in two units", line, None, [names[at] for at in at_x])
+    titled = head[-1][1] if head and len(at_x) > 1 else []
+    if names and (names[at_x[0]] != WAVELENGTH or at_x[0]) and waves[at_x[0]] is not None:
+        sheet.notes.append(f"wavelengths are column {names[at_x[0]]!r}")
+    if len(at_x) > 1:
+        sheet.notes.append(f"each curve has wavelengths of its own: {len(at_x)} pairs of columns")
+    whole = _table_unit(table, head)
+    columns: list[_Column] = []
+    others = [at for at in range(table.width) if at not in at_x]
+    index = [at for at in others if len(at_x) == 1 and _counts(names, series, at, at_x[0])]
+    if index:
+        sheet.notes.append("a column that counts the rows was left out")
+    for at in others:
+        if at in index:
+            continue
+        wave = max((x for x in at_x if x < at), default=at_x[0])
+        stated = symbol_unit(units[at]) or Unit(units[at], unclear="has an unknown unit" if units[at] else "")
+        name = _curve_name(names, titled, wave, at, len(at_x) > 1) or (
+            "" if names else _made_name(table, len(columns), at_x)
+        )
+        unit = unit_of(name) if not names or names[at] == name else unit_of(names[at]).over(unit_of(name))
+        columns.append(_Column(name, unit.over(stated).over(whole), wave, at))
+    _check_names(table, line, names, columns, numbered=len(at_x) > 1)
+    return _numbered(columns) if len(at_x) > 1 else columns
+
+
+def _made_name(table: _Table, before: int, at_x: Sequence[int]) -> str:
+    return (table.sheet.name or "values") if table.width - len(at_x) == 1 else f"curve_{before + 1}"
+
+
+def _is_unit_row(cells: Sequence[str], below_head: bool) -> bool:
+    """Return whether a row holds units alone, one of them of wavelengths, below a row of names."""
+    given = [cell.strip("[]() ") for cell in cells if cell.strip("[]() ")]
+    known = [folded(cell) in _UNITS_NM or symbol_unit(cell) is not None for cell in given]
+    return below_head and bool(given) and all(known) and any(folded(cell) in _UNITS_NM for cell in given)
+
+
+def _names(table: _Table, head: Rows) -> tuple[int | None, list[str]]:
+    """Take the row of names from the rows above the numbers; the others are titles."""
+    sheet = table.sheet
+    named = next(
+        (at for at in reversed(range(len(head))) if any(_wave_unit(cell) is not None for cell in head[at][1])), None
+    )
+    if named is None and head and 1 < len(head[-1][1]) <= table.width:
+        named = len(head) - 1
+    if named is None:
+        if head:
+            sheet.notes.append(_titles(len(head)))
+        sheet.notes.append("there is no header: the first column was taken for wavelengths")
+        return None, []
+    line, names = head[named]
+    if len(names) > table.width or (len(names) == 1 < table.width and len(head) == 1):
+        table.fault("wrong number of columns", table.body[0][0], None, table.width, str(len(names)))
+    del head[named:]
+    if head and not (len(head[-1][1]) > 1 and sum(_wave_unit(cell) is not None for cell in names) > 1):
+        sheet.notes.append(_titles(len(head)))
+    return line, [*names, *[""] * (table.width - len(names))][: table.width]
+
+
+def _titles(count: int) -> str:
+    return f"{count} title {'line was' if count == 1 else 'lines were'} left out"
+
+
+def _unnamed_waves(table: _Table, names: Sequence[str], series: Sequence[Sequence[float | None]]) -> list[int]:
+    """Return the columns of wavelengths that no word tells: every second one, or the first."""
+
+    def like(at: int) -> bool:
+        values = [value for value in series[at] if value is None or not np.isnan(value)]
+        return len(values) > 1 and all(value is not None for value in values)
+
+    def rises(at: int) -> bool:
+        return like(at) and _rising([value for value in series[at] if value is None or not np.isnan(value)])
+
+    even = range(0, table.width, 2)
+    if table.width % 2 == 0 and table.width > 2:
+        if (
+            names
+            and all(_X.fullmatch(folded(names[at])) for at in even)
+            and all(names[at] for at in even)
+            and all(map(like, even))
+        ):
+            return [*even]
+        if all(map(rises, even)) and not all(map(rises, range(1, table.width, 2))):
+            return [*even]
+    if not names and table.width > 2 and _counting(series[0]) and rises(1):
+        return [1]
+    return [0] if (not names or _X.fullmatch(folded(names[0]))) else []
+
+
+def _counting(values: Sequence[float | None]) -> bool:
+    known = list(values)
+    return len(known) > 1 and any(known == [float(at + start) for at in range(len(known))] for start in (0, 1))
+
+
+def _counts(names: Sequence[str], series: Sequence[Sequence[float | None]], at: int, wave: int) -> bool:
+    """Return whether a column holds the numbers of the rows: it has no name, or is called so."""
+    named = not names or folded(names[at]) in _INDEX
+    return named and _counting(series[at]) and (at < wave or not names or not names[at])
+
+
+def _table_unit(table: _Table, head: Rows) -> Unit:
+    """Return the unit that the format, a title or a comment states for all columns."""
+    if table.sheet.unit:
+        return symbol_unit(table.sheet.unit) or unit_of(table.sheet.unit)
+    found = []
+    for text in (*table.sheet.remarks, *(" ".join(cells) for _, cells in head)):
+        parts = re.findall(r"[\[(][^\[\]]*[\])]|(?:unit|einheit|unite)s?\s*[:=]\s*\S.*", text, re.IGNORECASE)
+        units = [symbol_unit(re.sub(r"^.*?[:=]\s*", "", part).strip("[]() ")) for part in parts]
+        found += [unit_of(text) for unit in units if unit is not None and unit.quantity is not None]
+    if len({(unit.quantity, unit.factor) for unit in found}) > 1:
+        return Unit("titles", unclear="contradicts itself")
+    return found[0] if found else Unit()
+
+
+def _curve_name(names: Sequence[str], titled: Sequence[str], wave: int, at: int, pairs: bool) -> str:
+    """Return the name of a column: its head, or of a pair the text above it."""
+    head = names[at] if names else ""
+    if not pairs:
+        return head
+    above = next((titled[k] for k in (wave, at) if k < len(titled) and titled[k]), "")
+    if above:
+        return above
+    stem = re.sub(r"[\s_\-.]*\by\b|_y$", "", head, flags=re.IGNORECASE).strip()
+    return "" if _Y.fullmatch(folded(head)) else stem or head
+
+
+def _check_names(
+    table: _Table, line: int | None, names: Sequence[str], columns: Sequence[_Column], *, numbered: bool
+) -> None:
+    file = table.sheet.file
+    if not columns:
+        table.issues.append(
+            ValidationIssue("the file has no curve", file, line, allowed="one column or more beside the wavelength")
+        )
+    if numbered or not names or table.issues:
+        return
+    twice = [column.name for at, column in enumerate(columns) if column.name in [other.name for other in columns[:at]]]
+    table.issues += [ValidationIssue("column occurs twice", file, line, name) for name in twice if name]
+    if any(not column.name for column in columns):
+        table.issues.append(ValidationIssue("a column has no name", file, line, value=list(names)))
+
+
+def _numbered(columns: Sequence[_Column]) -> list[_Column]:
+    """Give columns without a name of their own numbers."""
+    known: list[_Column] = []
+    for number, column in enumerate(columns, 1):
+        name = (
+            column.name
+            if column.name and column.name not in [one.name for one in known]
+            else f"{column.name or 'curve'}_{number}"
+        )
+        known.append(column._replace(name=name))
+    return known
+
+
+def _numbers(table: _Table, used: set[int]) -> tuple[FloatArray, set[int]]:
+    """Return the numbers of a table, [n_rows, width], NaN for missing ones, and the columns with faults."""
+    values, bad = np.full((len(table.body), table.width), np.nan), set[int]()
+    names = table.head[-1][1] if table.head else []
+    percent = dict.fromkeys(used, 0)
+    for index, (line, row) in enumerate(table.body):
+        if len(table.issues) >= _MOST_CELL_FAULTS:
+            table.fault("too many errors; the rest was not read", line, None, None)
+            break
+        if len(row) > table.width:
+            table.fault("wrong number of columns", line, None, len(row), str(table.width))
+            bad |= used
+            continue
+        for at in used:
+            cell = row[at] if at < len(row) else ""
+            number = _number(cell, table.sheet.decimal)
+            if number is None or number > LARGEST:
+                problem = "not a usable number" if number is None else "value too large"
+                comma = "; a decimal comma? use a point" if re.fullmatch(r"[+-]?\d*,\d+", cell) else ""
+                key = names[at] if at < len(names) else None
+                table.fault(
+                    problem, line, key, cell, f"a finite number{comma}" if number is None else f"0 to {LARGEST:g}"
+                )
+                bad.add(at)
+            else:
+                values[index, at] = number
+                percent[at] += cell.endswith("%")
+    for at, count in percent.items():
+        given = int(np.isfinite(values[:, at]).sum())
+        if 0 < count < given:
+            table.fault(
+                "some values have percent signs",
+                None,
+                names[at] if at < len(names) else None,
+                f"{count} of {given}",
+                "all or none",
+            )
+    signed = [at for at, count in percent.items() if count]
+    if signed:
+        values[:, signed] *= 0.01
+        table.sheet.notes.append("values have percent signs, and were divided by 100")
+    return values, bad
+
+
+def _scan(table: _Table, columns: Sequence[_Column], numbers: FloatArray, bad: set[int]) -> Scan:
+    """Bring curves to nm, order and common wavelengths, and clean them of what has one meaning."""
+    sheet = table.sheet
+    factor = table.factor_nm
+    waves = {column.wave: numbers[:, column.wave] for column in columns}
+    if not factor and waves:
+        largest = max((float(np.nanmax(wave)) for wave in waves.values() if np.isfinite(wave).any()), default=0.0)
+        factor = 1e9 if 0 < largest < 1e-4 else 1e3 if 0 < largest < 20 else 1.0
+        sheet.notes.append(f"wavelengths have no unit, and were taken for {_UNIT_WORDS[factor]} by their size")
+    elif factor != 1:
+        sheet.notes.append(f"wavelengths in {_UNIT_WORDS[factor]} were brought to nm")
+    nm = {at: wave if factor == 1 else np.round(wave * factor, 6) for at, wave in waves.items()}
+    cleaner = _Cleaner(table, {})
+    curves = []
+    for column in columns:
+        wave, values = nm[column.wave], numbers[:, column.at]
+        faulty = bool(bad & {column.wave, column.at})
+        if (np.isnan(wave) & np.isfinite(values)).any() and not faulty:
+            row = int(np.flatnonzero(np.isnan(wave) & np.isfinite(values))[0])
+            table.fault("a value without a wavelength", table.body[row][0], column.name, float(values[row]))
+        curves.append(cleaner.cleaned(column, wave, values, faulty=faulty))
+    sheet.notes.extend(
+        f"{', '.join(names[:5])}{f' and {len(names) - 5} more' if names[5:] else ''}: {note}" if names[0] else note
+        for note, names in cleaner.said.items()
+    )
+    grid = np.unique(np.concatenate([wave for wave, _ in curves])) if curves else np.empty(0)
+    check_size(sheet.file, None, grid.size, len(curves))
+    values = np.full((grid.size, len(curves)), np.nan)
+    for at, (wave, own) in enumerate(curves):
+        if wave.size:
+            values[:, at] = own if wave.size == grid.size else np.interp(grid, wave, own, np.nan, np.nan)
+    names = tuple(column.name for column in columns)
+    signed = {at for at, column in enumerate(columns) if column.unit.quantity == "decibel"}
+    groups = [table.issues] if table.issues else sample_issues(sheet.file, grid, names, values, signed)
+    return Scan(
+        grid,
+        names,
+        values,
+        tuple(c.unit for c in columns),
+        tuple(map(tuple, groups)),
+        tuple(dict.fromkeys(sheet.notes)),
+    )
+
+
+@dataclass
+class _Cleaner:
+    """Repairs that have one meaning, with a note for each; adds an issue for anything else."""
+
+    table: _Table
+    said: dict[str, list[str]]
+
+    def _note(self, name: str, note: str) -> None:
+        self.said.setdefault(note, []).append(name)
+
+    def cleaned(
+        self, column: _Column, wave: FloatArray, values: FloatArray, *, faulty: bool
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return samples in rising order, each wavelength once, without gaps and without negatives."""
+        known = np.isfinite(wave)
+        order = np.flatnonzero(known)[np.argsort(wave[known], kind="stable")]
+        steps = np.diff(wave[known])
+        if (steps < 0).all() and steps.size:
+            self._note("", "falling wavelengths were turned round")
+        elif (steps < 0).any():
+            self._note("", "rows were sorted by wavelength")
+        wave, values = wave[order], values[order].copy()
+        if faulty:
+            wave, values = wave[np.isfinite(values)], values[np.isfinite(values)]
+        wave, values = self._averaged(column, wave, values)
+        wave, values = self._without_gaps(column, wave, values)
+        low = values < 0
+        if low.any() and column.unit.quantity != "decibel":
+            if -values.min() <= _NOISE_SHARE * values.max():
+                self._note(column.name, f"negatives of noise, down to {values.min():.3g}, were set to 0")
+                values[low] = 0.0
+            elif not faulty:
+                at = int(np.argmin(values))
+                self.table.fault(
+                    f"negative value at {wave[at]:g} nm",
+                    None,
+                    column.name,
+                    float(values[at]),
+                    ">= 0, or noise of up to 2 % of the peak",
+                )
+        return wave, values
+
+    def _averaged(self, column: _Column, wave: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Average samples at one wavelength; two spectra one after the other are an issue."""
+        unique, first, counts = np.unique(wave, return_index=True, return_counts=True)
+        if unique.size == wave.size:
+            return wave, values
+        with np.errstate(invalid="ignore"):
+            known = np.isfinite(values)
+            index = np.repeat(np.arange(unique.size), counts)
+            total, number = (np.bincount(index[known], weights, unique.size) for weights in (values[known], None))
+            mean = np.divide(total, number, out=np.full(unique.size, np.nan), where=number > 0)
+            spread = np.maximum.reduceat(np.where(known, np.abs(values - mean[index]), 0.0), first)
+        apart = (counts > 1) & (spread > _ALIKE_SHARE / 2 * np.nanmax(np.abs(values), initial=0.0))
+        if 4 * np.count_nonzero(apart) > unique.size:
+            at = float(unique[np.argmax(apart)])
+            self.table.fault(
+                "wavelengths occur twice, with other values", None, column.name, at, "one spectrum in a column"
+            )
+        repeated = int(np.count_nonzero(counts > 1))
+        self._note(
+            "", f"samples at the same wavelength were averaged, at {repeated} wavelength{'s' if repeated > 1 else ''}"
+        )
+        return unique, mean
+
+    def _without_gaps(self, column: _Column, wave: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Drop missing values at the ends, and fill one between two samples by a straight line."""
+        known: IndexArray = np.flatnonzero(np.isfinite(values))
+        if known.size == values.size or not known.size:
+            return wave[known], values[known]
+        inside = slice(known[0], known[-1] + 1)
+        if inside != slice(0, values.size):
+            self._note(column.name, f"there are no values beyond {wave[known[0]]:g} to {wave[known[-1]]:g} nm")
+        wave, values = wave[inside], values[inside]
+        gaps = np.flatnonzero(~np.isfinite(values))
+        if (np.diff(gaps) == 1).any():
+            at = gaps[:-1][np.diff(gaps) == 1][0]
+            self.table.fault(
+                "several values in a row are missing",
+                None,
+                column.name,
+                f"from {wave[at]:g} nm on",
+                "at most one between two",
+            )
+        for at in gaps:
+            filled = np.interp(wave[at], wave[np.isfinite(values)], values[np.isfinite(values)])
+            self._note(column.name, f"the missing value at {wave[at]:g} nm is {filled:.6g}, by a straight line")
+            values[at] = filled
+        return wave, values
+
+
+def check_size(file: str, line: int | None, n_samples: int, n_curves: int) -> None:
+    """Raise DataError for a table that would take minutes to read."""
+    for what, count, most in (
+        ("curves", n_curves, MOST_CURVES),
+        ("samples", n_samples, MOST_SAMPLES),
+        ("values", n_samples * n_curves, MOST_VALUES),
+    ):
+        if count > most:
+            raise DataError(
+                ValidationIssue(f"too many {what} in one file", file, line, None, count, f"at most {most:,}")
+            )
