@@ -158,7 +158,7 @@ def one_line(*said: str, alone: bool = True) -> Iterator[None]:
 
 
 def made(folder: Path, name: str = "mine", qe: Path | None = None, lights: Path | None = None) -> Path:
-    new_study(name, folder / "studies", qe, lights, "energy")
+    new_study(name, folder / "studies", [qe] if qe else [], [lights] if lights else [])
     return folder / "studies" / f"{name}.yaml"
 
 

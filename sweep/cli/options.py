@@ -11,7 +11,6 @@ from typing import Annotated, Any
 import typer
 
 from ..base.errors import StudyError, ValidationIssue, nearest
-from ..spectra.units import FITTING
 
 OF_STUDIES = "Studies"
 OF_RESULTS = "Results"
@@ -31,6 +30,8 @@ class ExportFormat(StrEnum):
 
 def quantity_of(word: str | None) -> Any:
     """Return a unit that is stated on the command line. Raises StudyError for an unknown one."""
+    from ..spectra.units import FITTING  # noqa: PLC0415  (heavy imports stay out of --help)
+
     known = [quantity for of_use in FITTING.values() for quantity in of_use]
     if word is not None and word not in known:
         raise StudyError(

@@ -56,7 +56,7 @@ def read_chief_rays(path: Path, corner_mm: float | None = None) -> ChiefRays:
     DataError
         If the file cannot be read or is not clean, with file, line, column and value.
     """
-    table = text_sheet(path)
+    table = text_sheet(path, f"a header `{_FIRST},...` and rows of numbers")
     unit, column = _columns(table)
     names = [_FIRST.replace("mm", unit), table.rows[0][1][column]]
     if len(table.rows) - 1 > _MOST_ROWS:

@@ -46,6 +46,7 @@ _NAME_AND_UNIT = re.compile(r"(.*?)[\s_/,.\-]*[\[(]?\s*([^\W\d_]+)\s*[\])]?")
 _X = re.compile(r"(.*?[\s_\-.])?x(_?\d+)?|")
 _Y = re.compile(r"(y(_?\d+)?|values?)|")
 _INDEX = ("", "#", "no", "no.", "nr", "nr.", "n", "id", "index", "row", "pixel", "unnamed: 0")
+_TITLE = "a title"
 _KEYED = re.compile(r"(.*?[^\d.\s])?\s*(\d+(?:\.\d+)?)\s*[\[(]?\s*(nm)?\s*[\])]?")
 
 
@@ -81,6 +82,7 @@ class _Table:
     sheet: Sheet
     head: Rows
     body: Rows
+    parsed: list[list[float | None]]
     width: int
     factor_nm: float = 0.0
     issues: list[ValidationIssue] = field(default_factory=list)
@@ -91,20 +93,15 @@ class _Table:
 
 def curves_of(sheet: Sheet) -> Scan:
     """Return the curves of a sheet. Raises DataError where there is no table."""
-    rows = [(line, _trimmed(cells)) for line, cells in sheet.rows]
-    sheet = replace(sheet, rows=[(line, cells) for line, cells in rows if cells])
+    width = max((at + 1 for _, cells in sheet.rows for at, cell in enumerate(cells) if cell), default=0)
+    if any(len(cells) > width for _, cells in sheet.rows):
+        sheet.notes.append("empty columns at the end were left out")
+    sheet = replace(sheet, rows=[(line, cells[:width]) for line, cells in sheet.rows])
     table = _table_of(_down(sheet) or sheet)
     columns = _columns(table)
     check_size(sheet.file, None, len(table.body), len(columns))
-    numbers, bad = _numbers(table, {at for column in columns for at in (column.wave, column.at)})
+    numbers, bad = _numbers(table, columns)
     return _scan(table, columns, numbers, bad)
-
-
-def _trimmed(cells: list[str]) -> list[str]:
-    cells = [cell.strip() for cell in cells]
-    while cells and not cells[-1]:
-        cells.pop()
-    return cells
 
 
 def _number(cell: str, decimal: str) -> float | None:
@@ -158,11 +155,11 @@ def _is_down(sheet: Sheet, head: Sequence[str], below: Rows, at: int) -> bool:
     column = [_number(row[before], sheet.decimal) if before < len(row) else None for _, row in below]
     if len(column) < 3 or not _rising(column):
         return False
-    if at and not head[before]:
-        raise DataError(
-            ValidationIssue("wavelengths down or along?", sheet.file, below[0][0], allowed=f"a head `{WAVELENGTH}`")
-        )
-    return at == 0 or _wave_unit(head[before]) is not None
+    worded = at > 0 and _wave_unit(head[before]) is not None
+    if at and (not head[before] or (worded and len(column) < _FEWEST_ALONG)):
+        allowed = "names that are no numbers"
+        raise DataError(ValidationIssue("wavelengths down or along?", sheet.file, below[0][0], allowed=allowed))
+    return at == 0 or worded
 
 
 def _row_name(cells: Sequence[str], sheet: Sheet, number: int) -> str:
@@ -206,13 +203,13 @@ def _listed(sheet: Sheet) -> Sheet | None:
 
 def _table_of(sheet: Sheet) -> _Table:
     """Split a sheet into the rows of numbers and the texts above them. DataError for none, or two tables."""
+    parsed = [[_number(cell, sheet.decimal) for cell in cells] for _, cells in sheet.rows]
     shares = []
-    for _, cells in sheet.rows:
-        numbers = [_number(cell, sheet.decimal) for cell in cells]
-        given = [number for number in numbers if number is None or not np.isnan(number)]
-        count = sum(number is not None for number in given)
-        shares.append((count, count / max(len(given), 1)))
+    for numbers in parsed:
+        count = sum(number is not None and number == number for number in numbers)  # noqa: PLR0124  (NaN: missing)
+        shares.append((count, count / max(count + sum(number is None for number in numbers), 1)))
     whole = [at for at, (count, share) in enumerate(shares) if count > 1 and share == 1]
+    whole = whole or [at for at, (count, share) in enumerate(shares) if count > 1 and share >= 0.5]
     empty = ValidationIssue(
         "no rows of numbers", sheet.file, allowed="a header `wavelength_nm,...` and rows of numbers"
     )
@@ -246,7 +243,7 @@ def _table_of(sheet: Sheet) -> _Table:
     body = sheet.rows[first : last + 1]
     widths = [len(cells) for _, cells in body]
     width = max(set(widths), key=widths.count)
-    table = _Table(sheet, sheet.rows[:first], body, width)
+    table = _Table(sheet, sheet.rows[:first], body, parsed[first : last + 1], width)
     if table.head and len(table.head[-1][1]) > width and any(_wave_unit(c) is not None for c in table.head[-1][1]):
         table.width = len(table.head[-1][1])  # columns that are empty at the end of rows
     return table
@@ -276,14 +273,11 @@ def _columns(table: _Table) -> list[_Column]:
         units[: len(cells)] = [cell.strip("[]()") for cell in cells]
         sheet.notes.append("a row of units was read")
     line, names = _names(table, head)
-    waves = [_wave_unit(cell) if cell else None for cell in names]
+    waves = [_wave_unit(cell) if cell else None for cell in names or [""] * table.width]
     waves = [_UNITS_NM.get(folded(units[at]), 0.0) if wave == 0 else wave for at, wave in enumerate(waves)]
     if any(units) and not any(wave is not None for wave in waves):
         waves = [_UNITS_NM.get(folded(unit)) for unit in units]
-    series = [
-        [_number(row[at], sheet.decimal) if at < len(row) else np.nan for _, row in table.body]
-        for at in range(table.width)
-    ]
+    series = [[row[at] if at < len(row) else np.nan for row in table.parsed] for at in range(table.width)]
     at_x = [at for at, wave in enumerate(waves) if wave is not None] or _unnamed_waves(table, names, series)
     if not at_x:
         first = names[0] if names else ""
@@ -293,8 +287,8 @@ def _columns(table: _Table) -> list[_Column]:
             )
         )
         at_x = [0]
-    table.factor_nm = waves[at_x[0]] or 0.0
-    if len({waves[at] or 0.0 for at in at_x}) > 1:
+    table.factor_nm = (waves[at_x[0]] if waves else 0.0) or 0.0
+    if len({waves[at] or 0.0 for at in at_x if waves}) > 1:
         table.fault("wavelengths in two units", line, None, [names[at] for at in at_x])
     titled = head[-1][1] if head and len(at_x) > 1 else []
     if names and (names[at_x[0]] != WAVELENGTH or at_x[0]) and waves[at_x[0]] is not None:
@@ -316,7 +310,15 @@ def _columns(table: _Table) -> list[_Column]:
             "" if names else _made_name(table, len(columns), at_x)
         )
         unit = unit_of(name) if not names or names[at] == name else unit_of(names[at]).over(unit_of(name))
-        columns.append(_Column(name, unit.over(stated).over(whole), wave, at))
+        unit = unit.over(stated)
+        columns.append(
+            _Column(
+                name,
+                unit if unit.quantity and not whole.factor and whole.words == _TITLE else unit.over(whole),
+                wave,
+                at,
+            )
+        )
     _check_names(table, line, names, columns, numbered=len(at_x) > 1)
     return _numbered(columns) if len(at_x) > 1 else columns
 
@@ -399,14 +401,17 @@ def _table_unit(table: _Table, head: Rows) -> Unit:
     """Return the unit that the format, a title or a comment states for all columns."""
     if table.sheet.unit:
         return symbol_unit(table.sheet.unit) or unit_of(table.sheet.unit)
-    found = []
-    for text in (*table.sheet.remarks, *(" ".join(cells) for _, cells in head)):
+    found: list[Unit] = []
+    texts = [*table.sheet.remarks, *(" ".join(cells) for _, cells in head)]
+    for text in texts:
         parts = re.findall(r"[\[(][^\[\]]*[\])]|(?:unit|einheit|unite)s?\s*[:=]\s*\S.*", text, re.IGNORECASE)
         units = [symbol_unit(re.sub(r"^.*?[:=]\s*", "", part).strip("[]() ")) for part in parts]
-        found += [unit_of(text) for unit in units if unit is not None and unit.quantity is not None]
-    if len({(unit.quantity, unit.factor) for unit in found}) > 1:
-        return Unit("titles", unclear="contradicts itself")
-    return found[0] if found else Unit()
+        found += [unit for unit in units if unit is not None and (unit.quantity or unit.factor == 0.01)]
+    if not found:
+        words = {unit_of(text).quantity for text in texts} - {None}
+        return Unit(_TITLE, next(iter(words))) if len(words) == 1 else Unit()
+    several = len({(unit.quantity, unit.factor) for unit in found}) > 1
+    return Unit("titles", unclear="contradicts itself") if several else found[0]
 
 
 def _curve_name(names: Sequence[str], titled: Sequence[str], wave: int, at: int, pairs: bool) -> str:
@@ -450,43 +455,37 @@ def _numbered(columns: Sequence[_Column]) -> list[_Column]:
     return known
 
 
-def _numbers(table: _Table, used: set[int]) -> tuple[FloatArray, set[int]]:
+def _numbers(table: _Table, columns: Sequence[_Column]) -> tuple[FloatArray, set[int]]:
     """Return the numbers of a table, [n_rows, width], NaN for missing ones, and the columns with faults."""
+    keys = {column.wave: WAVELENGTH for column in columns} | {column.at: column.name for column in columns}
     values, bad = np.full((len(table.body), table.width), np.nan), set[int]()
-    names = table.head[-1][1] if table.head else []
-    percent = dict.fromkeys(used, 0)
-    for index, (line, row) in enumerate(table.body):
+    percent = dict.fromkeys(keys, 0)
+    waves = {column.wave for column in columns}
+    pairs = waves if len(waves) > 1 else set()  # rows may end after any of several curves
+    for index, ((line, row), parsed) in enumerate(zip(table.body, table.parsed, strict=True)):
         if len(table.issues) >= _MOST_CELL_FAULTS:
             table.fault("too many errors; the rest was not read", line, None, None)
             break
-        if len(row) > table.width:
+        if len(row) != table.width and len(row) not in pairs:
             table.fault("wrong number of columns", line, None, len(row), str(table.width))
-            bad |= used
+            bad |= keys.keys()
             continue
-        for at in used:
-            cell = row[at] if at < len(row) else ""
-            number = _number(cell, table.sheet.decimal)
-            if number is None or number > LARGEST:
-                problem = "not a usable number" if number is None else "value too large"
-                comma = "; a decimal comma? use a point" if re.fullmatch(r"[+-]?\d*,\d+", cell) else ""
-                key = names[at] if at < len(names) else None
-                table.fault(
-                    problem, line, key, cell, f"a finite number{comma}" if number is None else f"0 to {LARGEST:g}"
-                )
+        for at, key in keys.items():
+            number = parsed[at] if at < len(parsed) else np.nan
+            if number is None:
+                comma = "; a decimal comma? use a point" if re.fullmatch(r"[+-]?\d*,\d+", row[at]) else ""
+                table.fault("not a usable number", line, key, row[at], f"a finite number{comma}")
+                bad.add(at)
+            elif number > LARGEST:
+                table.fault("value too large", line, key, row[at], f"0 to {LARGEST:g}")
                 bad.add(at)
             else:
                 values[index, at] = number
-                percent[at] += cell.endswith("%")
+                percent[at] += at < len(row) and row[at].endswith("%")
     for at, count in percent.items():
         given = int(np.isfinite(values[:, at]).sum())
         if 0 < count < given:
-            table.fault(
-                "some values have percent signs",
-                None,
-                names[at] if at < len(names) else None,
-                f"{count} of {given}",
-                "all or none",
-            )
+            table.fault("some values have percent signs", None, keys[at], f"{count} of {given}", "all or none")
     signed = [at for at, count in percent.items() if count]
     if signed:
         values[:, signed] *= 0.01

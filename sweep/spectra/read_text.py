@@ -24,6 +24,8 @@ _BEGINNING_BYTES = 4096
 _COMMENT = re.compile(r"#|//|%(?![TtRr]\b|[;,\t])")
 _SAMPLED = 400
 """Lines that tell the delimiter."""
+_NEARLY = 0.9
+"""Share of the best score from which on the first of the separators is taken: a title of words has few numbers."""
 _MARKS = {"\t": "tabs", ";": "semicolons", ",": "", "|": "bars", " ": "blanks"}
 NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _LEADING_ZEROS = re.compile(r"[+-]?0\d.*")
@@ -82,7 +84,7 @@ def number_of(cell: str) -> float | None:
     return number + 0.0 if np.isfinite(number) else None
 
 
-def text_sheet(path: Path) -> Sheet:
+def text_sheet(path: Path, allowed: str = "a header `wavelength_nm,...` and rows of numbers") -> Sheet:
     """Return the rows of a text. Raises DataError where it is none, or empty."""
     text, notes = _decoded(path)
     file, lines = str(path), re.split(r"\r\n|\r|\n", text)
@@ -107,9 +109,7 @@ def text_sheet(path: Path) -> Sheet:
     kept = [(n, line) for n, line in numbered if line.strip() and not _COMMENT.match(line)]
     sheet.remarks = [_COMMENT.sub("", line, count=1).strip() for _, line in comments]
     if not kept:
-        raise DataError(
-            ValidationIssue("the file is empty", file, allowed="a header `wavelength_nm,...` and rows of numbers")
-        )
+        raise DataError(ValidationIssue("the file is empty", file, allowed=allowed))
     mark = _mark([line for _, line in kept])
     if _MARKS[mark]:
         sheet.notes.append(f"columns are separated by {_MARKS[mark]}")
@@ -173,9 +173,8 @@ def _mark(lines: Sequence[str]) -> str:
         return total
 
     scores = {mark: numbers(mark) for mark in _MARKS}
-    best = max(scores, key=lambda mark: scores[mark])
-    if scores[best] > 0:
-        return best
+    if max(scores.values()) > 0:
+        return next(mark for mark in _MARKS if scores[mark] >= _NEARLY * max(scores.values()))
     return max(("\t", ";", ",", "|"), key=lambda mark: sum(mark in line for line in some))
 
 

@@ -57,13 +57,15 @@ _WHOLE_PERCENT = (10.0, 130.0)
 _NOISE = 0.05
 """Noise above a share of 1."""
 
-_SYMBOLS: tuple[tuple[str, Quantity | None, float], ...] = (
+_SYMBOLS: tuple[tuple[str, Quantity | None, float | None], ...] = (
     (r"%|percent|pct|prozent", None, 0.01),
     (r"a(mp(ere)?s?)?/w(att)?|aw-1", "responsivity", 1.0),
     (r"ma/w|maw-1", "responsivity", 1e-3),
     (r"e-?/(ph|photon)|electrons?/photon", "qe", 1.0),
     (r"o\.?d\.?|abs\.?|absorbance", "density", 1.0),
     (r"dB", "decibel", 1.0),
+    (r"qe|eqe", "qe", None),
+    (r"t|transmission|transmittance", "transmission", None),
     (r"(photons?|quanta|ph|[munp]?mol)([/(s].*)?", "photons", 1.0),
     (r"counts?|cts|adu", "photons", 1.0),
     (r"[munk]?(w|watts?|j)([/(].*|(cm|m|sr|nm|s)-.*)?", "energy", 1.0),
@@ -129,11 +131,12 @@ def symbol_unit(text: str) -> Unit | None:
     """Return the unit that a text is as a whole, as in brackets or in a row of units; None for other texts."""
     if (of := _PERCENT_OF.fullmatch(text.strip())) is not None:
         return Unit(text.strip(), "transmission" if (of[1] or of[2]) in "tT" else "reflectance", 0.01)
-    plain = re.sub(r"[\s^*\u00b7]", "", folded(text)).replace("per", "/")
+    plain = re.sub(r"[\s^*\u00b7]", "", re.sub(r"\bper\b", "/", folded(text)))
     for pattern, quantity, factor in _SYMBOLS:
         if re.fullmatch(pattern, plain, re.IGNORECASE):
             return Unit(text.strip(), quantity, factor)
-    return Unit(text.strip(), unclear="has an unknown unit") if _FOREIGN.fullmatch(plain) else None
+    foreign = _FOREIGN.fullmatch(plain) and not re.search(r"[\[\]]|\w \w", text)
+    return Unit(text.strip(), unclear="has an unknown unit") if foreign else None
 
 
 def _parts(head: str) -> tuple[str, list[Unit]]:
@@ -147,8 +150,8 @@ def _parts(head: str) -> tuple[str, list[Unit]]:
         found.append(unit)
         return " "
 
-    if "/" in head and _BRACKETS.search(head) is None and (whole := symbol_unit(head)) is not None:
-        return "", [whole] if not whole.unclear else []
+    if "/" in head and _BRACKETS.search(head) is None and (whole := symbol_unit(head)) and not whole.unclear:
+        return "", [whole]
     bare = _TRAILING.sub(taken, _PERCENT_OF.sub(taken, _BRACKETS.sub(taken, head)))
     return bare.strip(" _,:/"), found
 
@@ -191,7 +194,7 @@ def used_as(
     `stated`: the quantity that the user says. `scaled`: the user scales the numbers, so percent stay as they are.
     Raises DataError where the quantity is unclear, or none of this use.
     """
-    values, said, quantities, factors = {}, dict[str, list[str]](), {}, {}
+    values, said, units = dict(curves.values), dict[str, list[str]](), dict(curves.units)
     top = max((float(curves.samples(name)[1].max(initial=0.0)) for name in columns), default=0.0)
     for name in columns:
         unit = curves.units.get(name, Unit())
@@ -209,18 +212,16 @@ def used_as(
         if not scaled and quantity not in ("density", "decibel", "relative_responsivity", "energy", "photons"):
             factor = 0.01 if note else unit.factor or 1.0
         values[name] = converted(curves.wavelength_nm, curves.values[name] * factor, quantity, unit)
-        quantities[name], factors[name] = quantity, factor
+        units[name] = Unit(SAID[quantity], quantity, factor)
+        _check_share(curves, name, values[name], use, quantity)
         how = SAID[quantity]
         if not unit.quantity and not stated:
             how = f"no unit, assumed to be {SAID[quantity]}"
         said.setdefault(how + (f"; {note}" if note else ""), []).append(name)
-    for name in columns:
-        _check_share(curves, name, values[name], use, quantities[name])
     notes = [
         f"{', '.join(names[:5])}{f' and {len(names) - 5} more' if names[5:] else ''}: {how}"
         for how, names in said.items()
     ]
-    units = {name: Unit(SAID[quantities[name]], quantities[name], factors[name]) for name in columns}
     return replace(curves, values=values, notes=(*curves.notes, *notes), units=units)
 
 

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from ..base.disk import is_folder
-from ..base.errors import DataError
+from ..base.errors import DataError, ValidationIssue
 from ..base.types import FloatArray
 from ..camera.pixel import unquantized
 from ..spectra.builtin.registry import BUILT_IN_LIGHTS
+from ..spectra.builtin.surrogate import BUILT_IN_RANGE_NM
 from ..spectra.color import VISIBLE_NM
 from ..spectra.formats import is_curve_file
 from ..spectra.light_files import lights_file
 from ..spectra.lights import Lights, make_lights
 from ..spectra.population import DRIFT_NM_PER_K
+from ..spectra.spectrum import WavelengthGrid
 from .document import KeyPath
 from .model import Study
 from .schema import MOST_TYPES, StudySection
@@ -80,6 +84,29 @@ def with_light_files(section: StudySection, sources: Sources) -> StudySection:
     return section.model_copy(update=changed)
 
 
+def _padded(make: Callable[[WavelengthGrid], Lights], grid: WavelengthGrid) -> Lights:
+    """Return built-in lights on a grid that goes beyond their wavelengths, and 0 there."""
+    nodes, (low, high) = grid.nodes_nm, BUILT_IN_RANGE_NM
+    inside = np.flatnonzero((nodes >= low) & (nodes <= high))
+    if inside.size < 2:
+        raise DataError(ValidationIssue("no wavelengths of built-in lights", value=f"{low:g} to {high:g} nm"))
+    first, last = int(inside[0]), int(inside[-1])
+    made = make(grid.model_copy(update={"start_nm": float(nodes[first]), "stop_nm": float(nodes[last])}))
+    return replace(made, photons=np.pad(made.photons, ((0, 0), (first, grid.size - 1 - last))))
+
+
+def _built_in(section: LightsSection, sources: Sources, at: KeyPath) -> Lights | None:
+    """Return a built-in data set; None after adding issues."""
+    assert section.builtin is not None
+    excess = sorted(section.model_fields_set - {"builtin", "files", "outside"})
+    for key in excess:
+        sources.add((*at, key), "a built-in data set has its own", getattr(section, key), "this key beside `files`")
+    known, anywhere = BUILT_IN_LIGHTS, section.outside == "zero"
+    if anywhere:
+        known = {name: partial(_padded, make) for name, make in BUILT_IN_LIGHTS.items()}
+    return None if excess else sources.built_in(at, section.builtin, known, anywhere=anywhere)
+
+
 def lights_of(section: LightsSection, sources: Sources, at: KeyPath = ("lights",)) -> Lights | None:
     """Construct the lights of a section.
 
@@ -104,11 +131,7 @@ def lights_of(section: LightsSection, sources: Sources, at: KeyPath = ("lights",
     """
     section = offered_curves(sources, at, section, "sweep.lights", BUILT_IN_LIGHTS)
     if section.builtin is not None:
-        excess = sorted(section.model_fields_set - {"builtin", "files", "outside"})
-        for key in excess:
-            value = getattr(section, key)
-            sources.add((*at, key), "a built-in data set has its own", value, "this key beside `files`")
-        return None if excess else sources.built_in(at, section.builtin, BUILT_IN_LIGHTS, section.outside)
+        return _built_in(section, sources, at)
     before = len(sources.issues)
     files = (*at, "files")
     count = sum(len(columns) for entry in section.files for columns in entry.signals.values())

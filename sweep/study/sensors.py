@@ -129,7 +129,7 @@ def _columns(sources: Sources, path: KeyPath, entry: CurveFile, factor: float | 
     use: Use = "sensor" if entry.relative_to is None else "filter"
     given = FITTING[use][0] if entry.file in sources.given and not sources.given[entry.file].units else None
     known = sources.used(
-        (*path, "columns"),
+        path,
         entry,
         use,
         entry.columns.values(),
@@ -139,8 +139,9 @@ def _columns(sources: Sources, path: KeyPath, entry: CurveFile, factor: float | 
     if sources.kept is None and known is None:
         return {}
     if known is not None and entry.relative_to is None:
-        top = max(float(known.samples(column)[1].max()) for column in entry.columns.values())
-        relative = any(known.units[column].quantity == "relative_responsivity" for column in entry.columns.values())
+        present = [column for column in entry.columns.values() if column in known.values]
+        top = max((float(known.samples(column)[1].max()) for column in present), default=0.0)
+        relative = any(known.units[column].quantity == "relative_responsivity" for column in present)
         if relative or is_normalized_response(entry.scale * top):
             sources.warnings.append(f"{entry.file}: {NORMALIZED}")
     scaled = {}

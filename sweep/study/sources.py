@@ -5,9 +5,9 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TypeVar, cast
+from typing import TypeVar
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from ..spectra.colorants import BUILTIN_COLORANTS, Colorants, read_colorants
 from ..spectra.formats import digest, read_curves
 from ..spectra.lens_files import ChiefRays, read_chief_rays
 from ..spectra.lights import Lights
-from ..spectra.spectrum import Curves, Outside, WavelengthGrid, integral_between, photons_from_energy
+from ..spectra.spectrum import Curves, WavelengthGrid, integral_between, photons_from_energy
 from ..spectra.units import Quantity, Use, used_as
 from .document import Document, KeyPath, by_line
 from .schema_curves import ColorantsSection, CurveFile, LightFile, TaskFile
@@ -37,12 +37,6 @@ _Made = TypeVar("_Made", SensorCurves, Lights)
 _Content = TypeVar("_Content", Curves, ChiefRays)
 _Key = TypeVar("_Key")
 _Entry = CurveFile | LightFile | TaskFile
-
-
-def _padded(made: Lights, before: int, size: int) -> Lights:
-    """Return lights with zeros up to the ends of the grid."""
-    padding = ((0, 0), (before, size - before - made.photons.shape[1]))
-    return replace(made, photons=np.pad(made.photons, padding))
 
 
 @dataclass(frozen=True)
@@ -163,25 +157,16 @@ class Sources:
         at: KeyPath,
         name: str,
         known: Mapping[str, Callable[[WavelengthGrid], _Made]],
-        outside: Outside = "refuse",
+        *,
+        anywhere: bool = False,
     ) -> _Made | None:
-        """Return a built-in sensor or built-in lights on the study's wavelengths; None after adding issues.
-
-        `outside`: lights may be 0 beyond their wavelengths.
-        """
+        """Return a built-in sensor or lights on the study's wavelengths, also beyond theirs; None after issues."""
         if name not in known:
             allowed = f"{', '.join(known)}, or a mapping with `files`"
             self.add(at, f"unknown built-in {at[-1]}", name, allowed, nearest(name, known))
             return None
-        grid, nodes = self.grid, self.grid.nodes_nm
         try:
-            if outside == "zero":
-                inside = np.flatnonzero((nodes >= BUILT_IN_RANGE_NM[0]) & (nodes <= BUILT_IN_RANGE_NM[1]))
-                if inside.size > 1:
-                    ends = {"start_nm": float(nodes[inside[0]]), "stop_nm": float(nodes[inside[-1]])}
-                    made = known[name](grid.model_copy(update=ends))
-                    return cast(_Made, _padded(made, int(inside[0]), grid.size))
-            return known[name](grid) if self.in_built_in_range("the built-in curves") else None
+            return known[name](self.grid) if anywhere or self.in_built_in_range("the built-in curves") else None
         except DataError as error:
             (first, *_) = error.issues
             self.add(("wavelengths",), f"{name} has curves from {first.value}", None, "wavelengths within them")
@@ -351,14 +336,10 @@ class Sources:
         curves = self.curves(path, entry)
         if curves is None:
             return None
-        wanted = list(dict.fromkeys(curves.values if columns is None else columns))
-        for column in wanted:
-            if column not in curves.values:
-                self.unknown(path, f"column of {entry.file}", column, curves.values)
-        if not set(wanted) <= curves.values.keys():
-            return None
+        wanted = curves.values if columns is None else columns
+        known = [column for column in dict.fromkeys(wanted) if column in curves.values]
         try:
-            made = used_as(curves, wanted, use, stated, scaled=scaled)
+            made = used_as(curves, known, use, stated, scaled=scaled)
         except DataError as error:
             for issue in error.issues:
                 self.add(path, f"{entry.file}, column {issue.key}: {issue.problem}", issue.value, issue.allowed)

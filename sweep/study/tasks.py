@@ -11,7 +11,7 @@ from ..camera.pixel import Pixel, irradiance_factor
 from ..camera.scene import Scene
 from ..camera.sensor import SensorCurves
 from ..designs.space import Space
-from ..spectra.builtin.task_sets import is_surface, separation_task, shipped, spectra_of_group, task_groups
+from ..spectra.builtin.task_sets import THERMAL_K, is_surface, separation_task, shipped, spectra_of_group, task_groups
 from ..spectra.formats import is_curve_file
 from ..spectra.tasks import ILLUMINANTS, SHIPPED, Conditions, GriddedTask, StudyTasks
 from ..spectra.units import Use
@@ -42,7 +42,9 @@ def tasks_of(section: TasksSection, sources: Sources) -> StudyTasks | None:
     before = len(sources.issues)
     user_tasks = section.own.values()
     named = [entry for task in user_tasks for spectra in task.classes.values() for entry in spectra]
-    if section.shipped or any(task.under for task in user_tasks) or any(isinstance(entry, str) for entry in named):
+    lights = {light for task in user_tasks for light in task.under}
+    thermal = lights <= THERMAL_K.keys() and 380 <= sources.grid.start_nm <= sources.grid.stop_nm <= 1000
+    if section.shipped or (lights and not thermal) or any(isinstance(entry, str) for entry in named):
         sources.in_built_in_range("the spectra of the tasks")
     for name in section.shipped:
         if name not in SHIPPED:

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from sweep.report.pages import script
-from sweep.spectra.files import read_curves
+from sweep.spectra.formats import read_curves
 
 from ..build import SCENES, study_file
 from ..commanded import commanded, sweep

@@ -43,7 +43,9 @@ def test_a_file_is_judged_as_a_study_judges_it(own: Path) -> None:
     for cfa, expected in (("RYNCy", table.iloc[0]), ("RGGB", plain.loc["RGGB"]), ("RYYCy", plain.loc["RYYCy"])):
         assert float(found[cfa][0]) == pytest.approx(expected["csd_yellow_red"], abs=0.05)
         assert float(found[cfa][-1]) == pytest.approx(expected["cfa_sensitivity"], abs=5e-4)
-    assert "T read as a transmission, times Y; values in percent; it is N of RYNCy, in place of Y" in said
+    assert (
+        "T: transmission; values up to 95 are assumed to be percent, times Y; it is N of RYNCy, in place of Y" in said
+    )
 
 
 def test_the_limit_is_of_filters_with_as_much_light(own: Path) -> None:
@@ -55,7 +57,7 @@ def test_the_limit_is_of_filters_with_as_much_light(own: Path) -> None:
     )
     limit = study.limit()
     assert limit.curve is not None
-    best = pd.DataFrame({"N": limit.curve}, index=pd.Index(study.wavelength_nm, name="wavelength_nm"))
+    best = pd.DataFrame({"N (QE)": limit.curve}, index=pd.Index(study.wavelength_nm, name="wavelength_nm"))
     best.to_csv(own.with_name("best.csv"))
     found = sweep.evaluate(own.with_name("best.csv"))
     assert found.gap is not None
@@ -81,14 +83,15 @@ def test_own_sensor_and_lights(tmp_path: Path, own: Path) -> None:
     requested = ("evaluate", own, "--transmission", "--sensor", qe, "--lights", leds)
     code, said, err = commanded(*requested)
     assert (code, err) == (0, "")
-    assert "times W; values in percent; it is N of RGBN, in place of W" in said
+    assert "values up to 95 are assumed to be percent, times W; it is N of RGBN, in place of W" in said
     assert list(rows(said)) == ["RGGB", "RGBW", "RGBN"]
     assert "No limit is computed: the filter is the brightest on white, and sets the exposure" in said
 
 
 def test_a_filter_that_sets_the_exposure_has_no_limit(own: Path) -> None:
     """95 % at most wavelengths."""
-    assert "No limit is computed: the filter is the brightest on white, and sets the" in commanded("evaluate", own)[1]
+    said = commanded("evaluate", own, "--quantity", "qe")[1]
+    assert "No limit is computed: the filter is the brightest on white, and sets the" in said
 
 
 def test_a_filter_a_little_above_the_curve_it_replaces_has_a_limit_too(tmp_path: Path) -> None:
@@ -98,7 +101,7 @@ def test_a_filter_a_little_above_the_curve_it_replaces_has_a_limit_too(tmp_path:
     y, nm = study.curve("Y").to_numpy(), study.wavelength_nm
     few = nm[::10]
     sampled = np.interp(nm, few, y[::10] * np.where(abs(few - 640) < 15, 0.4, 1.0))
-    found = sweep.evaluate(csv(tmp_path, "wavelength_nm,N", nm, sampled, name="few.csv"))
+    found = sweep.evaluate(csv(tmp_path, "wavelength_nm,N [QE]", nm, sampled, name="few.csv"))
     assert (sampled > y).any()
     assert "no filter between 0 and the larger of Y and itself, which leaves the exposure to other pixels," in str(
         found
@@ -150,7 +153,7 @@ def test_a_design_of_a_run_has_its_own_numbers_again_and_others_under_other_ligh
         (["filter.csv", "--lights", "t16"], "did you mean 'tl16'?"),
         (["filter.csv", "--design", "best"], "`design` goes with a run's folder"),
         (["filter.csv", "--allow-code"], "`allow-code` goes with a run's folder"),
-        (["above.csv"], "values above 1"),
+        (["above.csv"], "values up to 1.5 are no transmission"),
         (["short.csv"], "the curve is truncated"),
     ],
 )

@@ -15,7 +15,7 @@ from sweep.cli.audit import audit_output
 from sweep.cli.export import export_design, relative_transmission
 from sweep.cli.options import ExportFormat
 from sweep.spectra.builtin.surrogate import surrogate_parameters
-from sweep.spectra.files import read_curves
+from sweep.spectra.formats import read_curves
 from sweep.spectra.filter_files import HINTS, color_hints, csv_text, isetcam_mat, unique_names
 from sweep.study import load_study
 

@@ -17,7 +17,7 @@ from sweep.designs.edge import edge, edge_gradient
 from sweep.designs.families.dual import Dual
 from sweep.designs.families.stopband import Stopband
 from sweep.metrics.bound import FEASIBLE
-from sweep.spectra.files import read_curves
+from sweep.spectra.formats import read_curves
 from sweep.spectra.lights import make_lights
 from sweep.spectra.spectrum import WavelengthGrid, check_samples, resample
 from sweep.study import load_study

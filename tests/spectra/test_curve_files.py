@@ -7,7 +7,7 @@ import pytest
 from scipy.io import savemat
 
 from sweep.base.errors import DataError
-from sweep.spectra.files import digest, read_curves
+from sweep.spectra.formats import digest, read_curves
 
 
 def written(tmp_path: Path, text: str, name: str = "curves.csv") -> Path:
@@ -34,12 +34,14 @@ def test_csv(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("wavelength_nm,R\n400,0.1\n410,nan\n", ["FILE:3: R:", "not a usable number", "'nan'"]),
-        ("wavelength_nm,R\n400,0.1\n410,\n", ["FILE:3: R:", "not a usable number"]),
-        ("wavelength_nm,R\n400,0.1\n410,-0.2\n", ["FILE:3: R:", "'-0.2'", ">= 0"]),
+        (
+            "wavelength_nm,R\n400,0.1\n410,nan\n420,\n430,1\n",
+            ["FILE: R:", "several values in a row are missing", "410 nm"],
+        ),
+        ("wavelength_nm,R\n400,0.1\n410,inf\n", ["FILE:3: R:", "not a usable number", "'inf'"]),
+        ("wavelength_nm,R\n400,0.1\n410,-0.2\n", ["FILE: R:", "negative value at 410 nm", ">= 0"]),
         ("wavelength_nm,R\n400,0.1\n410,x\n", ["FILE:3: R:", "'x'"]),
-        ("wavelength_nm,R\n400,0.1\n420,0.1\n410,0.2\n", ["FILE:4: wavelength_nm:", "not sorted"]),
-        ("wavelength_nm,R\n400,0.1\n400,0.2\n", ["FILE:3: wavelength_nm:", "twice"]),
+        ("wavelength_nm,R\n400,0.1\n400,0.2\n410,0.1\n410,0.2\n", ["FILE: R:", "twice, with other values"]),
         ("wavelength_nm,R\n400,0.1\n410,0.2,0.3\n", ["FILE:3:", "columns", "got 3"]),
         ("wavelength_km,R\n0.4,0.1\n0.41,0.2\n", ["FILE:1: wavelength_km:", "no column wavelength", "wavelength_nm"]),
         ("wavelength_nm,R\n0.4,0.1\n0.7,0.2\n", ["FILE: R:", "um"]),
@@ -57,7 +59,7 @@ def test_a_fault_of_a_csv_names_file_line_column_value(tmp_path: Path, text: str
 
 
 def test_every_fault_of_a_csv_is_named(tmp_path: Path) -> None:
-    assert len(issues(written(tmp_path, "wavelength_nm,R,G\n400,a,1\n410,1,-1\n405,nan,1\n"))) == 4
+    assert len(issues(written(tmp_path, "wavelength_nm,R,G\n400,a,1\n410,1,-1\n405,x,1\n420,2,2\n"))) == 3
 
 
 def test_mat_of_isetcam(tmp_path: Path) -> None:
@@ -82,7 +84,7 @@ def test_mat_of_one_spectrum(tmp_path: Path) -> None:
     [
         ({"wavelength": [400.0, 410.0], "dat": [1.0, 1.0]}, "did you mean 'dat'"),
         ({"wavelength": [400.0, 410.0], "data": [[1.0, 1.0, 1.0]]}, "does not fit"),
-        ({"wavelength": [400.0, 410.0], "data": [1.0, np.nan]}, "not a finite"),
+        ({"wavelength": [400.0, 410.0], "data": [1.0, -1.0]}, "negative value at 410 nm"),
         ({"wavelength": "text", "data": [1.0, 1.0]}, "must be real numbers"),
     ],
 )
@@ -102,7 +104,7 @@ def test_damaged_files_are_faults(tmp_path: Path) -> None:
     (tmp_path / "latin.csv").write_bytes(b"wavelength_nm,\xe9\n400,1\n700,1\n")
     assert read_curves(tmp_path / "latin.csv").notes == ("the text is not UTF-8, and was read as Latin-1",)
     assert "cannot be read" in issues(tmp_path / "absent.csv")[0]
-    assert ".csv, .tsv, .txt, .dat, .mat" in issues(written(tmp_path, "x", "curves.xls"))[0]
+    assert ".csv, .tsv, .txt, .dat, .asc, .isd, .prn, .mat" in issues(written(tmp_path, "x", "curves.xls"))[0]
 
 
 def test_digest_is_sha256_of_the_bytes(tmp_path: Path) -> None:

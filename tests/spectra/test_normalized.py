@@ -20,7 +20,7 @@ from sweep.study import load_study
 NM = np.arange(390.0, 711, 5)
 STUDY = """\
 study: tiny
-sensor: {files: [{file: qe.csv, columns: {R: R, G: G, B: B}, SCALE}]}
+sensor: {files: [{file: qe.csv, columns: {R: R, G: G, B: B}, quantity: QUANTITY, SCALE}]}
 lights: tl16
 cfas: [RGGB]
 """
@@ -39,7 +39,7 @@ def test_a_file_with_a_maximum_of_one_gets_a_note_on_normalization(
 ) -> None:
     qe = qe_file(tmp_path, top)
     assert (f"Note: {NORMALIZED}." in described(qe, tmp_path).lines) == normalized
-    assert (f"Note: qe.csv: {NORMALIZED}." in new_study("mine", tmp_path, qe, None, "energy")) == normalized
+    assert (f"Note: qe.csv: {NORMALIZED}." in new_study("mine", tmp_path, [qe], [])) == normalized
 
 
 @pytest.mark.parametrize(
@@ -50,21 +50,25 @@ def test_a_study_warns_of_normalized_curves_after_scaling(
     tmp_path: Path, top: float, scale: str, normalized: bool
 ) -> None:
     qe_file(tmp_path, top)
-    (tmp_path / "tiny.yaml").write_text(STUDY.replace("SCALE", scale))
+    (tmp_path / "tiny.yaml").write_text(STUDY.replace("SCALE", scale).replace("QUANTITY", "qe"))
     study = load_study(tmp_path / "tiny.yaml")
     assert study.warnings == ((f"qe.csv: {NORMALIZED}",) if normalized else ())
 
 
 def test_a_transmission_of_one_is_no_relative_response(tmp_path: Path) -> None:
     qe_file(tmp_path, 1.0)
-    text = STUDY.replace("SCALE", "relative_to: C").replace("{files", "{builtin: ar0820, files")
+    text = (
+        STUDY.replace("SCALE", "relative_to: C")
+        .replace("QUANTITY", "transmission")
+        .replace("{files", "{builtin: ar0820, files")
+    )
     (tmp_path / "tiny.yaml").write_text(text)
     assert load_study(tmp_path / "tiny.yaml").warnings == ()
 
 
 def test_a_run_and_its_report_say_so(tmp_path: Path) -> None:
     qe_file(tmp_path, 1.0)
-    (tmp_path / "tiny.yaml").write_text(STUDY.replace("SCALE", "scale: 1"))
+    (tmp_path / "tiny.yaml").write_text(STUDY.replace("SCALE", "scale: 1").replace("QUANTITY", "qe"))
     run_study(load_study(tmp_path / "tiny.yaml"), tmp_path / "out", 1, lambda *_: None)
     output = read_output(tmp_path / "out")
     assert f"Note: qe.csv: {NORMALIZED}." in summary_lines(output)

@@ -19,7 +19,7 @@ from sweep.base.errors import MOST_ISSUES, SweepError
 from sweep.cli.describe import described
 from sweep.run.rows import rules_of, run_job
 from sweep.run.sweep import Sweep
-from sweep.spectra.files import read_curves
+from sweep.spectra.formats import read_curves
 from sweep.study import Study, load_study
 
 from ..commanded import commanded

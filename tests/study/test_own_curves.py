@@ -55,7 +55,7 @@ def test_a_user_curve_replaces_the_built_in_one_in_every_cfa(tmp_path: Path) -> 
     [
         ("N: mine", ", relative_to: Yy", "relative_to: unknown curve (got 'Yy')"),
         ("N: mine", ", relative_to: N", "relative_to: unknown curve (got 'N')"),
-        ("N: mine", "", "QE above 1 (looks like percent: set `scale: 0.01`)"),
+        ("N: mine", ", scale: 1", "QE above 1 (looks like percent: set `scale: 0.01`)"),
         ("N: other", "", "unknown column of own.csv"),
     ],
 )

@@ -216,8 +216,8 @@ def test_every_fault_is_named_at_once(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("qe", "expected"),
     [
-        ("wavelength_nm,R,C\n400,0.1,0.5\n700,nan,0.5\n", "qe.csv:3: R: not a usable number (got 'nan')"),
-        ("wavelength_nm,R,C\n400,10,50\n700,20,50\n", "QE above 1 (looks like percent: set `scale: 0.01`) (got 20.0)"),
+        ("wavelength_nm,R,C\n400,0.1,0.5\n700,n.n,0.5\n", "qe.csv:3: R: not a usable number (got 'n.n')"),
+        ("wavelength_nm,R,C\n400,2,5\n700,2,5\n", "qe.csv, column R: values up to 5 are no QE"),
         ("wavelength_nm,R,C\n450,0.1,0.5\n700,0.2,0.5\n", "qe.csv, column R: the curve is truncated"),
         ("wavelength_km,R,C\n0.4,0.1,0.5\n0.7,0.2,0.5\n", "qe.csv:1: wavelength_km: no column wavelength"),
         (

@@ -16,7 +16,8 @@ from ruamel.yaml.error import YAMLError
 from sweep.base.errors import MOST_ISSUES, StudyError, SweepError, ValidationIssue, nearest
 from sweep.cli.listing import list_lines, studies_of
 from sweep.results.tables import RESOLVED
-from sweep.spectra.text_tables import MOST_BYTES, MOST_CURVES, MOST_SAMPLES, MOST_VALUES
+from sweep.spectra.read_table import MOST_CURVES, MOST_SAMPLES, MOST_VALUES
+from sweep.spectra.read_text import MOST_BYTES
 from sweep.study import load_study
 from sweep.study.document import MOST_DEPTH, Document, Tree
 from sweep.study.editors import study_schema

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...base.types import FloatArray
 from ..color import color_matching, luminance_per_photon_radiance
-from ..spectrum import WavelengthGrid, energy_from_photons, equal_photons
+from ..spectrum import WavelengthGrid, energy_from_photons, equal_photons, photons_from_energy
 from ..tasks import ILLUMINANTS, Chart, GriddedTask, TaskColumns
 from . import spectra, surrogate_spectra
 from .data_sets.tl16 import lights
@@ -17,26 +17,24 @@ _WHITE_LED = [f"LED-{kind}" for kind in ("B1", "B2", "B3", "B4", "B5", "BH1", "V
 _HID = ["HP4", "HP5"]
 _GRAY = 0.18
 _STREET = ("d65", "a", "led", "hps")
+THERMAL_K = {"d65": 6504.0, "d50": 5003.0, "a": 2855.54}
+"""Correlated color temperatures of lights that reach 1,000 nm; there, daylight is without the absorption of water."""
+_C2_NM_K = 1.438776877e7
+"""Second radiation constant, exact in the SI of 2019."""
 _MOST = 20
 """Spectra of a class of a shipped task: of larger groups an even share."""
 
 
 def illuminant(grid: WavelengthGrid, name: str) -> FloatArray:
-    """Return the relative photons of an illuminant.
-
-    Parameters
-    ----------
-    grid : WavelengthGrid
-        Wavelengths, nm.
-    name : str
-        Illuminant.
-
-    Returns
-    -------
-    ndarray of shape (n_wavelengths,)
-        Values.
-    """
-    return spectra.gridded(grid, spectra.spectrum_of(*ILLUMINANTS[name]))
+    """Return the relative photons of an illuminant; daylight and filament go on as black bodies beyond its samples."""
+    spectrum = spectra.spectrum_of(*ILLUMINANTS[name])
+    photons, nodes, last_nm = spectra.gridded(grid, spectrum), grid.nodes_nm, float(spectrum.wavelength_nm[-1])
+    if name in THERMAL_K and nodes[-1] > last_nm:
+        at = np.append(nodes, last_nm)
+        body = at**-4.0 / np.expm1(_C2_NM_K / (at * THERMAL_K[name]))
+        end = float(photons_from_energy(np.array([last_nm]), spectrum.value[-1:])[0])
+        photons = np.where(nodes > last_nm, body[:-1] * end / body[-1], photons)
+    return photons
 
 
 def task_groups() -> dict[str, int]:

@@ -1,0 +1,652 @@
+"""Files as laboratories, data sheets and spreadsheets have them: the right curve, or one line that says why not."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import openpyxl
+import pytest
+
+import sweep
+from sweep.base.errors import DataError
+from sweep.spectra.builtin.task_sets import illuminant
+from sweep.spectra.formats import read_curves
+from sweep.spectra.spectrum import WavelengthGrid
+from sweep.spectra.units import Quantity, Use, unit_of, used_as
+from sweep.study import load_study
+
+from ..build import one_line
+from ..commanded import commanded
+
+E_C, H, C = 1.602176634e-19, 6.62607015e-34, 299792458.0
+PEAKS = {"sensor": (610, 540, 460, 570), "filter": (560, 640, 500, 590), "light": (505, 592, 628, 636)}
+NAMES = {
+    "sensor": (("R", "G", "B", "C"), ("red", "green", "blue", "clear"), ("QE Rot", "QE Grün", "QE Blau", "QE Klar")),
+    "filter": (("notch", "Sample1", "Filter B", "F4"),),
+    "light": (("led 1", "amber", "TL_red", "red2"), ("505", "592", "628", "636")),
+}
+# Use, words of the head (in brackets), the numbers in the file of the right values v at a wavelength in m.
+UNITS: dict[Use, dict[str, object]] = {
+    "sensor": {
+        "": lambda v, m: v,
+        "QE": lambda v, m: v,
+        "%": lambda v, m: 100 * v,
+        "A/W": lambda v, m: v * m * E_C / (H * C),
+        "mA/W": lambda v, m: 1e3 * v * m * E_C / (H * C),
+    },
+    "filter": {
+        "T": lambda v, m: v,
+        "%T": lambda v, m: 100 * v,
+        "OD": lambda v, m: -np.log10(v),
+        "Absorbance": lambda v, m: -np.log10(v),
+        "dB": lambda v, m: 10 * np.log10(v),
+        "": lambda v, m: v,
+    },
+    "light": {
+        "": lambda v, m: v,
+        "W/m2/nm": lambda v, m: v,
+        "µW/cm²/nm": lambda v, m: v,
+        "photons/s/nm": lambda v, m: v,
+        "counts": lambda v, m: np.rint(60_000 * v),
+    },
+}
+
+
+@dataclass(frozen=True)
+class Written:
+    """A file, the right values of its curves and what they are."""
+
+    text: str
+    use: Use
+    wave_nm: np.ndarray
+    values: np.ndarray
+    unit: str
+
+
+def table(rng: np.random.Generator) -> Written:
+    """A table in a layout of its own, from a writer that knows nothing of the reader."""
+    use: Use = ("sensor", "filter", "light")[rng.integers(3)]
+    step = int(rng.choice([1, 2, 5, 10]))
+    nm = np.arange(int(rng.choice([350, 380, 400])), 781, step).astype(float)
+    count = int(rng.integers(1, 5))
+    width = 14.0 if use == "light" else 45.0
+    right = np.stack([0.004 + 0.6 * np.exp(-(((nm - peak) / width) ** 2)) for peak in PEAKS[use][:count]], axis=1)
+    unit = str(rng.choice([*UNITS[use]]))
+    numbers = UNITS[use][unit](right, nm[:, None] * 1e-9)  # type: ignore[operator]
+    if unit == "counts":
+        right = numbers
+    mark = str(rng.choice([",", ";", "\t", "|", "   "]))
+    decimal = "," if rng.integers(2) and mark != "," else "."
+    of_wave, scale = [("nm", 1.0), ("nm", 1.0), ("um", 1e-3)][rng.integers(3)]
+
+    def cell(number: float) -> str:
+        text = f"{number:.9g}" if rng.integers(4) else f"{number:.9e}"
+        return text.replace(".", decimal)
+
+    names = list(NAMES[use][rng.integers(len(NAMES[use]))][:count])
+    if mark == "   ":
+        names = [name.replace(" ", "_") for name in names]
+    place = str(rng.choice(["head", "row", "title"])) if unit else "none"
+    heads = [f"{name} [{unit}]" if place == "head" else name for name in names]
+    layout = str(rng.choice(["down", "down", "along", "pairs"]))
+    if mark == "   " and layout == "pairs":
+        layout = "down"
+    order = np.arange(nm.size)
+    if layout != "along":
+        order = (order, order[::-1], rng.permutation(nm.size))[rng.integers(3)]
+    waves = [cell(value * scale) for value in nm[order]]
+    columns = [[cell(value) for value in numbers[order, at]] for at in range(count)]
+    lines: list[list[str]] = []
+    word = str(rng.choice(["Wavelength", "wavelength", "Wellenlänge", "lambda", "WL"]))
+    first = of_wave if layout == "along" or (place != "row" and rng.integers(3) == 0) else f"{word} ({of_wave})"
+    if mark == "   ":
+        first = first.replace(" ", "_")
+        heads = [head.replace(" ", "_") for head in heads]
+    if layout == "along":
+        first = ("lamp", "name", "", of_wave)[rng.integers(4)]
+        waves = [
+            f"{value:g}".replace(".", decimal) + ("", " nm", "[nm]")[0 if mark == "   " else rng.integers(3) * 0]
+            for value in nm
+        ]
+        lines = [[first, *waves], *([head, *column] for head, column in zip(heads, columns, strict=True))]
+    elif layout == "pairs":
+        if rng.integers(2):
+            lines.append(list(itertools.chain(*([name, ""] for name in heads))))
+            lines.append([of_wave if rng.integers(2) else "X", "Y"] * count)
+        else:
+            lines.append(list(itertools.chain(*([f"{word} ({of_wave})", head] for head in heads))))
+        lines += [
+            list(itertools.chain(*([w, v] for v in row)))
+            for w, row in zip(waves, zip(*columns, strict=True), strict=True)
+        ]
+    else:
+        lines = [[first, *heads]]
+        if place == "row":
+            lines.append([of_wave, *[unit] * count])
+            lines[0][0] = word
+        lines += [[w, *row] for w, row in zip(waves, zip(*columns, strict=True), strict=True)]
+        if rng.integers(6) == 0:
+            lines = (
+                [["" if at == 0 else str(at - 1), *line] for at, line in enumerate(lines)] if place != "row" else lines
+            )
+    if place == "row" and layout != "down":
+        place = "title"
+    text = [mark.join(line) for line in lines]
+    if rng.integers(5) == 0:
+        text = [line + mark for line in text] if mark.strip() else text
+    before = [f"measured values, unit: {unit}"] if place == "title" else []
+    before += [["# note"], ["report of lamp 7"], [""], []][rng.integers(4)]
+    joined = ("\r\n", "\n")[rng.integers(2)].join([*before, *text, ""])
+    return Written(joined, use, nm, right, unit)
+
+
+def close(found: np.ndarray, right: np.ndarray) -> bool:
+    return bool(np.abs(found - right).max() <= 1e-6 * np.abs(right).max())
+
+
+def reads_back(path: Path, written: Written) -> bool:
+    """Whether a file was read, and then rightly; raises AssertionError for any other number."""
+    try:
+        curves = read_curves(path)
+        made = used_as(curves, list(curves.values), written.use)
+    except DataError as error:
+        assert all(len(str(issue).splitlines()) == 1 for issue in error.issues)
+        return False
+    found = np.stack([np.interp(written.wave_nm, *made.samples(name)) for name in made.values], axis=1)
+    assert found.shape == written.values.shape, written.text[:600]
+    assert close(found, written.values), (made.notes, written.unit, written.text[:600])
+    for name in made.values:
+        quantity = made.units[name].quantity
+        if written.use == "light":
+            assert quantity == ("photons" if written.unit.startswith(("photon", "count")) else "energy")
+    return True
+
+
+def test_of_a_thousand_layouts_none_is_another_number(tmp_path: Path) -> None:
+    rng, read = np.random.default_rng(11), 0
+    refused: dict[str, int] = {}
+    for number in range(1000):
+        written = table(rng)
+        path = tmp_path / f"a.{('csv', 'txt', 'dat')[number % 3]}"
+        encoding = str(rng.choice(["utf-8", "utf-8-sig", "utf-16", "latin-1", "utf-16-le"]))
+        path.write_bytes(written.text.encode(encoding, "replace"))
+        ok = reads_back(path, written)
+        read += ok
+        if not ok:
+            refused[written.unit] = refused.get(written.unit, 0) + 1
+    assert read > 900, refused
+
+
+MEANINGS = """
+R | | |
+Red (A/W) | responsivity | 1 |
+Blau [mA/W] | responsivity | 0.001 |
+responsivity | responsivity | |
+Spectral Responsivity (A/W) | responsivity | 1 |
+relative responsivity | relative_responsivity | |
+Responsivity, normalized | responsivity | |
+SSF per energy | relative_responsivity | |
+Relative Response | ? | |
+spectral sensitivity | ? | |
+Empfindlichkeit | ? | |
+QE | qe | |
+QE Rot [%] | qe | 0.01 |
+QE_G | qe | |
+green qe % | qe | 0.01 |
+EQE (%) | qe | 0.01 |
+IPCE / % | qe | 0.01 |
+quantum efficiency | qe | |
+Quantum Efficiency [%] | qe | 0.01 |
+Quanteneffizienz (%) | qe | 0.01 |
+Quantenausbeute | qe | |
+rendement quantique [%] | qe | 0.01 |
+Rendement Quantique | qe | |
+B [e-/photon] | qe | 1 |
+B (e/ph) | qe | 1 |
+QE (A/W) | ? | |
+QE [fraction] | qe | 1 |
+QE (0-1) | qe | 1 |
+R (%) | | 0.01 |
+R [percent] | | 0.01 |
+Rot (Prozent) | | 0.01 |
+R_pct | | 0.01 |
+C (-) | | 1 |
+C [1] | | 1 |
+R (a.u.) | | 1 |
+R (arb. units) | | 1 |
+Red (norm.) | | 1 |
+R (V/lx/s) | ? | |
+R [V] | ? | |
+R (left) | | |
+T | transmission | |
+t | transmission | |
+%T | transmission | 0.01 |
+T% | transmission | 0.01 |
+T (%) | transmission | 0.01 |
+T [%] | transmission | 0.01 |
+Baseline 100%T | transmission | 0.01 |
+Sample 3 %T | transmission | 0.01 |
+Transmission | transmission | |
+transmittance | transmission | |
+Transmittance (%) | transmission | 0.01 |
+internal transmittance | transmission | |
+Transmissionsgrad [%] | transmission | 0.01 |
+Durchlässigkeit [%] | transmission | 0.01 |
+facteur de transmission | transmission | |
+IR cut transmission % | transmission | 0.01 |
+Transmission (dB) | decibel | 1 |
+Loss [dB] | decibel | 1 |
+S21 (dB) | decibel | 1 |
+OD | density | |
+OD 4 notch | density | |
+633 OD | density | 1 |
+notch (OD) | density | 1 |
+Optical Density | density | |
+optische Dichte | density | |
+densité optique | density | |
+Absorbance | density | |
+Absorbance (%) | ? | |
+Abs | density | |
+Extinktion | density | |
+Absorption | ? | |
+absorptance | ? | |
+Extinction | ? | |
+OD (%) | ? | |
+Reflectance | reflectance | |
+%R | reflectance | 0.01 |
+Remission [%] | reflectance | 0.01 |
+Reflexionsgrad | reflectance | |
+T1 | | |
+TL red | | |
+Y592 | | |
+505 | | |
+led_red | | |
+W | | |
+power [W] | energy | 1 |
+Radiance [W/(sr m2 nm)] | energy | 1 |
+Spectral Irradiance (W/m²/nm) | energy | 1 |
+Irradiance [µW/cm²/nm] | energy | 1 |
+mW/nm | energy | 1 |
+W/m2/nm | energy | 1 |
+SPD | energy | |
+Strahldichte | energy | |
+Bestrahlungsstärke [W/m2/nm] | energy | 1 |
+amber (W m-2 nm-1) | energy | 1 |
+spectral power | | |
+Photons | photons | |
+photon flux (µmol/m2/s/nm) | photons | 1 |
+PPFD | photons | |
+red [photons/s/nm] | photons | 1 |
+quanta | photons | |
+Counts | photons | |
+Intensity (counts) | photons | 1 |
+Helligkeit | | |
+luminance | ? | |
+red (lm) | ? | |
+"""
+"""Head | quantity, `?` where it is refused | factor to plain numbers."""
+
+
+@pytest.mark.parametrize("line", MEANINGS.strip().splitlines())
+def test_a_head_says_quantity_and_factor(line: str) -> None:
+    head, quantity, factor, _ = (part.strip() for part in line.split("|"))
+    unit = unit_of(head)
+    assert (quantity == "?") == bool(unit.unclear), unit
+    if not unit.unclear:
+        assert (unit.quantity or "") == quantity
+        assert (unit.factor or 1.0) == (float(factor) if factor else 1.0)
+
+
+NM = np.arange(380.0, 781, 5)
+QE = {
+    name: peak * np.exp(-(((NM - nm) / width) ** 2))
+    for name, peak, nm, width in (
+        ("Red", 0.6, 610, 45),
+        ("Green", 0.65, 535, 45),
+        ("Blue", 0.6, 455, 40),
+        ("Clear", 0.75, 560, 160),
+    )
+}
+
+
+def rows(columns: Sequence[Sequence[object]], mark: str = ",", decimal: str = ".") -> str:
+    return (
+        "\n".join(mark.join(str(cell).replace(".", decimal) for cell in row) for row in zip(*columns, strict=True))
+        + "\n"
+    )
+
+
+def ppf(values: np.ndarray) -> list[str]:
+    return [f"{value:.6f}" for value in values]
+
+
+T = 0.9 - 0.7 * np.exp(-(((NM - 633) / 12) ** 2))
+LED = np.exp(-(((NM - 628) / 14) ** 2))
+CARY = (
+    "Baseline 100%T,,notch,,\nWavelength (nm),%T,Wavelength (nm),%T,\n"
+    + rows([NM[::-1], ppf(100 * np.ones(NM.size)), NM[::-1], ppf(100 * T[::-1]), [""] * NM.size])
+    + "\nnotch\nCollection Time: 11/26/2026 9:00:00 AM\nScan Version 6.2.0.1588\nStart (nm)              780.0\n"
+)
+OCEAN = (
+    "Data from FLMS0_0.txt Node\n\nDate: Thu Nov 26 09:00:00 CET 2026\nUser: me\nSpectrometer: FLMS0\nTrigger mode: 0\n"
+    "Integration Time (sec): 1.000000E-1\nScans to average: 10\nXAxis mode: Wavelengths\nNumber of Pixels in Spectrum: 81\n"
+    ">>>>>Begin Spectral Data<<<<<\n" + rows([NM, ppf(1000 * LED)], "\t")
+)
+PERKIN_ELMER = (
+    "PE UV       SUBTECH     SPECTRUM    ASCII       PEDS        4.00\n   -1\nnotch.asc\n26/11/26\n09:00:00.00\n"
+    "#HDR\n-1\n-1\n#GR\nnm\n%T\n1.000000\n0.000000\n780.000000\n-5.000000\n81\n14\n100.0\n20.0\n#DATA\n"
+    + rows([NM[::-1], ppf(100 * T[::-1])], "\t")
+)
+SPECWIN = (
+    "[General Information]\nInstrument=CAS 140CT\n[Curve Information]\nName=TL red\nClass=Spectral Radiant Intensity\n"
+    "Unit=W/(sr nm)\nLength=81\n[Measurement Conditions]\nIntegrationTime=100\nData\n" + rows([NM, ppf(LED)], "\t", ",")
+)
+CS_2000 = (
+    "File Version,1.0\nData Name,TL\n"
+    "No.,Title,Meas. time,Lv,x,y,"
+    + ",".join(f"{nm:.0f}" for nm in NM)
+    + "\n"
+    + "1,TL red,2026/11/26,812.3,0.7012,0.2985,"
+    + ",".join(ppf(LED))
+    + "\n"
+    + "2,TL dim,2026/11/26,81.2,0.7012,0.2985,"
+    + ",".join(ppf(LED / 10))
+    + "\n"
+)
+GERMAN = "Sensor;Messung 3\nWellenlänge [nm];QE Rot [%];QE Grün [%];QE Blau [%];QE Klar [%]\n" + rows(
+    [NM.astype(int), *(ppf(100 * qe) for qe in QE.values())], ";", ","
+)
+SEKONIC = "Title,TL red\nMeasuring Mode,Ambient\nIlluminance [lx],12.3\nCIE1931 x,0.7012\n" + "".join(
+    f"Spectral Data {nm:.0f}[nm],{value}\n" for nm, value in zip(NM, ppf(LED), strict=True)
+)
+SPDX = (
+    '<?xml version="1.0" encoding="utf-8"?>\n<IESTM2714 xmlns="iestm2714" version="1.0"><Header><Description>TL red</Description>'
+    "</Header><SpectralDistribution><SpectralQuantity>flux</SpectralQuantity>"
+    + "".join(f'<SpectralData wavelength="{nm}">{value}</SpectralData>' for nm, value in zip(NM, ppf(LED), strict=True))
+    + "</SpectralDistribution></IESTM2714>"
+)
+RAWTOACES = json.dumps(
+    {
+        "header": {"manufacturer": "A", "model": "B"},
+        "spectral_data": {
+            "units": "relative",
+            "index": {"main": ["R", "G", "B"]},
+            "data": {
+                "main": {
+                    f"{nm:.0f}": [float(QE[name][at]) for name in ("Red", "Green", "Blue")] for at, nm in enumerate(NM)
+                }
+            },
+        },
+    }
+)
+
+INSTRUMENTS: dict[str, tuple[str, str, Use, dict[str, np.ndarray]]] = {
+    "Cary": ("a.csv", CARY, "filter", {"Baseline 100%T": np.ones(NM.size), "notch": T}),
+    "Ocean": ("a.txt", OCEAN, "light", {"a": 1000 * LED}),
+    "Perkin-Elmer": ("notch.asc", PERKIN_ELMER, "filter", {"notch": T}),
+    "Specwin": ("a.isd", SPECWIN, "light", {"TL red": LED}),
+    "CS-2000": ("a.csv", CS_2000, "light", {"TL red 2026/11/26": LED, "TL dim 2026/11/26": LED / 10}),
+    "German": (
+        "a.csv",
+        GERMAN,
+        "sensor",
+        dict(zip(("QE Rot [%]", "QE Grün [%]", "QE Blau [%]", "QE Klar [%]"), QE.values(), strict=True)),
+    ),
+    "Sekonic": ("a.csv", SEKONIC, "light", {"TL red": LED}),
+    "IES": ("a.spdx", SPDX, "light", {"TL red": LED}),
+    "rawtoaces": (
+        "a.json",
+        RAWTOACES,
+        "sensor",
+        {name: 400 / NM * QE[long] for name, long in (("R", "Red"), ("G", "Green"), ("B", "Blue"))},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", INSTRUMENTS)
+def test_a_file_of_an_instrument_is_read_as_it_means(tmp_path: Path, name: str) -> None:
+    file, text, use, right = INSTRUMENTS[name]
+    (tmp_path / file).write_text(text, encoding="latin-1" if name == "German" else "utf-8")
+    curves = read_curves(tmp_path / file)
+    made = used_as(curves, list(curves.values), use)
+    assert list(made.values) == list(right)
+    for column, values in right.items():
+        wave, found = made.samples(column)
+        np.testing.assert_array_equal(wave, NM)
+        np.testing.assert_allclose(found, values, atol=1.1e-6 * max(values.max(), 1.0))
+    if use == "light":
+        assert {unit.quantity for unit in made.units.values()} == {"energy"}
+
+
+def test_a_spreadsheet_is_read_from_its_first_sheet_with_a_table(tmp_path: Path) -> None:
+    book = openpyxl.Workbook()
+    book.active.append(["Report"])
+    sheet = book.create_sheet("QE")
+    sheet.append(["QE of a sensor"])
+    sheet.append(["Wavelength (nm)", *(f"{name} (A/W)" for name in QE)])
+    for at, nm in enumerate(NM):
+        sheet.append([int(nm), *(float(qe[at]) * nm / 1239.841984 for qe in QE.values())])
+    book.save(tmp_path / "qe.xlsx")
+    curves = read_curves(tmp_path / "qe.xlsx")
+    made = used_as(curves, list(curves.values), "sensor")
+    for found, right in zip(made.values.values(), QE.values(), strict=True):
+        np.testing.assert_allclose(found, right, rtol=1e-8)
+    assert "sheet 'QE' of a spreadsheet" in curves.notes
+
+
+def test_digitized_pairs_keep_their_own_wavelengths_and_doubles_are_averaged(tmp_path: Path) -> None:
+    """As WebPlotDigitizer exports clicks: names above X, Y; in no order, some of them twice."""
+    rng = np.random.default_rng(3)
+    clicks = [np.sort(rng.uniform(395, 705, 45)) for _ in QE]
+    values = [100 * np.interp(x, NM, qe) for x, qe in zip(clicks, QE.values(), strict=True)]
+    columns: list[list[str]] = []
+    for x, y in zip(clicks, values, strict=True):
+        order = rng.permutation([*range(x.size), 7])
+        near = np.where(np.arange(order.size) == np.flatnonzero(order == 7)[0], 0.3, 0.0) - np.where(
+            np.arange(order.size) == np.flatnonzero(order == 7)[1], 0.3, 0.0
+        )
+        columns += [[f"{v:.8f}" for v in x[order]], [f"{v:.8f}" for v in y[order] + near]]
+    head = ",".join(itertools.chain(*([name, ""] for name in QE)))
+    (tmp_path / "a.csv").write_text(f"{head}\n{','.join(['X', 'Y'] * 4)}\n" + rows(columns))
+    curves = read_curves(tmp_path / "a.csv")
+    made = used_as(curves, list(curves.values), "sensor")
+    assert list(made.values) == list(QE)
+    for name, x, y in zip(QE, clicks, values, strict=True):
+        np.testing.assert_allclose(np.interp(x, *made.samples(name)), y / 100, atol=1e-8)
+    assert any("samples at the same wavelength were averaged" in note for note in curves.notes)
+
+
+def test_curves_of_two_lengths_end_where_they_end(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("nm,a,b\n400,1,\n410,2,\n420,3,1\n430,4,2\n440,,3\n")
+    curves = read_curves(tmp_path / "a.csv")
+    assert [list(wave) for wave, _ in map(curves.samples, ("a", "b"))] == [[400, 410, 420, 430], [420, 430, 440]]
+    assert "a: there are no values beyond 400 to 430 nm" in curves.notes
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("nm,R\n400,0.1\n500,nan\n510,nan\n700,0.2\n", "several values in a row are missing"),
+        ("nm,R\n400,0.1\n500,-0.1\n700,0.2\n", "negative value at 500 nm"),
+        ("nm;R\n400;1,234\n500;2,345\n700;3,456\n", "a comma may be a decimal mark or part every three digits"),
+        ("nm,R\n400,0.1\n450,0.2\n500,0.3\n400,0.5\n450,0.9\n500,0.1\n", "wavelengths occur twice, with other values"),
+        ("nm,R\n400,1\n500,2\n\nsecond\n400,1\n500,2\n510,3\n", "two tables in one file"),
+        ("nm,R\n400,10 %\n500,20\n700,30\n", "some values have percent signs"),
+        ("frequency,R\n400,1\n500,2\n", "no column wavelength"),
+    ],
+)
+def test_what_has_no_one_meaning_is_one_line(tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / "a.csv").write_text(text)
+    with one_line(said):
+        read_curves(tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize(
+    ("head", "top", "use", "stated", "said"),
+    [
+        ("R", 4.03, "sensor", None, "values up to 4.03 are no QE"),
+        ("notch", 4.03, "filter", None, "values up to 4.03 are no transmission"),
+        ("R [%]", 0.6, "sensor", None, "values in percent, but none is above 1"),
+        ("T", 0.6, "sensor", None, "transmission is no QE"),
+        ("OD", 0.6, "light", None, "optical density is no energy of a light"),
+        ("Radiance", 0.6, "sensor", None, "energy is no QE"),
+        ("R (A/W)", 6.0, "sensor", None, "its largest QE would be"),
+        ("Relative Response", 0.6, "sensor", None, "the head does not tell its quantity"),
+        ("Relative Response", 0.6, "sensor", "qe", ""),
+        ("OD", 0.6, "filter", "transmission", ""),
+        ("dB", 3.0, "filter", None, "its largest transmission would be"),
+    ],
+)
+def test_an_unknown_or_contradicting_unit_is_refused_or_stated(
+    tmp_path: Path, head: str, top: float, use: Use, stated: Quantity | None, said: str
+) -> None:
+    (tmp_path / "a.csv").write_text(f"nm,{head}\n400,{top / 2}\n550,{top}\n700,{top / 3}\n")
+    curves = read_curves(tmp_path / "a.csv")
+    if said:
+        with one_line(said):
+            used_as(curves, [head], use, stated)
+    else:
+        assert used_as(curves, [head], use, stated).samples(head)[1].max() == top
+
+
+def csd(sensor: object, cfas: Sequence[str] = ("RGGB",)) -> list[float]:
+    table = sweep.make_study(sensor=sensor, cfas=list(cfas)).evaluate()
+    return [float(value) for value in table["csd_yellow_red"]]
+
+
+def test_responsivities_give_the_same_electrons_as_qe(tmp_path: Path) -> None:
+    """Heads of a data sheet in A/W; 176.4 DN and 0.278 of a clear pixel are from the QE by an independent program."""
+    qe = rows([["Wavelength (nm)", *NM], *([name, *(f"{v:.9f}" for v in values)] for name, values in QE.items())])
+    (tmp_path / "qe.csv").write_text(qe)
+    per_w = {name: values * NM * 1e-9 * E_C / (H * C) for name, values in QE.items()}
+    (tmp_path / "aw.csv").write_text(
+        rows(
+            [
+                ["Wavelength (nm)", *NM],
+                *([f"{name} (A/W)", *(f"{v:.9f}" for v in values)] for name, values in per_w.items()),
+            ]
+        )
+    )
+    assert csd(sweep.sensor(tmp_path / "aw.csv")) == pytest.approx(csd(sweep.sensor(tmp_path / "qe.csv")), rel=1e-6)
+    assert csd(sweep.sensor(tmp_path / "qe.csv"))[0] == pytest.approx(176.4, abs=0.05)
+
+
+@pytest.mark.parametrize(("head", "density", "right"), [("OD", 4.0, 234.1), ("Absorbance", 0.9, 167.0)])
+def test_a_notch_in_optical_density_is_judged_as_its_transmission(
+    tmp_path: Path, head: str, density: float, right: float
+) -> None:
+    nm = np.arange(400.0, 701)
+    od = (0.03 if density > 1 else 0.02) + density * np.exp(-(((nm - 633) / 8) ** 2))
+    (tmp_path / "notch.csv").write_text(rows([["Wavelength (nm)", *nm], [head, *(f"{v:.4f}" for v in od)]]))
+    for options in ({"relative_to": "Y"}, {}):
+        found = sweep.evaluate(tmp_path / "notch.csv", **options)
+        assert float(found.table.iloc[-1]["csd_yellow_red"]) == pytest.approx(right, abs=0.06)
+        assert "optical density, converted to transmission, times Y" in str(found)
+
+
+def test_a_folder_of_one_file_each_is_a_sensor_and_lights(tmp_path: Path) -> None:
+    """`describe`, `new`, `run` and `evaluate`."""
+    for name, values in QE.items():
+        (tmp_path / "qe").mkdir(exist_ok=True)
+        (tmp_path / "qe" / f"{name}.csv").write_text(rows([["nm", *NM], ["QE", *ppf(values)]]))
+    for name, peak in (("go", 505), ("wait", 592), ("stop", 632)):
+        (tmp_path / "leds").mkdir(exist_ok=True)
+        fine = np.arange(380.0, 781)
+        (tmp_path / "leds" / f"{name}.txt").write_text(
+            OCEAN.split("380.0\t")[0] + rows([fine, ppf(np.exp(-(((fine - peak) / 12) ** 2)))], "\t")
+        )
+    code, out, err = commanded("describe", tmp_path / "qe", "--output", tmp_path)
+    assert (code, err) == (0, "")
+    assert "4 curves: Blue, Clear, Green, Red." in out
+    code, out, err = commanded(
+        "new", "mine", "--qe", tmp_path / "qe", "--lights", tmp_path / "leds", "--folder", tmp_path
+    )
+    assert (code, err) == (0, "")
+    study = load_study(tmp_path / "mine.yaml")
+    np.testing.assert_allclose(study.sensor.qe["R"], np.interp(study.grid.nodes_nm, NM, QE["Red"]), atol=1e-6)
+    assert {kind: list(study.lights.names)[at[0]] for kind, at in study.lights.members.items()} == {
+        "green": "leds:go",
+        "yellow": "leds:wait",
+        "red": "leds:stop",
+    }
+    again = commanded(
+        "new",
+        "files",
+        "--folder",
+        tmp_path,
+        *itertools.chain(*(("--qe", tmp_path / "qe" / f"{name}.csv") for name in QE)),
+        *itertools.chain(*(("--lights", tmp_path / "leds" / f"{name}.txt") for name in ("go", "wait", "stop"))),
+    )
+    assert again[0] == 0, again
+    other = load_study(tmp_path / "files.yaml")
+    np.testing.assert_array_equal(other.sensor.qe["R"], study.sensor.qe["R"])
+    np.testing.assert_array_equal(other.lights.photons, study.lights.photons)
+    (tmp_path / "filters").mkdir()
+    (tmp_path / "filters" / "notch.asc").write_text(PERKIN_ELMER)
+    code, out, err = commanded(
+        "evaluate", tmp_path / "filters", "--sensor", tmp_path / "qe", "--lights", tmp_path / "leds"
+    )
+    assert (code, err) == (0, ""), err
+    assert "notch: transmission, times C; it is N of RGBN" in out
+
+
+def test_words_of_three_languages_are_channels(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(GERMAN.replace("Klar", "Gelb"), encoding="utf-8")
+    code, out, _ = commanded("new", "mine", "--qe", tmp_path / "a.csv", "--folder", tmp_path)
+    assert code == 0
+    assert "RYNB" in out
+    assert "R from QE Rot [%], G from QE Grün [%], B from QE Blau [%], Y from QE Gelb [%]" in out
+    (tmp_path / "b.csv").write_text(
+        GERMAN.replace("Rot", "x1").replace("Blau", "x2").replace("Klar", "x3"), encoding="utf-8"
+    )
+    code, out, _ = commanded("new", "other", "--qe", tmp_path / "b.csv", "--folder", tmp_path)
+    assert "Guessed by shape, check them: QE x1 [%], QE x2 [%], QE x3 [%]" in out
+    (tmp_path / "c.csv").write_text(
+        "nm,QE Grün [%],x1,x2\n" + rows([NM.astype(int), *(ppf(100 * QE["Green"]) for _ in range(3))])
+    )
+    code, _, err = commanded("new", "third", "--qe", tmp_path / "c.csv", "--folder", tmp_path)
+    assert code == 2
+    assert "only G was understood (got 'x1, x2')" in err
+
+
+def test_a_study_with_own_ir_cut_runs_to_1000_nm_with_built_in_lights(tmp_path: Path) -> None:
+    nm = np.arange(380, 1011, 5)
+    broad = [f"{v:.6f}" for v in 0.5 * np.exp(-(((nm - 600) / 200.0) ** 2))]
+    (tmp_path / "qe.csv").write_text(rows([["nm", *nm], *([f"{name} QE", *broad] for name in ("R", "G", "C"))]))
+    (tmp_path / "cut.csv").write_text(rows([["nm", *nm], ["%T", *np.where(nm < 690, 90, 1)]]))
+    text = (
+        "study: ir\nsensor: {files: [{file: qe.csv, columns: {R: R QE, G: G QE, C: C QE}}], clear: C, ir_cut: cut.csv}\n"
+        "wavelengths: {start_nm: 400, stop_nm: 1000}\nlights: {builtin: tl16, outside: zero}\ncfas: [RCCC]\n"
+    )
+    (tmp_path / "ir.yaml").write_text(text)
+    study = load_study(tmp_path / "ir.yaml")
+    cut = np.interp(study.grid.nodes_nm, nm, np.where(nm < 690, 0.9, 0.01))
+    np.testing.assert_allclose(
+        study.sensor.qe["C"], cut * np.interp(study.grid.nodes_nm, nm, [float(v) for v in broad]), rtol=1e-9
+    )
+    inside = study.grid.nodes_nm <= 700
+    short = sweep.make_study(lights="tl16", cfas=["RGGB"]).study.lights.photons
+    np.testing.assert_array_equal(study.lights.photons[:, inside], short)
+    assert not study.lights.photons[:, ~inside].any()
+    (tmp_path / "ir.yaml").write_text(text.replace("{builtin: tl16, outside: zero}", "tl16"))
+    with one_line("the built-in curves end before the grid"):
+        load_study(tmp_path / "ir.yaml")
+
+
+def test_daylight_and_filament_go_on_to_1000_nm() -> None:
+    long, short = (
+        WavelengthGrid(start_nm=400, stop_nm=1000, step_nm=5),
+        WavelengthGrid(start_nm=400, stop_nm=780, step_nm=5),
+    )
+    for name, kelvin in (("d65", 6504.0), ("a", 2855.54)):
+        photons = illuminant(long, name)
+        np.testing.assert_array_equal(photons[: short.size], illuminant(short, name))
+        ends = photons[[short.size - 1, -1]]
+        m = np.array([780e-9, 1000e-9])
+        body = m**-4 / np.expm1(H * C / (1.380649e-23 * m * kelvin))
+        assert ends[1] / ends[0] == pytest.approx(body[1] / body[0], rel=1e-9)
