@@ -15,8 +15,8 @@ from ..base.errors import DataError, ValidationIssue
 from ..spectra.facts import Curve
 from ..spectra.filter_files import HINTS
 from ..spectra.light_files import MOST_LETTERS, clean_curves
-from ..spectra.spectrum import Curves
-from ..spectra.units import Quantity, folded, name_of, used_as
+from ..spectra.spectrum import Curves, Quantity
+from ..spectra.units import folded, name_of, used_as
 
 _WORDS = {
     **dict.fromkeys(("red", "rot", "rouge"), "R"),

@@ -16,8 +16,8 @@ from ..camera.sensor import SensorCurves
 from ..spectra import LightUnit
 from ..spectra.formats import files_in, read_curves
 from ..spectra.lights import Lights
-from ..spectra.spectrum import Curves
-from ..spectra.units import FITTING, Quantity, Use, used_as
+from ..spectra.spectrum import Curves, Quantity
+from ..spectra.units import FITTING, Use, used_as
 from .channels import NEW, RATIO, Layout, layout_of, sensor_file
 from .filter_evaluation import (
     PLAIN_TILE,

@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 
 from ..base.disk import read_input
-from ..base.errors import OutputError, ValidationIssue
+from ..base.errors import DataError, OutputError, ValidationIssue
 from ..results.atomic import write_bytes
 from ..spectra.facts import Curve, Facts, facts_of, merge_equal_issues, notes
 from ..spectra.formats import read_curves, scan_curves
 from ..spectra.signal_color import LightColor
-from ..spectra.units import FITTING, Quantity, Use, used_as
+from ..spectra.spectrum import Quantity
+from ..spectra.units import FITTING, Use, used_as
 from .describe_picture import draw
 
 _MOST_NAMES = 12
@@ -92,8 +93,11 @@ def described(path: Path, folder: Path, quantity: Quantity | None = None) -> Des
         energy = facts.colors("energy").items()
         words = [f"{name} {color.xy[0]:.4f} {color.xy[1]:.4f}" for name, color in energy if color is not None]
         lines += [f"  the same numbers as energy would be at xy: {'; '.join(words)}"] if words else []
-    read = None if issues else _used(path, kind, quantity)
-    lines += [f"Read: {note}." for note in (read or ())]
+    if not issues:
+        try:
+            lines += [f"Read: {note}." for note in _used(path, kind, quantity)]
+        except DataError as error:
+            issues = error.issues
     lines += [f"Note: {note}." for note in notes(facts, as_qe=kind == "qe")]
     if not issues:
         lines.append("Its samples are clean: a study can read it.")

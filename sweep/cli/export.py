@@ -20,16 +20,13 @@ from ..spectra.filter_files import (
     csv_text,
     filter_names,
     isetcam_mat,
-    rgb_weights,
-    speos_text,
     unique_names,
 )
-from ..study import Study, folder_name
+from ..study import folder_name
 from .options import ExportFormat
 
 _ROUNDING = 1e-9
 _MOST_SHOWN = 10
-_RGB = ("R", "G", "B")
 Row = Mapping[Any, Any]
 
 
@@ -106,17 +103,6 @@ def export_design(
         f"       {mat_path} ({', '.join(filter_names(hints, curves))}: QE, so set the pixel's spectral QE to 1 in "
         "ISETCam).",
     ]
-    if ExportFormat.SPEOS in also:
-        for name, (channel, values) in zip(unique_names(map(folder_name, curves)), curves.items(), strict=True):
-            spectrum = path.with_name(f"{path.name}_{name}.spectrum")
-            about = f"{channel} of {_design(output, row)}: QE in percent, electrons per photon"
-            files[spectrum] = speos_text(wavelength_nm, values, about).encode("ascii")
-            lines.append(f"       {spectrum} ({channel}: QE in percent, for Speos)")
-    if ExportFormat.RGB in also:
-        weights = path.with_name(path.name + "_rgb_weights.csv")
-        text, weight_lines = _rgb_weights(study, curves)
-        files[weights] = text.encode("utf-8")
-        lines += [f"       {weights} (each channel as a sum of the sensor's R, G and B):", *weight_lines]
     if ExportFormat.SPECIFICATION in also:
         specified, page = (path.with_name(f"{path.name}_specification.{kind}") for kind in ("csv", "svg"))
         made = specification(output)
@@ -239,17 +225,3 @@ def _remarks(wavelength_nm: FloatArray, bases: Mapping[str, str], transmissions:
                 f"the filter takes the place of that of {base}, it cannot be put before it."
             )
     return lines
-
-
-def _rgb_weights(study: Study, curves: Mapping[str, FloatArray]) -> tuple[str, list[str]]:
-    """CSV of each channel as a sum of R, G and B, and a line per channel; raises DataError without them."""
-    fit = rgb_weights(curves, np.stack([study.sensor.curve(name) for name in _RGB]), study.lights.photons)
-    lines = []
-    for channel, weights, residual, error in zip(fit.channels, fit.weights, fit.residual, fit.light_error, strict=True):
-        shown = [round(float(weight), 4) + 0.0 for weight in weights]  # no -0.0000
-        terms = " ".join(f"{weight:+.4f} {name}" for weight, name in zip(shown, _RGB, strict=True))
-        lines.append(
-            f"       {channel} = {terms}; the sum misses {residual:.2%} of the curve (root mean square), and "
-            f"of each of the study's lights at most {error:.2%} of the brightest one's electrons."
-        )
-    return fit.as_csv(), lines

@@ -18,7 +18,8 @@ from ..results.atomic import atomic, write_text
 from ..spectra import LightUnit
 from ..spectra.light_files import lights_file
 from ..spectra.read_text import MOST_BYTES
-from ..spectra.units import FITTING, Quantity
+from ..spectra.spectrum import Quantity
+from ..spectra.units import FITTING
 from ..study import Study, folder_name, load_study
 from ..study.editors import SCHEMA_FILE, TITLE, schema_text
 from ..study.schema import StudySection

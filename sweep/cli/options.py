@@ -21,10 +21,8 @@ PANELS = (OF_STUDIES, OF_RESULTS, OF_CURVES, OF_TOOL)
 
 
 class ExportFormat(StrEnum):
-    """Files that an export can write, too: of other programs, or the specification of a colorant from a map."""
+    """Files that an export can write, too: the specification of a colorant from a map."""
 
-    SPEOS = "speos"
-    RGB = "rgb"
     SPECIFICATION = "specification"
 
 

@@ -12,8 +12,7 @@ from ..base.types import FloatArray
 from . import LightUnit
 from .read_table import Scan
 from .signal_color import VISIBLE, LightColor, light_color
-from .spectrum import WavelengthGrid, photons_from_energy, resample
-from .units import Unit
+from .spectrum import Unit, WavelengthGrid, photons_from_energy, resample
 
 _NEEDED = WavelengthGrid()
 _BROAD_NM = 70.0

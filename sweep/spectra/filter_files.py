@@ -1,11 +1,10 @@
-"""Write the filters of a CFA: CSV, ISETCam's `.mat` color filters, Speos' `.spectrum`, and sums of RGB."""
+"""Write the filters of a CFA: CSV, and ISETCam's `.mat` color filters."""
 
 from __future__ import annotations
 
 import csv
 import io
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,7 +18,6 @@ _FREE = "oxuzim"
 _CLEAR = ("c", "clear")
 _HEADER = b"MATLAB 5.0 MAT-file, written by sweep"
 _HEADER_BYTES = 116
-_SPEOS_TITLE = "OPTIS - Spectrum file v1.0"
 
 
 def unique_names(names: Iterable[str]) -> list[str]:
@@ -160,94 +158,3 @@ def isetcam_mat(
     )
     # SciPy's header holds the time.
     return _HEADER.ljust(_HEADER_BYTES) + content.getvalue()[_HEADER_BYTES:]
-
-
-def speos_text(wavelength_nm: FloatArray, values: FloatArray, about: str) -> str:
-    """Return a curve as Speos reads it.
-
-    A title, the description, the number of samples, then a line of wavelength (nm) and percent each. Source: Ansys
-    Optics, "Create spectrum file from graph".
-
-    Parameters
-    ----------
-    wavelength_nm : ndarray of shape (n_wavelengths,)
-        Wavelengths, nm.
-    values : ndarray of shape (n_wavelengths,)
-        Curve, 0 to 1.
-    about : str
-        Description in ASCII, one line.
-
-    Returns
-    -------
-    str
-        Text.
-    """
-    plain = " ".join(about.split()).encode("ascii", "replace").decode("ascii")
-    head = [_SPEOS_TITLE, plain, str(wavelength_nm.size)]
-    rows = [f"{float(nm)!r}\t{float(share)!r}" for nm, share in zip(wavelength_nm, 100.0 * values, strict=True)]
-    return "\n".join([*head, *rows, ""])
-
-
-@dataclass(frozen=True)
-class RgbWeights:
-    """Least-squares fit of channels by red, green and blue, with equal weight of all wavelengths.
-
-    Parameters
-    ----------
-    channels : tuple of str
-        Channels.
-    weights : ndarray of shape (n_channels, 3)
-        Weights of any sign.
-    residual : ndarray of shape (n_channels,)
-        RMS of the residual over that of the curve, 0 to 1.
-    light_error : ndarray of shape (n_channels,)
-        Largest error of a channel's electrons over the lights, relative to its brightest light.
-    """
-
-    channels: tuple[str, ...]
-    weights: FloatArray
-    residual: FloatArray
-    light_error: FloatArray
-
-    def as_csv(self) -> str:
-        """Return one row per channel with every digit.
-
-        Returns
-        -------
-        str
-            Text.
-        """
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(["channel", "red", "green", "blue", "residual", "largest_error_of_a_light"])
-        rows = zip(self.channels, self.weights, self.residual, self.light_error, strict=True)
-        for channel, weights, residual, error in rows:
-            writer.writerow([channel, *(repr(float(number)) for number in (*weights, residual, error))])
-        return text.getvalue()
-
-
-def rgb_weights(qe: Mapping[str, FloatArray], rgb: FloatArray, photons: FloatArray) -> RgbWeights:
-    """Fit channels by three curves.
-
-    Parameters
-    ----------
-    qe : mapping of str to ndarray of shape (n_wavelengths,)
-        Channels; one whose curve is 0 has weights and a residual of 0.
-    rgb : ndarray of shape (3, n_wavelengths)
-        Curves of the fit.
-    photons : ndarray of shape (n_lights, n_wavelengths)
-        Lights.
-
-    Returns
-    -------
-    RgbWeights
-        Fit.
-    """
-    curves = np.stack(list(qe.values()))
-    weights = np.asarray(np.linalg.lstsq(rgb.T, curves.T, rcond=None)[0].T, dtype=float)
-    fit = weights @ rgb
-    left, whole = (np.asarray(np.sqrt((part**2).mean(axis=1)), dtype=float) for part in (curves - fit, curves))
-    brightest, off = (curves @ photons.T).max(axis=1), np.abs((fit - curves) @ photons.T).max(axis=1)
-    errors = np.divide(off, brightest, out=np.full_like(off, np.inf), where=brightest > 0)
-    residual = np.divide(left, whole, out=np.zeros_like(left), where=whole > 0)
-    return RgbWeights(tuple(qe), weights, residual, errors)

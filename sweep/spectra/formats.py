@@ -257,7 +257,9 @@ def _excel_sheet(path: Path) -> Sheet:
     file, content = str(path), read_input(path, MOST_BYTES, DataError)
     if importlib.util.find_spec("openpyxl") is None:
         raise DataError(
-            ValidationIssue("a spreadsheet needs the extra `xlsx`", file, allowed="pip install 'sweep[xlsx]', or CSV")
+            ValidationIssue(
+                "a spreadsheet needs the extra `xlsx`", file, allowed="pip install 'cfa-sweep[xlsx]', or CSV"
+            )
         ) from None
     import pandas as pd  # noqa: PLC0415  (slow to import)
 

@@ -15,8 +15,8 @@ import numpy as np
 from ..base.errors import DataError, ValidationIssue
 from ..base.types import FloatArray, IndexArray
 from .read_text import MISSING, Rows, Sheet, number_of
-from .spectrum import LARGEST, sample_issues
-from .units import Unit, folded, symbol_unit, unit_of
+from .spectrum import LARGEST, Unit, sample_issues
+from .units import folded, symbol_unit, unit_of
 
 WAVELENGTH = "wavelength_nm"
 """Name of the first column of the package's own files."""
@@ -174,8 +174,13 @@ def _listed(sheet: Sheet) -> Sheet | None:
     names: list[str] = []
     for line, cells in sheet.rows:
         match = _KEYED.fullmatch(cells[0])
-        if match is not None and match[1] and len(cells) > 1 and _number(cells[1], sheet.decimal) is not None:
-            series.setdefault(match[1], []).append((line, [match[2], *cells[1:]]))
+        if (
+            match is not None
+            and (match[1] or match[3])
+            and len(cells) > 1
+            and _number(cells[1], sheet.decimal) is not None
+        ):
+            series.setdefault(match[1] or "", []).append((line, [match[2], *cells[1:]]))
         elif folded(cells[0]) in ("title", "name", "sample", "sample name", "titel") and len(cells) > 1:
             names = cells[1:]
     found = [
@@ -261,7 +266,7 @@ def _wave_unit(cell: str) -> float | None:
     match = _NAME_AND_UNIT.fullmatch(text)
     if match is None or match[2] not in _UNITS_NM or (not match[1] and len(match[2]) == 1):
         return None
-    return _UNITS_NM[match[2]] if not match[1] or _WAVE.fullmatch(match[1].strip()) else None
+    return _UNITS_NM[match[2]] if not match[1] or _WAVE.fullmatch(match[1].removesuffix(" in").strip()) else None
 
 
 def _columns(table: _Table) -> list[_Column]:
@@ -301,6 +306,11 @@ def _columns(table: _Table) -> list[_Column]:
     index = [at for at in others if len(at_x) == 1 and _counts(names, series, at, at_x[0])]
     if index:
         sheet.notes.append("a column that counts the rows was left out")
+    texts = [at for at in others if all(value is None or np.isnan(value) for value in series[at])]
+    if texts and len(texts) < len(others):
+        named = ", ".join(repr(names[at]) for at in texts if names and names[at])
+        sheet.notes.append(f"columns without numbers were left out{f': {named}' if named else ''}")
+        index += texts
     for at in others:
         if at in index:
             continue

@@ -31,7 +31,7 @@ NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _LEADING_ZEROS = re.compile(r"[+-]?0\d.*")
 _COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
-MISSING = ("", "nan", "n/a", "na", "#n/a", "-", "--", "null", "none")
+MISSING = ("", "nan", "n/a", "n.a.", "na", "#n/a", "#nv", "-", "--", "null", "none")
 _WORD_AND_BRACKET = re.compile(r"\S*[^\s\[(]\s?[\[(][^\[\]()]*(?:\([^()]*\)[^\[\]()]*)*[\])]|\S+")
 
 

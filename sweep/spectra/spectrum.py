@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,11 +16,19 @@ from pydantic import model_validator
 from ..base.errors import DataError, ValidationIssue
 from ..base.types import FloatArray, Positive, Section
 
-if TYPE_CHECKING:
-    from .units import Unit
-
 Resampling = Literal["linear", "mean"]
 Outside = Literal["refuse", "zero"]
+Quantity = Literal[
+    "qe",
+    "responsivity",
+    "relative_responsivity",
+    "transmission",
+    "density",
+    "decibel",
+    "reflectance",
+    "energy",
+    "photons",
+]
 
 PLANCK_J_S = 6.62607015e-34
 """Planck constant, exact in the SI of 2019."""
@@ -86,6 +94,27 @@ class WavelengthGrid(Section):
             Integrals.
         """
         return np.asarray(values.sum(axis=-1) * self.step_nm, dtype=float)
+
+
+@dataclass(frozen=True)
+class Unit:
+    """What a head says of its numbers: words for messages, quantity, factor to plain numbers, and why it is unclear."""
+
+    words: str = ""
+    quantity: Quantity | None = None
+    factor: float | None = None
+    unclear: str = ""
+    loss: bool = False
+
+    def over(self, other: Unit) -> Unit:
+        """Return this unit, completed by one of the whole table."""
+        if self.unclear or not other.words:
+            return self
+        if self.quantity and other.quantity and self.quantity != other.quantity:
+            return Unit(f"{self.words}, {other.words}", unclear="contradicts itself")
+        quantity, factor = self.quantity or other.quantity, self.factor if self.factor is not None else other.factor
+        words = ", ".join(dict.fromkeys(filter(None, (self.words, other.words))))
+        return Unit(words, quantity, factor, other.unclear if quantity is None else "", self.loss or other.loss)
 
 
 @dataclass(frozen=True)

@@ -5,26 +5,15 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
 from ..base.errors import DataError, ValidationIssue
 from ..base.types import FloatArray
-from .spectrum import LIGHT_M_S, PLANCK_J_S, Curves
+from .spectrum import LIGHT_M_S, PLANCK_J_S, Curves, Quantity, Unit
 
-Quantity = Literal[
-    "qe",
-    "responsivity",
-    "relative_responsivity",
-    "transmission",
-    "density",
-    "decibel",
-    "reflectance",
-    "energy",
-    "photons",
-]
 FilterQuantity = Literal["transmission", "density", "decibel"]
 SensorQuantity = Literal["qe", "responsivity", "relative_responsivity", "transmission", "density", "decibel"]
 Use = Literal["sensor", "filter", "light", "surface"]
@@ -96,28 +85,8 @@ _FOREIGN = re.compile(r".*/.*|lm|lx|cd|m?v|ev|au|cm-1|[munpk]?a")
 _BRACKETS = re.compile(r"[\[(]([^\[\]()]*(?:\([^()]*\)[^\[\]()]*)*)[\])]")
 _PERCENT_OF = re.compile(r"(?:\b100\s*)?%\s*([tr])\b|\b([tr])\s*%", re.IGNORECASE)
 """`%T`, `T%` and `Baseline 100%T`, as photometers write them."""
+_LEADING = re.compile(r"^\s*(%)\s*(?=[^\W\d_]{2})")
 _TRAILING = re.compile(r"(?:^|[\s_,:/])(%|od|a/w|ma/w|db|percent|pct)\s*$", re.IGNORECASE)
-
-
-@dataclass(frozen=True)
-class Unit:
-    """What a head says of its numbers: words for messages, quantity, factor to plain numbers, and why it is unclear."""
-
-    words: str = ""
-    quantity: Quantity | None = None
-    factor: float | None = None
-    unclear: str = ""
-    loss: bool = False
-
-    def over(self, other: Unit) -> Unit:
-        """Return this unit, completed by one of the whole table."""
-        if self.unclear or not other.words:
-            return self
-        if self.quantity and other.quantity and self.quantity != other.quantity:
-            return Unit(f"{self.words}, {other.words}", unclear="contradicts itself")
-        quantity, factor = self.quantity or other.quantity, self.factor if self.factor is not None else other.factor
-        words = ", ".join(dict.fromkeys(filter(None, (self.words, other.words))))
-        return Unit(words, quantity, factor, other.unclear if quantity is None else "", self.loss or other.loss)
 
 
 def folded(text: str) -> str:
@@ -152,7 +121,8 @@ def _parts(head: str) -> tuple[str, list[Unit]]:
 
     if "/" in head and _BRACKETS.search(head) is None and (whole := symbol_unit(head)) and not whole.unclear:
         return "", [whole]
-    bare = _TRAILING.sub(taken, _PERCENT_OF.sub(taken, _BRACKETS.sub(taken, head)))
+    bare = _LEADING.sub(taken, _PERCENT_OF.sub(taken, _BRACKETS.sub(taken, head)))
+    bare = _TRAILING.sub(taken, bare)
     return bare.strip(" _,:/"), found
 
 

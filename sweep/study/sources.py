@@ -20,8 +20,8 @@ from ..spectra.colorants import BUILTIN_COLORANTS, Colorants, read_colorants
 from ..spectra.formats import digest, read_curves
 from ..spectra.lens_files import ChiefRays, read_chief_rays
 from ..spectra.lights import Lights
-from ..spectra.spectrum import Curves, WavelengthGrid, integral_between, photons_from_energy
-from ..spectra.units import Quantity, Use, used_as
+from ..spectra.spectrum import Curves, Quantity, WavelengthGrid, integral_between, photons_from_energy
+from ..spectra.units import Use, used_as
 from .document import Document, KeyPath, by_line
 from .schema_curves import ColorantsSection, CurveFile, LightFile, TaskFile
 

@@ -13,10 +13,9 @@ from scipy.spatial.distance import cdist
 from sweep.base.errors import OutputError, SweepError
 from sweep.cli.audit import audit_output
 from sweep.cli.export import export_design, relative_transmission
-from sweep.cli.options import ExportFormat
 from sweep.spectra.builtin.surrogate import surrogate_parameters
-from sweep.spectra.formats import read_curves
 from sweep.spectra.filter_files import HINTS, color_hints, csv_text, isetcam_mat, unique_names
+from sweep.spectra.formats import read_curves
 from sweep.study import load_study
 
 from ..build import ran, stopband_study, study_file
@@ -116,48 +115,6 @@ def test_isetcam_reads_the_same_filters(tiny: Path, tmp_path: Path) -> None:
     (comment,) = raw["comment"]
     for words in ("tiny", "mine", "left_nm=606", "QE", "set the pixel's spectral QE to 1", "surrogate"):
         assert words in comment
-
-
-def test_speos_and_rgb_weights_come_back_as_they_left(tiny: Path, tmp_path: Path) -> None:
-    code, said, wrong = commanded(
-        "export", tiny, "--design", "mine", "--to", tmp_path, "--also", "speos", "--also", "rgb"
-    )
-    assert code == 0, wrong
-    table = read_curves(tmp_path / "mine.csv")
-    for name in ("R", "Y", "N", "Cy"):
-        path = tmp_path / f"mine_{name}.spectrum"
-        title, about, count, *rows = path.read_text().splitlines()
-        assert (title, count) == ("OPTIS - Spectrum file v1.0", "301")
-        assert about.startswith(f"{name} of mine, design ")
-        nm, percent = np.loadtxt(rows).T
-        np.testing.assert_array_equal(nm, table.wavelength_nm)
-        np.testing.assert_allclose(percent, 100 * table.values[name], rtol=1e-15)
-    weights = pd.read_csv(tmp_path / "mine_rgb_weights.csv", index_col="channel", float_precision="round_trip")
-    export_design(tiny, "RGGB", None, tmp_path)
-    rgb = read_curves(tmp_path / "RGGB.csv").values
-    primaries = np.stack([rgb["R"], rgb["G"], rgb["B"]])
-    np.testing.assert_allclose(weights.loc["R", ["red", "green", "blue"]].astype(float), [1, 0, 0], atol=1e-12)
-    assert weights.loc["R", "residual"] < 1e-12
-    spectra = pd.read_parquet(tiny / "curves.parquet")
-    lights = np.stack(
-        [light["value"] for _, light in spectra[spectra["kind"] == "light"].groupby("curve", observed=True)]
-    )
-    for name, row in weights.iterrows():
-        exact, fit = table.values[str(name)], row[["red", "green", "blue"]].to_numpy(float) @ primaries
-        left = exact - fit
-        assert np.abs(primaries @ left).max() < 1e-9  # what is left is orthogonal: no other weights are better
-        assert row["residual"] == pytest.approx(np.linalg.norm(left) / np.linalg.norm(exact), abs=1e-12)
-        share = np.abs(lights @ left).max() / (lights @ exact).max()
-        assert row["largest_error_of_a_light"] == pytest.approx(share, abs=1e-9)
-        assert f"misses {row['residual']:.2%} of the curve" in said
-    assert weights.loc["N", "residual"] > 0.01
-    assert "R = +1.0000 R +0.0000 G +0.0000 B" in said
-
-
-def test_rgb_weights_need_the_sensor_s_rgb(from_files: Path, tmp_path: Path) -> None:
-    with pytest.raises(SweepError, match=r"no such curve .got 'B'"):
-        export_design(from_files, "best", None, tmp_path / "to", [ExportFormat.RGB])
-    assert not (tmp_path / "to").exists()
 
 
 def test_the_same_export_again_is_the_same_and_nothing_else_is_overwritten(tiny: Path, tmp_path: Path) -> None:

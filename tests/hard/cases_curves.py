@@ -102,9 +102,9 @@ def no_negative_bins() -> Result:
     return Result(abs(least), 0.0)
 
 
-def study_text(folder: Path, cell: str) -> Path:
-    """A study whose red filter has `cell` for a value at 550 nm."""
-    rows = "\n".join(f"{w},{cell if w == 550 else 0.5},0.4" for w in range(390, 720, 10))
+def study_text(folder: Path, cell: str, after: str = "0.5") -> Path:
+    """A study whose red filter has `cell` for a value at 550 nm, and `after` at 560 nm."""
+    rows = "\n".join(f"{w},{({550: cell, 560: after}).get(w, 0.5)},0.4" for w in range(390, 720, 10))
     (folder / "qe.csv").write_text(f"wavelength_nm,red,green\n{rows}\n")
     path = folder / "s.yaml"
     path.write_text(
@@ -116,20 +116,27 @@ def study_text(folder: Path, cell: str) -> Path:
 
 @hard_case("a NaN in a user's file")
 def nan_in_a_file() -> Result:
-    """Refused, with file, line and column. Allowed: what is not a finite number of 0 or more is never mended."""
+    """One between two samples is on the straight line between them, and said. Allowed: all else is refused, in one line."""
     good = True
     with TemporaryDirectory() as name:
         folder = Path(name)
         assert load_study(study_text(folder, "0.5")).sensor.qe["R"].shape == (301,)
-        for cell in ("nan", "NaN", "-nan", "inf", "1e999", "-1e-300", "", "n/a"):
+        for cell in ("nan", "NaN", "", "n/a"):
+            path = study_text(folder, cell)
+            good &= bool((load_study(path).sensor.qe["R"] == 0.5).all())
+            good &= any("red: the missing value at 550 nm is 0.5" in said for said in load_study(path).warnings)
+            path = study_text(folder, cell, cell)
+            good &= refused(lambda: read_curves(folder / "qe.csv"), DataError, "qe.csv", "red", "in a row are missing")
+        for cell in ("-nan", "inf", "1e999", "x"):
             path = study_text(folder, cell)
             good &= refused(lambda: read_curves(folder / "qe.csv"), DataError, "qe.csv:18", "red")
             good &= refused(lambda path=path: load_study(path), StudyError, "qe.csv:18", "red")
-        for bad in (np.nan, np.inf, -1e-300):
+        for bad in (np.inf, -0.1):
             data = np.full((31, 2), 0.5)
             data[7, 1] = bad
             savemat(folder / "qe.mat", {"wavelength": np.arange(400.0, 710.0, 10.0), "data": data})
-            good &= refused(lambda: read_curves(folder / "qe.mat"), DataError, "qe.mat", "curve_2", "470 nm")
+            place = "qe.mat:9" if bad > 0 else "470 nm"
+            good &= refused(lambda: read_curves(folder / "qe.mat"), DataError, "qe.mat", "curve_2", place)
     return outcome(good)
 
 

@@ -165,7 +165,10 @@ def test_signal_types_of_a_file_follow_from_its_colors(folder: Path) -> None:
         ),
     )
     alone = load(folder, text("one", "own", after="validate: {lights: third.csv}\n"))
-    assert any("third.csv: read as energy; green: g1; yellow: y1; red: r1, r2" in line for line in alone.warnings)
+    assert any(
+        "third.csv: g1, y1, r1, r2: no unit, assumed to be energy; green: g1; yellow: y1; red: r1, r2" in line
+        for line in alone.warnings
+    )
     assert alone.held_out is not None
     assert named.held_out is not None
     assert alone.held_out.names == named.held_out.names

@@ -203,7 +203,7 @@ def emptied(folder: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.long
 @pytest.mark.usefixtures("plain_pictures")
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_kills_in_every_phase(tmp_path: Path, undisturbed: Path, whole_s: float, seed: int) -> None:
     """Parents and workers, by three signals, at random moments; the rows are those of an undisturbed run each time.
 

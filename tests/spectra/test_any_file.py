@@ -16,8 +16,8 @@ import sweep
 from sweep.base.errors import DataError
 from sweep.spectra.builtin.task_sets import illuminant
 from sweep.spectra.formats import read_curves
-from sweep.spectra.spectrum import WavelengthGrid
-from sweep.spectra.units import Quantity, Use, unit_of, used_as
+from sweep.spectra.spectrum import Quantity, WavelengthGrid
+from sweep.spectra.units import Use, unit_of, used_as
 from sweep.study import load_study
 
 from ..build import one_line
@@ -30,31 +30,28 @@ NAMES = {
     "filter": (("notch", "Sample1", "Filter B", "F4"),),
     "light": (("led 1", "amber", "TL_red", "red2"), ("505", "592", "628", "636")),
 }
-# Use, words of the head (in brackets), the numbers in the file of the right values v at a wavelength in m.
-UNITS: dict[Use, dict[str, object]] = {
-    "sensor": {
-        "": lambda v, m: v,
-        "QE": lambda v, m: v,
-        "%": lambda v, m: 100 * v,
-        "A/W": lambda v, m: v * m * E_C / (H * C),
-        "mA/W": lambda v, m: 1e3 * v * m * E_C / (H * C),
-    },
-    "filter": {
-        "T": lambda v, m: v,
-        "%T": lambda v, m: 100 * v,
-        "OD": lambda v, m: -np.log10(v),
-        "Absorbance": lambda v, m: -np.log10(v),
-        "dB": lambda v, m: 10 * np.log10(v),
-        "": lambda v, m: v,
-    },
-    "light": {
-        "": lambda v, m: v,
-        "W/m2/nm": lambda v, m: v,
-        "µW/cm²/nm": lambda v, m: v,
-        "photons/s/nm": lambda v, m: v,
-        "counts": lambda v, m: np.rint(60_000 * v),
-    },
+UNITS: dict[Use, tuple[str, ...]] = {
+    "sensor": ("", "QE", "%", "A/W", "mA/W"),
+    "filter": ("", "T", "%T", "OD", "Absorbance", "dB"),
+    "light": ("", "W/m2/nm", "µW/cm²/nm", "photons/s/nm", "counts"),
 }
+"""Words of the head, in brackets."""
+
+
+def in_unit(unit: str, right: np.ndarray, nm: np.ndarray) -> np.ndarray:
+    """The numbers in the file of right values."""
+    match unit:
+        case "%" | "%T":
+            return 100 * right
+        case "A/W" | "mA/W":
+            return (1e3 if unit == "mA/W" else 1.0) * right * nm * 1e-9 * E_C / (H * C)
+        case "OD" | "Absorbance":
+            return -np.log10(right)
+        case "dB":
+            return 10 * np.log10(right)
+        case "counts":
+            return np.rint(60_000 * right)
+    return right
 
 
 @dataclass(frozen=True)
@@ -68,7 +65,7 @@ class Written:
     unit: str
 
 
-def table(rng: np.random.Generator) -> Written:
+def table(rng: np.random.Generator) -> Written:  # noqa: PLR0912, PLR0915  (choices one after the other)
     """A table in a layout of its own, from a writer that knows nothing of the reader."""
     use: Use = ("sensor", "filter", "light")[rng.integers(3)]
     step = int(rng.choice([1, 2, 5, 10]))
@@ -77,7 +74,7 @@ def table(rng: np.random.Generator) -> Written:
     width = 14.0 if use == "light" else 45.0
     right = np.stack([0.004 + 0.6 * np.exp(-(((nm - peak) / width) ** 2)) for peak in PEAKS[use][:count]], axis=1)
     unit = str(rng.choice([*UNITS[use]]))
-    numbers = UNITS[use][unit](right, nm[:, None] * 1e-9)  # type: ignore[operator]
+    numbers = in_unit(unit, right, nm[:, None])
     if unit == "counts":
         right = numbers
     mark = str(rng.choice([",", ";", "\t", "|", "   "]))
@@ -108,10 +105,9 @@ def table(rng: np.random.Generator) -> Written:
         first = first.replace(" ", "_")
         heads = [head.replace(" ", "_") for head in heads]
     if layout == "along":
-        first = ("lamp", "name", "", of_wave)[rng.integers(4)]
+        first, words = ("lamp", "name", "", of_wave)[rng.integers(4)], int(rng.integers(3))
         waves = [
-            f"{value:g}".replace(".", decimal) + ("", " nm", "[nm]")[0 if mark == "   " else rng.integers(3) * 0]
-            for value in nm
+            f"{value:g}".replace(".", decimal) + ("" if mark == "   " else ("", " nm", "[nm]")[words]) for value in nm
         ]
         lines = [[first, *waves], *([head, *column] for head, column in zip(heads, columns, strict=True))]
     elif layout == "pairs":
@@ -155,7 +151,7 @@ def reads_back(path: Path, written: Written) -> bool:
         curves = read_curves(path)
         made = used_as(curves, list(curves.values), written.use)
     except DataError as error:
-        assert all(len(str(issue).splitlines()) == 1 for issue in error.issues)
+        assert all(len(str(issue).splitlines()) == 1 for issue in error.issues)  # noqa: PT017
         return False
     found = np.stack([np.interp(written.wave_nm, *made.samples(name)) for name in made.values], axis=1)
     assert found.shape == written.values.shape, written.text[:600]

@@ -15,8 +15,8 @@ from scipy.io import savemat
 from sweep.base.errors import DataError, SweepError
 from sweep.cli.describe import described
 from sweep.spectra.formats import read_curves, scan_curves
-from sweep.spectra.spectrum import LARGEST, LEAST_PEAK, check_samples
 from sweep.spectra.read_table import MOST_CURVES, MOST_SAMPLES
+from sweep.spectra.spectrum import LARGEST, LEAST_PEAK, check_samples
 
 from ..watchdog import within
 
@@ -143,7 +143,9 @@ def test_tables_up_to_the_limits_are_read(tmp_path: Path) -> None:
 def test_of_many_faults_reading_stops(tmp_path: Path) -> None:
     names = ",".join(f"c{i}" for i in range(1000))
     path = lines(
-        tmp_path / "bad.csv", "wavelength_nm," + names, *[f"{400 + i},{','.join(['x', '1'] * 500)}" for i in range(300)]
+        tmp_path / "bad.csv",
+        "wavelength_nm," + names,
+        *[f"{400 + i},{','.join((['x', '1'], ['1', 'x'])[i % 2] * 500)}" for i in range(300)],
     )
     with within(HANG_S):
         scan = scan_curves(path)

@@ -265,7 +265,7 @@ def test_a_study_without_vision_loads_nothing_of_it(tmp_path: Path) -> None:
     [
         ("captures: [{}, {sensitivity: 0.01, qe_factor: {R: 0.9}}]", "pixel.captures[1].qe_factor: `vision` has"),
         ("captures: split_pixel, merge: weighted", "pixel.merge: `vision` counts electrons of the first usable"),
-        ("captures: [{}, {sensitivity: 1.0e-6}]", "pixel.captures: too many readings for `vision`"),
+        ("captures: [{}, {sensitivity: 5.0e-5}]", "pixel.captures: too many readings for `vision`"),
         ("captures: [{}, {sensitivity: 0.1, well_e: 40000}]", "pixel.captures[1].well_e: too large for `vision`"),
     ],
 )
