@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from ..base.types import FloatArray, IndexArray
-from .read_table import WAVELENGTH
+from .layouts import WAVELENGTH
 
 HINTS = "rgbcymwiuxzok"
 """First letters of filter names that ISETCam has a color for (its `sensorColorOrder`)."""

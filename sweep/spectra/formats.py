@@ -17,7 +17,9 @@ import numpy as np
 
 from ..base.disk import is_folder, read_input
 from ..base.errors import DataError, ValidationIssue, nearest
-from .read_table import MOST_CURVES, MOST_VALUES, WAVELENGTH, Scan, check_size, curves_of
+from .clean import several
+from .layouts import WAVELENGTH
+from .read_table import MOST_CURVES, MOST_VALUES, Scan, check_size, curves_of
 from .read_text import MOST_BYTES, Sheet, text_sheet
 from .spectrum import Curves
 
@@ -112,10 +114,7 @@ def _joined(scans: Mapping[Path, Scan]) -> Scan:
     for file, scan in scans.items():
         for note in scan.notes:
             said.setdefault(note, []).append(file.name)
-    notes = [
-        f"{', '.join(files[:3])}{f' and {len(files) - 3} more' if files[3:] else ''}: {note}"
-        for note, files in said.items()
-    ]
+    notes = [f"{several(files)}: {note}" for note, files in said.items()]
     return Scan(grid, tuple(names), values, units, issues, (f"{len(scans)} files of a folder were read", *notes))
 
 

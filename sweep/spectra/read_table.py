@@ -13,41 +13,27 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.errors import DataError, ValidationIssue
-from ..base.types import FloatArray, IndexArray
-from .read_text import MISSING, Rows, Sheet, number_of
+from ..base.types import FloatArray
+from .clean import Cleaner
+from .layouts import UNIT_WORDS, UNITS_NM, WAVELENGTH, number_in, rising, turned_down, wave_unit
+from .read_text import Rows, Sheet
 from .spectrum import LARGEST, Unit, sample_issues
 from .units import folded, symbol_unit, unit_of
 
-WAVELENGTH = "wavelength_nm"
-"""Name of the first column of the package's own files."""
 MOST_CURVES = 2_000
 MOST_SAMPLES = 100_000
 MOST_VALUES = 2_000_000
 """Limits of a file of curves: 2,000 curves of 1,000 samples are read in a second or two."""
-_FEWEST_ALONG = 20
-_RANGE_NM = (100.0, 20_000.0)
 _MOST_CELL_FAULTS = 10_000
-_NOISE_SHARE = 0.02
-"""Negatives up to this share of a curve's largest value are noise around 0."""
-_ALIKE_SHARE = 0.05
-"""Repeated samples that are mostly farther apart, relative to the peak, are of two spectra."""
-_WAVE = re.compile(
-    r"wave ?lengths?|wave|wvl|wl|lambda|\u03bb|wellenlange|wellenlaenge|longueurs? d'onde|longitud(es)? de onda"
-    r"|lunghezz[ae] d'onda|comprimentos? de onda"
-)
-_UNITS_NM = {
-    **dict.fromkeys(("nm", "nanometer", "nanometers", "nanometre", "nanometres"), 1.0),
-    **dict.fromkeys(("um", "micron", "microns", "micrometer", "micrometers", "micrometre"), 1e3),
-    **dict.fromkeys(("a", "angstrom", "angstroms"), 0.1),
-    "m": 1e9,
-}
-_UNIT_WORDS = {1.0: "nm", 1e3: "um", 0.1: "angstrom", 1e9: "m"}
-_NAME_AND_UNIT = re.compile(r"(.*?)[\s_/,.\-]*[\[(]?\s*([^\W\d_]+)\s*[\])]?")
 _X = re.compile(r"(.*?[\s_\-.])?x(_?\d+)?|")
 _Y = re.compile(r"(y(_?\d+)?|values?)|")
 _INDEX = ("", "#", "no", "no.", "nr", "nr.", "n", "id", "index", "row", "pixel", "unnamed: 0")
+_SPREAD = re.compile(
+    r"\b(std( ?dev)?|stdev|standard deviation|sigma|uncertainty|u95|unsicherheit|standardabweichung)\b"
+)
+"""Heads of columns that are no curves."""
+_Series = Sequence[float | None]
 _TITLE = "a title"
-_KEYED = re.compile(r"(.*?[^\d.\s])?\s*(\d+(?:\.\d+)?)\s*[\[(]?\s*(nm)?\s*[\])]?")
 
 
 @dataclass(frozen=True)
@@ -97,118 +83,17 @@ def curves_of(sheet: Sheet) -> Scan:
     if any(len(cells) > width for _, cells in sheet.rows):
         sheet.notes.append("empty columns at the end were left out")
     sheet = replace(sheet, rows=[(line, cells[:width]) for line, cells in sheet.rows])
-    table = _table_of(_down(sheet) or sheet)
+    table = _table_of(turned_down(sheet) or sheet)
     columns = _columns(table)
     check_size(sheet.file, None, len(table.body), len(columns))
-    numbers, bad = _numbers(table, columns)
-    return _scan(table, columns, numbers, bad)
-
-
-def _number(cell: str, decimal: str) -> float | None:
-    """Return a number, also one with a percent sign; NaN for a missing one; None for a text."""
-    if cell.casefold() in MISSING:
-        return np.nan
-    return number_of(cell.replace(decimal, ".").rstrip("%").rstrip())
-
-
-def _rising(values: Sequence[float | None]) -> bool:
-    """Return whether numbers rise or fall within the range of wavelengths in nm."""
-    known = np.array([np.nan if value is None else value for value in values])
-    steps = np.diff(known)
-    inside = (known >= _RANGE_NM[0]) & (known <= _RANGE_NM[1])
-    return bool(known.size > 1 and inside.all() and ((steps > 0).all() or (steps < 0).all()))
-
-
-def _down(sheet: Sheet) -> Sheet | None:
-    """Return a sheet with wavelengths along a row, or in the words of a list, turned; None for others."""
-    for index, (line, cells) in enumerate(sheet.rows):
-        plain = [_KEYED.fullmatch(cell.replace(sheet.decimal, ".")) for cell in cells]
-        at_number = [at for at, match in enumerate(plain) if match is not None]
-        if len(at_number) < _FEWEST_ALONG:
-            continue
-        run = max(np.split(at_number, 1 + np.flatnonzero(np.diff(at_number) != 1)), key=len)
-        waves = [float(match[2]) for at in run if (match := plain[at]) is not None]
-        at, below = int(run[0]), sheet.rows[index + 1 :]
-        if len(waves) < _FEWEST_ALONG or not _rising(waves) or not below or _is_down(sheet, cells, below, at):
-            break
-        turned = [(line, [WAVELENGTH, *(_row_name(row[:at], sheet, k) for k, (_, row) in enumerate(below, 1))])]
-        for column, wave in zip(run, waves, strict=True):
-            values = [row[column] if column < len(row) else "" for _, row in below]
-            turned.append((line, [f"{wave:.12g}".replace(".", sheet.decimal), *values]))
-        if (longest := max(below, key=lambda row: len(row[1])))[1][len(cells) :]:
-            problem = ValidationIssue(
-                "wrong number of columns", sheet.file, longest[0], None, len(longest[1]), str(len(cells))
-            )
-            raise DataError(problem)
-        notes = [*sheet.notes, "wavelengths are along a row: the table was turned"]
-        remarks = [*sheet.remarks, *(" ".join(row) for _, row in sheet.rows[:index])]
-        return replace(sheet, rows=turned, notes=notes, remarks=remarks)
-    return _listed(sheet)
-
-
-def _is_down(sheet: Sheet, head: Sequence[str], below: Rows, at: int) -> bool:
-    """Return whether numbers in a head are names, since wavelengths stand down the column before them.
-
-    Raises DataError where both may be wavelengths.
-    """
-    before = max(at - 1, 0)
-    column = [_number(row[before], sheet.decimal) if before < len(row) else None for _, row in below]
-    if len(column) < 3 or not _rising(column):
-        return False
-    worded = at > 0 and _wave_unit(head[before]) is not None
-    if at and (not head[before] or (worded and len(column) < _FEWEST_ALONG)):
-        allowed = "names that are no numbers"
-        raise DataError(ValidationIssue("wavelengths down or along?", sheet.file, below[0][0], allowed=allowed))
-    return at == 0 or worded
-
-
-def _row_name(cells: Sequence[str], sheet: Sheet, number: int) -> str:
-    """Return the name of a row: its texts before the numbers, else its number."""
-    texts = [cell for cell in cells if cell and _number(cell, sheet.decimal) is None]
-    return " ".join(texts) or (cells[0] if cells and cells[0] else f"curve_{number}")
-
-
-def _listed(sheet: Sheet) -> Sheet | None:
-    """Return a list of `Spectral Data 380[nm],0.001` as a table."""
-    series: dict[str, list[tuple[int, list[str]]]] = {}
-    names: list[str] = []
-    for line, cells in sheet.rows:
-        match = _KEYED.fullmatch(cells[0])
-        if (
-            match is not None
-            and (match[1] or match[3])
-            and len(cells) > 1
-            and _number(cells[1], sheet.decimal) is not None
-        ):
-            series.setdefault(match[1] or "", []).append((line, [match[2], *cells[1:]]))
-        elif folded(cells[0]) in ("title", "name", "sample", "sample name", "titel") and len(cells) > 1:
-            names = cells[1:]
-    found = [
-        rows for rows in series.values() if len(rows) >= _FEWEST_ALONG and _rising([float(row[0]) for _, row in rows])
-    ]
-    if not found:
-        return None
-    rows = max(found, key=len)
-    count = max(len(row) for _, row in rows) - 1
-    names = (
-        names
-        if len(names) == count
-        else [sheet.name or "values"]
-        if count == 1
-        else [f"curve_{k + 1}" for k in range(count)]
-    )
-    table = [
-        (rows[0][0], [WAVELENGTH, *names]),
-        *((n, [row[0].replace(".", sheet.decimal), *row[1:]]) for n, row in rows),
-    ]
-    others = [" ".join(cells) for _, cells in sheet.rows if _KEYED.fullmatch(cells[0]) is None]
-    note = "wavelengths are in the words of a list"
-    return replace(sheet, rows=table, notes=[*sheet.notes, note], remarks=[*sheet.remarks, *others])
+    numbers, bad, in_percent = _numbers(table, columns)
+    plain = [c._replace(unit=replace(c.unit, factor=1.0)) if c.at in in_percent else c for c in columns]
+    return _scan(table, plain, numbers, bad)
 
 
 def _table_of(sheet: Sheet) -> _Table:
     """Split a sheet into the rows of numbers and the texts above them. DataError for none, or two tables."""
-    parsed = [[_number(cell, sheet.decimal) for cell in cells] for _, cells in sheet.rows]
+    parsed = [[number_in(cell, sheet.decimal) for cell in cells] for _, cells in sheet.rows]
     shares = []
     for numbers in parsed:
         count = sum(number is not None and number == number for number in numbers)  # noqa: PLR0124  (NaN: missing)
@@ -219,7 +104,7 @@ def _table_of(sheet: Sheet) -> _Table:
         "no rows of numbers", sheet.file, allowed="a header `wavelength_nm,...` and rows of numbers"
     )
     if not whole:
-        if sheet.rows and len(sheet.rows[0][1]) == 1 and _wave_unit(sheet.rows[0][1][0]) is not None:
+        if sheet.rows and len(sheet.rows[0][1]) == 1 and wave_unit(sheet.rows[0][1][0]) is not None:
             raise DataError(
                 ValidationIssue(
                     "the file has no curve",
@@ -249,24 +134,13 @@ def _table_of(sheet: Sheet) -> _Table:
     widths = [len(cells) for _, cells in body]
     width = max(set(widths), key=widths.count)
     table = _Table(sheet, sheet.rows[:first], body, parsed[first : last + 1], width)
-    if table.head and len(table.head[-1][1]) > width and any(_wave_unit(c) is not None for c in table.head[-1][1]):
+    if table.head and len(table.head[-1][1]) > width and any(wave_unit(c) is not None for c in table.head[-1][1]):
         table.width = len(table.head[-1][1])  # columns that are empty at the end of rows
     return table
 
 
 def _is_head(cells: Sequence[str]) -> bool:
-    return any(_wave_unit(cell) is not None for cell in cells) or not cells[0]
-
-
-def _wave_unit(cell: str) -> float | None:
-    """Return the factor from wavelengths under a head to nm; 0 without a unit; None if it is none of wavelengths."""
-    text = folded(cell.replace("\u212b", "a").replace("\u00c5", "a").replace("\u00e5", "a")).replace("_", " ")
-    if _WAVE.fullmatch(text):
-        return 0.0
-    match = _NAME_AND_UNIT.fullmatch(text)
-    if match is None or match[2] not in _UNITS_NM or (not match[1] and len(match[2]) == 1):
-        return None
-    return _UNITS_NM[match[2]] if not match[1] or _WAVE.fullmatch(match[1].removesuffix(" in").strip()) else None
+    return any(wave_unit(cell) is not None for cell in cells) or not cells[0]
 
 
 def _columns(table: _Table) -> list[_Column]:
@@ -278,10 +152,10 @@ def _columns(table: _Table) -> list[_Column]:
         units[: len(cells)] = [cell.strip("[]()") for cell in cells]
         sheet.notes.append("a row of units was read")
     line, names = _names(table, head)
-    waves = [_wave_unit(cell) if cell else None for cell in names or [""] * table.width]
-    waves = [_UNITS_NM.get(folded(units[at]), 0.0) if wave == 0 else wave for at, wave in enumerate(waves)]
+    waves = [wave_unit(cell) if cell else None for cell in names or [""] * table.width]
+    waves = [UNITS_NM.get(folded(units[at]), 0.0) if wave == 0 else wave for at, wave in enumerate(waves)]
     if any(units) and not any(wave is not None for wave in waves):
-        waves = [_UNITS_NM.get(folded(unit)) for unit in units]
+        waves = [UNITS_NM.get(folded(unit)) for unit in units]
     series = [[row[at] if at < len(row) else np.nan for row in table.parsed] for at in range(table.width)]
     at_x = [at for at, wave in enumerate(waves) if wave is not None] or _unnamed_waves(table, names, series)
     if not at_x:
@@ -303,16 +177,9 @@ def _columns(table: _Table) -> list[_Column]:
     whole = _table_unit(table, head)
     columns: list[_Column] = []
     others = [at for at in range(table.width) if at not in at_x]
-    index = [at for at in others if len(at_x) == 1 and _counts(names, series, at, at_x[0])]
-    if index:
-        sheet.notes.append("a column that counts the rows was left out")
-    texts = [at for at in others if all(value is None or np.isnan(value) for value in series[at])]
-    if texts and len(texts) < len(others):
-        named = ", ".join(repr(names[at]) for at in texts if names and names[at])
-        sheet.notes.append(f"columns without numbers were left out{f': {named}' if named else ''}")
-        index += texts
+    left_out = _left_out(sheet, names, series, others, at_x)
     for at in others:
-        if at in index:
+        if at in left_out:
             continue
         wave = max((x for x in at_x if x < at), default=at_x[0])
         stated = symbol_unit(units[at]) or Unit(units[at], unclear="has an unknown unit" if units[at] else "")
@@ -333,6 +200,23 @@ def _columns(table: _Table) -> list[_Column]:
     return _numbered(columns) if len(at_x) > 1 else columns
 
 
+def _left_out(
+    sheet: Sheet, names: Sequence[str], series: Sequence[_Series], others: Sequence[int], at_x: Sequence[int]
+) -> list[int]:
+    """Return columns that are no curves: that count the rows, without numbers, of deviations; with a note on each."""
+    index = [at for at in others if len(at_x) == 1 and _counts(names, series, at, at_x[0])]
+    if index:
+        sheet.notes.append("a column that counts the rows was left out")
+    texts = [at for at in others if all(value is None or np.isnan(value) for value in series[at])]
+    spreads = [at for at in others if names and _SPREAD.search(folded(names[at]).replace("_", " "))]
+    for what, some in (("without numbers", texts), ("of deviations", spreads)):
+        if some and len(some) < len(others):
+            named = ", ".join(repr(names[at]) for at in some if names and names[at])
+            sheet.notes.append(f"columns {what} were left out{f': {named}' if named else ''}")
+            index += some
+    return index
+
+
 def _made_name(table: _Table, before: int, at_x: Sequence[int]) -> str:
     return (table.sheet.name or "values") if table.width - len(at_x) == 1 else f"curve_{before + 1}"
 
@@ -340,15 +224,15 @@ def _made_name(table: _Table, before: int, at_x: Sequence[int]) -> str:
 def _is_unit_row(cells: Sequence[str], below_head: bool) -> bool:
     """Return whether a row holds units alone, one of them of wavelengths, below a row of names."""
     given = [cell.strip("[]() ") for cell in cells if cell.strip("[]() ")]
-    known = [folded(cell) in _UNITS_NM or symbol_unit(cell) is not None for cell in given]
-    return below_head and bool(given) and all(known) and any(folded(cell) in _UNITS_NM for cell in given)
+    known = [folded(cell) in UNITS_NM or symbol_unit(cell) is not None for cell in given]
+    return below_head and bool(given) and all(known) and any(folded(cell) in UNITS_NM for cell in given)
 
 
 def _names(table: _Table, head: Rows) -> tuple[int | None, list[str]]:
     """Take the row of names from the rows above the numbers; the others are titles."""
     sheet = table.sheet
     named = next(
-        (at for at in reversed(range(len(head))) if any(_wave_unit(cell) is not None for cell in head[at][1])), None
+        (at for at in reversed(range(len(head))) if any(wave_unit(cell) is not None for cell in head[at][1])), None
     )
     if named is None and head and 1 < len(head[-1][1]) <= table.width:
         named = len(head) - 1
@@ -361,7 +245,7 @@ def _names(table: _Table, head: Rows) -> tuple[int | None, list[str]]:
     if len(names) > table.width or (len(names) == 1 < table.width and len(head) == 1):
         table.fault("wrong number of columns", table.body[0][0], None, table.width, str(len(names)))
     del head[named:]
-    if head and not (len(head[-1][1]) > 1 and sum(_wave_unit(cell) is not None for cell in names) > 1):
+    if head and not (len(head[-1][1]) > 1 and sum(wave_unit(cell) is not None for cell in names) > 1):
         sheet.notes.append(_titles(len(head)))
     return line, [*names, *[""] * (table.width - len(names))][: table.width]
 
@@ -370,7 +254,7 @@ def _titles(count: int) -> str:
     return f"{count} title {'line was' if count == 1 else 'lines were'} left out"
 
 
-def _unnamed_waves(table: _Table, names: Sequence[str], series: Sequence[Sequence[float | None]]) -> list[int]:
+def _unnamed_waves(table: _Table, names: Sequence[str], series: Sequence[_Series]) -> list[int]:
     """Return the columns of wavelengths that no word tells: every second one, or the first."""
 
     def like(at: int) -> bool:
@@ -378,7 +262,7 @@ def _unnamed_waves(table: _Table, names: Sequence[str], series: Sequence[Sequenc
         return len(values) > 1 and all(value is not None for value in values)
 
     def rises(at: int) -> bool:
-        return like(at) and _rising([value for value in series[at] if value is None or not np.isnan(value)])
+        return like(at) and rising([value for value in series[at] if value is None or not np.isnan(value)])
 
     even = range(0, table.width, 2)
     if table.width % 2 == 0 and table.width > 2:
@@ -401,7 +285,7 @@ def _counting(values: Sequence[float | None]) -> bool:
     return len(known) > 1 and any(known == [float(at + start) for at in range(len(known))] for start in (0, 1))
 
 
-def _counts(names: Sequence[str], series: Sequence[Sequence[float | None]], at: int, wave: int) -> bool:
+def _counts(names: Sequence[str], series: Sequence[_Series], at: int, wave: int) -> bool:
     """Return whether a column holds the numbers of the rows: it has no name, or is called so."""
     named = not names or folded(names[at]) in _INDEX
     return named and _counting(series[at]) and (at < wave or not names or not names[at])
@@ -465,8 +349,8 @@ def _numbered(columns: Sequence[_Column]) -> list[_Column]:
     return known
 
 
-def _numbers(table: _Table, columns: Sequence[_Column]) -> tuple[FloatArray, set[int]]:
-    """Return the numbers of a table, [n_rows, width], NaN for missing ones, and the columns with faults."""
+def _numbers(table: _Table, columns: Sequence[_Column]) -> tuple[FloatArray, set[int], list[int]]:
+    """Return the numbers of a table, [n_rows, width], NaN for missing ones, and columns with faults, with % signs."""
     keys = {column.wave: WAVELENGTH for column in columns} | {column.at: column.name for column in columns}
     values, bad = np.full((len(table.body), table.width), np.nan), set[int]()
     percent = dict.fromkeys(keys, 0)
@@ -500,7 +384,7 @@ def _numbers(table: _Table, columns: Sequence[_Column]) -> tuple[FloatArray, set
     if signed:
         values[:, signed] *= 0.01
         table.sheet.notes.append("values have percent signs, and were divided by 100")
-    return values, bad
+    return values, bad, signed
 
 
 def _scan(table: _Table, columns: Sequence[_Column], numbers: FloatArray, bad: set[int]) -> Scan:
@@ -511,11 +395,11 @@ def _scan(table: _Table, columns: Sequence[_Column], numbers: FloatArray, bad: s
     if not factor and waves:
         largest = max((float(np.nanmax(wave)) for wave in waves.values() if np.isfinite(wave).any()), default=0.0)
         factor = 1e9 if 0 < largest < 1e-4 else 1e3 if 0 < largest < 20 else 1.0
-        sheet.notes.append(f"wavelengths have no unit, and were taken for {_UNIT_WORDS[factor]} by their size")
+        sheet.notes.append(f"wavelengths have no unit, and were taken for {UNIT_WORDS[factor]} by their size")
     elif factor != 1:
-        sheet.notes.append(f"wavelengths in {_UNIT_WORDS[factor]} were brought to nm")
+        sheet.notes.append(f"wavelengths in {UNIT_WORDS[factor]} were brought to nm")
     nm = {at: wave if factor == 1 else np.round(wave * factor, 6) for at, wave in waves.items()}
-    cleaner = _Cleaner(table, {})
+    cleaner = Cleaner(sheet.file, table.issues)
     curves = []
     for column in columns:
         wave, values = nm[column.wave], numbers[:, column.at]
@@ -523,11 +407,9 @@ def _scan(table: _Table, columns: Sequence[_Column], numbers: FloatArray, bad: s
         if (np.isnan(wave) & np.isfinite(values)).any() and not faulty:
             row = int(np.flatnonzero(np.isnan(wave) & np.isfinite(values))[0])
             table.fault("a value without a wavelength", table.body[row][0], column.name, float(values[row]))
-        curves.append(cleaner.cleaned(column, wave, values, faulty=faulty))
-    sheet.notes.extend(
-        f"{', '.join(names[:5])}{f' and {len(names) - 5} more' if names[5:] else ''}: {note}" if names[0] else note
-        for note, names in cleaner.said.items()
-    )
+        signed = column.unit.quantity == "decibel"
+        curves.append(cleaner.cleaned(column.name, wave, values, signed=signed, faulty=faulty))
+    sheet.notes.extend(cleaner.notes)
     grid = np.unique(np.concatenate([wave for wave, _ in curves])) if curves else np.empty(0)
     check_size(sheet.file, None, grid.size, len(curves))
     values = np.full((grid.size, len(curves)), np.nan)
@@ -535,8 +417,8 @@ def _scan(table: _Table, columns: Sequence[_Column], numbers: FloatArray, bad: s
         if wave.size:
             values[:, at] = own if wave.size == grid.size else np.interp(grid, wave, own, np.nan, np.nan)
     names = tuple(column.name for column in columns)
-    signed = {at for at, column in enumerate(columns) if column.unit.quantity == "decibel"}
-    groups = [table.issues] if table.issues else sample_issues(sheet.file, grid, names, values, signed)
+    in_db = {at for at, column in enumerate(columns) if column.unit.quantity == "decibel"}
+    groups = [table.issues] if table.issues else sample_issues(sheet.file, grid, names, values, in_db)
     return Scan(
         grid,
         names,
@@ -545,97 +427,6 @@ def _scan(table: _Table, columns: Sequence[_Column], numbers: FloatArray, bad: s
         tuple(map(tuple, groups)),
         tuple(dict.fromkeys(sheet.notes)),
     )
-
-
-@dataclass
-class _Cleaner:
-    """Repairs that have one meaning, with a note for each; adds an issue for anything else."""
-
-    table: _Table
-    said: dict[str, list[str]]
-
-    def _note(self, name: str, note: str) -> None:
-        self.said.setdefault(note, []).append(name)
-
-    def cleaned(
-        self, column: _Column, wave: FloatArray, values: FloatArray, *, faulty: bool
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return samples in rising order, each wavelength once, without gaps and without negatives."""
-        known = np.isfinite(wave)
-        order = np.flatnonzero(known)[np.argsort(wave[known], kind="stable")]
-        steps = np.diff(wave[known])
-        if (steps < 0).all() and steps.size:
-            self._note("", "falling wavelengths were turned round")
-        elif (steps < 0).any():
-            self._note("", "rows were sorted by wavelength")
-        wave, values = wave[order], values[order].copy()
-        if faulty:
-            wave, values = wave[np.isfinite(values)], values[np.isfinite(values)]
-        wave, values = self._averaged(column, wave, values)
-        wave, values = self._without_gaps(column, wave, values)
-        low = values < 0
-        if low.any() and column.unit.quantity != "decibel":
-            if -values.min() <= _NOISE_SHARE * values.max():
-                self._note(column.name, f"negatives of noise, down to {values.min():.3g}, were set to 0")
-                values[low] = 0.0
-            elif not faulty:
-                at = int(np.argmin(values))
-                self.table.fault(
-                    f"negative value at {wave[at]:g} nm",
-                    None,
-                    column.name,
-                    float(values[at]),
-                    ">= 0, or noise of up to 2 % of the peak",
-                )
-        return wave, values
-
-    def _averaged(self, column: _Column, wave: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Average samples at one wavelength; two spectra one after the other are an issue."""
-        unique, first, counts = np.unique(wave, return_index=True, return_counts=True)
-        if unique.size == wave.size:
-            return wave, values
-        with np.errstate(invalid="ignore"):
-            known = np.isfinite(values)
-            index = np.repeat(np.arange(unique.size), counts)
-            total, number = (np.bincount(index[known], weights, unique.size) for weights in (values[known], None))
-            mean = np.divide(total, number, out=np.full(unique.size, np.nan), where=number > 0)
-            spread = np.maximum.reduceat(np.where(known, np.abs(values - mean[index]), 0.0), first)
-        apart = (counts > 1) & (spread > _ALIKE_SHARE / 2 * np.nanmax(np.abs(values), initial=0.0))
-        if 4 * np.count_nonzero(apart) > unique.size:
-            at = float(unique[np.argmax(apart)])
-            self.table.fault(
-                "wavelengths occur twice, with other values", None, column.name, at, "one spectrum in a column"
-            )
-        repeated = int(np.count_nonzero(counts > 1))
-        self._note(
-            "", f"samples at the same wavelength were averaged, at {repeated} wavelength{'s' if repeated > 1 else ''}"
-        )
-        return unique, mean
-
-    def _without_gaps(self, column: _Column, wave: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Drop missing values at the ends, and fill one between two samples by a straight line."""
-        known: IndexArray = np.flatnonzero(np.isfinite(values))
-        if known.size == values.size or not known.size:
-            return wave[known], values[known]
-        inside = slice(known[0], known[-1] + 1)
-        if inside != slice(0, values.size):
-            self._note(column.name, f"there are no values beyond {wave[known[0]]:g} to {wave[known[-1]]:g} nm")
-        wave, values = wave[inside], values[inside]
-        gaps = np.flatnonzero(~np.isfinite(values))
-        if (np.diff(gaps) == 1).any():
-            at = gaps[:-1][np.diff(gaps) == 1][0]
-            self.table.fault(
-                "several values in a row are missing",
-                None,
-                column.name,
-                f"from {wave[at]:g} nm on",
-                "at most one between two",
-            )
-        for at in gaps:
-            filled = np.interp(wave[at], wave[np.isfinite(values)], values[np.isfinite(values)])
-            self._note(column.name, f"the missing value at {wave[at]:g} nm is {filled:.6g}, by a straight line")
-            values[at] = filled
-        return wave, values
 
 
 def check_size(file: str, line: int | None, n_samples: int, n_curves: int) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..base.errors import DataError, ValidationIssue
 from ..base.types import FloatArray
+from .clean import several
 from .spectrum import LIGHT_M_S, PLANCK_J_S, Curves, Quantity, Unit
 
 FilterQuantity = Literal["transmission", "density", "decibel"]
@@ -188,10 +189,7 @@ def used_as(
         if not unit.quantity and not stated:
             how = f"no unit, assumed to be {SAID[quantity]}"
         said.setdefault(how + (f"; {note}" if note else ""), []).append(name)
-    notes = [
-        f"{', '.join(names[:5])}{f' and {len(names) - 5} more' if names[5:] else ''}: {how}"
-        for how, names in said.items()
-    ]
+    notes = [f"{several(names)}: {how}" for how, names in said.items()]
     return replace(curves, values=values, notes=(*curves.notes, *notes), units=units)
 
 
