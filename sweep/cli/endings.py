@@ -49,6 +49,10 @@ def ends_in_lines(command: Callable[[], object]) -> NoReturn:
     except KeyboardInterrupt:
         print_issues(["interrupted"])
         code = _INTERRUPTED
+    except SystemExit:
+        if type(sys.stdout).__name__ != "PacifyFlushWrapper":  # click's, where no one reads what is printed
+            raise
+        code = _BROKEN_PIPE
     try:
         _flush()
     except (OSError, ValueError):

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import csv
+import io
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import islice, product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+from pyarrow import parquet as pq
 
+from ..base.disk import read_input
 from ..base.errors import DataError, SweepError, ValidationIssue, nearest
 from ..base.types import FloatArray
 from ..vision.batches import image_id
@@ -24,6 +30,10 @@ _ID, _STATE = "image_id", "state"
 _SUM = 1e-3
 """By how much the sum of probabilities may differ from 1."""
 _BINS = 10
+_MOST_BYTES, _MOST_CELLS = 100_000_000, 10_000_000
+_BEGINNING_BYTES = 4096
+_CONTROLS = re.compile(rb"[\x00-\x08\x0e-\x1f]")
+"""Control bytes: archives and pictures have them within the first few bytes."""
 
 
 @dataclass(frozen=True)
@@ -78,27 +88,35 @@ def network_of(images: pd.DataFrame) -> Reader:
 
 
 def table_of(path: Path) -> pd.DataFrame:
-    """Return a file as a table.
-
-    Parameters
-    ----------
-    path : Path
-        CSV or Parquet.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Table.
-
-    Raises
-    ------
-    DataError
-        If it cannot be read.
-    """
+    """Return a CSV or Parquet file as a table, its rows counted from 0. Raises DataError if it cannot be read."""
+    content = read_input(path, _MOST_BYTES, DataError)
     try:
-        return pd.read_parquet(path) if path.suffix == ".parquet" else pd.read_csv(path)
-    except (OSError, ValueError) as error:
+        if path.suffix == ".parquet":
+            return _parquet(path, content)
+        if _CONTROLS.search(content[:_BEGINNING_BYTES]):
+            raise DataError(ValidationIssue("not a text table", str(path), allowed="CSV, or Parquet named .parquet"))
+        text = io.StringIO(content.decode("utf-8-sig"))
+        first = [len(row) for row in islice(csv.reader(text), 2)]
+        if len(set(first)) > 1:  # pandas would take the first of too many fields for an index
+            problem = f"a row of {first[1]} fields under {first[0]} heads"
+            raise DataError(ValidationIssue(problem, str(path), 2))
+        text.seek(0)
+        return pd.read_csv(text, low_memory=False)
+    except (OSError, ValueError, csv.Error, MemoryError) as error:
         raise DataError(ValidationIssue(f"cannot be read: {' '.join(str(error).split())[:200]}", str(path))) from None
+
+
+def _parquet(path: Path, content: bytes) -> pd.DataFrame:
+    """Return a Parquet file as a table; one that would not fit is refused before it is unpacked."""
+    texts = [field.name for field in pq.read_schema(pa.BufferReader(content)) if pa.types.is_string(field.type)]
+    file = pq.ParquetFile(pa.BufferReader(content), read_dictionary=texts)  # equal texts are held once
+    groups = [file.metadata.row_group(at) for at in range(file.metadata.num_row_groups)]
+    cells = file.metadata.num_rows * file.metadata.num_columns
+    if cells > _MOST_CELLS or sum(group.total_byte_size for group in groups) > _MOST_BYTES:
+        allowed = f"up to {_MOST_CELLS:,} cells and {_MOST_BYTES:,} bytes"
+        raise DataError(ValidationIssue("the table is too large", str(path), value=f"{cells:,} cells", allowed=allowed))
+    table: pd.DataFrame = file.read().to_pandas(ignore_metadata=True)
+    return table
 
 
 def read_predictions(path: Path, images: pd.DataFrame, states: Sequence[str]) -> Reader:

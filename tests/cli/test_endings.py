@@ -152,3 +152,14 @@ def test_an_output_without_room_is_one_line() -> None:
         done = subprocess.run([*COMMAND, "schema"], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert done.returncode == 2
     assert done.stderr == "sweep: No space left on device\n"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", [("plan", "stopband"), ("list",)])
+def test_a_pipe_that_is_closed_ends_as_by_its_signal(command: tuple[str, ...]) -> None:
+    sweep = Path(sys.executable).with_name("sweep")
+    with subprocess.Popen([sweep, *command], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as running:
+        assert running.stdout is not None
+        running.stdout.close()
+        _, said = running.communicate(timeout=60)
+    assert (running.returncode, said) == (141, b"")
