@@ -22,7 +22,7 @@ _UsageError: Any = typer.BadParameter.__bases__[0]
 def ends_in_lines(command: Callable[[], object]) -> NoReturn:
     """Run a command and exit with its code.
 
-    SIGTERM ends a command as SIGINT does. Errors of the program itself keep their traceback.
+    SIGTERM and SIGHUP end a command as SIGINT does. Errors of the program itself keep their traceback.
 
     Parameters
     ----------
@@ -38,7 +38,9 @@ def ends_in_lines(command: Callable[[], object]) -> NoReturn:
         for stream in (sys.stdout, sys.stderr):
             if hasattr(stream, "reconfigure"):  # a letter that the terminal does not know is no issue
                 stream.reconfigure(errors="backslashreplace")
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):  # a terminal that closes
+            if signal.getsignal(number) is not signal.SIG_IGN:
+                signal.signal(number, signal.default_int_handler)
         result = command()
         _flush()
         code = result if isinstance(result, int) else 0

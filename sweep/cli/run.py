@@ -18,7 +18,7 @@ from ..base.types import in_turn
 from ..results.atomic import atomic
 from ..results.folder import run_in
 from ..results.tables import ALL_SENSORS, REPORT
-from ..run.workers import workers
+from ..run.workers import backend_here, workers
 from ..study import SensorAndLights, SensorStudies, Study, folder_name, load_study
 from .output import ProgressDisplay, print_lines
 
@@ -82,6 +82,9 @@ def run_one(
     if backend not in runner.BACKENDS:
         allowed = ", ".join(runner.BACKENDS)
         raise SweepError(ValidationIssue("unknown backend", key="--backend", value=backend, allowed=allowed))
+    if (usable := backend_here(backend)) != backend:
+        note("no shared memory for processes here (/dev/shm): threads compute the same rows.")
+        backend = usable
     study = load_study(path, data, changes=changes, allow_code=allow_code, member=member)
     folder, other = runner.output_folder(output / folder_name(study.name), study)
     n_workers = jobs or os.cpu_count() or 1

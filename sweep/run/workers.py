@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
+import re
+import shutil
 import signal
+import tempfile
 import threading
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import joblib
@@ -20,6 +25,10 @@ from ..base.errors import InterruptedRunError, SweepError
 from ..base.types import Call, Parallel, Progress
 
 BACKENDS = ("loky", "threading", "dask")
+STOPPING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+"""Signals that stop a run; Windows has no SIGHUP."""
+_LEFT = re.compile(r"(?:sem\.loky-|joblib_memmapping_folder_)(\d+)[-_]")
+"""Names of what joblib keeps in shared memory and temporary folders, with the number of its process."""
 _stop = threading.Event()
 """A stop was asked for. Compiled libraries may swallow the exception by which the signal's handler says so, or raise
 another one in its place, as if a design had failed."""
@@ -178,6 +187,8 @@ def workers(n_jobs: int, backend: str = "loky", scheduler: str | None = None) ->
         If Dask is not installed, or its scheduler does not answer.
     """
     settings: dict[str, Any] = {}
+    backend = backend_here(backend)
+    _remove_what_the_dead_left()
     # These filters stay: joblib may warn of cancelled calls after a stop has left the block.
     warnings.filterwarnings("ignore", message=".*have been cancelled", category=UserWarning)
     warnings.filterwarnings("ignore", message="A worker stopped while some jobs", category=UserWarning)
@@ -189,6 +200,29 @@ def workers(n_jobs: int, backend: str = "loky", scheduler: str | None = None) ->
         stack.enter_context(threadpool_limits(limits=1))  # with one worker, and with threads, this process computes
         stack.enter_context(joblib.parallel_config(backend, **settings))
         yield Workers(n_jobs, backend)
+
+
+def backend_here(backend: str) -> str:
+    """Return the backend, or threads in the place of processes where this machine has no semaphores for these."""
+    if backend != "loky":
+        return backend
+    try:
+        multiprocessing.Lock()
+    except (OSError, ImportError):  # /dev/shm is missing or full, or nobody may write there
+        return "threading"
+    return backend
+
+
+def _remove_what_the_dead_left() -> None:
+    """Remove semaphores and shared arrays of joblib whose process is gone: killed with its whole group."""
+    for place in {Path("/dev/shm"), Path(tempfile.gettempdir())}:
+        with suppress(OSError):
+            for left in place.iterdir():
+                owner = _LEFT.match(left.name)
+                if owner is None or psutil.pid_exists(int(owner[1])):
+                    continue
+                with suppress(OSError):  # of another user
+                    shutil.rmtree(left) if left.is_dir() else left.unlink()
 
 
 def run_with_progress(parallel: Parallel, calls: Sequence[Call], phase: str, progress: Progress) -> Iterator[Any]:
@@ -217,7 +251,7 @@ def run_with_progress(parallel: Parallel, calls: Sequence[Call], phase: str, pro
 
 @contextmanager
 def stopped_by_signals() -> Iterator[None]:
-    """Let SIGTERM stop a run as Ctrl-C does, within a `with` block.
+    """Let SIGTERM, and a terminal that closes, stop a run as Ctrl-C does, within a `with` block.
 
     joblib ends its workers when the exception reaches it; finished parts are on the disk. Python handles signals in
     the main thread alone; elsewhere nothing changes.
@@ -235,7 +269,7 @@ def stopped_by_signals() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.getsignal(number) for number in STOPPING}
     for number, handler in before.items():
         if handler is not signal.SIG_IGN:  # as a shell sets it for background jobs
             signal.signal(number, _ask_to_stop)
@@ -261,8 +295,9 @@ def _ask_to_stop(*_: object) -> None:
 
 
 def _begin_worker(parent: int) -> None:
-    """Ignore Ctrl-C in a worker, and end the worker with its parent."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """Ignore Ctrl-C and the end of a terminal in a worker, and end the worker with its parent."""
+    for number in set(STOPPING) - {signal.SIGTERM}:
+        signal.signal(number, signal.SIG_IGN)
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
 
 
@@ -295,5 +330,5 @@ def _client(scheduler: str | None) -> Any:
         raise SweepError("--backend dask needs Dask: pip install 'cfa-sweep[dask]'") from None
     try:
         return Client(scheduler, timeout="10s", set_as_default=True)  # type: ignore[no-untyped-call]
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, TypeError) as error:
         raise SweepError(f"--scheduler {scheduler}: {str(error).splitlines()[0]}") from None

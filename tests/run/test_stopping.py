@@ -124,7 +124,8 @@ def assert_continues(folder: Path, undisturbed: Path, jobs: int) -> None:
         pytest.param(phase, jobs, number, marks=pytest.mark.slow)
         for phase in PHASES
         for jobs, number in ((1, signal.SIGTERM), (2, signal.SIGINT))
-    ],
+    ]
+    + [pytest.param("sweep", 2, signal.SIGHUP, marks=pytest.mark.slow)],
 )
 def test_a_stop_ends_every_phase(
     tmp_path: Path, undisturbed: Path, phase: str, jobs: int, number: signal.Signals
