@@ -1,0 +1,142 @@
+"""Terms that are small or seldom: each alone, against arithmetic of its own, so that none can go unnoticed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sweep
+from sweep.base.errors import InfeasibleError, SweepError
+from sweep.camera.forward import forward_model
+from sweep.camera.merge import merged
+from sweep.camera.pixel import Pixel
+from sweep.metrics.columns.sensitivity import CFA_SENSITIVITY
+from sweep.metrics.quantity import Column
+from sweep.report.price import _row
+from sweep.results.parts import Parts
+from sweep.run import robustness
+from sweep.run.answers import CachedCalls
+
+from ..run.test_robustness import candidate, street
+
+
+def test_a_code_of_companding_has_the_variance_of_a_uniform_step() -> None:
+    """Steps of 256 DN, far above the noise of few electrons: the variance grows by step^2 / 12."""
+    knees = [[1_024.0, 1_024.0], [1_024.0 + 256 * 3_200, 4_224.0]]
+    linear = {"captures": [{"bits": 20, "well_e": 100_000, "gain_dn_per_e": 8.0}], "read_noise_e": 2.0}
+    plain, coded = (Pixel.model_validate(linear | more) for more in ({}, {"companding": knees}))
+    electrons = np.array([[1_000.0]])
+    before, after = (merged(electrons, np.ones((1, 1)), pixel).variance[0] for pixel in (plain, coded))
+    assert before == pytest.approx(8.0**2 * (1_000 + 2.0**2), rel=0.01)
+    assert after - before == pytest.approx(256.0**2 / 12, rel=1e-6)
+
+
+def model_of(**scene: Any) -> Any:
+    made = sweep.make_study(
+        cfas=["RGGB"], pixel={"dark_e_per_s": scene.pop("dark_e_per_s", 0.0), "crosstalk": 0.1}, scenarios={"s": scene}
+    )
+    (space,) = made.study.spaces
+    setup = made.study.setup(space, "s").with_all_effects
+    return forward_model(setup), setup
+
+
+ROAD = {
+    "target": {"distance_m": 50, "fov_deg": 60, "phase_px": [0, 0]},
+    "exposure": {"kind": "fixed", "exposure_s": 0.001},
+    "optics": {"f_number": 2},
+    "intensity_cd": 100,
+}
+
+
+def unlit(**scene: Any) -> np.ndarray:
+    model, setup = model_of(**ROAD, **scene)
+    return np.asarray(model.electrons.unlit(np.empty((1, 0, setup.camera.grid.size))))
+
+
+def test_dark_current_adds_its_electrons_to_every_element() -> None:
+    np.testing.assert_allclose(unlit(dark_e_per_s=1234.5, background_cd_m2=3.0) - unlit(background_cd_m2=3.0), 1234.5)
+
+
+def test_the_background_is_dimmed_by_the_lens_off_axis_and_not_by_air() -> None:
+    on_axis = unlit(background_cd_m2=50.0)
+    np.testing.assert_allclose(
+        unlit(background_cd_m2=50.0, off_axis_deg=40.0), on_axis * np.cos(np.radians(40.0)) ** 4, rtol=1e-12
+    )
+    np.testing.assert_allclose(unlit(background_cd_m2=50.0, visibility_m=30.0), on_axis, rtol=1e-12)
+    assert (on_axis > 0).all()
+
+
+def limit(most: float | None) -> Any:
+    constraints = {} if most is None else {CFA_SENSITIVITY: {"max": most}}
+    study = sweep.make_study(
+        cfas=["RYYCy", "RYNCy"],
+        boxes={"any": {"cfa": "RYNCy", "channel": "N", "base": "Y", "to": 0.0}},
+        constraints=constraints,
+    )
+    return study, study.limit()
+
+
+def test_a_bound_keeps_to_the_light_that_is_allowed_at_most() -> None:
+    """Of the light of a CFA most is of its other pixels: a constant, which counts once."""
+    study, free = limit(None)
+    assert free.curve is not None
+    light = float(study.evaluate(N=free.curve).iloc[0][CFA_SENSITIVITY])
+    _, loose = limit(light + 0.01)
+    assert loose.proven == pytest.approx(free.proven, rel=1e-6)
+    _, tight = limit(light - 0.02)
+    assert tight.curve is not None
+    assert tight.proven < free.proven
+    assert float(study.evaluate(N=tight.curve).iloc[0][CFA_SENSITIVITY]) <= light - 0.02 + 1e-6
+    others = float(study.evaluate(N=np.zeros(301)).iloc[0][CFA_SENSITIVITY])
+    with pytest.raises((InfeasibleError, SweepError)):
+        limit(others - 0.01)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "best", "effect"),
+    [("more", 2.0, "gain"), ("more", 0.5, "loss"), ("less", 2.0, "loss"), ("less", 0.5, "gain"), ("less", 1.0, "same")],
+)
+def test_a_gain_is_more_of_what_is_wanted_and_less_of_what_is_not(wanted: Any, best: float, effect: str) -> None:
+    column = Column(name="x", metric="x", meaning="x", unit="", wanted=wanted)
+    assert _row(column, 1.0, best)[-1] == effect
+
+
+def test_a_yield_counts_each_camera_with_the_wanted_distance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    study = street(tmp_path)
+    design = candidate(study)
+    population = design.setup.lights.population
+    assert population is not None
+    assert population.wanted_dn is not None
+    steps = population.wanted_dn * (1 + np.linspace(-0.05, 0.05, population.draws))
+    monkeypatch.setattr(robustness, "drawn_dn", lambda *_: steps)
+    numbers, _ = robustness._robustness(design, None, ("yellow", "red"), 1)
+    assert numbers["yield"] == np.count_nonzero(steps >= population.wanted_dn) / population.draws
+
+
+def answer_of(number: int) -> int:
+    return number
+
+
+class Pool:
+    """Workers that count their calls."""
+
+    def __init__(self) -> None:
+        self.calls = 0
+
+    def unordered(self, calls: Any) -> Iterator[tuple[int, int]]:
+        for at, (function, arguments, _) in enumerate(calls):
+            self.calls += 1
+            yield at, function(*arguments)
+
+
+def test_answers_of_one_round_are_not_those_of_another(tmp_path: Path) -> None:
+    first, again = Pool(), Pool()
+    for pool in (first, again):
+        cached = CachedCalls(pool, Parts(tmp_path), "a")  # type: ignore[arg-type]
+        assert list(cached([(answer_of, (1,), {}), (answer_of, (2,), {})])) == [1, 2]
+        assert list(cached([(answer_of, (3,), {}), (answer_of, (4,), {})])) == [3, 4]
+    assert (first.calls, again.calls) == (4, 0)
