@@ -16,6 +16,10 @@ _ALIKE_SHARE = 0.05
 """Repeated samples that are mostly farther apart, relative to the peak, are of two spectra."""
 
 
+_FEWEST_STACKED, _MOSTLY = 5, 0.9
+"""Samples of one of several spectra in a column, and their share of all: rows in no order have short runs."""
+
+
 def several(names: Sequence[str]) -> str:
     """Return up to five names, and how many more there are."""
     return f"{', '.join(names[:5])}{f' and {len(names) - 5} more' if names[5:] else ''}"
@@ -41,15 +45,18 @@ class Cleaner:
         self.issues.append(ValidationIssue(problem, self.file, None, name, value, allowed))
 
     def cleaned(
-        self, name: str, wave: FloatArray, values: FloatArray, *, signed: bool, faulty: bool
+        self, name: str, wave: FloatArray, values: FloatArray, *, noise: float, faulty: bool
     ) -> tuple[FloatArray, FloatArray]:
-        """Return samples in rising order, each wavelength once, without gaps and, unless `signed`, without negatives.
+        """Return samples in rising order, each wavelength once, without gaps and without negatives.
 
-        `faulty`: of samples with issues already, so that what follows from these is none.
+        `noise`: negatives down to so much are noise in any case; none is set to 0 if it is infinite. `faulty`: of
+        samples with issues already, so that what follows from these is none.
         """
         known = np.isfinite(wave)
         order = np.flatnonzero(known)[np.argsort(wave[known], kind="stable")]
         steps = np.diff(wave[known])
+        if not faulty:
+            self._refuse_stacked(name, wave[known])
         if (steps < 0).all() and steps.size:
             self._note("", "falling wavelengths were turned round")
         elif (steps < 0).any():
@@ -60,8 +67,8 @@ class Cleaner:
         wave, values = self._averaged(name, wave, values)
         wave, values = self._without_gaps(name, wave, values)
         low = values < 0
-        if low.any() and not signed:
-            if -values.min() <= _NOISE_SHARE * values.max():
+        if low.any() and np.isfinite(noise):
+            if -values.min() <= max(_NOISE_SHARE * values.max(), noise):
                 self._note(name, f"negatives of noise, down to {values.min():.3g}, were set to 0")
                 values[low] = 0.0
             elif not faulty:
@@ -69,6 +76,16 @@ class Cleaner:
                 allowed = ">= 0, or noise of up to 2 % of the peak"
                 self._fault(name, f"negative value at {wave[at]:g} nm", float(values[at]), allowed)
         return wave, values
+
+    def _refuse_stacked(self, name: str, wave: FloatArray) -> None:
+        """Add an issue for spectra one below the other: wavelengths that begin again and go over most of them."""
+        steps = np.diff(wave)
+        falls = steps < 0 if np.count_nonzero(steps > 0) >= np.count_nonzero(steps < 0) else steps > 0
+        runs = np.split(wave, 1 + np.flatnonzero(falls))
+        most = [run for run in runs if run.size >= _FEWEST_STACKED and np.ptp(run) > np.ptp(wave) / 2]
+        if len(most) > 1 and sum(run.size for run in most) > _MOSTLY * wave.size:
+            at = float(most[1][0])
+            self._fault(name, "wavelengths begin again: several spectra?", at, "one spectrum in a column")
 
     def _averaged(self, name: str, wave: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Average samples at one wavelength; two spectra one after the other are an issue."""

@@ -10,6 +10,7 @@ import math
 import warnings
 import zipfile
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -108,7 +109,7 @@ def _joined(scans: Mapping[Path, Scan]) -> Scan:
             if known.any():
                 values[:, len(names)] = np.interp(grid, scan.wavelength_nm[known], own[known], np.nan, np.nan)
             names.append(file.stem if len(scan.names) == 1 else f"{file.stem} {name}")
-    units = tuple(unit for scan in scans.values() for unit in scan.units)
+    units = tuple(replace(unit, group=file.name) for file, scan in scans.items() for unit in scan.units)
     issues = tuple(group for scan in scans.values() for group in scan.issues)
     said: dict[str, list[str]] = {}
     for file, scan in scans.items():
@@ -243,11 +244,12 @@ def _spdx_sheet(path: Path) -> Sheet:
             )
         ) from None
     quantity = (items["SpectralQuantity"].text or "").strip() if "SpectralQuantity" in items else ""
-    name = (items["Description"].text or "").strip() if "Description" in items else ""
-    if not pairs:
-        raise DataError(ValidationIssue("no `SpectralData`", file))
+    name = " ".join((items["Description"].text or "").split()) if "Description" in items else ""
+    parts = sum(element.tag.rpartition("}")[2] == "SpectralDistribution" for element in root.iter())
+    if not pairs or parts > 1:
+        raise DataError(ValidationIssue(f"{parts} spectra with {len(pairs)} samples", file, allowed="one spectrum"))
     sheet = _sheet_of(file, [wave for wave, _ in pairs], {name or path.stem: [value for _, value in pairs]})
-    sheet.unit = _SPDX_UNITS.get(quantity.casefold(), "")
+    sheet.unit = "" if quantity.casefold() in ("relative", "") else _SPDX_UNITS.get(quantity.casefold(), quantity)
     return sheet
 
 

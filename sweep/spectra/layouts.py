@@ -9,6 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.errors import DataError, ValidationIssue
+from ..base.types import IndexArray
+from .clean import several
 from .read_text import MISSING, Rows, Sheet, number_of
 from .units import folded
 
@@ -17,9 +19,13 @@ WAVELENGTH = "wavelength_nm"
 _FEWEST_ALONG = 20
 _RANGE_NM = (100.0, 20_000.0)
 _WAVE = re.compile(
-    r"wave ?lengths?|wave|wvl|wl|lambda|\u03bb|wellenlange|wellenlaenge|longueurs? d'onde|longitud(es)? de onda"
-    r"|lunghezz[ae] d'onda|comprimentos? de onda"
+    r"wave ?lengths?|wavelenghts?|wave|wvl|wvlgth|wl|lambda|\u03bb|wellenlange|wellenlaenge|longueurs? d'onde"
+    r"|longitud(es)? de onda|lunghezz[ae] d'onda|comprimentos? de onda|vaglangd|golflengte|\u6ce2\u9577|\u6ce2\u957f"
 )
+_NO_WAVE = re.compile(r"\b(frequency|frequenz|freq|wave ?numbers?|wellenzahl|raman|[tg]hz|ev|cm 1|1 cm|energy)\b")
+"""Words of what is along a spectrum in the place of wavelengths."""
+_MOST_LETTERS = 80
+"""Letters of a head of wavelengths."""
 UNITS_NM = {
     **dict.fromkeys(("nm", "nanometer", "nanometers", "nanometre", "nanometres"), 1.0),
     **dict.fromkeys(("um", "micron", "microns", "micrometer", "micrometers", "micrometre"), 1e3),
@@ -27,7 +33,8 @@ UNITS_NM = {
     "m": 1e9,
 }
 UNIT_WORDS = {1.0: "nm", 1e3: "um", 0.1: "angstrom", 1e9: "m"}
-_NAME_AND_UNIT = re.compile(r"(.*?)[\s_/,.\-]*[\[(]?\s*([^\W\d_]+)\s*[\])]?")
+_PREFIX = re.compile(r"|nm|x|wl?|wvl|lambda|.*(spectral|radiance|wavelength).*")
+"""What may stand before wavelengths in heads."""
 _KEYED = re.compile(r"(.*?[^\d.\s])?\s*(\d+(?:\.\d+)?)\s*[\[(]?\s*(nm)?\s*[\])]?")
 
 
@@ -48,40 +55,75 @@ def rising(values: Sequence[float | None]) -> bool:
 
 def wave_unit(cell: str) -> float | None:
     """Return the factor from wavelengths under a head to nm; 0 without a unit; None if it is none of wavelengths."""
-    text = folded(cell.replace("\u212b", "a").replace("\u00c5", "a").replace("\u00e5", "a")).replace("_", " ")
-    if _WAVE.fullmatch(text):
-        return 0.0
-    match = _NAME_AND_UNIT.fullmatch(text)
-    if match is None or match[2] not in UNITS_NM or (not match[1] and len(match[2]) == 1):
+    if len(cell) > _MOST_LETTERS:
         return None
-    return UNITS_NM[match[2]] if not match[1] or _WAVE.fullmatch(match[1].removesuffix(" in").strip()) else None
+    words = re.sub(r"[\s_/,.\-\[\](){}:]+", " ", folded(cell)).split()
+    if words and words[-1] in ("air", "vacuum"):
+        words.pop()
+    if _WAVE.fullmatch(" ".join(words)):
+        return 0.0
+    if not words or words[-1] not in UNITS_NM or (len(words) == 1 and len(words[0]) == 1):
+        return None
+    named = " ".join(words[:-1]).removesuffix(" in")
+    return UNITS_NM[words[-1]] if not named or _WAVE.fullmatch(named) else None
+
+
+def refuse_other_axis(file: str, line: int | None, words: str) -> None:
+    """Raise DataError if words name something else than wavelengths."""
+    plain = re.sub(r"[^\w]+", " ", folded(words[:_MOST_LETTERS])).strip()
+    if _NO_WAVE.search(plain):
+        raise DataError(
+            ValidationIssue("a spectrum over something else than wavelengths", file, line, None, words, "nm, um")
+        )
+
+
+def wave_unit_of_word(cell: str) -> bool:
+    """Return whether a cell names wavelengths by a word, not by their unit alone."""
+    return wave_unit(cell) is not None and folded(cell).strip("[]() ") not in UNITS_NM
 
 
 def turned_down(sheet: Sheet) -> Sheet | None:
     """Return a sheet with wavelengths along a row, or in the words of a list, turned; None for others."""
     for index, (line, cells) in enumerate(sheet.rows):
-        plain = [_KEYED.fullmatch(cell.replace(sheet.decimal, ".")) for cell in cells]
-        at_number = [at for at, match in enumerate(plain) if match is not None]
-        if len(at_number) < _FEWEST_ALONG:
+        found = [_keyed(cell, sheet.decimal) for cell in cells]
+        prefixes = [match[0] for match in found if match is not None and _PREFIX.fullmatch(folded(match[0]))]
+        if len(prefixes) < _FEWEST_ALONG:
             continue
-        run = max(np.split(at_number, 1 + np.flatnonzero(np.diff(at_number) != 1)), key=len)
-        waves = [float(match[2]) for at in run if (match := plain[at]) is not None]
-        at, below = int(run[0]), sheet.rows[index + 1 :]
-        if len(waves) < _FEWEST_ALONG or not rising(waves) or not below or _is_down(sheet, cells, below, at):
+        usual = max(set(prefixes), key=prefixes.count)
+        alike = [at for at, match in enumerate(found) if match is not None and match[0] == usual]
+        corner = cells[alike[0] - 1] if alike[0] else ""
+        factor = wave_unit(corner) or 1.0
+        alike = [at for at in alike if _RANGE_NM[0] <= (found[at] or ("", 0.0))[1] * factor <= _RANGE_NM[1]]
+        runs: list[IndexArray] = np.split(np.array(alike, dtype=np.intp), 1 + np.flatnonzero(np.diff(alike) != 1))
+        run = max(runs, key=len)
+        waves = [match[1] for at in run if (match := found[at]) is not None]
+        below = sheet.rows[index + 1 :]
+        if len(waves) < _FEWEST_ALONG or not rising([wave * factor for wave in waves]) or not below:
+            continue
+        at = int(run[0])
+        if _is_down(sheet, cells, below, at):
             break
-        turned = [(line, [WAVELENGTH, *(_row_name(row[:at], sheet, k) for k, (_, row) in enumerate(below, 1))])]
+        refuse_other_axis(sheet.file, line, corner)
+        if (longest := max(below, key=lambda row: len(row[1])))[1][len(cells) :]:
+            problem, count = "wrong number of columns", len(longest[1])
+            raise DataError(ValidationIssue(problem, sheet.file, longest[0], None, count, str(len(cells))))
+        first = corner if wave_unit(corner) is not None else WAVELENGTH
+        turned = [(line, [first, *(_row_name(row[:at], sheet, k) for k, (_, row) in enumerate(below, 1))])]
         for column, wave in zip(run, waves, strict=True):
             values = [row[column] if column < len(row) else "" for _, row in below]
             turned.append((line, [f"{wave:.12g}".replace(".", sheet.decimal), *values]))
-        if (longest := max(below, key=lambda row: len(row[1])))[1][len(cells) :]:
-            problem = ValidationIssue(
-                "wrong number of columns", sheet.file, longest[0], None, len(longest[1]), str(len(cells))
-            )
-            raise DataError(problem)
+        others = [cell for k, cell in enumerate(cells[at:], at) if k not in set(run) and cell]
         notes = [*sheet.notes, "wavelengths are along a row: the table was turned"]
-        remarks = [*sheet.remarks, *(" ".join(row) for _, row in sheet.rows[:index])]
+        notes += [f"columns beside the wavelengths were left out: {several(others)}"] if others else []
+        remarks = [*sheet.remarks, *(" ".join(row) for _, row in sheet.rows[:index]), *([corner] if corner else [])]
         return replace(sheet, rows=turned, notes=notes, remarks=remarks)
     return _listed(sheet)
+
+
+def _keyed(cell: str, decimal: str) -> tuple[str, float] | None:
+    """Return the words before the wavelength in a cell like `Spectral Data 380[nm]`, and it; None for others."""
+    match = _KEYED.fullmatch(cell.replace(decimal, ".")) if len(cell) <= _MOST_LETTERS else None
+    return None if match is None else (match[1] or ("" if match[3] is None else "nm"), float(match[2]))
 
 
 def _is_down(sheet: Sheet, head: Sequence[str], below: Rows, at: int) -> bool:
@@ -107,38 +149,27 @@ def _row_name(cells: Sequence[str], sheet: Sheet, number: int) -> str:
 
 
 def _listed(sheet: Sheet) -> Sheet | None:
-    """Return a list of `Spectral Data 380[nm],0.001` as a table."""
-    series: dict[str, list[tuple[int, list[str]]]] = {}
+    """Return the longest list of `Spectral Data 380[nm],0.001` as a table."""
+    series: list[tuple[str, list[tuple[int, list[str]]]]] = []
     names: list[str] = []
     for line, cells in sheet.rows:
-        match = _KEYED.fullmatch(cells[0])
-        if (
-            match is not None
-            and (match[1] or match[3])
-            and len(cells) > 1
-            and number_in(cells[1], sheet.decimal) is not None
-        ):
-            series.setdefault(match[1] or "", []).append((line, [match[2], *cells[1:]]))
+        key = _keyed(cells[0], sheet.decimal)
+        if key is not None and key[0] and len(cells) > 1 and number_in(cells[1], sheet.decimal) is not None:
+            row = (line, [f"{key[1]:.12g}", *cells[1:]])
+            if not series or series[-1][0] != key[0] or float(series[-1][1][-1][1][0]) >= key[1]:
+                series.append((key[0], []))
+            series[-1][1].append(row)
         elif folded(cells[0]) in ("title", "name", "sample", "sample name", "titel") and len(cells) > 1:
             names = cells[1:]
-    found = [
-        rows for rows in series.values() if len(rows) >= _FEWEST_ALONG and rising([float(row[0]) for _, row in rows])
-    ]
+    found = [rows for _, rows in series if len(rows) >= _FEWEST_ALONG and rising([float(row[0]) for _, row in rows])]
     if not found:
         return None
     rows = max(found, key=len)
     count = max(len(row) for _, row in rows) - 1
-    names = (
-        names
-        if len(names) == count
-        else [sheet.name or "values"]
-        if count == 1
-        else [f"curve_{k + 1}" for k in range(count)]
-    )
-    table = [
-        (rows[0][0], [WAVELENGTH, *names]),
-        *((n, [row[0].replace(".", sheet.decimal), *row[1:]]) for n, row in rows),
-    ]
-    others = [" ".join(cells) for _, cells in sheet.rows if _KEYED.fullmatch(cells[0]) is None]
+    if len(names) != count:
+        names = [sheet.name or "values"] if count == 1 else [f"curve_{k + 1}" for k in range(count)]
+    table = [(rows[0][0], [WAVELENGTH, *names])]
+    table += [(n, [row[0].replace(".", sheet.decimal), *row[1:]]) for n, row in rows]
+    others = [" ".join(cells) for _, cells in sheet.rows if _keyed(cells[0], sheet.decimal) is None]
     note = "wavelengths are in the words of a list"
     return replace(sheet, rows=table, notes=[*sheet.notes, note], remarks=[*sheet.remarks, *others])

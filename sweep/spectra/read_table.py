@@ -8,6 +8,8 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -15,25 +17,41 @@ import numpy as np
 from ..base.errors import DataError, ValidationIssue
 from ..base.types import FloatArray
 from .clean import Cleaner
-from .layouts import UNIT_WORDS, UNITS_NM, WAVELENGTH, number_in, rising, turned_down, wave_unit
+from .layouts import (
+    UNIT_WORDS,
+    UNITS_NM,
+    WAVELENGTH,
+    number_in,
+    refuse_other_axis,
+    rising,
+    turned_down,
+    wave_unit,
+    wave_unit_of_word,
+)
 from .read_text import Rows, Sheet
 from .spectrum import LARGEST, Unit, sample_issues
-from .units import folded, symbol_unit, unit_of
+from .units import begun_by_quantity, folded, stated_in_title, symbol_unit, unit_of
 
 MOST_CURVES = 2_000
 MOST_SAMPLES = 100_000
 MOST_VALUES = 2_000_000
 """Limits of a file of curves: 2,000 curves of 1,000 samples are read in a second or two."""
+_MOST_TITLES = 100
+_AXIS = re.compile(r"\W*x[\s_-]?(?:axis ?(?:units?|mode)?|units?|mode)\b\W*(.*)")
 _MOST_CELL_FAULTS = 10_000
 _X = re.compile(r"(.*?[\s_\-.])?x(_?\d+)?|")
 _Y = re.compile(r"(y(_?\d+)?|values?)|")
 _INDEX = ("", "#", "no", "no.", "nr", "nr.", "n", "id", "index", "row", "pixel", "unnamed: 0")
 _SPREAD = re.compile(
-    r"\b(std( ?dev)?|stdev|standard deviation|sigma|uncertainty|u95|unsicherheit|standardabweichung)\b"
+    r"\b(std( ?dev)?|stdev|standard deviation|sigma|(expanded )?uncertainty|u95|rsd|unsicherheit|standardabweichung)\b"
+    r"|^u\(|^(dark|reference|saturated|background|flag)\b"
 )
 """Heads of columns that are no curves."""
+_NOISE_OD = 0.05
+"""Negatives of optical densities that are noise of the baseline."""
+_MOST_UM = 1.65
+"""Largest wavelength without a unit that is taken for um: from 1.65 eV on, light is visible."""
 _Series = Sequence[float | None]
-_TITLE = "a title"
 
 
 @dataclass(frozen=True)
@@ -71,7 +89,13 @@ class _Table:
     parsed: list[list[float | None]]
     width: int
     factor_nm: float = 0.0
+    between: Rows = field(default_factory=list)
     issues: list[ValidationIssue] = field(default_factory=list)
+
+    @cached_property
+    def series(self) -> list[list[float | None]]:
+        """Numbers of each column; NaN for missing ones, None for texts."""
+        return [[row[at] if at < len(row) else np.nan for row in self.parsed] for at in range(self.width)]
 
     def fault(self, problem: str, line: int | None, key: str | None, value: object, allowed: str | None = None) -> None:
         self.issues.append(ValidationIssue(problem, self.sheet.file, line, key, value, allowed))
@@ -83,6 +107,11 @@ def curves_of(sheet: Sheet) -> Scan:
     if any(len(cells) > width for _, cells in sheet.rows):
         sheet.notes.append("empty columns at the end were left out")
     sheet = replace(sheet, rows=[(line, cells[:width]) for line, cells in sheet.rows])
+    refuse_other_axis(sheet.file, None, sheet.axis)
+    texts = [(None, remark) for remark in sheet.remarks]
+    for line, text in [*texts, *((line, " ".join(cells)) for line, cells in sheet.rows[:_MOST_TITLES])]:
+        if (stated := _AXIS.match(folded(text))) is not None:
+            refuse_other_axis(sheet.file, line, stated[1])
     table = _table_of(turned_down(sheet) or sheet)
     columns = _columns(table)
     check_size(sheet.file, None, len(table.body), len(columns))
@@ -143,61 +172,81 @@ def _is_head(cells: Sequence[str]) -> bool:
     return any(wave_unit(cell) is not None for cell in cells) or not cells[0]
 
 
+@dataclass
+class _Heads:
+    """What stands above numbers: names and units of the columns (empty for none), their line, and titles."""
+
+    line: int | None
+    names: list[str]
+    units: list[str]
+    titles: Rows
+
+
+def _heads(table: _Table) -> _Heads:
+    """Take units and names from the rows above numbers."""
+    units, head = [""] * table.width, list(table.head)
+    if head and len(head[-1][1]) <= table.width and _is_unit_row(head):
+        cells = head.pop()[1]
+        units[: len(cells)] = map(_bare, cells)
+        table.sheet.notes.append("a row of units was read")
+    line, names = _names(table, head)
+    if names and not names[-1] and names[0] and table.width > 1 and _steps_by_one(table.series[0]):
+        names = ["", *names[:-1]]  # as R writes row names
+    return _Heads(line, names, units, head)
+
+
+def _waves(table: _Table, heads: _Heads) -> list[int]:
+    """Return the columns of wavelengths, and keep the factor that brings them to nm."""
+    names, units, notes = heads.names, heads.units, table.sheet.notes
+    waves = [wave_unit(cell) if cell else None for cell in names or units]
+    for at, wave in enumerate(waves):
+                if names and wave is not None and units[at] and folded(units[at]) not in UNITS_NM:
+            table.fault("wavelengths in an unknown unit", heads.line, names[at], units[at], ", ".join(UNITS_NM))
+        if wave in (0, None) and (wave == 0 or not any(known is not None for known in waves)):
+            waves[at] = UNITS_NM.get(folded(units[at]), wave)
+    found = [at for at, wave in enumerate(waves) if wave is not None] or _unnamed_waves(table, names, table.series)
+    if not found:
+        first = names[0] if names else ""
+        table.fault("no column wavelength", heads.line, first, first, f"`{WAVELENGTH}` as the first column")
+        found = [0]
+    table.factor_nm = waves[found[0]] or 0.0
+    if len({waves[at] or 0.0 for at in found}) > 1:
+        table.fault("wavelengths in two units", heads.line, None, [names[at] for at in found])
+    if names and (names[found[0]] != WAVELENGTH or found[0]) and waves[found[0]] is not None:
+        notes.append(f"wavelengths are column {names[found[0]]!r}")
+    if len(found) > 1:
+        notes.append(f"each curve has wavelengths of its own: {len(found)} pairs of columns")
+    return found
+
+
 def _columns(table: _Table) -> list[_Column]:
     """Return the curves of a table from its heads, units and numbers; adds issues where they are unclear."""
-    sheet, units = table.sheet, [""] * table.width
-    head = list(table.head)
-    if head and len(head[-1][1]) <= table.width and _is_unit_row(head[-1][1], len(head) > 1):
-        cells = head.pop()[1]
-        units[: len(cells)] = [cell.strip("[]()") for cell in cells]
-        sheet.notes.append("a row of units was read")
-    line, names = _names(table, head)
-    waves = [wave_unit(cell) if cell else None for cell in names or [""] * table.width]
-    waves = [UNITS_NM.get(folded(units[at]), 0.0) if wave == 0 else wave for at, wave in enumerate(waves)]
-    if any(units) and not any(wave is not None for wave in waves):
-        waves = [UNITS_NM.get(folded(unit)) for unit in units]
-    series = [[row[at] if at < len(row) else np.nan for row in table.parsed] for at in range(table.width)]
-    at_x = [at for at, wave in enumerate(waves) if wave is not None] or _unnamed_waves(table, names, series)
-    if not at_x:
-        first = names[0] if names else ""
-        table.issues.append(
-            ValidationIssue(
-                "no column wavelength", sheet.file, line, first, first, f"`{WAVELENGTH}` as the first column"
-            )
-        )
-        at_x = [0]
-    table.factor_nm = (waves[at_x[0]] if waves else 0.0) or 0.0
-    if len({waves[at] or 0.0 for at in at_x if waves}) > 1:
-        table.fault("wavelengths in two units", line, None, [names[at] for at in at_x])
-    titled = head[-1][1] if head and len(at_x) > 1 else []
-    if names and (names[at_x[0]] != WAVELENGTH or at_x[0]) and waves[at_x[0]] is not None:
-        sheet.notes.append(f"wavelengths are column {names[at_x[0]]!r}")
-    if len(at_x) > 1:
-        sheet.notes.append(f"each curve has wavelengths of its own: {len(at_x)} pairs of columns")
-    whole = _table_unit(table, head)
-    columns: list[_Column] = []
+    heads = _heads(table)
+    names, at_x = heads.names, _waves(table, heads)
+    pairs = len(at_x) > 1
+    titled = heads.titles[-1][1] if heads.titles and pairs else []
+    whole, loose = _table_units(table, heads.titles)
     others = [at for at in range(table.width) if at not in at_x]
-    left_out = _left_out(sheet, names, series, others, at_x)
-    for at in others:
-        if at in left_out:
-            continue
+    left_out = _left_out(table.sheet, names, table.series, others, at_x)
+    columns: list[_Column] = []
+    for at in (at for at in others if at not in left_out):
         wave = max((x for x in at_x if x < at), default=at_x[0])
-        stated = symbol_unit(units[at]) or Unit(units[at], unclear="has an unknown unit" if units[at] else "")
-        name = _curve_name(names, titled, wave, at, len(at_x) > 1) or (
-            "" if names else _made_name(table, len(columns), at_x)
-        )
-        unit = unit_of(name) if not names or names[at] == name else unit_of(names[at]).over(unit_of(name))
-        unit = unit.over(stated)
-        columns.append(
-            _Column(
-                name,
-                unit if unit.quantity and not whole.factor and whole.words == _TITLE else unit.over(whole),
-                wave,
-                at,
-            )
-        )
-    _check_names(table, line, names, columns, numbered=len(at_x) > 1)
-    return _numbered(columns) if len(at_x) > 1 else columns
+        name = _curve_name(names, titled, wave, at, pairs)
+        unit = unit_of(names[at]).over(unit_of(name)) if names else Unit()
+        stated = symbol_unit(heads.units[at]) or unit_of(heads.units[at])
+        if heads.units[at] and not stated.words:
+            stated = Unit(heads.units[at], unclear="has an unknown unit")
+        above = [cells[at] for _, cells in heads.titles if not cells[0] and at < len(cells) and not titled]
+        for other in (stated, *map(unit_of, above), whole):
+            unit = unit.over(other)
+        unit = unit if unit.quantity or unit.unclear else unit.over(loose)
+        columns.append(_Column(name or ("" if names else _made_name(table, len(columns), at_x)), unit, wave, at))
+    used = {at_x[0], *(column.at for column in columns)}
+    for below, cells in table.between:
+        if given := [cell for at, cell in enumerate(cells) if cell and at in used]:
+            table.fault("neither heads, units nor numbers", below, None, given[0], "one row of heads, one of units")
+    _check_names(table, heads.line, names, columns, numbered=pairs)
+    return _numbered(columns) if pairs else columns
 
 
 def _left_out(
@@ -221,19 +270,30 @@ def _made_name(table: _Table, before: int, at_x: Sequence[int]) -> str:
     return (table.sheet.name or "values") if table.width - len(at_x) == 1 else f"curve_{before + 1}"
 
 
-def _is_unit_row(cells: Sequence[str], below_head: bool) -> bool:
-    """Return whether a row holds units alone, one of them of wavelengths, below a row of names."""
-    given = [cell.strip("[]() ") for cell in cells if cell.strip("[]() ")]
-    known = [folded(cell) in UNITS_NM or symbol_unit(cell) is not None for cell in given]
-    return below_head and bool(given) and all(known) and any(folded(cell) in UNITS_NM for cell in given)
+def _bare(cell: str) -> str:
+    """Return a cell without brackets around all of it."""
+    return cell[1:-1].strip() if cell[:1] in ("[", "(") and cell[-1:] in ("]", ")") else cell
+
+
+def _is_unit_row(head: Rows) -> bool:
+    """Return whether the last of the rows above numbers holds units alone, below a row of names."""
+    given = [_bare(cell) for cell in head[-1][1] if _bare(cell)]
+    if len(head) < 2 or not given:
+        return False
+    pure = [folded(cell) in UNITS_NM or symbol_unit(cell) is not None for cell in given]
+    named = len(head[-2][1]) > 1 and any(wave_unit(cell) is not None for cell in head[-2][1])
+    of_wave = any(folded(cell) in UNITS_NM for cell in given)
+    worded = any(map(wave_unit_of_word, head[-1][1]))
+    told = all(known or unit_of(cell).words for known, cell in zip(pure, given, strict=True))
+    return (all(pure) and of_wave) or (told and named and not worded)
 
 
 def _names(table: _Table, head: Rows) -> tuple[int | None, list[str]]:
     """Take the row of names from the rows above the numbers; the others are titles."""
     sheet = table.sheet
-    named = next(
-        (at for at in reversed(range(len(head))) if any(wave_unit(cell) is not None for cell in head[at][1])), None
-    )
+    named = next((at for at in reversed(range(len(head))) if any(map(wave_unit_of_word, head[at][1]))), None)
+    if named is None and head and any(wave_unit(cell) is not None for cell in head[-1][1]):
+        named = len(head) - 1
     if named is None and head and 1 < len(head[-1][1]) <= table.width:
         named = len(head) - 1
     if named is None:
@@ -244,6 +304,7 @@ def _names(table: _Table, head: Rows) -> tuple[int | None, list[str]]:
     line, names = head[named]
     if len(names) > table.width or (len(names) == 1 < table.width and len(head) == 1):
         table.fault("wrong number of columns", table.body[0][0], None, table.width, str(len(names)))
+    table.between = head[named + 1 :]
     del head[named:]
     if head and not (len(head[-1][1]) > 1 and sum(wave_unit(cell) is not None for cell in names) > 1):
         sheet.notes.append(_titles(len(head)))
@@ -285,27 +346,36 @@ def _counting(values: Sequence[float | None]) -> bool:
     return len(known) > 1 and any(known == [float(at + start) for at in range(len(known))] for start in (0, 1))
 
 
+def _steps_by_one(values: _Series) -> bool:
+    """Return whether whole numbers rise by one from row to row, as row names of a part of a table do."""
+    known = [value for value in values if value is not None]
+    return len(known) == len(values) > 2 and all(b - a == 1 and a == int(a) for a, b in pairwise(known))
+
+
 def _counts(names: Sequence[str], series: Sequence[_Series], at: int, wave: int) -> bool:
     """Return whether a column holds the numbers of the rows: it has no name, or is called so."""
     named = not names or folded(names[at]) in _INDEX
-    return named and _counting(series[at]) and (at < wave or not names or not names[at])
+    counts = _counting(series[at]) or (bool(names) and not names[at] and _steps_by_one(series[at]))
+    return named and counts and (at < wave or (bool(names) and not names[at]))
 
 
-def _table_unit(table: _Table, head: Rows) -> Unit:
-    """Return the unit that the format, a title or a comment states for all columns."""
-    if table.sheet.unit:
-        return symbol_unit(table.sheet.unit) or unit_of(table.sheet.unit)
-    found: list[Unit] = []
-    texts = [*table.sheet.remarks, *(" ".join(cells) for _, cells in head)]
-    for text in texts:
-        parts = re.findall(r"[\[(][^\[\]]*[\])]|(?:unit|einheit|unite)s?\s*[:=]\s*\S.*", text, re.IGNORECASE)
-        units = [symbol_unit(re.sub(r"^.*?[:=]\s*", "", part).strip("[]() ")) for part in parts]
-        found += [unit for unit in units if unit is not None and (unit.quantity or unit.factor == 0.01)]
-    if not found:
-        words = {unit_of(text).quantity for text in texts} - {None}
-        return Unit(_TITLE, next(iter(words))) if len(words) == 1 else Unit()
-    several = len({(unit.quantity, unit.factor) for unit in found}) > 1
-    return Unit("titles", unclear="contradicts itself") if several else found[0]
+def _table_units(table: _Table, head: Rows) -> tuple[Unit, Unit]:
+    """Return the unit that the format, a title or a comment states for all columns, and one of words of a title."""
+    if (stated := table.sheet.unit.strip()) == "A":
+        return Unit(stated, "density"), Unit()
+    if stated:
+        unit = symbol_unit(stated) or unit_of(stated)
+        return (unit if unit.words else Unit(stated, unclear="has an unknown unit")), Unit()
+    texts = [*table.sheet.remarks, *(" ".join(cells) for _, cells in head if cells[0])]
+    return _only([stated_in_title(text) for text in texts]), _only([begun_by_quantity(text) for text in texts])
+
+
+def _only(units: Sequence[Unit | None]) -> Unit:
+    """Return the only unit of several texts; one that is unclear if they contradict each other."""
+    found = [unit for unit in units if unit is not None]
+    if len({(unit.quantity, unit.factor, unit.unclear) for unit in found}) > 1:
+        return Unit("; ".join(unit.words for unit in found), unclear="contradicts itself")
+    return found[0] if found else Unit()
 
 
 def _curve_name(names: Sequence[str], titled: Sequence[str], wave: int, at: int, pairs: bool) -> str:
@@ -392,9 +462,13 @@ def _scan(table: _Table, columns: Sequence[_Column], numbers: FloatArray, bad: s
     sheet = table.sheet
     factor = table.factor_nm
     waves = {column.wave: numbers[:, column.wave] for column in columns}
-    if not factor and waves:
+    if not waves:
+        factor = 1.0
+    if not factor:
         largest = max((float(np.nanmax(wave)) for wave in waves.values() if np.isfinite(wave).any()), default=0.0)
         factor = 1e9 if 0 < largest < 1e-4 else 1e3 if 0 < largest < 20 else 1.0
+        if factor == 1e3 and largest > _MOST_UM:
+            table.fault("wavelengths have no unit: um, or energies in eV?", None, None, largest, "a head with the unit")
         sheet.notes.append(f"wavelengths have no unit, and were taken for {UNIT_WORDS[factor]} by their size")
     elif factor != 1:
         sheet.notes.append(f"wavelengths in {UNIT_WORDS[factor]} were brought to nm")
@@ -407,8 +481,8 @@ def _scan(table: _Table, columns: Sequence[_Column], numbers: FloatArray, bad: s
         if (np.isnan(wave) & np.isfinite(values)).any() and not faulty:
             row = int(np.flatnonzero(np.isnan(wave) & np.isfinite(values))[0])
             table.fault("a value without a wavelength", table.body[row][0], column.name, float(values[row]))
-        signed = column.unit.quantity == "decibel"
-        curves.append(cleaner.cleaned(column.name, wave, values, signed=signed, faulty=faulty))
+        noise = {"decibel": np.inf, "density": _NOISE_OD}.get(column.unit.quantity or "", 0.0)
+        curves.append(cleaner.cleaned(column.name, wave, values, noise=noise, faulty=faulty))
     sheet.notes.extend(cleaner.notes)
     grid = np.unique(np.concatenate([wave for wave, _ in curves])) if curves else np.empty(0)
     check_size(sheet.file, None, grid.size, len(curves))

@@ -7,6 +7,7 @@ import csv
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import zip_longest
 from pathlib import Path
 from typing import NamedTuple
 
@@ -31,41 +32,47 @@ NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _LEADING_ZEROS = re.compile(r"[+-]?0\d.*")
 _COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
+_DOTTED = re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3})+")
+_OVERFLOW = re.compile(r"[+-]?9\.9{2,}e\+?\d+|-9999(\.0*)?", re.IGNORECASE)
+"""Marks of instruments for what they could not measure."""
 MISSING = ("", "nan", "n/a", "n.a.", "na", "#n/a", "#nv", "-", "--", "null", "none")
 _WORD_AND_BRACKET = re.compile(r"\S*[^\s\[(]\s?[\[(][^\[\]()]*(?:\([^()]*\)[^\[\]()]*)*[\])]|\S+")
 
 
 class Instrument(NamedTuple):
-    """Text of an instrument: the line before its numbers, one after them, and where the head has the unit or a name."""
+    """Text of an instrument: the line before its numbers, what its head has, and a line after the numbers."""
 
     begin: re.Pattern[str]
+    head: re.Pattern[str]
     end: re.Pattern[str] | None = None
-    unit: re.Pattern[str] | None = None
-    name: re.Pattern[str] | None = None
 
 
 INSTRUMENTS = {
     "Ocean": Instrument(
-        re.compile(r">{3,}\s*begin.*<{3,}", re.I),
-        re.compile(r">{3,}\s*end.*<{3,}", re.I),
-        re.compile(r"^y ?axis.*?[:=]\s*(.+)$", re.I | re.M),
+        re.compile(r">{3,}\s*begin.*<{3,}", re.I), re.compile(r""), re.compile(r">{3,}\s*end.*<{3,}", re.I)
     ),
-    "Thorlabs": Instrument(re.compile(r"\[data\]", re.I), re.compile(r"\[end.*\]", re.I)),
-    "PerkinElmer": Instrument(re.compile(r"#data", re.I), None, re.compile(r"^#gr\s*\n.*\n(.+)$", re.I | re.M)),
-    "Instrument Systems": Instrument(
-        re.compile(r"(spectral )?data", re.I),
-        None,
-        re.compile(r"^(?:unit|einheit)\s*=\s*(.+)$", re.I | re.M),
-        re.compile(r"^(?:name|title|comment)\s*=\s*(\S.*)$", re.I | re.M),
-    ),
+    "Thorlabs": Instrument(re.compile(r"\[data\]", re.I), re.compile(r""), re.compile(r"\[end.*\]", re.I)),
+    "PerkinElmer": Instrument(re.compile(r"#data", re.I), re.compile(r"^#gr", re.I | re.M)),
+    "JASCO": Instrument(re.compile(r"xydata", re.I), re.compile(r"^xunits", re.I | re.M)),
+    "Instrument Systems": Instrument(re.compile(r"(spectral )?data", re.I), re.compile(r"^\[.*\]\s*$", re.M)),
 }
+_AXIS_X = re.compile(r"^\W*x[\s_-]?(?:axis)?[\s_-]?(?:units?|mode)?\s*[:=;,\t ]\s*(\S.*)$", re.I | re.M)
+_AXIS_Y = re.compile(
+    r"^\W*(?:y[\s_-]?(?:axis)?[\s_-]?(?:units?|mode)?|unit|einheit)\s*[:=;,\t ]\s*(\D.*)$", re.I | re.M
+)
+_PERKIN_ELMER_Y = re.compile(r"^#gr\s*\n(.*)\n(.+)$", re.I | re.M)
+_NAMED = re.compile(r"^(?:name|title|comment)\s*=\s*(\S.*)$", re.I | re.M)
+_PACKED = re.compile(r"^##xydata", re.I | re.M)
+_MOST_HEAD = 200
+"""Lines of an instrument's head."""
 
 
 @dataclass
 class Sheet:
     """Rows of cells with their line numbers, and what stands beside them.
 
-    `remarks`: comments. `unit`: that of all curves, as the format states it. `name`: that of the only curve.
+    `remarks`: comments. `unit`, `axis`: of all curves and of what they are over, as the format states them.
+    `name`: that of the only curve.
     """
 
     file: str
@@ -73,6 +80,7 @@ class Sheet:
     notes: list[str] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
     unit: str = ""
+    axis: str = ""
     name: str = ""
     decimal: str = "."
 
@@ -80,7 +88,8 @@ class Sheet:
 def number_of(cell: str) -> float | None:
     """Return a finite number as tables have it, without Python's underscores and other scripts' digits."""
     cell = cell.strip()
-    number = float(cell) if NUMBER.fullmatch(cell) and not _LEADING_ZEROS.fullmatch(cell) else np.nan
+    usual = NUMBER.fullmatch(cell) and not _LEADING_ZEROS.fullmatch(cell) and not _OVERFLOW.fullmatch(cell)
+    number = float(cell) if usual else np.nan
     return number + 0.0 if np.isfinite(number) else None
 
 
@@ -90,25 +99,30 @@ def text_sheet(path: Path, allowed: str = "a header `wavelength_nm,...` and rows
     file, lines = str(path), re.split(r"\r\n|\r|\n", text)
     sheet = Sheet(file, [], notes)
     numbered = list(enumerate(lines, 1))
+    if _PACKED.search(text[:_BEGINNING_BYTES]):
+        raise DataError(
+            ValidationIssue("JCAMP-DX with packed numbers", file, allowed="a table of wavelengths and values")
+        )
     for maker, known in INSTRUMENTS.items():
-        begin = next((at for at, line in enumerate(lines) if known.begin.fullmatch(line.strip())), None)
-        if begin is None:
+        begin = next((at for at, line in enumerate(lines[:_MOST_HEAD]) if known.begin.fullmatch(line.strip())), None)
+        head = "\n".join(line.strip() for line in lines[:begin])
+        if begin is None or not known.head.search(head):
             continue
         end = next(
             (at for at in range(begin + 1, len(lines)) if known.end and known.end.fullmatch(lines[at].strip())), None
         )
-        head = "\n".join(line.strip() for line in lines[:begin])
-        sheet.unit, sheet.name = (
-            found[1].strip() if pattern and (found := pattern.search(head)) else ""
-            for pattern in (known.unit, known.name)
-        )
+        of_y, named = _AXIS_Y.search(head), _NAMED.search(head)
+        sheet.unit, sheet.name = (found[1].strip() if found else "" for found in (of_y, named))
+        sheet.axis = found[1].strip() if (found := _AXIS_X.search(head)) else ""
+        if (perkin_elmer := _PERKIN_ELMER_Y.search(head)) is not None:
+            sheet.axis, sheet.unit = perkin_elmer[1].strip(), perkin_elmer[2].strip()
         sheet.notes.append(f"{begin + 1} lines of the head of a file of {maker} were left out")
         numbered = numbered[begin + 1 : end]
         break
     comments = [(n, line) for n, line in numbered if _COMMENT.match(line)]
     kept = [(n, line) for n, line in numbered if line.strip() and not _COMMENT.match(line)]
     sheet.remarks = [_COMMENT.sub("", line, count=1).strip() for _, line in comments]
-    if not kept:
+    if not any(re.search(r"[^\s,;|]", line) for _, line in kept):
         raise DataError(ValidationIssue("the file is empty", file, allowed=allowed))
     mark = _mark([line for _, line in kept])
     if _MARKS[mark]:
@@ -153,7 +167,7 @@ def _decoded(path: Path) -> tuple[str, list[str]]:
 
 
 def _split(line: str, mark: str) -> list[str]:
-    if mark == " ":
+    if mark == " " and '"' not in line:
         return _WORD_AND_BRACKET.findall(line)
     (cells,) = csv.reader([line], delimiter=mark, strict=line.count('"') % 2 == 1, skipinitialspace=True)
     return [cell.strip() for cell in cells]
@@ -194,6 +208,12 @@ def _find_decimal(sheet: Sheet) -> None:
     """Find the decimal mark: a comma where numbers have some, and none has a point. DataError where it is unclear."""
     some = [sheet.rows[int(at)] for at in np.unique(np.linspace(0, len(sheet.rows) - 1, _SAMPLED).astype(int))]
     cells = [cell.rstrip("%").strip() for _, row in some for cell in row]
+    for column in zip_longest(*(row for _, row in some), fillvalue=""):
+        dotted = [cell for cell in column if _DOTTED.fullmatch(cell)]
+        whole = [cell for cell in column if cell.isdigit() and int(cell[:6]) >= 100]
+        if dotted and whole and len(dotted) == sum("." in cell for cell in column) and float(dotted[0]) < 100:
+            problem, allowed = "a point may be a decimal mark or part every three digits", "numbers without it"
+            raise DataError(ValidationIssue(problem, sheet.file, value=dotted[0], allowed=allowed))
     commas = [cell for cell in cells if _COMMA.fullmatch(cell) or _THOUSANDS.fullmatch(cell)]
     if not commas or any("." in cell and NUMBER.fullmatch(cell) for cell in cells):
         return

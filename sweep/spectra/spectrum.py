@@ -98,17 +98,21 @@ class WavelengthGrid(Section):
 
 @dataclass(frozen=True)
 class Unit:
-    """What a head says of its numbers: words for messages, quantity, factor to plain numbers, and why it is unclear."""
+    """What a head says of its numbers: words for messages, quantity, factor to plain numbers, and why it is unclear.
+
+    `loss`: dB of a loss are positive. `group`: file of a folder, whose numbers have one scale.
+    """
 
     words: str = ""
     quantity: Quantity | None = None
     factor: float | None = None
     unclear: str = ""
     loss: bool = False
+    group: str = ""
 
     def over(self, other: Unit) -> Unit:
         """Return this unit, completed by one of the whole table."""
-        if self.unclear or not other.words:
+        if not other.words or (self.unclear and not (self.unclear.startswith("does not") and other.quantity)):
             return self
         if self.quantity and other.quantity and self.quantity != other.quantity:
             return Unit(f"{self.words}, {other.words}", unclear="contradicts itself")

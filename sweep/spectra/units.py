@@ -47,65 +47,83 @@ _WHOLE_PERCENT = (10.0, 130.0)
 _NOISE = 0.05
 """Noise above a share of 1."""
 
+_MOST_LETTERS = 300
+"""Letters of a head that are looked at."""
+_MOST_DENSITY = 15.0
+_PER = r"(([/(.]|(?=(c?m|nm|um|sr|s)(-|\d)))(c?m|nm|um|sr|s|\(|1)[^\W_]*[\w/().\-]*)?"
+"""What may follow the unit of a spectrum: `/m2/nm`, `(sr nm)`, `m-2 nm-1`."""
 _SYMBOLS: tuple[tuple[str, Quantity | None, float | None], ...] = (
     (r"%|percent|pct|prozent", None, 0.01),
     (r"a(mp(ere)?s?)?/w(att)?|aw-1", "responsivity", 1.0),
     (r"ma/w|maw-1", "responsivity", 1e-3),
     (r"e-?/(ph|photon)|electrons?/photon", "qe", 1.0),
     (r"o\.?d\.?|abs\.?|absorbance", "density", 1.0),
-    (r"dB", "decibel", 1.0),
+    (r"db", "decibel", 1.0),
     (r"qe|eqe", "qe", None),
     (r"t|transmission|transmittance", "transmission", None),
-    (r"(photons?|quanta|ph|[munp]?mol)([/(s].*)?", "photons", 1.0),
+    (r"(photons?|quanta|ph|[munp]?mol)" + _PER, "photons", 1.0),
     (r"counts?|cts|adu", "photons", 1.0),
-    (r"[munk]?(w|watts?|j)([/(].*|(cm|m|sr|nm|s)-.*)?", "energy", 1.0),
+    (r"[munk]?(w|watts?|j)" + _PER, "energy", 1.0),
     (r"1|-|fraction|none|dimensionless|ratio|0(\.\.\.?|-|to)1|nm-1|1/nm", None, 1.0),
     (r"a\.u\.|arb\..*|arbitrary.*|rel\.?|relative|norm\.?|normali[sz]ed|normiert", None, 1.0),
 )
 """Units in brackets, in a row of their own or at the end of a head: quantity, and factor to plain numbers."""
+_PHOTONS = r"photons?|photonen|quanta|quantum flux|ppfd|pfd|ypfd"
 _WORDS: tuple[tuple[str, Quantity], ...] = (
     (r"qe|eqe|ipce|quantum (efficiency|yield)|quanten\w+|(rendement|efficacite) quantique", "qe"),
     (r"(relative|rel|normali[sz]ed|normiert\w*) (spectral )?responsivity", "relative_responsivity"),
     (r"response per energy|ssf per energy", "relative_responsivity"),
-    (r"responsivity|responsivitat|responsivite", "responsivity"),
+    (r"responsivity|responsivitat|responsivite|radiant sensitivity", "responsivity"),
     (r"transmission|transmittance|transmissivity|transmittanz|transmissionsgrad|durchlassigkeit|trans", "transmission"),
-    (r"od|optical density|density|absorbance|absorbanz|extinktion|densite optique|optische dichte", "density"),
+    (r"od(?! *\d)|optical density|absorbance|absorbanz|extinktion|densite optique|optische dichte", "density"),
     (r"reflectance|reflectivity|remission|reflexionsgrad|remissionsgrad", "reflectance"),
+    (_PHOTONS, "photons"),
     (r"ir ?radiance|radiance|radiant|spd|energy|energie|watts?|strahldichte|bestrahlungsstarke|leistung", "energy"),
-    (r"photons?|photonen|quanta|ppfd", "photons"),
     (r"counts?|cts", "photons"),
 )
+_EXCLUSIVE: frozenset[Quantity] = frozenset({"qe", "responsivity", "transmission", "density", "reflectance"})
+"""Quantities of which no two can be meant; a `photon irradiance (umol/m2/s/nm)` is one of photons."""
 _UNCLEAR = re.compile(
-    r"\b(absorption|absorptance|extinction|response|sensitivity|empfindlichkeit|sensibilite|reponse|luminance|lumen|lux)\b"
+    r"\b(absorption|absorptance|absorptivity|absorbing|extinction|response|sensitivity|empfindlichkeit|sensibilite"
+    r"|reponse|luminance|lumen|lux|loss|attenuation|dampfung|reflection|blocking|emissivity|napierian|base e"
+    r"|coefficient|log|log10|ln|return loss|1 t|scatter\w*|haze)\b"
 )
+_OTHERWISE = re.compile(r"napierian|base e|coefficient|return|^log|^1 t")
+"""Words by which a quantity that is named is another one."""
 _LOSS = re.compile(r"\b(attenuation|insertion loss|loss|dampfung)\b")
-_WHOLE: dict[str, Quantity] = {"t": "transmission", "abs": "density", "abs.": "density"}
+_WHOLE: dict[str, Quantity] = {"t": "transmission", "abs": "density", "density": "density"}
 """Heads that are a quantity as a whole."""
-_FOREIGN = re.compile(r".*/.*|lm|lx|cd|m?v|ev|au|cm-1|[munpk]?a")
+_SINGLE = ("a", "k", "n")
+"""Heads that are some quantity of a material as a whole, and say not which."""
+_PER_FREQUENCY = re.compile(r".*([tgmk]?hz|ev|cm-1)\)*|dbm.*")
+_FOREIGN = re.compile(r".*/.*|.*[a-z]-\d.*|lm|lx|cd|m?v|ev|m?au|cm-1|[munpk]?a|\u2030|pp[mb]|(x|10|1e)-?\d.*|dbm|log.*")
 """Units that are none of a curve."""
 _BRACKETS = re.compile(r"[\[(]([^\[\]()]*(?:\([^()]*\)[^\[\]()]*)*)[\])]")
 _PERCENT_OF = re.compile(r"(?:\b100\s*)?%\s*([tr])\b|\b([tr])\s*%", re.IGNORECASE)
 """`%T`, `T%` and `Baseline 100%T`, as photometers write them."""
 _LEADING = re.compile(r"^\s*(%)\s*(?=[^\W\d_]{2})")
-_TRAILING = re.compile(r"(?:^|[\s_,:/])(%|od|a/w|ma/w|db|percent|pct)\s*$", re.IGNORECASE)
+_TRAILING = re.compile(r"(?:(?:^|[\s_,:/])(od|m?a[/_ ]w(?:\^?-1)?|db|percent|pct)|(%|\u2030))\s*$", re.IGNORECASE)
 
 
 def folded(text: str) -> str:
-    """Return a text without accents, in lower case, with plain blanks and minus signs."""
-    plain = unicodedata.normalize("NFKD", text.replace("\u00b5", "u").replace("\u03bc", "u").replace("\u2212", "-"))
-    kept = "".join(c for c in plain if not unicodedata.combining(c)).replace("\u00df", "ss")
-    return " ".join(kept.casefold().replace("\u207b", "-").split())
+    """Return a text without accents, in lower case, with plain blanks, minus signs and apostrophes."""
+    plain = unicodedata.normalize("NFKD", text[:_MOST_LETTERS].replace("\u2019", "'").replace("\x92", "'"))
+    kept = "".join(c for c in plain if not unicodedata.combining(c))
+    for foreign, own in (("\u00b5", "u"), ("\u03bc", "u"), ("\u2212", "-"), ("\u00df", "ss")):
+        kept = kept.replace(foreign, own)
+    return " ".join(kept.casefold().split())
 
 
 def symbol_unit(text: str) -> Unit | None:
     """Return the unit that a text is as a whole, as in brackets or in a row of units; None for other texts."""
     if (of := _PERCENT_OF.fullmatch(text.strip())) is not None:
         return Unit(text.strip(), "transmission" if (of[1] or of[2]) in "tT" else "reflectance", 0.01)
-    plain = re.sub(r"[\s^*\u00b7]", "", re.sub(r"\bper\b", "/", folded(text)))
-    for pattern, quantity, factor in _SYMBOLS:
-        if re.fullmatch(pattern, plain, re.IGNORECASE):
-            return Unit(text.strip(), quantity, factor)
-    foreign = _FOREIGN.fullmatch(plain) and not re.search(r"[\[\]]|\w \w", text)
+    plain = re.sub(r"[\s^*{}\u00b7\u22c5]", "", re.sub(r"\bper\b", "/", folded(text))).replace("a_w", "a/w")
+    if not _PER_FREQUENCY.fullmatch(plain):
+        for pattern, quantity, factor in _SYMBOLS:
+            if re.fullmatch(pattern, plain):
+                return Unit(text.strip(), quantity, factor)
+    foreign = _FOREIGN.fullmatch(plain) and not re.search(r"[\[\]]|[^\W\d_]{3} [^\W\d_]{3}|\bw/", text)
     return Unit(text.strip(), unclear="has an unknown unit") if foreign else None
 
 
@@ -114,14 +132,20 @@ def _parts(head: str) -> tuple[str, list[Unit]]:
     found: list[Unit] = []
 
     def taken(match: re.Match[str]) -> str:
-        unit = symbol_unit(match[0] if match.re is _PERCENT_OF else match[1])
+        inside = match[0] if match.re is _PERCENT_OF else next(group for group in match.groups() if group is not None)
+        unit = symbol_unit(inside)
         if unit is None:
             return match[0]
         found.append(unit)
         return " "
 
-    if "/" in head and _BRACKETS.search(head) is None and (whole := symbol_unit(head)) and not whole.unclear:
-        return "", [whole]
+    head = head[:_MOST_LETTERS]
+    if re.search(r"[/\-]", head):
+        if (whole := symbol_unit(head)) and not whole.unclear:
+            return "", [whole]
+        before, _, after = head.rpartition(" / ")
+        if before and (unit := symbol_unit(after)):
+            return before.strip(), [unit]
     bare = _LEADING.sub(taken, _PERCENT_OF.sub(taken, _BRACKETS.sub(taken, head)))
     bare = _TRAILING.sub(taken, bare)
     return bare.strip(" _,:/"), found
@@ -132,17 +156,24 @@ def name_of(head: str) -> str:
     return _parts(head)[0] or head
 
 
+def _quantity_in(text: str) -> list[Quantity]:
+    """Return the first quantity that words name, in a list; empty for none."""
+    if text in _WHOLE:
+        return [_WHOLE[text]]
+    return [quantity for pattern, quantity in _WORDS if re.search(rf"\b({pattern})\b", text)][:1]
+
+
 def unit_of(head: str) -> Unit:
     """Return what the head of a column says of its numbers."""
     name, found = _parts(head)
     bare = re.sub(r"[\W_]+", " ", folded(name)).strip()
-    stated = [_WHOLE[bare]] if bare in _WHOLE else []
-    stated += [quantity for pattern, quantity in _WORDS if not stated and re.search(rf"\b({pattern})\b", bare)][:1]
-    quantities = {unit.quantity for unit in found if unit.quantity} | set(stated)
-    if {"relative_responsivity", "responsivity"} <= quantities:
-        quantities -= {"relative_responsivity"}
-    if "decibel" in quantities:
-        quantities -= {"transmission"}
+    stated = _quantity_in(bare)
+    symbols = {unit.quantity for unit in found if unit.quantity}
+    if {"relative_responsivity", "responsivity"} <= {*stated, *symbols}:
+        stated = []
+    if "decibel" in symbols and not re.search(r"return|reflect", bare):
+        stated = [] if stated == ["transmission"] else stated
+    quantities = symbols | {one for one in stated if not symbols or one in _EXCLUSIVE}
     factors = {unit.factor for unit in found if unit.factor is not None}
     percent = 0.01 in factors and quantities & {"density", "decibel", "responsivity", "relative_responsivity"}
     if len(quantities) > 1 or len(factors) > 1 or percent:
@@ -150,10 +181,35 @@ def unit_of(head: str) -> Unit:
     if unknown := [unit for unit in found if unit.unclear]:
         return unknown[0]
     quantity = next(iter(quantities), None)
-    if quantity is None and _UNCLEAR.search(bare):
+    unclear = _UNCLEAR.search(bare) and (
+        quantity is None or re.search(r"napierian|base e|coefficient|return|^log|^1 t", bare)
+    )
+    if unclear or bare in _SINGLE:
         return Unit(head, unclear="does not tell its quantity")
     said = ", ".join([*(unit.words for unit in found), *(SAID[one].split(",")[0] for one in stated)])
     return Unit(said, quantity, next(iter(factors), None), loss=bool(_LOSS.search(bare)))
+
+
+def stated_in_title(text: str) -> Unit | None:
+    """Return the unit that a title or a comment states: in brackets, after `unit:`, as A/W, or as a whole."""
+    text = text[:_MOST_LETTERS]
+    parts = re.findall(r"[\[(][^\[\]]*[\])]|(?:unit|einheit|unite)s?\s*[:=]\s*\S.*", text, re.IGNORECASE)
+    parts += re.findall(r"(?<![\w/])m?A\s?/\s?W(?![\w/])", text)
+    units = [symbol_unit(text), *(symbol_unit(re.sub(r"^[^\[(]*?[:=]\s*", "", part).strip("[]() ")) for part in parts)]
+    return next((unit for unit in units if unit is not None and (unit.quantity or unit.factor == 0.01)), None)
+
+
+def begun_by_quantity(text: str) -> Unit | None:
+    """Return the unit of a title that begins with a quantity, as `Transmittance of ND filters, %`; None for others."""
+    plain = re.sub(r"[^\w%]+", " ", folded(text)).strip()
+    words = "|".join(f"(?:{pattern})" for pattern, _ in _WORDS)
+    begins = re.match(rf"(?:spectral )?({words})\b(?! *\d)", plain)
+    if begins is not None and (quantity := _quantity_in(begins[1])):
+        found = unit_of(text)
+        return found if found.unclear else Unit(text, found.quantity or quantity[0], found.factor, loss=found.loss)
+    if re.match(r"(?:relative |normali[sz]ed )?(?:spectral )?(?:response|sensitivity|empfindlichkeit)\b", plain):
+        return Unit(text, unclear="does not tell its quantity")
+    return None
 
 
 def used_as(
@@ -166,18 +222,32 @@ def used_as(
     Raises DataError where the quantity is unclear, or none of this use.
     """
     values, said, units = dict(curves.values), dict[str, list[str]](), dict(curves.units)
-    top = max((float(curves.samples(name)[1].max(initial=0.0)) for name in columns), default=0.0)
-    for name in columns:
+
+    def asked(name: str) -> Quantity:
+        return stated or curves.units.get(name, Unit()).quantity or FITTING[use][0]
+
+    def top(name: str) -> float:
         unit = curves.units.get(name, Unit())
-        quantity = stated or unit.quantity or FITTING[use][0]
-        if stated is None and unit.unclear:
+        alike = [
+            other
+            for other in curves.values
+            if (known := curves.units.get(other, Unit())).factor == unit.factor
+            and known.group == unit.group
+            and asked(other) == asked(name)
+        ]
+        return max(float(curves.samples(other)[1].max(initial=0.0)) for other in {*alike, name})
+
+    for name in columns:
+        unit, quantity = curves.units.get(name, Unit()), asked(name)
+        vague = unit.unclear and not (use == "light" and re.search("respon|sensiti|empfind", folded(unit.words)))
+        if stated is None and vague:
             raise DataError(_unclear(curves, name, f"the head {unit.unclear}", unit.words, use))
         if quantity not in FITTING[use]:
             problem = f"{SAID[quantity].split(',')[0]} is no {SAID[FITTING[use][0]]}"
             raise DataError(
                 _unclear(curves, name, problem if use != "light" else f"{problem} of a light", unit.words, use)
             )
-        factor, note = 1.0, "" if scaled else _plain(unit, quantity, top)
+        factor, note = 1.0, "" if scaled else _plain(unit, quantity, top(name), stated=stated is not None)
         if note.startswith("!"):
             raise DataError(_unclear(curves, name, note[1:], unit.words, use))
         if not scaled and quantity not in ("density", "decibel", "relative_responsivity", "energy", "photons"):
@@ -185,7 +255,10 @@ def used_as(
         values[name] = converted(curves.wavelength_nm, curves.values[name] * factor, quantity, unit)
         units[name] = Unit(SAID[quantity], quantity, factor)
         _check_share(curves, name, values[name], use, quantity)
-        how = SAID[quantity]
+        told = {known.quantity for known in curves.units.values()}
+        if use == "filter" and (unit.quantity or stated) is None and name_of(name) == "R" and "transmission" in told:
+            raise DataError(_unclear(curves, name, "reflectance, or the transmission of a red filter?", "", use))
+        how = SAID[quantity].replace("A/W", "mA/W") if factor == 1e-3 else SAID[quantity]
         if not unit.quantity and not stated:
             how = f"no unit, assumed to be {SAID[quantity]}"
         said.setdefault(how + (f"; {note}" if note else ""), []).append(name)
@@ -193,12 +266,14 @@ def used_as(
     return replace(curves, values=values, notes=(*curves.notes, *notes), units=units)
 
 
-def _plain(unit: Unit, quantity: Quantity, top: float) -> str:
+def _plain(unit: Unit, quantity: Quantity, top: float, *, stated: bool) -> str:
     """Return a note where percent are assumed, a fault that begins with `!`, or nothing; `top`: largest number."""
+    if quantity == "density":
+        return f"!values up to {top:.4g} are no {SAID[quantity].split(',')[0]}" if top > _MOST_DENSITY else ""
     if quantity not in ("qe", "transmission", "reflectance"):
         return ""
     if unit.factor == 0.01:
-        return "" if top > 1.0 + _NOISE else "!values in percent, but none is above 1"
+        return "" if top > 1.0 + _NOISE or stated else "!values in percent, but none is above 1"
     if top <= 1.0 + _NOISE:
         return ""
     if unit.factor is None and _WHOLE_PERCENT[0] <= top <= _WHOLE_PERCENT[1]:

