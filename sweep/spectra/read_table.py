@@ -200,7 +200,7 @@ def _waves(table: _Table, heads: _Heads) -> list[int]:
     names, units, notes = heads.names, heads.units, table.sheet.notes
     waves = [wave_unit(cell) if cell else None for cell in names or units]
     for at, wave in enumerate(waves):
-                if names and wave is not None and units[at] and folded(units[at]) not in UNITS_NM:
+        if names and wave is not None and units[at] and folded(units[at]) not in UNITS_NM:
             table.fault("wavelengths in an unknown unit", heads.line, names[at], units[at], ", ".join(UNITS_NM))
         if wave in (0, None) and (wave == 0 or not any(known is not None for known in waves)):
             waves[at] = UNITS_NM.get(folded(units[at]), wave)
