@@ -123,7 +123,7 @@ def symbol_unit(text: str) -> Unit | None:
         for pattern, quantity, factor in _SYMBOLS:
             if re.fullmatch(pattern, plain):
                 return Unit(text.strip(), quantity, factor)
-    foreign = _FOREIGN.fullmatch(plain) and not re.search(r"[\[\]]|[^\W\d_]{3} [^\W\d_]{3}|\bw/", text)
+    foreign = _FOREIGN.fullmatch(plain) and not re.search(r"[\[\]]|[^\W\d_]{3,} ?\(|[^\W\d_]{3} [^\W\d_]{3}|\bw/", text)
     return Unit(text.strip(), unclear="has an unknown unit") if foreign else None
 
 
