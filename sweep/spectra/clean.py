@@ -21,8 +21,9 @@ _FEWEST_STACKED, _MOSTLY = 5, 0.9
 
 
 def several(names: Sequence[str]) -> str:
-    """Return up to five names, and how many more there are."""
-    return f"{', '.join(names[:5])}{f' and {len(names) - 5} more' if names[5:] else ''}"
+    """Return up to five names, and how many more there are; with nothing that steers a terminal."""
+    text = f"{', '.join(names[:5])}{f' and {len(names) - 5} more' if names[5:] else ''}"
+    return text if text.isprintable() else repr(text)[1:-1]
 
 
 @dataclass

@@ -148,8 +148,10 @@ def facts_of(scan: Scan) -> Facts:
     for at, name in enumerate(name if name.isprintable() else repr(name)[1:-1] for name in cut):
         shown.append(name if name and name not in shown else f"{name or 'column'} ({at + 2})")
     known = np.isfinite(scan.values)
+    # What says nm, and is um, is refused; its picture is of what was meant.
+    nm = scan.wavelength_nm * (1e3 if 0 < scan.wavelength_nm.max(initial=0.0) < 20 else 1.0)
     columns = zip(shown, known.T, scan.values.T, scan.units, strict=True)
-    return Facts(tuple(Curve(name, scan.wavelength_nm[at], values[at], unit) for name, at, values, unit in columns))
+    return Facts(tuple(Curve(name, nm[at], values[at], unit) for name, at, values, unit in columns))
 
 
 def notes(facts: Facts, *, as_qe: bool) -> list[str]:

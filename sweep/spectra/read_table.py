@@ -44,7 +44,7 @@ _Y = re.compile(r"(y(_?\d+)?|values?)|")
 _INDEX = ("", "#", "no", "no.", "nr", "nr.", "n", "id", "index", "row", "pixel", "unnamed: 0")
 _SPREAD = re.compile(
     r"\b(std( ?dev)?|stdev|standard deviation|sigma|(expanded )?uncertainty|u95|rsd|unsicherheit|standardabweichung)\b"
-    r"|^u\(|^(dark|reference|saturated|background|flag)\b"
+    r"|^u\(|^(saturated|flag)\b"
 )
 """Heads of columns that are no curves."""
 _NOISE_OD = 0.05
@@ -297,6 +297,8 @@ def _names(table: _Table, head: Rows) -> tuple[int | None, list[str]]:
     if named is None and head and 1 < len(head[-1][1]) <= table.width:
         named = len(head) - 1
     if named is None:
+        if head and len(head[-1][1]) == 1 < len(re.split(r"[;,\t|]", head[-1][1][0])) == table.width:
+            table.fault("heads have another separator than numbers", head[-1][0], None, head[-1][1][0], "one separator")
         if head:
             sheet.notes.append(_titles(len(head)))
         sheet.notes.append("there is no header: the first column was taken for wavelengths")

@@ -93,8 +93,8 @@ _OTHERWISE = re.compile(r"napierian|base e|coefficient|return|^log|^1 t")
 _LOSS = re.compile(r"\b(attenuation|insertion loss|loss|dampfung)\b")
 _WHOLE: dict[str, Quantity] = {"t": "transmission", "abs": "density", "density": "density"}
 """Heads that are a quantity as a whole."""
-_SINGLE = ("a", "k", "n")
-"""Heads that are some quantity of a material as a whole, and say not which."""
+_SINGLE = ("A", "k", "n")
+"""Heads of filters and sensors that are some quantity of a material, or a name."""
 _PER_FREQUENCY = re.compile(r".*([tgmk]?hz|ev|cm-1)\)*|dbm.*")
 _FOREIGN = re.compile(r".*/.*|.*[a-z]-\d.*|lm|lx|cd|m?v|ev|m?au|cm-1|[munpk]?a|\u2030|pp[mb]|(x|10|1e)-?\d.*|dbm|log.*")
 """Units that are none of a curve."""
@@ -184,7 +184,7 @@ def unit_of(head: str) -> Unit:
     unclear = _UNCLEAR.search(bare) and (
         quantity is None or re.search(r"napierian|base e|coefficient|return|^log|^1 t", bare)
     )
-    if unclear or bare in _SINGLE:
+    if unclear:
         return Unit(head, unclear="does not tell its quantity")
     said = ", ".join([*(unit.words for unit in found), *(SAID[one].split(",")[0] for one in stated)])
     return Unit(said, quantity, next(iter(factors), None), loss=bool(_LOSS.search(bare)))
@@ -240,6 +240,8 @@ def used_as(
     for name in columns:
         unit, quantity = curves.units.get(name, Unit()), asked(name)
         vague = unit.unclear and not (use == "light" and re.search("respon|sensiti|empfind", folded(unit.words)))
+        if stated is None and unit.quantity is None and use in ("sensor", "filter") and name_of(name) in _SINGLE:
+            raise DataError(_unclear(curves, name, "absorbance, or a name?", "", use))
         if stated is None and vague:
             raise DataError(_unclear(curves, name, f"the head {unit.unclear}", unit.words, use))
         if quantity not in FITTING[use]:

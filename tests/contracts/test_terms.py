@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import sweep
-from sweep.base.errors import InfeasibleError, SweepError
 from sweep.camera.forward import forward_model
 from sweep.camera.merge import merged
 from sweep.camera.pixel import Pixel
@@ -18,10 +17,7 @@ from sweep.metrics.columns.sensitivity import CFA_SENSITIVITY
 from sweep.metrics.quantity import Column
 from sweep.report.price import _row
 from sweep.results.parts import Parts
-from sweep.run import robustness
 from sweep.run.answers import CachedCalls
-
-from ..run.test_robustness import candidate, street
 
 
 def test_a_code_of_companding_has_the_variance_of_a_uniform_step() -> None:
@@ -92,8 +88,7 @@ def test_a_bound_keeps_to_the_light_that_is_allowed_at_most() -> None:
     assert tight.proven < free.proven
     assert float(study.evaluate(N=tight.curve).iloc[0][CFA_SENSITIVITY]) <= light - 0.02 + 1e-6
     others = float(study.evaluate(N=np.zeros(301)).iloc[0][CFA_SENSITIVITY])
-    with pytest.raises((InfeasibleError, SweepError)):
-        limit(others - 0.01)
+    assert limit(others - 0.01)[1].proven == -np.inf
 
 
 @pytest.mark.parametrize(
@@ -103,18 +98,6 @@ def test_a_bound_keeps_to_the_light_that_is_allowed_at_most() -> None:
 def test_a_gain_is_more_of_what_is_wanted_and_less_of_what_is_not(wanted: Any, best: float, effect: str) -> None:
     column = Column(name="x", metric="x", meaning="x", unit="", wanted=wanted)
     assert _row(column, 1.0, best)[-1] == effect
-
-
-def test_a_yield_counts_each_camera_with_the_wanted_distance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    study = street(tmp_path)
-    design = candidate(study)
-    population = design.setup.lights.population
-    assert population is not None
-    assert population.wanted_dn is not None
-    steps = population.wanted_dn * (1 + np.linspace(-0.05, 0.05, population.draws))
-    monkeypatch.setattr(robustness, "drawn_dn", lambda *_: steps)
-    numbers, _ = robustness._robustness(design, None, ("yellow", "red"), 1)
-    assert numbers["yield"] == np.count_nonzero(steps >= population.wanted_dn) / population.draws
 
 
 def answer_of(number: int) -> int:

@@ -98,6 +98,18 @@ def test_a_yield_is_that_of_draws_of_their_own(tmp_path: Path) -> None:
     agree(street(tmp_path), 20_000)
 
 
+def test_a_yield_counts_each_camera_with_the_wanted_distance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    study = street(tmp_path)
+    design = candidate(study)
+    population = design.setup.lights.population
+    assert population is not None
+    assert population.wanted_dn is not None
+    steps = population.wanted_dn * (1 + np.linspace(-0.05, 0.05, population.draws))
+    monkeypatch.setattr(robustness, "drawn_dn", lambda *_: steps)
+    numbers, _ = robustness._robustness(design, None, ("yellow", "red"), 1)
+    assert numbers["yield"] == np.count_nonzero(steps >= population.wanted_dn) / population.draws
+
+
 def thick(folder: Path) -> Study:
     path = folder / "street.yaml"
     street(folder)

@@ -685,7 +685,7 @@ TRAPS: dict[str, tuple[str, Use, int | str]] = {
     "one minus": (down("nm,1-T", SHARE), "filter", "does not tell its quantity"),
     "base e": (down("nm,Absorbance (base e)", OD31), "filter", "does not tell its quantity"),
     "mAU": (down("nm,Absorbance (mAU)", 1e3 * OD31), "filter", "has an unknown unit"),
-    "A": (down("nm, A", OD31 / 2), "filter", "does not tell its quantity"),
+    "A": (down("nm, A", OD31 / 2), "filter", "absorbance, or a name?"),
     "dense": (down("nm,209 OD", 100 * SHARE), "filter", "are no optical density"),
     "per Hz": (down("nm,Lamp (W/m2/Hz)", SHARE), "light", "has an unknown unit"),
     "per eV": (down("nm,Lamp (photons/s/eV)", SHARE), "light", "has an unknown unit"),

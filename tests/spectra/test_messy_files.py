@@ -65,7 +65,11 @@ VARIANTS: dict[str, tuple[str, str, str]] = {
     "falling": ("a.csv", text(rows=slice(None, None, -1)), "turned round"),
     "title lines": ("a.csv", text(before="QE of sensor X\nmeasured 2024, room 3\n"), "2 title lines were left out"),
     "trailing commas": ("a.csv", text(tail=","), "empty columns at the end were left out"),
-    "a row of units": ("a.csv", text(head="Wavelength").replace("\n", "\nnm,%,%,%\n", 1), "a row of units was read"),
+    "a row of units": (
+        "a.csv",
+        text(head="Wavelength", values=100 * QE).replace("\n", "\nnm,%,%,%\n", 1),
+        "a row of units was read",
+    ),
     "percent signs": ("a.csv", text(cell=lambda v: f"{100 * v:g} %"), "percent signs"),
     "wavelengths last": (
         "a.csv",
@@ -77,7 +81,11 @@ VARIANTS: dict[str, tuple[str, str, str]] = {
         "\n".join(f"{'' if i == 0 else i - 1},{x}" for i, x in enumerate(text().splitlines())),
         "counts the rows",
     ),
-    "Ocean spectrometer": ("a.txt", _OCEAN + _NUMBERS + ">>>>>End Spectral Data<<<<<\n", "spectrometer's head"),
+    "Ocean spectrometer": (
+        "a.txt",
+        _OCEAN + _NUMBERS + ">>>>>End Spectral Data<<<<<\n",
+        "lines of the head of a file of Ocean",
+    ),
     "Thorlabs spectrometer": (
         "a.txt",
         "[SpectrumHeader]\nDate;2024\n[Data]\n" + _NUMBERS.replace("\t", ";") + "[EndOfFile]\n",
@@ -113,11 +121,12 @@ def test_a_file_variant_is_read_or_refused_with_advice(tmp_path: Path, name: str
     assert (code, err) == (0, "")
     assert any(line.startswith("Read: ") and said in line for line in out.splitlines())
     found = read_curves(path)
+    right = 100 * QE if name == "a row of units" else QE
     np.testing.assert_allclose(found.wavelength_nm, WAVE, rtol=0, atol=1e-9)
     if name in ("small negatives", "one sample missing"):
         np.testing.assert_allclose(np.stack([*found.values.values()], axis=1), QE, atol=0.03)
     else:
-        np.testing.assert_allclose(np.stack([*found.values.values()], axis=1), QE, rtol=1e-5, atol=1e-12)
+        np.testing.assert_allclose(np.stack([*found.values.values()], axis=1), right, rtol=1e-5, atol=1e-12)
     made = commanded("new", "mine", "--qe", path, "--folder", tmp_path / "studies")
     assert made[0] == 0, made[2]
     study = load_study(tmp_path / "studies" / "mine.yaml")
