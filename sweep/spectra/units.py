@@ -15,7 +15,6 @@ from ..base.types import FloatArray
 from .clean import several
 from .spectrum import LIGHT_M_S, PLANCK_J_S, Curves, Quantity, Unit
 
-FilterQuantity = Literal["transmission", "density", "decibel"]
 SensorQuantity = Literal["qe", "responsivity", "relative_responsivity", "transmission", "density", "decibel"]
 Use = Literal["sensor", "filter", "light", "surface"]
 ELEMENTARY_CHARGE_C = 1.602176634e-19
@@ -181,10 +180,7 @@ def unit_of(head: str) -> Unit:
     if unknown := [unit for unit in found if unit.unclear]:
         return unknown[0]
     quantity = next(iter(quantities), None)
-    unclear = _UNCLEAR.search(bare) and (
-        quantity is None or re.search(r"napierian|base e|coefficient|return|^log|^1 t", bare)
-    )
-    if unclear:
+    if _UNCLEAR.search(bare) and (quantity is None or _OTHERWISE.search(bare)):
         return Unit(head, unclear="does not tell its quantity")
     said = ", ".join([*(unit.words for unit in found), *(SAID[one].split(",")[0] for one in stated)])
     return Unit(said, quantity, next(iter(factors), None), loss=bool(_LOSS.search(bare)))
