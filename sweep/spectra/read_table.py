@@ -7,9 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
-from itertools import pairwise
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -17,20 +15,18 @@ import numpy as np
 from ..base.errors import DataError, ValidationIssue
 from ..base.types import FloatArray
 from .clean import Cleaner
+from .heads import Series, Table, counting, heads_of, steps_by_one, table_units, wave_columns
 from .layouts import (
     UNIT_WORDS,
-    UNITS_NM,
     WAVELENGTH,
     number_in,
     refuse_other_axis,
-    rising,
     turned_down,
     wave_unit,
-    wave_unit_of_word,
 )
-from .read_text import Rows, Sheet
+from .read_text import Sheet
 from .spectrum import LARGEST, Unit, sample_issues
-from .units import begun_by_quantity, folded, stated_in_title, symbol_unit, unit_of
+from .units import folded, symbol_unit, unit_of
 
 MOST_CURVES = 2_000
 MOST_SAMPLES = 100_000
@@ -39,7 +35,6 @@ MOST_VALUES = 2_000_000
 _MOST_TITLES = 100
 _AXIS = re.compile(r"\W*x[\s_-]?(?:axis ?(?:units?|mode)?|units?|mode)\b\W*(.*)")
 _MOST_CELL_FAULTS = 10_000
-_X = re.compile(r"(.*?[\s_\-.])?x(_?\d+)?|")
 _Y = re.compile(r"(y(_?\d+)?|values?)|")
 _INDEX = ("", "#", "no", "no.", "nr", "nr.", "n", "id", "index", "row", "pixel", "unnamed: 0")
 _SPREAD = re.compile(
@@ -51,7 +46,6 @@ _NOISE_OD = 0.05
 """Negatives of optical densities that are noise of the baseline."""
 _MOST_UM = 1.65
 """Largest wavelength without a unit that is taken for um: from 1.65 eV on, light is visible."""
-_Series = Sequence[float | None]
 
 
 @dataclass(frozen=True)
@@ -79,28 +73,6 @@ class _Column(NamedTuple):
     at: int
 
 
-@dataclass
-class _Table:
-    """A table under work: rows of numbers, and of the texts above them."""
-
-    sheet: Sheet
-    head: Rows
-    body: Rows
-    parsed: list[list[float | None]]
-    width: int
-    factor_nm: float = 0.0
-    between: Rows = field(default_factory=list)
-    issues: list[ValidationIssue] = field(default_factory=list)
-
-    @cached_property
-    def series(self) -> list[list[float | None]]:
-        """Numbers of each column; NaN for missing ones, None for texts."""
-        return [[row[at] if at < len(row) else np.nan for row in self.parsed] for at in range(self.width)]
-
-    def fault(self, problem: str, line: int | None, key: str | None, value: object, allowed: str | None = None) -> None:
-        self.issues.append(ValidationIssue(problem, self.sheet.file, line, key, value, allowed))
-
-
 def curves_of(sheet: Sheet) -> Scan:
     """Return the curves of a sheet. Raises DataError where there is no table."""
     width = max((at + 1 for _, cells in sheet.rows for at, cell in enumerate(cells) if cell), default=0)
@@ -120,7 +92,7 @@ def curves_of(sheet: Sheet) -> Scan:
     return _scan(table, plain, numbers, bad)
 
 
-def _table_of(sheet: Sheet) -> _Table:
+def _table_of(sheet: Sheet) -> Table:
     """Split a sheet into the rows of numbers and the texts above them. DataError for none, or two tables."""
     parsed = [[number_in(cell, sheet.decimal) for cell in cells] for _, cells in sheet.rows]
     shares = []
@@ -162,7 +134,7 @@ def _table_of(sheet: Sheet) -> _Table:
     body = sheet.rows[first : last + 1]
     widths = [len(cells) for _, cells in body]
     width = max(set(widths), key=widths.count)
-    table = _Table(sheet, sheet.rows[:first], body, parsed[first : last + 1], width)
+    table = Table(sheet, sheet.rows[:first], body, parsed[first : last + 1], width)
     if table.head and len(table.head[-1][1]) > width and any(wave_unit(c) is not None for c in table.head[-1][1]):
         table.width = len(table.head[-1][1])  # columns that are empty at the end of rows
     return table
@@ -172,60 +144,13 @@ def _is_head(cells: Sequence[str]) -> bool:
     return any(wave_unit(cell) is not None for cell in cells) or not cells[0]
 
 
-@dataclass
-class _Heads:
-    """What stands above numbers: names and units of the columns (empty for none), their line, and titles."""
-
-    line: int | None
-    names: list[str]
-    units: list[str]
-    titles: Rows
-
-
-def _heads(table: _Table) -> _Heads:
-    """Take units and names from the rows above numbers."""
-    units, head = [""] * table.width, list(table.head)
-    if head and len(head[-1][1]) <= table.width and _is_unit_row(head):
-        cells = head.pop()[1]
-        units[: len(cells)] = map(_bare, cells)
-        table.sheet.notes.append("a row of units was read")
-    line, names = _names(table, head)
-    if names and not names[-1] and names[0] and table.width > 1 and _steps_by_one(table.series[0]):
-        names = ["", *names[:-1]]  # as R writes row names
-    return _Heads(line, names, units, head)
-
-
-def _waves(table: _Table, heads: _Heads) -> list[int]:
-    """Return the columns of wavelengths, and keep the factor that brings them to nm."""
-    names, units, notes = heads.names, heads.units, table.sheet.notes
-    waves = [wave_unit(cell) if cell else None for cell in names or units]
-    for at, wave in enumerate(waves):
-        if names and wave is not None and units[at] and folded(units[at]) not in UNITS_NM:
-            table.fault("wavelengths in an unknown unit", heads.line, names[at], units[at], ", ".join(UNITS_NM))
-        if wave in (0, None) and (wave == 0 or not any(known is not None for known in waves)):
-            waves[at] = UNITS_NM.get(folded(units[at]), wave)
-    found = [at for at, wave in enumerate(waves) if wave is not None] or _unnamed_waves(table, names, table.series)
-    if not found:
-        first = names[0] if names else ""
-        table.fault("no column wavelength", heads.line, first, first, f"`{WAVELENGTH}` as the first column")
-        found = [0]
-    table.factor_nm = waves[found[0]] or 0.0
-    if len({waves[at] or 0.0 for at in found}) > 1:
-        table.fault("wavelengths in two units", heads.line, None, [names[at] for at in found])
-    if names and (names[found[0]] != WAVELENGTH or found[0]) and waves[found[0]] is not None:
-        notes.append(f"wavelengths are column {names[found[0]]!r}")
-    if len(found) > 1:
-        notes.append(f"each curve has wavelengths of its own: {len(found)} pairs of columns")
-    return found
-
-
-def _columns(table: _Table) -> list[_Column]:
+def _columns(table: Table) -> list[_Column]:
     """Return the curves of a table from its heads, units and numbers; adds issues where they are unclear."""
-    heads = _heads(table)
-    names, at_x = heads.names, _waves(table, heads)
+    heads = heads_of(table)
+    names, at_x = heads.names, wave_columns(table, heads)
     pairs = len(at_x) > 1
     titled = heads.titles[-1][1] if heads.titles and pairs else []
-    whole, loose = _table_units(table, heads.titles)
+    whole, loose = table_units(table, heads.titles)
     others = [at for at in range(table.width) if at not in at_x]
     left_out = _left_out(table.sheet, names, table.series, others, at_x)
     columns: list[_Column] = []
@@ -250,7 +175,7 @@ def _columns(table: _Table) -> list[_Column]:
 
 
 def _left_out(
-    sheet: Sheet, names: Sequence[str], series: Sequence[_Series], others: Sequence[int], at_x: Sequence[int]
+    sheet: Sheet, names: Sequence[str], series: Sequence[Series], others: Sequence[int], at_x: Sequence[int]
 ) -> list[int]:
     """Return columns that are no curves: that count the rows, without numbers, of deviations; with a note on each."""
     index = [at for at in others if len(at_x) == 1 and _counts(names, series, at, at_x[0])]
@@ -266,118 +191,15 @@ def _left_out(
     return index
 
 
-def _made_name(table: _Table, before: int, at_x: Sequence[int]) -> str:
+def _made_name(table: Table, before: int, at_x: Sequence[int]) -> str:
     return (table.sheet.name or "values") if table.width - len(at_x) == 1 else f"curve_{before + 1}"
 
 
-def _bare(cell: str) -> str:
-    """Return a cell without brackets around all of it."""
-    return cell[1:-1].strip() if cell[:1] in ("[", "(") and cell[-1:] in ("]", ")") else cell
-
-
-def _is_unit_row(head: Rows) -> bool:
-    """Return whether the last of the rows above numbers holds units alone, below a row of names."""
-    given = [_bare(cell) for cell in head[-1][1] if _bare(cell)]
-    if len(head) < 2 or not given:
-        return False
-    pure = [folded(cell) in UNITS_NM or symbol_unit(cell) is not None for cell in given]
-    named = len(head[-2][1]) > 1 and any(wave_unit(cell) is not None for cell in head[-2][1])
-    of_wave = any(folded(cell) in UNITS_NM for cell in given)
-    worded = any(map(wave_unit_of_word, head[-1][1]))
-    told = all(known or unit_of(cell).words for known, cell in zip(pure, given, strict=True))
-    return (all(pure) and of_wave) or (told and named and not worded)
-
-
-def _names(table: _Table, head: Rows) -> tuple[int | None, list[str]]:
-    """Take the row of names from the rows above the numbers; the others are titles."""
-    sheet = table.sheet
-    named = next((at for at in reversed(range(len(head))) if any(map(wave_unit_of_word, head[at][1]))), None)
-    if named is None and head and any(wave_unit(cell) is not None for cell in head[-1][1]):
-        named = len(head) - 1
-    if named is None and head and 1 < len(head[-1][1]) <= table.width:
-        named = len(head) - 1
-    if named is None:
-        if head and len(head[-1][1]) == 1 < len(re.split(r"[;,\t|]", head[-1][1][0])) == table.width:
-            table.fault("heads have another separator than numbers", head[-1][0], None, head[-1][1][0], "one separator")
-        if head:
-            sheet.notes.append(_titles(len(head)))
-        sheet.notes.append("there is no header: the first column was taken for wavelengths")
-        return None, []
-    line, names = head[named]
-    if len(names) > table.width or (len(names) == 1 < table.width and len(head) == 1):
-        table.fault("wrong number of columns", table.body[0][0], None, table.width, str(len(names)))
-    table.between = head[named + 1 :]
-    del head[named:]
-    if head and not (len(head[-1][1]) > 1 and sum(wave_unit(cell) is not None for cell in names) > 1):
-        sheet.notes.append(_titles(len(head)))
-    return line, [*names, *[""] * (table.width - len(names))][: table.width]
-
-
-def _titles(count: int) -> str:
-    return f"{count} title {'line was' if count == 1 else 'lines were'} left out"
-
-
-def _unnamed_waves(table: _Table, names: Sequence[str], series: Sequence[_Series]) -> list[int]:
-    """Return the columns of wavelengths that no word tells: every second one, or the first."""
-
-    def like(at: int) -> bool:
-        values = [value for value in series[at] if value is None or not np.isnan(value)]
-        return len(values) > 1 and all(value is not None for value in values)
-
-    def rises(at: int) -> bool:
-        return like(at) and rising([value for value in series[at] if value is None or not np.isnan(value)])
-
-    even = range(0, table.width, 2)
-    if table.width % 2 == 0 and table.width > 2:
-        if (
-            names
-            and all(_X.fullmatch(folded(names[at])) for at in even)
-            and all(names[at] for at in even)
-            and all(map(like, even))
-        ):
-            return [*even]
-        if all(map(rises, even)) and not all(map(rises, range(1, table.width, 2))):
-            return [*even]
-    if not names and table.width > 2 and _counting(series[0]) and rises(1):
-        return [1]
-    return [0] if (not names or _X.fullmatch(folded(names[0]))) else []
-
-
-def _counting(values: Sequence[float | None]) -> bool:
-    known = list(values)
-    return len(known) > 1 and any(known == [float(at + start) for at in range(len(known))] for start in (0, 1))
-
-
-def _steps_by_one(values: _Series) -> bool:
-    """Return whether whole numbers rise by one from row to row, as row names of a part of a table do."""
-    known = [value for value in values if value is not None]
-    return len(known) == len(values) > 2 and all(b - a == 1 and a == int(a) for a, b in pairwise(known))
-
-
-def _counts(names: Sequence[str], series: Sequence[_Series], at: int, wave: int) -> bool:
+def _counts(names: Sequence[str], series: Sequence[Series], at: int, wave: int) -> bool:
     """Return whether a column holds the numbers of the rows: it has no name, or is called so."""
     named = not names or folded(names[at]) in _INDEX
-    counts = _counting(series[at]) or (bool(names) and not names[at] and _steps_by_one(series[at]))
+    counts = counting(series[at]) or (bool(names) and not names[at] and steps_by_one(series[at]))
     return named and counts and (at < wave or (bool(names) and not names[at]))
-
-
-def _table_units(table: _Table, head: Rows) -> tuple[Unit, Unit]:
-    """Return the unit that the format, a title or a comment states for all columns, and one of words of a title."""
-    if (stated := table.sheet.unit.strip()) == "A":
-        return Unit(stated, "density"), Unit()
-    if stated:
-        unit = symbol_unit(stated) or unit_of(stated)
-        return (unit if unit.words else Unit(stated, unclear="has an unknown unit")), Unit()
-    texts = [*table.sheet.remarks, *(" ".join(cells) for _, cells in head if cells[0])]
-    return _only([stated_in_title(text) for text in texts]), _only([begun_by_quantity(text) for text in texts])
-
-
-def _only(units: Sequence[Unit | None]) -> Unit:
-    """Return the only unit of several texts; one that is unclear if they contradict each other."""
-    found = [unit for unit in units if unit is not None]
-    if len({(unit.quantity, unit.factor, unit.unclear) for unit in found}) > 1:
-        return Unit("; ".join(unit.words for unit in found), unclear="contradicts itself")
-    return found[0] if found else Unit()
 
 
 def _curve_name(names: Sequence[str], titled: Sequence[str], wave: int, at: int, pairs: bool) -> str:
@@ -393,7 +215,7 @@ def _curve_name(names: Sequence[str], titled: Sequence[str], wave: int, at: int,
 
 
 def _check_names(
-    table: _Table, line: int | None, names: Sequence[str], columns: Sequence[_Column], *, numbered: bool
+    table: Table, line: int | None, names: Sequence[str], columns: Sequence[_Column], *, numbered: bool
 ) -> None:
     file = table.sheet.file
     if not columns:
@@ -421,7 +243,7 @@ def _numbered(columns: Sequence[_Column]) -> list[_Column]:
     return known
 
 
-def _numbers(table: _Table, columns: Sequence[_Column]) -> tuple[FloatArray, set[int], list[int]]:
+def _numbers(table: Table, columns: Sequence[_Column]) -> tuple[FloatArray, set[int], list[int]]:
     """Return the numbers of a table, [n_rows, width], NaN for missing ones, and columns with faults, with % signs."""
     keys = {column.wave: WAVELENGTH for column in columns} | {column.at: column.name for column in columns}
     values, bad = np.full((len(table.body), table.width), np.nan), set[int]()
@@ -459,7 +281,7 @@ def _numbers(table: _Table, columns: Sequence[_Column]) -> tuple[FloatArray, set
     return values, bad, signed
 
 
-def _scan(table: _Table, columns: Sequence[_Column], numbers: FloatArray, bad: set[int]) -> Scan:
+def _scan(table: Table, columns: Sequence[_Column], numbers: FloatArray, bad: set[int]) -> Scan:
     """Bring curves to nm, order and common wavelengths, and clean them of what has one meaning."""
     sheet = table.sheet
     factor = table.factor_nm
