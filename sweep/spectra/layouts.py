@@ -17,6 +17,8 @@ from .units import folded
 WAVELENGTH = "wavelength_nm"
 """Name of the first column of the package's own files."""
 _FEWEST_ALONG = 20
+_MOST_TITLES = 100
+"""Rows above one of wavelengths."""
 _RANGE_NM = (100.0, 20_000.0)
 _WAVE = re.compile(
     r"wave ?lengths?|wavelenghts?|wave|wvl|wvlgth|wl|lambda|\u03bb|wellenlange|wellenlaenge|longueurs? d'onde"
@@ -84,9 +86,13 @@ def wave_unit_of_word(cell: str) -> bool:
 
 def turned_down(sheet: Sheet) -> Sheet | None:
     """Return a sheet with wavelengths along a row, or in the words of a list, turned; None for others."""
-    for index, (line, cells) in enumerate(sheet.rows):
+    for index, (line, cells) in enumerate(sheet.rows[:_MOST_TITLES]):
+        if len(cells) < _FEWEST_ALONG:
+            continue
         found = [_keyed(cell, sheet.decimal) for cell in cells]
-        prefixes = [match[0] for match in found if match is not None and _PREFIX.fullmatch(folded(match[0]))]
+        prefixes = [match[0] for match in found if match is not None]
+        fitting = {prefix for prefix in set(prefixes) if _PREFIX.fullmatch(folded(prefix))}
+        prefixes = [prefix for prefix in prefixes if prefix in fitting]
         if len(prefixes) < _FEWEST_ALONG:
             continue
         usual = max(set(prefixes), key=prefixes.count)

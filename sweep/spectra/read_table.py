@@ -31,7 +31,7 @@ from .units import folded, symbol_unit, unit_of
 MOST_CURVES = 2_000
 MOST_SAMPLES = 100_000
 MOST_VALUES = 2_000_000
-"""Limits of a file of curves: 2,000 curves of 1,000 samples are read in a second or two."""
+"""Limits of a file of curves: 2,000 curves of 1,000 samples are read in some seconds."""
 _MOST_TITLES = 100
 _AXIS = re.compile(r"\W*x[\s_-]?(?:axis ?(?:units?|mode)?|units?|mode)\b\W*(.*)")
 _MOST_CELL_FAULTS = 10_000
