@@ -15,7 +15,6 @@ from ..designs.space import Space
 from ..metrics.bound import total_violation
 from ..metrics.quantity import Column, Quantity
 from ..search.limit import Limit
-from ..spectra.units import Use
 from ..study import Study, folder_name
 from .inline_curves import CurveLike, on_grid, wavelength_table
 from .user_filters import (
@@ -158,16 +157,17 @@ class LoadedStudy:
         if not channels:
             return self._plain_and_named(cfa, scenarios)
         factor = 1.0 if relative_to is None else study.sensor.curve(relative_to)
-        use: Use = "sensor" if relative_to is None else "filter"
-        rows = {name: on_grid(name, curve, study.grid, use) * factor for name, curve in channels.items()}
-        counts = {name: len(curves) for name, curves in rows.items()}
-        if len(set(counts.values())) > 1:
+        rows = {
+            name: on_grid(name, curve, study.grid, "sensor" if relative_to is None else "filter") * factor
+            for name, curve in channels.items()
+        }
+        if len({len(curves) for curves in rows.values()}) > 1:
+            counts = {name: len(curves) for name, curves in rows.items()}
             raise SweepError(ValidationIssue("different numbers of filters", value=counts))
         chosen = find_cfa(study, list(channels)) if cfa is None else self._cfa(cfa, list(channels))
         bases = replaced_curves(study, chosen, list(channels), base)
         curves = np.stack([*rows.values()], axis=1)
-        setups = {name: user_filter_setup(study, chosen, name, bases) for name in scenarios}
-        columns = {name: evaluate_curves(study, setup, curves) for name, setup in setups.items()}
+        columns = {s: evaluate_curves(study, user_filter_setup(study, chosen, s, bases), curves) for s in scenarios}
         return table_of_results(study, [("own", chosen, name, values) for name, values in columns.items()])
 
     def _plain_and_named(self, cfa: str | None, scenarios: list[str]) -> pd.DataFrame:

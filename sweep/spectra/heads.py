@@ -75,7 +75,7 @@ def wave_columns(table: Table, heads: Heads) -> list[int]:
             table.fault("wavelengths in an unknown unit", heads.line, names[at], units[at], ", ".join(UNITS_NM))
         if wave in (0, None) and (wave == 0 or not any(known is not None for known in waves)):
             waves[at] = UNITS_NM.get(folded(units[at]), wave)
-    found = [at for at, wave in enumerate(waves) if wave is not None] or _unnamed_waves(table, names, table.series)
+    found = [at for at, wave in enumerate(waves) if wave is not None] or _unnamed_waves(table, names)
     if not found:
         first = names[0] if names else ""
         table.fault("no column wavelength", heads.line, first, first, f"`{WAVELENGTH}` as the first column")
@@ -112,10 +112,10 @@ def _names(table: Table, head: Rows) -> tuple[int | None, list[str]]:
     """Take the row of names from the rows above the numbers; the others are titles."""
     sheet = table.sheet
     named = next((at for at in reversed(range(len(head))) if any(map(wave_unit_of_word, head[at][1]))), None)
-    if named is None and head and any(wave_unit(cell) is not None for cell in head[-1][1]):
-        named = len(head) - 1
-    if named is None and head and 1 < len(head[-1][1]) <= table.width:
-        named = len(head) - 1
+    if named is None and head:
+        last = head[-1][1]
+        if 1 < len(last) <= table.width or any(wave_unit(cell) is not None for cell in last):
+            named = len(head) - 1
     if named is None:
         if head and len(head[-1][1]) == 1 < len(re.split(r"[;,\t|]", head[-1][1][0])) == table.width:
             table.fault("heads have another separator than numbers", head[-1][0], None, head[-1][1][0], "one separator")
@@ -137,15 +137,15 @@ def _titles(count: int) -> str:
     return f"{count} title {'line was' if count == 1 else 'lines were'} left out"
 
 
-def _unnamed_waves(table: Table, names: Sequence[str], series: Sequence[Series]) -> list[int]:
+def _unnamed_waves(table: Table, names: Sequence[str]) -> list[int]:
     """Return the columns of wavelengths that no word tells: every second one, or the first."""
 
     def like(at: int) -> bool:
-        values = [value for value in series[at] if value is None or not np.isnan(value)]
+        values = [value for value in table.series[at] if value is None or not np.isnan(value)]
         return len(values) > 1 and all(value is not None for value in values)
 
     def rises(at: int) -> bool:
-        return like(at) and rising([value for value in series[at] if value is None or not np.isnan(value)])
+        return like(at) and rising([value for value in table.series[at] if value is None or not np.isnan(value)])
 
     even = range(0, table.width, 2)
     if table.width % 2 == 0 and table.width > 2:
@@ -158,7 +158,7 @@ def _unnamed_waves(table: Table, names: Sequence[str], series: Sequence[Series])
             return [*even]
         if all(map(rises, even)) and not all(map(rises, range(1, table.width, 2))):
             return [*even]
-    if not names and table.width > 2 and counting(series[0]) and rises(1):
+    if not names and table.width > 2 and counting(table.series[0]) and rises(1):
         return [1]
     return [0] if (not names or _X.fullmatch(folded(names[0]))) else []
 

@@ -17,7 +17,7 @@ from .units import folded
 WAVELENGTH = "wavelength_nm"
 """Name of the first column of the package's own files."""
 _FEWEST_ALONG = 20
-_MOST_TITLES = 100
+MOST_TITLES = 100
 """Rows above one of wavelengths."""
 _RANGE_NM = (100.0, 20_000.0)
 _WAVE = re.compile(
@@ -86,7 +86,7 @@ def wave_unit_of_word(cell: str) -> bool:
 
 def turned_down(sheet: Sheet) -> Sheet | None:
     """Return a sheet with wavelengths along a row, or in the words of a list, turned; None for others."""
-    for index, (line, cells) in enumerate(sheet.rows[:_MOST_TITLES]):
+    for index, (line, cells) in enumerate(sheet.rows[:MOST_TITLES]):
         if len(cells) < _FEWEST_ALONG:
             continue
         found = [_keyed(cell, sheet.decimal) for cell in cells]

@@ -17,6 +17,7 @@ from ..base.types import FloatArray
 from .clean import Cleaner
 from .heads import Series, Table, counting, heads_of, steps_by_one, table_units, wave_columns
 from .layouts import (
+    MOST_TITLES,
     UNIT_WORDS,
     WAVELENGTH,
     number_in,
@@ -32,7 +33,6 @@ MOST_CURVES = 2_000
 MOST_SAMPLES = 100_000
 MOST_VALUES = 2_000_000
 """Limits of a file of curves: 2,000 curves of 1,000 samples are read in some seconds."""
-_MOST_TITLES = 100
 _AXIS = re.compile(r"\W*x[\s_-]?(?:axis ?(?:units?|mode)?|units?|mode)\b\W*(.*)")
 _MOST_CELL_FAULTS = 10_000
 _Y = re.compile(r"(y(_?\d+)?|values?)|")
@@ -81,7 +81,7 @@ def curves_of(sheet: Sheet) -> Scan:
     sheet = replace(sheet, rows=[(line, cells[:width]) for line, cells in sheet.rows])
     refuse_other_axis(sheet.file, None, sheet.axis)
     texts = [(None, remark) for remark in sheet.remarks]
-    for line, text in [*texts, *((line, " ".join(cells)) for line, cells in sheet.rows[:_MOST_TITLES])]:
+    for line, text in [*texts, *((line, " ".join(cells)) for line, cells in sheet.rows[:MOST_TITLES])]:
         if (stated := _AXIS.match(folded(text))) is not None:
             refuse_other_axis(sheet.file, line, stated[1])
     table = _table_of(turned_down(sheet) or sheet)

@@ -245,9 +245,11 @@ def used_as(
             raise DataError(
                 _unclear(curves, name, problem if use != "light" else f"{problem} of a light", unit.words, use)
             )
-        factor, note = 1.0, "" if scaled else _plain(unit, quantity, top(name), stated=stated is not None)
-        if note.startswith("!"):
-            raise DataError(_unclear(curves, name, note[1:], unit.words, use))
+        factor, note, fault = 1.0, "", ""
+        if not scaled:
+            note, fault = _plausible(unit, quantity, top(name), stated=stated is not None)
+        if fault:
+            raise DataError(_unclear(curves, name, fault, unit.words, use))
         if not scaled and quantity not in ("density", "decibel", "relative_responsivity", "energy", "photons"):
             factor = 0.01 if note else unit.factor or 1.0
         values[name] = converted(curves.wavelength_nm, curves.values[name] * factor, quantity, unit)
@@ -264,19 +266,19 @@ def used_as(
     return replace(curves, values=values, notes=(*curves.notes, *notes), units=units)
 
 
-def _plain(unit: Unit, quantity: Quantity, top: float, *, stated: bool) -> str:
-    """Return a note where percent are assumed, a fault that begins with `!`, or nothing; `top`: largest number."""
+def _plausible(unit: Unit, quantity: Quantity, top: float, *, stated: bool) -> tuple[str, str]:
+    """Return a note where percent are assumed, and why the largest number `top` cannot be; empty for neither."""
     if quantity == "density":
-        return f"!values up to {top:.4g} are no {SAID[quantity].split(',')[0]}" if top > _MOST_DENSITY else ""
+        return "", f"values up to {top:.4g} are no {SAID[quantity].split(',')[0]}" if top > _MOST_DENSITY else ""
     if quantity not in ("qe", "transmission", "reflectance"):
-        return ""
+        return "", ""
     if unit.factor == 0.01:
-        return "" if top > 1.0 + _NOISE or stated else "!values in percent, but none is above 1"
+        return "", "" if top > 1.0 + _NOISE or stated else "values in percent, but none is above 1"
     if top <= 1.0 + _NOISE:
-        return ""
+        return "", ""
     if unit.factor is None and _WHOLE_PERCENT[0] <= top <= _WHOLE_PERCENT[1]:
-        return f"values up to {top:.4g} are assumed to be percent"
-    return f"!values up to {top:.4g} are no {SAID[quantity]}"
+        return f"values up to {top:.4g} are assumed to be percent", ""
+    return "", f"values up to {top:.4g} are no {SAID[quantity]}"
 
 
 def _unclear(curves: Curves, name: str, problem: str, words: str, use: Use) -> ValidationIssue:
