@@ -17,7 +17,7 @@ from ..base.disk import read_input
 from ..base.errors import DataError, OutputError, ValidationIssue
 from ..results.atomic import write_bytes
 from ..spectra.facts import Curve, Facts, facts_of, merge_equal_issues, notes
-from ..spectra.formats import read_curves, scan_curves
+from ..spectra.formats import curves_from, scan_curves
 from ..spectra.signal_color import LightColor
 from ..spectra.spectrum import Quantity
 from ..spectra.units import FITTING, Use, used_as
@@ -25,12 +25,7 @@ from .describe_picture import draw
 
 _MOST_NAMES = 12
 _MOST_PICTURE = 100_000_000
-_KINDS: dict[str, tuple[Use, ...]] = {
-    "qe": ("sensor",),
-    "filters": ("filter",),
-    "surfaces": ("surface",),
-    "lights": ("light",),
-}
+_USES: dict[str, Use] = {"qe": "sensor", "filters": "filter", "surfaces": "surface", "lights": "light"}
 _NAMES = {"qe": "QE of a sensor", "filters": "filters", "surfaces": "surfaces", "lights": "light spectra"}
 _SOFTWARE = "sweep describe"
 """Software that a picture names in its first bytes: by this it is known to be a description's."""
@@ -95,7 +90,8 @@ def described(path: Path, folder: Path, quantity: Quantity | None = None) -> Des
         lines += [f"  the same numbers as energy would be at xy: {'; '.join(words)}"] if words else []
     if not issues:
         try:
-            lines += [f"Read: {note}." for note in _used(path, kind, quantity)]
+            taken = used_as(curves_from(scan, path), scan.names, _USES[kind], quantity)
+            lines += [f"Read: {note}." for note in taken.notes[len(scan.notes) :]]
         except DataError as error:
             issues = error.issues
     lines += [f"Note: {note}." for note in notes(facts, as_qe=kind == "qe")]
@@ -148,17 +144,10 @@ def _range(facts: Facts) -> str:
 def _kind(facts: Facts, quantity: Quantity | None) -> str:
     """Return what curves are: as stated, as heads say, or as their shapes look."""
     told = {quantity} if quantity else {curve.unit.quantity for curve in facts.curves} - {None}
-    for kind, uses in _KINDS.items():
-        if told and all(any(one in FITTING[use] for use in uses) for one in told):
+    for kind, use in _USES.items():
+        if told and told <= set(FITTING[use]):
             return kind
     return "qe" if facts.is_likely_qe else "lights"
-
-
-def _used(path: Path, kind: str, quantity: Quantity | None) -> tuple[str, ...]:
-    """Return how the numbers are taken. Raises DataError for units that are unclear."""
-    curves = read_curves(path)
-    use = _KINDS[kind][0]
-    return used_as(curves, list(curves.values), use, quantity).notes[len(curves.notes) :]
 
 
 def _guess(facts: Facts, quantity: Quantity | None, kind: str) -> str:

@@ -39,8 +39,6 @@ class Curve:
         Name.
     wavelength_nm, values : ndarray of shape (n,)
         Samples, wavelengths increasing; n >= 0.
-    unit : Unit
-        What its head says.
     """
 
     name: str
@@ -81,6 +79,11 @@ class Curve:
         if self.values.size < 2 or not self.peak > 0:
             return np.zeros(grid.size)
         return resample(self.wavelength_nm, np.clip(self.values / self.peak, 0, None), grid, "mean", "zero")
+
+    def color(self, quantity: LightUnit) -> LightColor | None:
+        """Return the color of the curve as a light of this quantity; None without visible light."""
+        relative = self.on(VISIBLE)
+        return light_color(photons_from_energy(VISIBLE.nodes_nm, relative) if quantity == "energy" else relative)
 
     @property
     def width_nm(self) -> float:
@@ -132,12 +135,7 @@ class Facts:
         dict of str to LightColor or None
             Colors.
         """
-        colors = {}
-        for curve in self.curves:
-            values = curve.on(VISIBLE)
-            energy = quantity == "energy"
-            colors[curve.name] = light_color(photons_from_energy(VISIBLE.nodes_nm, values) if energy else values)
-        return colors
+        return {curve.name: curve.color(quantity) for curve in self.curves}
 
 
 def facts_of(scan: Scan) -> Facts:

@@ -72,6 +72,11 @@ def read_curves(path: Path) -> Curves:
     scan = scan_curves(path)
     if scan.issues:
         raise DataError(scan.issues[0])
+    return curves_from(scan, path)
+
+
+def curves_from(scan: Scan, path: Path) -> Curves:
+    """Return the curves of a scan without issues."""
     names = scan.names
     return Curves(
         scan.wavelength_nm,
@@ -92,7 +97,7 @@ def scan_curves(path: Path) -> Scan:
             ValidationIssue("unknown kind of curve file", str(path), value=path.suffix, allowed=", ".join(READERS))
         )
     sheet = reader(path)
-    sheet.name = sheet.name or ("" if path.suffix.casefold() in (".mat",) else path.stem)
+    sheet.name = sheet.name or ("" if reader is _mat_sheet else path.stem)
     return curves_of(sheet)
 
 

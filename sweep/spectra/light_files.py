@@ -13,9 +13,9 @@ import numpy as np
 from ..base.errors import DataError, ValidationIssue
 from . import LightUnit
 from .facts import Curve, merge_equal_issues
-from .formats import read_curves, scan_curves
-from .signal_color import VISIBLE, LightColor, light_color
-from .spectrum import Curves, WavelengthGrid, photons_from_energy
+from .formats import curves_from, scan_curves
+from .signal_color import LightColor
+from .spectrum import Curves, WavelengthGrid
 from .units import used_as
 
 _SIGNAL_COLORS = ("green", "yellow", "orange", "red")
@@ -72,7 +72,7 @@ def clean_curves(path: Path) -> Curves:
     scan = scan_curves(path)
     if scan.issues:
         raise DataError(merge_equal_issues(list(chain.from_iterable(scan.issues))))
-    return read_curves(path)
+    return curves_from(scan, path)
 
 
 def lights_file(
@@ -91,9 +91,9 @@ def lights_file(
         curves = used_as(read, list(read.values), "light", quantity)
         types: dict[str, dict[str, LightColor]] = {}
         for name in curves.values:
-            relative = Curve(name, *curves.samples(name)).on(VISIBLE)
-            energy = curves.units[name].quantity == "energy"
-            color = light_color(photons_from_energy(VISIBLE.nodes_nm, relative) if energy else relative)
+            color = Curve(name, *curves.samples(name)).color(
+                "energy" if curves.units[name].quantity == "energy" else "photons"
+            )
             if color is not None and color.signal is not None:
                 types.setdefault(color.signal, {})[name] = color
             elif color is None:
