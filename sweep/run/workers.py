@@ -19,6 +19,7 @@ from typing import Any
 
 import joblib
 import psutil
+from joblib.externals.loky.backend import resource_tracker
 from threadpoolctl import threadpool_limits
 
 from ..base.errors import InterruptedRunError, SweepError
@@ -196,6 +197,7 @@ def workers(n_jobs: int, backend: str = "loky", scheduler: str | None = None) ->
         if backend == "dask":
             stack.enter_context(_client(scheduler))
         elif backend == "loky":
+            _start_quiet_tracker()
             settings = {"inner_max_num_threads": 1, "initializer": _begin_worker, "initargs": (os.getpid(),)}
         stack.enter_context(threadpool_limits(limits=1))  # with one worker, and with threads, this process computes
         stack.enter_context(joblib.parallel_config(backend, **settings))
@@ -211,6 +213,19 @@ def backend_here(backend: str) -> str:
     except (OSError, ImportError):  # /dev/shm is missing or full, or nobody may write there
         return "threading"
     return backend
+
+
+def _start_quiet_tracker() -> None:
+    """Start the process that removes joblib's semaphores; it warns of those that workers left behind when killed."""
+    before = os.environ.get("PYTHONWARNINGS")
+    os.environ["PYTHONWARNINGS"] = ",".join(filter(None, (before, "ignore:resource_tracker:UserWarning")))
+    try:
+        resource_tracker.ensure_running()
+    finally:
+        if before is None:
+            del os.environ["PYTHONWARNINGS"]
+        else:
+            os.environ["PYTHONWARNINGS"] = before
 
 
 def _remove_what_the_dead_left() -> None:
