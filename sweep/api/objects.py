@@ -300,9 +300,10 @@ class LoadedStudy:
             As `sweep run` reports it.
         """
         from ..report import make_report, read_output
+        from ..results.identity import run_facts
         from ..run import output_folder, run_study
 
-        folder, _ = output_folder(Path(output) / folder_name(self.name), self.study)
+        folder, _ = output_folder(Path(output) / folder_name(self.name), run_facts(self.study))
         run_study(self.study, folder, jobs or os.cpu_count() or 1, _silent, ("sweep", "from Python"))
         make_report(read_output(folder), repair=True)
         return FinishedRun(folder)

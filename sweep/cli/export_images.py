@@ -74,6 +74,7 @@ def export_images(
     street = f"{STREET_MANIFEST} (streets), " if vision.street else ""
     boxes = ", coco-*.json" if files.coco else ""
     return [
+        *output.doubts,
         f"{len(manifest):,} images of {names}: {counts}; the same scenes, lamps and photons for every design.",
         f"Files: {files.folder}/: {MANIFEST}, {street}images/{boxes}.",
     ]

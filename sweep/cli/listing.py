@@ -10,6 +10,7 @@ from ..base.disk import is_folder, read_facts
 from ..base.errors import StudyError, SweepError, ValidationIssue
 from ..camera.sensor import BUILT_IN_SENSORS
 from ..results.folder import run_in
+from ..results.identity import run_facts, several_facts
 from ..results.lock import in_use
 from ..results.tables import PROVENANCE
 from ..run import output_folder
@@ -118,8 +119,9 @@ def _listed(path: Path, outputs: Path, data: Path | None) -> StudyListing:
         if several is None:
             stated, state = studies[0].name, _state(studies[0], outputs)
         else:
-            stated, folder = several.name, outputs / folder_name(several.name)
-            runs = [run_in(output_folder(folder / folder_name(one.name), one)[0]) for one in studies]
+            facts = several_facts(dict(zip(several.members, studies, strict=True)))
+            stated, (folder, _) = several.name, output_folder(outputs / folder_name(several.name), facts)
+            runs = [run_in(folder / folder_name(one.name)) for one in studies]
             finished = sum(run is not None and run.finished for run in runs)
             state = f"{finished} of {len(runs)} runs finished" if finished < len(runs) else f"finished, {finished} runs"
     except SweepError as error:
@@ -133,7 +135,7 @@ def _listed(path: Path, outputs: Path, data: Path | None) -> StudyListing:
 
 
 def _state(study: Study, outputs: Path) -> str:
-    folder, note = output_folder(outputs / folder_name(study.name), study)
+    folder, note = output_folder(outputs / folder_name(study.name), run_facts(study))
     held = run_in(folder)
     if held is None:
         return "not run" if note is None else "changed since it was run"

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import typer
 
 Json = Annotated[bool, typer.Option("--json", help="Say one JSON object on stdout, and everything else on stderr.")]
-Quiet = Annotated[bool, typer.Option("--quiet", help="Print errors alone, and with --json the object.")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="Print errors alone, a run's folder, and with --json the object.")]
 _INTERVAL_S = 10.0
 _LEAST_SHARE, _LEAST_S = 0.01, 60.0
 """The time left is printed from this share of a phase, or this time, on: the first jobs wait for the compiler."""

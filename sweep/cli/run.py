@@ -2,33 +2,40 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
+import re
 import sys
 import time
 import webbrowser
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import pyarrow.parquet as pq
 import typer
 
 from .. import run as runner
-from ..base.errors import ErrorBoundExceededError, InterruptedRunError, OutputError, SweepError, ValidationIssue
+from ..base.errors import ErrorBoundExceededError, InterruptedRunError, SweepError, ValidationIssue
 from ..base.types import in_turn
-from ..results.atomic import atomic
-from ..results.folder import run_in
-from ..results.tables import ALL_SENSORS, REPORT
+from ..results.folder import begin
+from ..results.identity import run_facts, several_facts
+from ..results.inventory import Inventory
+from ..results.lock import locked
+from ..results.parts import Parts
+from ..results.tables import ALL_SENSORS, PROVENANCE, REPORT, RESULTS, json_of
+from ..run.answers import CachedCalls
 from ..run.workers import backend_here, workers
 from ..study import SensorAndLights, SensorStudies, Study, folder_name, load_study
 from .output import ProgressDisplay, print_lines
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from ..base.types import Parallel
 
 _JSON_KEYS = ("filters", "designs", "failed", "duration_s", "search", "check", "warnings")
 """Keys of provenance that `--json` repeats."""
+_LONGEST_NAME = 120
 
 
 def run_one(
@@ -86,10 +93,11 @@ def run_one(
         note("no shared memory for processes here (/dev/shm): threads compute the same rows.")
         backend = usable
     study = load_study(path, data, changes=changes, allow_code=allow_code, member=member)
-    folder, other = runner.output_folder(output / folder_name(study.name), study)
-    n_workers = jobs or os.cpu_count() or 1
-    if other is not None:
-        note(f"{other}.")
+    folder, n_workers = output / folder_name(study.name), jobs or os.cpu_count() or 1
+    if member is None:
+        folder, other = runner.output_folder(folder / changed_name(changes), run_facts(study))
+        if other is not None:
+            note(f"{other}.")
     if dry_run:
         left = runner.remaining_work(study, folder, n_workers)
         print_lines(runner.remaining_work_lines(left, folder), as_json=as_json, quiet=quiet)
@@ -120,10 +128,20 @@ def run_one(
     return {"computed": bool(computed), **facts}
 
 
+def changed_name(changes: Mapping[str, str]) -> str:
+    """Return the folder, within that of a study, for a run with values of `--set`; empty without any."""
+    stated = ",".join(f"{key}={value}" for key, value in sorted(changes.items()))
+    name = re.sub(r"[^a-zA-Z0-9_.,=+-]", "_", stated)
+    if len(name) > _LONGEST_NAME:
+        name = f"{name[:_LONGEST_NAME]}-{hashlib.sha256(stated.encode()).hexdigest()[:8]}"
+    return name
+
+
 class SensorsOptions(NamedTuple):
-    """Options of `sweep run` for a study of several sensors."""
+    """Options of `sweep run` for a study of several sensors; `changed`: see `changed_name`."""
 
     output: Path
+    changed: str
     jobs: int | None
     dry_run: bool
     as_json: bool
@@ -153,43 +171,76 @@ def run_sensors(
     Raises
     ------
     SweepError
-        As `run_one`, for the first member that cannot be run, after all others; and if the folder holds a plain run.
+        As `run_one`, for the first member that cannot be run, after all others.
     """
-    folder, quiet = options.output / folder_name(several.name), options.quiet
-    studies = [(member, load(member=member)) for member in several.members]  # mistakes before any work
-    if run_in(folder) is not None:
-        raise OutputError(ValidationIssue("holds a run of one sensor", str(folder), allowed="another --output"))
+    began_s, quiet = time.monotonic(), options.quiet
+    studies = {member: load(member=member) for member in several.members}  # mistakes before any work
+    known = several_facts(studies)
+    folder, other = runner.output_folder(options.output / folder_name(several.name) / options.changed, known)
+    if other is not None and not quiet:
+        typer.echo(f"Note: {other}.", err=True)
     made, failed = dict[SensorAndLights, dict[str, Any]](), list[SweepError]()
-    for member in several.members:
-        if not quiet:
-            typer.echo(f"-- {member.name} --", err=True)
-        try:
-            made[member] = run(member=member, output=folder)
-        except InterruptedRunError:
-            raise
-        except SweepError as error:  # the others are run all the same
-            failed.append(error)
-    if made and not options.dry_run:
-        from ..report.sensors import SensorRun, report_sensors  # noqa: PLC0415  (while workers compute)
-        from ..run.all_sensors import all_sensors_table  # noqa: PLC0415  (few studies have several sensors)
-
-        joined = folder / ALL_SENSORS
-        if any(facts["computed"] for facts in made.values()):
-            joined.unlink(missing_ok=True)
-        if not joined.exists():
-            with ProgressDisplay(quiet=quiet) as display, workers(options.jobs or os.cpu_count() or 1) as parallel:
-                table = all_sensors_table(studies, parallel, display.update)
-            if table is not None:
-                with atomic(joined) as hidden:
-                    pq.write_table(table, hidden)
-        runs = [SensorRun(member, Path(one["folder"])) for member, one in made.items()]
-        lines = report_sensors(folder, runs)
-        print_lines(lines, as_json=options.as_json, quiet=quiet)
-        if options.opens:
-            webbrowser.open((folder / REPORT).absolute().as_uri())
+    with runner.stopped_by_signals(), nullcontext() if options.dry_run else locked(folder):
+        inventory = Inventory(folder) if options.dry_run else begin(folder, known)
+        for member in several.members:
+            if not quiet:
+                typer.echo(f"-- {member.name} --", err=True)
+            try:
+                made[member] = run(member=member, output=folder)
+            except InterruptedRunError:
+                raise
+            except SweepError as error:  # the others are run all the same
+                failed.append(error)
+        if made and not options.dry_run:
+            computed = any(facts["computed"] for facts in made.values())
+            lines = _join(inventory, studies, made, options, computed=computed, began_s=began_s)
+            print_lines(lines, as_json=options.as_json, quiet=quiet)
+    if options.opens and made and not options.dry_run:
+        webbrowser.open((folder / REPORT).absolute().as_uri())
     if failed:
         raise failed[0]
     return {"folder": str(folder), "runs": [*made.values()]}
+
+
+def _join(
+    inventory: Inventory,
+    studies: Mapping[SensorAndLights, Study],
+    made: Mapping[SensorAndLights, Mapping[str, Any]],
+    options: SensorsOptions,
+    *,
+    computed: bool,
+    began_s: float,
+) -> list[str]:
+    """Write what several sensors have in common, where it is missing or damaged; return the answer."""
+    from ..report.sensors import SensorRun, report_sensors, rows_of_all  # noqa: PLC0415  (while workers compute)
+    from ..run.all_sensors import all_sensors_table  # noqa: PLC0415  (few studies have several sensors)
+
+    if inventory.list_damaged:
+        inventory.remove(inventory.unlisted())
+    runs = [SensorRun(member, Path(one["folder"])) for member, one in made.items()]
+    wrong = inventory.wrong([PROVENANCE, RESULTS, *({ALL_SENSORS} & inventory.files.keys())])
+    if computed or wrong:
+        inventory.remove([PROVENANCE])
+        inventory.write_table(RESULTS, rows_of_all(runs))
+        if {PROVENANCE, ALL_SENSORS} & wrong.keys():
+            inventory.remove([ALL_SENSORS])
+            parts = Parts(inventory.folder)
+            with ProgressDisplay(quiet=options.quiet) as display, workers(options.jobs or os.cpu_count() or 1) as pool:
+                kept = CachedCalls(pool, parts, f"{inventory.fingerprint} all sensors")
+                table = all_sensors_table([*studies.items()], kept, display.update)
+            if table is not None:
+                inventory.write_table(ALL_SENSORS, table)
+            parts.remove()
+        facts = {
+            "fingerprint": inventory.fingerprint,
+            "runs": inventory.facts["runs"],
+            "command": sys.argv,
+            "designs": sum(one["designs"] for one in made.values()),
+            "failed": sum(one["failed"] for one in made.values()),
+            "duration_s": round(time.monotonic() - began_s, 3),
+        }
+        inventory.write({PROVENANCE: json_of(facts).encode("utf-8")})
+    return report_sensors(inventory, runs)
 
 
 def finish(

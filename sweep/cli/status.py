@@ -10,10 +10,12 @@ from typing import Any
 from ..base.disk import read_facts
 from ..base.errors import OutputError
 from ..metrics.share import format_share
-from ..results.inventory import Inventory, issues_of, no_run
+from ..results.folder import run_in
+from ..results.inventory import Inventory, issues_of
 from ..results.lock import in_use
 from ..results.parts import ANSWER, PARTS, ROWS, Parts
-from ..results.tables import PROVENANCE, RESULTS, rows_in
+from ..results.tables import PROVENANCE, REPORT, RESULTS, RUN, rows_in
+from ..study import folder_name
 
 
 @dataclass(frozen=True)
@@ -45,12 +47,13 @@ def status_of(folder: Path, *, verify: bool = False) -> Status:
         If there is no run, or files of a finished run are missing or damaged.
     """
     inventory = Inventory(folder)
-    if not inventory.fingerprint:
-        raise no_run(folder)
+    inventory.require_run()
     running = in_use(folder)
+    if inventory.runs:
+        return _status_of_several(inventory, verify=verify, running=running)
     finished = PROVENANCE in inventory.files and not running
     if finished or (verify and not running):
-        wrong = inventory.wrong(quick=not verify) | inventory.wrong([PROVENANCE] if finished else [])
+        wrong = inventory.wrong(quick=not verify) | inventory.wrong([PROVENANCE, RUN] if finished else [RUN])
         if wrong:
             raise OutputError(issues_of(folder, wrong))
     if finished:
@@ -77,6 +80,33 @@ def status_of(folder: Path, *, verify: bool = False) -> Status:
     if verify and not running:
         lines.append(f"ok: its {len(inventory.files)} files are as the run wrote them.")
     return Status(lines, {"folder": str(folder), "state": state, "verified": verify, **values})
+
+
+def _status_of_several(inventory: Inventory, *, verify: bool, running: bool) -> Status:
+    """Return the state of a study of several sensors or lights: a line for each of them."""
+    folder, lines, states = inventory.folder, [], {}
+    if not running and (wrong := inventory.wrong(quick=not verify)):
+        raise OutputError(issues_of(folder, wrong))
+    for member in inventory.runs:
+        inner = folder / folder_name(member.name)
+        if run_in(inner) is None:
+            states[member.name] = "not run"
+            lines.append(f"{member.name}: not run.")
+            continue
+        status = status_of(inner, verify=verify)
+        states[member.name] = str(status.facts["state"])
+        lines.append(f"{member.name}: {status.lines[0]}")
+    count = sum(state == "finished" for state in states.values())
+    whole = count == len(states) and PROVENANCE in inventory.files
+    state = "running" if running else "finished" if whole else "interrupted"
+    lines.append(
+        f"{state}: {count} of {len(states)} runs finished{'' if whole or running else '; the same command continues'}."
+    )
+    if PROVENANCE in inventory.files:
+        lines.append(f"Files: {folder}/: {RESULTS}, {REPORT}.")
+    if verify and not running:
+        lines.append(f"ok: its {len(inventory.files)} files are as the run wrote them.")
+    return Status(lines, {"folder": str(folder), "state": state, "verified": verify, "runs": states})
 
 
 def _number(facts: Mapping[str, Any], key: str) -> float:

@@ -122,7 +122,7 @@ def compare_runs(folders: Sequence[Path], to: Path | None) -> Comparison:
         lines += ["", titles[name], *aligned(areas[name][1])]
     if len(areas) > _MOST_SCENARIOS:
         lines.append(f"({len(areas) - _MOST_SCENARIOS} more scenes in {PAGE}.)")
-    lines += ["", *answer, *(f"Note: {note}" for note in notes)]
+    lines += ["", *answer, *(f"Note: {note}" for note in notes), *(doubt for one in outputs for doubt in one.doubts)]
     lines.append(f"Files: {target}/: {', '.join([PAGE, TABLE, *(f'{PICTURE}.{kind}' for kind in drawn)])}.")
     of_all = [table.assign(scene=name) for name, (_, table) in areas.items()]
     tables = {"best": best, "plain": plain, "studies": studies, "origins": origins}

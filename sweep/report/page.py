@@ -147,7 +147,7 @@ def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
         "published": rows(published),
         "constraints": format_constraints(output),
         "terms": term_definitions(output),
-        "summary": summary_lines(output),
+        "summary": summary_lines(output)[:-1],  # without the folder
         "provenance": output.provenance.model_dump(mode="json"),
     }
 

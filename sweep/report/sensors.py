@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from ..base.types import FloatArray
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.quantity import Column
-from ..results.atomic import atomic, write_bytes, write_text
+from ..results.inventory import Inventory
 from ..results.output import Output, read_output
-from ..results.tables import ALL_SENSORS, FOUND, PLAIN, REPORT, RESULTS
+from ..results.tables import ALL_SENSORS, FOUND, PLAIN, REPORT, RESULTS, read_table
 from ..run.all_sensors import ALL
 from ..run.uncertainty import REFERENCE, UNCLIPPED
 from ..study import SensorAndLights, folder_name
@@ -45,39 +44,33 @@ class SensorRun:
 
 
 def runs_in(folder: Path) -> list[SensorRun]:
-    """Return the runs of a study of several sensors.
+    """Return the runs of a study of several sensors; none of the folder of another study."""
+    runs = [SensorRun(member, folder / folder_name(member.name)) for member in Inventory(folder).runs]
+    return [run for run in runs if Inventory(run.folder).finished]
+
+
+def rows_of_all(runs: Sequence[SensorRun]) -> pa.Table:
+    """Return the rows of all runs with `sensor` and `lights` before them."""
+    tables = []
+    for run in runs:
+        table = read_table(run.folder / RESULTS)
+        kinds = [f.type.value_type if pa.types.is_dictionary(f.type) else f.type for f in table.schema]
+        table = table.cast(pa.schema(zip(table.column_names, kinds, strict=True)))
+        for at, (key, value) in enumerate(zip(_KEYS, run.member[:2], strict=True)):
+            table = table.add_column(at, key, pa.array([value] * len(table)))
+        tables.append(table)
+    return pa.concat_tables(tables, promote_options="default")
+
+
+def report_sensors(inventory: Inventory, runs: Sequence[SensorRun]) -> list[str]:
+    """Write a picture and a page of a study of several sensors.
+
+    The filters for several sensors are read from `all_sensors.parquet`, see `all_sensors_table`, if the folder has it.
 
     Parameters
     ----------
-    folder : Path
-        Folder of the study.
-
-    Returns
-    -------
-    list of SensorRun
-        Runs; an empty list if the folder is none of such a study.
-    """
-    try:
-        if pq.read_schema(folder / RESULTS).names[:2] != list(_KEYS):
-            return []
-        table = pq.read_table(folder / RESULTS, columns=list(_KEYS))
-    except (OSError, ValueError):
-        return []
-    pairs = dict.fromkeys(zip(*(table[name].to_pylist() for name in _KEYS), strict=True))
-    members = [SensorAndLights(sensor, lights, (at, at)) for at, (sensor, lights) in enumerate(pairs)]
-    return [SensorRun(member, folder / folder_name(member.name)) for member in members]
-
-
-def report_sensors(folder: Path, runs: Sequence[SensorRun]) -> list[str]:
-    """Write one table of all rows, a picture and a page of a study of several sensors.
-
-    `results.parquet` has the rows of all runs with `sensor` and `lights` before them. The filters for several sensors
-    are read from `all_sensors.parquet`, see `all_sensors_table`, if the folder has it.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the study, named as it; has those of the runs.
+    inventory : Inventory
+        Files of the study, in a locked folder.
     runs : sequence of SensorRun
         Finished runs.
 
@@ -85,28 +78,24 @@ def report_sensors(folder: Path, runs: Sequence[SensorRun]) -> list[str]:
     -------
     list of str
         Answer, as it is printed.
+
+    Raises
+    ------
+    OutputError
+        For files that are damaged, or if the disk refuses.
     """
+    folder = inventory.folder
+    inventory.require({ALL_SENSORS} & inventory.files.keys())
     outputs = [(run.member, read_output(run.folder)) for run in runs]
-    tables = []
-    for run in runs:
-        table = pq.read_table(run.folder / RESULTS)
-        kinds = [f.type.value_type if pa.types.is_dictionary(f.type) else f.type for f in table.schema]
-        table = table.cast(pa.schema(zip(table.column_names, kinds, strict=True)))
-        for at, (key, value) in enumerate(zip(_KEYS, run.member[:2], strict=True)):
-            table = table.add_column(at, key, pa.array([value] * len(table)))
-        tables.append(table)
-    with atomic(folder / RESULTS) as hidden:
-        pq.write_table(pa.concat_tables(tables, promote_options="default"), hidden)
     figures = pd.DataFrame([row for member, output in outputs for row in _figures(member, output)])
     drawn = draw_sensors(figures, outputs[0][1].trade_off[0].words)
     images = {kind: rendered(drawn, kind) for kind in ("png", "svg")}
-    for kind, image in images.items():
-        write_bytes(image, folder / f"{PICTURE}.{kind}")
     words, summary = outputs[0][1].trade_off[0].words, _summary(figures)
     n_found = figures.loc[figures["kind"] == FOUND, "cfa"].nunique()
     lines = [*_answer(summary, n_found, str(figures["reference"].iloc[0]), words)]
     answer, stated = lines[: max(n_found, 1)], f"{camera_and_scene(outputs[0][1])}."
-    together = pd.read_parquet(folder / ALL_SENSORS) if (folder / ALL_SENSORS).exists() else pd.DataFrame()
+    known = ALL_SENSORS in inventory.files
+    together = read_table(folder / ALL_SENSORS).to_pandas() if known else pd.DataFrame()
     if len(together):
         lines += _together(together, outputs[0][1].goal)
     lines += _notes(outputs)
@@ -124,9 +113,10 @@ def report_sensors(folder: Path, runs: Sequence[SensorRun]) -> list[str]:
         together=rows(together) if len(together) else [],
         links=links,
     )
-    write_text(text, folder / REPORT)
+    inventory.write({f"{PICTURE}.{kind}": image for kind, image in images.items()} | {REPORT: text.encode("utf-8")})
     lines.insert(len(answer), stated)
-    return [*lines, f"Files: {folder}/: {RESULTS}, {REPORT}, {PICTURE}.png; a run and its report in each folder."]
+    files = f"Files: {RESULTS}, {REPORT}, {PICTURE}.png, and a folder for each run, in the folder"
+    return [*lines, files, str(folder)]
 
 
 def _figures(member: SensorAndLights, output: Output) -> Iterator[dict[str, Any]]:

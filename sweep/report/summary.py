@@ -44,7 +44,7 @@ def _scene_lines(output: Output) -> list[str]:
 
 
 def summary_lines(output: Output, took_s: float | None = None) -> list[str]:
-    """Return the summary of a run and the place of its files.
+    """Return the summary of a run; its last line is the folder.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def summary_lines(output: Output, took_s: float | None = None) -> list[str]:
         areas = ", ".join(f"{name} {area:.3f}" for name, area in facts.hypervolume.items() if area > 0)
         least = facts.hypervolume_least_sensitivity
         lines.append(f"Hypervolume (DN x sensitivity, above 0 and a sensitivity of {least:g}): {areas}.")
-    lines += [f"Note: {warning}." for warning in facts.warnings]
+    lines += [*(f"Note: {warning}." for warning in facts.warnings), *output.doubts]
     ratio = output.study.lights.photon_ratio
     if ratio is not None:
         lines.append(
@@ -95,9 +95,8 @@ def summary_lines(output: Output, took_s: float | None = None) -> list[str]:
     if note := assumptions_line(output):
         lines.append(note)
     computed = f"{facts.duration_s:.1f} s by {_count(facts.workers, 'worker')}"
-    lines.append(f"Computed in {computed}." if took_s is None else f"Took {took_s:.1f} s; computed in {computed}.")
-    lines.append(f"Files: {output.folder}/: results.parquet, report.html, provenance.json.")
-    return lines
+    took = f"Computed in {computed}" if took_s is None else f"Took {took_s:.1f} s; computed in {computed}"
+    return [*lines, f"{took}. Files: results.parquet, report.html, provenance.json in the folder", str(output.folder)]
 
 
 def _plan_line(output: Output) -> str:

@@ -185,6 +185,9 @@ FILES = {
     files.VISION_STREETS: "the first street of each light level through each design, sRGB: bytes of rows x columns x 3 "
     "in `pixels`",
     files.VISION_MISREAD: "images that were read wrongly, in false colors: bytes of rows x columns x 3 in `pixels`",
+    files.ALL_SENSORS: "of a study of several sensors, one filter for all of them and one for all but each: "
+    "`designed_on`, space, sensor, lights, `judged` (it was not designed on this one), objective, sensitivities, "
+    "violation, `own_best` (objective of the best filter of this one alone) and parameters",
     files.AUDIT: "rows of `sweep audit`: errors against the reference settings, and those that are allowed",
     files.RESOLVED: "the study with every default written out; a study file itself",
     files.PROVENANCE: "versions, seed, command, machine, plans of the scenes, meanings of the columns",

@@ -3,85 +3,58 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import count
 from pathlib import Path
 from typing import Any
 
 from ..base.errors import OutputError, ValidationIssue
-from ..study import Study
-from .identity import fingerprint, identity
 from .inventory import Inventory
+from .tables import RUN
 
 _MOST_SHOWN = 3
 
 
 def run_in(folder: Path) -> Inventory | None:
-    """Return the run in a folder.
-
-    Parameters
-    ----------
-    folder : Path
-        Output folder.
-
-    Returns
-    -------
-    Inventory or None
-        Run; files of others under the names of a run's have an empty fingerprint.
-
-    Raises
-    ------
-    OutputError
-        If `run.json` is damaged.
-    """
+    """Return the run in a folder; files of others under the names of a run's have an empty fingerprint."""
     inventory = Inventory(folder)
-    return inventory if inventory.fingerprint or inventory.foreign_files() else None
+    return inventory if inventory.fingerprint or inventory.damaged or inventory.foreign_files() else None
 
 
-def output_folder(base: Path, study: Study) -> tuple[Path, str | None]:
-    """Return the folder of a study's run.
+def output_folder(base: Path, facts: Mapping[str, Any]) -> tuple[Path, str | None]:
+    """Return the folder of a run: `base`, or `base-2` and so on if that holds another run or files of others.
 
     Parameters
     ----------
     base : Path
         Preferred folder.
-    study : Study
-        Study.
+    facts : mapping
+        Content of its `run.json`.
 
     Returns
     -------
     folder : Path
-        `base`, or `base-2` and so on if it holds another study.
+        Folder.
     note : str or None
-        Difference to that study.
+        Difference to the run in `base`.
     """
     note = None
     for number in count(1):
         folder = base if number == 1 else base.with_name(f"{base.name}-{number}")
         held = run_in(folder)
-        if held is None or held.fingerprint == fingerprint(study):
+        if held is None or held.is_of(facts):
             return folder, None if note is None else f"{note}; this one is in {folder}"
+        if held.damaged:
+            held.require_run()
         if held.fingerprint:
-            note = f"{folder} holds another study of this name ({_changed(held, study)})"
+            note = f"{folder} holds another study of this name ({_changed(held, facts)})"
         else:
             note = f"{folder / held.foreign_files()[0]} is not of a run of this study"
     raise AssertionError
 
 
-def begin(folder: Path, study: Study) -> Inventory:
-    """Write into the folder which run it holds.
-
-    Parameters
-    ----------
-    folder : Path
-        Output folder.
-    study : Study
-        Study.
-
-    Returns
-    -------
-    Inventory
-        Files of the run.
+def begin(folder: Path, facts: Mapping[str, Any]) -> Inventory:
+    """Write into the folder which run it holds, and return its files.
 
     Raises
     ------
@@ -89,17 +62,26 @@ def begin(folder: Path, study: Study) -> Inventory:
         If it holds another run, or files of others.
     """
     inventory = Inventory(folder)
-    if not inventory.fingerprint:
-        inventory.begin(fingerprint(study), {"identity": identity(study), "designs": study.n_designs})
-    elif inventory.fingerprint != fingerprint(study):
-        problem = f"holds another study ({_changed(inventory, study)})"
+    if inventory.is_of(facts):
+        if inventory.damaged or RUN not in inventory.files:
+            inventory.begin(facts)
+        return inventory
+    if inventory.damaged:
+        inventory.require_run()
+    if inventory.fingerprint:
+        problem = f"holds another study ({_changed(inventory, facts)})"
         raise OutputError(ValidationIssue(problem, str(folder), allowed="another folder"))
+    inventory.begin(facts)
     return inventory
 
 
-def _changed(held: Inventory, study: Study) -> str:
+def _changed(held: Inventory, facts: Mapping[str, Any]) -> str:
     """Return the first few keys that differ, with their values."""
-    before, after = (dict(_flat(x)) for x in (held.facts.get("identity"), json.loads(json.dumps(identity(study)))))
+    if held.damaged:
+        return f"its {RUN} is damaged"
+    if ("runs" in held.facts) != ("runs" in facts):
+        return f"of {'several sensors' if 'runs' in held.facts else 'one sensor'}"
+    before, after = (dict(_flat(x)) for x in (held.facts.get("identity"), json.loads(json.dumps(facts["identity"]))))
     keys = [key for key in {**before, **after} if before.get(key) != after.get(key)]
     if not keys or not before.keys() & after.keys():
         return "of another version of this package"

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from typing import Any
 
-from ..study import Study
+from ..study import SensorAndLights, Study
 
 MODEL_VERSION = "20"
 """Raised whenever the same study would give other rows; part of every part's key."""
@@ -47,16 +48,23 @@ def identity(study: Study) -> dict[str, Any]:
 
 
 def fingerprint(study: Study) -> str:
-    """Return the SHA-256 of the canonical JSON of `identity`.
+    """Return the SHA-256 of the canonical JSON of `identity`."""
+    return _digest(identity(study))
 
-    Parameters
-    ----------
-    study : Study
-        Study.
 
-    Returns
-    -------
-    str
-        Hexadecimal digest.
-    """
-    return hashlib.sha256(json.dumps(identity(study), sort_keys=True).encode()).hexdigest()
+def run_facts(study: Study) -> dict[str, Any]:
+    """Return the content of the `run.json` of a study's run."""
+    known = identity(study)
+    return {"fingerprint": _digest(known), "identity": known, "designs": study.n_designs}
+
+
+def several_facts(studies: Mapping[SensorAndLights, Study]) -> dict[str, Any]:
+    """Return the content of the `run.json` of a study of several sensors or lights; `runs` names each pair of them."""
+    known = {member.name: identity(study) for member, study in studies.items()}
+    designs = sum(study.n_designs for study in studies.values())
+    runs = [[member.sensor, member.lights] for member in studies]
+    return {"fingerprint": _digest(known), "identity": known, "designs": designs, "runs": runs}
+
+
+def _digest(value: object) -> str:
+    return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()

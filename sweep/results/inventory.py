@@ -2,6 +2,7 @@
 
 `run.json` says which study the folder is of. `SHA256SUMS` lists all files of the run, `run.json` included, in the form
 that `sha256sum -c` checks. A folder without `run.json` is no run's: files in it that have names of a run's are others'.
+Either may be damaged: the other, and provenance, still tell whose run it is, and what cannot be verified is said.
 """
 
 from __future__ import annotations
@@ -16,17 +17,30 @@ from typing import Any
 
 import pyarrow as pa
 
-from ..base.disk import MOST_FACTS, digest_of, is_link, is_real_folder, parsed_facts, read_plain
+from ..base.disk import MOST_FACTS, digest_of, is_link, is_real_folder, parsed_facts, read_facts, read_plain
 from ..base.errors import OutputError, ValidationIssue
+from ..study import SensorAndLights
 from .atomic import write_bytes
-from .tables import AUDIT, FIGURES, MADE_BY_RUN, PROVENANCE, RUN, SUMS, is_drawn, is_user_code, json_of, write_table
+from .tables import (
+    AUDIT,
+    FIGURES,
+    MADE_BY_RUN,
+    PROVENANCE,
+    RESULTS,
+    RUN,
+    SUMS,
+    is_drawn,
+    is_of_run,
+    json_of,
+    write_table,
+)
 
 _SUM = re.compile(r"([0-9a-f]{64})  (\S+)")
 _MISSING, _DAMAGED, _UNLISTED = "is missing", "is damaged", f"is not listed in {SUMS}"
 
 
 class Inventory:
-    """The files of a run's folder, empty where there is no run; raises OutputError for a damaged `run.json`.
+    """The files of a run's folder, empty where there is no run.
 
     Attributes
     ----------
@@ -35,29 +49,75 @@ class Inventory:
         Contents of `run.json`: `fingerprint` and `identity` of the study, and its number of designs.
     files : dict of str
         Name (`figures/chart.png`) -> SHA-256 of the file.
+    damaged : bool
+        `run.json` is there, but not as the run wrote it; `facts` then has the fingerprint of the provenance, if any.
     """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.files: dict[str, str] = {}
         self.facts: dict[str, Any] = {}
+        self._lines = 0
         with suppress(OSError):
-            text = read_plain(folder / SUMS, MOST_FACTS).decode("utf-8", "replace")
-            self.files = {name: sha for sha, name in _SUM.findall(text) if is_user_code(name) or name == RUN}
-        path = folder / RUN
-        if os.path.lexists(path):
-            with suppress(OSError):
-                content = read_plain(path, MOST_FACTS)
-                if self.files.get(RUN) in (None, hashlib.sha256(content).hexdigest()):
-                    self.facts = parsed_facts(content)
-            if not isinstance(self.facts.get("fingerprint"), str):
-                problem = "is damaged, so that nothing is known of the run; move its folder away"
-                raise OutputError(ValidationIssue(problem, str(path), allowed="another --output"))
+            lines = read_plain(folder / SUMS, MOST_FACTS).decode("utf-8", "replace").splitlines()
+            entries = [entry for entry in map(_SUM.fullmatch, lines) if entry is not None]
+            self.files = {name: sha for sha, name in (entry.groups() for entry in entries) if _is_listed(name)}
+            self._lines = len(lines)
+        self.damaged = os.path.lexists(folder / RUN) and not self._read_facts()
+
+    def _read_facts(self) -> bool:
+        """Read `run.json`; where it is damaged, the fingerprint alone, from the provenance."""
+        with suppress(OSError):
+            content = read_plain(self.path(RUN), MOST_FACTS)
+            facts = parsed_facts(content)
+            known = self.files.get(RUN) in (None, hashlib.sha256(content).hexdigest())
+            if known and isinstance(facts.get("fingerprint"), str):
+                self.facts = facts
+                return True
+        if PROVENANCE not in self.files or not self.wrong([PROVENANCE]):
+            facts = read_facts(self.path(PROVENANCE))
+            if isinstance(facts.get("fingerprint"), str):
+                self.facts = {key: facts[key] for key in ("fingerprint", "runs") if key in facts}
+        return False
 
     @property
     def fingerprint(self) -> str:
         """Fingerprint of the run's study; empty without a run."""
         return str(self.facts.get("fingerprint", ""))
+
+    def is_of(self, facts: Mapping[str, Any]) -> bool:
+        """Return whether the folder holds the run with some facts; a list alone tells, too."""
+        if self.damaged and self.files.get(RUN) == hashlib.sha256(json_of(facts).encode("utf-8")).hexdigest():
+            return True
+        return self.fingerprint == str(facts["fingerprint"])
+
+    def require_run(self) -> None:
+        """Raise OutputError if nothing tells which run the folder is of."""
+        if self.damaged and not self.fingerprint:
+            problem = "is damaged, so that nothing is known of the run; move its folder away"
+            raise OutputError(ValidationIssue(problem, str(self.path(RUN)), allowed="another --output"))
+        if not self.fingerprint:
+            raise OutputError(
+                ValidationIssue("no run here", str(self.folder), allowed="a folder that `sweep run` made")
+            )
+
+    @property
+    def runs(self) -> list[SensorAndLights]:
+        """Sensors and lights of a study of several; none of another."""
+        pairs = self.facts.get("runs", [])
+        known = [pair for pair in pairs if isinstance(pair, list) and [type(name) for name in pair] == [str, str]]
+        return [SensorAndLights(sensor, lights, (at, at)) for at, (sensor, lights) in enumerate(known)]
+
+    @property
+    def list_damaged(self) -> bool:
+        """True if the list has strange lines, or does not name what a finished run has."""
+        return self._lines > len(self.files) or bool(self.unlisted())
+
+    @property
+    def unverified(self) -> list[str]:
+        """Files that the damaged lists of a finished run cannot vouch for."""
+        cut = self._lines > len(self.files) or {PROVENANCE, RESULTS}.intersection(self.unlisted())
+        return sorted({*([RUN] if self.damaged else []), *(self.unlisted() if cut else [])})
 
     @property
     def finished(self) -> bool:
@@ -91,6 +151,8 @@ class Inventory:
             Only say which are missing.
         """
         issues = dict.fromkeys(self.unlisted() if names is None else (), _UNLISTED)
+        if names is None and self._lines > len(self.files):
+            issues[SUMS] = _DAMAGED
         for name in sorted(self.files if names is None else names):
             path = self.path(name)
             if name not in self.files or not os.path.lexists(path) or self._linked(name):
@@ -113,7 +175,7 @@ class Inventory:
             Names.
         """
         finished = os.path.lexists(self.path(PROVENANCE))
-        return [name for name in self._present() if finished and is_user_code(name) and name not in self.files]
+        return [name for name in self._present() if finished and _is_listed(name) and name not in self.files]
 
     def _present(self) -> list[str]:
         """Return the names of the files in the folder and among its figures."""
@@ -124,7 +186,7 @@ class Inventory:
         return name.startswith(f"{FIGURES}/") and is_link(self.folder / FIGURES)
 
     def require(self, names: Iterable[str]) -> None:
-        """Check that files are as the run wrote them.
+        """Check that files are as the run wrote them, but for those that damaged lists cannot vouch for.
 
         Parameters
         ----------
@@ -136,7 +198,8 @@ class Inventory:
         OutputError
             If a file is missing or damaged, with its name.
         """
-        if wrong := self.wrong(names):
+        unverified = self.unverified
+        if wrong := self.wrong([name for name in names if name not in unverified]):
             raise OutputError(issues_of(self.folder, wrong))
 
     def foreign_files(self) -> list[str]:
@@ -147,19 +210,17 @@ class Inventory:
         list of str
             Names.
         """
-        if self.facts:
+        if self.facts or self.damaged:
             return []
-        return [name for name in self._present() if is_user_code(name) or name == SUMS]
+        return [name for name in self._present() if is_of_run(name) or name == SUMS]
 
-    def begin(self, fingerprint: str, facts: Mapping[str, Any]) -> None:
+    def begin(self, facts: Mapping[str, Any]) -> None:
         """Write which study the folder is of.
 
         Parameters
         ----------
-        fingerprint : str
-            Fingerprint of the study.
         facts : mapping
-            Further content of `run.json`.
+            Content of `run.json`.
 
         Raises
         ------
@@ -168,7 +229,7 @@ class Inventory:
         """
         for name in self.foreign_files():
             raise OutputError(ValidationIssue("is not of this run; move it away", str(self.folder / name)))
-        self.facts = {"fingerprint": fingerprint, **facts}
+        self.facts, self.damaged = dict(facts), False
         self.write({RUN: json_of(self.facts).encode("utf-8")})
 
     def write(self, contents: Mapping[str, bytes]) -> None:
@@ -271,22 +332,6 @@ class Inventory:
         write_bytes("".join(lines).encode("utf-8"), self.path(SUMS))
 
 
-def no_run(folder: Path) -> OutputError:
-    """Return the error for a folder without a run.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder.
-
-    Returns
-    -------
-    OutputError
-        Error.
-    """
-    return OutputError(ValidationIssue("no run here", str(folder), allowed="a folder that `sweep run` made"))
-
-
 def issues_of(folder: Path, wrong: Mapping[str, str]) -> list[ValidationIssue]:
     """Return a line for each file that is not as the run wrote it.
 
@@ -306,6 +351,10 @@ def issues_of(folder: Path, wrong: Mapping[str, str]) -> list[ValidationIssue]:
         ValidationIssue(f"{what}; `sweep run` of its study makes it again", str(folder / n))
         for n, what in wrong.items()
     ]
+
+
+def _is_listed(name: str) -> bool:
+    return is_of_run(name) or name == RUN
 
 
 def _names(folder: Path) -> list[str]:

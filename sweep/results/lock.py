@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import stat
@@ -9,15 +10,20 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from filelock import FileLock, Timeout
+from filelock import BaseFileLock, FileLock, SoftFileLock, Timeout
 
-from ..base.disk import is_real_folder
+from ..base.disk import is_real_folder, read_plain
 from ..base.errors import OutputError, ValidationIssue
 from .atomic import LEFT_OVER
 from .parts import PARTS
 from .tables import FIGURES
 
 LOCK = ".lock"
+OWNER = ".lock-owner"
+"""Its name on disks without flock."""
+_NO_FLOCK = {errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOLCK}
+_MARKER = re.compile(rb"\d+\n[^\n]+\n(\d*\n?)")
+_MOST_BYTES = 4096
 _WAIT_S = 0.2
 """Someone may just be looking whether the folder is in use."""
 
@@ -26,7 +32,8 @@ _WAIT_S = 0.2
 def locked(output: Path) -> Iterator[None]:
     """Hold the output folder for one command.
 
-    The system releases the lock with its process. Hidden files of killed commands and workers are removed.
+    The system releases the lock with its process; where it cannot, the next command on the same host does. Hidden files
+    of killed commands and workers are removed.
 
     Parameters
     ----------
@@ -43,12 +50,11 @@ def locked(output: Path) -> Iterator[None]:
     OutputError
         If it is in use or cannot be written.
     """
-    lock = FileLock(output / LOCK)
     try:
         output.mkdir(parents=True, exist_ok=True)
         if os.path.lexists(output / LOCK) and not _is_lock(output / LOCK):
             raise OutputError(ValidationIssue("is not of this run; move it away", str(output / LOCK)))
-        lock.acquire(timeout=_WAIT_S)
+        lock = _acquired(output, _WAIT_S)
     except Timeout:
         raise OutputError(ValidationIssue("in use by another command", str(output))) from None
     except OSError as error:
@@ -62,10 +68,28 @@ def locked(output: Path) -> Iterator[None]:
         lock.release()
 
 
+def _acquired(output: Path, wait_s: float) -> BaseFileLock:
+    """Return the held lock of a folder: of the system, or where the disk has none a file that names host and process.
+
+    That file gives way when its process on this host is gone.
+    """
+    lock: BaseFileLock = FileLock(output / LOCK, fallback_to_soft=False)
+    try:
+        lock.acquire(timeout=wait_s)
+    except (OSError, NotImplementedError) as error:
+        if isinstance(error, OSError) and error.errno not in _NO_FLOCK:
+            raise
+        lock = SoftFileLock(output / OWNER)
+        lock.acquire(timeout=wait_s)
+    return lock
+
+
 def _is_lock(path: Path) -> bool:
-    """Return whether a file is empty."""
+    """Return whether a file is empty, or names a process and its host."""
     status = path.lstat()
-    return stat.S_ISREG(status.st_mode) and not status.st_size
+    if not stat.S_ISREG(status.st_mode) or status.st_size > _MOST_BYTES:
+        return False
+    return not status.st_size or _MARKER.fullmatch(read_plain(path, _MOST_BYTES)) is not None
 
 
 def in_use(output: Path) -> bool:
@@ -81,13 +105,13 @@ def in_use(output: Path) -> bool:
     bool
         True if it is in use.
     """
-    if not (output / LOCK).is_file():
+    if not (output / LOCK).is_file() and not (output / OWNER).is_file():
         return False
     try:
-        with FileLock(output / LOCK).acquire(timeout=0):
-            return False
+        _acquired(output, 0).release()
     except (Timeout, OSError):
         return True
+    return False
 
 
 def _clear(output: Path) -> None:

@@ -20,12 +20,12 @@ from ..camera.mosaic import Mosaic
 from ..metrics.bound import Bound
 from ..metrics.objective import Objective
 from ..metrics.quantity import Column
-from ..study import StudySection
+from ..study import StudySection, folder_name
 from . import tables as files
 from .curves import SCHEMA as CURVES_SCHEMA
 from .curves import KeptCurves
 from .facts import Provenance, checked_facts, missing_parts_error
-from .inventory import Inventory, no_run
+from .inventory import Inventory
 from .profiles import ParameterProfile, Profiles
 from .tables import FEW, FOUND, NAMED, PLAIN, PROVENANCE, RESOLVED, RESULTS, SWEPT, read_table
 from .thinning import Counts, swept_points, thinned
@@ -61,7 +61,8 @@ class Output:
     `places`: separations over the sensor; `map`: the best objective over two parameters; `handovers`: where captures of
     an HDR pixel are full; `worst`: worst values over series;
     `saturated`: signals that fill a pixel; `uncertainty`: quantiles over random sensors;
-    `vision`: tables of the benchmark of vision by their files' names.
+    `vision`: tables of the benchmark of vision by their files' names. `unverified`: files that the damaged lists of the
+    folder cannot vouch for.
     """
 
     folder: Path
@@ -89,6 +90,7 @@ class Output:
     saturated: pd.DataFrame
     uncertainty: pd.DataFrame | None
     vision: Mapping[str, pd.DataFrame]
+    unverified: Sequence[str]
     profiles: Mapping[str, Sequence[ParameterProfile]]
     _made: dict[object, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
@@ -111,6 +113,14 @@ class Output:
             self._made[key] = make()
         made: _Made = self._made[key]
         return made
+
+    @property
+    def doubts(self) -> list[str]:
+        """A note on the files that damaged lists of the folder cannot vouch for; none of an intact run."""
+        if not self.unverified:
+            return []
+        names = ", ".join(self.unverified)
+        return [f"Note: not verified, since lists of {self.folder} are damaged: {names}; `sweep run` repairs it."]
 
     @property
     def objective(self) -> Objective:
@@ -260,13 +270,17 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         Files, which it names, are missing or not as the run wrote them.
     """
     inventory = Inventory(folder)
-    if not inventory.fingerprint:
-        raise no_run(folder)
-    if PROVENANCE not in inventory.files:
+    inventory.require_run()
+    if inventory.runs:
+        names = ", ".join(folder_name(one.name) for one in inventory.runs)
+        raise OutputError(ValidationIssue("holds the runs of several sensors", str(folder), allowed=f"one of {names}"))
+    unverified = inventory.unverified
+    if PROVENANCE not in (*inventory.files, *unverified):
         raise OutputError(
             ValidationIssue("no finished run here", str(folder), allowed="a folder that `sweep run` finished")
         )
-    optional = {name for name in (*files.MADE_BY_RUN, files.AUDIT) if name in inventory.files}.difference(_ALWAYS)
+    present = {*inventory.files, *unverified}
+    optional = present.intersection((*files.MADE_BY_RUN, files.AUDIT)).difference(_ALWAYS)
     if not audited:
         optional.discard(files.AUDIT)
     inventory.require([*_ALWAYS, *sorted(optional)])
@@ -322,6 +336,7 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         saturated=more[files.SATURATED],
         uncertainty=more.get(files.UNCERTAINTY),
         vision={name: more[name] for name in files.VISION_TABLES if name in more},
+        unverified=unverified,
         profiles=profiles.found if all(made.grid is not None for made in study.sweeps.values()) else {},
     )
 

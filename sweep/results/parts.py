@@ -1,7 +1,8 @@
 """Finished work of a running or interrupted run: part files.
 
 A part is written under a hidden name, synced and renamed, by the worker that computed it if that is on this machine.
-Its name holds the key of the work and the SHA-256 of its bytes: missing or damaged parts are computed again.
+Its name holds the key of the work, and the SHA-256 of key and bytes: a part that is missing, damaged or of other work
+is computed again.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ _MOST_BYTES = 2**30
 """Bytes of a part, at most."""
 
 
-def _digest(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()[:_DIGITS]
+def _digest(key: str, content: bytes) -> str:
+    return hashlib.sha256(key[:_DIGITS].encode() + content).hexdigest()[:_DIGITS]
 
 
 def write_part(folder: Path, key: str, kind: str, content: bytes) -> str:
@@ -43,7 +44,7 @@ def write_part(folder: Path, key: str, kind: str, content: bytes) -> str:
     content : bytes
         The file.
     """
-    name = f"{key[:_DIGITS]}-{_digest(content)}.{kind}"
+    name = f"{key[:_DIGITS]}-{_digest(key, content)}.{kind}"
     write_bytes(content, folder / name)
     return name
 
@@ -136,7 +137,7 @@ class Parts:
             return None
         with suppress(OSError):
             content = read_plain(self.folder / name, _MOST_BYTES)
-            if name[_DIGITS + 1 :].startswith(_digest(content)):
+            if name[_DIGITS + 1 :].startswith(_digest(key, content)):
                 return content
         self.forget(key)
         return None

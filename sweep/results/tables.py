@@ -55,12 +55,12 @@ MADE_BY_RUN = frozenset(
         *(RESULTS, SEARCH_LOG, FRONT, CURVES, POINTS, RECOGNITION, CROSSINGS, LIMITED_BY, ROBUSTNESS, REGIONS_MAP),
         *(SENSOR_MAP, TRADED, RENDERED, VALIDATED, LEFT_OUT, COMBINATIONS, MAP, HANDOVERS, WORST, SATURATED),
         UNCERTAINTY,
-        *(*VISION_TABLES, PROVENANCE, RESOLVED),
+        *(*VISION_TABLES, ALL_SENSORS, PROVENANCE, RESOLVED),
     )
 )
 """Files that a run itself writes beside its lists; the report draws from them, `sweep audit` adds a table."""
 _DRAWN = re.compile(
-    r"report\.html|cfas\.(png|svg)|pareto(-\d+)?\.(png|svg)|paper_comparison\.(csv|parquet)"
+    r"report\.html|sensors\.(png|svg)|cfas\.(png|svg)|pareto(-\d+)?\.(png|svg)|paper_comparison\.(csv|parquet)"
     r"|figures/((filters|series|places)-\d+|tiles|sensor|signals|chart|scorecard|(color-noise|rendered)-\d+"
     r"|regions-\d+|map|captures-\d+|clouds-(cfas|designs)|vision-(errors|learning|ranks|misread|street))\.(png|svg)"
 )
@@ -107,7 +107,7 @@ def is_drawn(name: str) -> bool:
     return _DRAWN.fullmatch(name) is not None
 
 
-def is_user_code(name: str) -> bool:
+def is_of_run(name: str) -> bool:
     """Return whether a name is one that commands give to files of a run, beside its two lists.
 
     Parameters

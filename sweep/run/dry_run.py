@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..results.folder import run_in
-from ..results.identity import fingerprint
+from ..results.identity import run_facts
 from ..results.parts import Parts
 from ..results.tables import PLAIN, RESULTS
 from ..search.solver import refinement_of
@@ -59,7 +59,7 @@ def remaining_work(study: Study, output: Path, n_jobs: int) -> RemainingWork:
         Remaining work.
     """
     held = run_in(output)
-    whole = held is not None and held.fingerprint == fingerprint(study) and not held.wrong([RESULTS], quick=True)
+    whole = held is not None and held.is_of(run_facts(study)) and not held.wrong([RESULTS], quick=True)
     study = study.with_plans()
     if whole:
         return RemainingWork(study, study.n_designs, 0, searches=False)

@@ -22,6 +22,7 @@ from ..metrics.pareto import hypervolume
 from ..results.dictionary import described
 from ..results.facts import Provenance, missing_keys
 from ..results.folder import begin
+from ..results.identity import run_facts
 from ..results.inventory import Inventory
 from ..results.lock import LOCK, locked
 from ..results.parts import Parts
@@ -31,6 +32,7 @@ from ..results.tables import (
     LEFT_OUT,
     MAP,
     PROVENANCE,
+    REPORT,
     RESOLVED,
     RESULTS,
     SEARCH_LOG,
@@ -162,8 +164,9 @@ def run_study(
     if study.section.vision is not None and study.section.vision.network:
         require_network()
     with stopped_by_signals(), locked(output):
-        inventory = begin(output, study)
-        inventory.remove(inventory.unlisted())  # nothing is known of them
+        inventory = begin(output, run_facts(study))
+        if inventory.list_damaged:  # nothing is known of what it lacks, nor whether the report was whole
+            inventory.remove([*inventory.unlisted(), REPORT])
         wrong = set(inventory.wrong(sorted(files_of(study))))
         facts = read_facts(inventory.path(PROVENANCE))
         if missing_keys(Provenance, facts) or (options.retry_failed and facts["failed"]):

@@ -101,8 +101,8 @@ def test_several_studies_in_one_call(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert code == 2
     assert err.count("unknown quantity (got 'nothing')") == 1
     assert [line for line in said.splitlines() if line.startswith("==")] == [f"== {path} ==" for path in paths]
-    assert opened == [(out / name / "report.html").as_uri() for name in ("one", "two")]
-    resolved = YAML(typ="safe").load((out / "two" / "study.resolved.yaml").read_text())
+    assert opened == [(out / name / "seed=5" / "report.html").as_uri() for name in ("one", "two")]
+    resolved = YAML(typ="safe").load((out / "two" / "seed=5" / "study.resolved.yaml").read_text())
     assert resolved["seed"] == 5
 
 

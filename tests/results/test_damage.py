@@ -18,6 +18,7 @@ import pytest
 from sweep.base.errors import OutputError
 from sweep.cli.status import status_of
 from sweep.report import make_report, read_output
+from sweep.results.identity import run_facts
 from sweep.results.inventory import Inventory
 from sweep.results.parts import PARTS, Parts
 from sweep.results.tables import RUN, SUMS
@@ -116,18 +117,81 @@ def test_a_damaged_file_is_never_served_and_the_same_command_makes_it_again(
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_with_a_damaged_run_json_nothing_is_known_of_the_folder_and_nothing_touched(
+def test_a_run_whose_run_json_is_damaged_is_read_with_a_note_and_repaired(
     whole_folder: Path, tmp_path: Path, damage: Callable[[Path], None]
 ) -> None:
     shutil.copytree(whole_folder, tmp_path, dirs_exist_ok=True)
     folder = tmp_path / "outputs" / "small"
     damage(folder / RUN)
+    code, _, said = commanded("status", folder)
+    assert (code, said.count("\n"), "run.json: is damaged; `sweep run`" in said) == (2, 1, True)
+    for command in ("report", folder), ("export", folder, "--design", "best"), ("compare", folder, folder):
+        code, out, _ = commanded(*command)
+        assert (code, f"Note: not verified, since lists of {folder} are damaged: run.json;" in out) == (0, True), (
+            command
+        )
+    code, _, said = commanded("run", tmp_path / "small.yaml", "--output", folder.parent, "--jobs", 1)
+    assert (code, "nothing was computed" in said) == (0, True)
+    assert same_tables(folder, whole_folder / "outputs" / "small")
+    code, out, _ = commanded("status", folder, "--verify")
+    assert (code, "ok: its" in out) == (0, True)
+    assert RUN in Inventory(folder).files
+
+
+@pytest.mark.usefixtures("plain_pictures")
+def test_an_emptied_list_hides_no_finished_run(whole_folder: Path, tmp_path: Path) -> None:
+    shutil.copytree(whole_folder, tmp_path, dirs_exist_ok=True)
+    folder = tmp_path / "outputs" / "small"
+    emptied(folder / SUMS)
+    code, out, _ = commanded("export", folder, "--design", "best")
+    assert (code, "Note: not verified" in out, "results.parquet" in out) == (0, True, True)
+    assert commanded("run", tmp_path / "small.yaml", "--output", folder.parent, "--jobs", 1)[0] == 0
+    assert same_tables(folder, whole_folder / "outputs" / "small")
+    assert commanded("status", folder, "--verify")[0] == 0
+    assert RUN in Inventory(folder).files
+
+
+@pytest.mark.usefixtures("plain_pictures")
+@pytest.mark.parametrize(
+    ("name", "other"), [("figures/chart.png", "figures/other.png"), ("pareto.png", "pareto-9.png")]
+)
+def test_a_renamed_entry_of_the_list_loses_no_figure(whole_folder: Path, tmp_path: Path, name: str, other: str) -> None:
+    shutil.copytree(whole_folder, tmp_path, dirs_exist_ok=True)
+    folder = tmp_path / "outputs" / "small"
+    before = (folder / SUMS).read_text()
+    assert before.count(f"  {name}\n") == 1
+    (folder / SUMS).write_text(before.replace(f"  {name}\n", f"  {other}\n"))
+    assert commanded("status", folder, "--verify")[0] == 2
+    assert commanded("run", tmp_path / "small.yaml", "--output", folder.parent, "--jobs", 1)[0] == 0
+    assert (folder / name).read_bytes()
+    assert commanded("status", folder, "--verify")[0] == 0
+    assert Inventory(folder).files.keys() == {line.split()[1] for line in before.splitlines()}
+
+
+def test_a_run_of_which_nothing_is_known_is_not_touched(whole_folder: Path, tmp_path: Path) -> None:
+    shutil.copytree(whole_folder, tmp_path, dirs_exist_ok=True)
+    folder = tmp_path / "outputs" / "small"
+    for name in (RUN, SUMS, "provenance.json"):
+        emptied(folder / name)
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    for command in ("status", folder), ("run", tmp_path / "small.yaml", "--output", folder.parent):
+    for command in ("status", folder), ("report", folder), ("run", tmp_path / "small.yaml", "--output", folder.parent):
         code, _, said = commanded(*command)
         assert (code, said.count("\n")) == (2, 1)
-        assert "run.json: is damaged" in said
+        assert "run.json: is damaged, so that nothing is known of the run" in said
     assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
+
+
+def test_parts_whose_names_are_swapped_are_computed_again(plain: Study, whole: pd.DataFrame, tmp_path: Path) -> None:
+    parts = half_done(plain, tmp_path).paths("parquet")
+    first, second = parts[:2]
+    keys, digests = zip(*(path.stem.split("-") for path in (first, second)), strict=True)
+    assert len({*keys}) == len({*digests}) == 2
+    first.rename(first.with_name("kept"))
+    second.rename(second.with_name(f"{keys[0]}-{digests[1]}.parquet"))
+    first.with_name("kept").rename(first.with_name(f"{keys[1]}-{digests[0]}.parquet"))
+    ran(plain, tmp_path, 1)
+    pd.testing.assert_frame_equal(rows(tmp_path), whole)
+    assert (tmp_path / "provenance.json").read_text().count("was damaged on the disk and is computed again") == 2
 
 
 def test_the_list_of_digests_is_in_the_form_of_sha256sum(whole_folder: Path) -> None:
@@ -172,7 +236,7 @@ def test_damaged_parts_are_computed_again_and_named(plain: Study, whole: pd.Data
 def test_an_output_that_cannot_be_written_is_one_line(plain: Study, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     for folder in (tmp_path / "file" / "out", Path("/proc/nothing"), tmp_path / ("long" * 100)):
-        assert output_folder(folder, plain) == (folder, None)
+        assert output_folder(folder, run_facts(plain)) == (folder, None)
         with pytest.raises(OutputError, match="cannot be written"):
             ran(plain, folder, 1)
 
@@ -183,7 +247,7 @@ def test_without_run_json_files_of_a_run_s_names_are_others(whole_folder: Path, 
     for name in (RUN, SUMS):
         (folder / name).unlink()
     study = load_study(tmp_path / "small.yaml")
-    assert output_folder(folder, study)[0] == folder.with_name("small-2")
+    assert output_folder(folder, run_facts(study))[0] == folder.with_name("small-2")
     with pytest.raises(OutputError, match="is not of this run"):
         run_study(study, folder, 1, lambda *_: pytest.fail("something was computed"))
     assert commanded("status", folder)[0] == 2
@@ -221,8 +285,9 @@ def interrupted(study: Study, folder: Path) -> list[Path]:
 def planted(path: Path, content: bytes) -> None:
     """Other content under a part's key, with its right digest."""
     path.unlink()
-    digest = hashlib.sha256(content).hexdigest()[:32]
-    path.with_name(f"{path.name.split('-')[0]}-{digest}{path.suffix}").write_bytes(content)
+    key = path.name.split("-")[0]
+    digest = hashlib.sha256(key.encode() + content).hexdigest()[:32]
+    path.with_name(f"{key}-{digest}{path.suffix}").write_bytes(content)
 
 
 class Bomb:

@@ -16,10 +16,11 @@ from sweep.base.errors import OutputError
 from sweep.cli.audit import audit_output
 from sweep.cli.status import status_of
 from sweep.report import make_report, read_output
+from sweep.results.identity import run_facts
 from sweep.results.inventory import Inventory
 from sweep.results.lock import LOCK, locked
 from sweep.results.parts import PARTS, ROWS, Parts
-from sweep.results.tables import RUN, is_drawn, is_user_code
+from sweep.results.tables import RUN, is_drawn, is_of_run
 from sweep.run import output_folder, run_study
 from sweep.study import Study, load_study
 
@@ -62,7 +63,7 @@ def test_a_foreign_file_is_reported_and_stays(few: Study, tmp_path: Path, name: 
         run_study(few, base, 1, computed)
     assert len(caught.value.issues) == 1
     assert (base / name).read_text() == "mine"
-    folder, note = output_folder(base, few)  # the command goes beside it, and says why
+    folder, note = output_folder(base, run_facts(few))  # the command goes beside it, and says why
     assert folder == tmp_path / "tiny-2"
     assert note is not None
     assert name in note
@@ -158,7 +159,7 @@ def test_names_that_reports_give_are_known(finished: FinishedFolder, study: str)
     drawn = [path for path in folder.rglob("*") if path.suffix in (".png", ".svg", ".html")]
     assert len(drawn) > 10
     assert all(is_drawn(path.relative_to(folder).as_posix()) for path in drawn)
-    assert all(map(is_user_code, Inventory(folder).files.keys() - {RUN}))
+    assert all(map(is_of_run, Inventory(folder).files.keys() - {RUN}))
 
 
 @pytest.mark.usefixtures("plain_pictures")

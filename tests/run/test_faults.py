@@ -14,7 +14,7 @@ import pytest
 from sweep.base.errors import FailedDesignError, OutputError, SweepError
 from sweep.cli.status import status_of
 from sweep.report import make_report, read_output
-from sweep.results.identity import CHUNK
+from sweep.results.identity import CHUNK, run_facts
 from sweep.results.lock import locked
 from sweep.results.parts import ANSWER, PARTS, ROWS, Parts
 from sweep.run import RunOptions, output_folder, remaining_work, remaining_work_lines, run_study
@@ -165,22 +165,22 @@ def test_dry_run_lists_the_work_and_computes_no_design(tmp_path: Path, monkeypat
 
 def test_a_changed_study_goes_beside_the_old_one(plain: Study, tmp_path: Path) -> None:
     base = tmp_path / "tiny"
-    assert output_folder(base, plain) == (base, None)
+    assert output_folder(base, run_facts(plain)) == (base, None)
     ran(plain, base, 1)
-    assert output_folder(base, plain) == (base, None)
+    assert output_folder(base, run_facts(plain)) == (base, None)
     path = study_file(tmp_path)
     path.write_text(path.read_text().split("constraints:")[0].replace("exposure_s: 0.002", "exposure_s: 0.003"))
     changed = load_study(path)
-    folder, note = output_folder(base, changed)
+    folder, note = output_folder(base, run_facts(changed))
     assert folder == tmp_path / "tiny-2"
     assert note is not None
     assert "changed scenarios.dim.exposure.exposure_s: 0.002 -> 0.003" in note
     with pytest.raises(OutputError, match="holds another study"):
         ran(changed, base, 1)
     ran(changed, folder, 1)
-    assert output_folder(base, changed)[0] == folder
+    assert output_folder(base, run_facts(changed))[0] == folder
     path.write_text(path.read_text().replace("0.003", "0.004"))
-    assert output_folder(base, load_study(path))[0] == tmp_path / "tiny-3"
+    assert output_folder(base, run_facts(load_study(path)))[0] == tmp_path / "tiny-3"
 
 
 @pytest.mark.slow

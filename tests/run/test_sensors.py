@@ -318,8 +318,10 @@ def test_a_plain_run_is_not_overwritten(tmp_path: Path) -> None:
     assert commanded("run", path, "--output", tmp_path / "out", "--jobs", 1, "--quiet")[0] == 0
     before = (tmp_path / "out" / "few" / "results.parquet").read_bytes()
     path.write_text(SEVERAL)
-    code, _, err = commanded("run", path, "--output", tmp_path / "out", "--jobs", 1, "--quiet")
-    assert (code, "holds a run of one sensor" in err) == (2, True)
+    code, out, err = commanded("run", path, "--output", tmp_path / "out", "--jobs", 1, "--dry-run")
+    assert (code, "out/few holds another study of this name (of one sensor)" in err) == (0, True)
+    assert "Results go to" in out
+    assert "few-2" in out
     assert (tmp_path / "out" / "few" / "results.parquet").read_bytes() == before
 
 

@@ -130,10 +130,11 @@ def test_a_missing_or_empty_folder_is_reported(tmp_path: Path) -> None:
 
 def test_an_interrupted_and_a_changed_run_are_reported(tmp_path: Path) -> None:
     from sweep.results.folder import begin
+    from sweep.results.identity import run_facts
     from sweep.study import load_study
 
     path = study_file(tmp_path)
-    begin(tmp_path / "out" / "tiny", load_study(path))
+    begin(tmp_path / "out" / "tiny", run_facts(load_study(path)))
     assert "interrupted" in list_lines(tmp_path, studies_of(tmp_path, tmp_path / "out"))[0]
     path.write_text(
         path.read_text() + "seed: 77\n"

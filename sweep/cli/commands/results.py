@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ...base.errors import ErrorBoundExceededError, SweepError, ValidationIssue
+from ...base.errors import ErrorBoundExceededError, OutputError, SweepError, ValidationIssue
 from ..options import OF_RESULTS, AllowCode, DataFolder, ExportFormat, ImageForm, ImageSplit, RunFolder, run_folders
 from ..output import Json, ProgressDisplay, Quiet, print_result
 
@@ -132,16 +132,22 @@ def score(
 def report(context: typer.Context, folder: RunFolder) -> None:
     """Draw figures and report of a finished run again."""
     from ...report.sensors import report_sensors, runs_in
+    from ...results.inventory import Inventory
+    from ...results.lock import locked
     from ..run import finish
 
     began_s = context.find_root().obj
-    if not (runs := runs_in(folder)):
+    if not Inventory(folder).runs:
         finish(folder, began_s)
         return
-    for run in runs:
-        finish(run.folder, began_s, quiet=True)
-    for line in report_sensors(folder, runs):
-        typer.echo(line)
+    with locked(folder):
+        runs = runs_in(folder)
+        if not runs:
+            raise OutputError(ValidationIssue("no finished run here", str(folder), allowed="`sweep run` of its study"))
+        for run in runs:
+            finish(run.folder, began_s, quiet=True)
+        for line in report_sensors(Inventory(folder), runs):
+            typer.echo(line)
 
 
 def status(

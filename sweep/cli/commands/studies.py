@@ -146,7 +146,9 @@ def run(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Run studies one after the other: results, figures and report go to OUTPUT/<study>.
+    """Run studies one after the other: results, figures and report go to OUTPUT/<study>, the last line of each.
+
+    With --set they go to OUTPUT/<study>/KEY=VALUE.
 
     The same command continues an interrupted run, and replaces missing or damaged files.
     Other files in the folder are kept; SHA256SUMS lists those of the run.
@@ -154,8 +156,9 @@ def run(
     """
     from ...run import RunOptions
     from ...study import load_study, sensor_studies_in
-    from ..run import SensorsOptions, run_one, run_sensors
+    from ..run import SensorsOptions, changed_name, run_one, run_sensors
 
+    changed = changes_of(changes)
     with_options = partial(
         run_one,
         data=data,
@@ -165,7 +168,7 @@ def run(
         scheduler=scheduler,
         dry_run=dry_run,
         options=RunOptions(fail_fast, retry_failed),
-        changes=changes_of(changes),
+        changes=changed,
         allow_code=allow_code,
         opens=opens,
         as_json=as_json,
@@ -177,13 +180,13 @@ def run(
         if len(studies) > 1 and not quiet:
             typer.echo(f"== {path} ==", err=as_json)
         try:
-            several = sensor_studies_in(path, changes_of(changes))
+            several = sensor_studies_in(path, changed)
             run_it = partial(with_options, path, began_s=began_s)
             if several is None:
                 facts = run_it()
             else:
-                load = partial(load_study, path, data, changes=changes_of(changes), allow_code=allow_code)
-                how = SensorsOptions(output, jobs, dry_run, as_json, quiet, opens)
+                load = partial(load_study, path, data, changes=changed, allow_code=allow_code)
+                how = SensorsOptions(output, changed_name(changed), jobs, dry_run, as_json, quiet, opens)
                 facts = run_sensors(several, run_it, load, how)
         except InterruptedRunError:
             raise
@@ -191,6 +194,9 @@ def run(
             print_issues(error.issues)
             code = max(code, error.exit_code)
             facts = {"faults": [str(issue) for issue in error.issues], "exit_code": error.exit_code}
+        else:
+            if quiet and not (as_json or dry_run):  # else it ends the summary
+                typer.echo(facts["folder"])
         runs.append({"study": str(path), "exit_code": 0} | facts)
         began_s = time.monotonic()
     if as_json:
