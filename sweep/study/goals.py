@@ -29,6 +29,8 @@ _NUMBERS = re.compile(r"( [^ =]+=[^ =]+)+$")
 """Numbers that `each` adds to a scenario's name."""
 _MOST_OF_AXIS = 200
 """Values of one parameter of a map."""
+_MOST_LIGHT = 10.0
+"""Light of a modified channel over that of its base that anyone may want; larger bounds are percentages."""
 _LEAST_ERROR = 1e-12
 """Smallest error that is stated where errors are no exact sums."""
 
@@ -73,8 +75,24 @@ def check_goals(section: StudySection, sources: Sources, requested: RequestedQua
             if end not in ends and value is not None:
                 right = " or ".join(f"`{other}`" for other in ends)
                 sources.add((*path, end), f"{name} has no `{end}`", value, right)
+            elif value is not None:
+                _check_range((*path, end), known[name], value, sources)
         if known[name].rows == "decades" and bound.max is not None and not _LEAST_ERROR <= bound.max <= 1:
             sources.add((*path, "max"), "no such error is computed", bound.max, f"{_LEAST_ERROR:g} to 1")
+
+
+def _check_range(path: KeyPath, quantity: Quantity, value: float, sources: Sources) -> None:
+    """Check that a bound is one that the quantity can have."""
+    low = -math.inf if quantity.signed else 0.0
+    high = _MOST_LIGHT if quantity.role == "light" else quantity.most if path[-1] == "min" else math.inf
+    if not low <= value <= high:
+        percent = f"; {value:g} % are {value / 100:g}" if quantity.role == "light" and value <= 100 else ""
+        sources.add(
+            path,
+            f"{quantity.name} has no such values",
+            value,
+            (f"{low:g} or more" if high == math.inf else f"{low:g} to {high:g}") + percent,
+        )
 
 
 def _check_slopes(path: KeyPath, quantity: Quantity, section: StudySection, sources: Sources) -> None:
@@ -256,27 +274,6 @@ def _check_merged(section: StudySection, sources: Sources) -> None:
         if scene.drive is not None:
             problem = "a search under the noise of merged captures needs steady light"
             sources.add(("scenarios", name, "drive"), problem, None, "no `drive`")
-
-
-def bounds_like_percentages(study: Study) -> Iterator[str]:
-    """Find bounds on ratios that look like percentages.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-
-    Yields
-    ------
-    str
-        A warning per bound.
-    """
-    for name, bound in study.constraints.items():
-        quantity = study.quantities[name]
-        for end, value in (("min", bound.min), ("max", bound.max)):
-            if quantity.role == "light" and value is not None and 2 < value <= 100:
-                place = f"constraints.{name}.{end}"
-                yield f"{place}: {value:g} of a ratio; is it a percentage? {value:g} % are {value / 100:g}"
 
 
 def unreachable_constraints(study: Study, space: Space, scenario: str) -> list[ValidationIssue]:

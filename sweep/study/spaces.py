@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import cast
 
+import numpy as np
+
 from ..base.errors import SweepError, nearest
 from ..base.types import FloatArray
 from ..base.user_code import Offered, is_in_file, offers
@@ -26,6 +28,7 @@ from .sources import Sources
 from .user_code import allowed, code_of, is_from_outside
 
 _MOST_POINTS = 2_000_000
+_OUT_OF_ORDER_NM = 1e-9
 _MOST_DRAWN = 10_000_000
 _FAMILIES: Offered = "sweep.families"
 
@@ -184,6 +187,7 @@ class SpaceBuilder:
         made = Filter(family, dict.fromkeys(entry.channel, entry.base), target_name, entry.technology)
         space = Space(kind, name, entry.cfa, made, tuple(ordered), kind != "search" and rows is None, rows)
         check_filter(space, path, self.sensor, self.sources)
+        _check_formed(space, axes_path, self.sources)
         return [space]
 
     def _check_numbers(
@@ -237,6 +241,26 @@ class SpaceBuilder:
                     break
             ordered.append(values)
         return ordered
+
+
+def _check_formed(space: Space, path: KeyPath, sources: Sources) -> None:
+    """Check that a grid names each value once, and that some filter is well-formed: its edges are in order."""
+    twice = {name for name, axis in zip(space.parameters, space.axes, strict=True) if len({*axis}) < len(axis)}
+    for name in sorted(twice) if path[-1] == "grid" else ():
+        sources.add((*path, name), "a value twice", None, "different values")
+    if sources.issues or space.filter is None or isinstance(space.filter.family, PluginFamily):
+        return
+    if isinstance(space.rows, PairedDesigns):
+        beyond = float(space.violation(space.points(0, space.size)).min())
+    else:  # the conditions are linear, each least at a corner
+        low, high = (np.array([end(axis) for axis in space.axes], dtype=float) for end in (min, max))
+        slopes = space.filter.family.violation_gradient(low)
+        least = space.filter.family.violation(low[None])[0] + np.minimum(slopes * (high - low), 0.0).sum(axis=1)
+        beyond = float(least.max())
+    if beyond > _OUT_OF_ORDER_NM:
+        which = "is inverted" if space.kind == "design" else "has no filter whose edges are in order"
+        problem = f"{space.name} {which}: one edge lies {beyond:.6g} nm behind the next, or more"
+        sources.add(path[:-1], problem, None, "left edges before right ones, at both ends of the edges")
 
 
 def _sweep_axes(sweep: SweepSection, seed: int) -> tuple[str, dict[str, tuple[float, ...]], ListedDesigns | None]:

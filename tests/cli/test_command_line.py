@@ -109,20 +109,72 @@ def test_several_studies_in_one_call(tmp_path: Path, monkeypatch: pytest.MonkeyP
 def test_percentages_and_unreachable_constraints_are_reported(tmp_path: Path) -> None:
     path = tmp_path / "a.yaml"
     path.write_text(BASE.replace("sensitivity: {min: 0.9}", "sensitivity: {min: 90}"))
-    code, said, _ = commanded("check", path)
-    assert code == 0
-    assert "constraints.sensitivity.min: 90 of a ratio; is it a percentage? 90 % are 0.9" in said
-    assert "out of reach: sensitivity >= 90" in said
-    code, _, err = commanded("run", path, "--output", tmp_path / "out")
-    assert code == 3
-    assert "out of reach" in err
+    for command in ("check", path), ("run", path, "--output", tmp_path / "out"):
+        code, _, err = commanded(*command)
+        assert (code, err.count("\n")) == (2, 1)
+        assert (
+            "constraints.sensitivity.min: sensitivity has no such values (got 90.0); allowed: 0 to 10; 90 % are 0.9"
+            in err
+        )
+    path.write_text(BASE.replace("sensitivity: {min: 0.9}", "sensitivity: {min: 5}"))
+    for command in ("check", path), ("run", path, "--output", tmp_path / "out"):
+        code, _, err = commanded(*command)
+        assert code == 3
+        assert "out of reach: sensitivity >= 5" in err
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("name", ["sensitivity", "cfa_sensitivity", "edge_width_nm", "band_width_nm"])
-def test_no_design_of_a_box_exceeds_its_reported_maximum(tmp_path: Path, name: str) -> None:
+@pytest.mark.parametrize(
+    ("old", "new", "line"),
+    [
+        ("sensitivity: {min: 0.9}", "slope_per_nm: {max: -1}", "slope_per_nm has no such values (got -1.0)"),
+        (
+            "sensitivity: {min: 0.9}",
+            "min_transmission: {min: 1.5}",
+            "min_transmission has no such values (got 1.5); allowed: 0 to 1",
+        ),
+        ("left_width_nm: [5, 10]", "left_width_nm: [5, 10, 5]", "grid.left_width_nm: a value twice"),
+        (
+            "right_nm: 650",
+            "right_nm: 580",
+            "edges has no filter whose edges are in order: one edge lies 10 nm behind the",
+        ),
+    ],
+)
+def test_check_refuses_what_cannot_be_meant(tmp_path: Path, old: str, new: str, line: str) -> None:
+    assert old in BASE
+    path = tmp_path / "a.yaml"
+    path.write_text(BASE.replace(old, new))
+    code, _, err = commanded("check", path)
+    assert (code, err.count("\n"), line in err) == (2, 1, True), err
+
+
+def test_check_refuses_inverted_designs_and_boxes(tmp_path: Path) -> None:
+    path = tmp_path / "a.yaml"
+    start = "study: a\nsensor: ar0820\nlights: tl16\ncfas: [RGGB, RYNCy]\n"
+    of = "cfa: RYNCy, channel: N, base: Y, to: G"
+    band = "left_nm: {}, left_width_nm: {}, right_nm: {}, right_width_nm: 10"
+    for text, line in (
+        (f"designs: {{d: {{{of}, at: {{{band.format(660, 10, 640)}}}}}}}", "designs.d: d is inverted"),
+        (f"designs: {{d: {{{of}, at: {{{band.format(640, 60, 641)}}}}}}}", "designs.d: d is inverted"),  # at one end
+        (
+            f"boxes: {{b: {{{of}, box: {{{band.format([660, 680], 10, [630, 640])}}}}}}}\nsearch: {{space: b}}",
+            "boxes.b: b has no",
+        ),
+    ):
+        path.write_text(f"{start}{text}\n")
+        code, _, err = commanded("check", path)
+        assert (code, err.count("\n"), line in err) == (2, 1, True), err
+    path.write_text(f"{start}designs: {{d: {{{of}, at: {{{band.format(630, 10, 640)}}}}}}}\n")
+    assert commanded("check", path)[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "above"), [("sensitivity", 9), ("cfa_sensitivity", 1), ("edge_width_nm", 1000), ("band_width_nm", 1000)]
+)
+def test_no_design_of_a_box_exceeds_its_reported_maximum(tmp_path: Path, name: str, above: float) -> None:
     """Of 2,000 designs drawn from the box, none has more than the bound; just below its best one nothing is refused."""
-    study = load(tmp_path, BASE.replace("sensitivity: {min: 0.9}", f"{name}: {{min: 1000}}"))
+    study = load(tmp_path, BASE.replace("sensitivity: {min: 0.9}", f"{name}: {{min: {above}}}"))
     assert study.search is not None
     space = study.search.space
     (issue,) = unreachable_constraints(study, space, "chart")
