@@ -135,9 +135,9 @@ def test_percentages_and_unreachable_constraints_are_reported(tmp_path: Path) ->
         ),
         ("left_width_nm: [5, 10]", "left_width_nm: [5, 10, 5]", "grid.left_width_nm: a value twice"),
         (
-            "right_nm: 650",
-            "right_nm: 580",
-            "edges has no filter whose edges are in order: one edge lies 10 nm behind the",
+            "      right_nm: 650",
+            "      right_nm: 580",
+            "edges has no filter whose edges are in order: one edge lies ",
         ),
     ],
 )
