@@ -24,6 +24,7 @@ from ..results.lock import locked
 from ..results.parts import Parts
 from ..results.tables import ALL_SENSORS, PROVENANCE, REPORT, RESULTS, json_of
 from ..run.answers import CachedCalls
+from ..run.runner import discard
 from ..run.workers import backend_here, workers
 from ..study import SensorAndLights, SensorStudies, Study, folder_name, load_study
 from .output import ProgressDisplay, print_lines
@@ -191,6 +192,8 @@ def run_sensors(
                 raise
             except SweepError as error:  # the others are run all the same
                 failed.append(error)
+        if not made and not options.dry_run:
+            discard(inventory)
         if made and not options.dry_run:
             computed = any(facts["computed"] for facts in made.values())
             lines = _join(inventory, studies, made, options, computed=computed, began_s=began_s)

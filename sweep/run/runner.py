@@ -179,7 +179,7 @@ def run_study(
             try:
                 return run.make(wrong)
             except (StudyError, InfeasibleError):
-                _discard(inventory)
+                discard(inventory)
                 raise
 
 
@@ -354,7 +354,7 @@ def _hypervolumes(answer: SearchAnswer, gathered: RunRows) -> dict[str, float]:
     }
 
 
-def _discard(inventory: Inventory) -> None:
+def discard(inventory: Inventory) -> None:
     """Remove everything of a run without a result; files of others stay."""
     Parts(inventory.folder).remove()
     inventory.discard()

@@ -1,0 +1,209 @@
+"""The folder of a study of several sensors is a run: it is continued, verified and repaired, and kills lose nothing of it.
+
+A small study of vision is killed in the same way.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from sweep.results.inventory import Inventory
+from sweep.results.tables import ALL_SENSORS, REPORT, RESULTS, RUN, SUMS
+
+from ..commanded import commanded
+from ..conftest import draw_nothing
+from ..warm import Warm
+
+SEVERAL = """\
+study: few
+wavelengths: {step_nm: 5}
+sensors: [ar0820, opencam]
+lights: tl16
+cfas: [RGGB, RYNCy]
+boxes:
+  yellow: {cfa: RYNCy, channel: N, base: Y, to: G, box: {left_nm: [570, 640], left_width_nm: 8, right_nm: [630, 700], right_width_nm: 8}}
+constraints: {sensitivity: {min: 0.9}}
+search: {space: yellow, starts: 2, max_evaluations: 40}
+"""
+MEMBERS = ("ar0820_tl16", "opencam_tl16")
+VISION = """\
+study: few
+sensor: ar0820
+lights: tl16
+pixel: {read_noise_e: 2, offset_dn: 168, well_e: 4000}
+cfas: [RGGB, RYYCy]
+vision:
+  fov_deg: 120
+  distances_m: [500]
+  levels: {day: {illuminance_lx: 40000, exposure_s: 2.0e-5, phantom_cd: 50}}
+  crop_px: 16
+  places_per_pixel: 1
+  network: false
+  seeds: 2
+  train_images: 50
+  check_images: 50
+  test_images: 50
+"""
+
+pytestmark = pytest.mark.usefixtures("plain_pictures")
+
+
+@pytest.fixture(autouse=True)
+def plain_comparison(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sweep.report.sensors.rendered", lambda _, kind: kind.encode())
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("several")
+    with pytest.MonkeyPatch.context() as patch:
+        draw_nothing(patch)
+        patch.setattr("sweep.report.sensors.rendered", lambda _, kind: kind.encode())
+        code, out, err = run(folder)
+    assert code == 0, err
+    assert out.splitlines()[-1] == str(folder / "out" / "few")
+    return folder
+
+
+def run(folder: Path, text: str = SEVERAL, *extra: object) -> tuple[int, str, str]:
+    (folder / "few.yaml").write_text(text)
+    return commanded("run", folder / "few.yaml", "--output", folder / "out", "--jobs", 1, *extra)
+
+
+def copied(whole: Path, tmp_path: Path) -> Path:
+    shutil.copytree(whole, tmp_path, dirs_exist_ok=True)
+    return tmp_path / "out" / "few"
+
+
+def contents(folder: Path) -> dict[Path, bytes]:
+    return {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_a_finished_study_is_verified_and_not_computed_again(whole: Path, tmp_path: Path) -> None:
+    folder = copied(whole, tmp_path)
+    code, out, _ = commanded("status", folder, "--verify")
+    assert code == 0
+    assert "finished: 2 of 2 runs finished." in out
+    assert f"ok: its {len(Inventory(folder).files)} files are as the run wrote them." in out
+    before = contents(folder)
+    code, out, err = run(tmp_path, SEVERAL, "--quiet")
+    assert (code, out, err) == (0, f"{folder}\n", "")
+    assert contents(folder) == before
+    assert {RUN, SUMS, RESULTS, ALL_SENSORS, REPORT, "provenance.json"} <= {str(path) for path in before}
+
+
+@pytest.mark.parametrize("name", [ALL_SENSORS, RESULTS, REPORT, "provenance.json", RUN, SUMS])
+def test_damage_is_noticed_and_repaired(whole: Path, tmp_path: Path, name: str) -> None:
+    folder = copied(whole, tmp_path)
+    before = contents(folder)
+    os.truncate(folder / name, (folder / name).stat().st_size // 2)
+    code, _, err = commanded("status", folder, "--verify")
+    assert (code, "is damaged; `sweep run` of its study makes it again" in err) == (2, True)
+    code, _, err = commanded("report", folder)
+    assert (code, err.count("\n")) == ((2, 1) if name == ALL_SENSORS else (0, 0))
+    code, _, err = run(tmp_path)
+    assert (code, err.count("nothing was computed")) == (0, 2)
+    assert commanded("status", folder, "--verify")[0] == 0
+    for file in (ALL_SENSORS, RESULTS):
+        assert (folder / file).read_bytes() == before[Path(file)]
+
+
+def test_a_lost_run_is_made_again_alone(whole: Path, tmp_path: Path) -> None:
+    folder = copied(whole, tmp_path)
+    before = contents(folder)
+    shutil.rmtree(folder / MEMBERS[1])
+    assert "opencam tl16: not run." in commanded("status", folder)[1]
+    code, _, err = run(tmp_path)
+    assert (code, err.count("nothing was computed")) == (0, 1)
+    assert contents(folder)[Path(RESULTS)] == before[Path(RESULTS)]
+    assert commanded("status", folder, "--verify")[0] == 0
+
+
+def test_a_changed_study_goes_beside_with_its_own_filters(whole: Path, tmp_path: Path) -> None:
+    folder = copied(whole, tmp_path)
+    before = contents(folder)
+    code, _, err = run(tmp_path, SEVERAL.replace("[570, 640]", "[570, 575]"))
+    assert (code, "no design" in err, list(folder.parent.iterdir())) == (3, True, [folder])  # infeasible: nothing is left
+    code, out, err = run(tmp_path, SEVERAL.replace("0.9", "0.85"))
+    assert code == 0
+    assert "holds another study of this name (changed" in err
+    assert out.splitlines()[-1] == f"{folder}-2"
+    assert contents(folder) == before
+    tables = [pq.read_table(place / ALL_SENSORS) for place in (folder, Path(f"{folder}-2"))]
+    assert not tables[0].equals(tables[1])
+
+
+def test_other_commands_name_the_runs(whole: Path) -> None:
+    for command in ("export", "--design", "best"), ("audit",), ("compare", whole / "out" / "few"):
+        code, _, err = commanded(command[0], whole / "out" / "few", *command[1:])
+        assert (code, f"holds the runs of several sensors; allowed: one of {', '.join(MEMBERS)}" in err) == (2, True)
+
+
+def test_a_changed_value_names_the_folder_and_the_same_command_continues_it(tmp_path: Path) -> None:
+    text = SEVERAL.replace("sensors: [ar0820, opencam]", "sensor: ar0820").split("boxes")[0].replace(", RYNCy", "")
+    for bits in (8, 10, 8):
+        code, out, err = run(tmp_path, text, "--set", f"pixel.bits={bits}", "--set", "seed=2", "--quiet")
+        assert (code, out, err) == (0, f"{tmp_path}/out/few/pixel.bits={bits},seed=2\n", "")
+    assert sorted(path.name for path in (tmp_path / "out" / "few").iterdir()) == [
+        f"pixel.bits={bits},seed=2" for bits in (10, 8)
+    ]
+    code, out, _ = run(tmp_path, text, "--set", f"question=../{'x' * 300}")
+    (folder,) = [Path(line) for line in out.splitlines()[-1:]]
+    assert (code, folder.parent, len(folder.name)) == (0, tmp_path / "out" / "few", 129)
+
+
+def left_by(numbers: set[int]) -> list[str]:
+    """What joblib keeps in shared memory and temporary folders for some processes."""
+    places = [place for place in (Path("/dev/shm"), Path(tempfile.gettempdir())) if place.is_dir()]
+    names = [path.name for place in places for path in place.iterdir()]
+    found = [re.match(r"(?:sem\.loky-|joblib_memmapping_folder_)(\d+)[-_]", name) for name in names]
+    return [one[0] for one in found if one is not None and int(one[1]) in numbers]
+
+
+@pytest.mark.slow
+@pytest.mark.long
+@pytest.mark.skipif(not hasattr(os, "killpg"), reason="no process groups here")
+@pytest.mark.parametrize("text", [SEVERAL, VISION], ids=["several", "vision"])
+def test_kills_at_random_moments_lose_nothing(tmp_path: Path, text: str) -> None:
+    """Ten kills of the process or of its whole group, each at a random moment of what is left to do."""
+    rng = np.random.default_rng(11)
+    (tmp_path / "few.yaml").write_text(text)
+
+    numbers = set[int]()
+
+    def begun(name: str) -> Warm:
+        made = Warm("run", tmp_path / "few.yaml", "--output", tmp_path / name, "--jobs", 2, said=tmp_path / "said")
+        numbers.add(made.pid)
+        return made
+
+    started_s = time.monotonic()
+    assert begun("undisturbed").wait(timeout=120) == 0, (tmp_path / "said").read_text()
+    whole_s, kills = time.monotonic() - started_s, 0
+    while kills < 10:
+        process = begun("out")
+        time.sleep(float(rng.uniform(0, whole_s)))
+        if process.poll() is None:
+            group = rng.random() < 0.5
+            (os.killpg if group else os.kill)(process.pid, signal.SIGKILL if group else signal.SIGTERM)
+            kills += 1
+        process.wait(timeout=60)
+        said = (tmp_path / "said").read_text()
+        assert "Traceback" not in said.partition("Exception ignored")[0], said
+        if (tmp_path / "out" / "few" / REPORT).exists():
+            shutil.rmtree(tmp_path / "out")
+    assert begun("out").wait(timeout=120) == 0, (tmp_path / "said").read_text()
+    for table in (tmp_path / "undisturbed").rglob("*.parquet"):
+        again = tmp_path / "out" / table.relative_to(tmp_path / "undisturbed")
+        assert pq.read_table(again).equals(pq.read_table(table)), table.name
+    assert not [*(tmp_path / "out").rglob(".tmp-*"), *(tmp_path / "out").rglob("parts")]
+    assert not left_by(numbers)
