@@ -121,6 +121,8 @@ def run_one(
         from .audit import audit_again  # noqa: PLC0415  (tables are loaded while workers compute)
 
         audit_again(folder, data)
+        if quiet and member is None and not as_json:  # else it ends the summary
+            typer.echo(folder)
         with workers(n_workers if computed and backend == "loky" else 1) as parallel:
             silent = quiet or member is not None
             facts = finish(folder, began_s, repair=True, parallel=parallel, as_json=as_json, quiet=silent)
@@ -197,7 +199,7 @@ def run_sensors(
         if made and not options.dry_run:
             computed = any(facts["computed"] for facts in made.values())
             lines = _join(inventory, studies, made, options, computed=computed, began_s=began_s)
-            print_lines(lines, as_json=options.as_json, quiet=quiet)
+            print_lines(lines if not quiet else lines[-1:], as_json=options.as_json, quiet=quiet and options.as_json)
     if options.opens and made and not options.dry_run:
         webbrowser.open((folder / REPORT).absolute().as_uri())
     if failed:

@@ -133,7 +133,11 @@ def test_a_changed_study_goes_beside_with_its_own_filters(whole: Path, tmp_path:
     folder = copied(whole, tmp_path)
     before = contents(folder)
     code, _, err = run(tmp_path, SEVERAL.replace("[570, 640]", "[570, 575]"))
-    assert (code, "no design" in err, list(folder.parent.iterdir())) == (3, True, [folder])  # infeasible: nothing is left
+    assert (code, "no design" in err, list(folder.parent.iterdir())) == (
+        3,
+        True,
+        [folder],
+    )  # infeasible: nothing is left
     code, out, err = run(tmp_path, SEVERAL.replace("0.9", "0.85"))
     assert code == 0
     assert "holds another study of this name (changed" in err

@@ -195,9 +195,6 @@ def run(
             print_issues(error.issues)
             code = max(code, error.exit_code)
             facts = {"faults": [str(issue) for issue in error.issues], "exit_code": error.exit_code}
-        else:
-            if quiet and not (as_json or dry_run):  # else it ends the summary
-                typer.echo(facts["folder"])
         runs.append({"study": str(path), "exit_code": 0} | facts)
         began_s = time.monotonic()
     if as_json:
