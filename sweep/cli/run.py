@@ -194,9 +194,9 @@ def run_sensors(
                 raise
             except SweepError as error:  # the others are run all the same
                 failed.append(error)
-        if not made and not options.dry_run:
+        if not (made or options.dry_run):
             discard(inventory)
-        if made and not options.dry_run:
+        elif not options.dry_run:
             computed = any(facts["computed"] for facts in made.values())
             lines = _join(inventory, studies, made, options, computed=computed, began_s=began_s)
             print_lines(lines if not quiet else lines[-1:], as_json=options.as_json, quiet=quiet and options.as_json)

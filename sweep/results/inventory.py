@@ -104,7 +104,8 @@ class Inventory:
     @property
     def runs(self) -> list[SensorAndLights]:
         """Sensors and lights of a study of several; none of another."""
-        pairs = self.facts.get("runs", [])
+        stated = self.facts.get("runs")
+        pairs = stated if isinstance(stated, list) else []
         known = [pair for pair in pairs if isinstance(pair, list) and [type(name) for name in pair] == [str, str]]
         return [SensorAndLights(sensor, lights, (at, at)) for at, (sensor, lights) in enumerate(known)]
 

@@ -15,7 +15,7 @@ import numpy as np
 import pyarrow as pa
 
 from ..base.disk import read_facts
-from ..base.errors import InfeasibleError, StudyError, UpperBoundExceededError, ValidationIssue
+from ..base.errors import InfeasibleError, StudyError, UpperBoundExceededError
 from ..base.types import Progress
 from ..metrics.bound import FEASIBLE
 from ..metrics.pareto import hypervolume
@@ -48,7 +48,7 @@ from ..search.combinations import numbers_of
 from ..search.limit import Limit
 from ..search.problem import CONVERGED
 from ..study import Study
-from ..study.goals import unreachable_constraints
+from ..study.goals import refuse_unreachable
 from ..vision.installed import require_network
 from .answers import CachedCalls
 from .check import check_run
@@ -157,10 +157,7 @@ def run_study(
         SIGINT or SIGTERM came; finished parts are kept.
     """
     started = time.monotonic()
-    if study.search is not None and (
-        beyond := unreachable_constraints(study, study.search.space, study.search.scenario)
-    ):
-        raise InfeasibleError([ValidationIssue(f"{study.name}: no design can be feasible"), *beyond])
+    refuse_unreachable(study)
     if study.section.vision is not None and study.section.vision.network:
         require_network()
     with stopped_by_signals(), locked(output):

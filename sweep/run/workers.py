@@ -216,7 +216,7 @@ def backend_here(backend: str) -> str:
 
 
 def _start_quiet_tracker() -> None:
-    """Start the process that removes joblib's semaphores; it warns of those that workers left behind when killed."""
+    """Start the process that removes joblib's semaphores; warnings of what a stopped run left are ignored."""
     before = os.environ.get("PYTHONWARNINGS")
     os.environ["PYTHONWARNINGS"] = ",".join(filter(None, (before, "ignore:resource_tracker:UserWarning")))
     try:

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..base.errors import ValidationIssue
+from ..base.errors import InfeasibleError, ValidationIssue
 from ..base.user_code import kind_in_words
 from ..camera.scene import WhitePatchExposure
 from ..designs.family import ChoosingFamily
@@ -274,6 +274,13 @@ def _check_merged(section: StudySection, sources: Sources) -> None:
         if scene.drive is not None:
             problem = "a search under the noise of merged captures needs steady light"
             sources.add(("scenarios", name, "drive"), problem, None, "no `drive`")
+
+
+def refuse_unreachable(study: Study) -> None:
+    """Raise InfeasibleError if no filter of the searched space can meet a constraint."""
+    search = study.search
+    if search is not None and (beyond := unreachable_constraints(study, search.space, search.scenario)):
+        raise InfeasibleError([ValidationIssue(f"{study.name}: no design can be feasible"), *beyond])
 
 
 def unreachable_constraints(study: Study, space: Space, scenario: str) -> list[ValidationIssue]:

@@ -248,7 +248,7 @@ def _check_formed(space: Space, path: KeyPath, sources: Sources) -> None:
     twice = {name for name, axis in zip(space.parameters, space.axes, strict=True) if len({*axis}) < len(axis)}
     for name in sorted(twice) if path[-1] == "grid" else ():
         sources.add((*path, name), "a value twice", None, "different values")
-    if sources.issues or space.filter is None or isinstance(space.filter.family, PluginFamily):
+    if space.filter is None or isinstance(space.filter.family, PluginFamily):
         return
     if isinstance(space.rows, PairedDesigns):
         beyond = float(space.violation(space.points(0, space.size)).min())

@@ -5,6 +5,7 @@ A small study of vision is killed in the same way.
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -151,6 +152,14 @@ def test_other_commands_name_the_runs(whole: Path) -> None:
     for command in ("export", "--design", "best"), ("audit",), ("compare", whole / "out" / "few"):
         code, _, err = commanded(command[0], whole / "out" / "few", *command[1:])
         assert (code, f"holds the runs of several sensors; allowed: one of {', '.join(MEMBERS)}" in err) == (2, True)
+
+
+@pytest.mark.parametrize("runs", [5, None, "ab", [1], [["a"]], {"a": 1}])
+def test_forged_runs_are_none(tmp_path: Path, runs: object) -> None:
+    (tmp_path / RUN).write_text(json.dumps({"fingerprint": "0" * 64, "runs": runs}))
+    assert Inventory(tmp_path).runs == []
+    code, _, err = commanded("report", tmp_path)
+    assert (code, err.count("\n")) == (2, 1)
 
 
 def test_a_changed_value_names_the_folder_and_the_same_command_continues_it(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ...base.errors import InfeasibleError, InterruptedRunError, StudyError, SweepError, ValidationIssue
+from ...base.errors import InterruptedRunError, StudyError, SweepError, ValidationIssue
 from ..endings import print_issues
 from ..options import (
     OF_STUDIES,
@@ -34,7 +34,7 @@ PANEL = OF_STUDIES
 def check(study: StudyPath, data: DataFolder = None, changes: Changes = None, allow_code: AllowCode = False) -> None:
     """Check a study file and count its designs, without running it."""
     from ...study import load_study, sensor_studies_in
-    from ...study.goals import unreachable_constraints
+    from ...study.goals import refuse_unreachable
 
     changed = changes_of(changes)
     several = sensor_studies_in(study, changed)
@@ -42,9 +42,7 @@ def check(study: StudyPath, data: DataFolder = None, changes: Changes = None, al
     for member in members:
         loaded = load_study(study, data, changes=changed, allow_code=allow_code, member=member)
         which = "" if member is None else f"{member.name}: "
-        search = loaded.search
-        if search is not None and (beyond := unreachable_constraints(loaded, search.space, search.scenario)):
-            raise InfeasibleError([ValidationIssue(f"{loaded.name}: no design can be feasible"), *beyond])
+        refuse_unreachable(loaded)
         typer.echo(f"{study}: {which}{loaded.n_designs:,} designs on {', '.join(loaded.mosaics)}; nothing wrong found.")
         for warning in loaded.warnings:
             typer.echo(f"Note: {warning}.")
