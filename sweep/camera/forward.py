@@ -50,8 +50,8 @@ class ForwardModel:
         Evaluate once, so that no table of products is kept.
     """
 
-    all_apart, together = False, False
-    """True: all phases are kept; True: the pixels of all field positions are held together."""
+    together = False
+    """True: the pixels of all field positions are held together."""
 
     def __init__(self, setup: Setup, phases: Phases | None = None, *, once: bool = False) -> None:
         """Store the setup, and split responses that are too large to hold at once."""
@@ -63,8 +63,7 @@ class ForwardModel:
         self._of_scene = phases is None
         self._latest: dict[str, tuple[bytes, Any]] = {}
         if phases is None and setup.scene.target is not None:
-            phases = scene_phases(setup)
-            phases = phases if self.all_apart else different_phases(setup, phases)[0]
+            phases = different_phases(setup, scene_phases(setup))[0]
         self.phases = phases
         if setup.linear or phases is None:
             return
@@ -385,12 +384,6 @@ class ForwardModel:
     def few_pixels(self) -> tuple[IndexArray, ...] | None:
         """Pixels whose mean is each channel; None for a target, or if they are many."""
         return None if self.setup.scene.target is not None else self.readout.few_pixels
-
-
-class AllPhases(ForwardModel):
-    """Forward model that keeps mirrored phases apart, for pixels that are drawn one by one."""
-
-    all_apart = True
 
 
 _models: Cache[tuple[type[ForwardModel], bytes], ForwardModel] = Cache(16)

@@ -1,4 +1,4 @@
-"""Effects of noise on the states of a study: figures, usable ranges, recognition."""
+"""Effects of noise on the states of a study: figures, usable ranges, table."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ import pandas as pd
 from ..base.types import BoolArray, FloatArray
 from ..metrics.columns.chromatic import CHROMATIC_ERROR
 from ..metrics.columns.confusion import D_PRIME, STATE_ERROR, STATE_ERROR_BOUND
-from ..metrics.recognition import CLASSIFIERS, MOST_LIKELY
 from ..results.output import Output
 from ..spectra.lights import Pair
 from ..study.axes import series_of
@@ -34,19 +33,13 @@ _ANY_NOTE = (
     "brightness, by Gaussians with the noise of both. The dashed line is the error that the study allows; a ring marks "
     "where a design passes it."
 )
-_COUNTED = (
-    "Counted: of raw patches drawn with noise, of all signals, the share whose state a classifier says that was "
-    "trained on others. It is of all signals, the error above of the two that are confused most: neither follows from "
-    "the other."
-)
 _HANDOVERS = (
     "A stroke marks where a channel hands over to its next capture, or is saturated, for the median {kind} lamp."
 )
-_RULE_NAMES = {MOST_LIKELY: "most likely signal", "nearest_centroid": "nearest centroid", "lda": "LDA"}
 
 
 def all_series(output: Output) -> list[SeriesFigure]:
-    """Return every figure of a quantity over scenarios: errors and accuracies, if requested, then separations.
+    """Return every figure of a quantity over scenarios: errors, if requested, then separations.
 
     Parameters
     ----------
@@ -61,7 +54,7 @@ def all_series(output: Output) -> list[SeriesFigure]:
     figures = [*_noise_figures(output), *series_figures(output)]
     if output.handovers is not None:
         figures = [_with_handovers(figure, output.handovers, output.trade_off[0].pair) for figure in figures]
-    return sorted(figures, key=lambda figure: figure.note == _COUNTED)  # accuracies of drawn patches last
+    return figures
 
 
 def _with_handovers(figure: SeriesFigure, handovers: pd.DataFrame, pair: Pair | None) -> SeriesFigure:
@@ -76,7 +69,7 @@ def _with_handovers(figure: SeriesFigure, handovers: pd.DataFrame, pair: Pair | 
 
 
 def _noise_figures(output: Output) -> Iterator[SeriesFigure]:
-    """Yield for each series of scenarios the error of the worst pair of states, and accuracies of classifiers."""
+    """Yield for each series of scenarios the error of the worst pair of states."""
     if output.study.recognition is None:
         return
     for (base, key), scenarios in series_of(output.scenarios).items():
@@ -97,12 +90,6 @@ def _noise_figures(output: Output) -> Iterator[SeriesFigure]:
             lines = {name: Line(dprime, None) for name, dprime in dprimes.items()}
             y_label = f"{_LEAST_DPRIME} ({_DRAWN_DPRIME[0]:g}: or less)"
             yield draw(f"{where}: {_LEAST_DPRIME}", y_label=y_label, lines=lines, log_y=True)
-        if output.recognition is not None:
-            for rule in CLASSIFIERS:
-                accuracies = over_series(output.recognition, scenarios, f"{rule}_accuracy")
-                lines = {name: Line(accuracy, None) for name, accuracy in accuracies.items()}
-                y_label = f"accuracy of {_RULE_NAMES[rule]} on raw patches"
-                yield draw(f"{where}: {y_label}", y_label=y_label, lines=lines, from_zero=False, note=_COUNTED)
 
 
 def usable_lines(output: Output) -> Iterator[str]:
@@ -204,7 +191,7 @@ def _dprimes(output: Output) -> list[str]:
 
 
 def recognition_table(output: Output) -> pd.DataFrame:
-    """Return errors in closed form and accuracies on drawn patches, one row per design and scenario.
+    """Return errors, one row per design and scenario.
 
     Parameters
     ----------
@@ -224,10 +211,4 @@ def recognition_table(output: Output) -> pd.DataFrame:
     shown["smallest d'"] = rows[dprime].min(axis=1).map("{:.2f}".format)
     for column, label in ((STATE_ERROR, _ERROR), (STATE_ERROR_BOUND, "bound of the error")):
         shown[label] = rows[column].map("{:.2g}".format)
-    if output.recognition is not None:
-        by_id = output.recognition.set_index("design_id").reindex(rows["design_id"])
-        for rule in (MOST_LIKELY, *CLASSIFIERS):
-            columns = by_id[[f"{rule}_accuracy{end}" for end in ("", "_low", "_high")]]
-            texts = [f"{v:.4f} ({a:.4f} to {b:.4f})" for v, a, b in columns.itertuples(index=False)]
-            shown[f"accuracy, {_RULE_NAMES[rule]}"] = texts
     return shown

@@ -157,7 +157,6 @@ FILES = {
     "with the limit alone: " + ", ".join(files.front_schema(["<parameters>"]).names),
     files.CURVES: "a row per curve and wavelength: " + ", ".join(SCHEMA.names),
     files.POINTS: "points of the clouds: design_id, signal_type, signal, channel, dn",
-    files.RECOGNITION: "raw patches classified, where a study asks for them, with 95 % intervals",
     files.CROSSINGS: "where a study with `recognition` has scenarios that differ in one number: the numbers `at` which "
     "the error of a plain CFA, named design or answer of the search is the allowed one, with everything on, the "
     "`error` there, and whether it `rises` beyond; `quantity`: `state_error` of lamps of equal brightness, or "

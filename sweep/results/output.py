@@ -75,7 +75,6 @@ class Output:
     curves: KeptCurves
     points: pd.DataFrame
     front: pd.DataFrame | None
-    recognition: pd.DataFrame | None
     crossings: pd.DataFrame | None
     searched: pd.DataFrame | None
     audited: pd.DataFrame | None
@@ -321,7 +320,6 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         curves=curves,
         points=more[files.POINTS],
         front=more.get(files.FRONT),
-        recognition=more.get(files.RECOGNITION),
         crossings=more.get(files.CROSSINGS),
         searched=more.get(files.SEARCH_LOG),
         audited=more.get(files.AUDIT),

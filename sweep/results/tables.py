@@ -26,7 +26,6 @@ SEARCH_LOG = "search.parquet"
 FRONT = "front.parquet"
 CURVES = "curves.parquet"
 POINTS = "points.parquet"
-RECOGNITION = "recognition.parquet"
 CROSSINGS = "crossings.parquet"
 LIMITED_BY = "limited_by.parquet"
 ROBUSTNESS = "robustness.parquet"
@@ -52,7 +51,7 @@ RUN, SUMS = "run.json", "SHA256SUMS"
 REPORT, FIGURES, VISION_FIGURES = "report.html", "figures", "vision-"
 MADE_BY_RUN = frozenset(
     (
-        *(RESULTS, SEARCH_LOG, FRONT, CURVES, POINTS, RECOGNITION, CROSSINGS, LIMITED_BY, ROBUSTNESS, REGIONS_MAP),
+        *(RESULTS, SEARCH_LOG, FRONT, CURVES, POINTS, CROSSINGS, LIMITED_BY, ROBUSTNESS, REGIONS_MAP),
         *(SENSOR_MAP, TRADED, RENDERED, VALIDATED, LEFT_OUT, COMBINATIONS, MAP, HANDOVERS, WORST, SATURATED),
         UNCERTAINTY,
         *(*VISION_TABLES, ALL_SENSORS, PROVENANCE, RESOLVED),

@@ -19,7 +19,6 @@ from ..results.tables import (
     HANDOVERS,
     LIMITED_BY,
     POINTS,
-    RECOGNITION,
     REGIONS_MAP,
     RENDERED,
     ROBUSTNESS,
@@ -36,7 +35,7 @@ from ..study.axes import series_of
 from .allowed_lamps import regions_table
 from .colors import error_against_noise_table, rendered_table
 from .crossings import crossings_table
-from .details import Details, limited_by_table, recognition_table, sensor_map_table
+from .details import Details, limited_by_table, sensor_map_table
 from .handovers import handovers_table
 from .held_out import held_out_table
 from .robustness import robustness_table
@@ -114,7 +113,7 @@ def row_tables(study: Study) -> dict[str, Callable[[DerivedInput], pa.Table]]:
     dict of str to callable
         Function of each table, by file name, in the order of their computation.
     """
-    recognition, tasks = study.section.recognition, study.tasks
+    tasks = study.tasks
     tables: dict[str, Callable[[DerivedInput], pa.Table]] = {
         CURVES: _curves_table,
         POINTS: _points_table,
@@ -135,10 +134,8 @@ def row_tables(study: Study) -> dict[str, Callable[[DerivedInput], pa.Table]]:
         tables[HANDOVERS] = lambda s: handovers_table(s.study, s.rows, s.parallel, s.progress)
     if has_worst(study):
         tables[WORST] = lambda s: worst_table(s.study, s.rows, s.parallel, s.progress)
-    if recognition is not None and series_of(study.scenarios):
+    if study.section.recognition is not None and series_of(study.scenarios):
         tables[CROSSINGS] = lambda s: crossings_table(s.study, s.rows, s.parallel, s.progress)
-    if recognition is not None and recognition.patches:
-        tables[RECOGNITION] = lambda s: recognition_table(s.study, s.rows, s.details)
     if tasks is not None and "color" in tasks.by_name:
         tables[TRADED] = lambda s: error_against_noise_table(s.study, s.rows)
         tables[RENDERED] = lambda s: rendered_table(s.study, s.rows)

@@ -1,4 +1,4 @@
-"""Details of the designs that a report shows: limiting lights, digital numbers, recognition, maps over the sensor."""
+"""Details of the designs that a report shows: limiting lights, digital numbers, maps over the sensor."""
 
 from __future__ import annotations
 
@@ -11,16 +11,15 @@ import pyarrow as pa
 
 from ..base.types import FloatArray, IndexArray, Parallel, Progress, delayed
 from ..camera.field import over_field, scene_at
-from ..camera.forward import AllPhases, ForwardModel, forward_model
+from ..camera.forward import forward_model
 from ..camera.setup import Setup
 from ..designs.block import CurveBlock, edges_of_some
 from ..designs.space import Space
 from ..metrics.limiting import LimitingLights, limited_by_name, limiting_lights, limiting_lights_of
-from ..metrics.recognition import columns, recognize
 from ..metrics.separation import csd_name, separations
 from ..metrics.smooth import smooth_response
 from ..results.designs import computed_rows, few_rows, row_curves
-from ..results.tables import FEW, FOUND, LIMITED_BY, POINTS, RECOGNITION
+from ..results.tables import FOUND, LIMITED_BY, POINTS
 from ..spectra.lights import Pair
 from ..study import Study
 from .workers import run_with_progress
@@ -33,8 +32,8 @@ _HEIGHTS = 41
 """Image heights of a sensor map, in equal steps."""
 _MOST_VALUES = 2_000_000
 """Digital numbers that are held at once."""
-_Design = tuple[int, FloatArray, frozenset[str]]
-"""A design's id, its curves, ndarray[1, n_modified, n_wavelengths], and the tables that it is in."""
+_Design = tuple[int, FloatArray]
+"""A design's id, and its curves, ndarray[1, n_modified, n_wavelengths]."""
 
 
 @dataclass(frozen=True)
@@ -47,13 +46,10 @@ class Details:
         Two lights that limit each separation.
     dn : ndarray of shape (n_signals, n_channels)
         Digital numbers at the first sampling phase.
-    recognized : mapping of str to float
-        Result of `recognize`.
     """
 
     limited_by: Mapping[Pair, str | None] | None = None
     dn: FloatArray | None = None
-    recognized: Mapping[str, float] | None = None
 
 
 def design_details(
@@ -90,76 +86,32 @@ def design_details(
     groups: dict[tuple[str, ...], tuple[Setup, list[_Design]]] = {}
     for row in computed_rows(rows, on_front):
         scenario, design_id = str(row["scenario"]), int(row["design_id"])
-        wanted = {LIMITED_BY}
-        if design_id in front or scenario == first or row["kind"] == FOUND:
-            wanted.add(POINTS)
-        if _patches(study) and row["kind"] in FEW:
-            wanted.add(RECOGNITION)
-        if wanted := wanted.intersection(tables):
+        if LIMITED_BY in tables or (
+            POINTS in tables and (design_id in front or scenario == first or row["kind"] == FOUND)
+        ):
             space, curves = row_curves(study, row)
             key = (scenario, space.cfa, *(() if space.filter is None else space.filter.channels))
             group = groups.setdefault(key, (study.setup(space, scenario), []))
-            group[1].append((design_id, curves, frozenset(wanted)))
+            group[1].append((design_id, curves))
     calls = [
-        delayed(_details, setup, designs[start : start + _AT_ONCE], study.states, _patches(study), study.section.seed)
+        delayed(_details, setup, designs[start : start + _AT_ONCE])
         for setup, designs in groups.values()
         for start in range(0, len(designs), _AT_ONCE)
     ]
     result: dict[int, Details] = {}
-    for details in run_with_progress(parallel, calls, "lights and patches", progress):
+    for details in run_with_progress(parallel, calls, "digital numbers", progress):
         result |= details
     return result
 
 
-def _patches(study: Study) -> int:
-    recognition = study.section.recognition
-    return 0 if recognition is None else recognition.patches or 0
-
-
-def _details(
-    setup: Setup, designs: Sequence[_Design], states: tuple[str, ...], patches: int, seed: int
-) -> dict[int, Details]:
-    """Return details by row id; random patches follow from the study's seed and the id."""
+def _details(setup: Setup, designs: Sequence[_Design]) -> dict[int, Details]:
+    """Return details by row id."""
     result = {}
-    for design_id, curves, wanted in designs:
-        model = forward_model(setup, AllPhases if RECOGNITION in wanted else ForwardModel)
-        limited_by = dn = recognized = None
-        if wanted & {LIMITED_BY, POINTS}:
-            response = model.read(curves)[0]
-            limited_by = {pair: lights[0] for pair, lights in limiting_lights(setup, response).items()}
-            dn = response[0, 0].copy()
-        if RECOGNITION in wanted:
-            assert isinstance(model, AllPhases)
-            recognized = recognize(model, curves, states, patches, np.random.default_rng((seed, design_id)))
-        result[design_id] = Details(limited_by, dn, recognized)
+    for design_id, curves in designs:
+        response = forward_model(setup).read(curves)[0]
+        limited_by = {pair: lights[0] for pair, lights in limiting_lights(setup, response).items()}
+        result[design_id] = Details(limited_by, response[0, 0].copy())
     return result
-
-
-def recognition_table(study: Study, rows: pd.DataFrame, details: Mapping[int, Details]) -> pa.Table:
-    """Return one row per plain CFA, named design and answer: keys, `patches` and `recognition.columns`.
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    rows : pandas.DataFrame
-        Rows of plain CFAs, named designs and the answer.
-    details : mapping of int to Details
-        Details by row id.
-
-    Returns
-    -------
-    pyarrow.Table
-        Table.
-    """
-    keys = ["design_id", "kind", "name", "cfa", "scenario"]
-    made = []
-    for row in few_rows(rows):
-        recognized = details[int(row["design_id"])].recognized
-        assert recognized is not None
-        made.append({key: row[key] for key in keys} | {"patches": _patches(study)} | dict(recognized))
-    fields = [("design_id", pa.int64()), *((key, pa.string()) for key in keys[1:]), ("patches", pa.int64())]
-    return pa.Table.from_pylist(made, schema=pa.schema([*fields, *((name, pa.float64()) for name in columns())]))
 
 
 def limited_by_table(

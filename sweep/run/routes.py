@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 
 from ..base.types import FloatArray
-from ..camera.forward import AllPhases, ForwardModel, forward_model
+from ..camera.forward import ForwardModel, forward_model
 from ..camera.plan import Plan
 from ..camera.setup import Setup
 from ..designs.block import CurveBlock, edges_of
@@ -54,8 +54,6 @@ class Rules:
         Benchmark of vision.
     seed : int
         Seed of the study.
-    drawn : bool
-        Raw patches are drawn of plain CFAs and named designs.
     """
 
     schema: pa.Schema
@@ -67,7 +65,6 @@ class Rules:
     plans: Mapping[str, Plan]
     vision: Vision | None
     seed: int
-    drawn: bool
 
     @property
     def order(self) -> tuple[str, ...]:
@@ -148,7 +145,7 @@ def text_of(error: Exception) -> str:
 def _columns(space: Space, start: int, setup: Setup, points: FloatArray, rules: Rules) -> Columns:
     """Return the quantities of a block of designs, ndarray of shape (n_designs,) each."""
     size, requested = setup.camera.grid.size, rules.requested
-    model = forward_model(setup, AllPhases if rules.drawn and space.kind in FEW else ForwardModel)
+    model = forward_model(setup)
     edges = edges_of(space, start, start + len(points))
     designs = CurveBlock(space.curves(points, size)) if edges is None else edges
     columns = evaluate(

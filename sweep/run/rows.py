@@ -126,7 +126,7 @@ def rules_of(study: Study) -> Rules:
     Rules
         Rules.
     """
-    section, recognition = study.section, study.section.recognition
+    section = study.section
     return Rules(
         schema=described(result_schema(study.parameters, list(study.quantities)), study.quantities),
         requested=study.requested,
@@ -137,7 +137,6 @@ def rules_of(study: Study) -> Rules:
         plans=study.plans,
         vision=section.vision,
         seed=section.seed,
-        drawn=recognition is not None and bool(recognition.patches),
     )
 
 

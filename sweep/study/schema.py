@@ -38,7 +38,6 @@ from .schema_curves import (
     named,
 )
 
-_FEWEST_PATCHES = 10
 _MOST_ROWS = 64
 _MOST_DRAWN = 1_000_000
 _MOST_OWN = 50
@@ -173,19 +172,10 @@ class Recognition(Section):
 
     states: Annotated[list[Name], Field(min_length=2, max_length=MOST_TYPES)] | None = None
     """Signal types to classify; left out, all of them."""
-    patches: int = Field(default=200, ge=0, le=5000)
-    """Raw patches of every signal, drawn for each plain CFA, named design and answer of the search, half of them
-    to train the classifiers; 0: none."""
     error_max: float = Field(default=1e-3, ge=1e-300, lt=0.5)
     """Largest error probability of two states at which a CFA counts as usable."""
     probabilities: bool = False
     """Add columns of the contrast transfer accuracy (CTA) of IEEE 2020-2024 (formerly CDP)."""
-
-    @model_validator(mode="after")
-    def _enough(self) -> Recognition:
-        if 0 < self.patches < _FEWEST_PATCHES:
-            raise ValueError(f"patches: 0, or at least {_FEWEST_PATCHES}: {self.patches} are too few to train and test")
-        return self
 
 
 class Levels(Section):

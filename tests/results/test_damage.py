@@ -38,11 +38,11 @@ EVERY_TABLE = stopband_study(
     after="""\
 constraints: {sensitivity: {min: 0.9}}
 search: {starts: 1, max_evaluations: 20, front: {min: 0.8, max: 0.9, count: 2}}
-recognition: {states: [green, yellow, red], patches: 20}
+recognition: {states: [green, yellow, red]}
 published: {Table 2: {RGGB: {csd_yellow_red: 138}}}
 """,
 )
-TABLES = ("results", "search", "front", "curves", "points", "recognition")
+TABLES = ("results", "search", "front", "curves", "points")
 FILES = (
     *(f"{name}.parquet" for name in (*TABLES, "audit", "paper_comparison")),
     *("study.resolved.yaml", "provenance.json", "report.html", "pareto.png", "figures/sensor.svg", SUMS),

@@ -7,7 +7,7 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from sweep.results.tables import LIMITED_BY, POINTS, RECOGNITION
+from sweep.results.tables import LIMITED_BY, POINTS
 from sweep.run import run_study
 from sweep.study import load_study
 
@@ -24,9 +24,9 @@ scenarios:
 cfas: [RGGB, RYNCy]
 designs:
   RYN4Cy: {cfa: RYNCy, channel: N, base: Y, to: G, at: RYN4Cy}
-recognition: {states: [yellow, red], patches: 20}
+recognition: {states: [yellow, red]}
 """
-TABLES = (LIMITED_BY, POINTS, RECOGNITION)
+TABLES = (LIMITED_BY, POINTS)
 
 
 @pytest.fixture

@@ -29,7 +29,6 @@ SAID = "sweep: interrupted; finished parts are kept, the same command continues\
 PHASES = {
     "search": ("sweep.search.solver:search_from", 3),
     "sweep": ("sweep.metrics.evaluate:evaluate", 6),
-    "recognition": ("sweep.metrics.recognition:recognize", 2),
     "tables": ("sweep.results.tables:write_tables", 1),
     "points": ("sweep.results.tables:write_table", 2),
     "check": ("sweep.run.check:_checked", 1),
@@ -47,7 +46,7 @@ def noisy_study(folder: Path) -> Path:
         .replace("chart: {exposure: {kind: white_patch}}", "chart: {noise: true}")
     )
     text = text.replace("exposure_s: 0.002}}", "exposure_s: 0.002}, noise: true}")
-    path.write_text(text + "recognition: {states: [green, yellow, red], patches: 40}\n")
+    path.write_text(text + "recognition: {states: [green, yellow, red]}\n")
     return path
 
 
@@ -111,7 +110,7 @@ def assert_continues(folder: Path, undisturbed: Path, jobs: int) -> None:
     """The same command, in this process."""
     code, _, said = commanded(*command(folder, "--jobs", str(jobs))[3:])
     assert code == 0, said
-    for name in ("results", "search", "points", "recognition", "curves"):
+    for name in ("results", "search", "points", "curves"):
         tables = [pq.read_table(place / f"{name}.parquet") for place in (folder / "out" / "tiny", undisturbed)]
         assert tables[0].equals(tables[1]), name
     assert not list((folder / "out").rglob(".tmp-*"))

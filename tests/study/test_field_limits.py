@@ -62,7 +62,7 @@ sweeps:
   grid: {cfa: RYNCy, channel: N, base: Y, to: 0.1, grid: {left_nm: {min: 590.0, max: 610.0, count: 2}, left_width_nm: [5.0],
     right_nm: 650.0, right_width_nm: {values: [5.0]}, depth: 1.0}}
 production: {edge_shift_nm: 2.0}
-recognition: {patches: 10, error_max: 0.001}
+recognition: {error_max: 0.001}
 objective: {minimum: {csd_yellow_red: 1.0}}
 constraints: {sensitivity: {min: 0.9}, slope_per_nm: {max: 0.06}}
 search: {space: grid, starts: 2, max_evaluations: 20, front: {min: 0.9, max: 1.0, count: 2}}
