@@ -181,10 +181,10 @@ def test_the_figures_at_an_angle_are_those_of_their_command(finished: FinishedFo
 @pytest.mark.slow
 def test_the_figures_of_accuracy_are_those_of_their_command(tmp_path: Path) -> None:
     study = load_study(STUDIES / "accuracy.yaml")
-    measure_accuracy(study, lambda _: study, tmp_path, lambda *_: None, settings={}, presets=("fast", "standard"))
+    measure_accuracy(study, tmp_path, lambda *_: None, presets=("fast", "standard"))
     table = pd.read_parquet(tmp_path / "accuracy.parquet")
     assert table["scenario"].nunique() == 8
-    errors = table.groupby("value")["error_dn"].max()
+    errors = table.groupby("preset")["error_dn"].max()
     for preset, most in FIGURES_OF_ACCURACY.values():
         assert most / 100 <= errors[preset] <= most
 

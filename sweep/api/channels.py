@@ -34,13 +34,11 @@ _LETTERS |= {"m": "M", "mg": "M"}
 _ORDER = ("R", "G", "B", "W", "C", "Y", "Cy", "M")
 _HUMP = re.compile(r"(?<=[^\W\d_A-Z])(?=[A-Z])")
 _TOKEN = re.compile(r"[^\W\d_]+")
-_CLEAR_NM = 180.0
-"""Equivalent width above which a curve is taken for a clear pixel."""
 RATIO = "_over_"
 """Part of the column names that `sweep export` gives to transmissions."""
 _NEEDED_NM = (450.0, 680.0)
 """Range that QE curves must cover to see every signal color."""
-_UNKNOWN = "the name says no channel, and its shape is that of another"
+_UNKNOWN = "the name says no channel"
 _FEWEST = 3
 NEW = "N"
 """Name of the modified channel."""
@@ -48,11 +46,10 @@ NEW = "N"
 
 @dataclass(frozen=True)
 class Channels:
-    """Columns of each channel, other columns with the reason they are left out, and columns that shapes tell alone."""
+    """Columns of each channel, and other columns with the reason they are left out."""
 
     columns: Mapping[str, str]
     left_out: Mapping[str, str]
-    guessed: frozenset[str]
 
 
 @dataclass(frozen=True)
@@ -103,7 +100,7 @@ def channel_of(column: str) -> str | None:
 
 
 def channels_of(curves: Mapping[str, Curve]) -> Channels:
-    """Assign columns to channels by their names, and those that no name explains by the shapes of their curves.
+    """Assign columns to channels by their names.
 
     Parameters
     ----------
@@ -119,10 +116,7 @@ def channels_of(curves: Mapping[str, Curve]) -> Channels:
     left_out = {column: "0 from 400 to 700 nm" for column in curves if column not in lit}
     left_out |= {column: reason for column in lit if (reason := _no_channel(column))}
     lit = {column: curve for column, curve in lit.items() if column not in left_out}
-    named = {column: channel for column in lit if (channel := channel_of(column)) is not None}
-    shapes = {column: _by_shape(curve) for column, curve in lit.items() if column not in named}
-    guessed = {column: shape for column, shape in shapes.items() if shape not in named.values()}
-    assigned = named | guessed
+    assigned = {column: channel for column in lit if (channel := channel_of(column)) is not None}
     columns: dict[str, str] = {}
     for column in sorted(lit, key=lambda column: column != assigned.get(column)):  # a whole name before a part of one
         channel = assigned.get(column)
@@ -133,7 +127,7 @@ def channels_of(curves: Mapping[str, Curve]) -> Channels:
         else:
             columns[channel] = column
     ordered = {channel: columns[channel] for channel in _ORDER if channel in columns}
-    return Channels(ordered, left_out, frozenset(guessed) & frozenset(columns.values()))
+    return Channels(ordered, left_out)
 
 
 def _no_channel(column: str) -> str:
@@ -142,16 +136,6 @@ def _no_channel(column: str) -> str:
         return "a transmission, no QE"
     hinted = column[:1] in tuple(HINTS) and column[1:] == NEW
     return f"{NEW} is the channel that the study designs" if column == NEW or hinted else ""
-
-
-def _by_shape(curve: Curve) -> str:
-    """Return C for a broad curve, else B, G or R by the median wavelength from 400 to 700 nm."""
-    if curve.width_nm >= _CLEAR_NM:
-        return "C"
-    inside = (curve.wavelength_nm >= 400) & (curve.wavelength_nm <= 700)
-    weight = np.cumsum(np.clip(curve.values, 0, None) * inside)
-    half_nm = float(curve.wavelength_nm[np.searchsorted(weight, weight[-1] / 2)])
-    return "B" if half_nm < 500 else "G" if half_nm < 570 else "R"
 
 
 def layout_of(channels: Mapping[str, float]) -> Layout:
@@ -235,12 +219,14 @@ def sensor_file(paths: Path | Sequence[Path], quantity: Quantity | None = None) 
     channels = channels_of(curves)
     shown = places[0]
     unknown = [name for name, reason in channels.left_out.items() if reason == _UNKNOWN]
-    if not channels.columns:
+    if not channels.columns and not unknown:
         raise DataError(
             ValidationIssue("no curve that could be QE", str(shown), allowed="values above 0 between 400 and 700 nm")
         )
     if len(channels.columns) < _FEWEST and (unknown or len(channels.columns) == 1):
-        problem = f"only {' and '.join(channels.columns)} {'was' if len(channels.columns) == 1 else 'were'} understood"
+        understood = " and ".join(channels.columns)
+        verb = "was" if len(channels.columns) == 1 else "were"
+        problem = f"only {understood} {verb} understood" if understood else "no column names a channel"
         allowed = (
             "columns named by channels (R, G, B, W, C, Y, Cy, M) or colors, three or more; `sensor.files` of a study"
         )

@@ -31,8 +31,6 @@ class Accuracy(Section):
     brightness_steps: int = Field(default=1, ge=1, le=64)
     """Nodes of the brightness curves of lamps that fill or merge pixels, relative to those of `standard`; chromatic
     figures are refined between them."""
-    single_precision: bool = False
-    """Single precision for the product of filters and light."""
 
     @property
     def phase_steps_per_px(self) -> int:

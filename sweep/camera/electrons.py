@@ -142,9 +142,6 @@ class Electrons:
             self._kept: FloatArray | None = None
             if 0 < size <= KEPT and not once:
                 self._kept = self._table()
-                # Merged values of up to 10^6 DN keep 0.1 DN in double precision alone.
-                if setup.accuracy.single_precision and not setup.camera.pixel.captures:
-                    self._kept = np.asarray(self._kept, dtype=np.float32)
         else:
             self._touched, self._kept = np.empty(0, dtype=np.intp), None
 

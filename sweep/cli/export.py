@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,6 @@ import numpy as np
 from ..base.errors import OutputError, SweepError, ValidationIssue
 from ..base.types import FloatArray
 from ..report import Output, check_kept, read_output, study_of
-from ..report.figures import pictures_of
 from ..report.parameter_map import specification
 from ..results.atomic import write_bytes
 from ..results.designs import find_design_row, row_curves
@@ -23,7 +22,6 @@ from ..spectra.filter_files import (
     unique_names,
 )
 from ..study import folder_name
-from .options import ExportFormat
 
 _ROUNDING = 1e-9
 _MOST_SHOWN = 10
@@ -35,8 +33,8 @@ def export_design(
     key: str,
     data: Path | None,
     to: Path | None,
-    also: Collection[ExportFormat] = (),
     *,
+    with_specification: bool = False,
     allow_code: bool = False,
 ) -> list[str]:
     """Write `<key>.csv` and `<key>.mat` of a design of a finished run, and say what it is.
@@ -53,8 +51,8 @@ def export_design(
         Folder of the study's files; without it, the curves that the run kept are taken.
     to : Path or None
         Folder of the new files, FOLDER/export without it.
-    also : collection of ExportFormat
-        Files of other programs beside them.
+    with_specification : bool
+        True to write what an absorption band would have to be beside them.
     allow_code : bool
         True to run the code that the study names.
 
@@ -66,7 +64,7 @@ def export_design(
     Raises
     ------
     SweepError
-        For an unknown key, a design that failed, and a sensor without what `also` needs.
+        For an unknown key, a design that failed, and a specification without a map of absorption bands.
     OutputError
         For a folder without a finished run, for curves that are not those of the run, and where a file of other
         content would be overwritten.
@@ -103,21 +101,16 @@ def export_design(
         f"       {mat_path} ({', '.join(filter_names(hints, curves))}: QE, so set the pixel's spectral QE to 1 in "
         "ISETCam).",
     ]
-    if ExportFormat.SPECIFICATION in also:
-        specified, page = (path.with_name(f"{path.name}_specification.{kind}") for kind in ("csv", "svg"))
-        made = specification(output)
-        if made is None:
+    if with_specification:
+        specified, specified_table = path.with_name(f"{path.name}_specification.csv"), specification(output)
+        if specified_table is None:
             problem, allowed = (
                 "no map of absorption bands",
                 "a study with `search: {map: {peak_nm: ..., fwhm_nm: ...}}`",
             )
-            raise SweepError(ValidationIssue(problem, str(folder), None, "--also", "specification", allowed))
-        specified_table, drawing = made
-        files |= {
-            specified: specified_table.to_csv(index=False).encode("utf-8"),
-            page: pictures_of(drawing, ("svg",))["svg"],
-        }
-        lines.append(f"       {specified}, {page} (what an absorption band would have to be)")
+            raise SweepError(ValidationIssue(problem, str(folder), None, "--specification", None, allowed))
+        files[specified] = specified_table.to_csv(index=False).encode("utf-8")
+        lines.append(f"       {specified} (what an absorption band would have to be)")
     for file, content in files.items():
         _refuse_other(file, content)
     for file, content in files.items():

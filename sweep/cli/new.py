@@ -1,10 +1,9 @@
-"""New study files: for the built-in curves, for a user's curves, or from an existing study; and their schema."""
+"""New study files, for the built-in curves or for a user's curves; and their schema."""
 
 from __future__ import annotations
 
 import json
 import os
-import re
 import shlex
 from collections.abc import Sequence
 from contextlib import suppress
@@ -23,11 +22,9 @@ from ..spectra.units import FITTING
 from ..study import Study, folder_name, load_study
 from ..study.editors import SCHEMA_FILE, TITLE, schema_text
 from ..study.schema import StudySection
-from .emva1288 import pixel_figures
 from .study_text import Sources, one_line, study_text
 
 _MOST_LETTERS = 100
-_MOST_STUDY = 500_000
 
 
 def new_study(
@@ -36,7 +33,6 @@ def new_study(
     qe: Sequence[Path],
     lights: Sequence[Path],
     quantities: Sequence[Quantity] = (),
-    pixel: Path | None = None,
 ) -> list[str]:
     """Write `folder`/<name>.yaml, and the schema that editors complete it with where the folder has none.
 
@@ -48,8 +44,6 @@ def new_study(
         Files or folders of curves, which stay where they are; none takes built-in curves.
     quantities : sequence of str
         Stated units of the curves and of the lights.
-    pixel : Path or None
-        EMVA 1288 results, whose figures go into the study.
 
     Returns
     -------
@@ -75,9 +69,6 @@ def new_study(
         start_nm, stop_nm = (400, 700) if sources.sensor is None else sources.sensor.range_nm
         unit: LightUnit | None = "photons" if "photons" in quantities else "energy" if "energy" in quantities else None
         sources = replace(sources, lights=lights_file(lights, unit, start_nm, stop_nm))
-    if pixel is not None:
-        figures, missing = pixel_figures(pixel)
-        sources = replace(sources, pixel=figures, pixel_file=pixel, not_in_pixel=missing)
     new_folders = [place for place in (folder, *folder.parents) if not os.path.lexists(place)]
     try:
         study = _write(path, name, sources)
@@ -107,43 +98,6 @@ def _write(path: Path, name: str, sources: Sources) -> Study:
             raise DataError([replace(issue, file=None, line=None) for issue in error.issues]) from None
         _write_schema_beside(path)
     return study
-
-
-def study_from(name: str, folder: Path, source: Path) -> list[str]:
-    """Copy a study under another name, with its comments.
-
-    Parameters
-    ----------
-    name : str
-        Name of the new study.
-    folder : Path
-        Folder of the new study.
-    source : Path
-        Study to copy.
-
-    Returns
-    -------
-    list of str
-        Lines to print.
-
-    Raises
-    ------
-    StudyError
-        If the name is invalid or the copy cannot be loaded.
-    OutputError
-        If the file exists.
-    """
-    path = _new_path(name, folder)
-    text = read_input(source, _MOST_STUDY, StudyError).decode("utf-8")
-    text, count = re.subn(r"^study:.*$", f"study: {name}", text, count=1, flags=re.MULTILINE)
-    if not count:
-        raise StudyError(ValidationIssue("no line `study: NAME`", str(source)))
-    with atomic(path) as hidden:
-        hidden.write_text(text, encoding="utf-8")
-        study = load_study(hidden)
-        _write_schema_beside(path)
-    line = f"{path}: {study.n_designs:,} designs on {', '.join(study.mosaics)}, as {source}."
-    return [line, f"Next: sweep run {shlex.quote(str(path))}"]
 
 
 def _new_path(name: str, folder: Path) -> Path:
@@ -176,8 +130,6 @@ def _source_lines(sources: Sources) -> list[str]:
         channels = sources.sensor.channels
         taken = ", ".join(f"{channel} from {one_line(column)}" for channel, column in channels.columns.items())
         lines.append(f"Channels: {taken}.")
-        if channels.guessed:
-            lines.append(f"Guessed by shape, check them: {', '.join(map(one_line, sorted(channels.guessed)))}.")
         lines += [f"Read: {note}." for note in sources.sensor.notes]
         left_out |= channels.left_out
     if sources.lights is not None:
@@ -187,9 +139,6 @@ def _source_lines(sources: Sources) -> list[str]:
         left_out |= sources.lights.left_out
     if left_out:
         lines.append(f"Left out, see the file: {', '.join(map(one_line, left_out))}.")
-    if sources.pixel:
-        missing = ", ".join(sources.not_in_pixel)
-        lines.append(f"Pixel: {', '.join(sources.pixel)} from {sources.pixel_file}; not in it: {missing}.")
     return lines
 
 

@@ -20,12 +20,6 @@ PANELS = (OF_STUDIES, OF_RESULTS, OF_CURVES, OF_TOOL)
 """Groups of commands in the help, in order."""
 
 
-class ExportFormat(StrEnum):
-    """Files that an export can write, too: the specification of a colorant from a map."""
-
-    SPECIFICATION = "specification"
-
-
 def quantity_of(word: str | None) -> Any:
     """Return a unit that is stated on the command line. Raises StudyError for an unknown one."""
     from ..spectra.units import FITTING  # noqa: PLC0415  (heavy imports stay out of --help)

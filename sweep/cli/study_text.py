@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
@@ -21,18 +21,14 @@ _TYPICAL_NM = {"green": 505, "yellow": 590, "orange": 605, "red": 635}
 
 @dataclass(frozen=True)
 class Sources:
-    """Files that a study takes its curves and its pixel from; None for built-in curves, or for the defaults.
+    """Files that a study takes its curves from; None for built-in curves.
 
-    `path_in_study`: path of a file as the study says it; `pixel_file`: the EMVA 1288 results, of which `pixel` has the
-    keys of `pixel:` and `not_in_pixel` those that are missing.
+    `path_in_study`: path of a file as the study says it.
     """
 
     sensor: SensorFile | None = None
     lights: LightsFile | None = None
     path_in_study: Callable[[Path], str] = str
-    pixel: Mapping[str, float] | None = None
-    pixel_file: Path | None = None
-    not_in_pixel: Sequence[str] = ()
 
 
 def study_text(name: str, sources: Sources, photon_ratio: float | None) -> str:
@@ -74,7 +70,7 @@ question: >-
 seed: 1
 
 {_sensor(sources, layout.clear)}
-{_lights(sources, photon_ratio)}{_pixel(sources)}
+{_lights(sources, photon_ratio)}
 scenarios:
   chart:                # every signal fills the field; exposed for a white patch, per CFA
     exposure: {{kind: white_patch, level: 0.95}}
@@ -116,8 +112,6 @@ def _sensor(sources: Sources, clear: str | None) -> str:
     if sensor is None:
         return "sensor: ar0820          # built-in surrogate curves; `sweep new NAME --qe FILE` takes your own\n"
     lines = ["sensor:", f"  name: {scalar(sensor.name)}", "  files:"]
-    known = {own: channel for channel, own in sensor.channels.columns.items()}
-    guessed = {known[own] for own in sensor.channels.guessed}
     for entry in sensor.entries:
         lines += [f"    - file: {scalar(sources.path_in_study(entry['file']))}"]
         lines.append(f"      quantity: {entry['quantity']}      # unit of the file's numbers")
@@ -125,8 +119,7 @@ def _sensor(sources: Sources, clear: str | None) -> str:
             lines.append(f"      scale: {entry['scale']:.6g}       # brings them to plain numbers")
         lines.append("      columns:          # channel: column of the file")
         for channel, column in entry["columns"].items():
-            guess = "        # guessed by its shape: check" if channel in guessed else ""
-            lines.append(f"        {channel}: {scalar(column)}{guess}")
+            lines.append(f"        {channel}: {scalar(column)}")
     lines += _left_out(sensor.channels.left_out)
     if clear:
         lines.append(f"  clear: {clear}              # the unfiltered pixel")
@@ -161,14 +154,6 @@ def _lights(sources: Sources, photon_ratio: float | None) -> str:
             width = min(max(len(scalar(column)) for column in columns), 40)
             lines += [f"          - {scalar(name):<{width}}  # {_reason(color)}" for name, color in columns.items()]
     return "\n".join([*lines, *_left_out(lights.left_out)]) + "\n"
-
-
-def _pixel(sources: Sources) -> str:
-    if not sources.pixel or sources.pixel_file is None:
-        return ""
-    lines = ["", f"pixel:                  # EMVA 1288 results: {one_line(sources.pixel_file.name)}"]
-    lines += [f"  {key}: {value:.12g}" for key, value in sources.pixel.items()]
-    return "\n".join([*lines, f"  # not in the file, so the defaults hold: {', '.join(sources.not_in_pixel)}"]) + "\n"
 
 
 def _reason(color: LightColor) -> str:

@@ -7,27 +7,6 @@ import numpy as np
 from ..base.types import BoolArray, FloatArray
 
 
-def hypervolume(values: FloatArray, reference: FloatArray) -> float:
-    """Return the volume that points dominate.
-
-    Parameters
-    ----------
-    values : ndarray of shape (n, n_objectives)
-        Points, all objectives maximized.
-    reference : ndarray of shape (n_objectives,)
-        Reference point.
-
-    Returns
-    -------
-    float
-        Hypervolume.
-    """
-    import moocore  # noqa: PLC0415  (pulls in pandas: kept off the start-up path)
-
-    inside = np.isfinite(values).all(axis=1) & (values > reference).all(axis=1)
-    return float(moocore.hypervolume(values[inside], ref=reference, maximise=True)) if inside.any() else 0.0
-
-
 def knee(values: FloatArray) -> int | None:
     """Return the knee of a front: the point farthest beyond the line between its ends.
 

@@ -29,8 +29,6 @@ OF_A_SHARE: Literal["yield"] = "yield"
 BEST_PLACE = "best_place_"
 """How the name of a CSD's largest value over the places where the light may fall on the mosaic begins, each at its
 worst moment of a pulsed light."""
-HELD_OUT = "held_out_"
-"""How the name of a CSD of lights that the study does not optimize for begins."""
 DN = "DN"
 """Unit of digital numbers."""
 DECADES = "decades"

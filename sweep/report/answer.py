@@ -10,7 +10,7 @@ from ..base.types import FloatArray
 from ..metrics.columns.confusion import CNR, D_PRIME
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.limiting import limited_by_name
-from ..metrics.quantity import DECADES, HELD_OUT, OF_A_SHARE, WORST_CASE
+from ..metrics.quantity import DECADES, OF_A_SHARE, WORST_CASE
 from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
 from ..results.thinning import per_exposure
@@ -149,9 +149,6 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:  # noqa: PLR0912  
         yield f"{text} {over.words}."
     else:
         text += f" {_format_separation(output, best)}"
-        held_out = float(best.get(HELD_OUT + (separation.of or separation.name), np.nan))
-        if np.isfinite(held_out):
-            text += f" ({separation.formatted(held_out)} on lights that it has not seen)"
         yield f"{text}{_in(output, leaders.scenario)}{_times(output, best, plain)}.{_equal(output, best)}"
     search = output.provenance.search
     if search is not None and search.scenarios > 1 and best["kind"] == FOUND:

@@ -18,22 +18,19 @@ from ..results.output import Output, read_output
 from ..results.tables import write_csv
 from ..study import folder_name
 from .answer import largest_separation_elsewhere
-from .compare_fronts import draw_fronts, fronts_in, hypervolumes, on_the_same_axes, scene_names
+from .compare_fronts import draw_fronts, front_table, fronts_in, on_the_same_axes, scene_names
 from .compare_tables import (
     best_of_runs,
     curve_notes,
-    origin_differences,
     plain_differences,
     ranking,
     side_by_side,
-    study_differences,
+    version_note,
 )
 from .figures import Drawing, pictures_of
 from .pages import aligned, inlined, page, rows
 from .terms import format_constraint
 
-Areas = tuple[str, pd.DataFrame]
-"""The box of the hypervolumes in words, and a row per front."""
 PAGE, PICTURE, TABLE = "compare.html", "fronts", "compare.csv"
 _KINDS = ("png", "svg")
 _MARK = b'<meta name="generator" content="sweep compare">'
@@ -41,8 +38,9 @@ _MARK = b'<meta name="generator" content="sweep compare">'
 _MARK_WITHIN = 1024
 _LETTERS = string.ascii_uppercase
 _MOST_LETTERS = 100
+OF_FRONTS = "whatever the constraints ask of the two axes"
 _MOST_SCENARIOS = 4
-"""Scenes whose hypervolumes are printed; the page has all."""
+"""Scenes whose fronts are printed; the page has all."""
 
 
 @dataclass(frozen=True)
@@ -84,16 +82,14 @@ def compare_runs(folders: Sequence[Path], to: Path | None) -> Comparison:
     _refuse_other(target)
     outputs = [read_output(folder) for folder in folders]
     runs = {f"{letter} {' '.join(o.study.study.split())}": o for letter, o in zip(_LETTERS, outputs, strict=False)}
-    areas, figure, notes = compare_fronts(runs)
-    answer = [*ranking(runs), *_largest(areas)]
+    fronts, figure, notes = compare_fronts(runs)
+    answer = ranking(runs)
     answer += [f"{run}: {line}" for run, output in runs.items() for line in largest_separation_elsewhere(output)]
-    notes = [*_same_folders(runs), *curve_notes(runs), *_constraint_note(runs), *notes]
+    notes = [*_same_folders(runs), *curve_notes(runs), *version_note(runs), *_constraint_note(runs), *notes]
     best = best_of_runs(runs)
     shown, left_out = side_by_side(best, runs)
     plain, same = plain_differences(runs)
-    studies, origins = study_differences(runs), origin_differences(runs)
     drawn = {} if figure is None else pictures_of(figure, _KINDS)
-    titles = {name: f"Fronts in {name}, {words}" for name, (words, _) in areas.items()}
     html = page(
         "compare.html.j2",
         runs={run: str(output.folder) for run, output in runs.items()},
@@ -101,36 +97,33 @@ def compare_runs(folders: Sequence[Path], to: Path | None) -> Comparison:
         notes=notes,
         best=rows(shown),
         left_out=left_out,
+        of_fronts=OF_FRONTS,
         picture=inlined(drawn["png"]) if drawn else None,
-        hypervolumes=[(titles[name], rows(table)) for name, (_, table) in areas.items()],
+        fronts=[(name, rows(table)) for name, table in fronts.items()],
         plain=rows(plain),
         same=same or "The runs share no plain CFA and no named design.",
-        studies=rows(studies),
-        origins=rows(origins),
     )
     write_text(html, target / PAGE)
     write_csv(best, target / TABLE)
     for kind in _KINDS:
         _write_or_remove(drawn.get(kind), target / f"{PICTURE}.{kind}")
     lines = [f"{run}: {output.folder}" for run, output in runs.items()]
-    lines += _section("What differs in the studies", studies, "nothing")
-    lines += _section("What differs in how they were computed", origins, "nothing")
     lines += _section("Best designs", shown, "none")
     lines += [f"({left_out} more parameters in {TABLE}.)"] if left_out else []
     lines += _section("Plain CFAs and named designs", plain, same or "none in common")
-    for name in list(areas)[:_MOST_SCENARIOS]:
-        lines += ["", titles[name], *aligned(areas[name][1])]
-    if len(areas) > _MOST_SCENARIOS:
-        lines.append(f"({len(areas) - _MOST_SCENARIOS} more scenes in {PAGE}.)")
+    for name in list(fronts)[:_MOST_SCENARIOS]:
+        lines += _section(f"Fronts in {name}, {OF_FRONTS}", fronts[name], "none")
+    if len(fronts) > _MOST_SCENARIOS:
+        lines.append(f"({len(fronts) - _MOST_SCENARIOS} more scenes in {PAGE}.)")
     lines += ["", *answer, *(f"Note: {note}" for note in notes), *(doubt for one in outputs for doubt in one.doubts)]
     lines.append(f"Files: {target}/: {', '.join([PAGE, TABLE, *(f'{PICTURE}.{kind}' for kind in drawn)])}.")
-    of_all = [table.assign(scene=name) for name, (_, table) in areas.items()]
-    tables = {"best": best, "plain": plain, "studies": studies, "origins": origins}
-    tables["hypervolumes"] = pd.concat(of_all, ignore_index=True) if of_all else pd.DataFrame()
+    of_all = [table.assign(scene=name) for name, table in fronts.items()]
+    tables = {"best": best, "plain": plain}
+    tables["fronts"] = pd.concat(of_all, ignore_index=True) if of_all else pd.DataFrame()
     return Comparison(target, lines, tables, notes)
 
 
-def compare_fronts(runs: Mapping[str, Output]) -> tuple[dict[str, Areas], Drawing | None, list[str]]:
+def compare_fronts(runs: Mapping[str, Output]) -> tuple[dict[str, pd.DataFrame], Drawing | None, list[str]]:
     """Compare the fronts of runs with the same axes, in equal scenes.
 
     Parameters
@@ -140,8 +133,8 @@ def compare_fronts(runs: Mapping[str, Output]) -> tuple[dict[str, Areas], Drawin
 
     Returns
     -------
-    areas : dict of str
-        Hypervolumes by scene.
+    fronts : dict of str to pandas.DataFrame
+        Fronts by scene, a row each.
     drawing : Drawing or None
         Plot of the first scene.
     notes : list of str
@@ -161,7 +154,6 @@ def compare_fronts(runs: Mapping[str, Output]) -> tuple[dict[str, Areas], Drawin
         within = f"{', '.join(shared)}" if len(shared) <= _MOST_SCENARIOS else f"{len(shared)} of {len(places)}"
         notes.append(f"Fronts are compared in the scenes that two runs or more have: {within}.")
     fronts = {scene: those for scene in shared if (those := fronts_in(places[scene]))}
-    areas = {scene: hypervolumes(those) for scene, those in fronts.items()}
     if not fronts:
         return {}, None, notes
     scene, shown = next(iter(fronts.items()))
@@ -172,17 +164,8 @@ def compare_fronts(runs: Mapping[str, Output]) -> tuple[dict[str, Areas], Drawin
             marks.append((run, float(row[sensitivity.name]), float(row[separation.name])))
     of = ", ".join(places[scene]) if len(places[scene]) <= 3 else f"{len(places[scene])} runs"
     labels = sensitivity.words, separation.axis
-    return areas, partial(draw_fronts, f"{of}: fronts in {scene}", labels, list(runs), shown, marks), notes
-
-
-def _largest(areas: Mapping[str, Areas]) -> list[str]:
-    """Return the front with the largest hypervolume, if there are several to compare."""
-    for scene, (_, table) in list(areas.items())[:1]:
-        if table["run"].nunique() > 1:
-            most = table.nlargest(1, "hypervolume").iloc[0]
-            share = f"{most['hypervolume']:.4g} DN x sensitivity, {most['of the box']} of the box"
-            return [f"Largest hypervolume in {scene}: {most['run']}, {most['CFA']} ({most['front']}): {share}."]
-    return []
+    tables = {scene: front_table(those) for scene, those in fronts.items()}
+    return tables, partial(draw_fronts, f"{of}: fronts in {scene}", labels, list(runs), shown, marks), notes
 
 
 def _same_folders(runs: Mapping[str, Output]) -> list[str]:

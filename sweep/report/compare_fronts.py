@@ -1,9 +1,8 @@
-"""Fronts of several runs on the same axes, their hypervolumes, and their plot."""
+"""Fronts of several runs on the same axes, a table of their ends, and their plot."""
 
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -13,9 +12,7 @@ import pandas as pd
 
 from ..base.types import FloatArray
 from ..metrics.objective import COMBINED
-from ..metrics.pareto import hypervolume
 from ..metrics.quantity import DN, WORST_CASE
-from ..metrics.share import format_share
 from ..results.output import Output
 from ..results.tables import FOUND
 from .figures import CURVE_CYCLE, DASHES, canvas, legend_beside
@@ -23,8 +20,6 @@ from .figures import CURVE_CYCLE, DASHES, canvas, legend_beside
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_STEP = 0.01
-_BELOW = 1e-9
 _MARKERS = "osD^vPX<>hp"
 _MARKS_PER_LINE = 12
 
@@ -170,44 +165,10 @@ def _sorted(values: pd.DataFrame) -> FloatArray:
     return points[np.argsort(points[:, 1], kind="stable")]
 
 
-def box_of(fronts: Sequence[ComparedFront]) -> tuple[FloatArray, FloatArray]:
-    """Return the corners of the box of all fronts: no separation and 0.01 below the lowest sensitivity, and the top.
-
-    Parameters
-    ----------
-    fronts : sequence of ComparedFront
-        Fronts.
-
-    Returns
-    -------
-    low, high : ndarray of shape (2,)
-        Corners.
-    """
-    points = np.concatenate([front.points for front in fronts])
-    lowest = math.floor((points[:, 1].min() - _BELOW) / _STEP) * _STEP
-    return np.array([min(0.0, points[:, 0].min()), round(lowest, 2)]), points.max(axis=0)
-
-
-def hypervolumes(fronts: Sequence[ComparedFront]) -> tuple[str, pd.DataFrame]:
-    """Return the box in words, and one row per front with its ends, its hypervolume and its share of the box.
-
-    Parameters
-    ----------
-    fronts : sequence of ComparedFront
-        Fronts.
-
-    Returns
-    -------
-    box : str
-        Text.
-    table : pandas.DataFrame
-        Table.
-    """
-    reference, top = box_of(fronts)
-    whole = float(np.prod(top - reference))
+def front_table(fronts: Sequence[ComparedFront]) -> pd.DataFrame:
+    """Return one row per front with its ends."""
     rows = []
     for front in fronts:
-        area = hypervolume(front.points, reference)
         low, high = front.points.min(axis=0), front.points.max(axis=0)
         rows.append(
             {
@@ -217,16 +178,9 @@ def hypervolumes(fronts: Sequence[ComparedFront]) -> tuple[str, pd.DataFrame]:
                 "points": len(front.points),
                 "separation / DN": f"{low[0]:.1f} to {high[0]:.1f}",
                 "sensitivity": f"{low[1]:.4f} to {high[1]:.4f}",
-                "hypervolume": area,
-                "of the box": format_share(area / whole) if whole > 0 else "-",
             }
         )
-    words = (
-        f"whatever the constraints ask of the two axes; hypervolume (DN x sensitivity) above the reference of "
-        f"{reference[0]:g} DN at a sensitivity of {reference[1]:g}, in the box up to {top[0]:.1f} DN at {top[1]:.4f} "
-        f"({whole:.4g}):"
-    )
-    return words, pd.DataFrame(rows)
+    return pd.DataFrame(rows)
 
 
 def draw_fronts(

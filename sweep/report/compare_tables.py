@@ -1,9 +1,8 @@
-"""Tables of a comparison: best designs, plain CFAs, and differences between studies."""
+"""Tables of a comparison: best designs and plain CFAs; notes on curves and versions that differ."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -20,9 +19,6 @@ from .leaders import label, of_reference
 _SAME = 1e-9
 """Relative; CSDs of one study that were computed on two machines differ by less."""
 _MOST_PARAMETERS = 12
-_SHOWN = 48
-_BEFORE = 20
-"""Characters of a long value that are shown before the difference."""
 
 
 def best_of_runs(runs: Mapping[str, Output]) -> pd.DataFrame:
@@ -187,82 +183,6 @@ def _maximized(output: Output) -> tuple[str, str]:
     ) else ""
 
 
-def study_differences(runs: Mapping[str, Output]) -> pd.DataFrame:
-    """Return one row for every key of the resolved studies that differs; columns `key` and one per run.
-
-    Parameters
-    ----------
-    runs : mapping of str to Output
-        Runs by name.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Table.
-    """
-    return _differences({run: output.resolved for run, output in runs.items()})
-
-
-def origin_differences(runs: Mapping[str, Output]) -> pd.DataFrame:
-    """Return the differences of sensor, lights, files, versions, and plans; columns as in `study_differences`.
-
-    Parameters
-    ----------
-    runs : mapping of str to Output
-        Runs by name.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Table.
-    """
-    trees = {}
-    for run, output in runs.items():
-        kept = {"sensor", "lights", "model_version", "data_sha256", "versions", "designs"}
-        simulated = {
-            name: {"tolerance_dn": plan.tolerance_dn}
-            | {choice.effect: "computed" if choice.computed else "left out" for choice in plan.effects}
-            for name, plan in output.provenance.plans.items()
-        }
-        trees[run] = output.provenance.model_dump(mode="json", include=kept) | {"simulated": simulated}
-    return _differences(trees)
-
-
-def _differences(trees: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
-    leaves = {run: dict(_leaves("", tree)) for run, tree in trees.items()}
-    rows = []
-    for key in dict.fromkeys(key for values in leaves.values() for key in values):
-        texts = [values.get(key, "-") for values in leaves.values()]
-        if len(set(texts)) > 1:
-            rows.append([key, *_cut(texts)])
-    return pd.DataFrame(rows, columns=["key", *trees])
-
-
-def _leaves(path: str, tree: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """Yield dotted keys and values in words."""
-    for key, value in tree.items():
-        where = f"{path}.{key}" if path else str(key)
-        if isinstance(value, Mapping):
-            yield from _leaves(where, value)
-        else:
-            plain = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False, default=str)
-            yield where, " ".join(plain.split())
-
-
-def _cut(texts: list[str]) -> list[str]:
-    """Return differing values; of long ones the part from the first difference on."""
-    there = [text for text in texts if text != "-"]
-    if max(map(len, there)) <= _SHOWN:
-        return texts
-    shortest = min(map(len, there))
-    alike = next((i for i in range(shortest) if len({text[i] for text in there}) > 1), shortest)
-    start = max(0, alike - _BEFORE) if len(set(there)) > 1 else 0
-    stop = start + _SHOWN
-    return [
-        "-" if text == "-" else f"{'...' * bool(start)}{text[start:stop]}{'...' * (len(text) > stop)}" for text in texts
-    ]
-
-
 def curve_notes(runs: Mapping[str, Output]) -> list[str]:
     """Return a sentence for each run with other curves than the first, whose CSDs have another scale.
 
@@ -286,6 +206,14 @@ def curve_notes(runs: Mapping[str, Output]) -> list[str]:
             shares = f"{of_reference(reference)} in {first}, {of_reference(output)} in {name}"
             notes.append(f"The CFA sensitivities do not compare: they are shares {shares}.")
     return notes
+
+
+def version_note(runs: Mapping[str, Output]) -> list[str]:
+    """Return a sentence that says which model each run was computed by, if these differ."""
+    models = {run: output.provenance.model_version for run, output in runs.items()}
+    if len(set(models.values())) < 2:
+        return []
+    return [f"Computed by different models: {', '.join(f'{run} by {model}' for run, model in models.items())}."]
 
 
 def _other_curves(first: KeptCurves, second: KeptCurves) -> str:

@@ -15,7 +15,6 @@ from ..metrics.objective import COMBINED
 from ..results.inventory import Inventory
 from ..results.lock import locked
 from ..results.output import Output
-from ..results.profiles import profile_table
 from ..results.tables import FIGURES, FOUND, NAMED, PLAIN, REPORT, VISION_FIGURES, csv_of, encoded, is_drawn
 from . import signal_figures as signals
 from . import tables
@@ -32,12 +31,12 @@ from .page_data import payload
 from .pages import inlined, page, rows, script
 from .parameter_map import map_drawing
 from .price import price_table
-from .scenes import effect_table, scene_groups, scene_table
+from .scenes import scene_groups, scene_table
 from .scorecard import draw_scorecard, scorecard
 from .sensor_map import map_drawings
 from .series import draw_series
 from .stated import stated_lines
-from .summary import counts_line, summary_lines
+from .summary import counts_line
 from .tables import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
 from .terms import format_constraints, term_definitions
 from .trade_off import draw_trade_off, overview_figure, pareto_figure, traded_cfas
@@ -111,7 +110,7 @@ def _contents(output: Output, some: Iterable[str] | None, parallel: Parallel) ->
 
 def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
     """Return the content of the page without its pictures."""
-    drawn, groups = payload(output), scene_groups(output)
+    drawn = payload(output)
     answer, further = answer_parts(output)
     over_all = len(output.scenarios) == 1 or searched_series(output) is not None
     series_first = bool(drawn["series"]) and output.best.empty
@@ -120,7 +119,6 @@ def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
         "study": output.study,
         "card": scorecard(output),
         "card_first": output.best.empty and not series_first and output.study.tasks is not None,
-        "groups": [(group, rows(effect_table(group.effects))) for group in groups],
         "objective": _objective(output),
         "numbers_in": "" if over_all else f"in {leaders_of(output).scenario}",
         "series_first": series_first,
@@ -133,10 +131,9 @@ def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
         "price": rows(price_table(output)),
         "counts": counts_line(output),
         "interactive": drawn,
-        "profiles": {cfa: rows(profile_table(profiles)) for cfa, profiles in output.profiles.items()},
         "plotly": script("plotly-gl2d.min.js"),
         "script": script("report.js"),
-        "scenes": rows(scene_table(groups)),
+        "scenes": rows(scene_table(scene_groups(output))),
         "lamps": rows(lamp_table(output)),
         "vision": _vision(output),
         "comparison": rows(tables.comparison_table(output)),
@@ -147,7 +144,6 @@ def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
         "published": rows(published),
         "constraints": format_constraints(output),
         "terms": term_definitions(output),
-        "summary": summary_lines(output)[:-1],  # without the folder
         "provenance": output.provenance.model_dump(mode="json"),
     }
 

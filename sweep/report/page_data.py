@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.columns.color_separation import CSD
 from ..metrics.limiting import limited_by_name
-from ..metrics.pareto import hypervolume, knee
+from ..metrics.pareto import knee
 from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
 from . import values as content
@@ -26,7 +25,6 @@ from .trade_off import TradeOff, around_designs, pareto_figure, traded_cfas
 
 _OF_PARAMETERS, _OF_OTHERS = 2, 4
 """Digits of columns that are no quantities."""
-_PLACES = 80
 GROUPS = ("infeasible", "feasible", "front", "named", "best", "plain")
 _PUBLISHED = "RYN4Cy"
 _PUBLISHED_LABEL = "model of the paper's RYN4Cy"
@@ -70,11 +68,6 @@ def payload(output: Output) -> dict[str, Any]:
         "cloud_scenario": output.scenarios[0],
         "limited": _limited(output, rows),
         "nearest": _nearest(output, rows),
-        "profiles": {
-            cfa: [{"parameter": p.parameter, "values": p.values.tolist(), "best": p.best.tolist()} for p in profiles]
-            for cfa, profiles in output.profiles.items()
-        },
-        "history": history_of(output),
         "front": _front(output, rows),
         "series": [_series(series) for series in all_series(output)],
         "swept": bool((rows["kind"] == SWEPT).any()),
@@ -219,50 +212,6 @@ def _clouds(output: Output, rows: pd.DataFrame) -> dict[str, Any]:
             kept["channels"][cfas[design]] = channels
             kept["designs"][str(design)] = _packed(dn, "f4")
     return kept
-
-
-def history_of(output: Output) -> dict[str, Any] | None:
-    """Return the best feasible objective of each start and of all, and the hypervolume, over the evaluations.
-
-    The hypervolume is above an objective of 0 and `least_sensitivity`; there is none for an objective that is no CSD.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    dict or None
-        None without a search.
-    """
-    log = output.searched
-    if log is None or log.empty:
-        return None
-    feasible = log["violation"].to_numpy() <= FEASIBLE
-    bound = output.constraints.get("sensitivity", Bound.model_construct(min=None, max=None))
-    met = feasible & (bound.violation(log["sensitivity"].to_numpy()) <= FEASIBLE)
-    starts = log["objective"].where(feasible)[log["sensitivity_min"].isna()].groupby(log["start"])
-    at = np.unique(np.geomspace(1, len(log), min(_PLACES, len(log))).round().astype(np.intp))
-    levels = log["sensitivity_min"].dropna()
-    least = float(levels.min()) if len(levels) else bound.min or 0.0
-    best_of_all, volume = _so_far(log["objective"].where(met)), None
-    if output.goal.role == "separation":
-        pairs, reference = log[["objective", "sensitivity"]].to_numpy(dtype=float), np.array([0.0, least - 1e-6])
-        # It cannot shrink as designs are added; the last bit of a sum in another order can.
-        volume = np.maximum.accumulate([hypervolume(pairs[:n][feasible[:n]], reference) for n in at]).tolist()
-    return {
-        "starts": [{"number": int(str(number)), "best": _so_far(best)} for number, best in starts],
-        "evaluations": at.tolist(),
-        "best": [best_of_all[n - 1] for n in at],
-        "volume": volume,
-        "least_sensitivity": least,
-        "label": output.goal.words,
-    }
-
-
-def _so_far(objective: pd.Series) -> list[float | None]:
-    return _finite(np.fmax.accumulate(objective.to_numpy(dtype=float)))
 
 
 def _finite(values: np.ndarray) -> list[float | None]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -13,13 +12,10 @@ import numpy as np
 import pandas as pd
 
 from ..base.types import FloatArray
-from ..designs.families.mixture import THICKNESS_UM
 from ..results.output import Output
 from ..results.tables import NAMED
 from .figures import Drawing, canvas
 from .leaders import label, leaders_of
-from .pages import aligned
-from .terms import assumptions_line, format_constraints
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,8 +27,6 @@ _AMOUNTS = ("absorbance", "mol_per_l", "percent_by_weight")
 _BETWEEN = 101
 """Peaks, from one of the map to the next, among which the widest band is looked for."""
 _MOST_NAMED = 3
-_MOST_OF_PAGE = 45
-"""Rows of the table on the page; the file has all."""
 _STYLES = ("-", "--", ":", "-.")
 
 
@@ -216,21 +210,11 @@ def _amount(band: Mapping[str, float]) -> str:
     return f" ({band['mol_per_l']:.3f} mol/l, {band['percent_by_weight']:.1f} % by weight)"
 
 
-def specification(output: Output) -> tuple[pd.DataFrame, Drawing] | None:
-    """Return what an absorption band would have to be, as a table and as one page.
+def specification(output: Output) -> pd.DataFrame | None:
+    """Return what an absorption band would have to be; None without a map of absorption bands.
 
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    table : pandas.DataFrame
-        For each width the best peak, its absorbance in a film of 0.8 um, objective and sensitivity, and, where an
-        extinction is assumed, concentrations.
-    drawing : Drawing
-        Page with the map, constraints, sentences and the table; None without a map of absorption bands.
+    For each width the best peak, its absorbance (decadic, in a film of 0.8 um), objective and sensitivity, and, where
+    an extinction is assumed, concentrations.
     """
     figure = map_figure(output)
     if figure is None or figure.names != _BAND:
@@ -238,26 +222,7 @@ def specification(output: Output) -> tuple[pd.DataFrame, Drawing] | None:
     cells = _feasible(output)
     best = cells.loc[cells.groupby("fwhm_nm")["objective"].idxmax()].sort_values("fwhm_nm")
     names = ("fwhm_nm", "peak_nm", "absorbance", "objective", "sensitivity", "mol_per_l", "percent_by_weight")
-    table = best[[name for name in names if name in best]].rename(columns={"objective": output.goal.name})
-    search = output.provenance.search
-    where = "" if search is None else f"Pixel {search.channel} of {search.cfa}, scenario {search.scenario}"
-    heads = [f"{where}; {format_constraints(output)}. Absorbance: decadic, in a film of {THICKNESS_UM:g} um."]
-    lines = [*heads, *map_lines(output), assumptions_line(output)]
-    digits = {"absorbance": 3, "sensitivity": 4, "mol_per_l": 4, "percent_by_weight": 2, output.goal.name: 1}
-    texts = table.apply(lambda column: column.map(f"{{:.{digits.get(str(column.name), 0)}f}}".format))
-    return table, partial(_draw_page, figure, [line for line in lines if line], aligned(texts))
-
-
-def _draw_page(figure: MapFigure, lines: Sequence[str], table: Sequence[str]) -> Figure:
-    """Draw a page of A4: the map, sentences, and the table."""
-    page, axes = canvas(8.27, 11.69)
-    page.set_layout_engine("none")
-    axes.set_position((0.1, 0.6, 0.85, 0.34))
-    _draw_on(page, axes, figure)
-    written = "\n".join(part for line in lines for part in textwrap.wrap(line, 100))
-    page.text(0.07, 0.55, written, fontsize=8.5, va="top")
-    page.text(0.07, 0.43, "\n".join(table[:_MOST_OF_PAGE]), fontsize=7, va="top", family="monospace")
-    return page
+    return best[[name for name in names if name in best]].rename(columns={"objective": output.goal.name})
 
 
 def map_drawing(output: Output) -> Iterator[tuple[str, str, Drawing]]:

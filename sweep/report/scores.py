@@ -24,7 +24,7 @@ from ..run.score import (
 )
 from ..run.score_streets import is_of_streets, labels_of_test, read_detections, street_lines, street_scores
 from ..vision.detections import ALL
-from ..vision.scenes import WHOLE, states_of
+from ..vision.scenes import NETWORK, states_of
 from .figures import CURVE_CYCLE, DASHES, canvas, legend_beside, rendered
 from .pages import inlined, page, rows
 
@@ -60,7 +60,7 @@ def score_readers(output: Output, predictions: Sequence[Path], to: Path) -> list
     """
     vision = output.study.vision
     assert vision is not None
-    check_unique([path.stem for path in predictions] + ([WHOLE] if vision.network else []))
+    check_unique([path.stem for path in predictions] + ([NETWORK] if vision.network else []))
     of_streets = [path for path in predictions if vision.street is not None and is_of_streets(path)]
     predictions = [path for path in predictions if path not in of_streets]
     lines = _score_streets(output, of_streets, to) if of_streets else []

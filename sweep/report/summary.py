@@ -6,7 +6,6 @@ from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..results.facts import SearchFacts
 from ..results.output import Output
 from ..results.tables import PLAIN
-from ..study.axes import series_of
 from .answer import answer_parts
 from .leaders import capital, of_reference
 from .price import price_line
@@ -17,30 +16,17 @@ from .terms import assumptions_line
 from .values import drawn_rows
 
 _MOST_PARAMETERS = 10
-_MOST_SCENARIOS = 8
 
 
-def _scene_lines(output: Output) -> list[str]:
-    """Return CFAs and named designs in each scenario; a series by its two ends, of many others few."""
-    shown, single = output.trade_off[0], len(output.scenarios) == 1
-    title = f"{capital(shown.words)} of the named CFAs and designs"
-    title += f", and their share {of_reference(output)}:" if single else ":"
-    inner = {name for members in series_of(output.scenarios).values() for name in list(members)[1:-1]}
-    names = [name for name in output.scenarios if name not in inner]
-    if len(names) > _MOST_SCENARIOS:
-        names = [*names[:4], *names[-2:]]
-    lines = [] if single else [title]
-    rows = output.named[output.named[shown.name].notna()]
-    for name in names:
-        designs = [
-            f"{row['name']} {shown.formatted(row[shown.name])}" + (f" at {row[CFA_SENSITIVITY]:.3f}" if single else "")
-            for row in rows[rows["scenario"] == name].to_dict("records")
-        ]
-        if designs:
-            lines.append(f"{title if single else f'{name}:'} {', '.join(designs)}.")
-    if left := len(output.scenarios) - len(names):
-        lines.append(f"({_count(left, 'more scenario')} in the report.)")
-    return lines
+def _named_line(output: Output) -> list[str]:
+    """Return CFAs and named designs where there is one scenario; of several the report has the figures."""
+    if len(output.scenarios) > 1:
+        return []
+    shown = output.trade_off[0]
+    rows = output.named[output.named[shown.name].notna()].to_dict("records")
+    designs = [f"{row['name']} {shown.formatted(row[shown.name])} at {row[CFA_SENSITIVITY]:.3f}" for row in rows]
+    of = f"{capital(shown.words)} of the named CFAs and designs, and their share {of_reference(output)}"
+    return [f"{of}: {', '.join(designs)}."] if designs else []
 
 
 def summary_lines(output: Output, took_s: float | None = None) -> list[str]:
@@ -60,7 +46,7 @@ def summary_lines(output: Output, took_s: float | None = None) -> list[str]:
     """
     facts = output.provenance
     answer, further = answer_parts(output)
-    lines = [*answer, *stated_lines(output), *further, *_scene_lines(output)]
+    lines = [*answer, *stated_lines(output), *further, *_named_line(output)]
     if not output.best.empty:
         best = output.best.iloc[0]
         names = [name for name in output.parameters if best[name] == best[name]]
@@ -82,10 +68,6 @@ def summary_lines(output: Output, took_s: float | None = None) -> list[str]:
         algorithms = " and ".join(filter(None, (facts.search.algorithm, facts.search.refinement)))
         lines.append(f"Search: {algorithms}, {starts}, {evaluations}: {reached}.")
         lines.append(_limit_line(output, facts.search))
-    if facts.hypervolume:
-        areas = ", ".join(f"{name} {area:.3f}" for name, area in facts.hypervolume.items() if area > 0)
-        least = facts.hypervolume_least_sensitivity
-        lines.append(f"Hypervolume (DN x sensitivity, above 0 and a sensitivity of {least:g}): {areas}.")
     lines += [*(f"Note: {warning}." for warning in facts.warnings), *output.doubts]
     ratio = output.study.lights.photon_ratio
     if ratio is not None:

@@ -7,7 +7,6 @@ import pandas as pd
 from ..camera.scene import OBJECT_RESOLUTION
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.limiting import limited_by_name
-from ..metrics.quantity import HELD_OUT
 from ..results.output import Output
 from .pages import aligned
 
@@ -63,14 +62,12 @@ def best_table(output: Output, max_rows: int = 12) -> pd.DataFrame:
 def _shown(output: Output, rows: pd.DataFrame, keys: list[str], rest: list[str]) -> pd.DataFrame:
     """Return rows of the result table for display: columns selected, rounded and renamed.
 
-    Order of the columns: `keys`, both axes of the trade-off, CSDs on the held-out lights, `rest` without the former,
-    limiting lights of the separation.
+    Order of the columns: `keys`, both axes of the trade-off, `rest` without the former, limiting lights.
     """
     separation = output.trade_off[0]
     axes = [separation.name, CFA_SENSITIVITY]
-    held_out = [name for distance in output.distances if (name := HELD_OUT + distance) in output.table]
     limits = [limited_by_name(separation.pair)] if separation.pair and separation.role == "separation" else []
-    columns = [*keys, *axes, *held_out, *(name for name in rest if name not in axes), *limits]
+    columns = [*keys, *axes, *(name for name in rest if name not in axes), *limits]
     shown = rows[columns].copy()
     for column in shown.select_dtypes("float64"):
         quantity = output.columns.get(str(column))
@@ -79,7 +76,6 @@ def _shown(output: Output, rows: pd.DataFrame, keys: list[str], rest: list[str])
         shown = shown.drop(columns="scenario")
     titles = {name: output.words(name).replace("_", " ") for name in columns}
     titles |= dict.fromkeys(limits, f"{separation.words} limited by")
-    titles |= {name: f"{output.words(name.removeprefix(HELD_OUT))}, other lights" for name in held_out}
     return shown.rename(columns=titles)
 
 

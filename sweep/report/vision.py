@@ -14,16 +14,13 @@ from ..metrics.share import format_share
 from ..results.output import Output
 from ..results.tables import VISION, VISION_CONDITIONS
 from ..vision.readers import OBSERVER
-from ..vision.scenes import HALF, QUARTER, SHUFFLED, UNSEEN, WHOLE, states_of
+from ..vision.scenes import NETWORK, SHUFFLED, UNSEEN, states_of
 from ..vision.scores import Interval, confusion_matrix, interval_of_seeds, mean_of
 from ..vision.section import Vision
 
-NETWORK = WHOLE
 READER_NAMES = {
     OBSERVER: "ideal observer",
     NETWORK: "network",
-    HALF: "network, half of the images",
-    QUARTER: "network, a quarter of the images",
 }
 _REFERENCE = "RGGB"
 _FEWEST_RANKED = 5

@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 
 from ..metrics.share import format_share
 from ..results.output import Output
-from ..results.tables import VISION_MISREAD, VISION_STREET, VISION_STREETS
+from ..results.tables import VISION_STREET, VISION_STREETS
 from ..vision.detections import ALL, precision_scores
 from ..vision.readers import OBSERVER
-from ..vision.scenes import FIXED, PARTS, SEEN, SHUFFLED, UNSEEN
+from ..vision.scenes import FIXED, NETWORK, SEEN, SHUFFLED
 from ..vision.scores import Interval, costs, macro_f1
-from .figures import CURVE_CYCLE, Drawing, canvas, canvas_grid, legend_beside, panel_grid
+from .figures import CURVE_CYCLE, Drawing, canvas_grid, legend_beside, panel_grid
 from .vision import (
-    NETWORK,
     PREDICTORS,
     READER_NAMES,
     Benchmark,
@@ -228,44 +227,9 @@ def vision_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
     yield "vision-errors", f"Images that the {who} reads wrongly, over the distance", errors
     if ranks.between:
         yield "vision-ranks", f"What predicts the {who}'s errors", partial(_draw_ranks, ranks, list(levels), who)
-    if benchmark.main_reader == NETWORK:
-        caption = "What more images would bring: errors of networks trained on a quarter, half and all of the images"
-        yield "vision-learning", caption, partial(_draw_learning, _learning(benchmark), benchmark.vision.train_images)
     if VISION_STREETS in output.vision:
         caption = "One street for each light level through each design's plain ISP"
         yield "vision-street", caption, street_drawing(output.vision[VISION_STREETS])
-    pictures = output.vision[VISION_MISREAD]
-    if len(pictures):
-        caption = f"Images that the {who} read wrongly, lenses shuffled, in false colors: what it is > what was said"
-        yield "vision-misread", caption, partial(_draw_misread, _misread(benchmark, pictures))
-
-
-def _learning(benchmark: Benchmark) -> dict[str, tuple[list[Interval], Interval]]:
-    """Return the errors of the networks of a quarter, half and all of the images, and the observer's, by design."""
-    parts = sorted(PARTS, key=PARTS.__getitem__)
-    return {
-        design: (
-            [benchmark.error(design, part, SHUFFLED) for part in parts],
-            benchmark.error(design, OBSERVER, SHUFFLED),
-        )
-        for design in benchmark.designs
-    }
-
-
-def _draw_learning(errors: Mapping[str, tuple[list[Interval], Interval]], n_images: int) -> Figure:
-    """Draw errors over the number of training images, a line per design; thin the ideal observer's."""
-    figure, axes = canvas(7.0, 4.2)
-    images = [round(share * n_images) for share in sorted(PARTS.values())]
-    for (design, (of_parts, ideal)), color in zip(errors.items(), CURVE_CYCLE * 4, strict=False):
-        values, low, high = ([100 * getattr(one, end) for one in of_parts] for end in ("value", "low", "high"))
-        axes.plot(images, values, "o-", color=color, label=design, markersize=3.5)
-        axes.fill_between(images, low, high, color=color, alpha=0.12, linewidth=0)
-        axes.axhline(100 * ideal.value, color=color, linewidth=0.8, alpha=0.8)
-    axes.set(xscale="log", xlabel="training images", ylabel="images read wrongly / %", ylim=(0, None))
-    axes.set_xticks(images, [f"{n:,}" for n in images], minor=False)
-    axes.minorticks_off()
-    legend_beside(axes, "thin: ideal observer")
-    return figure
 
 
 def street_drawing(pictures: pd.DataFrame) -> Drawing:
@@ -302,24 +266,6 @@ def _draw_streets(streets: Sequence[tuple[str, NDArray[np.uint8]]], n_designs: i
         axes.set_axis_off()
         axes.set_title(title, fontsize=7)
     return figure
-
-
-def _misread(benchmark: Benchmark, pictures: pd.DataFrame) -> list[tuple[str, NDArray[np.uint8]]]:
-    """Return title and false colors, ndarray of shape (rows, columns, 3), of a few images of every design."""
-    per_design = max(1, _COLUMNS * _ROWS // pictures["name"].nunique())
-    shown = pictures.groupby("name", sort=False).head(per_design).head(_COLUMNS * _ROWS)
-    answers = benchmark.images
-    answers = answers[(answers["order"] == SHUFFLED) & (answers["lamps"] == UNSEEN)]
-    keys = ["name", "seed", "image"]
-    columns = [*keys, "distance_m", "level", "state", benchmark.main_reader]
-    rows = shown[[*keys, "rows", "columns", "pixels"]].merge(answers[columns], on=keys, how="left").to_dict("records")
-    return [
-        (
-            f"{row['name']}\n{row['distance_m']:g} m, {row['level']}\n{row['state']} > {row[benchmark.main_reader]}",
-            _picture(row["pixels"], row["rows"], row["columns"]),
-        )
-        for row in rows
-    ]
 
 
 def _between(ranks: Ranks, name: str) -> str:
@@ -364,14 +310,4 @@ def _draw_ranks(ranks: Ranks, levels: Sequence[str], who: str) -> Figure:
         axes.set_xlabel(_LABELS[name])
     panels[0].set_ylabel(f"images that the {who} reads wrongly / %")
     legend_beside(panels[-1])
-    return figure
-
-
-def _draw_misread(images: Sequence[tuple[str, NDArray[np.uint8]]]) -> Figure:
-    """Draw the contact sheet."""
-    figure, panels = panel_grid(len(images), _COLUMNS, (1.5, 1.85), (0, 0))
-    for axes, (title, pixels) in zip(panels, images, strict=True):
-        axes.imshow(pixels, interpolation="nearest")
-        axes.set_axis_off()
-        axes.set_title(title, fontsize=6)
     return figure

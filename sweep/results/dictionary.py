@@ -125,7 +125,6 @@ FILES = {
     "of the swept designs that the report draws: the best of each CFA, those that lead, the feasible front, and up to "
     f"{MOST_POINTS:,} other feasible and as many infeasible ones, evenly: `design_id`, `limited_by_<a>_<b>` (for "
     "any sampling phase, at the worst one of the lattice that was computed)",
-    files.VALIDATED: "where a study validates on other lights: `design_id` and `held_out_csd_<a>_<b>`, their CSDs, DN",
     files.ROBUSTNESS: "where the lights have a population, for each plain CFA, named design and answer of the search: "
     "`design_id`; how many times as large population and production tolerances must be for the worst CSD to fall below "
     "that of the best plain CFA (`breaks_at`; null: not up to 3 times), and the CSD, lights, shifts and temperatures "
@@ -175,15 +174,13 @@ FILES = {
     files.RENDERED: "there, too: colors (XYZ over white) and noise of the areas of two rendered pictures",
     files.VISION: "a row per image of the benchmark of vision: design_id, name, cfa, seed, order (of the lenses), "
     "lamps (seen in training or unseen), image, state, lamp, intensity_cd, background, phantom, distance_m, level, "
-    "and what each reader says with its probability: observer, network, half and quarter (networks that learned from a "
-    "part of the images)",
+    "and what each reader says with its probability: observer, network",
     files.VISION_CONDITIONS: "of each design at each distance and level of light: csd (DN), dprime and pair_error, the "
     "smallest or the largest over the pairs of lenses",
     files.VISION_STREET: "of streets: average_precision of the simplest detector for each design, seed, light level "
     "and signal type (`state`), of `lit` lit lenses",
     files.VISION_STREETS: "the first street of each light level through each design, sRGB: bytes of rows x columns x 3 "
     "in `pixels`",
-    files.VISION_MISREAD: "images that were read wrongly, in false colors: bytes of rows x columns x 3 in `pixels`",
     files.ALL_SENSORS: "of a study of several sensors, one filter for all of them and one for all but each: "
     "`designed_on`, space, sensor, lights, `judged` (it was not designed on this one), objective, sensitivities, "
     "violation, `own_best` (objective of the best filter of this one alone) and parameters",

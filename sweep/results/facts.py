@@ -157,8 +157,6 @@ class Provenance(_Facts):
     quantities: tuple[Column, ...]
     warnings: tuple[str, ...]
     search: SearchFacts | None = None
-    hypervolume: dict[str, float] | None = None
-    hypervolume_least_sensitivity: float | None = None
 
 
 def missing_keys(kind: type[BaseModel], facts: Mapping[str, Any]) -> list[str]:

@@ -34,8 +34,6 @@ def identity(study: Study) -> dict[str, Any]:
     section = study.section.model_dump(mode="json", by_alias=True, exclude={"question"})
     if study.section.lights.builtin is None:
         section["lights"]["photon_ratio"] = study.lights.photon_ratio  # stated, or from the spectra: the same study
-    if study.held_out is not None:
-        lights.update(study.held_out.photons.tobytes() + repr(study.held_out.types).encode())
     lights.update(study.lights.photons.tobytes() + repr((study.lights.types, study.lights.photon_ratio)).encode())
     return {
         "study": section,

@@ -26,7 +26,6 @@ from .curves import SCHEMA as CURVES_SCHEMA
 from .curves import KeptCurves
 from .facts import Provenance, checked_facts, missing_parts_error
 from .inventory import Inventory
-from .profiles import ParameterProfile, Profiles
 from .tables import FEW, FOUND, NAMED, PLAIN, PROVENANCE, RESOLVED, RESULTS, SWEPT, read_table
 from .thinning import Counts, swept_points, thinned
 
@@ -54,15 +53,13 @@ _COLUMNS: dict[str, Sequence[str]] = {
 class Output:
     """Results of a run; of a long result table, `table` holds the rows that a report shows.
 
-    `study`: the study that was run, and `resolved` its file. `profiles`: over the whole table, per CFA; none where a
-    sweep is no grid. `swept_points`: ids of the swept designs that figures show as points. `searched`: the search's
-    evaluations. `audited`: rows of `sweep audit`; `left_out`: a row per light that was left out of a search; `regions`:
+    `study`: the study that was run, and `resolved` its file. `swept_points`: ids of the swept designs that figures show
+    as points. `audited`: rows of `sweep audit`; `left_out`: a row per light that was left out of a search; `regions`:
     cells of the maps of color regions. `error_against_noise`: color error against noise, `rendered`: areas of pictures;
     `places`: separations over the sensor; `map`: the best objective over two parameters; `handovers`: where captures of
-    an HDR pixel are full; `worst`: worst values over series;
-    `saturated`: signals that fill a pixel; `uncertainty`: quantiles over random sensors;
-    `vision`: tables of the benchmark of vision by their files' names. `unverified`: files that the damaged lists of the
-    folder cannot vouch for.
+    an HDR pixel are full; `worst`: worst values over series; `saturated`: signals that fill a pixel; `uncertainty`:
+    quantiles over random sensors; `vision`: tables of the benchmark of vision by their files' names. `unverified`:
+    files that the damaged lists of the folder cannot vouch for.
     """
 
     folder: Path
@@ -76,7 +73,6 @@ class Output:
     points: pd.DataFrame
     front: pd.DataFrame | None
     crossings: pd.DataFrame | None
-    searched: pd.DataFrame | None
     audited: pd.DataFrame | None
     left_out: pd.DataFrame | None
     regions: pd.DataFrame | None
@@ -90,7 +86,6 @@ class Output:
     uncertainty: pd.DataFrame | None
     vision: Mapping[str, pd.DataFrame]
     unverified: Sequence[str]
-    profiles: Mapping[str, Sequence[ParameterProfile]]
     _made: dict[object, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def once(self, key: object, make: Callable[[], _Made]) -> _Made:
@@ -294,15 +289,14 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         if name in optional or name in _ALWAYS:
             _check_columns(folder / name, columns)
     objective = study.objective.column
-    profiles = Profiles(objective, next(iter(study.scenarios)), provenance.parameters)
     points = swept_points(folder / RESULTS)
     order = [objective, *provenance.trade_off]
-    table, counts = thinned(folder / RESULTS, order, provenance.trade_off[0], points, profiles.add)
+    table, counts = thinned(folder / RESULTS, order, provenance.trade_off[0], points)
     more = {
         name: read_table(folder / name).to_pandas()
         for name in (files.POINTS, files.LIMITED_BY, files.SATURATED, *optional)
     }
-    for name in (files.LIMITED_BY, files.VALIDATED, files.ROBUSTNESS):
+    for name in (files.LIMITED_BY, files.ROBUSTNESS):
         if name in more:
             table = table.merge(more[name].drop(columns="filter_id", errors="ignore"), on="design_id", how="left")
     try:
@@ -321,7 +315,6 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         points=more[files.POINTS],
         front=more.get(files.FRONT),
         crossings=more.get(files.CROSSINGS),
-        searched=more.get(files.SEARCH_LOG),
         audited=more.get(files.AUDIT),
         left_out=more.get(files.LEFT_OUT),
         regions=more.get(files.REGIONS_MAP),
@@ -335,7 +328,6 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         uncertainty=more.get(files.UNCERTAINTY),
         vision={name: more[name] for name in files.VISION_TABLES if name in more},
         unverified=unverified,
-        profiles=profiles.found if all(made.grid is not None for made in study.sweeps.values()) else {},
     )
 
 

@@ -37,11 +37,10 @@ CHART, NIGHT = "chart", "night"
 """Pictures of which `rendered.parquet` has the areas."""
 COMBINATIONS, MAP = "combinations.parquet", "map.parquet"
 HANDOVERS, WORST, SATURATED = "handovers.parquet", "worst.parquet", "saturated.parquet"
-VALIDATED, LEFT_OUT = "validated.parquet", "leave_one_out.parquet"
+LEFT_OUT = "leave_one_out.parquet"
 VISION, VISION_CONDITIONS = "vision.parquet", "vision_conditions.parquet"
-VISION_MISREAD = "vision_misread.parquet"
 VISION_STREET, VISION_STREETS = "vision_street.parquet", "vision_street_pictures.parquet"
-VISION_TABLES = (VISION, VISION_CONDITIONS, VISION_MISREAD, VISION_STREET, VISION_STREETS)
+VISION_TABLES = (VISION, VISION_CONDITIONS, VISION_STREET, VISION_STREETS)
 """Tables of the benchmark of vision: a row per image, per distance and level, per picture that was read wrongly, per
 light level and state of detections in streets, and per picture of a street."""
 AUDIT, ALL_SENSORS = "audit.parquet", "all_sensors.parquet"
@@ -52,7 +51,7 @@ REPORT, FIGURES, VISION_FIGURES = "report.html", "figures", "vision-"
 MADE_BY_RUN = frozenset(
     (
         *(RESULTS, SEARCH_LOG, FRONT, CURVES, POINTS, CROSSINGS, LIMITED_BY, ROBUSTNESS, REGIONS_MAP),
-        *(SENSOR_MAP, TRADED, RENDERED, VALIDATED, LEFT_OUT, COMBINATIONS, MAP, HANDOVERS, WORST, SATURATED),
+        *(SENSOR_MAP, TRADED, RENDERED, LEFT_OUT, COMBINATIONS, MAP, HANDOVERS, WORST, SATURATED),
         UNCERTAINTY,
         *(*VISION_TABLES, ALL_SENSORS, PROVENANCE, RESOLVED),
     )
@@ -61,7 +60,7 @@ MADE_BY_RUN = frozenset(
 _DRAWN = re.compile(
     r"report\.html|sensors\.(png|svg)|cfas\.(png|svg)|pareto(-\d+)?\.(png|svg)|paper_comparison\.(csv|parquet)"
     r"|figures/((filters|series|places)-\d+|tiles|sensor|signals|chart|scorecard|(color-noise|rendered)-\d+"
-    r"|regions-\d+|map|captures-\d+|clouds-(cfas|designs)|vision-(errors|learning|ranks|misread|street))\.(png|svg)"
+    r"|regions-\d+|map|captures-\d+|clouds-(cfas|designs)|vision-(errors|ranks|street))\.(png|svg)"
 )
 _PARAMETERS = "cfa_sweep_parameters"
 _ROWS_AT_ONCE = 65_536

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -158,7 +158,6 @@ def thinned(
     order: Sequence[str],
     separation: str,
     keep: IndexArray,
-    see: Callable[[pa.Table], None] = lambda _: None,
 ) -> tuple[pd.DataFrame, Counts]:
     """Read the table to show and the counts of the whole one, a row group at a time.
 
@@ -174,8 +173,6 @@ def thinned(
         A column, DN.
     keep : ndarray[n_kept]
         Ids of further designs to keep.
-    see : callable
-        Called with every row group of the whole table.
 
     Raises
     ------
@@ -190,7 +187,6 @@ def thinned(
     kept: list[pa.Table] = []
     counted: Counter[_Group] = Counter()
     for table in batches(path):
-        see(table)
         names = [table[name].cast(pa.string()) for name in _COUNTED[:4]]
         groups = pa.table([*names, table["feasible"], table["pareto"]], names=_COUNTED).group_by(list(_COUNTED))
         for row in groups.aggregate([([], "count_all")]).to_pylist():

@@ -26,7 +26,6 @@ from ..results.tables import (
     SENSOR_MAP,
     TRADED,
     UNCERTAINTY,
-    VALIDATED,
     WORST,
 )
 from ..search.limit import Limit
@@ -37,7 +36,6 @@ from .colors import error_against_noise_table, rendered_table
 from .crossings import crossings_table
 from .details import Details, limited_by_table, sensor_map_table
 from .handovers import handovers_table
-from .held_out import held_out_table
 from .robustness import robustness_table
 from .saturated import saturated_table
 from .uncertainty import uncertainty_table
@@ -120,8 +118,6 @@ def row_tables(study: Study) -> dict[str, Callable[[DerivedInput], pa.Table]]:
         SATURATED: lambda s: saturated_table(s.study, s.rows, s.parallel, s.progress),
         LIMITED_BY: lambda s: limited_by_table(s.study, s.details, s.points, s.parallel, s.progress),
     }
-    if study.held_out is not None:
-        tables[VALIDATED] = lambda s: held_out_table(s.study, s.rows, s.on_front, s.parallel, s.progress)
     if study.pair_over_population is not None:
         tables[ROBUSTNESS] = lambda s: robustness_table(s.study, s.rows, s.kept("robustness"), s.progress)
     if study.section.uncertainty is not None:

@@ -106,24 +106,6 @@ class RunRows:
             values = _values(marked.take(at), self.rules.front)
             self._front[group] = set(map(tuple, values[non_dominated(values)].tolist()))
 
-    def swept_front(self, cfa: str, scenario: str) -> FloatArray:
-        """Return the front of the swept rows alone.
-
-        Parameters
-        ----------
-        cfa, scenario : str
-            CFA and scenario.
-
-        Returns
-        -------
-        ndarray of shape (n, 2)
-            Both quantities, each pair once.
-        """
-        wanted = word_mask(self._rows, "kind", SWEPT) & word_mask(self._rows, "cfa", cfa)
-        wanted &= word_mask(self._rows, "scenario", scenario) & self._rows["pareto"].to_numpy()
-        values = _values(self._rows.filter(pa.array(wanted)), self.rules.front)
-        return np.unique(values[non_dominated(values)], axis=0)
-
     def marked(self, table: pa.Table) -> pa.Table:
         """Return a table of the run with `pareto` only where a row is on the front of the whole run.
 

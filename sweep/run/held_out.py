@@ -1,4 +1,4 @@
-"""Separations on lights that a design was not made for: other lights, and each light that a search leaves out."""
+"""Separations on each light that a search leaves out."""
 
 from __future__ import annotations
 
@@ -6,72 +6,23 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import numpy as np
 import pyarrow as pa
 
 from ..base.types import FloatArray, Parallel, Progress, delayed
-from ..camera.forward import forward_model
-from ..camera.setup import Setup
-from ..metrics.evaluate import evaluate
 from ..metrics.objective import Objective
-from ..metrics.quantity import HELD_OUT, WORST_CASE
-from ..metrics.separation import csd_name
-from ..results.designs import computed_rows, row_curves
+from ..metrics.quantity import WORST_CASE
 from ..search.problem import Evaluation, Problem, best_feasible, starting_points
 from ..search.solver import search_from, smooth_objective
-from ..spectra.lights import class_pairs
 from ..study import Search, Study
 from .workers import run_with_progress
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 _LEFT_OUT_STARTS = 4
 """Starts of each search without a light."""
 _NAMES = ("objective", "signal_type", "signal")
 _FIGURES = ("seen", "with_it", "fall")
-
-
-def held_out_table(
-    study: Study, rows: pd.DataFrame, on_front: pd.DataFrame, parallel: Parallel, progress: Progress
-) -> pa.Table:
-    """Compute the CSDs of other lights in the study's scenes, with the effects of their plans.
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    rows : pandas.DataFrame
-        Rows of plain CFAs, named designs and the answer.
-    on_front : pandas.DataFrame
-        Rows on the front.
-    parallel : callable
-        Runs calls on the cores.
-    progress : callable
-        Called with a phase, work done and work in total.
-
-    Returns
-    -------
-    pyarrow.Table
-        `design_id` and `held_out_csd_<a>_<b>`, DN.
-    """
-    lights = study.held_out
-    assert lights is not None
-    shown, calls = computed_rows(rows, on_front), []
-    for row in shown:
-        space, curves = row_curves(study, row)
-        calls.append(delayed(_on_lights, replace(study.setup(space, row["scenario"]), lights=lights), curves))
-    csds = run_with_progress(parallel, calls, "held-out lights", progress)
-    names = [HELD_OUT + csd_name(pair) for pair in class_pairs(lights.classes)]
-    schema = pa.schema([("design_id", pa.int64()), *((name, pa.float64()) for name in names)])
-    held_out = [{"design_id": row["design_id"], **csd} for row, csd in zip(shown, csds, strict=True)]
-    return pa.Table.from_pylist(held_out, schema=schema)
-
-
-def _on_lights(setup: Setup, curves: FloatArray) -> dict[str, float]:
-    columns = evaluate(forward_model(setup), np.asarray(curves, dtype=float))
-    names = [csd_name(pair) for pair in class_pairs(setup.lights.classes)]
-    return {HELD_OUT + name: float(columns[name][0]) for name in names}
 
 
 def left_out_table(study: Study, search: Search, best: Evaluation, parallel: Parallel, progress: Progress) -> pa.Table:

@@ -22,7 +22,6 @@ from ..metrics.objective import COMBINED, Objective, columns_of
 from ..metrics.quantity import OF_A_SHARE, WORST_CASE, YIELD, Columns, Quantity, RequestedQuantities
 from ..metrics.user_metrics import UserMetric
 from ..results.identity import CHUNK
-from ..results.tables import FEW
 from ..vision.section import Vision
 
 _MOST_LETTERS = 200

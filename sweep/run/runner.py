@@ -17,8 +17,6 @@ import pyarrow as pa
 from ..base.disk import read_facts
 from ..base.errors import InfeasibleError, StudyError, UpperBoundExceededError
 from ..base.types import Progress
-from ..metrics.bound import FEASIBLE
-from ..metrics.pareto import hypervolume
 from ..results.dictionary import described
 from ..results.facts import Provenance, missing_keys
 from ..results.folder import begin
@@ -330,25 +328,11 @@ class _Run:
                 warnings.append("no start of the search converged: more `max_evaluations` may find a better design")
             if "saturation" in study.plans[answer.scenario].computed and not study.searches_merged:
                 warnings.append("pixels may saturate: the search sees them before clipping, its row after")
-            if answer.front:
-                facts["hypervolume"] = _hypervolumes(answer, self.gathered)
-                facts["hypervolume_least_sensitivity"] = answer.search.levels[0]
         duration_s = round(time.monotonic() - self.started, 3)
         seconds = max(_CHECK_S, _CHECK_SHARE * duration_s)
         facts["check"], unchecked = check_run(study, self.inventory.path(RESULTS), seconds, self.pool)
         how = self.how | {"duration_s": duration_s}
         return Provenance(**provenance(study, how), **facts, warnings=(*warnings, *unchecked))
-
-
-def _hypervolumes(answer: SearchAnswer, gathered: RunRows) -> dict[str, float]:
-    """Return the area that sweep and search dominate above no separation and the lowest level of sensitivity."""
-    reference = np.array([0.0, answer.search.levels[0] - 1e-6])
-    runs = (*answer.runs, *(run for point in answer.front for run in point.runs))
-    points = [[e.objective, e.sensitivity] for run in runs for e in run.log if e.violation <= FEASIBLE]
-    return {
-        "sweep": hypervolume(gathered.swept_front(answer.search.space.cfa, answer.search.scenario), reference),
-        "search": hypervolume(np.array(points).reshape(-1, 2), reference),
-    }
 
 
 def discard(inventory: Inventory) -> None:

@@ -22,7 +22,7 @@ from ..base.types import FloatArray
 from ..vision.batches import image_id
 from ..vision.detections import ALL
 from ..vision.lamps import TEST
-from ..vision.scenes import SHUFFLED, UNSEEN, WHOLE
+from ..vision.scenes import NETWORK, SHUFFLED, UNSEEN
 from ..vision.scores import Interval, interval_of_seeds
 
 UNKNOWN = "unknown"
@@ -83,8 +83,8 @@ def network_of(images: pd.DataFrame) -> Reader:
     Reader
         Reader.
     """
-    columns = {_ID: _ID, WHOLE: "answer", f"{WHOLE}_p": "confidence"}
-    return Reader(WHOLE, images[list(columns)].rename(columns=columns))
+    columns = {_ID: _ID, NETWORK: "answer", f"{NETWORK}_p": "confidence"}
+    return Reader(NETWORK, images[list(columns)].rename(columns=columns))
 
 
 def table_of(path: Path) -> pd.DataFrame:

@@ -18,12 +18,12 @@ from ..metrics.columns.confusion import D_PRIME, STATE_ERROR
 from ..metrics.evaluate import evaluate
 from ..metrics.separation import csd_name
 from ..results.designs import few_rows, row_curves
-from ..results.tables import FOUND, VISION, VISION_CONDITIONS, VISION_MISREAD, VISION_STREET, VISION_STREETS
+from ..results.tables import FOUND, VISION, VISION_CONDITIONS, VISION_STREET, VISION_STREETS
 from ..spectra.lights import class_pairs, pair_name
 from ..study import Study
 from ..vision.images import setup_at
 from ..vision.readers import OBSERVER, Answers, SeedReading, read_images
-from ..vision.scenes import ORDERS, PARTS, SEEN, UNSEEN, states_of
+from ..vision.scenes import NETWORK, ORDERS, SEEN, UNSEEN, states_of
 from ..vision.section import Vision
 from .workers import run_with_progress
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 _TEXT, _NUMBER, _COUNT = pa.string(), pa.float64(), pa.int64()
 _DESIGN = [("design_id", _COUNT), ("name", _TEXT), ("cfa", _TEXT)]
-_READERS = (OBSERVER, *PARTS)
+_READERS = (OBSERVER, NETWORK)
 _IMAGES = pa.schema(
     [
         *_DESIGN,
@@ -47,7 +47,6 @@ _CONDITIONS = pa.schema(
     + [(name, _NUMBER) for name in ("csd", "dprime", "pair_error")]
 )
 _PIXELS = [("rows", _COUNT), ("columns", _COUNT), ("pixels", pa.binary())]
-_MISREAD = pa.schema([*_DESIGN, ("seed", _COUNT), ("image", _COUNT), *_PIXELS])
 _STREET = pa.schema(
     [*_DESIGN, ("seed", _COUNT), ("level", _TEXT), ("state", _TEXT), ("lit", _COUNT), ("average_precision", _NUMBER)]
 )
@@ -84,14 +83,12 @@ def vision_tables(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
     pairs = [(at, seed) for seed in range(vision.seeds) for at in range(len(designs))]
     calls = [delayed(read_images, *setups[at], vision, (study.section.seed, seed)) for at, seed in pairs]
     images: list[dict[str, Any]] = []
-    pictures: list[dict[str, Any]] = []
     detected: list[dict[str, Any]] = []
     streets: list[dict[str, Any]] = []
     readings = run_with_progress(parallel, calls, "images read (designs x seeds)", progress)
     for (at, seed), reading in zip(pairs, readings, strict=True):
         design = {name: designs[at][name] for name, _ in _DESIGN}
         images += _image_rows(study, vision, design | {"seed": seed}, reading)
-        pictures += _picture_rows(design | {"seed": seed}, reading)
         detected += _street_rows(design | {"seed": seed}, vision, reading)
         if seed == 0:
             streets += [
@@ -107,7 +104,6 @@ def vision_tables(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
     tables = {
         VISION: pa.Table.from_pylist(images, schema=_IMAGES),
         VISION_CONDITIONS: pa.Table.from_pylist(conditions, schema=_CONDITIONS),
-        VISION_MISREAD: pa.Table.from_pylist(pictures, schema=_MISREAD),
     }
     if vision.street is not None:
         tables |= {
@@ -167,11 +163,6 @@ def _rows_of(study: Study, vision: Vision, key: dict[str, Any], answers: Answers
             best = int(probabilities[at].argmax())
             row |= {name: states[best], f"{name}_p": float(probabilities[at, best])}
         yield row
-
-
-def _picture_rows(key: dict[str, Any], reading: SeedReading) -> Iterator[dict[str, Any]]:
-    for at, picture in zip(reading.pictured, reading.pictures, strict=True):
-        yield key | {"image": at} | _pixels(np.rint(255 * picture).astype(np.uint8))
 
 
 def _street_rows(key: dict[str, Any], vision: Vision, reading: SeedReading) -> Iterator[dict[str, Any]]:

@@ -88,6 +88,8 @@ def check_lights(
     """
     _check_columns(requested, sources)
     _check_recognition(section, lights, sources)
+    if section.validation is not None and section.validation.leave_one_out and section.search is None:
+        sources.add(("validate", "leave_one_out"), "nothing is searched", None, "a study with `search`")
     _check_vision(section, lights, mosaics, sources)
     _check_published(section, lights, mosaics, sources)
     _check_captures(section, mosaics, sources)

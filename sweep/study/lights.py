@@ -74,14 +74,10 @@ def with_light_files(section: StudySection, sources: Sources) -> StudySection:
         return LightsSection.model_validate(taken.keys(lambda _: name) | stated)
 
     before = len(sources.issues)
-    changed: dict[str, object] = {"lights": read(section.lights, ("lights",))}
-    validation = section.validation
-    if validation is not None and validation.lights is not None:
-        lights = read(validation.lights, ("validate", "lights"))
-        changed["validation"] = validation.model_copy(update={"lights": lights})
+    lights = read(section.lights, ("lights",))
     if len(sources.issues) > before:
         raise sources.error
-    return section.model_copy(update=changed)
+    return section.model_copy(update={"lights": lights})
 
 
 def _padded(make: Callable[[WavelengthGrid], Lights], grid: WavelengthGrid) -> Lights:
@@ -165,37 +161,6 @@ def lights_of(section: LightsSection, sources: Sources, at: KeyPath = ("lights",
     signals = [signal for group in by_type.values() for signal in group]
     source = ", ".join(entry.file for entry in section.files)
     return make_lights(sources.grid, section.name or "lights", signals, source, photon_ratio=section.photon_ratio)
-
-
-def held_out_lights(section: StudySection, lights: Lights | None, sources: Sources) -> Lights | None:
-    """Construct the lights for validation, as bright as those of the study.
-
-    Parameters
-    ----------
-    section : StudySection
-        The keys of the study, checked against the schema.
-    lights : Lights or None
-        Lights of the study.
-    sources : Sources
-        Files, curves and the issues so far.
-
-    Returns
-    -------
-    Lights or None
-        None if the study has no validation or the run is finished, which does not keep them.
-    """
-    validation, path = section.validation, ("validate", "lights")
-    if validation is not None and validation.leave_one_out and section.search is None:
-        sources.add(("validate", "leave_one_out"), "nothing is searched", None, "a study with `search`")
-    if validation is None or validation.lights is None or lights is None or sources.kept is not None:
-        return None
-    held_out = lights_of(validation.lights, sources, path)
-    if held_out is None:
-        return None
-    for name in held_out.classes:
-        if name not in lights.classes:
-            sources.unknown(path, "signal type", name, lights.classes)
-    return replace(held_out, photon_ratio=lights.photon_ratio)
 
 
 def with_population(lights: Lights, section: StudySection, sources: Sources) -> Lights:

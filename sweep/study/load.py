@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from ..base.disk import is_folder
 from ..base.errors import StudyError, ValidationIssue
-from ..spectra.spectrum import Curves, WavelengthGrid
+from ..spectra.spectrum import Curves
 from .document import Document
 from .model import Study
 from .resolve import resolve
@@ -23,7 +23,6 @@ from .sources import KeptSources, Sources
 def load_study(
     path: Path,
     data: Path | None = None,
-    step_nm: float | None = None,
     kept: KeptSources | None = None,
     changes: Mapping[str, str] = {},
     *,
@@ -38,8 +37,6 @@ def load_study(
         The study file.
     data
         Folder in which the files that it names are looked for first; then beside the study.
-    step_nm
-        Step of the wavelength grid instead of the study's, nm.
     kept
         Curves on that grid to take instead of those in files.
     changes
@@ -67,10 +64,6 @@ def load_study(
         section, notes = narrowed(section, chosen)
         if len(members) > 1:
             section = section.model_copy(update={"study": chosen.name})
-    if step_nm is not None:
-        grid = section.wavelengths
-        finer = WavelengthGrid(start_nm=grid.start_nm, stop_nm=grid.stop_nm, step_nm=step_nm)
-        section = section.model_copy(update={"wavelengths": finer})
     if data is not None and not is_folder(data):
         raise StudyError(ValidationIssue("no such folder", None, None, "--data", str(data)))
     folders = [path.parent] if data is None else [data, path.parent]

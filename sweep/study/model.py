@@ -72,7 +72,6 @@ class Study:
     search: Search | None
     digests: Mapping[str, str]
     warnings: tuple[str, ...]
-    held_out: Lights | None = None
     tasks: StudyTasks | None = None
     user_metrics: tuple[UserMetric, ...] = ()
     user_effects: tuple[UserEffect, ...] = ()

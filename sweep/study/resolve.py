@@ -10,7 +10,7 @@ from ..camera.mosaic import Mosaic
 from ..metrics.registry import quantities_of
 from . import checks
 from .goals import check_goals, check_searched, search_of
-from .lights import check_luminances, check_range, held_out_lights, lights_of, with_light_files, with_population
+from .lights import check_luminances, check_range, lights_of, with_light_files, with_population
 from .model import Study, requested_quantities
 from .schema import CfaSection, StudySection
 from .sensors import check_lenses, check_uncertainty, sensor_of, with_chief_rays, with_technologies
@@ -58,7 +58,6 @@ def resolve(section: StudySection, sources: Sources) -> Study:
     }
     if sensor is not None:
         sensor = with_technologies(sensor, section, sources)
-    held_out = attempt(lambda: held_out_lights(section, lights, sources))
     if lights is not None:
         lights = with_population(lights, section, sources)
     tasks, spaces, colorants = None, [], None
@@ -105,7 +104,6 @@ def resolve(section: StudySection, sources: Sources) -> Study:
         search=search,
         digests=dict(sources.digests),
         warnings=tuple(sources.warnings),
-        held_out=held_out,
         tasks=tasks,
         user_metrics=metrics or (),
         user_effects=effects or (),

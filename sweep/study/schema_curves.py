@@ -171,22 +171,10 @@ LIGHTS_NAME: Any = named(BUILT_IN_LIGHTS)
 
 
 class Validation(Section):
-    """Validation on lights that the search does not use; they are as bright as the study's lights."""
+    """Validation on lights that the search does not use."""
 
-    lights: Annotated[
-        LightsSection | None,
-        BeforeValidator(builtin, json_schema_input_type=LIGHTS_NAME | LightsSection),
-    ] = None
-    """Other lights, of signal types that the study has; their CSDs stand beside its own. A built-in set, a file, or a
-    mapping with `files`."""
-    leave_one_out: bool = False
+    leave_one_out: bool
     """Search again without each light in turn: how far does the optimum fall on it?"""
-
-    @model_validator(mode="after")
-    def _something(self) -> Validation:
-        if self.lights is None and not self.leave_one_out:
-            raise ValueError("`lights`, `leave_one_out: true`, or both")
-        return self
 
 
 _TaskName = Annotated[str, Field(min_length=1, max_length=40, pattern="^[a-z][a-z0-9_]*$")]

@@ -23,7 +23,7 @@ from .batches import Batch
 from .head import heights
 from .network import Network, train
 from .planes import demosaicked, in_noise, tile_planes
-from .scenes import FIXED, PARTS, orders_of_lenses, states_of
+from .scenes import FIXED, orders_of_lenses, states_of
 from .section import Vision
 
 _LEAST_REACH_PX = 6.0
@@ -41,7 +41,7 @@ class _Examples:
 
     `planes`: ndarray of shape (n, rows, columns, planes), in units of the noise; `mirrored` the same of their mirror
     images (empty if the tile has none); `condition`: index of distance, level and background; `fixed`: 1 for lenses in
-    the street's order; `image`: number in the split; `targets`: ndarray of int, shape (n, 4), state, lit position,
+    the street's order; `targets`: ndarray of int, shape (n, 4), state, lit position,
     order and sun on the lenses.
     """
 
@@ -49,7 +49,6 @@ class _Examples:
     mirrored: Float32
     condition: IndexArray
     fixed: IndexArray
-    image: IndexArray
     targets: IndexArray
 
     def some(self, which: IndexArray | BoolArray) -> _Examples:
@@ -63,7 +62,7 @@ class _Examples:
 
 
 class NetworkReader:
-    """Networks that read the images of one design: trained on all of the training images, and on parts of them.
+    """Network that reads the images of one design.
 
     Parameters
     ----------
@@ -79,7 +78,7 @@ class NetworkReader:
         self.vision = vision
         self.mosaic = mosaic
         self.pixel = pixel
-        self._fitted: dict[str, _Fitted] = {}
+        self._fitted: _Fitted | None = None
         self._kinds = [tuple(vision.lenses[kind] for kind in order) for order in orders_of_lenses(len(vision.lenses))]
         self._conditions = list(product(vision.levels, vision.backgrounds, vision.distances_m))
         rows, columns = mosaic.indices.shape
@@ -129,7 +128,6 @@ class NetworkReader:
                 np.empty((0,), np.float32) if self._mirror is None else self.planes(images, mirrored=True),
                 _codes(zip(labels["level"], labels["background"], labels["distance_m"], strict=True), self._conditions),
                 (labels["order"] == FIXED).to_numpy().astype(np.intp),
-                labels["image"].to_numpy(dtype=np.intp),
                 self._targets(labels),
             )
             for images, labels in batches
@@ -143,7 +141,7 @@ class NetworkReader:
         return np.stack([state, lit, order, labels["phantom"].to_numpy(dtype=np.intp)], axis=1)
 
     def learn(self, training: Iterable[Batch], check: Iterable[Batch], seed: tuple[int, ...]) -> None:
-        """Train a network for each of `PARTS`, and its confidence on other lamps.
+        """Train the network, and its confidence on other lamps.
 
         Parameters
         ----------
@@ -158,9 +156,7 @@ class NetworkReader:
         # Those that stand in the street's order by chance teach that order, too, beside any.
         by_chance = examples.some(examples.targets[:, 2] == 0)
         examples = _Examples.joined([examples, replace(by_chance, fixed=np.ones_like(by_chance.fixed))])
-        for part, share in PARTS.items():
-            learned = examples.some(examples.image < share * self.vision.train_images)
-            self._fitted[part] = self._fit(learned, seed).calibrated(checked)
+        self._fitted = self._fit(examples, seed).calibrated(checked)
 
     def _fit(self, training: _Examples, seed: tuple[int, ...]) -> _Fitted:
         inputs = _Inputs(training, (-1, len(self.vision.distances_m)), len(self._conditions))
@@ -172,8 +168,8 @@ class NetworkReader:
         sizes = (1 + n_lenses, 1 + n_lenses, len(self._kinds), 2)
         return _Fitted(train((planes, known), targets, sizes, self.vision.epochs, seed), inputs, 1.0)
 
-    def read(self, images: Iterable[Batch]) -> dict[str, FloatArray]:
-        """Return the probability of each state by the network of each of `PARTS`.
+    def read(self, images: Iterable[Batch]) -> FloatArray:
+        """Return the probability of each state.
 
         Parameters
         ----------
@@ -182,11 +178,11 @@ class NetworkReader:
 
         Returns
         -------
-        dict of str to ndarray of shape (n, n_states)
-            Probabilities by part.
+        ndarray of shape (n, n_states)
+            Probabilities.
         """
-        examples = self._examples(images)
-        return {part: fitted.probabilities(examples) for part, fitted in self._fitted.items()}
+        assert self._fitted is not None
+        return self._fitted.probabilities(self._examples(images))
 
 
 class _Inputs:

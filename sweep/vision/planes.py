@@ -96,31 +96,3 @@ def _convolved(images: FloatArray, tents: list[FloatArray]) -> FloatArray:
     for axis, tent in zip((-2, -1), tents, strict=True):
         result = convolve1d(result, tent, axis=axis, mode="constant")
     return result
-
-
-def false_colors(image: FloatArray, mosaic: Mosaic, mean_nm: FloatArray, offset_dn: float) -> FloatArray:
-    """Return a demosaicked image in false colors.
-
-    Red shows the channel with the longest mean wavelength, blue the shortest, green the one in the middle. The
-    brightest value is 1; the root shows dark parts.
-
-    Parameters
-    ----------
-    image : ndarray of shape (rows, columns)
-        Raw image, DN.
-    mosaic : Mosaic
-        Tile.
-    mean_nm : ndarray of shape (n_channels,)
-        Mean wavelength of each channel, nm.
-    offset_dn : float
-        Pedestal, DN.
-
-    Returns
-    -------
-    ndarray of shape (rows, columns, 3)
-        0 to 1.
-    """
-    planes = np.maximum(demosaicked(image, mosaic) - offset_dn, 0.0)
-    order = np.argsort(-mean_nm)
-    shown = np.stack([planes[..., order[at]] for at in (0, len(order) // 2, -1)], axis=-1)
-    return np.asarray(np.sqrt(shown / max(float(shown.max()), 1.0)), dtype=float)

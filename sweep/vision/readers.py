@@ -13,11 +13,10 @@ from ..camera.setup import Setup
 from .batches import batches, images_of_split, scene_key, scenes_of
 from .detections import precisions
 from .detector import Detector
-from .images import HeadCamera, Numbers
+from .images import HeadCamera
 from .lamps import CHECK, TEST, TRAIN, Lamps, split_lamps
 from .observer import posteriors
-from .planes import false_colors
-from .scenes import ORDERS, WHOLE, Scenes, draw_scenes
+from .scenes import NETWORK, ORDERS, Scenes, draw_scenes
 from .section import Vision
 from .street import StreetCamera, draw_streets, street_labels
 
@@ -44,16 +43,13 @@ class Answers:
 class SeedReading:
     """Answers of one seed by order of the lenses, on lamps that the network has not seen, and on those it has.
 
-    `pictures` are wrongly read images in false colors, [n, rows, columns, 3]; `pictured` their numbers among the
-    images with lenses in any order. `precision` is that of a detector in streets and `lit` the number of lit lenses,
+    `precision` is that of a detector in streets and `lit` the number of lit lenses,
     [n_levels, n_lenses]; `streets` the first street of each light level, [n_levels, rows, columns, 3]. Without streets
     they are empty.
     """
 
     unseen: dict[str, Answers]
     seen: dict[str, Answers]
-    pictures: FloatArray
-    pictured: list[int]
     precision: FloatArray
     lit: IndexArray
     streets: NDArray[np.uint8]
@@ -80,7 +76,7 @@ def read_images(setup: Setup, curves: FloatArray, vision: Vision, seed: tuple[in
     """
     camera = HeadCamera(setup, curves, vision)
     lamps = split_lamps(setup.lights, vision, seed)
-    reader = _networks(camera, lamps, seed) if vision.network else None
+    reader = _network(camera, lamps, seed) if vision.network else None
     unseen: dict[str, Answers] = {}
     seen: dict[str, Answers] = {}
     for order in ORDERS:
@@ -93,11 +89,10 @@ def read_images(setup: Setup, curves: FloatArray, vision: Vision, seed: tuple[in
         answers = {OBSERVER: posteriors(camera, scenes, images, lamps[TEST], order)}
         known: dict[str, FloatArray] = {}
         if reader is not None:
-            answers |= reader.read(batches(camera, scenes, _KEY, order, TEST, "raw"))
-            known = reader.read(batches(camera, known_scenes, _KEY, order, TEST, "raw"))
+            answers[NETWORK] = reader.read(batches(camera, scenes, _KEY, order, TEST, "raw"))
+            known[NETWORK] = reader.read(batches(camera, known_scenes, _KEY, order, TEST, "raw"))
         unseen[order], seen[order] = Answers(scenes, answers), Answers(known_scenes, known)
-    pictures, pictured = _pictures(camera, unseen[ORDERS[-1]], images)
-    return SeedReading(unseen, seen, pictures, pictured, *_streets(camera, lamps, seed))
+    return SeedReading(unseen, seen, *_streets(camera, lamps, seed))
 
 
 def _streets(
@@ -147,7 +142,7 @@ def observer_error(setup: Setup, curves: FloatArray, vision: Vision, seed: tuple
     return float(np.mean(1 - posteriors(camera, scenes, camera.images(scenes), lamps[TEST], order).max(axis=1)))
 
 
-def _networks(camera: HeadCamera, lamps: dict[str, Lamps], seed: tuple[int, int]) -> NetworkReader:
+def _network(camera: HeadCamera, lamps: dict[str, Lamps], seed: tuple[int, int]) -> NetworkReader:
     from .network_reader import NetworkReader  # noqa: PLC0415  (JAX: only where a study asks for a network)
 
     reader = NetworkReader(camera.vision, camera.setup.camera.mosaic, camera.pixel)
@@ -155,15 +150,3 @@ def _networks(camera: HeadCamera, lamps: dict[str, Lamps], seed: tuple[int, int]
     training, check = (images_of_split(camera, lamps, key, seed[0], split, "raw") for split in (TRAIN, CHECK))
     reader.learn(training, check, seed)
     return reader
-
-
-def _pictures(camera: HeadCamera, answers: Answers, images: Numbers) -> tuple[FloatArray, list[int]]:
-    """Return images that the network (without one, the observer) read wrongly, up to a number."""
-    probabilities = answers.probabilities.get(WHOLE, answers.probabilities[OBSERVER])
-    wrong = np.flatnonzero(probabilities.argmax(axis=1) != answers.scenes.state)[:_SHOWN]
-    curves = camera.qe
-    mean_nm = curves @ camera.setup.camera.grid.nodes_nm / np.maximum(curves.sum(axis=1), 1e-300)
-    mosaic, offset = camera.setup.camera.mosaic, camera.pixel.offset_dn
-    shown = [false_colors(camera.table.values_dn[images[at]], mosaic, mean_nm, offset) for at in wrong]
-    side = camera.vision.crop_px
-    return np.array(shown).reshape(-1, side, side, 3), [int(at) for at in wrong]

@@ -20,9 +20,8 @@ ORDERS = (FIXED, SHUFFLED)
 SEEN, UNSEEN = "seen", "unseen"
 """Lamps of an image: used in the training of the network or not; the image itself never is."""
 PHANTOM_SHARE = 0.5
-WHOLE, HALF, QUARTER = "network", "half", "quarter"
-PARTS = {WHOLE: 1.0, HALF: 0.5, QUARTER: 0.25}
-"""Networks of a benchmark, and the share of the training images that each has learned from."""
+NETWORK = "network"
+"""Name of the reader that is trained."""
 
 
 @cache

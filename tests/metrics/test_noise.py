@@ -87,7 +87,9 @@ def test_a_discriminant_of_drawn_pixels_errs_as_often_as_the_closed_form_says() 
     assert wrong > 0.005  # enough errors to count
     # No rule errs less often than the closed form, but for its 1/16 nat; nor than this (Bhattacharyya; Kailath, 1967,
     # for equally frequent signals). One covariance for both, and Gaussians for whole numbers, cost the rule little.
-    assert closed["error_yellow_red"] / 1.07 - 4 * deviation <= wrong <= 1.1 * closed["error_yellow_red"] + 4 * deviation
+    assert (
+        closed["error_yellow_red"] / 1.07 - 4 * deviation <= wrong <= 1.1 * closed["error_yellow_red"] + 4 * deviation
+    )
     assert wrong + 4 * deviation >= (1 - (1 - closed["error_bound_yellow_red"] ** 2) ** 0.5) / 2
 
 

@@ -14,10 +14,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from sweep.base.errors import OutputError, SweepError
-from sweep.report import read_output
 from sweep.report.compare import compare_runs
-from sweep.report.compare_fronts import ComparedFront, box_of, draw_fronts, hypervolumes
-from sweep.report.compare_tables import study_differences
+from sweep.report.compare_fronts import ComparedFront, draw_fronts
 from sweep.study import load_study
 
 from ..build import STUDY, ran
@@ -68,24 +66,6 @@ def compared(folders: Sequence[Path], to: Path) -> tuple[str, str]:
     return "\n".join(compare_runs(folders, to).lines), (to / "compare.html").read_text(encoding="utf-8")
 
 
-def test_a_hypervolume_is_the_area_by_hand() -> None:
-    first = ComparedFront("A", "X", False, np.array([[100.0, 0.905], [40.0, 0.95]]))
-    second = ComparedFront("B", "X", True, np.array([[60.0, 1.0]]))
-    reference, top = box_of([first, second])
-    np.testing.assert_allclose(reference, [0.0, 0.90], atol=1e-12)
-    np.testing.assert_array_equal(top, [100.0, 1.0])
-    _, table = hypervolumes([first, second])
-    # 100 DN up to 0.905, then 40 DN up to 0.95; 60 DN up to 1
-    np.testing.assert_allclose(table["hypervolume"], [100 * 0.005 + 40 * 0.045, 60 * 0.1], rtol=1e-9)
-    assert list(table["of the box"]) == ["23.0%", "60.0%"]
-
-
-def test_a_point_on_a_hundredth_counts() -> None:
-    front = ComparedFront("A", "X", False, np.array([[50.0, 0.9]]))
-    np.testing.assert_allclose(box_of([front])[0], [0.0, 0.89], atol=1e-12)
-    assert hypervolumes([front])[1]["hypervolume"][0] == pytest.approx(0.5, rel=1e-9)
-
-
 @pytest.mark.slow
 def test_two_runs_say_who_is_best_and_by_how_much(runs: dict[str, Path], tmp_path: Path) -> None:
     said, page = compared([runs["chart"], runs["sparse"]], tmp_path / "to")
@@ -99,8 +79,6 @@ def test_two_runs_say_who_is_best_and_by_how_much(runs: dict[str, Path], tmp_pat
         f"Best yellow/red CSD under the constraints: A chart with {best['chart']:.1f} DN; B sparse has {best['sparse']:.1f} DN, "
         f"{less:.1f} DN ({less / best['chart']:.1%}) less." in said
     )
-    assert "sweeps.edges.grid.left_nm" in said
-    assert "constraints" not in said.split("What differs in how")[0]
     assert "used other curves" not in said
     assert "Equal in every CSD: RGGB, RYYCy, mine." in said
     table = pd.read_csv(tmp_path / "to" / "compare.csv")
@@ -128,7 +106,6 @@ def test_figures_of_different_scenes_are_not_compared(runs: dict[str, Path], tmp
     assert "less" not in said.split("Best yellow/red CSD", 1)[1]
     assert "The runs have no equal scene, so no fronts are compared." in found.notes
     assert found.tables["plain"].empty
-    assert ["scenarios.chart.exposure.level", "0.95", "0.8"] in [line.split() for line in said.splitlines()]
     figures = [line for line in said.splitlines() if line.startswith("yellow/red CSD in chart")]
     assert len(figures) == 2
     assert all(line.split().count("-") == 1 for line in figures)
@@ -139,7 +116,7 @@ def test_equal_scenes_are_compared_whatever_their_names(runs: dict[str, Path], t
     found = compare_runs([runs["chart"], runs["brighter"], runs["sparse"]], tmp_path)
     said = "\n".join(found.lines)
     assert "Fronts in chart, " in said
-    assert set(found.tables["hypervolumes"]["run"]) == {"A chart", "C sparse"}
+    assert set(found.tables["fronts"]["run"]) == {"A chart", "C sparse"}
     assert any(
         note.startswith("Fronts are compared in the scenes that two runs or more have: chart.") for note in found.notes
     )
@@ -147,22 +124,18 @@ def test_equal_scenes_are_compared_whatever_their_names(runs: dict[str, Path], t
 
 @pytest.mark.usefixtures("plain_fronts")
 def test_the_same_folder_twice_is_equal(runs: dict[str, Path], tmp_path: Path) -> None:
-    said, page = compared([runs["tiny"], runs["tiny"]], tmp_path)
+    said, _ = compared([runs["tiny"], runs["tiny"]], tmp_path)
     assert "A tiny and B tiny are the same folder." in said
     assert "; B tiny is equal." in said
-    assert "What differs in the studies: nothing" in said
     assert "Equal in every CSD: RGGB, RYYCy, mine." in said
-    assert "Nothing: the studies are the same." in page
 
 
 @pytest.mark.usefixtures("plain_fronts")
 def test_fronts_of_shared_scenes_are_compared(runs: dict[str, Path], tmp_path: Path) -> None:
     said, _ = compared([runs["tiny"], runs["chart"], runs["sparse"]], tmp_path)
     assert "Fronts are compared in the scenes that two runs or more have: chart." in said
-    assert "above the reference of 0 DN at a sensitivity of" in said
     assert "Fronts in dim" not in said
     assert "traced by the search" in said
-    assert "scenarios.dim" in said
     said, _ = compared([runs["tiny"], runs["tiny"]], tmp_path)
     assert "Fronts in dim" in said
 
@@ -216,7 +189,6 @@ def test_dn_of_other_meaning_are_not_ranked(runs: dict[str, Path], tmp_path: Pat
     assert "Best yellow/red CSD in DN of 20 bits under the constraints: B deep with" in said
     assert "Runs with different meanings of DN are not ranked against each other." in said
     assert "so none are compared" in said
-    assert ["pixel.bits", "12", "20"] in [line.split() for line in said.splitlines()]
 
 
 @pytest.mark.parametrize("name", ["compare.html", "compare.csv", "fronts.png", "fronts.svg"])
@@ -258,26 +230,6 @@ def test_comparison_reports_different_curves(runs: dict[str, Path], tmp_path: Pa
         f"used other curves (sensor: R; lights: 1 of {curves[lights]['curve'].nunique()}): their results do not compare"
         in said
     )
-
-
-def test_differences_are_shown_where_they_begin(runs: dict[str, Path]) -> None:
-    one = read_output(runs["chart"])
-    long = [float(number) for number in range(60)]
-    other = [*long[:50], 77.0, *long[51:]]
-
-    def rows(*extra: dict[str, object]) -> list[list[str]]:
-        from dataclasses import replace
-
-        outputs = {chr(65 + at): replace(one, resolved={"same": 1, **own}) for at, own in enumerate(extra)}
-        return study_differences(outputs).to_numpy().tolist()
-
-    ((key, first, second),) = rows({"x": {"values": long}}, {"x": {"values": other}})
-    assert key == "x.values"
-    assert "50.0" in first
-    assert "77.0" in second
-    assert len(first) < 80
-    assert rows({"x": {"y": 1}}, {}) == [["x.y", "1", "-"]]
-    assert rows({"x": {"y": 1}}, {"x": {"y": None}}, {"x": {}}) == [["x.y", "1", "null", "-"]]
 
 
 @pytest.mark.usefixtures("plain_fronts")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from shutil import copytree
@@ -16,11 +15,10 @@ import pytest
 from sweep.base.errors import OutputError
 from sweep.metrics.pareto import knee
 from sweep.report import read_output, summary_lines
-from sweep.report.page_data import history_of, payload
+from sweep.report.page_data import payload
 from sweep.report.scenes import scene_groups
 from sweep.results.facts import CheckFacts
 from sweep.results.identity import CHUNK
-from sweep.results.profiles import ParameterProfile, Profiles
 from sweep.run.rows import Job, jobs_of, rules_of, run_job
 from sweep.study import Study, load_study
 
@@ -39,59 +37,6 @@ def test_the_knee_is_farthest_from_the_line_between_the_ends() -> None:
     assert knee(np.array([[0.0, 2.0], [0.5, 0.6], [2.0, 0.0]])) is None  # nor has one that bends inward
     assert knee(np.full((3, 2), 1.0)) is None
     assert knee(np.array([[0.0, 2.0], [np.nan, 1.0], [2.0, 0.0]])) is None
-
-
-def table_of(frame: pd.DataFrame) -> pa.Table:
-    words = pa.dictionary(pa.int32(), pa.string())
-    table = pa.Table.from_pandas(frame, preserve_index=False)
-    for name in ("kind", "cfa", "scenario"):
-        table = table.set_column(table.column_names.index(name), name, table[name].cast(words))
-    return table
-
-
-def test_a_profile_is_the_best_of_all_feasible_designs_at_a_value() -> None:
-    random = np.random.default_rng(4)
-    n = 4000
-    frame = pd.DataFrame(
-        {
-            "kind": random.choice(["sweep", "design"], n, p=[0.9, 0.1]),
-            "cfa": random.choice(["A", "B"], n),
-            "scenario": random.choice(["one", "two"], n),
-            "left_nm": random.integers(0, 7, n) * 10.0 + 590,
-            "depth": np.ones(n),
-            "csd_yellow_red": random.normal(100, 30, n),
-            "feasible": random.random(n) < 0.5,
-        }
-    )
-    found = Profiles("csd_yellow_red", "one", ["left_nm", "depth"])
-    for part in np.array_split(np.arange(n), 5):
-        found.add(table_of(frame.iloc[part]))
-    own = frame[(frame["kind"] == "sweep") & (frame["scenario"] == "one") & frame["feasible"]]
-    for cfa in ("A", "B"):
-        (profile,) = found.found[cfa]  # one depth alone is no profile
-        assert profile.parameter == "left_nm"
-        for value, best in zip(profile.values, profile.best, strict=True):
-            assert best == own[(own["cfa"] == cfa) & (own["left_nm"] == value)]["csd_yellow_red"].max()
-        assert len(profile.values) == 7
-
-
-def test_many_values_keep_their_best_ones() -> None:
-    values = np.linspace(0, 1, 5001)
-    frame = pd.DataFrame({"left_nm": values, "csd_a_b": 5 - (values - 0.61) ** 2, "feasible": True})
-    frame = frame.assign(kind="sweep", cfa="A", scenario="one")
-    found = Profiles("csd_a_b", "one", ["left_nm"])
-    found.add(table_of(frame[["kind", "cfa", "scenario", "left_nm", "csd_a_b", "feasible"]]))
-    (profile,) = found.found["A"]
-    assert len(profile.values) < 100
-    assert profile.best.max() == frame["csd_a_b"].max()
-    assert profile.values[profile.best.argmax()] == pytest.approx(0.61)
-
-
-def test_the_range_that_keeps_the_objective_contains_the_best_value() -> None:
-    values = np.arange(7.0)
-    profile = ParameterProfile("x", values, np.array([96.0, 10.0, 97.0, 100.0, 95.0, 94.0, 99.0]))
-    assert profile.keeps == (2.0, 4.0)
-    assert profile.drop == 90.0
 
 
 def test_omitted_effects_are_not_reported_as_simulated(finished: FinishedFolder) -> None:
@@ -115,39 +60,6 @@ def test_report_states_the_largest_difference_of_the_check(finished: FinishedFol
         "allowed 0.1 DN)."
     )
     assert not check.passed
-
-
-@pytest.mark.slow
-def test_of_a_series_the_terminal_lists_the_two_ends(finished: FinishedFolder) -> None:
-    lines = summary_lines(read_output(finished("fog")))
-    assert [line.split(":")[0] for line in lines if line.startswith("day ")] == [
-        "day visibility_m=50",
-        "day visibility_m=10000",
-    ]
-    assert "(1 more scenario in the report.)" in lines
-
-
-def test_the_history_ends_at_the_answer(finished: FinishedFolder) -> None:
-    folder = finished("stopband")
-    output = read_output(folder)
-    history = history_of(output)
-    assert history is not None
-    facts = json.loads((folder / "provenance.json").read_text())
-    log = pd.read_parquet(folder / "search.parquet")
-    assert (
-        history["evaluations"][-1] == len(log) == facts["search"]["evaluations"] + facts["search"]["front_evaluations"]
-    )
-    assert np.nanmax([start["best"][-1] for start in history["starts"]]) == facts["search"]["best_smooth_objective"]
-    assert history["best"][-1] == pytest.approx(facts["search"]["best_smooth_objective"], rel=1e-6)
-    assert (np.diff(history["volume"]) >= 0).all()
-    # The area below a staircase, by hand: everything feasible, above no separation and the lowest level.
-    feasible = log[log["violation"] <= 1e-6].sort_values("sensitivity", ascending=False)
-    area, reached = 0.0, 0.0
-    for row in feasible.itertuples():
-        if row.objective > reached:
-            area += (row.objective - reached) * (row.sensitivity - history["least_sensitivity"] + 1e-6)
-            reached = row.objective
-    assert history["volume"][-1] == pytest.approx(area, rel=1e-6)
 
 
 @pytest.mark.slow

@@ -52,27 +52,6 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-@pytest.mark.usefixtures("plain_pictures")
-def test_other_lights_read_as_in_a_study_of_their_own(folder: Path) -> None:
-    validated = "validate:\n  lights:\n    " + FILE.replace("FILE", "other").replace("REDS", "[r1]") + "\n"
-    study = load(folder, text("one", "own", after=validated))
-    ran(study, folder / "one", 1)
-    ratio = f"photon_ratio: {study.lights.photon_ratio!r}, "
-    ran(load(folder, text("two", "other", ratio, "[r1]")), folder / "two", 1)
-    held = pd.read_parquet(folder / "one" / "validated.parquet").set_index("design_id")
-    own = pd.read_parquet(folder / "two" / "results.parquet").set_index("design_id")
-    assert {0, 1} <= set(held.index)
-    for design, row in held.iterrows():
-        for pair in ("green_yellow", "yellow_red"):
-            assert row[f"held_out_csd_{pair}"] == own.loc[design, f"csd_{pair}"]
-    output = read_output(folder / "one")
-    make_report(output)
-    best = output.best.iloc[0]
-    said = output.trade_off[0].formatted(own.loc[best["design_id"], "csd_yellow_red"])
-    assert f"({said} on lights that it has not seen)" in "\n".join(summary_lines(output))
-    assert "yellow/<wbr>red CSD, other lights" in (folder / "one" / "report.html").read_text()
-
-
 @pytest.mark.slow
 @pytest.mark.usefixtures("plain_pictures")
 def test_a_search_without_a_light_finds_no_less(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -131,19 +110,14 @@ def test_another_light_changes_no_reading_of_a_resolved_study(folder: Path) -> N
 @pytest.mark.parametrize(
     ("after", "said"),
     [
-        ("validate: {}\n", "`lights`, `leave_one_out: true`, or both"),
+        ("validate: {}\n", "validate.leave_one_out: missing"),
         (
             "validate: {leave_one_out: true}\n",
             "validate.leave_one_out: nothing is searched; allowed: a study with `search`",
         ),
         ("validate: {leav_one_out: true}\n", "did you mean 'leave_one_out'?"),
         ("validat: {leave_one_out: true}\n", "did you mean 'validate'?"),
-        ("validate: {lights: tl17}\n", "validate.lights: unknown built-in lights (got 'tl17')"),
-        (
-            "validate: {lights: {builtin: tl16, photon_ratio: 3}}\n",
-            "validate.lights.photon_ratio: a built-in data set has its own (got 3.0)",
-        ),
-        ("validate: {lights: tl16}\n", "unknown signal type (got 'orange')"),
+        ("validate: {lights: tl16}\n", "validate.lights: unknown key"),
     ],
 )
 def test_a_wrong_validation_is_one_line(folder: Path, after: str, said: str) -> None:
@@ -151,42 +125,30 @@ def test_a_wrong_validation_is_one_line(folder: Path, after: str, said: str) -> 
     assert any(said in issue for issue in found), found
 
 
+def with_lights(stated: str) -> str:
+    """The study of built-in curves with other lights."""
+    return re.sub(r"^lights: .*$", f"lights: {stated}", text("one", "own"), flags=re.MULTILINE)
+
+
 def test_signal_types_of_a_file_follow_from_its_colors(folder: Path) -> None:
     """The same reading as with its columns named, told to the user, and kept in the resolved study."""
     lights(folder, "third", 590, 634)
-    named = load(
-        folder,
-        text(
-            "one",
-            "own",
-            after="validate:\n  lights:\n    "
-            + FILE.replace("FILE", "third").replace("REDS", "[r1, r2]").replace("photons", "energy")
-            + "\n",
-        ),
-    )
-    alone = load(folder, text("one", "own", after="validate: {lights: third.csv}\n"))
+    named = load(folder, text("one", "third").replace("photons", "energy"))
+    alone = load(folder, with_lights("third.csv"))
     assert any(
         "third.csv: g1, y1, r1, r2: no unit, assumed to be energy; green: g1; yellow: y1; red: r1, r2" in line
         for line in alone.warnings
     )
-    assert alone.held_out is not None
-    assert named.held_out is not None
-    assert alone.held_out.names == named.held_out.names
-    keyed = load(folder, text("one", "own", after="validate: {lights: {builtin: third.csv, name: street}}\n"))
-    assert keyed.held_out is not None
-    assert keyed.held_out.name == "street"
-    np.testing.assert_array_equal(alone.held_out.photons, named.held_out.photons)
-    ran(alone, folder / "out", 1)
-    kept = (folder / "out" / "study.resolved.yaml").read_text()
-    assert "third.csv" in kept
-    assert "r2" in kept.split("validate:")[1]
+    assert alone.lights.names == named.lights.names
+    np.testing.assert_array_equal(alone.lights.photons, named.lights.photons)
+    assert load(folder, with_lights("{builtin: third.csv, name: street}")).lights.name == "street"
 
 
 @pytest.mark.parametrize(
-    ("lights", "said"),
+    ("file", "said"),
     [("othr.csv", "no such file (got 'othr.csv')"), ("qe.csv", "lights of one signal color or none")],
 )
-def test_a_file_that_is_no_lights_is_one_line(folder: Path, lights: str, said: str) -> None:
+def test_a_file_that_is_no_lights_is_one_line(folder: Path, file: str, said: str) -> None:
     (folder / "qe.csv").write_text("nm,a,b\n400,0.1,0.2\n700,0.1,0.2\n")
     with pytest.raises(StudyError, match=re.escape(said)):
-        load(folder, text("one", "own", after=f"validate: {{lights: {lights}}}\n"))
+        load(folder, with_lights(file))

@@ -18,7 +18,6 @@ from sweep.designs.tolerance import NONE, Tolerance
 from sweep.metrics.bound import FEASIBLE, Bound, total_violation
 from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.objective import Objective
-from sweep.metrics.pareto import hypervolume
 from sweep.metrics.smooth import smooth_response
 from sweep.report.summary import _limit_line
 from sweep.results.facts import SearchFacts
@@ -140,12 +139,6 @@ def test_upper_bound_leaves_out_constraints_of_edges() -> None:
     )
     assert found.left_out == ("edge_width_nm", "edge shifts of sensitivity")
     assert found.proven == pytest.approx(limit_of(constrained(sensitivity=Bound(min=0.93))).proven, abs=1e-9)
-
-
-def test_hypervolume_of_two_steps() -> None:
-    values = np.array([[2.0, 1.0], [1.0, 2.0], [np.nan, 5.0], [-1.0, 9.0]])
-    assert hypervolume(values, np.array([0.0, 0.0])) == pytest.approx(3.0)
-    assert hypervolume(values[2:], np.array([0.0, 0.0])) == 0.0
 
 
 def test_no_limit_is_claimed_where_it_would_not_hold() -> None:

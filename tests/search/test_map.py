@@ -127,9 +127,7 @@ def test_the_widest_band_is_no_wider_than_that_of_any_peak(top_nm: float, slopes
 
 def test_the_specification_has_amounts_for_every_width(folder: Path, tmp_path: Path) -> None:
     """A = e c l: 0.8 um of a dye of 80,000 l/(mol cm) have an absorbance of 6.4 per mol/l; 400 g/mol in 1,250 g/l."""
-    code, said, _ = commanded(
-        *("export", folder / "out", "--design", "best", "--also", "specification", "--to", tmp_path)
-    )
+    code, said, _ = commanded(*("export", folder / "out", "--design", "best", "--specification", "--to", tmp_path))
     assert code == 0
     assert "what an absorption band would have to be" in said
     table = pd.read_csv(tmp_path / "best_specification.csv")
@@ -140,12 +138,11 @@ def test_the_specification_has_amounts_for_every_width(folder: Path, tmp_path: P
     np.testing.assert_allclose(
         table["csd_yellow_red"], cells.groupby("fwhm_nm")["objective"].max().to_numpy(), rtol=1e-9
     )
-    assert (tmp_path / "best_specification.svg").stat().st_size > 10_000
 
 
 def test_without_a_map_there_is_no_specification(finished: FinishedFolder, tmp_path: Path) -> None:
     code, _, said = commanded(
-        *("export", finished("stopband"), "--design", "RGGB", "--also", "specification", "--to", tmp_path)
+        *("export", finished("stopband"), "--design", "RGGB", "--specification", "--to", tmp_path)
     )
     assert code == 2
     assert "no map of absorption bands" in said

@@ -601,8 +601,9 @@ def test_words_of_three_languages_are_channels(tmp_path: Path) -> None:
     (tmp_path / "b.csv").write_text(
         GERMAN.replace("Rot", "x1").replace("Blau", "x2").replace("Klar", "x3"), encoding="utf-8"
     )
-    code, out, _ = commanded("new", "other", "--qe", tmp_path / "b.csv", "--folder", tmp_path)
-    assert "Guessed by shape, check them: QE x1 [%], QE x2 [%], QE x3 [%]" in out
+    code, _, err = commanded("new", "other", "--qe", tmp_path / "b.csv", "--folder", tmp_path)
+    assert code == 2
+    assert "only G was understood (got 'QE x1 [%], QE x2 [%], QE x3 [%]')" in err
     (tmp_path / "c.csv").write_text(
         "nm,QE Grün [%],x1,x2\n" + rows([NM.astype(int), *(ppf(100 * QE["Green"]) for _ in range(3))])
     )

@@ -21,7 +21,7 @@ from sweep.vision.network_reader import NetworkReader
 from sweep.vision.observer import posteriors
 from sweep.vision.pixel_table import pixel_table
 from sweep.vision.readers import OBSERVER, read_images
-from sweep.vision.scenes import FIXED, ORDERS, SHUFFLED, WHOLE, draw_scenes
+from sweep.vision.scenes import FIXED, NETWORK, ORDERS, SHUFFLED, draw_scenes
 from sweep.vision.scores import confusion_matrix, costs, macro_f1, mean_of
 
 from ..build import BASE, issues, load
@@ -188,7 +188,7 @@ def test_a_network_reads_demosaicked_images() -> None:
     told = read_images(setup, NO_FILTERS, requested, (1, 0)).unseen[SHUFFLED]
     raw = read_images(setup, NO_FILTERS, requested.model_copy(update={"input": "raw", "network": False}), (1, 0))
     np.testing.assert_array_equal(told.probabilities[OBSERVER], raw.unseen[SHUFFLED].probabilities[OBSERVER])
-    assert (told.probabilities[WHOLE].argmax(axis=1) == told.scenes.state).mean() > 0.45
+    assert (told.probabilities[NETWORK].argmax(axis=1) == told.scenes.state).mean() > 0.45
 
 
 def test_scores() -> None:

@@ -15,9 +15,7 @@ PANEL = OF_CURVES
 
 
 def describe(
-    file: Annotated[
-        Path, typer.Argument(help="A file or folder of curves, or EMVA 1288 results (.xml).", show_default=False)
-    ],
+    file: Annotated[Path, typer.Argument(help="A file or folder of curves.", show_default=False)],
     output: Annotated[Path, typer.Option(help="Folder for the picture.")] = Path("outputs/describe"),
     quantity: Annotated[
         str | None,
@@ -28,12 +26,6 @@ def describe(
 ) -> None:
     """Plot and check a file of curves: contents, issues, colors of its lights."""
     facts: dict[str, Any] = {"file": str(file)}
-    if file.suffix.casefold() == ".xml" and quantity is None:
-        from ..emva1288 import pixel_lines
-
-        lines = pixel_lines(file)
-        print_result(lines, facts | {"lines": lines}, as_json=as_json, quiet=quiet)
-        return
     from ..describe import described
 
     description = described(file, output, quantity_of(quantity))

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ...base.errors import ErrorBoundExceededError, OutputError, SweepError, ValidationIssue
-from ..options import OF_RESULTS, AllowCode, DataFolder, ExportFormat, ImageForm, ImageSplit, RunFolder, run_folders
+from ..options import OF_RESULTS, AllowCode, DataFolder, ImageForm, ImageSplit, RunFolder, run_folders
 from ..output import Json, ProgressDisplay, Quiet, print_result
 
 PANEL = OF_RESULTS
@@ -78,12 +78,9 @@ def export(
     data: Annotated[
         Path | None, typer.Option(help="Folder with the run's curve files, which are then read again and compared.")
     ] = None,
-    also: Annotated[
-        list[ExportFormat] | None,
-        typer.Option(
-            help="Another file, too: .spectrum of Speos, weights of R, G and B, or the specification of a map's band."
-        ),
-    ] = None,
+    specification: Annotated[
+        bool, typer.Option("--specification", help="Also what an absorption band of the study's map would have to be.")
+    ] = False,
     to: Annotated[Path | None, typer.Option(help="Folder for the files.", show_default="FOLDER/export")] = None,
     allow_code: AllowCode = False,
     quiet: Quiet = False,
@@ -94,7 +91,7 @@ def export(
     if design is not None:
         from ..export import export_design
 
-        lines = export_design(folder, design, data, to, also or (), allow_code=allow_code)
+        lines = export_design(folder, design, data, to, with_specification=specification, allow_code=allow_code)
     else:
         from ...run.image_files import ImageFiles
         from ..export_images import export_images

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ...base.errors import InterruptedRunError, StudyError, SweepError, ValidationIssue
+from ...base.errors import InterruptedRunError, StudyError, SweepError
 from ..endings import print_issues
 from ..options import (
     OF_STUDIES,
@@ -80,30 +80,15 @@ def new(
         list[Path] | None,
         typer.Option(help="A file or folder of spectra of lights; may be repeated.", show_default=False),
     ] = None,
-    pixel: Annotated[
-        Path | None, typer.Option(help="EMVA 1288 results (XML) of the sensor's pixel.", show_default=False)
-    ] = None,
     quantity: Annotated[
         list[str] | None, typer.Option(help="Unit of the curves' or the lights' numbers, where heads do not tell it.")
     ] = None,
     folder: Annotated[Path, typer.Option(help="Folder of the studies.")] = Path("studies"),
-    source: Annotated[
-        str | None, typer.Option("--from", help="A study, or the name of one, to begin with.", show_default=False)
-    ] = None,
 ) -> None:
     """Write a commented study that runs as it is, for the built-in curves or for files of your own."""
-    from ...study.shipped import study_path
-    from ..new import new_study, study_from
+    from ..new import new_study
 
-    if source is None:
-        lines = new_study(name, folder, qe or [], lights or [], [quantity_of(one) for one in quantity or ()], pixel)
-    elif qe or lights or pixel:
-        raise StudyError(
-            ValidationIssue("a study that is copied has its own curves and pixel", key="--from", value=source)
-        )
-    else:
-        lines = study_from(name, folder, study_path(Path(source)))
-    for line in lines:
+    for line in new_study(name, folder, qe or [], lights or [], [quantity_of(word) for word in quantity or ()]):
         typer.echo(line)
 
 

@@ -14,14 +14,14 @@ PANEL = OF_TOOL
 
 
 def accuracy(study: StudyPath, data: DataFolder = None, output: Outputs = Path("outputs")) -> None:
-    """Measure what accuracy costs: error and time of presets and single settings, in each scene of a study."""
+    """Measure what accuracy costs: error and time of each preset, in each scene of a study."""
     from ...study import folder_name, load_study
     from ..accuracy import measure_accuracy
 
     loaded = load_study(study, data)
     folder = output / folder_name(loaded.name)
     with ProgressDisplay() as display:
-        lines = measure_accuracy(loaded, lambda step_nm: load_study(study, data, step_nm), folder, display.update)
+        lines = measure_accuracy(loaded, folder, display.update)
     for line in lines:
         typer.echo(line)
 

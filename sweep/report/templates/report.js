@@ -339,9 +339,7 @@ function drawParallel() {
   const some = [...rowsOf("front"), ...rowsOf("feasible"), ...rowsOf("best")];
   const every = Math.max(1, Math.ceil(some.length / 4000));
   const rows = some.filter((row, i) => i % every === 0 || group[row] !== G.feasible);
-  const profiled = (data.profiles[view.cfa] || []).map((p) => p.parameter);
-  const parameters = data.parameters.filter((name) => profiled.length === 0 || profiled.includes(name));
-  const names = [...parameters, ...Object.keys(data.columns).filter((n) => n.startsWith("csd_")), data.axes.x, data.axes.y, data.objective];
+  const names = [...data.parameters, ...Object.keys(data.columns).filter((n) => n.startsWith("csd_")), data.axes.x, data.axes.y, data.objective];
   const dimensions = [...new Set(names)].map((name) => ({name, values: rows.map((i) => columns[name] ? columns[name][i] : NaN)}))
     .filter(({values}) => values.every(Number.isFinite) && Math.max(...values) > Math.min(...values))
     .map(({name, values}) => ({label: plain(data.columns[name].label.replace(" CSD", "")), values}));
@@ -369,30 +367,6 @@ function drawParallel() {
   box.removeAllListeners("plotly_restyle");
   box.on("plotly_restyle", count);
   count();
-}
-
-function panels(box, entries, draw, height) {
-  const wide = narrow() ? 1 : Math.min(3, entries.length), rows = Math.ceil(entries.length / wide);
-  const layout = {grid: {rows, columns: wide, pattern: "independent", ygap: 0.35}, height: height * rows + 40,
-    margin: {l: 55, r: 10, t: 20, b: 45}, showlegend: false};
-  const found = [];
-  entries.forEach((entry, i) => draw(entry, i ? String(i + 1) : "", found, layout));
-  Plotly.react(box, found, layout, config);
-}
-
-function drawProfiles() {
-  const box = byId("profiles");
-  if (!box) return;
-  const entries = data.profiles[view.cfa] || [];
-  box.hidden = entries.length === 0;
-  if (!entries.length) return;
-  const top = Math.max(...entries.flatMap((e) => e.best)), label = view.y_label;
-  panels(box, entries, (entry, at, found, layout) => {
-    found.push({type: "scatter", mode: "lines+markers", x: entry.values, y: entry.best, xaxis: `x${at}`, yaxis: `y${at}`,
-      line: {color: "#0072b2"}, marker: {size: 4}, hovertemplate: `${plain(entry.parameter)} %{x:.4g}: %{y:.4g}<extra></extra>`});
-    layout[`xaxis${at}`] = Object.assign({title: {text: plain(entry.parameter)}}, grid);
-    layout[`yaxis${at}`] = Object.assign({range: [0, 1.05 * top], title: {text: entries.indexOf(entry) % 3 ? "" : plain(label)}}, grid);
-  }, 210);
 }
 
 function drawSeries(series, box) {
@@ -432,28 +406,6 @@ function logTicks(values) {
   }
   const shown = ticks.filter((tick) => tick > 0.8 * low && tick < 1.25 * high);
   return {tickmode: "array", tickvals: shown, ticktext: shown.map((tick) => tick.toLocaleString("en-US", {maximumSignificantDigits: 3}))};
-}
-
-function drawHistory() {
-  const box = byId("history"), h = data.history;
-  if (!box || !h) return;
-  const axis = {mode: "lines", type: "scatter", connectgaps: false};
-  const found = h.starts.map((start) => Object.assign({
-    x: start.best.map((_, i) => i + 1), y: start.best, name: `start ${start.number}`, line: {width: 1, color: "#9aa7b3"},
-    hovertemplate: `start ${start.number}, evaluation %{x}: %{y:.4g}<extra></extra>`}, axis));
-  const all = Object.assign({xaxis: "x2", yaxis: "y2", x: h.evaluations, hovertemplate: "%{x} evaluations: %{y:.5g}<extra></extra>"}, axis);
-  found.push(Object.assign({}, all, {y: h.best, line: {color: "#d55e00", width: 2}}));
-  if (h.volume) found.push(Object.assign({}, all, {y: h.volume, xaxis: "x3", yaxis: "y3", line: {color: "#0072b2", width: 2}}));
-  const panes = h.volume ? 3 : 2, wide = narrow() ? 1 : panes;
-  Plotly.react(box, found, {
-    grid: {rows: panes / wide, columns: wide, pattern: "independent"}, height: narrow() ? 255 * panes : 320, showlegend: false,
-    margin: {l: 55, r: 10, t: 20, b: 50},
-    xaxis: Object.assign({title: {text: "evaluations of one start"}}, grid),
-    yaxis: Object.assign({title: {text: `best feasible ${plain(h.label)}`}}, grid),
-    xaxis2: Object.assign({type: "log", title: {text: "evaluations, search and front"}}, grid), yaxis2: Object.assign({title: {text: "best feasible"}, rangemode: "tozero"}, grid),
-    xaxis3: Object.assign({type: "log", title: {text: "evaluations, search and front"}}, grid),
-    yaxis3: Object.assign({title: {text: "hypervolume"}, rangemode: "tozero"}, grid),
-  }, config);
 }
 
 function saveFront() {
@@ -510,7 +462,6 @@ function drawAll() {
   if (first !== undefined) choose(first);
   if (!view) return;
   later("parallel-section", drawParallel);
-  later("profiles-section", drawProfiles);
 }
 
 /* Pointing and clicking at the designs of a plot, once it is drawn. */
@@ -552,7 +503,6 @@ if (view) {
 }
 drawAll();
 listen("cfas");
-later("history", drawHistory);
 data.series.forEach((series, i) => later(`series-${i}`, () => drawSeries(series, byId(`series-${i}`))));
 /* A page that is printed has every figure, as wide as the paper; the first one beside the answer, two series to a page. */
 const heights = new Map();
