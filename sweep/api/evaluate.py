@@ -121,9 +121,7 @@ def evaluate(source: Path | str, *, design: str | None = None, **options: Any) -
         return evaluate_filter(filter_of_run(path, design, EvaluateOptions(**options)))
     for key, value in (("design", design), ("data", options.get("data")), ("allow-code", options.get("allow_code"))):
         if value:
-            raise DataError(
-                ValidationIssue(f"`{key}` goes with a run's folder", str(path), None, f"--{key}", str(value))
-            )
+            raise DataError(ValidationIssue(f"`{key}` requires a run folder", str(path), None, f"--{key}", str(value)))
     return evaluate_filter(filter_of_file(path, EvaluateOptions(**options)))
 
 

@@ -138,7 +138,7 @@ def _order(item: tuple[str, float | None]) -> tuple[bool, float]:
 
 def _reason(bound_dn: float | None, leave_out: bool, needed: bool) -> str:
     if leave_out:
-        return "less than the tolerance leaves room for"
+        return "bound below the remaining tolerance"
     if needed:
         return "errors under noise need it"
     return "no closed bound: computed wherever it is active" if bound_dn is None else "may change more than is allowed"

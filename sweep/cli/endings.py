@@ -122,7 +122,7 @@ def _text(error: Any) -> str | None:
         names = [os.fsdecode(name) for name in (error.filename, error.filename2) if isinstance(name, (str, bytes))]
         text = ": ".join([*names, error.strerror or str(error) or type(error).__name__])
     elif isinstance(error, UnicodeEncodeError) and error.reason == "surrogates not allowed":
-        text = f"a name that is no UTF-8 (got {error.object!r})"
+        text = f"file name is not UTF-8 (got {error.object!r})"
     elif isinstance(error, ImportError):
         text = f"a library cannot be loaded: {error}"
     elif isinstance(error, RuntimeError) and "thread" in str(error):  # of Python and of Arrow, where no more may start

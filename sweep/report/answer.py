@@ -21,7 +21,7 @@ from .noise import usable_lines
 from .over_series import flicker_lines, worst_of_series
 from .parameter_map import map_lines
 from .scorecard import score_lines, scorecard
-from .series import lead_sentence, leads_of, series_figures, vanishing_line
+from .series import lead_sentence, leads_of, scene_in_words, series_figures, vanishing_line
 from .terms import (
     angle_note,
     format_constraints,
@@ -122,7 +122,7 @@ def _format_separation(output: Output, row: Row) -> str:
 
 def _in(output: Output, scenario: str) -> str:
     """Return a scenario for the end of a sentence, if there are several."""
-    return f" in {scenario}" if len(output.scenarios) > 1 else ""
+    return f" in {scene_in_words(scenario)}" if len(output.scenarios) > 1 else ""
 
 
 def _best(output: Output, leaders: Leaders) -> Iterator[str]:  # noqa: PLR0912  (one sentence after another)
@@ -130,7 +130,7 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:  # noqa: PLR0912  
     best, plain, separation = leaders.chosen, leaders.plain, output.trade_off[0]
     if best is None:
         if len(output.scenarios) > 1:
-            yield f"In {leaders.scenario}, no design meets every constraint."
+            yield f"In {scene_in_words(leaders.scenario)}, no design meets every constraint."
         return
     under, stated = format_constraints(output), technology_of(output, best)
     notes = [
@@ -268,10 +268,10 @@ def _best_of_other_scenarios(output: Output) -> Iterator[str]:
         leaders = leaders_of(output, scenario)
         best = leaders.chosen
         if best is None:
-            yield f"In {scenario}, no design meets every constraint."
+            yield f"In {scene_in_words(scenario)}, no design meets every constraint."
         else:
             against = _times(output, best, leaders.plain)
-            yield f"In {scenario}, {full_name(best)} {_format_separation(output, best)}{against}."
+            yield f"In {scene_in_words(scenario)}, {full_name(best)} {_format_separation(output, best)}{against}."
     if left := len(output.scenarios) - 1 - len(others[:_MOST_SCENARIOS]):
         yield f"Of {left} more scenario{'s' if left > 1 else ''}, the report's tables have the best designs."
 

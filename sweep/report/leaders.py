@@ -213,7 +213,7 @@ def upper_bound_beside(output: Output, row: Row) -> float | None:
     if value <= bound:
         return bound
     if output.goal.unit == DN and value > bound + math.sqrt(len(output.mosaic(search.cfa).channels)):
-        problem = f"broken proof: {label(row)} has {value:.9g} DN, but its upper bound is {bound:.9g} DN"
+        problem = f"upper bound exceeded (bug): {label(row)} has {value:.9g} DN, but its upper bound is {bound:.9g} DN"
         raise UpperBoundExceededError(ValidationIssue(f"{problem}; this is an error of the program, not of the study"))
     return None
 

@@ -16,7 +16,7 @@ from ..results.tables import FOUND, PLAIN
 from ..study.axes import series_of
 from .leaders import Row, label, of_reference
 from .noise import rounded
-from .series import over_series, quantity_of
+from .series import over_series, quantity_of, scene_in_words
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -121,7 +121,7 @@ def flicker_lines(output: Output) -> Iterator[str]:
     if worst is None or not (worst["quantity"] == LAMP_SEEN).any():
         pulsed = output.few.dropna(subset=[LAMP_SEEN])
         least = min(pulsed.to_dict("records"), key=lambda row: float(row[LAMP_SEEN]))
-        share = f"{_percent(least[LAMP_SEEN])} of the phases ({least['name']} in {least['scenario']})"
+        share = f"{_percent(least[LAMP_SEEN])} of the phases ({least['name']} in {scene_in_words(least['scenario'])})"
         yield f"Pulsed lamps are seen in {'all phases' if least[LAMP_SEEN] > _ALL else f'as few as {share}'}."
         return
     known = worst.dropna().reset_index(drop=True)

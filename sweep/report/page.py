@@ -34,7 +34,7 @@ from .price import price_table
 from .scenes import scene_groups, scene_table
 from .scorecard import draw_scorecard, scorecard
 from .sensor_map import map_drawings
-from .series import draw_series
+from .series import draw_series, scene_in_words
 from .stated import stated_lines
 from .summary import counts_line
 from .tables import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
@@ -120,7 +120,7 @@ def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
         "card": scorecard(output),
         "card_first": output.best.empty and not series_first and output.study.tasks is not None,
         "objective": _objective(output),
-        "numbers_in": "" if over_all else f"in {leaders_of(output).scenario}",
+        "numbers_in": "" if over_all else f"in {scene_in_words(leaders_of(output).scenario)}",
         "series_first": series_first,
         "most_series": _MOST_SERIES,
         "terms_first": series_first and drawn["series"][0]["y_label"] == output.trade_off[0].axis,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
@@ -143,6 +144,16 @@ def quantity_of(key: str) -> tuple[str, str]:
     """
     name, _, unit = _LABELS.get(key, key).partition(" / ")
     return name, unit.strip("()")
+
+
+def scene_in_words(scenario: str) -> str:
+    """Return a scenario's name; numbers of many digits, as of geometric steps, in three: `lamp at 139 Hz`."""
+
+    def in_words(found: re.Match[str]) -> str:
+        unit = quantity_of(found[1])[1]
+        return f" at {float(found[2]):.3g} {unit}" if unit else f" {found[1]}={float(found[2]):.3g}"
+
+    return re.sub(r" (\w+)=(\d+\.\d{4,})(?![\de])", in_words, scenario)
 
 
 def over_series(rows: pd.DataFrame, scenarios: Mapping[str, float], column: str) -> dict[str, np.ndarray]:

@@ -9,7 +9,7 @@ import numpy as np
 from ..camera.scene import Scene, WhitePatchExposure
 from ..results.output import Output
 from ..study.axes import series_of
-from .series import over_series, quantity_of
+from .series import over_series, quantity_of, scene_in_words
 
 _FULL = "full_signals"
 _MOST_NAMED = 3
@@ -111,4 +111,4 @@ def saturation_lines(output: Output) -> Iterator[str]:
             f"{row['name']} {int(row[_FULL])} of {total}" for row in some.to_dict("records")[:_MOST_NAMED]
         )
         more = f" and {len(some) - _MOST_NAMED} more" if len(some) > _MOST_NAMED else ""
-        yield f"Warning: in {scenario}, signals fill pixels: {counts}{more}."
+        yield f"Warning: in {scene_in_words(str(scenario))}, signals fill pixels: {counts}{more}."

@@ -49,13 +49,13 @@ _WORST = (
     "the worst case of a CSD or sensitivity over edges that production shifts and films that it makes too thick or "
     "too thin (five errors from one end of both to the other, and the two other corners), "
     "and of a CSD over the population of the lights: then that of the response before clipping and rounding, with "
-    "everything on, over all members exactly"
+    "all effects, over all members exactly"
 )
 _OF_A_SHARE = (
     "the CSD that at least the share `population.wanted_yield` of the drawn lamps and cameras has, and with 95 % "
     "confidence (one-sided, binomial) that share of all, where the design was not chosen by the same draws, as a "
     "search's is: the mean of the draws that rank right below, a tenth of all that may have less, before clipping and "
-    "rounding, with everything on; no limit is computed of it, and a limit of others leaves a constraint on it out"
+    "rounding, with all effects; no limit is computed of it, and a limit of others leaves a constraint on it out"
 )
 _OWN = (
     "a metric of the study's `metrics`, the worst over moments and phases of the lattice; its error is not checked: "
@@ -157,14 +157,14 @@ FILES = {
     files.CURVES: "a row per curve and wavelength: " + ", ".join(SCHEMA.names),
     files.POINTS: "points of the clouds: design_id, signal_type, signal, channel, dn",
     files.CROSSINGS: "where a study with `recognition` has scenarios that differ in one number: the numbers `at` which "
-    "the error of a plain CFA, named design or answer of the search is the allowed one, with everything on, the "
+    "the error of a plain CFA, named design or answer of the search is the allowed one, with all effects, the "
     "`error` there, and whether it `rises` beyond; `quantity`: `state_error` of lamps of equal brightness, or "
     "`chromatic_error` of lamps of any",
     files.SATURATED: "for each plain CFA, named design and answer of the search (`design_id`), how many of the "
     "`signals` fill a pixel of any channel (`full_signals`), of an HDR pixel all its captures",
     files.WORST: "where scenarios differ in one number, and lamps are pulsed or the search maximizes the worst of the "
     "scenarios: for each plain CFA, named design and answer of the search the worst `value` of a `quantity`, and the "
-    "number `at` which it is, also between two scenarios, with everything on",
+    "number `at` which it is, also between two scenarios, with all effects",
     files.HANDOVERS: "where the pixel has captures and scenarios differ in one number: for each plain CFA, named "
     "design and answer of the search (`name`), channel and signal type, the number `at` which the median signal "
     "reaches the threshold of each capture (from 1 on), or saturation of the last one; inf: at none of the series, "

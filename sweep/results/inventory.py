@@ -229,7 +229,7 @@ class Inventory:
             If files of others are there, or the disk refuses.
         """
         for name in self.foreign_files():
-            raise OutputError(ValidationIssue("is not of this run; move it away", str(self.folder / name)))
+            raise OutputError(ValidationIssue("file not created by sweep; move it", str(self.folder / name)))
         self.facts, self.damaged = dict(facts), False
         self.write({RUN: json_of(self.facts).encode("utf-8")})
 
@@ -248,7 +248,7 @@ class Inventory:
         """
         for name, content in contents.items():
             if self._linked(name):
-                raise OutputError(ValidationIssue("is not of this run; move it away", str(self.folder / FIGURES)))
+                raise OutputError(ValidationIssue("file not created by sweep; move it", str(self.folder / FIGURES)))
             path = self.path(name)
             with suppress(OSError):  # an empty folder in its place goes
                 path.rmdir()

@@ -53,7 +53,7 @@ def locked(output: Path) -> Iterator[None]:
     try:
         output.mkdir(parents=True, exist_ok=True)
         if os.path.lexists(output / LOCK) and not _is_lock(output / LOCK):
-            raise OutputError(ValidationIssue("is not of this run; move it away", str(output / LOCK)))
+            raise OutputError(ValidationIssue("file not created by sweep; move it", str(output / LOCK)))
         lock = _acquired(output, _WAIT_S)
     except Timeout:
         raise OutputError(ValidationIssue("in use by another command", str(output))) from None

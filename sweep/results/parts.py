@@ -67,7 +67,7 @@ class Parts:
         self.folder = output / PARTS
         self._names: dict[str, str] = {}
         if os.path.lexists(self.folder) and not is_real_folder(self.folder):
-            raise OutputError(ValidationIssue("is no folder of this run; move it away", str(self.folder)))
+            raise OutputError(ValidationIssue("folder not created by sweep; move it", str(self.folder)))
         for path in sorted(self.folder.iterdir()) if is_real_folder(self.folder) else ():
             self.add(path.name)
 

@@ -160,8 +160,8 @@ def check_bound(value: float, proven: float, where: str = "") -> None:
     if not value <= proven + _PROOF_TOLERANCE * max(1.0, proven):
         raise UpperBoundExceededError(
             ValidationIssue(
-                f"broken proof{where}: a filter has {value:.9g}, but the upper bound is {proven:.9g}; what is finished "
-                "is kept; this is an error of the program, not of the study"
+                f"upper bound exceeded (bug){where}: a filter has {value:.9g}, but the upper bound is {proven:.9g}; finished "
+                "results are kept"
             )
         )
 

@@ -77,7 +77,7 @@ def columns_of(mosaic: Mosaic) -> list[int]:
 
 
 def every_channel() -> Setup:
-    """All channels of the reference side by side, read out with everything on."""
+    """All channels of the reference side by side, read out with all effects."""
     return isetcam_setup(Mosaic.from_rows("all", [reference()["qe_names"]]), 0.0, 1.0)
 
 

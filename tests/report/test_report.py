@@ -17,6 +17,7 @@ from sweep.metrics.pareto import knee
 from sweep.report import read_output, summary_lines
 from sweep.report.page_data import payload
 from sweep.report.scenes import scene_groups
+from sweep.report.series import scene_in_words
 from sweep.results.facts import CheckFacts
 from sweep.results.identity import CHUNK
 from sweep.run.rows import Job, jobs_of, rules_of, run_job
@@ -122,6 +123,19 @@ def test_a_camera_of_one_channel_has_a_report(tmp_path: Path) -> None:
     make_report(output)
     assert payload(output)["views"] == []
     assert "CCCC" in (tmp_path / "out" / "report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("scenario", "said"),
+    [
+        ("lamp frequency_hz=139.437707848", "lamp at 139 Hz"),
+        ("lamp frequency_hz=139.5", "lamp frequency_hz=139.5"),
+        ("far own_key=0.123456", "far own_key=0.123"),
+        ("night 12.34567", "night 12.34567"),
+    ],
+)
+def test_numbers_of_many_digits_are_short_in_sentences(scenario: str, said: str) -> None:
+    assert scene_in_words(scenario) == said
 
 
 def test_a_csv_has_every_digit_whatever_numpy_prints(tmp_path: Path) -> None:

@@ -248,7 +248,7 @@ def test_without_run_json_files_of_a_run_s_names_are_others(whole_folder: Path, 
         (folder / name).unlink()
     study = load_study(tmp_path / "small.yaml")
     assert output_folder(folder, run_facts(study))[0] == folder.with_name("small-2")
-    with pytest.raises(OutputError, match="is not of this run"):
+    with pytest.raises(OutputError, match="file not created by sweep"):
         run_study(study, folder, 1, lambda *_: pytest.fail("something was computed"))
     assert commanded("status", folder)[0] == 2
 
@@ -356,8 +356,8 @@ def test_a_link_for_the_folder_of_parts_is_refused(small: Study, tmp_path: Path)
     folder.mkdir()
     elsewhere.mkdir()
     (folder / PARTS).symlink_to(elsewhere)
-    with pytest.raises(OutputError, match=f"{PARTS}: is no folder of this run"):
+    with pytest.raises(OutputError, match=f"{PARTS}: folder not created by sweep"):
         Parts(folder)
-    with pytest.raises(OutputError, match=f"{PARTS}: is no folder of this run"):
+    with pytest.raises(OutputError, match=f"{PARTS}: folder not created by sweep"):
         ran(small, folder, 1)
     assert list(elsewhere.iterdir()) == []

@@ -59,7 +59,7 @@ def test_a_foreign_file_is_reported_and_stays(few: Study, tmp_path: Path, name: 
     def computed(*_: object) -> None:
         pytest.fail("something was computed")
 
-    with pytest.raises(OutputError, match=f"{name}: is not of this run") as caught:
+    with pytest.raises(OutputError, match=f"{name}: file not created by sweep") as caught:
         run_study(few, base, 1, computed)
     assert len(caught.value.issues) == 1
     assert (base / name).read_text() == "mine"
@@ -108,7 +108,7 @@ def test_a_link_in_the_place_of_a_run_folder_is_reported(few: Study, tmp_path: P
         ran(few, folder, 1)
         make_report(read_output(folder))
 
-    with pytest.raises(OutputError, match=f"{name}: is "):
+    with pytest.raises(OutputError, match=f"{name}: (file|folder) not created by sweep"):
         reported()
     assert [path.name for path in target.iterdir()] == ["precious.txt"]
     assert (target / "precious.txt").read_text() == "precious"
@@ -117,12 +117,12 @@ def test_a_link_in_the_place_of_a_run_folder_is_reported(few: Study, tmp_path: P
 def test_a_lock_that_says_something_else_stays(few: Study, tmp_path: Path) -> None:
     for content in (b"my notes", b"process 1 on me\nand more", b"x" * 100_000):
         (tmp_path / LOCK).write_bytes(content)
-        with pytest.raises(OutputError, match=f"{LOCK}: is not of this run"):
+        with pytest.raises(OutputError, match=f"{LOCK}: file not created by sweep"):
             ran(few, tmp_path, 1)
         assert (tmp_path / LOCK).read_bytes() == content
     (tmp_path / LOCK).unlink()
     os.mkfifo(tmp_path / LOCK)  # opening it would wait for ever
-    with pytest.raises(OutputError, match=f"{LOCK}: is not of this run"):
+    with pytest.raises(OutputError, match=f"{LOCK}: file not created by sweep"):
         ran(few, tmp_path, 1)
 
 

@@ -1,4 +1,4 @@
-"""The search: better than any of many designs, feasible when checked again, deterministic, and stopped by a broken proof."""
+"""The search: better than any of many designs, feasible when checked again, deterministic, and stopped by a upper bound exceeded (bug)."""
 
 from __future__ import annotations
 
@@ -215,7 +215,10 @@ TINY = stopband_study(
 
 @pytest.mark.parametrize(
     ("tolerance_dn", "where"),
-    [pytest.param(1e-3, "broken proof: ", marks=pytest.mark.slow), (0.02, "broken proof at a sensitivity")],
+    [
+        pytest.param(1e-3, "upper bound exceeded (bug): ", marks=pytest.mark.slow),
+        (0.02, "upper bound exceeded (bug) at a sensitivity"),
+    ],
 )
 def test_an_upper_bound_below_the_search_result_stops_the_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tolerance_dn: float, where: str

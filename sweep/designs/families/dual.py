@@ -63,7 +63,7 @@ class Dual(Banded):
         assert target is not None
         assert not options.model_fields_set
         if not (target > base).any():
-            raise SweepError(ValidationIssue("dual needs a ceiling `to` above its base: there is no room to swing"))
+            raise SweepError(ValidationIssue("dual: `to` must exceed `base` somewhere"))
         return Dual(wavelength_nm, base, target)
 
     def curves(self, x: FloatArray) -> FloatArray:

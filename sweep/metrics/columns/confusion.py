@@ -28,7 +28,7 @@ _MEANINGS = {
     ERROR_BOUND: "bound on how often the best rule takes a signal of one of two types for the other, for the worst "
     "signal",
     STATE_ERROR: "error of the worst pair of states: how often noise makes one of two look like the other",
-    STATE_ERROR_BOUND: "bound on how often the best rule tells the wrong state, for the worst signal",
+    STATE_ERROR_BOUND: "bound on how often the best rule misclassifies, for the worst signal",
 }
 _TOLD = {CNR: "contrast to noise", D_PRIME: "d'"}
 _ByPair = dict[Pair, FloatArray]

@@ -27,7 +27,7 @@ class UserColumns(Metric):
             Quantity(
                 name=metric.name,
                 metric=metric.name,
-                meaning=f"own metric {metric.code.name}: nothing is promised of it, the tolerance in DN is of CSDs",
+                meaning=f"own metric {metric.code.name}: no error bound; tolerance_dn applies to CSDs only",
                 unit=metric.unit,
                 label=metric.label,
                 digits=metric.digits,
