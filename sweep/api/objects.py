@@ -171,14 +171,14 @@ class LoadedStudy:
         return table_of_results(study, [("own", chosen, name, values) for name, values in columns.items()])
 
     def _plain_and_named(self, cfa: str | None, scenarios: list[str]) -> pd.DataFrame:
-        from ..results.tables import NAMED, PLAIN
+        from ..results.tables import NAMED, REFERENCE
         from ..run.routes import quantities_at
         from ..run.rows import rules_of
 
         study, rules = self.study, rules_of(self.study)
-        spaces = [s for s in study.spaces if s.kind in (PLAIN, NAMED) and cfa in (None, s.cfa)]
+        spaces = [s for s in study.spaces if s.kind in (REFERENCE, NAMED) and cfa in (None, s.cfa)]
         if not spaces:
-            known = list(dict.fromkeys(s.cfa for s in study.spaces if s.kind in (PLAIN, NAMED)))
+            known = list(dict.fromkeys(s.cfa for s in study.spaces if s.kind in (REFERENCE, NAMED)))
             near = None if cfa is None else nearest(cfa, known)
             raise SweepError(
                 ValidationIssue("no plain CFA or named design", value=cfa, allowed=", ".join(known), nearest=near)
@@ -447,7 +447,7 @@ class FinishedRun:
             if value not in known:
                 allowed, near = ", ".join(known), nearest(value, known)
                 raise SweepError(ValidationIssue("unknown", value=value, allowed=allowed, nearest=near))
-        return images_of_run(self.study.study, self.output.few, split, chosen, form)
+        return images_of_run(self.study.study, self.output.named_rows, split, chosen, form)
 
     def score(self, predictions: pd.DataFrame) -> pd.DataFrame:
         """Score a reader's answers to the test images of the run's benchmark of vision.

@@ -199,13 +199,13 @@ def evaluate_curves(study: Study, setup: Setup, curves: FloatArray) -> Columns:
         user_metrics=requested.user_metrics,
     )
     if setup.lights.population is not None and not study.tolerance:
-        from ..metrics.members import population_imager  # noqa: PLC0415  (only where lights have a population)
+        from ..metrics.members import population_model  # noqa: PLC0415  (only where lights have a population)
 
-        values |= {WORST + name: worst for name, worst in population_imager(setup).worst(curves).items()}
+        values |= {WORST + name: worst for name, worst in population_model(setup).worst(curves).items()}
         if requested.wanted_yield:
             from ..metrics.drawn import LampsAndCameras  # noqa: PLC0415
 
-            draws = LampsAndCameras(population_imager(setup), study.tolerance, study.section.seed)
+            draws = LampsAndCameras(population_model(setup), study.tolerance, study.section.seed)
             kept = draws.columns(lambda _, subset: curves[subset], len(curves), class_pairs(setup.lights.classes))
             values |= {YIELD + name: column for name, column in kept.items()}
     values |= family_quantities(None, np.empty((len(curves), 0)))

@@ -335,7 +335,7 @@ class Electrons:
             which = exposure_times(setup, white, self.light.fixed_white) == time_s
         if not which.any() or not np.isfinite(time_s[0]) or self.light.scales(time_s).shape[1] > 1:
             return None
-        some = block if which.all() else block.some(np.flatnonzero(which))
+        some = block if which.all() else block.subset(np.flatnonzero(which))
         unit = int(self._touched[0])
         uniform = np.zeros((len(some), len(self.position)))
         if self.background.any():
@@ -346,7 +346,7 @@ class Electrons:
         fixed, kept = np.ascontiguousarray(self.fixed[:, :, unit]), self._kept
 
         def make(part: slice) -> FloatArray:
-            few = some.some(part)
+            few = some.subset(part)
             values = few.product(kept, everywhere).reshape(len(few), len(fixed), -1).astype(float, copy=False)
             _expose(values, fixed, uniform[part], float(time_s[0]))
             return values

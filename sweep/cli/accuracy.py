@@ -25,7 +25,7 @@ from ..camera.setup import Setup
 from ..designs.block import CurveBlock, edges_of_some
 from ..designs.space import Space
 from ..metrics.evaluate import evaluate
-from ..metrics.quantity import BEST_PLACE, Columns
+from ..metrics.quantity import BEST_PHASE, Columns
 from ..metrics.separation import csd_name
 from ..report.accuracy_figure import draw_accuracy
 from ..report.figures import pictures_of
@@ -153,5 +153,5 @@ def _csds(model: ForwardModel, space: Space, numbers: IndexArray) -> FloatArray:
     columns = _evaluated(model, space, numbers)
     names = [csd_name(pair) for pair in class_pairs(model.setup.lights.classes)]
     if model.setup.all_phases:
-        names += [BEST_PLACE + name for name in names]
+        names += [BEST_PHASE + name for name in names]
     return np.stack([columns[name] for name in names])

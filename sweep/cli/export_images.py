@@ -64,7 +64,7 @@ def export_images(
         problem = "merged values of an HDR pixel are no whole numbers of 16 bits"
         raise SweepError(ValidationIssue(problem, key="--png", allowed="--form isp, or without --png"))
     study = study_of(output, data, allow_code=allow_code)
-    designs = vision_designs(study, output.few)
+    designs = vision_designs(study, output.named_rows)
     with workers(jobs or os.cpu_count() or 1) as parallel:
         fingerprint = Inventory(folder).fingerprint
         manifest = write_images(designs, vision, study.section.seed, fingerprint, files, parallel, progress)

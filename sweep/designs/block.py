@@ -75,7 +75,7 @@ class Block(Protocol):
             Largest step between neighboring wavelengths, and smallest ratio to the base, 1 where the base is 0.
         """
 
-    def some(self, which: IndexArray | slice) -> Block:
+    def subset(self, which: IndexArray | slice) -> Block:
         """Return some of the designs.
 
         Parameters
@@ -115,7 +115,7 @@ class CurveBlock:
         flat = seen.reshape(len(self.qe), -1)
         return row_products(flat.astype(weights.dtype, copy=False), weights)
 
-    def some(self, which: IndexArray | slice) -> CurveBlock:
+    def subset(self, which: IndexArray | slice) -> CurveBlock:
         """Return some of the designs.
 
         Parameters
@@ -273,7 +273,7 @@ class EdgeBlock:
         """Return the QE of the modified channel."""
         return self.space.curves(self.space.points_of(self.numbers), self.tables.base.size)
 
-    def some(self, which: IndexArray | slice) -> EdgeBlock:
+    def subset(self, which: IndexArray | slice) -> EdgeBlock:
         """Return some of the designs.
 
         Parameters

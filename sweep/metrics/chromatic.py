@@ -155,7 +155,7 @@ def chromatic_rows(design: SmoothDesign, *, pairs: Sequence[Pair], noise: bool, 
         for pair in pairs:
             first, second = (design.setup.members[kind] for kind in pair)
             key = f"{'noise' if noise else 'DN'} of {' and '.join(pair)} in case {number}"
-            parts.append(design.once(key, partial(_nearest_rows, lamps, curves, first, second, noise=noise)))
+            parts.append(design.cached(key, partial(_nearest_rows, lamps, curves, first, second, noise=noise)))
     rows = Rows.joined(parts)
     return rows.gaussian_decades() if decades else rows
 

@@ -20,7 +20,7 @@ from ..base.types import FloatArray, IndexArray
 from ..designs.tolerance import ProductionError, Tolerance
 from ..spectra.lights import Pair
 from ..spectra.members import Members
-from .members import PopulationImager
+from .members import PopulationModel
 from .separation import csd_name
 
 _PARTS = {0: 1, 1: 101, 2: 25, 3: 9}
@@ -75,9 +75,9 @@ class Draws:
             Distances, DN; changed in place.
         """
         draws = slice(int(self.starts[off]), int(self.starts[off + 1]))
-        out[draws] = np.sqrt((self.apart(draws, response) ** 2).sum(axis=-1))
+        out[draws] = np.sqrt((self.differences(draws, response) ** 2).sum(axis=-1))
 
-    def apart(self, some: slice | IndexArray, response: FloatArray) -> FloatArray:
+    def differences(self, some: slice | IndexArray, response: FloatArray) -> FloatArray:
         """Return first minus second light of some draws.
 
         Parameters
@@ -179,9 +179,9 @@ def rank_below(draws: int, share: float) -> int:
 class LampsAndCameras:
     """Draws of a scene for each two types; independent of those that count a yield."""
 
-    def __init__(self, population_imager: PopulationImager, tolerance: Tolerance, seed: int) -> None:
+    def __init__(self, population_model: PopulationModel, tolerance: Tolerance, seed: int) -> None:
         """Store the scene with all members of its lights, the tolerance and the seed."""
-        self.population_imager, self._tolerance, self._seed = population_imager, tolerance, seed
+        self.population_model, self._tolerance, self._seed = population_model, tolerance, seed
         self._draws: dict[Pair, Draws] = {}
 
     def draws(self, pair: Pair) -> Draws:
@@ -198,7 +198,7 @@ class LampsAndCameras:
             The draws.
         """
         if pair not in self._draws:
-            self._draws[pair] = draws_of(self.population_imager.members, pair, self._tolerance, (self._seed, 2))
+            self._draws[pair] = draws_of(self.population_model.members, pair, self._tolerance, (self._seed, 2))
         return self._draws[pair]
 
     def kept(self, curves: FloatArray, pairs: Sequence[Pair]) -> dict[Pair, tuple[float, IndexArray]]:
@@ -216,15 +216,15 @@ class LampsAndCameras:
         dict of pair to (float, ndarray of int)
             Distance, DN, and the draws whose mean it is; NaN where a response is NaN.
         """
-        imager = self.population_imager.imager
+        imager = self.population_model.imager
         distances_of = {pair: np.empty(self.draws(pair).size) for pair in pairs}
         step = max(
             1,
             _HELD
             // (
                 imager.n_cases
-                * self.population_imager.setup.lights.photons.shape[0]
-                * len(self.population_imager.setup.camera.qe)
+                * self.population_model.setup.lights.photons.shape[0]
+                * len(self.population_model.setup.camera.qe)
             ),
         )
         for start in range(0, len(curves), step):
@@ -260,7 +260,7 @@ class LampsAndCameras:
         dict of str to ndarray of shape (n_designs,)
             Distance, DN, by the name of the CSD.
         """
-        offs, setup = self.draws(pairs[0]).offs, self.population_imager.setup
+        offs, setup = self.draws(pairs[0]).offs, self.population_model.setup
         step = max(1, _HELD // (len(offs) * max(1, len(setup.camera.modified)) * setup.camera.grid.size))
         columns: dict[str, list[float]] = {csd_name(pair): [] for pair in pairs}
         for start in range(0, n_designs, step):
@@ -273,7 +273,7 @@ class LampsAndCameras:
     @property
     def _ranks(self) -> tuple[int, int]:
         """Number of draws that may have less than the wanted share has, and number of them whose mean is taken."""
-        population = self.population_imager.members.population
+        population = self.population_model.members.population
         assert population.wanted_yield is not None
         below = rank_below(population.draws, population.wanted_yield)
         return below, max(1, round(_NEAR * below))

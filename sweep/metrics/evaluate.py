@@ -23,7 +23,7 @@ from .columns.chromatic import CHROMATIC_CSD, CHROMATIC_DPRIME, CHROMATIC_ERROR,
 from .columns.color_separation import ColorSeparation
 from .columns.exposure import EXPOSURE
 from .metric import DesignMetric, FamilyMetric, LampMetric, NoiseMetric, PulseMetric, ReadoutMetric, VisionMetric
-from .quantity import BEST_PLACE, Columns, Quantity, RequestedQuantities
+from .quantity import BEST_PHASE, Columns, Quantity, RequestedQuantities
 from .registry import METRICS, quantities_of
 from .separation import csd_name, separations, separations_along
 from .user_metrics import UserMetric, user_quantities
@@ -174,9 +174,9 @@ def _refine_moments(model: ForwardModel, block: Block, columns: Columns) -> None
     """Refine the smallest distances over the moments of a pulse in the columns, for one phase."""
     names = _csd_names(model.setup)
     for design in np.flatnonzero(np.isfinite(columns[names[0]])):
-        curves = block.some(slice(design, design + 1)).curves()
+        curves = block.subset(slice(design, design + 1)).curves()
         for name, least in zip(names, _over_pulse(model, curves, range(len(names)), model.phases), strict=True):
-            for column in {name, BEST_PLACE + name if model.n_cases == 1 else name} & columns.keys():
+            for column in {name, BEST_PHASE + name if model.n_cases == 1 else name} & columns.keys():
                 columns[column][design] = min(columns[column][design], least)
 
 
@@ -189,7 +189,7 @@ def _refine_phases(model: ForwardModel, block: Block, columns: Columns) -> None:
     lattice, step_px = fine_lattice(setup)
     on_lattice = model.at(lattice)
     for design in np.flatnonzero(np.isfinite(columns[names[0]])):
-        curves = block.some(slice(design, design + 1)).curves()
+        curves = block.subset(slice(design, design + 1)).curves()
 
         def both_ends(at_phases: ForwardModel, curves: FloatArray = curves) -> FloatArray:
             csds = _csds(at_phases, curves)
@@ -201,9 +201,9 @@ def _refine_phases(model: ForwardModel, block: Block, columns: Columns) -> None:
         smallest, largest = np.split(extremes, 2)
         for number, name in enumerate(names):
             columns[name][design] = smallest[number]
-            columns[BEST_PLACE + name][design] = -largest[number]
+            columns[BEST_PHASE + name][design] = -largest[number]
             if _nonlinear_over_pulse(setup):
-                for column, end in ((name, number), (BEST_PLACE + name, number + len(names))):
+                for column, end in ((name, number), (BEST_PHASE + name, number + len(names))):
                     there = _over_pulse(model, curves, [number], at.subset(np.array([end])))[0]
                     columns[column][design] = min(columns[column][design], there)
 
@@ -215,9 +215,9 @@ def _refine_heights(model: ForwardModel, block: Block, cases: Columns, columns: 
     if not setup.accuracy.finest_phase_px:
         return
     at_heights = _by_phase(model, cases, len(heights))
-    best = [BEST_PLACE + name for name in names if model.n_cases == len(heights) and BEST_PLACE + name in columns]
+    best = [BEST_PHASE + name for name in names if model.n_cases == len(heights) and BEST_PHASE + name in columns]
     for design in np.flatnonzero(np.isfinite(at_heights).all(axis=(1, 2))):
-        curves = block.some(slice(design, design + 1)).curves()
+        curves = block.subset(slice(design, design + 1)).curves()
 
         def at_height(height: float, curves: FloatArray = curves) -> FloatArray:
             csds = _csds(forward_model(setup_at(setup, height)), curves).min(axis=1)
@@ -331,7 +331,7 @@ def evaluate(
 ) -> Columns:
     """Evaluate a batch of designs as the camera reads them out.
 
-    CSDs are the smallest over sampling phases, field positions and moments of a pulse; ``best_place_csd_<a>_<b>`` is
+    CSDs are the smallest over sampling phases, field positions and moments of a pulse; ``best_phase_csd_<a>_<b>`` is
     the largest over the phases of the smallest over the moments. Where all phases or field positions count, CSDs are
     refined; other metrics are the worst over the lattice.
 
@@ -362,7 +362,7 @@ def evaluate(
     else:
         parts = (
             _distances_along(model, changing, extra),
-            _read(model, block.some(np.flatnonzero(~changing.which)), extra),
+            _read(model, block.subset(np.flatnonzero(~changing.which)), extra),
         )
         cases, columns = (
             {name: _merged(changing.which, along[name], rest[name]) for name in along}
@@ -393,7 +393,7 @@ def _over_brightness(setup: Setup, block: Block, columns: Columns, states: Seque
         made |= {pair_name(of, pair): np.full(len(walked), np.nan) for of in (CHROMATIC_DPRIME, CHROMATIC_ERROR)}
     for design in range(len(walked)):
         wanted = [metric for metric in _LAMPS if (states if metric.of_states else walked[design])]
-        curves = block.some(slice(design, design + 1)).curves()
+        curves = block.subset(slice(design, design + 1)).curves()
         if not (wanted and np.isfinite(curves).all() and np.isfinite(columns[EXPOSURE][design])):
             continue
         for name, value in of_lamps(setup, curves, states, wanted).items():

@@ -91,5 +91,5 @@ def limiting_lights_of(imager: ForwardModel, block: Block) -> LimitingLights:
     response = np.empty((len(block), *whole.shape[1:]))
     response[changing.which] = whole
     if not changing.which.all():
-        response[~changing.which] = imager.read(block.some(np.flatnonzero(~changing.which)).curves())[0]
+        response[~changing.which] = imager.read(block.subset(np.flatnonzero(~changing.which)).curves())[0]
     return limiting_lights(imager.setup, response)

@@ -68,7 +68,7 @@ class NearestMembers:
         return np.asarray(values[..., rows, :] * (1 - share) + values[..., rows + 1, :] * share, dtype=float)
 
 
-class PopulationImager:
+class PopulationModel:
     """Scene with all members of the population of its lights."""
 
     parts = 5
@@ -149,10 +149,10 @@ class PopulationImager:
         return self._tables[pair]
 
 
-_imagers: Cache[bytes, PopulationImager] = Cache(16)
+_imagers: Cache[bytes, PopulationModel] = Cache(16)
 
 
-def population_imager(setup: Setup) -> PopulationImager:
+def population_model(setup: Setup) -> PopulationModel:
     """Return the population of a setup's lights; recent ones are cached.
 
     Parameters
@@ -162,7 +162,7 @@ def population_imager(setup: Setup) -> PopulationImager:
 
     Returns
     -------
-    PopulationImager
+    PopulationModel
         Scene with all members.
     """
-    return _imagers.get(hashlib.sha256(pickle.dumps(setup)).digest(), lambda: PopulationImager(setup))
+    return _imagers.get(hashlib.sha256(pickle.dumps(setup)).digest(), lambda: PopulationModel(setup))

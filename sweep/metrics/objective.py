@@ -14,7 +14,7 @@ from pydantic_core import CoreSchema
 from ..base.modules import instances_in
 from ..base.types import FloatArray, Section
 from . import rules
-from .quantity import DECADES, Quantity, RequestedQuantities
+from .quantity import LOG10, Quantity, RequestedQuantities
 from .registry import quantities_of
 from .rule import Rule
 from .rules.standard import Minimum
@@ -72,7 +72,7 @@ class Objective(create_model("_Rules", __base__=Section, **_FIELDS)):  # type: i
     @property
     def column(self) -> str:
         """Name of its column in the result table."""
-        alone = list(self.weights.values()) == [1.0] and self.rule.wanted == "more"
+        alone = list(self.weights.values()) == [1.0] and self.rule.direction == "more"
         return next(iter(self.weights)) if alone else COMBINED
 
     def of(self, columns: Mapping[str, FloatArray]) -> FloatArray:
@@ -92,7 +92,7 @@ class Objective(create_model("_Rules", __base__=Section, **_FIELDS)):  # type: i
 
     def __str__(self) -> str:
         terms = [name if weight == 1 else f"{weight:g} {name}" for name, weight in self.weights.items()]
-        return terms[0] if len(terms) == 1 and self.rule.wanted == "more" else self.rule.words(terms)
+        return terms[0] if len(terms) == 1 and self.rule.direction == "more" else self.rule.words(terms)
 
 
 def columns_of(requested: RequestedQuantities, objective: Objective) -> Mapping[str, Quantity]:
@@ -112,7 +112,7 @@ def columns_of(requested: RequestedQuantities, objective: Objective) -> Mapping[
     """
     if objective.column != COMBINED:
         return quantities_of(requested)
-    whole = Quantity(COMBINED, COMBINED, f"the study's objective: {objective}", wanted="more")
-    if objective.rule.wanted == "less":
-        whole = replace(whole, unit=DECADES, label=str(objective), digits=3, infinite=True)
+    whole = Quantity(COMBINED, COMBINED, f"the study's objective: {objective}", direction="more")
+    if objective.rule.direction == "less":
+        whole = replace(whole, unit=LOG10, label=str(objective), digits=3, infinite=True)
     return {**quantities_of(requested), COMBINED: whole}

@@ -26,12 +26,12 @@ WORST_CASE: Literal["worst case"] = "worst case"
 YIELD = "yield_"
 """Prefix of the columns of a yield: values that the wanted share of drawn lamps and cameras reaches."""
 OF_A_SHARE: Literal["yield"] = "yield"
-BEST_PLACE = "best_place_"
+BEST_PHASE = "best_phase_"
 """How the name of a CSD's largest value over the places where the light may fall on the mosaic begins, each at its
 worst moment of a pulsed light."""
 DN = "DN"
 """Unit of digital numbers."""
-DECADES = "decades"
+LOG10 = "decades"
 """Unit of how far an error is below 1: its logarithm to base 10."""
 Columns = dict[str, FloatArray]
 End = Literal["min", "max"]
@@ -55,7 +55,7 @@ class Column:
         Name in texts.
     digits : int
         Digits after the point.
-    wanted : {'more', 'less', ''}
+    direction : {'more', 'less', ''}
         Direction of improvement.
     role : {'separation', 'light', ''}
         Separation of colors, or its cost.
@@ -71,7 +71,7 @@ class Column:
     unit: str = ""
     label: str = ""
     digits: int = 4
-    wanted: Literal["more", "less", ""] = ""
+    direction: Literal["more", "less", ""] = ""
     role: Literal["separation", "light", ""] = ""
     extreme: Literal["worst case", "best place", "yield", ""] = ""
     of: str = ""
@@ -174,9 +174,9 @@ class Quantity(Column):
         The error bound of a plan covers it.
     nominal : bool
         It has no worst case.
-    rows : {'values', 'squares', 'decades'}
+    scale : {'linear', 'squared', 'log10'}
         Form of its smooth rows.
-    apart : {'', 'DN', 'noise', 'chromatic'}
+    distance_kind : {'', 'DN', 'noise', 'chromatic'}
         Smallest distance of two signals: in DN, in units of the noise, or over all brightnesses in DN.
     most : float
         Upper bound on any filter.
@@ -186,7 +186,7 @@ class Quantity(Column):
         Signal types that noise may confuse.
     slopes : bool
         Its rows have derivatives.
-    smooth, smooth_members, smooth_drawn : callable, optional
+    smooth, smooth_members, yield_rows : callable, optional
         Smooth rows of a design, over a population, over random lamps and cameras.
     linear : callable, optional
         Linear rows.
@@ -199,21 +199,21 @@ class Quantity(Column):
     signed: bool = False
     has_error_bound: bool = False
     nominal: bool = False
-    rows: Literal["values", "squares", "decades"] = "values"
-    apart: Literal["", "DN", "noise", "chromatic"] = ""
+    scale: Literal["linear", "squared", "log10"] = "linear"
+    distance_kind: Literal["", "DN", "noise", "chromatic"] = ""
     most: float = np.inf
     share: bool = False
     states: tuple[str, ...] = ()
     slopes: bool = True
     smooth: Callable[[SmoothDesign], Rows] | None = field(default=None, repr=False)
     smooth_members: Callable[[SmoothDesign], Rows] | None = field(default=None, repr=False)
-    smooth_drawn: Callable[[SmoothDesign], Rows] | None = field(default=None, repr=False)
+    yield_rows: Callable[[SmoothDesign], Rows] | None = field(default=None, repr=False)
     linear: Callable[[Setup], LinearRows] | None = field(default=None, repr=False)
 
     @property
     def has_limit(self) -> bool:
         """True if an upper bound on any filter exists."""
-        return bool(self.apart) or self.share or self.linear is not None
+        return bool(self.distance_kind) or self.share or self.linear is not None
 
     @property
     def column(self) -> Column:
@@ -260,8 +260,8 @@ class Quantity(Column):
         )
         label = f"{self.words} of {percent} of drawn lamps and cameras"
         named = replace(self, name=YIELD + self.name, meaning=meaning, label=label, extreme=OF_A_SHARE, of=self.name)
-        unknown = replace(named, apart="", linear=None, has_error_bound=False, smooth_members=None)
-        return replace(unknown, rows="values", smooth=self.smooth_drawn, smooth_drawn=None)
+        unknown = replace(named, distance_kind="", linear=None, has_error_bound=False, smooth_members=None)
+        return replace(unknown, scale="linear", smooth=self.yield_rows, yield_rows=None)
 
     def value(self, rows: Rows) -> float:
         """Return the quantity from its smooth rows.
@@ -276,7 +276,7 @@ class Quantity(Column):
         float
             Value.
         """
-        most = self.wanted == "less" and self.rows != "decades"
+        most = self.direction == "less" and self.scale != "log10"
         return self.of_row(float(rows.values.max() if most else rows.values.min()))
 
     def of_row(self, row: float) -> float:
@@ -292,9 +292,9 @@ class Quantity(Column):
         float
             Value.
         """
-        if self.rows == "decades":
+        if self.scale == "log10":
             return float(min(10.0**-row, 1.0))
-        return math.sqrt(max(row, 0.0)) if self.rows == "squares" else row
+        return math.sqrt(max(row, 0.0)) if self.scale == "squared" else row
 
     def worse(self, values: FloatArray | Sequence[FloatArray]) -> FloatArray:
         """Return the worst of several cases.
@@ -309,7 +309,7 @@ class Quantity(Column):
         ndarray of shape (n_designs,)
             Worst values.
         """
-        return np.asarray(np.max(values, axis=0) if self.wanted == "less" else np.min(values, axis=0), dtype=float)
+        return np.asarray(np.max(values, axis=0) if self.direction == "less" else np.min(values, axis=0), dtype=float)
 
 
 @dataclass(frozen=True)

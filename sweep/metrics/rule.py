@@ -17,7 +17,7 @@ class Rule(ABC):
     """
 
     name: ClassVar[str]
-    wanted: ClassVar[Literal["more", "less"]] = "more"
+    direction: ClassVar[Literal["more", "less"]] = "more"
     smallest: ClassVar[bool] = False
 
     @abstractmethod

@@ -22,7 +22,7 @@ from .separation import separation
 
 if TYPE_CHECKING:
     from .drawn import LampsAndCameras
-    from .members import PopulationImager
+    from .members import PopulationModel
 
 Made = TypeVar("Made")
 _SMALLEST = 1e-300
@@ -144,7 +144,7 @@ class SmoothDesign:
         x: FloatArray,
         free: IndexArray,
         span: FloatArray,
-        members: PopulationImager | None = None,
+        members: PopulationModel | None = None,
         drawn: LampsAndCameras | None = None,
         images: SeededVision | None = None,
     ) -> None:
@@ -158,7 +158,7 @@ class SmoothDesign:
         self._imager, self._free, self._span = imager, free, span
         self._made: dict[str, Any] = {}
 
-    def once(self, key: str, make: Callable[[], Made]) -> Made:
+    def cached(self, key: str, make: Callable[[], Made]) -> Made:
         """Return a value that several quantities share, computed at its first use.
 
         Parameters
@@ -297,7 +297,7 @@ class SmoothDesign:
             Values and derivatives.
         """
         assert self._drawn is not None
-        draws, imager = self._drawn.draws(pair), self._drawn.population_imager.imager
+        draws, imager = self._drawn.draws(pair), self._drawn.population_model.imager
         made = [self.family.perturbed(off) if any(off) else self.family for off in draws.offs]
         curves = np.stack([family.curves(self.x[None])[0] for family in made])
         value, chosen = self._drawn.kept(curves, [pair])[pair]
@@ -306,9 +306,9 @@ class SmoothDesign:
             which = np.searchsorted(draws.starts, chosen, side="right") - 1
             for off in np.unique(which):
                 some, design_curves = chosen[which == off], curves[off]
-                apart = draws.apart(some, imager.smooth(design_curves[None])[0])
+                apart = draws.differences(some, imager.smooth(design_curves[None])[0])
                 by_u = made[off].gradient(self.x)[self._free] * self._span[:, None, None]
-                slopes = (draws.apart(some, imager.gradient(design_curves, by_u)) * apart).sum(axis=-1)
+                slopes = (draws.differences(some, imager.gradient(design_curves, by_u)) * apart).sum(axis=-1)
                 length = np.linalg.norm(apart, axis=-1)
                 slope += np.divide(slopes, length, out=np.zeros_like(slopes), where=length > 0).sum(axis=1)
         return Rows(np.array([value]), slope[None] / chosen.size)

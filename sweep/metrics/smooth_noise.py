@@ -187,7 +187,7 @@ def _summed(parts: list[Rows]) -> Rows:
 
 def _between(design: SmoothDesign, pair: Pair, of: _OfPairs) -> Rows:
     """Return the rows of two types, [n_cases x n_first x n_second]."""
-    return design.once(f"{of.__name__} of {' and '.join(pair)}", lambda: _of_signals(design, pair, of))
+    return design.cached(f"{of.__name__} of {' and '.join(pair)}", lambda: _of_signals(design, pair, of))
 
 
 def _of_signals(design: SmoothDesign, pair: Pair, of: _OfPairs) -> Rows:

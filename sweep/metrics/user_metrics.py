@@ -84,7 +84,7 @@ class UserMetric:
 
     It returns ndarray of shape (n_designs,); or (n_designs, n), of which the worst counts, so that a search sees each
     of them; or None for a CFA that it does not apply to. A row must not depend on other rows. Optional attributes:
-    `name`, `unit`, `label`, `digits` and `wanted` (`more` or `less`).
+    `name`, `unit`, `label`, `digits` and `direction` (`more` or `less`).
     """
 
     code: UserCode
@@ -118,12 +118,15 @@ class UserMetric:
         return self._said("label", self.name.replace("_", " "))
 
     @property
-    def wanted(self) -> Literal["more", "less"]:
+    def direction(self) -> Literal["more", "less"]:
         """`more` or `less`; raises SweepError for anything else."""
-        wanted = self._said("wanted", "more")
-        if wanted not in ("more", "less"):
-            raise SweepError(ValidationIssue(f"{self.code.name}: no such `wanted`", value=wanted, allowed="more, less"))
-        return wanted  # type: ignore[return-value]  # one of both
+        if self._said("wanted", ""):
+            raise SweepError(ValidationIssue(f"{self.code.name}: `wanted` is named `direction`"))
+        direction = self._said("direction", "more")
+        if direction not in ("more", "less"):
+            problem = f"{self.code.name}: no such `direction`"
+            raise SweepError(ValidationIssue(problem, value=direction, allowed="more, less"))
+        return direction  # type: ignore[return-value]  # one of both
 
     @property
     def digits(self) -> int:
@@ -198,7 +201,7 @@ class UserMetric:
         if len(some) < len(by_case):
             return np.full(len(response), np.nan)
         joined = np.concatenate(some, axis=1)
-        return np.asarray(joined.min(axis=1) if self.wanted == "more" else joined.max(axis=1), dtype=float)
+        return np.asarray(joined.min(axis=1) if self.direction == "more" else joined.max(axis=1), dtype=float)
 
 
 def user_quantities(metrics: Sequence[UserMetric], setup: Setup, response: FloatArray) -> dict[str, FloatArray]:

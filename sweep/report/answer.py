@@ -10,9 +10,9 @@ from ..base.types import FloatArray
 from ..metrics.columns.confusion import CNR, D_PRIME
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.limiting import limited_by_name
-from ..metrics.quantity import DECADES, OF_A_SHARE, WORST_CASE
+from ..metrics.quantity import LOG10, OF_A_SHARE, WORST_CASE
 from ..results.output import Output
-from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
+from ..results.tables import NAMED, REFERENCE, SEARCHED, SWEPT
 from ..results.thinning import per_exposure
 from ..study.axes import series_of
 from .lamps import cost_of_worst_case, lamp_lines, over_population, robustness_lines
@@ -65,7 +65,7 @@ def answer_parts(output: Output) -> tuple[list[str], list[str]]:
 
 
 def _of_designs(output: Output) -> tuple[list[str], list[str]]:
-    searched = output.kind(SWEPT, FOUND)
+    searched = output.kind(SWEPT, SEARCHED)
     if len(searched) and output.best.empty:
         failed = searched[searched["status"] != "ok"]
         if len(failed) == len(searched):
@@ -140,8 +140,8 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:  # noqa: PLR0912  
         *([] if stated is None else [stated.description]),
     ]
     who = full_name(best) + (f" ({'; '.join(notes)})" if notes else "")
-    if best["kind"] in (PLAIN, NAMED):
-        who = f"the best {'CFA' if best['kind'] == PLAIN else 'design'} of this study, {who},"
+    if best["kind"] in (REFERENCE, NAMED):
+        who = f"the best {'CFA' if best['kind'] == REFERENCE else 'design'} of this study, {who},"
     text = f"With {under}, {who}" if under else capital(who)
     if output.goal.name not in (separation.name, separation.of):
         text += f" has the best {output.goal.words}, {output.goal.amount(best[output.goal.name])}, and"
@@ -151,10 +151,10 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:  # noqa: PLR0912  
         text += f" {_format_separation(output, best)}"
         yield f"{text}{_in(output, leaders.scenario)}{_times(output, best, plain)}.{_equal(output, best)}"
     search = output.provenance.search
-    if search is not None and search.scenarios > 1 and best["kind"] == FOUND:
+    if search is not None and search.scenarios > 1 and best["kind"] == SEARCHED:
         more = f" and {search.scenes_added} scenes between them" if search.scenes_added else ""
         yield f"It was searched for its worst value over {search.scenarios} scenarios{more}."
-    if output.objective.rule.wanted != "more":  # decades of what is to be the least, in its own unit
+    if output.objective.rule.direction != "more":  # decades of what is to be the least, in its own unit
         for name in output.objective.weights:
             rows = [row for row in (best, plain) if row is not None]
             values = [f"{float(row[name]):.3g} {output.columns[name].unit}".rstrip() for row in rows]
@@ -167,7 +167,7 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:  # noqa: PLR0912  
     yield from unseen_lines(output)
     for row in leaders.others:
         name = " ".join([full_name(row), *(f"({note})" for note in _convergence(output, row))])
-        if row["kind"] != FOUND:
+        if row["kind"] != SEARCHED:
             same = " that meets the same" if output.constraints else ""
             name = f"the best of {row['cfa']}{same}, {label(row)},"
         yield f"{capital(name)} {_format_separation(output, row)}{_format_limit(output, row)}."
@@ -176,16 +176,18 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:  # noqa: PLR0912  
 def _convergence(output: Output, row: Row) -> Iterator[str]:
     """Yield a note on the answer of a search that did not converge."""
     search = output.provenance.search
-    if row["kind"] == FOUND and search is not None and not search.converged:
+    if row["kind"] == SEARCHED and search is not None and not search.converged:
         yield "best found; no start converged"
 
 
 def _equal(output: Output, best: Row) -> str:
     """Return a sentence on CFAs and named designs whose separation is the best one's in all digits that are shown."""
-    if best["kind"] not in (PLAIN, NAMED):
+    if best["kind"] not in (REFERENCE, NAMED):
         return ""
     separation = output.trade_off[0]
-    rows = output.few[(output.few["scenario"] == best["scenario"]) & (output.few["design_id"] != best["design_id"])]
+    rows = output.named_rows[
+        (output.named_rows["scenario"] == best["scenario"]) & (output.named_rows["design_id"] != best["design_id"])
+    ]
     shown = separation.formatted(best[separation.name])
     names = [label(row) for row in rows.to_dict("records") if separation.formatted(row[separation.name]) == shown]
     return f" {' and '.join(names)} {'has' if len(names) == 1 else 'have'} {shown}, too." if names else ""
@@ -207,7 +209,7 @@ def _colorants(output: Output, best: Row) -> Iterator[str]:
 def _edges(best: Row) -> str:
     """Return the edges of a filter that was swept or found, in words; empty without a left and a right one."""
     left_nm, right_nm = (float(best.get(name, np.nan)) for name in ("left_nm", "right_nm"))
-    if best["kind"] not in (SWEPT, FOUND) or not np.isfinite([left_nm, right_nm]).all():
+    if best["kind"] not in (SWEPT, SEARCHED) or not np.isfinite([left_nm, right_nm]).all():
         return ""
     return f"edges at {left_nm:.0f} and {right_nm:.0f} nm"
 
@@ -298,7 +300,7 @@ def _times(output: Output, best: Row, plain: Row | None) -> str:
     if not of > 0:
         return f" ({name} by {separation.formatted(of)} at {light:.3f})"
     times = f"{best[CFA_SENSITIVITY] / light:.2f} times its light ({light:.3f})"
-    if separation.unit == DECADES:  # a ratio of logarithms says nothing
+    if separation.unit == LOG10:  # a ratio of logarithms says nothing
         more = separation.formatted(best[separation.name] - of)
         return f": {more} beyond {name} ({separation.formatted(of)}), and {times}"
     what = "that" if separation.metric in _BY_NOISE else "the separation"
@@ -321,15 +323,17 @@ def largest_separation_elsewhere(output: Output) -> list[str]:
     leaders, separation = leaders_of(output), output.trade_off[0]
     best, most, where = leaders.chosen, leaders.separates, _in(output, leaders.scenario)
     verb, more = "separates most", "separates more"
-    if separation.unit == DECADES or separation.metric in _BY_NOISE:
+    if separation.unit == LOG10 or separation.metric in _BY_NOISE:
         verb, more = "has the most", "has more"
     if most is None:
         return []
     if best is not None and not most[separation.name] > best[separation.name]:
-        leads = most["design_id"] == best["design_id"] and best["kind"] in (SWEPT, FOUND)
+        leads = most["design_id"] == best["design_id"] and best["kind"] in (SWEPT, SEARCHED)
         return [f"No CFA, named or swept design {more}{where}."] if leads else []
     figures = f"{separation.formatted(most[separation.name])} at {most[CFA_SENSITIVITY]:.3f} {of_reference(output)}"
-    missed = "" if most["kind"] == PLAIN else format_missed_constraints(output, most)  # nothing is asked of a plain CFA
+    missed = (
+        "" if most["kind"] == REFERENCE else format_missed_constraints(output, most)
+    )  # nothing is asked of a plain CFA
     ending = f", but {missed}" if missed else ""
     return [f"{capital(full_name(most))} {verb} of all{where}: {figures}{_format_limit(output, most)}{ending}."]
 
@@ -416,7 +420,7 @@ def headline_numbers(output: Output) -> list[tuple[str, str, str]]:
         """Return a value as a multiple of that of a plain CFA."""
         if plain is None or not float(plain[column]) > 0:
             return ""
-        if column == separation.name and separation.unit == DECADES:  # a ratio of logarithms says nothing
+        if column == separation.name and separation.unit == LOG10:  # a ratio of logarithms says nothing
             return f"{plain['name']} {formatted(float(plain[column]))}"
         return f"{best[column] / plain[column]:.2f} times {plain['name']} ({formatted(float(plain[column]))})"
 
@@ -431,7 +435,7 @@ def headline_numbers(output: Output) -> list[tuple[str, str, str]]:
         alike = " that moves like it" if is_angle_dependent(output, best) else ""
         name = f"below the upper bound for any filter{alike} in {search.channel} of {search.cfa}"
         numbers.append((separation.formatted(bound - value), name, shown))
-    elif best[measure] == best[measure] and separation.unit != DECADES and separation.metric not in (D_PRIME, CNR):
+    elif best[measure] == best[measure] and separation.unit != LOG10 and separation.metric not in (D_PRIME, CNR):
         rate = f"{_rate(float(best[measure]))} {separation.unit}"
         numbers.append((rate, "per ms of exposure", beside(measure, _rate)))
     return numbers

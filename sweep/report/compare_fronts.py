@@ -14,7 +14,7 @@ from ..base.types import FloatArray
 from ..metrics.objective import COMBINED
 from ..metrics.quantity import DN, WORST_CASE
 from ..results.output import Output
-from ..results.tables import FOUND
+from ..results.tables import SEARCHED
 from .figures import CURVE_CYCLE, DASHES, canvas, legend_beside
 
 if TYPE_CHECKING:
@@ -156,7 +156,7 @@ def fronts_in(runs: Mapping[str, tuple[Output, str]]) -> list[ComparedFront]:
         if output.front is not None and search and search.scenario == scenario:
             traced = _sorted(output.front[["objective", "sensitivity"]].dropna())
             if len(traced):
-                fronts.append(ComparedFront(label, str(output.kind(FOUND)["cfa"].iloc[0]), True, traced))
+                fronts.append(ComparedFront(label, str(output.kind(SEARCHED)["cfa"].iloc[0]), True, traced))
     return fronts
 
 

@@ -12,7 +12,7 @@ from ..metrics.objective import COMBINED
 from ..metrics.quantity import DN, Column
 from ..results.curves import KeptCurves
 from ..results.output import Output
-from ..results.tables import FOUND, SWEPT
+from ..results.tables import SEARCHED, SWEPT
 from .compare_fronts import dn_scale_label, scene_names
 from .leaders import label, of_reference
 
@@ -147,7 +147,7 @@ def ranking(runs: Mapping[str, Output]) -> list[str]:
     scene_of = scene_names(runs)
     for run, output in runs.items():
         if output.best.empty:
-            requested = len(output.kind(SWEPT, FOUND)) > 0
+            requested = len(output.kind(SWEPT, SEARCHED)) > 0
             lines.append(f"{run} has no {'feasible design' if requested else 'design that was swept or searched'}.")
         else:
             best = output.best.iloc[0]

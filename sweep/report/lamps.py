@@ -13,7 +13,7 @@ import pandas as pd
 from ..metrics.quantity import DN, WORST, WORST_CASE
 from ..metrics.share import format_share
 from ..results.output import Output
-from ..results.tables import FOUND, NAMED, PLAIN
+from ..results.tables import NAMED, REFERENCE, SEARCHED
 from ..spectra.color import NORM_NAMES
 from .figures import Drawing, panel_grid
 from .leaders import Row, capital, full_name, label, leaders_of
@@ -61,19 +61,19 @@ def robustness_lines(output: Output, best: Row | None) -> Iterator[str]:
     if output.study.population is None:
         return
     scenario = output.scenarios[0] if best is None else best["scenario"]
-    rows: list[Row] = list(output.few[output.few["scenario"] == scenario].to_dict("records"))
-    plain = [row for row in rows if row["kind"] == PLAIN]
+    rows: list[Row] = list(output.named_rows[output.named_rows["scenario"] == scenario].to_dict("records"))
+    plain = [row for row in rows if row["kind"] == REFERENCE]
     for row in rows:
-        if row["kind"] in (NAMED, FOUND) and np.isfinite(row.get("breaks_at", np.nan)):
+        if row["kind"] in (NAMED, SEARCHED) and np.isfinite(row.get("breaks_at", np.nan)):
             yield _breaks(output, row, plain)
-        elif row["kind"] == FOUND and plain:
+        elif row["kind"] == SEARCHED and plain:
             who = capital(full_name(row))
             yield f"{who} stays above the plain CFAs up to 3 times the stated range of lamps and edges."
     shares = []
     for row in rows:
         if np.isfinite(row.get("yield", np.nan)):
             share, low, high = (format_share(row[name], 2) for name in ("yield", "yield_low", "yield_high"))
-            name = "the search's answer" if row["kind"] == FOUND else row["name"]
+            name = "the search's answer" if row["kind"] == SEARCHED else row["name"]
             shares.append(f"{name} {share} ({low} to {high})")
     if shares:
         wanted = output.trade_off[0].formatted(output.study.population.wanted_dn or 0.0)
@@ -196,7 +196,7 @@ def lamp_maps(output: Output) -> dict[str, list[LampMap]]:
     """
     if output.regions is None:
         return {}
-    rows = output.few[output.few["scenario"] == leaders_of(output).scenario]
+    rows = output.named_rows[output.named_rows["scenario"] == leaders_of(output).scenario]
     designs = {row["design_id"]: row for row in rows.to_dict("records")}
     maps: dict[str, list[LampMap]] = {}
     for (norm, design), cells in output.regions.groupby(["norm", "design_id"], sort=False):
@@ -230,7 +230,7 @@ def lamp_lines(output: Output) -> Iterator[str]:
     for norm, designs in maps.items():
         chosen = [one for one in designs if best is not None and one.row["design_id"] == best["design_id"]]
         shown = chosen[0] if chosen else max(designs, key=lambda one: one.share)
-        plain = [one for one in designs if one.row["kind"] == PLAIN and one is not shown]
+        plain = [one for one in designs if one.row["kind"] == REFERENCE and one is not shown]
         beside = max(plain, key=lambda one: one.share, default=None)
         rival = "" if beside is None else f", {full_name(beside.row)} {format_share(beside.share)}"
         yield (

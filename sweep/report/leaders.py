@@ -13,7 +13,7 @@ from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.quantity import DN
 from ..results.facts import SearchFacts
 from ..results.output import Output
-from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
+from ..results.tables import NAMED, REFERENCE, SEARCHED, SWEPT
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -63,16 +63,16 @@ def leaders_of(output: Output, scenario: str | None = None) -> Leaders:
         Leaders.
     """
     scenario = output.scenario if scenario is None else scenario
-    return output.once(("leaders", scenario), partial(_leaders, output, scenario))
+    return output.cached(("leaders", scenario), partial(_leaders, output, scenario))
 
 
 def _leaders(output: Output, scenario: str) -> Leaders:
     separation = output.trade_off[0].name
     rows = output.table[(output.table["scenario"] == scenario) & (output.table["status"] == "ok")]
     best = output.best[output.best["scenario"] == scenario]
-    made = rows["kind"].isin([SWEPT, FOUND]).any()
+    made = rows["kind"].isin([SWEPT, SEARCHED]).any()
     chosen = _first(best) if made else _most(rows[rows["feasible"]], separation)
-    plain = rows[rows["kind"] == PLAIN]
+    plain = rows[rows["kind"] == REFERENCE]
     others: tuple[Row, ...] = ()
     if chosen is not None:
         plain = plain[plain["design_id"] != chosen["design_id"]]
@@ -138,9 +138,9 @@ def full_name(row: Row) -> str:
         Text.
     """
     name = label(row)
-    if row["kind"] in (PLAIN, NAMED) or (row["kind"] == FOUND and not name.startswith("best ")):
+    if row["kind"] in (REFERENCE, NAMED) or (row["kind"] == SEARCHED and not name.startswith("best ")):
         return name
-    return f"{'the ' if row['kind'] == FOUND else ''}{name} of {row['cfa']}"
+    return f"{'the ' if row['kind'] == SEARCHED else ''}{name} of {row['cfa']}"
 
 
 def capital(text: str) -> str:
@@ -205,7 +205,7 @@ def upper_bound_beside(output: Output, row: Row) -> float | None:
         If a value exceeds its bound by more.
     """
     search = upper_bound(output)
-    if search is None or not row["feasible"] or row["scenario"] != search.scenario or row["kind"] == PLAIN:
+    if search is None or not row["feasible"] or row["scenario"] != search.scenario or row["kind"] == REFERENCE:
         return None
     if search.limit_proven is None or f"{row['kind']} {row['space']}" not in search.bounded:
         return None

@@ -85,8 +85,8 @@ def _noise_figures(output: Output) -> Iterator[SeriesFigure]:
             y_label = f"{title} ({_LEAST:g}: or less)"
             yield draw(f"{where}: {title}", y_label=y_label, lines=lines, log_y=True, level=allowed, note=note)
         if output.study.pixel.captures:
-            least = output.few[_dprimes(output)].min(axis=1).clip(*_DRAWN_DPRIME)
-            dprimes = over_series(output.few.assign(**{D_PRIME: least}), scenarios, D_PRIME)
+            least = output.named_rows[_dprimes(output)].min(axis=1).clip(*_DRAWN_DPRIME)
+            dprimes = over_series(output.named_rows.assign(**{D_PRIME: least}), scenarios, D_PRIME)
             lines = {name: Line(dprime, None) for name, dprime in dprimes.items()}
             y_label = f"{_LEAST_DPRIME} ({_DRAWN_DPRIME[0]:g}: or less)"
             yield draw(f"{where}: {_LEAST_DPRIME}", y_label=y_label, lines=lines, log_y=True)
@@ -127,7 +127,7 @@ def usable_lines(output: Output) -> Iterator[str]:
 def _with_worst_error(output: Output) -> pd.DataFrame:
     """Return the rows with the worst error of any two states of lamps of unknown brightness."""
     of_pairs = [name for name, column in output.columns.items() if column.metric == CHROMATIC_ERROR]
-    return output.few.assign(**{CHROMATIC_ERROR: output.few[of_pairs].max(axis=1)})
+    return output.named_rows.assign(**{CHROMATIC_ERROR: output.named_rows[of_pairs].max(axis=1)})
 
 
 def _rate(allowed: float) -> str:
@@ -181,7 +181,7 @@ def _crossings(output: Output, series: str, key: str, quantity: str) -> dict[str
         return {}
     known = output.crossings[(output.crossings["series"] == series) & (output.crossings["key"] == key)]
     known = known[known["quantity"] == quantity]
-    names = output.few["name"].dropna().unique()
+    names = output.named_rows["name"].dropna().unique()
     return {str(name): np.sort(known.loc[known["name"] == name, "at"].to_numpy(dtype=float)) for name in names}
 
 
@@ -205,7 +205,7 @@ def recognition_table(output: Output) -> pd.DataFrame:
     """
     if output.study.recognition is None:
         return pd.DataFrame()
-    rows = output.few
+    rows = output.named_rows
     dprime = _dprimes(output)
     shown = pd.DataFrame({"name": rows["name"].astype(str), "scenario": rows["scenario"].astype(str)})
     shown["smallest d'"] = rows[dprime].min(axis=1).map("{:.2f}".format)

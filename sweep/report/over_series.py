@@ -12,7 +12,7 @@ from ..metrics.columns.flicker import FALSE_HUE, LAMP_SEEN, MODULATION
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.quantity import Column
 from ..results.output import Output
-from ..results.tables import FOUND, PLAIN
+from ..results.tables import REFERENCE, SEARCHED
 from ..study.axes import series_of
 from .leaders import Row, label, of_reference
 from .noise import rounded
@@ -96,17 +96,17 @@ class WorstOfSeries:
 def worst_of_series(output: Output, best: Row) -> WorstOfSeries | None:
     """Return the worst of the answer over its series; None if its refined values are not known."""
     group = searched_series(output)
-    if group is None or best["kind"] != FOUND or output.worst is None:
+    if group is None or best["kind"] != SEARCHED or output.worst is None:
         return None
     goal, scenarios, (_, unit) = output.goal, series_of(output.scenarios)[group], quantity_of(group[1])
     known = output.worst[(output.worst["series"] == group[0]) & (output.worst["quantity"] == goal.name)].dropna()
     least = {str(row["name"]): (float(row["value"]), float(row["at"])) for row in known.to_dict("records")}
-    light = {str(row["name"]): float(row[CFA_SENSITIVITY]) for row in output.few.to_dict("records")}
-    plain = [name for name in output.kind(PLAIN)["name"].unique() if least.get(name, (0.0, 0.0))[0] > 0]
+    light = {str(row["name"]): float(row[CFA_SENSITIVITY]) for row in output.named_rows.to_dict("records")}
+    plain = [name for name in output.kind(REFERENCE)["name"].unique() if least.get(name, (0.0, 0.0))[0] > 0]
     rival, name, numbers = max(plain, key=lambda one: least[one][0], default=None), label(best), [*scenarios.values()]
     loses: tuple[float, ...] = ()
     if rival is not None:
-        values = over_series(output.few, scenarios, goal.name)
+        values = over_series(output.named_rows, scenarios, goal.name)
         pairs = zip(numbers, values[name], values[rival], strict=True)
         loses = tuple(number for number, mine, its in pairs if its > mine)
     series = f"from {numbers[0]:g} to {numbers[-1]:g} {unit}"
@@ -115,11 +115,11 @@ def worst_of_series(output: Output, best: Row) -> WorstOfSeries | None:
 
 def flicker_lines(output: Output) -> Iterator[str]:
     """Yield how pulsed lamps look in an HDR pixel: over series of pulses at their worst number, or by scenario."""
-    if LAMP_SEEN not in output.few or output.few[LAMP_SEEN].isna().all():
+    if LAMP_SEEN not in output.named_rows or output.named_rows[LAMP_SEEN].isna().all():
         return
     worst = output.worst
     if worst is None or not (worst["quantity"] == LAMP_SEEN).any():
-        pulsed = output.few.dropna(subset=[LAMP_SEEN])
+        pulsed = output.named_rows.dropna(subset=[LAMP_SEEN])
         least = min(pulsed.to_dict("records"), key=lambda row: float(row[LAMP_SEEN]))
         share = f"{_percent(least[LAMP_SEEN])} of the phases ({least['name']} in {scene_in_words(least['scenario'])})"
         yield f"Pulsed lamps are seen in {'all phases' if least[LAMP_SEEN] > _ALL else f'as few as {share}'}."

@@ -15,7 +15,7 @@ from ..metrics.objective import COMBINED
 from ..results.inventory import Inventory
 from ..results.lock import locked
 from ..results.output import Output
-from ..results.tables import FIGURES, FOUND, NAMED, PLAIN, REPORT, VISION_FIGURES, csv_of, encoded, is_drawn
+from ..results.tables import FIGURES, NAMED, REFERENCE, REPORT, SEARCHED, VISION_FIGURES, csv_of, encoded, is_drawn
 from . import signal_figures as signals
 from . import tables
 from . import values as content
@@ -175,8 +175,8 @@ def _objective(output: Output) -> str:
 def _drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
     """Yield all drawings, the slowest first, so that no core waits for it."""
     for name, caption, kinds in (
-        ("clouds-cfas", "Signals in the channels of the plain CFAs", (PLAIN,)),
-        ("clouds-designs", "Signals in the channels of the named and the found designs", (NAMED, FOUND)),
+        ("clouds-cfas", "Signals in the channels of the plain CFAs", (REFERENCE,)),
+        ("clouds-designs", "Signals in the channels of the named and the found designs", (NAMED, SEARCHED)),
     ):
         designs = signals.clouds(output, *kinds)
         if designs:

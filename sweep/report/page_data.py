@@ -14,7 +14,7 @@ from ..metrics.columns.color_separation import CSD
 from ..metrics.limiting import limited_by_name
 from ..metrics.pareto import knee
 from ..results.output import Output
-from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
+from ..results.tables import NAMED, REFERENCE, SEARCHED, SWEPT
 from . import values as content
 from .figures import COLORS, CURVE_COLORS, TYPE_COLORS
 from .leaders import leaders_of
@@ -105,7 +105,7 @@ def _words(values: pd.Series) -> dict[str, Any]:
 def _groups(rows: pd.DataFrame) -> np.ndarray:
     """Return the index into GROUPS of each row."""
     front = rows["feasible"] & rows["pareto"]
-    kinds = [rows["kind"] == kind for kind in (PLAIN, FOUND, NAMED)]
+    kinds = [rows["kind"] == kind for kind in (REFERENCE, SEARCHED, NAMED)]
     return np.select([*kinds, front, rows["feasible"]], [5, 4, 3, 2, 1], default=0)
 
 

@@ -52,7 +52,7 @@ def price_table(output: Output) -> pd.DataFrame:
 
 
 def _row(column: Column, plain: float, best: float) -> tuple[str, str, str, str, str]:
-    better = best > plain if column.wanted == "more" else best < plain
+    better = best > plain if column.direction == "more" else best < plain
     effect = "same" if abs(best / plain - 1) < _SAME else "gain" if better else "loss"
     unit = f" {column.unit}" if column.unit and column.unit != "1" else ""
     one, other = (f"{value:.{_digits(value)}f}{unit}" for value in (plain, best))

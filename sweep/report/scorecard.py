@@ -13,7 +13,7 @@ from ..base.types import FloatArray
 from ..metrics.columns.tasks import PREFIX
 from ..metrics.quantity import Column
 from ..results.output import Output
-from ..results.tables import PLAIN
+from ..results.tables import REFERENCE
 from .figures import CURVE_CYCLE, canvas, legend_beside
 from .leaders import label
 
@@ -65,7 +65,7 @@ class ScoreRow:
         ratio = np.full(self.values.shape, np.nan)
         some = (self.values > 0) & (of > 0) & bool(self.best)
         np.divide(self.values, of, out=ratio, where=some)
-        return ratio if self.column.wanted == "more" else 1 / ratio
+        return ratio if self.column.direction == "more" else 1 / ratio
 
 
 @dataclass(frozen=True)
@@ -95,11 +95,13 @@ def scorecard(output: Output) -> Scorecard | None:
 
         first = {PREFIX + figure.what for figures in FIGURES.values() for figure in figures if figure.first}
         columns = [column for column in columns if column.metric in first]
-    rows = output.few[(output.few["scenario"] == output.scenarios[0]) & (output.few["status"] == "ok")]
+    rows = output.named_rows[
+        (output.named_rows["scenario"] == output.scenarios[0]) & (output.named_rows["status"] == "ok")
+    ]
     if not columns or rows.empty:
         return None
     # The reference, the designs that are judged, and the other plain CFAs.
-    plain = rows["kind"] == PLAIN
+    plain = rows["kind"] == REFERENCE
     rows = pd.concat([rows[plain].head(1), rows[~plain], rows[plain].iloc[1:]])
     names = tuple(label(row) for row in rows.to_dict("records"))
     return Scorecard(names, tuple(_row(column, rows[column.name].to_numpy(dtype=float)) for column in columns))
@@ -109,7 +111,7 @@ def _row(column: Column, values: FloatArray) -> ScoreRow:
     known = values[np.isfinite(values)]
     if not known.size or np.ptp(known) <= _SAME * np.abs(known).max() or np.abs(known).max() < 10.0**-column.digits:
         return ScoreRow(column, values, frozenset(), frozenset())
-    ends = (known.max(), known.min()) if column.wanted == "more" else (known.min(), known.max())
+    ends = (known.max(), known.min()) if column.direction == "more" else (known.min(), known.max())
     best, worst = (frozenset(np.flatnonzero(values == end).tolist()) for end in ends)
     return ScoreRow(column, values, best, worst)
 
@@ -149,7 +151,9 @@ def _against(card: Scorecard, rows: Sequence[ScoreRow]) -> list[str]:
     reference, *others = card.names
     alike: dict[tuple[str, int], list[str]] = {}
     for at, name in enumerate(others, 1):
-        signs = [np.sign(row.values[at] - row.values[0]) * (1 if row.column.wanted == "more" else -1) for row in rows]
+        signs = [
+            np.sign(row.values[at] - row.values[0]) * (1 if row.column.direction == "more" else -1) for row in rows
+        ]
         gains = [row.column.words for row, sign in zip(rows, signs, strict=True) if sign > 0]
         better = f"in {len(gains)}" + (f" ({', '.join(gains)})" if 0 < len(gains) <= _MOST_NAMED else "")
         alike.setdefault((better, sum(sign < 0 for sign in signs)), []).append(name)

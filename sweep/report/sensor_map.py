@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.types import FloatArray
 from ..results.output import Output
-from ..results.tables import FOUND, PLAIN, SENSOR_MAP
+from ..results.tables import REFERENCE, SEARCHED, SENSOR_MAP
 from .figures import Drawing, panel_grid
 
 if TYPE_CHECKING:
@@ -80,16 +80,16 @@ def sensor_figures(output: Output) -> Iterator[SensorFigure]:
     name = separation.of or separation.name
     if output.places is None or separation.pair is None or name not in output.places:
         return
-    for scenario, few in output.few.groupby("scenario", sort=False, observed=True):
+    for scenario, few in output.named_rows.groupby("scenario", sort=False, observed=True):
         places = output.places[output.places["design_id"].isin(few["design_id"])]
         plain: list[SensorMap] = []
         others: list[SensorMap] = []
         for row in few.to_dict("records"):
             rows = places[places["design_id"] == row["design_id"]]
-            called = BEST_FOUND if row["kind"] == FOUND else str(row["name"])
+            called = BEST_FOUND if row["kind"] == SEARCHED else str(row["name"])
             made = SensorMap(called, rows["height"].to_numpy(), rows[name].to_numpy())
             if made.dn.size and np.isfinite(made.dn).all():
-                (plain if row["kind"] == PLAIN else others).append(made)
+                (plain if row["kind"] == REFERENCE else others).append(made)
         level = max(((one.name, float(one.dn.min())) for one in plain), key=lambda one: one[1], default=None)
         shown = others or plain
         if shown:

@@ -17,9 +17,9 @@ from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.quantity import Column
 from ..results.inventory import Inventory
 from ..results.output import Output, read_output
-from ..results.tables import ALL_SENSORS, FOUND, PLAIN, REPORT, RESULTS, read_table
+from ..results.tables import ALL_SENSORS, REFERENCE, REPORT, RESULTS, SEARCHED, read_table
 from ..run.all_sensors import ALL
-from ..run.uncertainty import REFERENCE, UNCLIPPED
+from ..run.uncertainty import REFERENCE_CFA, UNCLIPPED
 from ..study import SensorAndLights, folder_name
 from .figures import CURVE_CYCLE, canvas, legend_beside, rendered
 from .pages import inlined, page, rows
@@ -91,7 +91,7 @@ def report_sensors(inventory: Inventory, runs: Sequence[SensorRun]) -> list[str]
     drawn = draw_sensors(figures, outputs[0][1].trade_off[0].words)
     images = {kind: rendered(drawn, kind) for kind in ("png", "svg")}
     words, summary = outputs[0][1].trade_off[0].words, _summary(figures)
-    n_found = figures.loc[figures["kind"] == FOUND, "cfa"].nunique()
+    n_found = figures.loc[figures["kind"] == SEARCHED, "cfa"].nunique()
     lines = [*_answer(summary, n_found, str(figures["reference"].iloc[0]), words)]
     answer, stated = lines[: max(n_found, 1)], f"{camera_and_scene(outputs[0][1])}."
     known = ALL_SENSORS in inventory.files
@@ -122,9 +122,9 @@ def report_sensors(inventory: Inventory, runs: Sequence[SensorRun]) -> list[str]
 def _figures(member: SensorAndLights, output: Output) -> Iterator[dict[str, Any]]:
     """Yield a row per plain CFA, named design and answer, in the first scenario."""
     separation = output.trade_off[0].name
-    few = output.few[(output.few["scenario"] == output.scenario) & (output.few["status"] == "ok")]
-    plain = few[few["kind"] == PLAIN]
-    known = plain[plain["name"] == REFERENCE]
+    few = output.named_rows[(output.named_rows["scenario"] == output.scenario) & (output.named_rows["status"] == "ok")]
+    plain = few[few["kind"] == REFERENCE]
+    known = plain[plain["name"] == REFERENCE_CFA]
     reference = (known if len(known) else plain if len(plain) else few).iloc[0]
     drawn = _uncertain(output, separation)
     for row in few.to_dict("records"):
@@ -132,7 +132,7 @@ def _figures(member: SensorAndLights, output: Output) -> Iterator[dict[str, Any]
             "sensor": member.sensor,
             "lights": member.lights,
             "name": str(row["name"]),
-            "design": f"{row['name']} of {row['cfa']}" if row["kind"] == FOUND else str(row["name"]),
+            "design": f"{row['name']} of {row['cfa']}" if row["kind"] == SEARCHED else str(row["name"]),
             "cfa": str(row["cfa"]),
             "kind": str(row["kind"]),
             "reference": str(reference["name"]),
@@ -155,7 +155,7 @@ def _uncertain(output: Output, separation: str) -> Mapping[Any, Mapping[str, flo
 
 def _summary(figures: pd.DataFrame) -> pd.DataFrame:
     """Return a row per design, the searched ones first: ranges of both ratios, and where both are above 1."""
-    figures, rows_of = figures.assign(last=figures["kind"] != FOUND).sort_values("last", kind="stable"), []
+    figures, rows_of = figures.assign(last=figures["kind"] != SEARCHED).sort_values("last", kind="stable"), []
     for design, of_design in figures[figures["name"] != figures["reference"]].groupby("design", sort=False):
         more = (of_design["ratio"] > 1) & (of_design["light_ratio"] > 1)
         row = {
@@ -276,7 +276,7 @@ def draw_sensors(figures: pd.DataFrame, words: str) -> Figure:
         axes.plot([], [], "o", color=CURVE_CYCLE[names.index(name) % len(CURVE_CYCLE)], label=name)
     for (sensor, lights), marker in zip(pairs, _MARKERS * 3, strict=False):
         axes.plot([], [], marker, color="#666666", label=f"{sensor}, {lights}")
-    reference = figures["reference"].iloc[0] if len(figures) else REFERENCE
+    reference = figures["reference"].iloc[0] if len(figures) else REFERENCE_CFA
     for line in (axes.axhline, axes.axvline):
         line(1.0, color="#666666", linestyle="--", linewidth=1.0)
     axes.set_yscale("log")

@@ -194,12 +194,12 @@ def series_figures(output: Output) -> list[SeriesFigure]:
     list of SeriesFigure
         Figures.
     """
-    rows, separation, columns = output.few, output.trade_off[0], output.columns.values()
-    best_place = [c.name for c in columns if (c.extreme, c.of) == ("best place", separation.name) and c.name in rows]
+    rows, separation, columns = output.named_rows, output.trade_off[0], output.columns.values()
+    best_phase = [c.name for c in columns if (c.extreme, c.of) == ("best place", separation.name) and c.name in rows]
     figures, series = [], series_of(output.scenarios)
     for (base, key), scenarios in series.items():
         worst = over_series(rows, scenarios, separation.name)
-        upper = over_series(rows, scenarios, best_place[0]) if best_place else {}
+        upper = over_series(rows, scenarios, best_phase[0]) if best_phase else {}
         upper = {n: y for n, y in upper.items() if np.isfinite(y).all() and not np.array_equal(y, worst[n])}
         lines = {name: Line(y, upper.get(name)) for name, y in worst.items()}
         if lines:

@@ -85,7 +85,7 @@ def _curves(output: Output) -> str:
 
 def saturation_lines(output: Output) -> Iterator[str]:
     """Yield in which scenarios signals fill pixels, by design."""
-    rows = output.few.merge(output.saturated, on="design_id", how="left")
+    rows = output.named_rows.merge(output.saturated, on="design_id", how="left")
     if not (rows[_FULL] > 0).any():
         return
     total, told = int(rows["signals"].max()), set[str]()

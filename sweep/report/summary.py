@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..results.facts import SearchFacts
 from ..results.output import Output
-from ..results.tables import PLAIN
+from ..results.tables import REFERENCE
 from .answer import answer_parts
 from .leaders import capital, of_reference
 from .price import price_line
@@ -106,7 +106,7 @@ def counts_line(output: Output) -> str:
     """
     counts = output.counts
     text = _count(output.provenance.filters, "filter")
-    plain = output.kind(PLAIN)["filter_id"].nunique()
+    plain = output.kind(REFERENCE)["filter_id"].nunique()
     text += f" ({plain} of them plain CFAs)" if plain else ""
     if len(output.scenarios) > 1:
         text += f" in {len(output.scenarios)} scenarios ({_count(counts.rows, 'row')})"

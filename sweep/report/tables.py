@@ -31,7 +31,7 @@ def comparison_table(output: Output) -> pd.DataFrame:
         One row per design and scenario: name, CSDs, sensitivities, limiting lights, feasibility.
     """
     rest = [*output.light, *output.further, *output.distances]
-    return _shown(output, output.few, ["name", "scenario"], [*rest, "feasible"])
+    return _shown(output, output.named_rows, ["name", "scenario"], [*rest, "feasible"])
 
 
 def best_table(output: Output, max_rows: int = 12) -> pd.DataFrame:

@@ -10,7 +10,7 @@ from ..designs.technology import Technology
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.quantity import DN, Column
 from ..results.output import Output
-from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
+from ..results.tables import NAMED, REFERENCE, SEARCHED, SWEPT
 from .leaders import Row, capital
 from .values import modifications
 
@@ -108,7 +108,7 @@ def unknown_lines(output: Output) -> Iterator[str]:
     str
         Sentence that names the filter families; a design with an unknown constrained quantity is infeasible.
     """
-    rows = output.kind(NAMED, SWEPT, FOUND)
+    rows = output.kind(NAMED, SWEPT, SEARCHED)
     rows = rows[rows["status"] == "ok"]
     for name in output.constraints:
         unknown = rows[rows[name].isna()]
@@ -152,11 +152,11 @@ def term_definitions(output: Output) -> list[str]:
 def _technologies(output: Output, row: Row) -> list[Technology | None]:
     """Return the possible technologies of a row's filter: several for swept rows, none for a plain CFA."""
     study, search = output.study, output.provenance.search
-    if row["kind"] == PLAIN:
+    if row["kind"] == REFERENCE:
         return []
     if row["kind"] == NAMED:
         return [study.designs[row["name"]].technology]
-    if row["kind"] == FOUND and search is not None:
+    if row["kind"] == SEARCHED and search is not None:
         return [(study.sweeps | study.boxes)[search.space].technology]
     technologies = [sweep.technology for sweep in study.sweeps.values()]
     return list({repr(technology): technology for technology in technologies}.values())  # distinct ones, in order

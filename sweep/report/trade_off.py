@@ -11,7 +11,7 @@ import numpy as np
 from ..base.types import FloatArray
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..results.output import Output
-from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
+from ..results.tables import NAMED, REFERENCE, SEARCHED, SWEPT
 from ..results.thinning import even
 from .figures import COLORS, canvas, legend_beside
 from .leaders import bounds_figure, label
@@ -127,8 +127,8 @@ def pareto_figure(output: Output, scenario: str, cfa: str) -> TradeOff:
     """
     table = output.table[(output.table["scenario"] == scenario) & (output.table["status"] == "ok")]
     designs = table[table["cfa"] == cfa]
-    swept, named, best = (designs[designs["kind"] == kind] for kind in (SWEPT, NAMED, FOUND))
-    references = table[table["kind"] == PLAIN]
+    swept, named, best = (designs[designs["kind"] == kind] for kind in (SWEPT, NAMED, SEARCHED))
+    references = table[table["kind"] == REFERENCE]
     separation, sensitivity = output.trade_off
     front = swept["pareto"] & swept["feasible"]
     groups = {
@@ -183,7 +183,7 @@ def overview_figure(output: Output, scenario: str) -> TradeOff:
     table = table[table[separation.name].notna()]
     swept = table[(table["kind"] == SWEPT) & table["pareto"]]
     groups = {}
-    for name, kind in {"plain": PLAIN, "named": NAMED, "best": FOUND}.items():
+    for name, kind in {"plain": REFERENCE, "named": NAMED, "best": SEARCHED}.items():
         rows = table[table["kind"] == kind]
         texts = [f"{label(row)} {separation.formatted(row[separation.name])}" for row in rows.to_dict("records")]
         groups[name] = _points(output, rows, CFA_SENSITIVITY, texts)
@@ -224,7 +224,7 @@ def around_designs(output: Output, scenario: str) -> TradeOff:
 
 def _limit_name(output: Output) -> str:
     """Return the filters of the upper bound, for a legend; empty without a search."""
-    search, found = output.provenance.search, output.kind(FOUND)
+    search, found = output.provenance.search, output.kind(SEARCHED)
     if search is None:
         return ""
     such = "such layers in " if len(found) and is_angle_dependent(output, found.iloc[0].to_dict()) else ""

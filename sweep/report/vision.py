@@ -199,7 +199,7 @@ def benchmark_of(output: Output) -> Benchmark:
     vision = output.study.vision
     assert vision is not None
     tables = output.vision[VISION], output.vision[VISION_CONDITIONS]
-    return output.once("vision", lambda: Benchmark(vision, output.study.seed, *tables))
+    return output.cached("vision", lambda: Benchmark(vision, output.study.seed, *tables))
 
 
 def format_interval(interval: Interval) -> str:

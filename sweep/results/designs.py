@@ -17,7 +17,7 @@ from ..designs.space import Space
 from ..study import Study, load_study
 from ..study.axes import series_of
 from ..study.sources import KeptSources
-from .tables import FEW, RESOLVED, RESULTS, batches
+from .tables import NAMED_KINDS, RESOLVED, RESULTS, batches
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -95,7 +95,7 @@ def computed_rows(*tables: pd.DataFrame) -> list[dict[Any, Any]]:
     return [*rows.values()]
 
 
-def few_rows(table: pd.DataFrame) -> list[dict[Any, Any]]:
+def named_rows(table: pd.DataFrame) -> list[dict[Any, Any]]:
     """Return the rows of plain CFAs, named designs and the search's answer, without those that failed.
 
     Parameters
@@ -108,7 +108,7 @@ def few_rows(table: pd.DataFrame) -> list[dict[Any, Any]]:
     list of dict
         Rows.
     """
-    return computed_rows(table[table["kind"].isin(FEW)])
+    return computed_rows(table[table["kind"].isin(NAMED_KINDS)])
 
 
 def rows_of_series(
@@ -136,7 +136,7 @@ def rows_of_series(
     space : Space
         Design space.
     """
-    few = few_rows(table)
+    few = named_rows(table)
     for (series, key), scenarios in series_of(study.scenarios).items():
         by_name: dict[str, dict[str, Mapping[Any, Any]]] = {}
         for row in few:

@@ -26,7 +26,7 @@ from .curves import SCHEMA as CURVES_SCHEMA
 from .curves import KeptCurves
 from .facts import Provenance, checked_facts, missing_parts_error
 from .inventory import Inventory
-from .tables import FEW, FOUND, NAMED, PLAIN, PROVENANCE, RESOLVED, RESULTS, SWEPT, read_table
+from .tables import NAMED, NAMED_KINDS, PROVENANCE, REFERENCE, RESOLVED, RESULTS, SEARCHED, SWEPT, read_table
 from .thinning import Counts, swept_points, thinned
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ class Output:
     unverified: Sequence[str]
     _made: dict[object, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
-    def once(self, key: object, make: Callable[[], _Made]) -> _Made:
+    def cached(self, key: object, make: Callable[[], _Made]) -> _Made:
         """Return a value that several parts of a report share, computed at its first use.
 
         Parameters
@@ -200,7 +200,7 @@ class Output:
     @cached_property
     def best(self) -> pd.DataFrame:
         """Feasible swept and searched designs, best first; those of the leading scenario before all others."""
-        candidates = self.table[self.table["feasible"] & self.table["kind"].isin([SWEPT, FOUND])]
+        candidates = self.table[self.table["feasible"] & self.table["kind"].isin([SWEPT, SEARCHED])]
         leading = (candidates["scenario"] == self.scenario).rename("leading")
         keys = ["leading", *self.order, "design_id"]
         return (
@@ -229,7 +229,7 @@ class Output:
         Parameters
         ----------
         *kinds : str
-            Kinds, see `tables.PLAIN`.
+            Kinds, see `tables.REFERENCE`.
 
         Returns
         -------
@@ -241,12 +241,12 @@ class Output:
     @cached_property
     def named(self) -> pd.DataFrame:
         """Plain CFAs and named designs."""
-        return self.kind(PLAIN, NAMED)
+        return self.kind(REFERENCE, NAMED)
 
     @cached_property
-    def few(self) -> pd.DataFrame:
+    def named_rows(self) -> pd.DataFrame:
         """Plain CFAs, named designs and the search's answer."""
-        return self.kind(*FEW)
+        return self.kind(*NAMED_KINDS)
 
 
 def read_output(folder: Path, *, audited: bool = True) -> Output:

@@ -80,9 +80,9 @@ _VERDICTS = (
 )
 ROW_COLUMNS = tuple(one.name for one in (*_KEYS, *_VERDICTS))
 """Columns of every result table; parameters and quantities stand between the keys and the verdicts."""
-PLAIN, NAMED, SWEPT, FOUND = "reference", "design", "sweep", "search"
+REFERENCE, NAMED, SWEPT, SEARCHED = "reference", "design", "sweep", "search"
 """Kinds of rows: a plain CFA, a named design, one that was swept, the search's answer."""
-FEW = (PLAIN, NAMED, FOUND)
+NAMED_KINDS = (REFERENCE, NAMED, SEARCHED)
 """Kinds of which there are few rows."""
 ROW_GROUP = 131_072
 """Rows that are read and written at once."""

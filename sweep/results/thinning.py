@@ -17,7 +17,7 @@ import pyarrow.parquet as pq
 from ..base.errors import OutputError, ValidationIssue
 from ..base.types import BoolArray, IndexArray
 from ..metrics.columns.exposure import EXPOSURE
-from .tables import PLAIN, SWEPT, batches, word_mask
+from .tables import REFERENCE, SWEPT, batches, word_mask
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -84,7 +84,7 @@ class Counts:
     def _designs(self, scenario: str | None, cfa: str | None, met: bool) -> Iterator[tuple[bool, int]]:
         for (kind, own_scenario, own_cfa, status, feasible, pareto), n in self.groups.items():
             wanted = scenario in (None, own_scenario) and cfa in (None, own_cfa)
-            if kind != PLAIN and status == "ok" and feasible == met and wanted:
+            if kind != REFERENCE and status == "ok" and feasible == met and wanted:
                 yield pareto, n
 
 

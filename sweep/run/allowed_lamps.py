@@ -13,7 +13,7 @@ import pyarrow as pa
 from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..camera.forward import ForwardModel
 from ..camera.setup import Setup
-from ..results.designs import few_rows, row_curves
+from ..results.designs import named_rows, row_curves
 from ..spectra.lights import Lights
 from ..spectra.single_leds import Norm, SingleLeds, all_leds
 from ..study import Study
@@ -61,7 +61,7 @@ def regions_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
     assert regions is not None
     leds = all_leds(regions)
     allowed = {norm: (leds.allowed(norm, "yellow"), leds.allowed(norm, "red")) for norm in regions.norms}
-    few, calls = few_rows(rows), []
+    few, calls = named_rows(rows), []
     for row in few:
         space, curves = row_curves(study, row)
         setup = study.setup(space, row["scenario"]).with_all_effects

@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 
 from ..base.types import FloatArray
-from ..results.designs import few_rows, row_curves
+from ..results.designs import named_rows, row_curves
 from ..results.tables import CHART, NIGHT
 from ..spectra.tasks import Chart, StudyTasks
 from ..study import Study
@@ -33,7 +33,7 @@ def _shown(study: Study, highlights: pd.DataFrame) -> Iterator[tuple[dict[str, A
     """Yield keys and colors of plain CFAs, named designs and the answer."""
     from ..metrics.tasks.color import PatchCamera  # noqa: PLC0415  (few studies have tasks)
 
-    for row in few_rows(highlights):
+    for row in named_rows(highlights):
         space, curves = row_curves(study, row)
         yield {key: row[key] for key in _KEYS}, PatchCamera(study.setup(space, row["scenario"]), curves)
 

@@ -15,7 +15,6 @@ from ..results.designs import computed_rows, row_curves, row_space
 from ..results.tables import (
     CROSSINGS,
     CURVES,
-    FOUND,
     HANDOVERS,
     LIMITED_BY,
     POINTS,
@@ -23,6 +22,7 @@ from ..results.tables import (
     RENDERED,
     ROBUSTNESS,
     SATURATED,
+    SEARCHED,
     SENSOR_MAP,
     TRADED,
     UNCERTAINTY,
@@ -89,7 +89,7 @@ class DerivedInput:
     def drawn(self) -> list[dict[Any, Any]]:
         """Rows of the first scenario and the search's answer, without those that failed."""
         first = self.rows["scenario"] == next(iter(self.study.scenarios))
-        return computed_rows(self.rows[first | (self.rows["kind"] == FOUND)])
+        return computed_rows(self.rows[first | (self.rows["kind"] == SEARCHED)])
 
     @property
     def other_front(self) -> list[dict[Any, Any]]:

@@ -18,8 +18,8 @@ from ..designs.space import Space
 from ..metrics.limiting import LimitingLights, limited_by_name, limiting_lights, limiting_lights_of
 from ..metrics.separation import csd_name, separations
 from ..metrics.smooth import smooth_response
-from ..results.designs import computed_rows, few_rows, row_curves
-from ..results.tables import FOUND, LIMITED_BY, POINTS
+from ..results.designs import computed_rows, named_rows, row_curves
+from ..results.tables import LIMITED_BY, POINTS, SEARCHED
 from ..spectra.lights import Pair
 from ..study import Study
 from .workers import run_with_progress
@@ -87,7 +87,7 @@ def design_details(
     for row in computed_rows(rows, on_front):
         scenario, design_id = str(row["scenario"]), int(row["design_id"])
         if LIMITED_BY in tables or (
-            POINTS in tables and (design_id in front or scenario == first or row["kind"] == FOUND)
+            POINTS in tables and (design_id in front or scenario == first or row["kind"] == SEARCHED)
         ):
             space, curves = row_curves(study, row)
             key = (scenario, space.cfa, *(() if space.filter is None else space.filter.channels))
@@ -192,7 +192,7 @@ def sensor_map_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progr
         One row per image height and design, in a scene with a field.
     """
     calls = []
-    for row in few_rows(rows):
+    for row in named_rows(rows):
         if study.scenarios[row["scenario"]].field is not None:
             space, curves = row_curves(study, row)
             setup = study.setup(space, row["scenario"])

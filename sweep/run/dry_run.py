@@ -9,7 +9,7 @@ from pathlib import Path
 from ..results.folder import run_in
 from ..results.identity import run_facts
 from ..results.parts import Parts
-from ..results.tables import PLAIN, RESULTS
+from ..results.tables import REFERENCE, RESULTS
 from ..search.solver import refinement_of
 from ..search.trade_off import most_searches
 from ..study import Study
@@ -84,7 +84,7 @@ def remaining_work_lines(todo: RemainingWork, output: Path) -> Iterator[str]:
         Lines.
     """
     study, search = todo.study, todo.study.search
-    plain = sum(space.size for space in study.spaces if space.kind == PLAIN)
+    plain = sum(space.size for space in study.spaces if space.kind == REFERENCE)
     yield (
         f"{_count(study.n_filters - plain, 'filter')} and {_count(plain, 'plain CFA')} "
         f"in {_count(len(study.scenarios), 'scenario')}, {_count(study.n_designs, 'row')}: "

@@ -9,7 +9,7 @@ import pyarrow as pa
 
 from ..base.types import BoolArray, FloatArray, IndexArray
 from ..metrics.pareto import non_dominated
-from ..results.tables import FEW, SWEPT, word_mask
+from ..results.tables import NAMED_KINDS, SWEPT, word_mask
 from ..results.thinning import best_at, leading_rows, row_groups
 from .routes import Rules
 
@@ -44,7 +44,7 @@ def report_rows(table: pa.Table, rules: Rules) -> pa.Table:
     pyarrow.Table
         Table.
     """
-    few, on_front = word_mask(table, "kind", *FEW), table["pareto"].to_numpy()
+    few, on_front = word_mask(table, "kind", *NAMED_KINDS), table["pareto"].to_numpy()
     feasible = table["feasible"].to_numpy()
     kept = [np.flatnonzero(few), leading_rows(table, rules.front[0], ~few)]
     for at in row_groups(table).values():
@@ -136,7 +136,7 @@ class RunRows:
         pandas.DataFrame
             Rows.
         """
-        few, drawn = word_mask(self._rows, "kind", *FEW), self._drawn()
+        few, drawn = word_mask(self._rows, "kind", *NAMED_KINDS), self._drawn()
         best = [
             best_at(self._rows, self.rules.order, BEST_PER_CFA, drawn & word_mask(self._rows, "cfa", cfa))
             for cfa in self._cfas()

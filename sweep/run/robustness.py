@@ -14,11 +14,11 @@ from ..camera.setup import Setup
 from ..designs.space import Space
 from ..designs.tolerance import AS_DESIGNED, NONE, ProductionError, Tolerance
 from ..metrics.drawn import draws_of
-from ..metrics.members import PopulationImager, population_imager
+from ..metrics.members import PopulationModel, population_model
 from ..metrics.separation import csd_name
 from ..metrics.share import share_interval
-from ..results.designs import few_rows, row_space
-from ..results.tables import PLAIN
+from ..results.designs import named_rows, row_space
+from ..results.tables import REFERENCE
 from ..spectra.lights import Pair
 from ..study import Study
 from .workers import run_with_progress
@@ -49,7 +49,7 @@ class Candidate:
     point: FloatArray
     tolerance: Tolerance
 
-    def imager(self, scale: float) -> PopulationImager:
+    def imager(self, scale: float) -> PopulationModel:
         """Return the scene with a scaled population of its lights.
 
         Parameters
@@ -59,12 +59,12 @@ class Candidate:
 
         Returns
         -------
-        PopulationImager
+        PopulationModel
             Scene with all members.
         """
         population = self.setup.lights.population
         assert population is not None
-        return population_imager(
+        return population_model(
             replace(self.setup, lights=replace(self.setup.lights, population=population.scaled(scale)))
         )
 
@@ -132,9 +132,9 @@ def robustness_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progr
     """
     pair = study.pair_over_population
     assert pair is not None
-    few, calls = few_rows(rows), []
+    few, calls = named_rows(rows), []
     for row in few:
-        plain = [one for one in few if one["kind"] == PLAIN and one["scenario"] == row["scenario"]]
+        plain = [one for one in few if one["kind"] == REFERENCE and one["scenario"] == row["scenario"]]
         best = max(plain, key=lambda one: one[f"worst_{csd_name(pair)}"], default=row)
         rival = None if best["design_id"] == row["design_id"] else _design(study, best)
         calls.append(delayed(_robustness, _design(study, row), rival, pair, study.section.seed))
@@ -225,7 +225,7 @@ def drawn_dn(design: Candidate, pair: Pair, seed: int) -> FloatArray:
     ndarray of shape (n_draws,)
         CSD, DN.
     """
-    imager = population_imager(design.setup)
+    imager = population_model(design.setup)
     tolerance = design.tolerance if design.space.filter is not None else NONE
     draws = draws_of(imager.members, pair, tolerance, (seed, 1))
     dn = np.empty(draws.size)

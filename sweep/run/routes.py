@@ -192,9 +192,9 @@ def worst_cases(
     curves = [space.curves(points, setup.camera.grid.size, off) for off in (AS_DESIGNED, *errors)]
     cases = [nominal, *(evaluate(model, shifted, user_metrics=user_metrics) for shifted in curves[1:])]
     if setup.lights.population is not None:
-        from ..metrics.members import population_imager  # noqa: PLC0415  (only where lights have a population)
+        from ..metrics.members import population_model  # noqa: PLC0415  (only where lights have a population)
 
-        members = population_imager(setup)
+        members = population_model(setup)
         cases = [case | members.worst(shifted) for case, shifted in zip(cases, curves, strict=True)]
     return {quantity.name: quantity.worse([case[quantity.of] for case in cases]) for quantity in worst}
 
@@ -202,10 +202,10 @@ def worst_cases(
 def _of_a_share(space: Space, setup: Setup, points: FloatArray, rules: Rules) -> Columns:
     """Return the CSD that the wanted share of random lamps and cameras has."""
     from ..metrics.drawn import LampsAndCameras  # noqa: PLC0415  (only where a share of lamps and cameras counts)
-    from ..metrics.members import population_imager  # noqa: PLC0415
+    from ..metrics.members import population_model  # noqa: PLC0415
 
     tolerance = rules.tolerance if space.filter is not None else NONE
-    drawn = LampsAndCameras(population_imager(setup), tolerance, rules.seed)
+    drawn = LampsAndCameras(population_model(setup), tolerance, rules.seed)
     pairs = [q.pair for q in rules.quantities.values() if q.extreme == OF_A_SHARE and q.pair is not None]
     csds = drawn.columns(lambda off, some: space.curves(points[some], setup.camera.grid.size, off), len(points), pairs)
     return {YIELD + name: values for name, values in csds.items()}

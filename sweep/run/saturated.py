@@ -10,7 +10,7 @@ import pyarrow as pa
 from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..camera.forward import forward_model
 from ..camera.setup import Setup
-from ..results.designs import few_rows, row_curves
+from ..results.designs import named_rows, row_curves
 from ..study import Study
 from .workers import run_with_progress
 
@@ -23,7 +23,7 @@ _SCHEMA = pa.schema([("design_id", pa.int64()), ("full_signals", pa.int64()), ("
 def saturated_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: Progress) -> pa.Table:
     """Count the signals that fill a pixel of any channel, for plain CFAs, named designs and the answer."""
     ids, calls = [], []
-    for row in few_rows(rows):
+    for row in named_rows(rows):
         space, curves = row_curves(study, row)
         ids.append(row["design_id"])
         calls.append(delayed(full_signals, study.setup(space, row["scenario"]), curves))

@@ -38,14 +38,14 @@ class FinishedJob:
     ----------
     part : str or bytes
         Name of its part file, or its content if the worker could not write it.
-    few : pyarrow.Table
+    named_rows : pyarrow.Table
         Result of `report_rows`.
     failed : int
         Designs that failed.
     """
 
     part: str | bytes
-    few: pa.Table
+    named_rows: pa.Table
     failed: int
 
 
@@ -143,7 +143,7 @@ class Sweep:
                 else:
                     self.parts.save(self.keys[index], ROWS, finished.part)
                 self.failed += finished.failed
-                gathered.add(finished.few)
+                gathered.add(finished.named_rows)
                 done += self.jobs[index].size
                 if finished.failed and options.fail_fast:
                     raise _first_failure(self.table(index))

@@ -17,8 +17,8 @@ from ..camera.setup import Setup
 from ..designs.space import Space
 from ..metrics.separation import csd_name
 from ..metrics.smooth import smooth_csd
-from ..results.designs import few_rows, row_curves
-from ..results.tables import PLAIN
+from ..results.designs import named_rows, row_curves
+from ..results.tables import REFERENCE
 from ..spectra.lights import Pair, class_pairs
 from ..study import Study
 from .workers import run_with_progress
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SHARES = (0.05, 0.5, 0.95)
-REFERENCE = "RGGB"
+REFERENCE_CFA = "RGGB"
 """CFA that others are compared with; the first plain one where a study does not have it."""
 UNCLIPPED = "pixels may saturate: random sensors are read before clipping"
 _CONFIDENCE = 0.95
@@ -70,16 +70,16 @@ def uncertainty_table(study: Study, rows: pd.DataFrame, parallel: Parallel, prog
     """
     errors = study.section.uncertainty
     assert errors is not None
-    few, calls = few_rows(rows), []
+    few, calls = named_rows(rows), []
     for row in few:
         space, curves = row_curves(study, row)
         setup = study.setup(space, row["scenario"]).with_all_effects
         names = _names(study, space)
         calls.append(delayed(_on_sensors, setup, curves[0], study.sensor, names, errors, study.section.seed))
     drawn_sensors = [*run_with_progress(parallel, calls, "random sensors", progress)]
-    plain = [row for row in few if row["kind"] == PLAIN] or few
+    plain = [row for row in few if row["kind"] == REFERENCE] or few
     names = [row["name"] for row in plain]
-    reference = REFERENCE if REFERENCE in names else names[0]
+    reference = REFERENCE_CFA if REFERENCE_CFA in names else names[0]
     of_reference = {
         row["scenario"]: sensors for row, sensors in zip(few, drawn_sensors, strict=True) if row["name"] == reference
     }

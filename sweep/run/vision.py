@@ -17,8 +17,8 @@ from ..camera.setup import Setup
 from ..metrics.columns.confusion import D_PRIME, STATE_ERROR
 from ..metrics.evaluate import evaluate
 from ..metrics.separation import csd_name
-from ..results.designs import few_rows, row_curves
-from ..results.tables import FOUND, VISION, VISION_CONDITIONS, VISION_STREET, VISION_STREETS
+from ..results.designs import named_rows, row_curves
+from ..results.tables import SEARCHED, VISION, VISION_CONDITIONS, VISION_STREET, VISION_STREETS
 from ..spectra.lights import class_pairs, pair_name
 from ..study import Study
 from ..vision.images import setup_at
@@ -129,8 +129,8 @@ def vision_designs(study: Study, rows: pd.DataFrame) -> list[tuple[dict[Any, Any
         Row, camera, and QE of the modified channels, ndarray of shape (n_modified, n_wavelengths).
     """
     first, by_name = next(iter(study.scenarios)), dict[str, dict[Any, Any]]()
-    for row in few_rows(rows):
-        if row["scenario"] == first or row["kind"] == FOUND:
+    for row in named_rows(rows):
+        if row["scenario"] == first or row["kind"] == SEARCHED:
             by_name[row["name"]] = row
     made = []
     for row in by_name.values():

@@ -67,7 +67,7 @@ def worst_over(
         if number not in known:
             model = ForwardModel(scenes.at(number), once=True)
             known[number] = evaluate_some(model, curves, quantities, states)
-        return known[number][quantity.name] * (-1.0 if quantity.wanted == "less" else 1.0)
+        return known[number][quantity.name] * (-1.0 if quantity.direction == "less" else 1.0)
 
     found: list[dict[str, str | float]] = []
     for quantity in quantities:

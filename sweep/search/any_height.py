@@ -42,7 +42,9 @@ class AnyHeight:
         self._looked_at = field_heights(whole.setup)
         self._models: dict[float, LinearModel] = {}
         requested = {*whole.objective.weights, *whole.constraints} & whole.pairs.keys()
-        self._pairs = {name: whole.pairs[name] for name in sorted(requested) if whole.quantities[name].apart == DN}
+        self._pairs = {
+            name: whole.pairs[name] for name in sorted(requested) if whole.quantities[name].distance_kind == DN
+        }
 
     @property
     def problem(self) -> Problem:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.types import IndexArray, Parallel, Progress, delayed
 from ..designs.family import ChoosingFamily
-from .held import held_at, search_held
+from .held import fix_parameters, search_held
 from .problem import Evaluation, Problem
 
 MOST_EXHAUSTIVE = 2_000
@@ -80,7 +80,7 @@ def with_members(problem: Problem, members: Members) -> Problem:
         held[number] = float(members[min(slot, len(members) - 1)])
         if slot >= len(members):
             held[amount] = 0.0
-    return held_at(replace(problem, family=problem.family.only(np.unique(members))), held)
+    return fix_parameters(replace(problem, family=problem.family.only(np.unique(members))), held)
 
 
 def amounts_of(

@@ -101,7 +101,7 @@ class FilterProgram:
         ends = (self._rows.matrix @ self._box[1] + self._rows.constant)[objective] / self._rows.rate[objective]
         self.top = float(min(ends.min(initial=np.inf), self.reach.max(axis=1, initial=-np.inf).min(initial=np.inf)))
         self._keep(np.flatnonzero(self.needed(max(self.top, 0.0)) > 0))
-        own_sizes = np.abs(self.apart) @ self.base + np.abs(self.added).max(axis=1, initial=0.0)
+        own_sizes = np.abs(self.differences) @ self.base + np.abs(self.added).max(axis=1, initial=0.0)
         self._sizes = abs(self._rows.matrix) @ self.base, own_sizes
         self.solved = 0
 
@@ -112,7 +112,7 @@ class FilterProgram:
         """
         matrices: list[csr_matrix] = [csr_matrix((0, self.base.size))]
         columns: list[FloatArray] = [np.empty((0, 5))]
-        for quantity in sorted(self.problem.quantities.values(), key=lambda q: q.wanted):  # steepness first
+        for quantity in sorted(self.problem.quantities.values(), key=lambda q: q.direction):  # steepness first
             bound = self.problem.constraints.get(quantity.name, Bound.model_construct(min=None, max=None))
             weight = self.problem.objective.weights.get(quantity.name)
             if quantity.linear is None or (bound.min is None and bound.max is None and weight is None):
@@ -142,12 +142,12 @@ class FilterProgram:
         fixed = np.delete(imager.smooth(self.base[None, None])[0], channel, axis=2)
         noise = self._noise(imager) if self.noisy else None
         for name, (a, b) in self.problem.pairs.items():
-            if self.problem.quantities[name].apart == "chromatic":  # their pairs are members of the program
+            if self.problem.quantities[name].distance_kind == "chromatic":  # their pairs are members of the program
                 continue
             first, second = setup.members[a], setup.members[b]
             apart = gain[:, first, None] - gain[:, None, second]
             squares = (fixed[:, first, None] - fixed[:, None, second]) ** 2
-            if noise is not None and self.problem.quantities[name].apart == "noise":
+            if noise is not None and self.problem.quantities[name].distance_kind == "noise":
                 own_noise, others = ((variance[:, first, None] + variance[:, None, second]) / 2 for variance in noise)
                 apart, squares = apart / np.sqrt(own_noise)[..., None], squares / others
             others_squared = squares.sum(axis=3).ravel()
@@ -172,11 +172,13 @@ class FilterProgram:
                     [distances.added, distances.squared, np.tile(coefficients, (distances.squared.size, 1))]
                 )
             )
-        self.apart = np.concatenate(apart)
+        self.differences = np.concatenate(apart)
         *added, self._squared, self._least, self._slack, self._rate = np.concatenate(columns).T
         self.added = np.stack(added, axis=1)
         low, high = self._box
-        ends = [np.maximum(part, 0) @ high + np.minimum(part, 0) @ low for part in (self.apart, -self.apart)]
+        ends = [
+            np.maximum(part, 0) @ high + np.minimum(part, 0) @ low for part in (self.differences, -self.differences)
+        ]
         apart_by = np.maximum(np.stack(ends, axis=1) + self.added, 0.0)
         most = np.sqrt(self._squared[:, None] + apart_by**2) * (1 + _SUM_ROUNDING)
         reach = np.divide(most, self._rate[:, None], out=np.full(most.shape, np.inf), where=self._rate[:, None] > 0)
@@ -195,7 +197,7 @@ class FilterProgram:
     def noisy(self) -> bool:
         """True if a distance is in units of the noise."""
         requested = {*self.problem.objective.weights, *self.problem.constraints} & self.problem.pairs.keys()
-        return any(self.problem.quantities[name].apart == "noise" for name in requested)
+        return any(self.problem.quantities[name].distance_kind == "noise" for name in requested)
 
     def reaches(self, curve: FloatArray) -> float:
         """Return the objective of a filter with the least noise, which is no less than its own.
@@ -211,12 +213,12 @@ class FilterProgram:
             Objective.
         """
         pairs, rows = self._rate > 0, self._rows.rate > 0
-        far = np.sqrt(self._squared + (self.apart @ curve) ** 2)[pairs] / self._rate[pairs]
+        far = np.sqrt(self._squared + (self.differences @ curve) ** 2)[pairs] / self._rate[pairs]
         linear = (self._rows.matrix @ curve + self._rows.constant)[rows] / self._rows.rate[rows]
         return float(min(self.top, far.min(initial=np.inf), linear.min(initial=np.inf)))
 
     def _keep(self, wanted: IndexArray) -> None:
-        self.apart, self.added, self.reach = self.apart[wanted], self.added[wanted], self.reach[wanted]
+        self.differences, self.added, self.reach = self.differences[wanted], self.added[wanted], self.reach[wanted]
         self._squared, self._least = self._squared[wanted], self._least[wanted]
         self._slack, self._rate = self._slack[wanted], self._rate[wanted]
 
@@ -262,7 +264,7 @@ class FilterProgram:
         pairs, signs = np.array(sides.pairs, dtype=np.intp), np.array(sides.signs)
         some = self.needed(t)[pairs] > 0
         pairs, signs = pairs[some], signs[some]
-        rows = vstack([self._rows.matrix, csr_matrix(signs[:, None] * self.apart[pairs])]).tocsr()
+        rows = vstack([self._rows.matrix, csr_matrix(signs[:, None] * self.differences[pairs])]).tocsr()
         own_added = self._added(pairs, signs)
         floor = np.concatenate([self._rows.needed(t), self.needed(t)[pairs] - own_added])
         rate = np.concatenate([self._rows.rate, self._rate[pairs]])
@@ -301,7 +303,7 @@ class FilterProgram:
         ndarray of shape (n_pairs,)
             Difference, DN.
         """
-        return np.asarray(side * (self.apart @ curve) + self.added[:, int(side < 0)], dtype=float)
+        return np.asarray(side * (self.differences @ curve) + self.added[:, int(side < 0)], dtype=float)
 
     def _best_margin(
         self, rows: csr_matrix, floor: FloatArray, rate: FloatArray

@@ -28,7 +28,7 @@ from .problem import Evaluation, Problem, SearchRun
 
 if TYPE_CHECKING:
     from ..metrics.drawn import LampsAndCameras
-    from ..metrics.members import PopulationImager
+    from ..metrics.members import PopulationModel
 
 BACK_OFF = 1e-8
 """The search keeps this far (relative) inside each bound, so that rounding does not leave its answer outside."""
@@ -78,10 +78,10 @@ class Point:
         return np.sqrt(least) if self.power == 2 else np.array(least)
 
 
-def _members_of(setup: Setup) -> PopulationImager:
-    from ..metrics.members import population_imager  # noqa: PLC0415  (only where lights have a population)
+def _members_of(setup: Setup) -> PopulationModel:
+    from ..metrics.members import population_model  # noqa: PLC0415  (only where lights have a population)
 
-    return population_imager(setup)
+    return population_model(setup)
 
 
 def _drawn_of(problem: Problem, setup: Setup) -> LampsAndCameras:
@@ -132,7 +132,7 @@ class Model:
             )
             for setup, family in problem.scenes
         ]
-        wanted_less = self._rule.wanted == "less"
+        wanted_less = self._rule.direction == "less"
         self._power = 1 if problem.signed_goal or wanted_less else 2  # a quantity that may be negative has no root
         self._back_off = {name: _back_off(problem, name, bound) for name, bound in problem.constraints.items()}
         self._points: dict[bytes, Point] = {}
@@ -217,7 +217,7 @@ class Model:
             quantity, rows = self._quantities[name], self._rows(name, made)
             columns[name] = np.array([quantity.value(rows)])
             terms.append(_term(quantity, rows, weight, self._rule, self._power))
-        if self._rule.wanted == "less":  # by the decades, which do not end where numbers do
+        if self._rule.direction == "less":  # by the decades, which do not end where numbers do
             return terms, float(min(rows.values.min() for rows in terms))
         return terms, float(self._problem.objective.of(columns)[0])
 
@@ -231,13 +231,13 @@ class Model:
 
 def _term(quantity: Quantity, rows: Rows, weight: float, rule: Rule, power: int) -> Rows:
     """Return the rows of a weighted quantity in the objective."""
-    if rule.wanted == "less" and quantity.rows == "values":
+    if rule.direction == "less" and quantity.scale == "linear":
         rows = rows.logarithms()
-    if rule.wanted == "less":
+    if rule.direction == "less":
         return rows.scaled(1.0, -math.log10(weight))
     if power == 1:
-        return (rows.roots() if quantity.rows == "squares" else rows).scaled(weight)
-    return (rows if quantity.rows == "squares" else rows.squares()).scaled(weight**2)
+        return (rows.roots() if quantity.scale == "squared" else rows).scaled(weight)
+    return (rows if quantity.scale == "squared" else rows.squares()).scaled(weight**2)
 
 
 def _back_off(problem: Problem, name: str, bound: Bound) -> float:
@@ -253,10 +253,10 @@ def _back_off(problem: Problem, name: str, bound: Bound) -> float:
 def _conditions(quantity: Quantity, bound: Bound, rows: Rows, back_off: float) -> list[Rows]:
     """Return rows that are <= 0 where a bound is met, with a relative margin of `back_off`."""
     conditions, scale = [], bound.scale
-    if quantity.rows == "decades" and bound.max is not None:
+    if quantity.scale == "log10" and bound.max is not None:
         least = -math.log10(bound.max)
         return [rows.scaled(-1.0, least + back_off * max(1.0, least))]
-    if bound.min is not None and quantity.rows == "squares":
+    if bound.min is not None and quantity.scale == "squared":
         conditions.append(rows.scaled(-1 / scale**2, (bound.min * (1 + back_off) / scale) ** 2))
     elif bound.min is not None:
         conditions.append(rows.scaled(-1 / scale, bound.min / scale + back_off))

@@ -14,7 +14,7 @@ _STARTS = (0.02, 0.3)
 """Shares of the box of what is free that a search begins at: of some colorants none is better than much."""
 
 
-def held_at(problem: Problem, values: Mapping[int, float]) -> Problem:
+def fix_parameters(problem: Problem, values: Mapping[int, float]) -> Problem:
     """Return the problem with parameters held at values.
 
     Parameters
@@ -82,4 +82,4 @@ def search_cells(
     list of Evaluation
         Results of `search_held`, in order.
     """
-    return [search_held(held_at(problem, cell), algorithm, max_evaluations, seed) for cell in cells]
+    return [search_held(fix_parameters(problem, cell), algorithm, max_evaluations, seed) for cell in cells]

@@ -52,7 +52,7 @@ _SHARES = (0.0, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5)
 
 
 _DISTANCES = {DN: smooth_csd, "noise": smooth_detectability, "chromatic": smooth_chromatic}
-"""Smallest distance of the smooth response, by `Quantity.apart`."""
+"""Smallest distance of the smooth response, by `Quantity.distance_kind`."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ def limit_of(
         raise SweepError(ValidationIssue(f"no limit: {refused}"))
     relaxed, left_out = _relaxed(problem)
     heights = _any_height_of(relaxed) if relaxed.setup.all_heights else None
-    distances = any(relaxed.quantities[name].apart for name in relaxed.objective.weights)
+    distances = any(relaxed.quantities[name].distance_kind for name in relaxed.objective.weights)
     tolerance = tolerance_dn if distances else _SENSITIVITY_TOLERANCE
     members, solved = _members_of(relaxed), 0
     while True:
@@ -160,7 +160,7 @@ def check_bound(value: float, proven: float, where: str = "") -> None:
     if not value <= proven + _PROOF_TOLERANCE * max(1.0, proven):
         raise UpperBoundExceededError(
             ValidationIssue(
-                f"upper bound exceeded (bug){where}: a filter has {value:.9g}, but the upper bound is {proven:.9g}; finished "
+                f"upper bound exceeded (bug){where}: a filter has {value:.9g}, but its bound is {proven:.9g}; finished "
                 "results are kept"
             )
         )
@@ -193,7 +193,7 @@ def gap_between(value: float, proven: float) -> float:
 def _members_of(problem: Problem) -> MemberPairs | ChromaticPairs | None:
     """Return the pairs of worst cases or of chromatic separations; None if there are none of them."""
     names = dict.fromkeys((*problem.objective.weights, *problem.constraints))
-    if chromatic := [name for name in names if problem.quantities[name].apart == "chromatic"]:
+    if chromatic := [name for name in names if problem.quantities[name].distance_kind == "chromatic"]:
         from .chromatic_pairs import ChromaticPairs  # noqa: PLC0415  (only for chromatic separations)
 
         return ChromaticPairs(problem, chromatic)
@@ -316,7 +316,7 @@ def _merges(problem: Problem) -> bool:
 def _mixes_chromatic(problem: Problem) -> bool:
     """Return whether a chromatic separation has a worst case beside it, all field positions, or limited brightness."""
     names, setup = (*problem.objective.weights, *problem.constraints), problem.setup
-    chromatic = any(problem.quantities[name].apart == "chromatic" for name in names)
+    chromatic = any(problem.quantities[name].distance_kind == "chromatic" for name in names)
     others = setup.all_heights or setup.scene.brightness is not None
     return chromatic and (others or any(problem.worst_distance(name) for name in names))
 
@@ -348,7 +348,7 @@ def _relaxed(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
     kept: dict[str, Bound] = {}
     for name, bound in problem.constraints.items():
         plain = plains[name]
-        better = "min" if quantities[name].wanted == "less" else "max"
+        better = "min" if quantities[name].direction == "less" else "max"
         relaxed_bound = bound.model_copy(update={better: None}) if name in nominal else bound
         if not quantities[plain].has_limit or relaxed_bound.min is relaxed_bound.max is None:
             left_out.append(name)
@@ -416,7 +416,7 @@ def _attained(problem: Problem, curve: FloatArray, over: Mapping[str, float]) ->
     curves = curve[None, None]
     columns = designed_quantities(problem.setup, curves) | {name: np.array([value]) for name, value in over.items()}
     for name in {*problem.objective.weights, *problem.constraints} & problem.pairs.keys():
-        apart = problem.quantities[name].apart
+        apart = problem.quantities[name].distance_kind
         if apart == "chromatic" and name in over:  # over the known brightnesses
             continue
         of = _DISTANCES[apart]

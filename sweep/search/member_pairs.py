@@ -14,7 +14,7 @@ from typing import Self
 import numpy as np
 
 from ..base.types import BoolArray, FloatArray, IndexArray
-from ..metrics.members import population_imager
+from ..metrics.members import population_model
 from ..spectra.population import Population
 from .perturbed import Distances, PerturbedFilter, perturbed_filters
 from .problem import Problem
@@ -96,7 +96,7 @@ class MemberPairs:
         if setup.lights.population is None:
             alone = Population.model_validate({"drift_nm_per_k": 0.0})
             setup = replace(setup, lights=replace(setup.lights, population=alone))
-        self._imager, self.names, self._ways = population_imager(setup), tuple(names), perturbed_filters(problem)
+        self._imager, self.names, self._ways = population_model(setup), tuple(names), perturbed_filters(problem)
         self._types = {name: pair for name in names if (pair := problem.quantities[name].pair) is not None}
         imager, channel, base = self._imager.imager, problem.setup.camera.modified[0], problem.setup.camera.base_qe
         self._gain = imager.per_qe(0, base)[:, :, channel]

@@ -165,7 +165,7 @@ class Problem:
             True if it is.
         """
         requested = self.quantities[quantity]
-        return requested.extreme == WORST_CASE and requested.apart == DN
+        return requested.extreme == WORST_CASE and requested.distance_kind == DN
 
     @property
     def has_user_objective(self) -> bool:
@@ -180,7 +180,7 @@ class Problem:
     @property
     def pairs(self) -> dict[str, Pair]:
         """Signal types of each distance, in DN or in units of the noise."""
-        distances = [q for q in self.quantities.values() if q.apart and not q.extreme]
+        distances = [q for q in self.quantities.values() if q.distance_kind and not q.extreme]
         return {q.name: q.pair for q in distances if q.pair is not None}
 
     @property

@@ -172,7 +172,7 @@ class SideSearch:
         self._value = value
         self._tolerance = tolerance
         self._most = most_programs
-        self._conflicts = _Conflicts(len(program.apart))
+        self._conflicts = _Conflicts(len(program.differences))
         self._best = self._closed = -np.inf
         self._closed_parts: list[SideRegion] = []
         self._curve: FloatArray | None = None

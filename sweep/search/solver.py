@@ -244,7 +244,7 @@ def extreme_value(problem: Problem, quantity: str, starts: FloatArray, max_evalu
     """
     alone = replace(problem, constraints={quantity: problem.constraints[quantity]})
     definition = problem.quantities[quantity]
-    sign = 1.0 if problem.constraints[quantity].min is not None or definition.rows == "decades" else -1.0
+    sign = 1.0 if problem.constraints[quantity].min is not None or definition.scale == "log10" else -1.0
     values = [v for u0 in starts for v in _extremes(alone, quantity, sign, u0, max_evaluations)]
     best = sign * max((sign * value for value in values), default=-np.inf)
     return definition.of_row(best) if np.isfinite(best) else best

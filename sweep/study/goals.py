@@ -60,9 +60,9 @@ def check_goals(section: StudySection, sources: Sources, requested: RequestedQua
         if not _is_known(path, "objective", name, section, sources, requested):
             continue
         _check_slopes(path, known[name], section, sources)
-        if known[name].wanted != rule.wanted:
-            right = f"`{{least: {{{name}: 1}}}}`" if rule.wanted == "more" else "`minimum` or `sum`"
-            sources.add(path, f"{known[name].wanted} of {name} is better", None, right)
+        if known[name].direction != rule.direction:
+            right = f"`{{least: {{{name}: 1}}}}`" if rule.direction == "more" else "`minimum` or `sum`"
+            sources.add(path, f"{known[name].direction} of {name} is better", None, right)
     for name, bound in section.constraints.items():
         path = ("constraints", name)
         if not _is_known(path, "quantity", name, section, sources, requested):
@@ -77,7 +77,7 @@ def check_goals(section: StudySection, sources: Sources, requested: RequestedQua
                 sources.add((*path, end), f"{name} has no `{end}`", value, right)
             elif value is not None:
                 _check_range((*path, end), known[name], value, sources)
-        if known[name].rows == "decades" and bound.max is not None and not _LEAST_ERROR <= bound.max <= 1:
+        if known[name].scale == "log10" and bound.max is not None and not _LEAST_ERROR <= bound.max <= 1:
             sources.add((*path, "max"), "no such error is computed", bound.max, f"{_LEAST_ERROR:g} to 1")
 
 
@@ -111,7 +111,7 @@ def _is_known(
         return True
     shifted = quantities_of(replace(requested, edge_shift=True)).get(name)
     if shifted is not None and shifted.extreme == WORST_CASE and not section.production.tolerance:
-        needed = "`production.edge_shift_nm`" + (" or `population`" if shifted.apart == DN else "")
+        needed = "`production.edge_shift_nm`" + (" or `population`" if shifted.distance_kind == DN else "")
         sources.add(path, f"{name} needs {needed}", None, "a shift above 0")
     elif name in {n for n, q in quantities_of(replace(requested, wanted_yield=1.0)).items() if q.extreme == OF_A_SHARE}:
         sources.add(path, f"{name} needs `population.wanted_yield`", None, "a share, such as 0.99")
@@ -319,7 +319,7 @@ def _most(study: Study, space: Space, scenario: str) -> Iterator[tuple[str, floa
     """Yield quantities with the largest values that they can have in a space."""
     setup = study.setup(space, scenario)
     for name, quantity in study.quantities.items():
-        if quantity.apart == DN and not quantity.extreme:
+        if quantity.distance_kind == DN and not quantity.extreme:
             yield name, setup.camera.longest_distance_dn
     if space.filter is None:
         return

@@ -122,7 +122,7 @@ def batches(
         Images with labels.
     """
     for start in range(0, len(scenes), TOGETHER):
-        block = scenes.some(slice(start, start + TOGETHER))
+        block = scenes.subset(slice(start, start + TOGETHER))
         numbers = np.arange(start, start + len(block))
         ids = {"image_id": [image_id(key["design_id"], key["seed"], order, split, int(number)) for number in numbers]}
         where = {"order": order, "split": split, "image": numbers}

@@ -301,7 +301,7 @@ class HeadCamera:
                 here = np.flatnonzero((scenes.distance == distance) & (scenes.level == level))
                 if not here.size:
                     continue
-                here_scenes = scenes.some(here)
+                here_scenes = scenes.subset(here)
                 lit = (here_scenes.state - 1, here_scenes.lamp, candelas[here_scenes.intensity])
                 place = (here_scenes.place * self.n_places()).astype(np.intp)
                 heads = self.electrons(int(distance), int(level))

@@ -51,7 +51,7 @@ class _Examples:
     fixed: IndexArray
     targets: IndexArray
 
-    def some(self, which: IndexArray | BoolArray) -> _Examples:
+    def subset(self, which: IndexArray | BoolArray) -> _Examples:
         parts = {field.name: getattr(self, field.name) for field in fields(self)}
         return _Examples(**{name: part[which] if len(part) else part for name, part in parts.items()})
 
@@ -154,7 +154,7 @@ class NetworkReader:
         """
         examples, checked = self._examples(training), self._examples(check)
         # Those that stand in the street's order by chance teach that order, too, beside any.
-        by_chance = examples.some(examples.targets[:, 2] == 0)
+        by_chance = examples.subset(examples.targets[:, 2] == 0)
         examples = _Examples.joined([examples, replace(by_chance, fixed=np.ones_like(by_chance.fixed))])
         self._fitted = self._fit(examples, seed).calibrated(checked)
 

@@ -107,7 +107,7 @@ def _streets(
     detector = Detector(design.mosaic, camera.pixel, vision.lenses)
     detector.learn(streets.batches(learned, lamps[TRAIN], key, TRAIN, "raw"))
     made = detector.detect(streets.batches(test, lamps[TEST], key, TEST, "raw"))
-    first = test.some(slice(0, len(camera.levels)))  # levels take turns
+    first = test.subset(slice(0, len(camera.levels)))  # levels take turns
     pictures = next(streets.batches(first, lamps[TEST], key, TEST, "isp")).images
     labels, shape = street_labels(vision, design.mosaic, test, key, TEST), (-1, len(vision.lenses))
     table = precisions(labels, made, vision.lenses)

@@ -80,7 +80,7 @@ class Scenes:
     def __len__(self) -> int:
         return len(self.state)
 
-    def some(self, which: IndexArray | NDArray[np.bool_] | slice) -> Scenes:
+    def subset(self, which: IndexArray | NDArray[np.bool_] | slice) -> Scenes:
         """Return some of the scenes.
 
         Parameters

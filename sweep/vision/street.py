@@ -58,7 +58,7 @@ class StreetScenes:
     def __len__(self) -> int:
         return len(self.level)
 
-    def some(self, which: slice) -> StreetScenes:
+    def subset(self, which: slice) -> StreetScenes:
         """Return some of the streets.
 
         Parameters
@@ -288,7 +288,7 @@ class StreetCamera:
         """
         labels = street_labels(self.camera.vision, self.camera.setup.camera.mosaic, scenes, key, split)
         for start in range(0, len(scenes), _AT_ONCE):
-            block = scenes.some(slice(start, start + _AT_ONCE))
+            block = scenes.subset(slice(start, start + _AT_ONCE))
             numbers = self.camera.drawn(self.expected(block, lamps).reshape(len(block), -1), block.key)
             images = in_form(self.camera, numbers.reshape(-1, *self.shape), block.level, form)
             yield Batch(images, labels.iloc[start : start + len(block)].reset_index(drop=True))

@@ -22,7 +22,7 @@ from sweep.camera.phases import (
 )
 from sweep.camera.setup import READOUT, Setup
 from sweep.metrics.evaluate import evaluate
-from sweep.metrics.quantity import BEST_PLACE
+from sweep.metrics.quantity import BEST_PHASE
 from sweep.metrics.separation import csd_name, separations
 
 from ..cases import thinned
@@ -96,7 +96,7 @@ def missed_dn(made: DesignScene, how: str) -> tuple[float, float]:
     above = below = -math.inf
     for name, (smallest, largest) in brute_force(made, how).items():
         above = max(above, float(found[name][0]) - smallest)
-        below = max(below, largest - float(found[BEST_PLACE + name][0]))
+        below = max(below, largest - float(found[BEST_PHASE + name][0]))
     return above, below
 
 

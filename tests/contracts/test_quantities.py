@@ -56,7 +56,7 @@ def csd(made: Made, quantity: Quantity) -> list[float]:
     return [min(cdist(case[first], case[second]).min() for case in design) for design in made.read]
 
 
-def best_place(made: Made, quantity: Quantity) -> list[float]:
+def best_phase(made: Made, quantity: Quantity) -> list[float]:
     first, second = (made.setup.members[name] for name in quantity.pair or ())
     return [max(cdist(case[first], case[second]).min() for case in design) for design in made.read]
 
@@ -239,7 +239,7 @@ def contrast_detected(made: Made, quantity: Quantity) -> list[float]:
 
 DEFINITIONS: dict[str, tuple[Callable[[Made, Quantity], list[float]], float]] = {
     "csd": (csd, 1e-12),
-    "best_place_csd": (best_place, 1e-12),
+    "best_phase_csd": (best_phase, 1e-12),
     "chromatic_csd": (chromatic, 1e-9),
     "chromatic_dprime": (chromatic_in_noise, 1e-5),
     "chromatic_error": (chromatic_error, 0.1),  # those of equal brightness: exact sums over digital numbers
@@ -349,7 +349,7 @@ def test_linear_rows_are_the_quantity(name: str) -> None:
     linear = quantity.linear(made.setup)
     for curve, value in zip(made.curves, made.found[name], strict=True):
         rows = (linear.rows @ curve[0] + linear.constant) / linear.scale
-        assert (rows.max() if quantity.wanted == "less" else rows.min()) == pytest.approx(value, rel=1e-12)
+        assert (rows.max() if quantity.direction == "less" else rows.min()) == pytest.approx(value, rel=1e-12)
 
 
 def test_searchable_quantities_have_a_worst_case() -> None:
@@ -359,7 +359,7 @@ def test_searchable_quantities_have_a_worst_case() -> None:
     assert worst == {name for name in goals if not QUANTITIES[name].nominal}
     assert {name for name in goals if QUANTITIES[name].nominal} == {n for n, q in QUANTITIES.items() if q.states}
     assert all(QUANTITIES[name].smooth is not None for name in goals)
-    assert all((QUANTITIES[name].rows == "decades") == (QUANTITIES[name].wanted == "less") for name in goals)
+    assert all((QUANTITIES[name].scale == "log10") == (QUANTITIES[name].direction == "less") for name in goals)
 
 
 def test_labels_differ() -> None:

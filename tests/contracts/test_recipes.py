@@ -150,7 +150,7 @@ class RedShare(DesignMetric):
                 NAME,
                 "QE of the modified channel from 600 nm on, over that of its base",
                 label="share of red",
-                wanted="more",
+                direction="more",
                 ends=("min",),
                 goal=True,
                 needs="modified",
@@ -175,7 +175,7 @@ class Darkest(ReadoutMetric):
     order = 10
 
     def quantities(self, requested):
-        return (Quantity("darkest_dn", "darkest_dn", "weakest signal in its best channel", "DN", wanted="more", ends=("min",)),)
+        return (Quantity("darkest_dn", "darkest_dn", "weakest signal in its best channel", "DN", direction="more", ends=("min",)),)
 
     def of_readout(self, setup, response, unlit):
         return {"darkest_dn": response.max(axis=2).min(axis=1)}

@@ -92,11 +92,11 @@ def test_a_bound_keeps_to_the_light_that_is_allowed_at_most() -> None:
 
 
 @pytest.mark.parametrize(
-    ("wanted", "best", "effect"),
+    ("direction", "best", "effect"),
     [("more", 2.0, "gain"), ("more", 0.5, "loss"), ("less", 2.0, "loss"), ("less", 0.5, "gain"), ("less", 1.0, "same")],
 )
-def test_a_gain_is_more_of_what_is_wanted_and_less_of_what_is_not(wanted: Any, best: float, effect: str) -> None:
-    column = Column(name="x", metric="x", meaning="x", unit="", wanted=wanted)
+def test_a_gain_is_more_of_what_is_wanted_and_less_of_what_is_not(direction: Any, best: float, effect: str) -> None:
+    column = Column(name="x", metric="x", meaning="x", unit="", direction=direction)
     assert _row(column, 1.0, best)[-1] == effect
 
 

@@ -228,7 +228,7 @@ def everything_clipped() -> Result:
         for more in ({}, {"target": NEAR | {"readout": "center"}}, {"drive": {"duty": 0.9, "frequency_hz": 100.0}}):
             setup = made(random_qe(9, 3), lights, bright | more, pixel)
             found = evaluate(ForwardModel(setup), plain(setup))
-            errors += [v for name, v in found.items() if name.startswith(("csd_", "best_place_"))]
+            errors += [v for name, v in found.items() if name.startswith(("csd_", "best_phase_"))]
     return Result(float(np.max(errors)), 0.0)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from sweep.metrics.members import population_imager
+from sweep.metrics.members import population_model
 from sweep.spectra.members import Members
 from sweep.spectra.population import Population
 from sweep.study import load_study
@@ -43,7 +43,7 @@ def population(name: str) -> Population:
 def worst(name: str) -> np.ndarray:
     lights = replace(STUDY.lights, population=population(name))
     curves = PROBLEM.family.curves(DESIGNS)
-    return population_imager(replace(PROBLEM.setup, lights=lights)).worst(curves, [("yellow", "red")])["csd_yellow_red"]
+    return population_model(replace(PROBLEM.setup, lights=lights)).worst(curves, [("yellow", "red")])["csd_yellow_red"]
 
 
 def responses(spectra: np.ndarray) -> np.ndarray:
@@ -143,7 +143,7 @@ def test_100_000_random_members_are_no_nearer() -> None:
 def test_the_nearest_members_are_members_and_so_far_apart(name: str) -> None:
     """What it says the nearest two are, computed from their shifts."""
     lights = replace(STUDY.lights, population=population(name))
-    seen = population_imager(replace(PROBLEM.setup, lights=lights))
+    seen = population_model(replace(PROBLEM.setup, lights=lights))
     response = seen.imager.smooth(PROBLEM.family.curves(DESIGNS))[:, 0]
     widths = POPULATIONS[name].get("width", [1.0])
     for design in range(len(DESIGNS)):

@@ -316,7 +316,7 @@ def test_a_figure_has_the_derivative_of_its_rows(name: str) -> None:
 
     x = X[0]
     values, by_u = rows(x)
-    made = values.max() if quantity.wanted == "less" else values.min()
+    made = values.max() if quantity.direction == "less" else values.min()
     assert made == pytest.approx(columns()[name][0], rel=1e-9)
     for at, span in enumerate(SPAN):
         slopes = []

@@ -62,7 +62,7 @@ def scores(sensor: str) -> dict[str, np.ndarray]:
     nothing = CurveBlock(np.empty((1, 0, study.grid.size)))
     found = [designed_quantities(study.setup_of(name, "chart", {}), nothing) for name in CFAS]
     wanted = [q for q in study.quantities.values() if q.metric in first and not q.name.endswith("_lps")]
-    return {q.name: np.array([own[q.name][0] for own in found]) * (-1 if q.wanted == "less" else 1) for q in wanted}
+    return {q.name: np.array([own[q.name][0] for own in found]) * (-1 if q.direction == "less" else 1) for q in wanted}
 
 
 def agreeing(sensor: str) -> dict[str, float]:

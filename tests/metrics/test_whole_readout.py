@@ -36,7 +36,7 @@ def absent(readings):
     CALLS.append(len(readings.dn))
 
 
-brightest.wanted, CALLS = "less", []
+brightest.direction, CALLS = "less", []
 """
 BRIGHTEST, ABSENT = (UserMetric(UserCode(f"mine.py:{name}", CODE)) for name in ("brightest", "absent"))
 
@@ -48,7 +48,7 @@ class Darkest(ReadoutMetric):
 
     def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:  # noqa: ARG002
         """Its column."""
-        return (Quantity("darkest_dn", "darkest_dn", "the weakest signal", "DN", wanted="more", ends=("min",)),)
+        return (Quantity("darkest_dn", "darkest_dn", "the weakest signal", "DN", direction="more", ends=("min",)),)
 
     def of_readout(self, setup: Any, response: np.ndarray, unlit: np.ndarray) -> Columns:  # noqa: ARG002
         """The weakest signal in its best channel."""

@@ -24,8 +24,8 @@ wavelengths: {start_nm: 400, stop_nm: 700, step_nm: 5}
 cfas: [RGGB, RCCC, RYYCy]
 tasks: [color, low_light, emergency]
 """
-MORE = Column("a_dprime", "task_dprime", "", digits=2, wanted="more")
-LESS = Column("a_lux", "task_lux", "", digits=2, wanted="less")
+MORE = Column("a_dprime", "task_dprime", "", digits=2, direction="more")
+LESS = Column("a_lux", "task_lux", "", digits=2, direction="less")
 
 
 def row(column: Column, *values: float) -> ScoreRow:
@@ -68,7 +68,7 @@ def test_a_run_with_tasks_has_a_scorecard(tiny: Path) -> None:
     assert "color_delta_e_mean_d65" in names
     assert "color_delta_e_max_d65" not in names
     for each in card.rows:
-        np.testing.assert_array_equal(each.values, output.few[each.column.name])
+        np.testing.assert_array_equal(each.values, output.named_rows[each.column.name])
     first = summary_lines(output)[0]
     assert f" of {sum(bool(each.best) for each in card.rows)} figures of tasks and worst in " in first
     page = (tiny / "tiny" / "report.html").read_text()
@@ -78,7 +78,7 @@ def test_a_run_with_tasks_has_a_scorecard(tiny: Path) -> None:
 
 def test_color_against_noise_passes_through_the_figures_of_the_table(tiny: Path) -> None:
     output = read_output(tiny / "tiny")
-    few = output.few.set_index("name")
+    few = output.named_rows.set_index("name")
     curves = error_curves(output)
     assert list(curves) == ["d65", "a", "led", "hps"]
     for light, rows in curves.items():
@@ -126,7 +126,7 @@ def test_the_scorecard_of_the_project(finished: FinishedFolder) -> None:
     assert not any({1, 2, 3, 4} & each.worst for each in card.rows)
     rows = [each for each in card.rows if each.best]
     factors = np.array([each.values[1:5] / each.values[7] for each in rows])
-    signs = np.sign(factors - 1) * [[1 if each.column.wanted == "more" else -1] for each in rows]
+    signs = np.sign(factors - 1) * [[1 if each.column.direction == "more" else -1] for each in rows]
     assert (signs > 0).sum(axis=0).tolist() == [22, 22, 20, 22]
     assert (signs < 0).sum(axis=0).tolist() == [3, 3, 5, 3]
     assert {path.name for path in (folder / "figures").glob("*.png")} >= {
@@ -141,7 +141,7 @@ def test_the_scorecard_of_the_project(finished: FinishedFolder) -> None:
 def test_a_balanced_stopband_keeps_its_bounds(finished: FinishedFolder) -> None:
     """The bounds of the study are 1.1 times the figures of its own RYYCy."""
     output = read_output(finished("balanced"))
-    ryycy = output.few.set_index("name").loc["RYYCy"]
+    ryycy = output.named_rows.set_index("name").loc["RYYCy"]
     for name, digits in (("color_delta_e_mean_d65", 2), ("low_light_lux_a", 0)):
         assert output.constraints[name].max == pytest.approx(1.1 * ryycy[name], abs=0.5 * 10.0**-digits)
         assert output.best.iloc[0][name] <= output.constraints[name].max

@@ -52,7 +52,7 @@ def test_a_map_is_that_of_each_place(tiny: Path) -> None:
     """Half way to the corner: tan(10.314 degrees) is half of tan(20 degrees)."""
     study, kept = load_study(tiny.parent / "tiny.yaml"), pd.read_parquet(tiny / "sensor_map.parquet")
     output = read_output(tiny)
-    few = output.few[output.few["scenario"] == "lens"].set_index("name")["design_id"]
+    few = output.named_rows[output.named_rows["scenario"] == "lens"].set_index("name")["design_id"]
     assert set(kept["design_id"]) == set(few)
     half = kept[kept["height"] == 0.5].set_index("design_id")
     assert set(half["cra_deg"]) == {16.0}
@@ -74,7 +74,7 @@ def test_the_report_draws_the_nominal_design_beside_the_robust_one(tiny: Path) -
     page = (tiny / "report.html").read_text()
     assert "<h2>Over the sensor</h2>" in page
     assert map_caption(figure) in page
-    lens = read_output(tiny).few.set_index(["scenario", "name"]).loc[("lens", "nominal")]
+    lens = read_output(tiny).named_rows.set_index(["scenario", "name"]).loc[("lens", "nominal")]
     # The row is refined between the heights of the map.
     assert -1 < lens["csd_yellow_red"] - nominal.min() <= 1e-9
     assert np.diff(figure.maps[0].heights).max() == pytest.approx(1 / 40)

@@ -124,7 +124,7 @@ def test_each_swept_design_of_the_page_is_limited_by_its_nearest_lights(finished
     block = edges_of(space, 0, space.size)
     assert block is not None
     setup = study.setup(space, "chart")
-    read = ForwardModel(setup).read_changing(block.some(output.swept_points - first))
+    read = ForwardModel(setup).read_changing(block.subset(output.swept_points - first))
     assert read is not None
     whole_response, names = read.whole[:, 0], np.array(setup.lights.names)
     for one, other in study.pairs:

@@ -65,7 +65,7 @@ def emptied(path: Path) -> None:
 
 
 DAMAGES = (cut, flipped, emptied)
-FEW = {("results.parquet", flipped), ("points.parquet", cut), ("report.html", emptied)}
+NAMED_KINDS = {("results.parquet", flipped), ("points.parquet", cut), ("report.html", emptied)}
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +89,7 @@ def same_tables(folder: Path, other: Path) -> bool:
 @pytest.mark.parametrize(
     ("file", "damage"),
     [
-        pytest.param(file, damage, marks=() if (file, damage) in FEW else pytest.mark.slow)
+        pytest.param(file, damage, marks=() if (file, damage) in NAMED_KINDS else pytest.mark.slow)
         for file in FILES
         for damage in DAMAGES
     ],

@@ -48,7 +48,7 @@ apart.unit, apart.label, apart.digits = "DN", "yellow/red gap", 1
 
 
 class Spread:
-    name, wanted = "red_spread", "less"
+    name, direction = "red_spread", "less"
 
     def of(self, readings):
         return np.ptp(readings.of("red"), axis=1).max(axis=1)

@@ -60,7 +60,7 @@ def test_a_csd_written_again_has_the_same_numbers_and_the_same_optimum(tmp_path:
         column["name"]: column for column in json.loads((tmp_path / "own/provenance.json").read_text())["quantities"]
     }
     assert kept["apart"]["unit"] == "DN"
-    assert kept["red_spread"]["wanted"] == "less"
+    assert kept["red_spread"]["direction"] == "less"
     assert pq.read_schema(tmp_path / "own" / "results.parquet").field("apart").type == "double"
 
 
@@ -173,7 +173,7 @@ def test_code_of_a_metric_runs_only_when_it_is_allowed(tmp_path: Path) -> None:
         (".reshape(len(one), -1)", ".reshape(len(one), -1) + len(one)", "depends on the designs beside it"),
         ('"DN", "yellow', '3, "yellow', "`unit` is no short text (got 3)"),
         ('"red_spread", "less"', 'property(lambda self: 1 / 0), "less"', "mine.py:Spread: ZeroDivisionError"),
-        ('"less"', '"fewer"', "no such `wanted` (got 'fewer'); allowed: more, less"),
+        ('"less"', '"fewer"', "no such `direction` (got 'fewer'); allowed: more, less"),
         (
             '"red_spread"',
             '"sensitivity"',

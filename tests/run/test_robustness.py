@@ -13,7 +13,7 @@ import pytest
 from scipy.optimize import brentq
 
 from sweep.designs.tolerance import Tolerance
-from sweep.metrics.members import population_imager
+from sweep.metrics.members import population_model
 from sweep.metrics.share import share_interval
 from sweep.report.summary import summary_lines
 from sweep.results.output import read_output
@@ -126,7 +126,7 @@ def test_a_worst_case_is_over_edges_and_films_together(tmp_path: Path) -> None:
     """Beside the corners of both tolerances, with the filter's edges moved by hand."""
     study = thick(tmp_path)
     design, pair = candidate(study), ("yellow", "red")
-    seen, found = population_imager(design.setup), []
+    seen, found = population_model(design.setup), []
     for edge in (-2.0, 2.0):
         for film in (0.992, 1.008):
             own = design.point * np.array([film, film, film, film, 1.0]) + np.array([edge, 0, edge, 0, 0])

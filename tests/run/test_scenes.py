@@ -32,7 +32,7 @@ def test_scenes_are_planned_and_drawn(road: tuple[Study, Path]) -> None:
     assert list(study.scenarios) == ["road distance_m=150", "road distance_m=250"]
     frame = pd.read_parquet(folder / "results.parquet")
     assert set(frame["status"]) == {"ok"}
-    assert (frame["csd_yellow_red"] < frame["best_place_csd_yellow_red"]).all()
+    assert (frame["csd_yellow_red"] < frame["best_phase_csd_yellow_red"]).all()
     assert (frame["promised_dn"] <= 2.5).all()
     assert (frame["promised_dn"] > 0).all()
     output = read_output(folder)
@@ -65,7 +65,7 @@ def test_an_audit_notices_a_wrong_row_in_any_csd(road: tuple[Study, Path]) -> No
     study, folder = road
     frame = pd.read_parquet(folder / "results.parquet")
     few = frame[(frame["kind"] == "reference") & (frame["scenario"] == "road distance_m=250")]
-    for column in ("csd_yellow_red", "best_place_csd_yellow_red"):
+    for column in ("csd_yellow_red", "best_phase_csd_yellow_red"):
         wrong = few.assign(**{column: few[column] + 6})
         found = audit_rows(study, [wrong])
         assert len(found.broken) == len(few) == 1

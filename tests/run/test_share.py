@@ -17,7 +17,7 @@ from sweep.designs.tolerance import ProductionError, Tolerance
 from sweep.metrics import drawn as drawn_module
 from sweep.metrics.bound import Bound
 from sweep.metrics.drawn import LampsAndCameras, rank_below
-from sweep.metrics.members import population_imager
+from sweep.metrics.members import population_model
 from sweep.metrics.objective import Objective
 from sweep.metrics.share import share_interval
 from sweep.report.summary import summary_lines
@@ -105,7 +105,7 @@ def test_many_designs_are_made_in_blocks_and_read_out_once_for_all_pairs_within_
 ) -> None:
     loaded, search = lamps()
     points = search.space.points(0, 7)
-    drawn = LampsAndCameras(population_imager(problem().setup), loaded.tolerance, 1)
+    drawn = LampsAndCameras(population_model(problem().setup), loaded.tolerance, 1)
     pairs = [("green", "yellow"), YELLOW_RED]
     size, read, made = loaded.grid.size, list[int](), list[int]()
     monkeypatch.setattr(drawn_module, "_HELD", 3 * 101 * size)

@@ -15,7 +15,7 @@ from sweep.base.errors import StudyError
 from sweep.report import read_output
 from sweep.report.parameter_map import _peak_and_width, _widest, _width_at, map_drawing, map_figure, map_lines
 from sweep.search.gradients import Model
-from sweep.search.held import held_at, search_held
+from sweep.search.held import fix_parameters, search_held
 from sweep.search.problem import SearchRun
 from sweep.study import load_study
 
@@ -82,7 +82,7 @@ def test_the_report_says_how_wide_a_band_may_be(folder: Path) -> None:
     study = load_study(folder / "band.yaml")
     assert study.search is not None
     problem, names = study.problem(study.search), study.search.space.parameters
-    held = held_at(problem, {names.index("peak_nm"): peak_nm, names.index("fwhm_nm"): fwhm_nm})
+    held = fix_parameters(problem, {names.index("peak_nm"): peak_nm, names.index("fwhm_nm"): fwhm_nm})
     rggb = output.table[output.table["name"] == "RGGB"]["csd_yellow_red"].iloc[0]
     assert search_held(held, "SLSQP", 60, 1).objective >= rggb
 

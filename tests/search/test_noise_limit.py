@@ -61,7 +61,7 @@ def test_each_error_without_upper_bound_has_a_reason() -> None:
     errors = {"error", "error_bound", "state_error", "state_error_bound", "chromatic_error"}
     assert {q.metric for q in without} == {"cnr", "chromatic_dprime", *errors}
     for quantity in without:
-        rule = "least" if quantity.wanted == "less" else "minimum"
+        rule = "least" if quantity.direction == "less" else "minimum"
         requested = replace(problem, objective=Objective.model_validate({rule: {quantity.name: 1.0}}))
         why = "is not convex in the filter: its noise grows with the light; d' has a limit"
         assert reason_without_bound(requested) == f"{quantity.name} {why}"

@@ -10,7 +10,7 @@ import pytest
 
 from sweep.api.user_filters import evaluate_curves
 from sweep.designs.tolerance import ProductionError, Tolerance
-from sweep.metrics.members import population_imager
+from sweep.metrics.members import population_model
 from sweep.metrics.objective import Objective
 from sweep.metrics.smooth import smooth_csd
 from sweep.search.gradients import Model
@@ -68,7 +68,7 @@ def limit() -> Limit:
 def test_the_limit_is_attained_over_all_members() -> None:
     found = limit()
     assert 0 <= found.proven - found.attained <= 0.02
-    over = population_imager(problem(binning_nm=1).setup).worst(found.curve[None, None])["csd_yellow_red"][0]
+    over = population_model(problem(binning_nm=1).setup).worst(found.curve[None, None])["csd_yellow_red"][0]
     assert over == pytest.approx(found.attained, rel=1e-9)
     assert found.open_parts == 0
 
@@ -82,7 +82,7 @@ def test_a_larger_population_has_a_lower_limit() -> None:
 def test_no_random_filter_beats_the_limit_over_the_population() -> None:
     setup, rng, best = problem(binning_nm=1).setup, np.random.default_rng(3), 0.0
     for kind in ("stopband", "multi_stopband", "free_form"):
-        worst = population_imager(setup).worst(feasible_filters(setup, kind, 3000, rng), [YELLOW_RED])
+        worst = population_model(setup).worst(feasible_filters(setup, kind, 3000, rng), [YELLOW_RED])
         best = max(best, float(worst["csd_yellow_red"].max()))
     assert 0.3 * limit().proven < best <= limit().proven
 
@@ -100,8 +100,8 @@ def test_the_table_of_the_documentation() -> None:
         shifts = (0.0,) if space.filter is None else (-2.0, -1.0, 0.0, 1.0, 2.0)
         point, setup = space.points(0, 1), study.setup(space, "f/2")
         curves = [space.curves(point, study.grid.size, ProductionError(shift)) for shift in shifts]
-        over = population_imager(setup).worst(np.concatenate(curves))["csd_yellow_red"].min()
-        warm = population_imager(alone.setup(alone.spaces[at], "f/2")).worst(space.curves(point, study.grid.size))
+        over = population_model(setup).worst(np.concatenate(curves))["csd_yellow_red"].min()
+        warm = population_model(alone.setup(alone.spaces[at], "f/2")).worst(space.curves(point, study.grid.size))
         values = (
             smooth_csd(setup, space.curves(point, study.grid.size), YELLOW_RED)[0],
             warm["csd_yellow_red"][0],
@@ -116,5 +116,5 @@ def test_a_filter_of_ones_own_has_its_worst_case_where_no_edges_shift() -> None:
     setup = study.setup(study.spaces[3], "f/2")
     curves = 0.9 * setup.camera.base_qe[None]
     found = evaluate_curves(study, setup, curves)["worst_csd_yellow_red"]
-    assert found == population_imager(setup).worst(curves)["csd_yellow_red"]
+    assert found == population_model(setup).worst(curves)["csd_yellow_red"]
     assert 0 < found[0] < smooth_csd(setup, curves, YELLOW_RED)[0]

@@ -10,7 +10,7 @@ import pytest
 
 from sweep.designs.tolerance import NONE, ProductionError, Tolerance
 from sweep.metrics.bound import Bound
-from sweep.metrics.members import population_imager
+from sweep.metrics.members import population_model
 from sweep.metrics.objective import Objective
 from sweep.metrics.smooth import smooth_csd
 from sweep.search.limit import Limit, limit_of, reason_without_bound
@@ -143,7 +143,7 @@ def test_free_form_filters_come_near_the_limit_over_lamps_and_edges() -> None:
     searched = study.problem(study.search)
     best = best_of(searched, 1, 100)
     came_out = [searched.family.perturbed(ProductionError(shift)).curves(best.x[None]) for shift in SHIFTS]
-    worst = population_imager(searched.setup).worst(np.concatenate(came_out))["csd_yellow_red"].min()
+    worst = population_model(searched.setup).worst(np.concatenate(came_out))["csd_yellow_red"].min()
     assert worst == pytest.approx(best.objective, rel=1e-9)
     proven = limit_of(searched).proven
     below = f"{1 - worst / proven:.1%}".replace("%", " %")

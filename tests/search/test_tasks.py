@@ -51,7 +51,7 @@ def test_the_search_is_as_good_as_the_best_of_many(name: str, objective: Any, al
     drawn = problem.from_unit(rng.random((150, problem.free.size)))
     drawn = drawn[(problem.family.violation(drawn) <= 0).all(axis=1)]
     columns = designed_quantities(problem.setup, problem.family.curves(drawn))
-    sign = 1 if problem.quantities[name].wanted == "more" else -1
+    sign = 1 if problem.quantities[name].direction == "more" else -1
     best = max(sign * value for value, s in zip(columns[name], columns["sensitivity"], strict=True) if s >= 0.8)
     points = starting_points(problem, study.search.starts, 1)
     log = [

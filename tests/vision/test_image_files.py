@@ -76,7 +76,7 @@ def test_raw_images_are_those_that_the_observer_reads(run: Path, tmp_path: Path)
         (name, split): n * 2 for name in ("RGGB", "RYYCy") for split, n in (("train", 300), ("check", 20), ("test", 60))
     }  # of two seeds; the test shows the street's order, too
     assert manifest["image_id"].is_unique
-    row, setup, curves = vision_designs(study, output.few)[1]
+    row, setup, curves = vision_designs(study, output.named_rows)[1]
     vision, seed = study.section.vision, (study.section.seed, 1)
     camera = HeadCamera(setup, curves, vision)
     scenes = scenes_of(vision, split_lamps(setup.lights, vision, seed), "shuffled", TEST, seed)

@@ -193,14 +193,14 @@ def test_drawn_images_are_as_noisy_as_the_product_draws_them() -> None:
     camera = HeadCamera(setup, NO_FILTERS, requested)
     lamps = split_lamps(setup.lights, requested, (1, 0))[TEST]
     one = draw_scenes(requested, lamps, SHUFFLED, 1, (5,))
-    many = one.some(np.zeros(2000, dtype=np.intp))
+    many = one.subset(np.zeros(2000, dtype=np.intp))
     many = replace(many, key=np.arange(2000))
     drawn = camera.images(many).reshape(2000, -1)
     again = draws_dn(np.repeat(camera.expected(one), 2000, axis=0), camera.pixel, np.random.default_rng(1))
     apart = (drawn.mean(axis=0) - again.mean(axis=0)) / np.sqrt((drawn.var(axis=0) + again.var(axis=0)) / 2000)
     assert np.abs(apart).max() < 5
     assert (drawn.var(axis=0) / again.var(axis=0)).mean() == pytest.approx(1.0, abs=0.01)
-    np.testing.assert_array_equal(camera.images(many.some(np.arange(3, 5))).reshape(2, -1), drawn[3:5])
+    np.testing.assert_array_equal(camera.images(many.subset(np.arange(3, 5))).reshape(2, -1), drawn[3:5])
 
 
 def test_planes_of_a_tile() -> None:

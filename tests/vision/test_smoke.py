@@ -166,7 +166,7 @@ def exported(folder: Path) -> tuple[Path, pd.DataFrame]:
 def reader_of_files(output: Output, exported: tuple[Path, pd.DataFrame], shuffled: bool) -> dict[str, np.ndarray]:
     """Answers to the test images of RGGB and the first seed by a network that knows the files alone."""
     study = study_of(output, None)
-    row, setup, _ = next(made for made in vision_designs(study, output.few) if made[0]["name"] == "RGGB")
+    row, setup, _ = next(made for made in vision_designs(study, output.named_rows) if made[0]["name"] == "RGGB")
     to, manifest = exported
     here = manifest[(manifest["design_id"] == row["design_id"]) & (manifest["seed"] == 0)]
     training, check, test = (here[here["split"] == split] for split in ("train", "check", "test"))

@@ -105,7 +105,7 @@ def test_the_lit_lens_is_where_the_label_says() -> None:
 def test_images_do_not_depend_on_how_many_are_made_at_once() -> None:
     camera, scenes = streets(test_images=50)
     together = np.concatenate([batch.images for batch in camera.batches(scenes, lamps_of(camera), KEY, TEST, "raw")])
-    alone = next(camera.batches(scenes.some(slice(40, 41)), lamps_of(camera), KEY, TEST, "raw")).images
+    alone = next(camera.batches(scenes.subset(slice(40, 41)), lamps_of(camera), KEY, TEST, "raw")).images
     np.testing.assert_array_equal(together[40], alone[0])
 
 

@@ -36,12 +36,12 @@ class ChromaticSeparation(ReadoutMetric, LampMetric):
                 unit=DN,
                 label=f"chromatic {pair[0]}/{pair[1]} CSD",
                 digits=1,
-                wanted="more",
+                direction="more",
                 ends=("min",),
                 goal=True,
                 pair=pair,
-                rows="squares",
-                apart="chromatic",
+                scale="squared",
+                distance_kind="chromatic",
                 smooth=partial(chromatic_rows, pairs=(pair,), noise=False),
             )
             for pair in class_pairs(requested.classes)
@@ -86,11 +86,11 @@ class ChromaticConfusion(LampMetric):
                     meaning="smallest distance between the reading of a light and that of one of another type of any "
                     "brightness, in units of the noise of both readings",
                     label=f"chromatic {pair[0]}/{pair[1]} d'",
-                    wanted="more",
+                    direction="more",
                     ends=("min",),
                     pair=pair,
                     states=pair,
-                    rows="squares",
+                    scale="squared",
                     smooth=partial(chromatic_rows, pairs=(pair,), noise=True),
                     goal=True,
                     nominal=True,  # each shift would take an evaluation with noise
@@ -102,11 +102,11 @@ class ChromaticConfusion(LampMetric):
                     "two: the error of Gaussians at the smallest chromatic d', Q(d'/2), and at least that of equal "
                     "brightness, `error_<a>_<b>`",
                     label=f"chromatic {pair[0]}/{pair[1]} error",
-                    wanted="less",
+                    direction="less",
                     ends=("max",),
                     pair=pair,
                     states=pair,
-                    rows="decades",
+                    scale="log10",
                     smooth=partial(chromatic_rows, pairs=(pair,), noise=True, decades=True),
                     goal=True,
                     nominal=True,  # each shift would take an evaluation with noise

@@ -9,7 +9,7 @@ from ...base.types import FloatArray
 from ...camera.setup import Setup
 from ...spectra.lights import class_pairs
 from ..metric import ReadoutMetric
-from ..quantity import BEST_PLACE, DN, Columns, Quantity, RequestedQuantities
+from ..quantity import BEST_PHASE, DN, Columns, Quantity, RequestedQuantities
 from ..separation import csd_name, separations
 from ..smooth import SmoothDesign
 
@@ -32,25 +32,25 @@ class ColorSeparation(ReadoutMetric):
                 unit=DN,
                 label=f"{pair[0]}/{pair[1]} CSD",
                 digits=1,
-                wanted="more",
+                direction="more",
                 role="separation",
                 ends=("min",),
                 goal=True,
                 has_error_bound=True,
                 pair=pair,
-                rows="squares",
-                apart="DN",
+                scale="squared",
+                distance_kind="DN",
                 smooth=partial(SmoothDesign.squared_distances, pair=pair),
                 smooth_members=partial(SmoothDesign.squared_distances_of_members, pair=pair),
-                smooth_drawn=partial(SmoothDesign.distance_of_a_share, pair=pair),
+                yield_rows=partial(SmoothDesign.distance_of_a_share, pair=pair),
             )
             for pair in class_pairs(requested.classes)
         ]
         best = [
             replace(
                 csd,
-                name=BEST_PLACE + csd.name,
-                metric="best_place_csd",
+                name=BEST_PHASE + csd.name,
+                metric="best_phase_csd",
                 meaning="where a scene asks for `any` sampling phase: the largest CSD over all real "
                 "sampling phases, and over the positions of a `field`, each at its worst moment of a pulsed light; "
                 "`csd_<a>_<b>` is then the smallest",
@@ -59,11 +59,11 @@ class ColorSeparation(ReadoutMetric):
                 of=csd.name,
                 ends=(),
                 goal=False,
-                rows="values",
-                apart="",
+                scale="linear",
+                distance_kind="",
                 smooth=None,
                 smooth_members=None,
-                smooth_drawn=None,
+                yield_rows=None,
             )
             for csd in nearest
         ]

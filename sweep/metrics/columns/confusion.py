@@ -86,13 +86,13 @@ def _quantity(metric: str, name: str, types: tuple[str, ...]) -> Quantity:
         pair=pairs[0] if metric in (CNR, D_PRIME, ERROR, ERROR_BOUND) else None,
         states=types,
         label=f"{'/'.join(types)} {_TOLD[metric]}" if metric in _TOLD else "",
-        wanted="less" if less else "more",
+        direction="less" if less else "more",
         ends=("max",) if less else ("min",),
         goal=True,
         nominal=True,  # each shift would take an evaluation with noise
         infinite=True,  # signals without noise are separated with certainty
-        rows="decades" if less else "squares",
-        apart="noise" if metric == D_PRIME else "",
+        scale="log10" if less else "squared",
+        distance_kind="noise" if metric == D_PRIME else "",
         smooth=smooth,
     )
 

@@ -39,7 +39,7 @@ class Flicker(PulseMetric):
                 metric=MODULATION,
                 meaning="flicker modulation of a pulsed lamp: (most - least) / (most + least) of its brightest channel "
                 "over all phases of its pulses (IEEE P2020), for the lamp with most",
-                wanted="less",
+                direction="less",
                 ends=("max",),
                 digits=3,
             ),
@@ -48,7 +48,7 @@ class Flicker(PulseMetric):
                 metric=LAMP_SEEN,
                 meaning="share of the phases of its pulses in which a lamp's brightest channel has 1 DN or more above "
                 "the readout without lamps, for the lamp with least",
-                wanted="more",
+                direction="more",
                 ends=("min",),
                 digits=3,
             ),
@@ -58,7 +58,7 @@ class Flicker(PulseMetric):
                 meaning="false hue of a pulsed lamp: the largest chromatic distance, as of `chromatic_csd_<a>_<b>`, "
                 "between its color at a phase of its pulses and its mean color",
                 unit=DN,
-                wanted="less",
+                direction="less",
                 ends=("max",),
                 digits=1,
             ),

@@ -33,7 +33,7 @@ class SmallestWidths(FamilyMetric):
                 unit="nm",
                 label=name.removesuffix("_nm").replace("_", " "),
                 digits=2,
-                wanted="more",
+                direction="more",
                 ends=("min",),
                 needs="family",
                 smooth=partial(_rows, name=name),

@@ -48,7 +48,7 @@ class Probabilities(NoiseMetric):
                 metric=CTA,
                 meaning=_MEANING,
                 pair=pair,
-                wanted="more",
+                direction="more",
                 ends=("min",),
                 most=1.0,
             )

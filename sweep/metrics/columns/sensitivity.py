@@ -44,7 +44,7 @@ class Sensitivity(DesignMetric):
             name=SENSITIVITY,
             metric=SENSITIVITY,
             meaning="sensitivity of the modified channel (1 = the channel it replaces)",
-            wanted="more",
+            direction="more",
             role="light",
             ends=("min", "max"),
             goal=True,
@@ -58,7 +58,7 @@ class Sensitivity(DesignMetric):
             metric=CFA_SENSITIVITY,
             meaning=f"sensitivity of the CFA: the light of the whole tile (1 = {reference_of(requested.brightest)})",
             label="CFA sensitivity",
-            wanted="more",
+            direction="more",
             role="light",
             ends=("min", "max"),
             goal=True,
@@ -140,11 +140,11 @@ def light_of(design: SmoothDesign) -> Columns:
         Sensitivities.
     """
     block = CurveBlock(design.curves[None])
-    return design.once("light", lambda: Sensitivity().of_designs(design.setup, block))
+    return design.cached("light", lambda: Sensitivity().of_designs(design.setup, block))
 
 
 def _row(design: SmoothDesign, *, name: str) -> Rows:
-    slopes = design.once("slopes of light", lambda: sensitivities_gradient(design.setup, design.by_u))
+    slopes = design.cached("slopes of light", lambda: sensitivities_gradient(design.setup, design.by_u))
     return Rows(light_of(design)[name], slopes[name][None])
 
 

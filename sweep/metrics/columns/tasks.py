@@ -37,8 +37,8 @@ class TaskFigures(DesignMetric):
                 unit=figure.unit,
                 label=" ".join(part for part in (task.name.replace("_", " "), figure.words, case.upper()) if part),
                 digits=figure.digits,
-                wanted=figure.wanted,
-                ends=("min",) if figure.wanted == "more" else ("max",),
+                direction=figure.direction,
+                ends=("min",) if figure.direction == "more" else ("max",),
                 goal=True,
                 signed=figure.signed,
                 smooth=partial(_rows, task=task.name, what=figure.what, case=case),
@@ -60,7 +60,7 @@ def _rows(design: SmoothDesign, *, task: str, what: str, case: LightName) -> Row
     """Return a figure's rows with derivatives; figures of a task share common parts."""
     from ..tasks.colorimetry import COMPLEX_STEP
 
-    rows = design.once(task, partial(_evaluation, design, task)).rows(what, case)
+    rows = design.cached(task, partial(_evaluation, design, task)).rows(what, case)
     return Rows(rows.real[0], rows.imag.T / COMPLEX_STEP)
 
 

@@ -28,7 +28,7 @@ class ImageReading(VisionMetric):
             VISION_ERROR,
             VISION_ERROR,
             meaning,
-            wanted="less",
+            direction="less",
             ends=("max",),
             goal=True,
             nominal=True,

@@ -18,7 +18,7 @@ class Least(Rule):
 
     name = "least"
     smallest = True
-    wanted = "less"
+    direction = "less"
 
     def of(self, terms: FloatArray) -> FloatArray:
         return np.asarray(-np.log10(np.maximum(terms.max(axis=0), _SMALLEST)), dtype=float)

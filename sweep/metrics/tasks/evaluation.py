@@ -213,7 +213,7 @@ def task_columns(setup: Setup, block: Block) -> Columns:
             evaluation = TaskEvaluation(task, patch_camera, tasks.conditions)
             for name, figure, case in figures_of(task.columns):
                 rows = evaluation.rows(figure.what, case)
-                figures[name] = rows.max(axis=1) if figure.wanted == "less" else rows.min(axis=1)
+                figures[name] = rows.max(axis=1) if figure.direction == "less" else rows.min(axis=1)
         parts.append(figures)
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 

@@ -24,7 +24,7 @@ class Figure:
         Key.
     words, meaning : str
         Name in texts, and meaning.
-    wanted : {'more', 'less'}
+    direction : {'more', 'less'}
         Direction of improvement.
     unit : str
         Unit.
@@ -41,7 +41,7 @@ class Figure:
     what: str
     words: str
     meaning: str
-    wanted: Literal["more", "less"]
+    direction: Literal["more", "less"]
     unit: str = ""
     digits: int = 3
     each: bool = True
