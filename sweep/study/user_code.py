@@ -205,7 +205,7 @@ def user_metrics(section: StudySection, sources: Sources) -> tuple[UserMetric, .
 
     def make(code: UserCode) -> UserMetric:
         metric = UserMetric(code)
-        for stated in ("name", "unit", "label", "wanted", "digits"):
+        for stated in ("name", "unit", "label", "direction", "digits"):
             getattr(metric, stated)
         return metric
 

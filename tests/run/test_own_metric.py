@@ -174,6 +174,7 @@ def test_code_of_a_metric_runs_only_when_it_is_allowed(tmp_path: Path) -> None:
         ('"DN", "yellow', '3, "yellow', "`unit` is no short text (got 3)"),
         ('"red_spread", "less"', 'property(lambda self: 1 / 0), "less"', "mine.py:Spread: ZeroDivisionError"),
         ('"less"', '"fewer"', "no such `direction` (got 'fewer'); allowed: more, less"),
+        (', direction = "', ', wanted = "', "`wanted` is named `direction`"),
         (
             '"red_spread"',
             '"sensitivity"',
