@@ -25,7 +25,6 @@ from .compare_tables import (
     plain_differences,
     ranking,
     side_by_side,
-    version_note,
 )
 from .figures import Drawing, pictures_of
 from .pages import aligned, inlined, page, rows
@@ -85,7 +84,7 @@ def compare_runs(folders: Sequence[Path], to: Path | None) -> Comparison:
     fronts, figure, notes = compare_fronts(runs)
     answer = ranking(runs)
     answer += [f"{run}: {line}" for run, output in runs.items() for line in largest_separation_elsewhere(output)]
-    notes = [*_same_folders(runs), *curve_notes(runs), *version_note(runs), *_constraint_note(runs), *notes]
+    notes = [*_same_folders(runs), *curve_notes(runs), *_constraint_note(runs), *notes]
     best = best_of_runs(runs)
     shown, left_out = side_by_side(best, runs)
     plain, same = plain_differences(runs)

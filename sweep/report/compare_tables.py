@@ -1,4 +1,4 @@
-"""Tables of a comparison: best designs and plain CFAs; notes on curves and versions that differ."""
+"""Tables of a comparison: best designs and plain CFAs; notes on curves that differ."""
 
 from __future__ import annotations
 
@@ -206,14 +206,6 @@ def curve_notes(runs: Mapping[str, Output]) -> list[str]:
             shares = f"{of_reference(reference)} in {first}, {of_reference(output)} in {name}"
             notes.append(f"The CFA sensitivities do not compare: they are shares {shares}.")
     return notes
-
-
-def version_note(runs: Mapping[str, Output]) -> list[str]:
-    """Return a sentence that says which model each run was computed by, if these differ."""
-    models = {run: output.provenance.model_version for run, output in runs.items()}
-    if len(set(models.values())) < 2:
-        return []
-    return [f"Computed by different models: {', '.join(f'{run} by {model}' for run, model in models.items())}."]
 
 
 def _other_curves(first: KeptCurves, second: KeptCurves) -> str:

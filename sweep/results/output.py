@@ -25,6 +25,7 @@ from . import tables as files
 from .curves import SCHEMA as CURVES_SCHEMA
 from .curves import KeptCurves
 from .facts import Provenance, checked_facts, missing_parts_error
+from .identity import MODEL_VERSION
 from .inventory import Inventory
 from .tables import NAMED, NAMED_KINDS, PROVENANCE, REFERENCE, RESOLVED, RESULTS, SEARCHED, SWEPT, read_table
 from .thinning import Counts, swept_points, thinned
@@ -278,11 +279,18 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
     if not audited:
         optional.discard(files.AUDIT)
     inventory.require([*_ALWAYS, *sorted(optional)])
+    facts = _mapping(folder / PROVENANCE, json.loads)
+    if facts.get("model_version", MODEL_VERSION) != MODEL_VERSION:
+        problem, allowed = (
+            "made by another version of sweep",
+            f"{MODEL_VERSION}; `sweep run` of the study makes it anew",
+        )
+        raise OutputError(ValidationIssue(problem, str(folder), None, "model_version", facts["model_version"], allowed))
     resolved = _mapping(folder / RESOLVED, lambda text: YAML(typ="safe").load(text))
     if lacks := [key for key in _ALWAYS_WRITTEN if key not in resolved]:
         raise missing_parts_error(folder / RESOLVED, lacks)
     study = checked_facts(folder / RESOLVED, StudySection, resolved)
-    provenance = checked_facts(folder / PROVENANCE, Provenance, _mapping(folder / PROVENANCE, json.loads))
+    provenance = checked_facts(folder / PROVENANCE, Provenance, facts)
     quantities = (column.name for column in provenance.quantities)
     _check_columns(folder / RESULTS, [*files.ROW_COLUMNS, *provenance.parameters, *quantities])
     for name, columns in _COLUMNS.items():

@@ -65,7 +65,7 @@ def emptied(path: Path) -> None:
 
 
 DAMAGES = (cut, flipped, emptied)
-NAMED_KINDS = {("results.parquet", flipped), ("points.parquet", cut), ("report.html", emptied)}
+FAST = {("results.parquet", flipped), ("points.parquet", cut), ("report.html", emptied)}
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +89,7 @@ def same_tables(folder: Path, other: Path) -> bool:
 @pytest.mark.parametrize(
     ("file", "damage"),
     [
-        pytest.param(file, damage, marks=() if (file, damage) in NAMED_KINDS else pytest.mark.slow)
+        pytest.param(file, damage, marks=() if (file, damage) in FAST else pytest.mark.slow)
         for file in FILES
         for damage in DAMAGES
     ],
@@ -239,6 +239,16 @@ def test_an_output_that_cannot_be_written_is_one_line(plain: Study, tmp_path: Pa
         assert output_folder(folder, run_facts(plain)) == (folder, None)
         with pytest.raises(OutputError, match="cannot be written"):
             ran(plain, folder, 1)
+
+
+def test_a_run_of_another_version_names_it(whole_folder: Path, tmp_path: Path) -> None:
+    shutil.copytree(whole_folder, tmp_path, dirs_exist_ok=True)
+    folder = tmp_path / "outputs" / "small"
+    facts = json.loads((folder / "provenance.json").read_text()) | {"model_version": "20"}
+    (folder / "provenance.json").write_text(json.dumps(facts))
+    listed_anew(folder)
+    with pytest.raises(OutputError, match=r"model_version: made by another version of sweep \(got '20'\)"):
+        read_output(folder)
 
 
 def test_without_run_json_files_of_a_run_s_names_are_others(whole_folder: Path, tmp_path: Path) -> None:
