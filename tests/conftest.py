@@ -10,13 +10,27 @@ from typing import Any
 
 import pandas as pd
 import pytest
+from jaxtyping import install_import_hook
+
+from .shapes import checked
+
+ROOT = Path(__file__).parent.parent
+KERNELS = ("compiled", "nearest", "vectorized")
+"""How names of files begin whose functions Numba compiles: it cannot compile what is wrapped."""
+install_import_hook(
+    [
+        ".".join(path.relative_to(ROOT).with_suffix("").parts)
+        for path in (ROOT / "sweep").rglob("*.py")
+        if not path.name.startswith((*KERNELS, "__init__"))
+    ],
+    f"{checked.__module__}.{checked.__name__}",
+)
 
 from sweep.study import Study
 
 from .commanded import commanded
 from .hard.registry import write_table
 
-ROOT = Path(__file__).parent.parent
 STUDIES = ROOT / "studies"
 MEASURED = ROOT / "sweep" / "spectra" / "builtin" / "measured"
 """Measured curves of the package."""

@@ -10,7 +10,7 @@ from typing import Any
 
 from ..base.disk import is_folder
 from ..base.errors import DataError, ValidationIssue, nearest
-from ..base.types import FloatArray
+from ..base.types import Array, Float
 from ..camera.mosaic import Mosaic
 from ..camera.sensor import SensorCurves
 from ..spectra import LightUnit
@@ -268,7 +268,7 @@ def _lights_and_types(source: str, quantity: LightUnit | None) -> tuple[CurveSou
     return spectra, make_study(lights=spectra, cfas=[PLAIN_TILE]).study.lights.classes
 
 
-def _lights_of_run(spectra: Lights, nodes_nm: FloatArray) -> CurveSource:
+def _lights_of_run(spectra: Lights, nodes_nm: Float[Array, " nodes"]) -> CurveSource:
     """Return the lights of a run, with the photons that they have in it."""
     import pandas as pd
 

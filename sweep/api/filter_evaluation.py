@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.errors import DataError, ValidationIssue
-from ..base.types import FloatArray
+from ..base.types import DesignCurves, PerWavelength
 from ..camera.exposure import may_be_brightest
 from ..camera.mosaic import Mosaic
 from ..designs.technology import Technology
@@ -248,7 +248,7 @@ def _rows(mosaic: Mosaic) -> list[list[str]]:
 
 
 def _upper_bound(
-    study: Study, cfa: str, filter_: FilterUnderTest, curves: FloatArray, light: float
+    study: Study, cfa: str, filter_: FilterUnderTest, curves: DesignCurves, light: float
 ) -> tuple[float | None, float | None, str, str]:
     """Return CSD before quantization, upper bound, the curve below which it holds, and a reason if there is none.
 
@@ -282,12 +282,12 @@ def _upper_bound(
     return None, None, "", reason
 
 
-def _is_below(curve: FloatArray, ceiling: FloatArray) -> bool:
+def _is_below(curve: PerWavelength, ceiling: PerWavelength) -> bool:
     """Return whether a curve is nowhere above another one, except for rounding."""
     return bool((curve <= ceiling * (1 + _SAME)).all())
 
 
-def diagonal_curve(mosaic: Mosaic, channel: str, curves: Mapping[str, FloatArray]) -> str:
+def diagonal_curve(mosaic: Mosaic, channel: str, curves: Mapping[str, DesignCurves]) -> str:
     """Return the curve that a channel of a 2 x 2 tile replaces: that of the pixel diagonal to it.
 
     Parameters

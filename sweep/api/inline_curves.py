@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from ..base.errors import DataError, ValidationIssue
-from ..base.types import FloatArray
+from ..base.types import Array, Float, FloatArray, PerSample, PerWavelength
 from ..spectra import formats
 from ..spectra.spectrum import Curves, WavelengthGrid, check_samples, resample
 from ..spectra.units import Use, used_as
@@ -56,7 +56,7 @@ def read_curves(file: Path | str) -> pd.DataFrame:
     return table
 
 
-def wavelength_table(wavelength_nm: FloatArray, columns: Mapping[Any, FloatArray]) -> pd.DataFrame:
+def wavelength_table(wavelength_nm: PerWavelength, columns: Mapping[Any, PerWavelength]) -> pd.DataFrame:
     """Return a table with one column per curve over wavelength.
 
     Parameters
@@ -139,7 +139,9 @@ def table_to_curves(table: pd.DataFrame) -> Curves:
     return Curves(nodes_nm, {name: curves.values[name] for name, curves in columns.items()}, "table")
 
 
-def on_grid(name: str, curve: CurveLike, grid: WavelengthGrid, use: Use = "sensor") -> FloatArray:
+def on_grid(
+    name: str, curve: CurveLike, grid: WavelengthGrid, use: Use = "sensor"
+) -> Float[Array, "curves wavelengths"]:
     """Bring one or more curves to a study's wavelength grid.
 
     Parameters
@@ -183,7 +185,7 @@ def on_grid(name: str, curve: CurveLike, grid: WavelengthGrid, use: Use = "senso
         raise _named(error, name) from None
 
 
-def _checked(name: str, wavelength_nm: Any, values: Any) -> tuple[FloatArray, Mapping[str, FloatArray]]:
+def _checked(name: str, wavelength_nm: Any, values: Any) -> tuple[PerSample, Mapping[str, PerSample]]:
     try:
         nodes_nm, samples = check_samples(np.asarray(wavelength_nm, dtype=float), np.asarray(values, dtype=float))
     except DataError as error:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from ..base.errors import DataError, ValidationIssue, nearest
-from ..base.types import FloatArray
+from ..base.types import DesignCurves
 from ..camera.exposure import largest_sensitivity_not_brightest
 from ..camera.forward import forward_model
 from ..camera.setup import Setup
@@ -164,7 +164,7 @@ def find_cfa(study: Study, channels: Sequence[str]) -> str:
     return chosen[0]
 
 
-def evaluate_curves(study: Study, setup: Setup, curves: FloatArray) -> Columns:
+def evaluate_curves(study: Study, setup: Setup, curves: DesignCurves) -> Columns:
     """Compute every quantity of filters in the modified channels, and their violation of the constraints.
 
     Parameters

@@ -3,15 +3,57 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+from jaxtyping import Bool as Bool
+from jaxtyping import Float as Float
+from jaxtyping import Int as Int
+from jaxtyping import Num as Num
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
 BoolArray = NDArray[np.bool_]
+if TYPE_CHECKING:
+    Array = FloatArray
+else:
+    Array = np.ndarray
+"""An array whose numbers the name before the bracket says, and whose shape the text behind it."""
+
+PerWavelength = Float[Array, " wavelengths"]
+PerDesign = Float[Array, " designs"]
+PerParameter = Float[Array, " parameters"]
+PerSample = Float[Array, " samples"]
+PerTerm = Float[Array, " terms"]
+PerRow = Float[Array, " rows"]
+PerKnot = Float[Array, " knots"]
+PerFree = Float[Array, " free"]
+"""One number for each parameter that a search may change."""
+PerValue = Float[Array, " values"]
+"""Numbers of any meaning in one row."""
+PerCapture = Float[Array, "captures ..."]
+"""Captures of an HDR pixel on the first axis."""
+SameShape = Float[Array, "*batch"]
+"""Of any shape, which is the same wherever this stands in one signature."""
+DesignCurves = Float[Array, "designs modified wavelengths"]
+"""QE of the modified channels of designs."""
+ChannelCurves = Float[Array, "modified wavelengths"]
+"""QE of the modified channels of one design."""
+CurvesGradient = Float[Array, "parameters modified wavelengths"]
+DesignParameters = Float[Array, "designs parameters"]
+DesignSignals = Float[Array, "designs signals channels"]
+"""What the channels say of each signal, in one case."""
+DesignCases = Float[Array, "designs cases signals channels"]
+"""What the channels say of each signal, at each sampling phase, field position and moment."""
+DesignPixels = Float[Array, "designs cases signals pixels"]
+ParameterWeights = Float[Array, "_conditions parameters"]
+"""Linear functions of the parameters, one in a row."""
+DesignNumbers = Int[IndexArray, " designs"]
+ImageNumbers = Int[IndexArray, " images"]
+MemberNumbers = Int[IndexArray, " _members"]
+"""Rows of the signals of a type, whose number differs from type to type."""
 
 Progress = Callable[[str, int, int], None]
 """Called with a phase, how much of it is done, and how much there is."""

@@ -26,7 +26,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.cache import Cache
-from ..base.types import FloatArray, IndexArray
+from ..base.types import (
+    Array,
+    Float,
+    FloatArray,
+    IndexArray,
+    Int,
+    PerKnot,
+    PerParameter,
+    PerRow,
+    PerValue,
+    PerWavelength,
+    SameShape,
+)
 from .scene import Scene
 from .setup import Setup
 
@@ -72,7 +84,7 @@ def half_angle_rad(f_number: float) -> float:
     return math.asin(min(1.0, 0.5 / f_number))
 
 
-def stretch(sine_squared: FloatArray, index: float) -> FloatArray:
+def stretch(sine_squared: SameShape, index: float) -> SameShape:
     """Return m: the transmission at wavelength l is that at l m for normal incidence.
 
     Parameters
@@ -104,9 +116,9 @@ class _Arc:
         Parameter at a squared sine.
     """
 
-    sine_squared: Callable[[FloatArray], FloatArray]
-    density: Callable[[FloatArray], FloatArray]
-    place: Callable[[FloatArray], FloatArray]
+    sine_squared: Callable[[SameShape], SameShape]
+    density: Callable[[SameShape], SameShape]
+    place: Callable[[SameShape], SameShape]
 
 
 def _arcs(cone: Cone) -> list[_Arc]:
@@ -121,10 +133,10 @@ def _arcs(cone: Cone) -> list[_Arc]:
         # t = middle - width cos(pi u): the roots at both ends of P(t) become smooth.
         middle, width = max(half, chief), min(half, chief)
 
-        def angle(u: FloatArray) -> FloatArray:
+        def angle(u: SameShape) -> SameShape:
             return np.asarray(middle - width * np.cos(math.pi * u))
 
-        def density(u: FloatArray) -> FloatArray:
+        def density(u: SameShape) -> SameShape:
             t = angle(u)
             across = math.sin(chief) * np.sin(t)
             cosine = np.divide(
@@ -133,7 +145,7 @@ def _arcs(cone: Cone) -> list[_Arc]:
             azimuth = np.arccos(np.clip(cosine, -1.0, 1.0)) / math.pi
             return np.asarray(2 * azimuth * np.sin(t) * np.cos(t) * width * math.pi * np.sin(math.pi * u) / area)
 
-        def place(x: FloatArray) -> FloatArray:
+        def place(x: PerParameter) -> PerParameter:
             t = np.arcsin(np.sqrt(np.clip(x, 0.0, 1.0)))
             return np.asarray(np.arccos(np.clip((middle - t) / width, -1.0, 1.0)) / math.pi)
 
@@ -141,14 +153,14 @@ def _arcs(cone: Cone) -> list[_Arc]:
     return arcs
 
 
-def _points(edges: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _points(edges: PerValue) -> tuple[Float[Array, "rays points"], Float[Array, "rays points"]]:
     """Return Gauss-Legendre points and weights between neighboring edges, ndarray of shape (n_panels, order) each."""
     node, weight = _RULE
     half = np.diff(edges)[:, None] / 2
     return edges[:-1, None] + half * (1 + node), half * weight
 
 
-def gauss_rays(cone: Cone, count: int) -> tuple[FloatArray, FloatArray]:
+def gauss_rays(cone: Cone, count: int) -> tuple[Float[Array, " count"], Float[Array, " count"]]:
     """Return a few rays that stand for the cone.
 
     The Gauss rule of the cone's own distribution: exact for polynomials of the squared sine of degree 2 count - 1.
@@ -207,7 +219,7 @@ class Stretches:
         ends = np.array([[arc.sine_squared(np.array([end]))[0] for end in (0.0, 1.0)] for arc in self._arcs])
         self.least, self.most = stretch(np.array([ends.min(), ends.max()]), index)
 
-    def below(self, m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def below(self, m: PerValue) -> tuple[PerValue, PerValue]:
         """Return the share of rays with a smaller stretch, and the sum of their stretches.
 
         Parameters
@@ -298,7 +310,9 @@ class AngularResponse:
                 for c in setup.camera.moving
             }
 
-    def curves(self, qe: FloatArray, channels: Sequence[int]) -> FloatArray:
+    def curves(
+        self, qe: Float[Array, "*batch channels wavelengths"], channels: Sequence[int]
+    ) -> Float[Array, "*batch channels wavelengths"]:
         """Return curves averaged over the cone of rays.
 
         Parameters
@@ -315,7 +329,9 @@ class AngularResponse:
         """
         return self._applied(qe, channels, of_light=False)
 
-    def light(self, light: FloatArray, channels: Sequence[int]) -> FloatArray:
+    def light(
+        self, light: Float[Array, "*batch spectra wavelengths"], channels: Sequence[int]
+    ) -> Float[Array, "*batch spectra wavelengths"]:
         """Return weights of curves at normal incidence from weights of curves in the cone.
 
         Parameters
@@ -332,7 +348,9 @@ class AngularResponse:
         """
         return self._applied(light, channels, of_light=True)
 
-    def _applied(self, values: FloatArray, channels: Sequence[int], *, of_light: bool) -> FloatArray:
+    def _applied(
+        self, values: Float[Array, "*batch wavelengths"], channels: Sequence[int], *, of_light: bool
+    ) -> Float[Array, "*batch wavelengths"]:
         if not any(channel in self.matrices for channel in channels):
             return values
         result = np.array(values, dtype=float)
@@ -344,7 +362,7 @@ class AngularResponse:
         return result
 
 
-def known_at(base_transmission: FloatArray) -> IndexArray:
+def known_at(base_transmission: PerWavelength) -> Int[IndexArray, " wavelengths"]:
     """Return the wavelengths at which a base transmission is large enough to know the filter on it.
 
     Parameters
@@ -364,7 +382,7 @@ _MATRICES: Cache[bytes, csr_matrix] = Cache(256)
 
 
 def _matrix(
-    wavelength_nm: FloatArray, base_transmission: FloatArray, index: float, cone: Cone, n_rays: int | None
+    wavelength_nm: PerWavelength, base_transmission: PerWavelength, index: float, cone: Cone, n_rays: int | None
 ) -> csr_matrix:
     """Return the matrix from a curve on a base transmission to the curve in the cone; cached."""
     key = wavelength_nm.tobytes() + base_transmission.tobytes() + repr((index, cone, n_rays)).encode()
@@ -383,7 +401,7 @@ def _matrix(
     return _MATRICES.get(hashlib.sha256(key).digest(), made)
 
 
-def _means(wavelength_nm: FloatArray, knots_nm: FloatArray, index: float, cone: Cone, n_rays: int | None) -> _Entries:
+def _means(wavelength_nm: PerWavelength, knots_nm: PerKnot, index: float, cone: Cone, n_rays: int | None) -> _Entries:
     """Return the mean over the rays of a transmission given at knots, as rows, columns and values of a matrix.
 
     Values are 0 or more, and those of each row (a wavelength) sum to 1; columns are knots.
@@ -394,7 +412,7 @@ def _means(wavelength_nm: FloatArray, knots_nm: FloatArray, index: float, cone: 
     return _over_rays(wavelength_nm, knots_nm, stretch(sine_squared, index), weights)
 
 
-def _over_rays(wavelength_nm: FloatArray, knots_nm: FloatArray, m: FloatArray, weights: FloatArray) -> _Entries:
+def _over_rays(wavelength_nm: PerWavelength, knots_nm: PerKnot, m: PerValue, weights: PerRow) -> _Entries:
     """Return the mean over single rays."""
     at = np.clip(wavelength_nm[:, None] * m, knots_nm[0], knots_nm[-1])
     first = np.clip(np.searchsorted(knots_nm, at, side="right") - 1, 0, max(knots_nm.size - 2, 0))
@@ -406,7 +424,7 @@ def _over_rays(wavelength_nm: FloatArray, knots_nm: FloatArray, m: FloatArray, w
     return np.tile(rows.ravel(), 2), np.concatenate([first.ravel(), last.ravel()]), shares
 
 
-def _over_cone(wavelength_nm: FloatArray, knots_nm: FloatArray, stretches: Stretches) -> _Entries:
+def _over_cone(wavelength_nm: PerWavelength, knots_nm: PerKnot, stretches: Stretches) -> _Entries:
     """Return the mean over all rays: for each pair of knots the share of rays between them, and their mean position."""
     last = knots_nm.size - 1
     low = np.clip(np.searchsorted(knots_nm, wavelength_nm * stretches.least, side="right") - 1, 0, last)

@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.types import BoolArray, FloatArray, IndexArray
+from ..base.types import Array, Bool, BoolArray, DesignSignals, Float, IndexArray, Int, PerDesign, PerValue
 from .effects import any_filter
 from .merge import merged, without_noise
 from .noise.table import unclipped_e
@@ -47,9 +47,9 @@ class LampReadings:
     full sensitivity. `readout`: that of the case alone.
     """
 
-    lit_e: FloatArray
-    dark_e: FloatArray
-    light: FloatArray
+    lit_e: Float[Array, "captures signals pixels"]
+    dark_e: Float[Array, "captures pixels"]
+    light: Float[Array, "captures pixels"]
     readout: Readout
     noisy: bool
 
@@ -76,12 +76,12 @@ class LampReadings:
         return not self.noisy and self.lit_e.shape[2] <= _MOST_KNEES and self.proportional
 
     @property
-    def full_e(self) -> tuple[FloatArray, FloatArray]:
+    def full_e(self) -> tuple[Float[Array, "signals pixels"], Float[Array, " pixels"]]:
         """Electrons of a pixel of full sensitivity, of the lamps and without them."""
         return self.lit_e[0] / self.light[0], self.dark_e[0] / self.light[0]
 
     @property
-    def full(self) -> BoolArray:
+    def full(self) -> Bool[BoolArray, " signals"]:
         """True for lamps that fill a pixel of any channel, of an HDR pixel all its captures, [n_signals]."""
         lit_e, dark_e = self.full_e
         full = np.zeros(self.n_signals, dtype=bool)
@@ -90,11 +90,13 @@ class LampReadings:
             full |= (lit_e[:, seen] + dark_e[seen] >= curve.knees_e[-1]).any(axis=1)
         return full
 
-    def pixel_curves(self) -> list[tuple[PixelCurve, IndexArray]]:
+    def pixel_curves(self) -> list[tuple[PixelCurve, Int[IndexArray, " _"]]]:
         """Return what pixels read over their electrons, for groups of elements."""
         return [(pixel_curve(self.readout.pixel, light, noisy=self.noisy), at) for light, at in groups_of(self.light)]
 
-    def means(self, signals: IndexArray, factors: FloatArray) -> FloatArray:
+    def means(
+        self, signals: Int[IndexArray, " signals"], factors: Float[Array, "signals factors"]
+    ) -> Float[Array, "signals factors channels"]:
         """Return the mean of each channel, DN: [n, n_factors, n_channels], as of `moments`."""
         if not self.proportional:
             return self.moments(signals, factors)[0]
@@ -104,7 +106,9 @@ class LampReadings:
             mean[..., at] = curve.mean(full_e[..., at])
         return np.asarray(mean @ self.readout.weights[0], dtype=float)
 
-    def moments(self, signals: IndexArray, factors: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def moments(
+        self, signals: Int[IndexArray, " signals"], factors: Float[Array, "signals factors"]
+    ) -> tuple[Float[Array, "signals factors channels"], Float[Array, "signals factors channels"]]:
         """Return mean, DN, and variance, DN^2, of each channel: [n, n_factors, n_channels].
 
         `factors`: brightnesses of each of the `signals`, [n, n_factors].
@@ -125,7 +129,9 @@ class LampReadings:
                 variance = np.zeros(mean.shape)
         return mean @ self.readout.weights[0], variance @ self.readout.spread_weights[0]
 
-    def by_electrons(self, signals: IndexArray, factors: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def by_electrons(
+        self, signals: Int[IndexArray, " values"], factors: PerValue
+    ) -> tuple[Float[Array, "values channels"], Float[Array, "values channels"]]:
         """Return derivatives of mean and variance of lamps, each at one brightness, by the electrons of each element.
 
         Of a pixel of full sensitivity, [n, n_elements]; all exposures have their fixed share of the light.
@@ -137,14 +143,21 @@ class LampReadings:
             by_mean[:, at], by_variance[:, at] = curve.slopes(full_e[:, at])
         return by_mean, by_variance
 
-    def along(self, signals: IndexArray, factors: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    def along(
+        self, signals: Int[IndexArray, " values"], factors: PerValue
+    ) -> tuple[
+        Float[Array, "values channels"],
+        Float[Array, "values channels"],
+        Float[Array, "values channels"],
+        Float[Array, "values channels"],
+    ]:
         """Return mean and variance of lamps, each at one brightness, [n, n_channels], and their derivatives by it."""
         mean, variance = (values[:, 0] for values in self.moments(signals, factors[:, None]))
         lit_e = self.full_e[0][signals]
         by_mean, by_variance = (slopes * lit_e for slopes in self.by_electrons(signals, factors))
         return mean, variance, by_mean @ self.readout.weights[0], by_variance @ self.readout.spread_weights[0]
 
-    def means_of_exposures(self, factors: FloatArray) -> FloatArray:
+    def means_of_exposures(self, factors: Float[Array, "signals factors"]) -> Float[Array, "factors _ 4"]:
         """Return the means of all lamps, each exposure with its own share of their light, [n, n_signals, n_channels].
 
         `factors`: light of each exposure relative to that of the scene, [n_exposures, n].
@@ -157,12 +170,14 @@ class LampReadings:
         dn = merged(electrons, light, pixel).mean if self.noisy else without_noise(electrons, light, pixel)
         return np.asarray(dn @ self.readout.weights[0], dtype=float)
 
-    def _full_e_at(self, signals: IndexArray, factors: FloatArray) -> FloatArray:
+    def _full_e_at(
+        self, signals: Int[IndexArray, " signals"], factors: Float[Array, "signals factors"]
+    ) -> Float[Array, "signals factors pixels"]:
         """Return electrons of a pixel of full sensitivity, [n, n_factors, n_elements]."""
         lit_e, dark_e = self.full_e
         return np.asarray(lit_e[signals, None] * factors[..., None] + dark_e)
 
-    def nodes(self, least: float, most: float, steps: int) -> FloatArray:
+    def nodes(self, least: float, most: float, steps: int) -> Float[Array, "signals nodes"]:
         """Return brightnesses between which curves are nearly straight: [n_signals, n_nodes], from dark to all full.
 
         `least`, `most`: ends of the brightness, relative to that of the scene. `steps`: in the place of each step.
@@ -203,14 +218,22 @@ class LampReadings:
         return np.sort(np.clip(np.concatenate(parts, axis=1), least, most), axis=1)
 
 
-def _geometric(first: FloatArray, last: FloatArray, ratio: float) -> FloatArray:
+def _geometric(
+    first: Float[Array, "signals 1"], last: Float[Array, "signals 1"], ratio: float
+) -> Float[Array, "signals factors"]:
     """Return steps of at most a ratio from the first to the last number of each row, equally many."""
     decades = np.log(np.maximum(last / np.maximum(first, 1e-300), 1.0))
     steps = max(1, int(np.ceil(decades.max() / np.log(ratio))))
     return np.asarray(first * np.exp(decades * np.arange(steps + 1) / steps), dtype=float)
 
 
-def of_case(electrons: FloatArray, dark: FloatArray, readout: Readout, *, noisy: bool) -> LampReadings:
+def of_case(
+    electrons: Float[Array, "captures signals pixels"],
+    dark: Float[Array, "captures pixels"],
+    readout: Readout,
+    *,
+    noisy: bool,
+) -> LampReadings:
     """Return the readings of a case from electrons with and without lamps.
 
     `electrons`: [n_exposures, n_signals, n_elements], `dark` the same without lamps, [n_exposures, n_elements].
@@ -219,7 +242,7 @@ def of_case(electrons: FloatArray, dark: FloatArray, readout: Readout, *, noisy:
     return LampReadings(electrons - dark[:, None], dark, light, readout, noisy)
 
 
-def room_dn(setup: Setup, response: FloatArray, unlit: FloatArray) -> FloatArray:
+def room_dn(setup: Setup, response: DesignSignals, unlit: Float[Array, "designs channels"]) -> PerDesign:
     """Return the chromatic distance up to which the closed form holds, DN, [n_designs]; negative: nowhere.
 
     `response`: readout, DN, [n_designs, n_signals, n_channels]; `unlit`: without lamps, DN, [n_designs, n_channels].
@@ -249,12 +272,17 @@ class LampSlopes:
     """
 
     lamps: LampReadings
-    lit_by_u: FloatArray
-    dark_by_u: FloatArray
+    lit_by_u: Float[Array, "free *captures signals pixels"]
+    dark_by_u: Float[Array, "free *captures pixels"]
 
     def moments(
-        self, signals: IndexArray, factors: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        self, signals: Int[IndexArray, " values"], factors: PerValue
+    ) -> tuple[
+        Float[Array, "values channels"],
+        Float[Array, "values channels"],
+        Float[Array, "free values channels"],
+        Float[Array, "free values channels"],
+    ]:
         """Return mean and variance of lamps, each at one brightness, [n, n_channels], and their derivatives."""
         readout = self.lamps.readout
         mean, variance = (values[:, 0] for values in self.lamps.moments(signals, factors[:, None]))

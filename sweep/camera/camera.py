@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..base.types import FloatArray
+from ..base.types import Array, ChannelCurves, Float, PerWavelength
 from ..designs.technology import Technology, index_of
 from ..spectra.spectrum import WavelengthGrid
 from .mosaic import Mosaic
@@ -38,14 +38,14 @@ class Camera:
 
     grid: WavelengthGrid
     mosaic: Mosaic
-    qe: FloatArray
+    qe: Float[Array, "channels wavelengths"]
     modified: tuple[int, ...]
-    clear_qe: FloatArray
+    clear_qe: PerWavelength
     pixel: Pixel
     technologies: tuple[Technology | None, ...] = field(default=(), kw_only=True)
 
     @property
-    def base_qe(self) -> FloatArray:
+    def base_qe(self) -> ChannelCurves:
         """Curves that the modified channels replace, ndarray of shape (n_modified, n_wavelengths)."""
         return self.qe[list(self.modified)]
 
@@ -74,7 +74,7 @@ class Camera:
         """Channels whose filter moves with the angle of the light."""
         return tuple(c for c in range(len(self.mosaic.channels)) if math.isfinite(self.effective_index(c)))
 
-    def base_transmission(self, channel: int) -> FloatArray:
+    def base_transmission(self, channel: int) -> PerWavelength:
         """Return the base transmission of a channel, which is the same at every angle.
 
         Parameters

@@ -18,7 +18,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from ..base.types import FloatArray, Section
+from ..base.types import Array, Float, PerSample, PerWavelength, Section
 from ..spectra.spectrum import WavelengthGrid
 from .noise.gaussian import share_below
 from .sensor import SensorCurves
@@ -58,7 +58,7 @@ class CurveErrors(Section):
 
 def drawn_curves(
     sensor: SensorCurves, grid: WavelengthGrid, names: Sequence[str], errors: CurveErrors, seed: int
-) -> FloatArray:
+) -> Float[Array, "draws names wavelengths"]:
     """Draw curves of a sensor; those of a name are the same whatever others are drawn.
 
     Parameters
@@ -100,18 +100,20 @@ def _rng(name: str, seed: int, part: int) -> np.random.Generator:
     return np.random.default_rng([seed, zlib.crc32(name.encode()), part])
 
 
-def _evenly(name: str, errors: CurveErrors, seed: int, count: int) -> FloatArray:
+def _evenly(name: str, errors: CurveErrors, seed: int, count: int) -> Float[Array, "rows columns"]:
     """Return numbers from -1 to 1, ndarray of shape (count, n_draws)."""
     return np.asarray(_rng(name, seed, 0).uniform(-1, 1, (count, errors.draws)), dtype=float)
 
 
-def _root(wave: FloatArray, length_nm: float) -> FloatArray:
+def _root(wave: PerSample, length_nm: float) -> Float[Array, "samples samples"]:
     """Return a root of the correlation matrix."""
     correlation = np.exp(-0.5 * ((wave[:, None] - wave) / length_nm) ** 2)
     return np.asarray(np.linalg.cholesky(correlation + _JITTER * np.eye(wave.size)), dtype=float)
 
 
-def with_filters(curves: FloatArray, base: FloatArray, designed: FloatArray) -> FloatArray:
+def with_filters(
+    curves: Float[Array, "draws wavelengths"], base: PerWavelength, designed: PerWavelength
+) -> Float[Array, "draws wavelengths"]:
     """Put a filter on drawn curves: its transmission relative to the curve that it replaces stays.
 
     Parameters

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.cache import Cache
-from ..base.types import BoolArray, FloatArray, IndexArray
+from ..base.types import Array, Bool, BoolArray, Float, FloatArray, IndexArray, Int, SameShape
 from .psf import DiscProfile
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ that of a lattice of phases."""
 _LATTICES: Cache[tuple[DiscProfile, float, bytes], FloatArray] = Cache(4)
 
 
-def covered(x: FloatArray, y: FloatArray, half: float, radius: float) -> FloatArray:
+def covered(x: SameShape, y: SameShape, half: float, radius: float) -> SameShape:
     """Return the share of a square that lies in a disc around the origin, from the exact areas.
 
     Parameters
@@ -58,11 +58,11 @@ class PixelLight:
         function.
     """
 
-    values: FloatArray
-    place: IndexArray
-    shares: FloatArray | None
+    values: Float[Array, "places functions"]
+    place: Int[IndexArray, "cases rows columns"]
+    shares: Float[Array, "functions wavelengths"] | None
 
-    def by_pixel(self) -> FloatArray:
+    def by_pixel(self) -> Float[Array, "cases rows columns _wavelengths"]:
         """Return the light of each pixel.
 
         Returns
@@ -72,7 +72,7 @@ class PixelLight:
         """
         return self._at_wavelengths(self.values)[self.place]
 
-    def folded(self, weights: FloatArray) -> FloatArray:
+    def folded(self, weights: Float[Array, "cases rows columns places"]) -> Float[Array, "cases places _wavelengths"]:
         """Sum over the pixels of each case with weights.
 
         Parameters
@@ -92,11 +92,13 @@ class PixelLight:
             result[case] = pixel_weights.T @ self.values[self.place[case].ravel()[used]]
         return self._at_wavelengths(result)
 
-    def _at_wavelengths(self, values: FloatArray) -> FloatArray:
+    def _at_wavelengths(self, values: Float[Array, "*batch functions"]) -> Float[Array, "*batch wavelengths"]:
         return values if self.shares is None else np.asarray(values @ self.shares)
 
 
-def different(window: Window, wanted: BoolArray) -> tuple[FloatArray, IndexArray]:
+def different(
+    window: Window, wanted: Bool[BoolArray, "cases rows columns"]
+) -> tuple[Float[Array, "places 2"], Int[IndexArray, " wanted"]]:
     """Return the distinct pixel positions around the light's center; mirrored ones are equal in a round image.
 
     Parameters
@@ -123,7 +125,12 @@ def different(window: Window, wanted: BoolArray) -> tuple[FloatArray, IndexArray
 
 
 def light_on_pixels(
-    window: Window, wanted: BoolArray, half_px: float, radius_px: float, profile: DiscProfile | None, pitch_um: float
+    window: Window,
+    wanted: Bool[BoolArray, "cases rows columns"],
+    half_px: float,
+    radius_px: float,
+    profile: DiscProfile | None,
+    pitch_um: float,
 ) -> PixelLight:
     """Return the light of the requested pixels; the others are dark.
 

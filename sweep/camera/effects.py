@@ -18,7 +18,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.types import FloatArray
+from ..base.types import Array, ChannelCurves, Float
 from . import pwm
 from .angular import known_at
 from .exposure import exposure_times, white_irradiance
@@ -42,8 +42,8 @@ class Box:
     """
 
     setup: Setup
-    low: FloatArray
-    high: FloatArray
+    low: Float[Array, "channels wavelengths"]
+    high: Float[Array, "channels wavelengths"]
 
     @cached_property
     def _exposures_s(self) -> tuple[float, float]:
@@ -63,7 +63,7 @@ class Box:
         return pwm.smallest(drive, *self._exposures_s), pwm.largest(drive, *self._exposures_s)
 
     @cached_property
-    def _highest(self) -> FloatArray:
+    def _highest(self) -> ChannelCurves:
         """Upper bound on the curves in the cone of rays, ndarray of shape (n_channels, n_wavelengths).
 
         The transmission of an interference filter is nowhere above its maximum.

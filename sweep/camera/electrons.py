@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.types import BoolArray, FloatArray
+from ..base.types import Array, Bool, BoolArray, DesignCases, DesignCurves, DesignPixels, Float, FloatArray, PerDesign
 from ..designs.block import Block
 from ..designs.products import row_products
 from .exposure import SceneLight, exposure_times
@@ -47,24 +47,24 @@ class Changing:
         From a slice of the designs to all channels without the lamps, ndarray of shape (n, n_cases, n_channels).
     """
 
-    fixed: FloatArray
+    fixed: Float[Array, "cases signals channels"]
     channel: int
-    make: Callable[[slice], FloatArray]
+    make: Callable[[slice], Float[Array, "_designs cases signals channels"]]
     exposure_s: float
-    which: BoolArray
-    unlit: Callable[[slice], FloatArray]
+    which: Bool[BoolArray, " designs"]
+    unlit: Callable[[slice], Float[Array, "_designs cases channels"]]
 
     @cached_property
-    def values(self) -> FloatArray:
+    def values(self) -> DesignCases:
         """Values of the channel that differs, computed at the first use."""
         return self.make(slice(None))
 
     @property
-    def whole(self) -> FloatArray:
+    def whole(self) -> Float[Array, "cases pixels channels wavelengths"]:
         """All channels of all designs, ndarray of shape (n, n_cases, n_signals, n_channels)."""
         return self.whole_of(slice(None))
 
-    def whole_of(self, part: slice) -> FloatArray:
+    def whole_of(self, part: slice) -> DesignCases:
         """Return all channels of some designs.
 
         Parameters
@@ -83,7 +83,12 @@ class Changing:
         return whole
 
 
-def _expose(rates: FloatArray, fixed: FloatArray, uniform: FloatArray, time_s: float) -> None:
+def _expose(
+    rates: Float[Array, "designs positions modified"],
+    fixed: Float[Array, "signals channels"],
+    uniform: Float[Array, "designs positions"],
+    time_s: float,
+) -> None:
     """Add fixed and uniform rates and multiply by the exposure time, in place."""
     if rates.size < _MANY:
         rates[:] = ((fixed + rates) + uniform[..., None]) * time_s
@@ -93,7 +98,7 @@ def _expose(rates: FloatArray, fixed: FloatArray, uniform: FloatArray, time_s: f
     expose(rates, fixed, uniform, time_s)
 
 
-def _background(setup: Setup) -> FloatArray:
+def _background(setup: Setup) -> Float[Array, " channels"]:
     """Return electrons/s of the background per unit of QE, behind air and lens, ndarray of shape (n_wavelengths,)."""
     dimmed = path_factor(setup, setup.camera.grid.nodes_nm, background=True)
     return np.asarray(background_irradiance(setup) * setup.camera.area_step_m2_nm * dimmed, dtype=float)
@@ -145,7 +150,9 @@ class Electrons:
         else:
             self._touched, self._kept = np.empty(0, dtype=np.intp), None
 
-    def at_each_position(self, light: FloatArray, channels: Sequence[int]) -> FloatArray:
+    def at_each_position(
+        self, light: Float[Array, "cases *batch spectra wavelengths"], channels: Sequence[int]
+    ) -> Float[Array, "cases *batch spectra wavelengths"]:
         """Return light on some channels behind their filters at each field position.
 
         Parameters
@@ -164,17 +171,25 @@ class Electrons:
             [response.light(light[self.position == at], channels) for at, response in enumerate(self.light.angular)]
         )
 
-    def _products(self, light: FloatArray, qe: FloatArray, of: Sequence[int]) -> FloatArray:
+    def _products(
+        self, light: Float[Array, "cases pixels _signals wavelengths"], qe: DesignCurves, of: Sequence[int]
+    ) -> Float[Array, "designs cases spectra pixels"]:
         """Sum light times QE times signals over channels and wavelengths, [n_designs, n_cases, n_signals, n_units]."""
         parts = [self._products_at(at, light[self.position == at], qe, of) for at in range(len(self.light.angular))]
         return np.concatenate(parts, axis=1)
 
-    def _add_pixels(self, split: SplitLight, qe: FloatArray, of: Sequence[int], out: FloatArray) -> None:
+    def _add_pixels(self, split: SplitLight, qe: DesignCurves, of: Sequence[int], out: DesignPixels) -> None:
         """Add the products of a factored light in place."""
         spectra = self.light.angular[0].curves(qe, of)[:, :, None] * self.light.signals
         split.add_sums(spectra, of, out)
 
-    def _products_at(self, field_index: int, light: FloatArray, qe: FloatArray, of: Sequence[int]) -> FloatArray:
+    def _products_at(
+        self,
+        field_index: int,
+        light: Float[Array, "cases pixels _signals wavelengths"],
+        qe: DesignCurves,
+        of: Sequence[int],
+    ) -> Float[Array, "_designs cases _signals pixels"]:
         """Sum the products at one field position."""
         cases, units, channels, _ = light.shape
         size, n, n_signals = self.setup.camera.grid.size, len(qe), len(self.light.signals)
@@ -186,7 +201,7 @@ class Electrons:
         products = (moved @ weights.T).reshape(n, n_signals, cases, units)
         return np.asarray(np.moveaxis(products, 1, 2), dtype=float)
 
-    def _table(self) -> FloatArray:
+    def _table(self) -> Float[Array, "rows columns"]:
         """Return signals times response, [channels x wavelengths, n_cases x n_signals x n_elements]."""
         cases, units, channels, size = self._modified.shape
         if not any(seen.matrices for seen in self.light.angular):
@@ -198,7 +213,7 @@ class Electrons:
         product = self.at_each_position(product, self.setup.camera.modified)
         return np.ascontiguousarray(product.reshape(-1, channels * size).T)
 
-    def rates(self, curves: FloatArray) -> FloatArray:
+    def rates(self, curves: DesignCurves) -> DesignPixels:
         """Return electrons/s of each signal.
 
         Parameters
@@ -224,7 +239,9 @@ class Electrons:
         rates[..., self._touched] += part
         return rates
 
-    def expected(self, curves: FloatArray, scales: FloatArray, exposure_s: FloatArray) -> FloatArray:
+    def expected(
+        self, curves: DesignCurves, scales: Float[Array, "designs scales"], exposure_s: PerDesign
+    ) -> Float[Array, "designs _cases signals pixels"]:
         """Return expected electrons before the full well.
 
         Parameters
@@ -251,12 +268,14 @@ class Electrons:
         rates *= exposure_s[:, None, None, None]
         return rates
 
-    def without_lamps(self, curves: FloatArray, scales: FloatArray, exposure_s: FloatArray) -> FloatArray:
+    def without_lamps(
+        self, curves: DesignCurves, scales: Float[Array, "designs scales"], exposure_s: PerDesign
+    ) -> Float[Array, "designs _cases 1 pixels"]:
         """Return what `expected` has without the lamps, in the shape of one signal."""
         electrons = np.repeat(self.unlit(curves), scales.shape[1], axis=1) * exposure_s[:, None, None]
         return np.asarray(electrons[:, :, None], dtype=float)
 
-    def unlit(self, curves: FloatArray) -> FloatArray:
+    def unlit(self, curves: DesignCurves) -> Float[Array, "designs cases pixels"]:
         """Return electrons/s of the elements without the lamps: of the background, and dark current.
 
         Parameters
@@ -272,7 +291,7 @@ class Electrons:
         uniform = self._fixed_uniform + self.through_filters(self.of_background(curves))
         return np.asarray(uniform + self.setup.camera.pixel.dark_e_per_s, dtype=float)
 
-    def of_background(self, curves: FloatArray) -> FloatArray:
+    def of_background(self, curves: DesignCurves) -> Float[Array, "designs positions modified"]:
         """Return electrons/s of the background in the modified channels.
 
         Parameters
@@ -287,7 +306,9 @@ class Electrons:
         """
         return np.asarray(np.einsum("nml,pml->npm", curves, self.background), dtype=float)
 
-    def through_filters(self, rates: FloatArray) -> FloatArray:
+    def through_filters(
+        self, rates: Float[Array, "designs positions modified"]
+    ) -> Float[Array, "designs cases pixels"]:
         """Distribute uniform light of the modified channels over the elements.
 
         Parameters
@@ -345,7 +366,7 @@ class Electrons:
         rest = self.fixed + (self._fixed_uniform + setup.camera.pixel.dark_e_per_s)[:, None]
         fixed, kept = np.ascontiguousarray(self.fixed[:, :, unit]), self._kept
 
-        def make(part: slice) -> FloatArray:
+        def make(part: slice) -> Float[Array, "_designs cases channels"]:
             few = some.subset(part)
             values = few.product(kept, everywhere).reshape(len(few), len(fixed), -1).astype(float, copy=False)
             _expose(values, fixed, uniform[part], float(time_s[0]))
@@ -353,7 +374,7 @@ class Electrons:
 
         dark = self._fixed_uniform + setup.camera.pixel.dark_e_per_s
 
-        def unlit(part: slice) -> FloatArray:
+        def unlit(part: slice) -> Float[Array, "designs cases pixels"]:
             electrons = np.repeat(dark[None], len(uniform[part]), axis=0)
             electrons[..., unit] = uniform[part]
             return np.asarray(electrons * time_s[0], dtype=float)

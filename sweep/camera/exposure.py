@@ -4,7 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.types import FloatArray
+from ..base.types import (
+    Array,
+    ChannelCurves,
+    CurvesGradient,
+    DesignCurves,
+    Float,
+    FloatArray,
+    PerDesign,
+    PerParameter,
+    PerWavelength,
+)
 from . import pwm
 from .angular import AngularResponse
 from .field import over_field
@@ -14,7 +24,7 @@ from .scene import WhitePatchExposure
 from .setup import Setup
 
 
-def white_irradiance(setup: Setup) -> FloatArray:
+def white_irradiance(setup: Setup) -> PerWavelength:
     """Return the photon irradiance of the white patch, which is flat in photons.
 
     Parameters
@@ -52,7 +62,9 @@ def fixed_white(setup: Setup) -> float:
     return float(rates.max(initial=0.0))
 
 
-def exposure_times(setup: Setup, modified_white: FloatArray, fixed: float | None = None) -> FloatArray:
+def exposure_times(
+    setup: Setup, modified_white: Float[Array, "designs modified"], fixed: float | None = None
+) -> PerDesign:
     """Return the exposure time of each design.
 
     Parameters
@@ -114,7 +126,9 @@ def largest_sensitivity_not_brightest(setup: Setup) -> float:
     return float(kept / modified) if modified > 0 else np.inf
 
 
-def relative_slope(setup: Setup, white: FloatArray, curves: FloatArray, curves_gradient: FloatArray) -> FloatArray:
+def relative_slope(
+    setup: Setup, white: PerWavelength, curves: ChannelCurves, curves_gradient: CurvesGradient
+) -> PerParameter:
     """Return the derivative of one design's exposure time, relative to that time.
 
     Parameters
@@ -160,7 +174,7 @@ class SceneLight:
         self.positions = over_field(setup)
         self.angular = [AngularResponse(position) for position in self.positions]
 
-    def exposure_s(self, curves: FloatArray) -> FloatArray:
+    def exposure_s(self, curves: DesignCurves) -> PerDesign:
         """Return the exposure time of each design.
 
         Parameters
@@ -175,7 +189,7 @@ class SceneLight:
         """
         return exposure_times(self.setup, curves @ self.white, self.fixed_white)
 
-    def scales(self, exposure_s: FloatArray) -> FloatArray:
+    def scales(self, exposure_s: PerDesign) -> Float[Array, "... designs moments"]:
         """Return the light relative to its mean at the moments of a pulsed light.
 
         Parameters
@@ -194,7 +208,7 @@ class SceneLight:
         return pwm.scales(self.setup, exposure_s, self.moments)
 
 
-def _different_moments(scales: FloatArray) -> FloatArray:
+def _different_moments(scales: Float[Array, "captures _designs _moments"]) -> Float[Array, "captures designs moments"]:
     """Return scales, [n_exposures, n_designs, n_moments], without moments of the same light in all of them."""
     flat = np.round(scales.reshape(-1, scales.shape[-1]), 12)
     return scales[..., np.sort(np.unique(flat, axis=1, return_index=True)[1])]

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..base.types import FloatArray
+from ..base.types import Array, Float, PerValue
 from .scene import Scene
 from .setup import Setup
 
@@ -103,8 +103,10 @@ def over_field(setup: Setup) -> tuple[Setup, ...]:
 
 
 def refined_heights(
-    heights: tuple[float, ...], values: FloatArray, evaluate: Callable[[float], FloatArray]
-) -> tuple[FloatArray, FloatArray]:
+    heights: tuple[float, ...],
+    values: Float[Array, "values heights"],
+    evaluate: Callable[[float], Float[Array, " _values"]],
+) -> tuple[PerValue, PerValue]:
     """Refine the smallest values over all image heights.
 
     The steps around the two smallest known values are halved four times; it is not proven that no lower value lies

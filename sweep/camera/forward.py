@@ -18,7 +18,7 @@ import numpy as np
 
 from ..base.cache import Cache
 from ..base.errors import SweepError, ValidationIssue
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, DesignCases, DesignCurves, DesignPixels, Float, IndexArray, Int, PerDesign
 from ..designs.block import Block
 from .brightness import LampReadings, of_case
 from .electrons import Changing, Electrons
@@ -82,7 +82,7 @@ class ForwardModel:
     def _in_parts(self) -> bool:
         return bool(self._positions or self._phase_blocks)
 
-    def at(self, phases: Phases | None, moments: FloatArray | None = None) -> ForwardModel:
+    def at(self, phases: Phases | None, moments: Float[Array, " moments"] | None = None) -> ForwardModel:
         """Return the model of the same scene at other phases, for a single use.
 
         Parameters
@@ -167,15 +167,15 @@ class ForwardModel:
             return None
         transfer = self.readout.transfer
 
-        def make(part: slice) -> FloatArray:
+        def make(part: slice) -> Float[Array, "_designs signals channels"]:
             return transfer(electrons.make(part))
 
-        def unlit(part: slice) -> FloatArray:
+        def unlit(part: slice) -> Float[Array, "designs cases pixels"]:
             return unquantized(electrons.unlit(part), self.readout.pixel)
 
         return replace(electrons, fixed=transfer(electrons.fixed), make=make, unlit=unlit)
 
-    def unlit(self, curves: FloatArray, exposure_s: FloatArray) -> FloatArray:
+    def unlit(self, curves: DesignCurves, exposure_s: PerDesign) -> Float[Array, "designs cases channels"]:
         """Return the response without the lamps: black level, dark current and background, unquantized.
 
         Parameters
@@ -196,7 +196,7 @@ class ForwardModel:
         dn = self.readout.folded(unquantized(electrons, self.readout.pixel)[:, :, None])[:, :, 0]
         return np.repeat(dn, self.light.scales(exposure_s).shape[-1], axis=1)
 
-    def read(self, curves: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def read(self, curves: DesignCurves) -> tuple[DesignCases, PerDesign]:
         """Read out a batch of designs.
 
         Parameters
@@ -213,14 +213,14 @@ class ForwardModel:
         """
         return self._read_once("read", curves, self._read)
 
-    def _read(self, curves: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _read(self, curves: DesignCurves) -> tuple[DesignCases, PerDesign]:
         exposure_s = self.light.exposure_s(curves)
         if self._in_parts:
             return np.concatenate([part.read(curves)[0] for part in self._parts()], axis=1), exposure_s
         dn = [self.readout.folded(self.readout.transfer(e)) for e in self._blocks(curves, exposure_s)]
         return np.concatenate(dn), exposure_s
 
-    def _read_once(self, how: str, curves: FloatArray, read: Callable[[FloatArray], _Result]) -> _Result:
+    def _read_once(self, how: str, curves: DesignCurves, read: Callable[[DesignCurves], _Result]) -> _Result:
         """Return the result of `read`, and keep that of a single design, from which several tables are made."""
         if len(curves) != 1 or self._in_parts:
             return read(curves)
@@ -231,7 +231,7 @@ class ForwardModel:
         result: _Result = kept[1]
         return result
 
-    def read_with_noise(self, curves: FloatArray) -> NoisyReadout:
+    def read_with_noise(self, curves: DesignCurves) -> NoisyReadout:
         """Read out a batch of designs with the variance of the noise.
 
         Pixels are read one by one: saturation and quantization must be computed.
@@ -248,7 +248,7 @@ class ForwardModel:
         """
         return self._read_once("noise", curves, self._read_with_noise)
 
-    def _read_with_noise(self, curves: FloatArray) -> NoisyReadout:
+    def _read_with_noise(self, curves: DesignCurves) -> NoisyReadout:
         if self._in_parts:
             readouts = [part.read_with_noise(curves) for part in self._parts()]
             joined = {
@@ -261,7 +261,9 @@ class ForwardModel:
         mean, variance, gaussian, reach = (np.concatenate(values) for values in zip(*parts, strict=True))
         return NoisyReadout(mean, variance, gaussian, reach, exposure_s)
 
-    def _blocks(self, curves: FloatArray, exposure_s: FloatArray) -> Iterator[FloatArray]:
+    def _blocks(
+        self, curves: DesignCurves, exposure_s: PerDesign
+    ) -> Iterator[Float[Array, "... cases signals pixels"]]:
         """Yield expected electrons of blocks of designs."""
         scales = self.light.scales(exposure_s)
         size = self.n_cases * scales.shape[-1] * len(self.light.signals) * self._response.shape[1]
@@ -270,7 +272,7 @@ class ForwardModel:
             block = slice(start, start + step)
             yield self._captured(curves[block], scales[..., block, :], exposure_s[block])
 
-    def lamps(self, curves: FloatArray) -> Iterator[LampReadings]:
+    def lamps(self, curves: DesignCurves) -> Iterator[LampReadings]:
         """Yield the readings of one design's lamps over their brightness, in each case; `curves` as of `read`."""
         if self._in_parts:
             for part in self._parts():
@@ -287,11 +289,16 @@ class ForwardModel:
             yield of_case(electrons[:, 0, case], dark[:, 0, case, 0], readout, noisy=is_noisy(self.setup))
 
     def _captured(
-        self, curves: FloatArray, scales: FloatArray, exposure_s: FloatArray, *, lit: bool = True
-    ) -> FloatArray:
+        self,
+        curves: DesignCurves,
+        scales: Float[Array, "... designs moments"],
+        exposure_s: PerDesign,
+        *,
+        lit: bool = True,
+    ) -> Float[Array, "*captures designs cases signals pixels"]:
         """Return expected electrons, or those without lamps; of an HDR pixel of each exposure, on the first axis."""
 
-        def of(model: ForwardModel, curves: FloatArray, scales: FloatArray) -> FloatArray:
+        def of(model: ForwardModel, curves: DesignCurves, scales: Float[Array, "designs moments"]) -> DesignPixels:
             electrons = model.electrons
             return (electrons.expected if lit else electrons.without_lamps)(curves, scales, exposure_s)
 
@@ -311,7 +318,7 @@ class ForwardModel:
         return np.stack(captured)
 
     @cached_property
-    def _of_exposures(self) -> list[tuple[FloatArray, ForwardModel]]:
+    def _of_exposures(self) -> list[tuple[Float[Array, " channels"], ForwardModel]]:
         """QE factors of the channels, and model of the electrons, of each exposure of an HDR pixel."""
         camera, made = self.setup.camera, []
         for exposure in camera.pixel.exposures:
@@ -327,7 +334,7 @@ class ForwardModel:
             made.append((factors, model))
         return made
 
-    def pixel_electrons(self, curves: FloatArray) -> FloatArray:
+    def pixel_electrons(self, curves: DesignCurves) -> Float[Array, "*captures designs cases signals pixels"]:
         """Return expected electrons of the pixels that are read.
 
         Parameters
@@ -354,7 +361,7 @@ class ForwardModel:
         exposure_s = self.light.exposure_s(curves)
         return self.readout.of_pixels(self._captured(curves, self.light.scales(exposure_s), exposure_s))
 
-    def channels_of(self, pixels: FloatArray, case: int) -> FloatArray:
+    def channels_of(self, pixels: Float[Array, "signals pixels"], case: int) -> Float[Array, "signals channels"]:
         """Return the channels from their pixels at one phase and field position.
 
         Parameters
@@ -376,12 +383,12 @@ class ForwardModel:
         return self.readout.channels_of(pixels, case)
 
     @property
-    def capture_light(self) -> FloatArray | None:
+    def capture_light(self) -> Float[Array, "captures pixels"] | None:
         """Relative light of exposures on `pixel_electrons`, [n_exposures, n_pixels]; None for a pixel read once."""
         return self.readout.of_pixels(self.readout.capture_light) if self.setup.camera.pixel.captures else None
 
     @property
-    def few_pixels(self) -> tuple[IndexArray, ...] | None:
+    def few_pixels(self) -> tuple[Int[IndexArray, " _pixels"], ...] | None:
         """Pixels whose mean is each channel; None for a target, or if they are many."""
         return None if self.setup.scene.target is not None else self.readout.few_pixels
 

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..base.types import FloatArray
+from ..base.types import Array, Float, PerWavelength
 from ..spectra.color import luminance_per_photon_radiance
 from .pixel import irradiance_factor
 from .scene import Scene
@@ -47,7 +47,7 @@ def scene_irradiance(setup: Setup) -> Irradiance:
     return irradiance
 
 
-def with_veiling_glare(irradiance: Irradiance, share: float, mean: FloatArray) -> Irradiance:
+def with_veiling_glare(irradiance: Irradiance, share: float, mean: PerWavelength) -> Irradiance:
     """Spread a share of the mean light of the field evenly over the field (integral of veiling glare, ISO 9358).
 
     Parameters
@@ -69,7 +69,7 @@ def with_veiling_glare(irradiance: Irradiance, share: float, mean: FloatArray) -
     return replace(irradiance, signals=kept * irradiance.signals, background=background)
 
 
-def signal_irradiance(setup: Setup) -> FloatArray:
+def signal_irradiance(setup: Setup) -> Float[Array, "signals wavelengths"]:
     """Return the photon irradiance of each signal.
 
     Parameters
@@ -85,7 +85,7 @@ def signal_irradiance(setup: Setup) -> FloatArray:
     return scene_irradiance(setup).signals
 
 
-def background_irradiance(setup: Setup) -> FloatArray:
+def background_irradiance(setup: Setup) -> PerWavelength:
     """Return the photon irradiance of the uniform background.
 
     Parameters
@@ -101,7 +101,7 @@ def background_irradiance(setup: Setup) -> FloatArray:
     return scene_irradiance(setup).background
 
 
-def _signals(setup: Setup) -> FloatArray:
+def _signals(setup: Setup) -> Float[Array, "signals wavelengths"]:
     """Return the irradiance of each signal from its radiance or luminance, [n_signals, n_wavelengths]."""
     scene = setup.scene
     factor = irradiance_factor(scene.optics)
@@ -112,7 +112,7 @@ def _signals(setup: Setup) -> FloatArray:
     return setup.lights.photons * (luminance / per_photon_radiance * factor)[:, None]
 
 
-def _uniform(setup: Setup, luminance_cd_m2: float) -> FloatArray:
+def _uniform(setup: Setup, luminance_cd_m2: float) -> PerWavelength:
     """Return the irradiance of a uniform light, flat in photons, ndarray of shape (n_wavelengths,)."""
     grid = setup.camera.grid
     if not luminance_cd_m2:
@@ -145,7 +145,7 @@ def size_exponent(visibility_m: float) -> float:
     return 1.3 if km < 50 else 1.6
 
 
-def air_transmittance(scene: Scene, wavelength_nm: FloatArray) -> FloatArray:
+def air_transmittance(scene: Scene, wavelength_nm: PerWavelength) -> PerWavelength:
     """Return the transmittance of the air between target and camera.
 
     exp(-beta D) with beta = ln(1 / 0.02) / visibility (lambda / 550 nm)^-q (Koschmieder).
@@ -185,7 +185,7 @@ def relative_illumination(scene: Scene) -> float:
     return math.cos(math.radians(scene.off_axis_deg)) ** 4
 
 
-def path_factor(setup: Setup, wavelength_nm: FloatArray, *, background: bool = False) -> FloatArray:
+def path_factor(setup: Setup, wavelength_nm: PerWavelength, *, background: bool = False) -> PerWavelength:
     """Return the factor of air and lens on the light of a signal or of the background.
 
     Parameters

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..base.cache import Cache
 from ..base.errors import SweepError, ValidationIssue
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, ChannelCurves, CurvesGradient, DesignCases, DesignCurves, Float, MemberNumbers
 from .brightness import LampReadings, LampSlopes, room_dn
 from .exposure import relative_slope
 from .forward import ForwardModel
@@ -37,7 +37,7 @@ class LinearModel(ForwardModel):
 
     hdr: Pixel | None = None
 
-    def smooth(self, curves: FloatArray) -> FloatArray:
+    def smooth(self, curves: DesignCurves) -> DesignCases:
         """Return the unquantized, unclipped response.
 
         Parameters
@@ -52,7 +52,9 @@ class LinearModel(ForwardModel):
         """
         return self.readout.folded(unquantized(self._expected(curves), self.readout.pixel))
 
-    def gradient(self, curves: FloatArray, curves_gradient: FloatArray) -> FloatArray:
+    def gradient(
+        self, curves: ChannelCurves, curves_gradient: CurvesGradient
+    ) -> Float[Array, "parameters cases signals channels"]:
         """Return the exact derivative of `smooth` at one design, with that of its exposure; a pulse's share is held.
 
         Parameters
@@ -69,7 +71,9 @@ class LinearModel(ForwardModel):
         """
         return self.smooth_with_gradient(curves, curves_gradient)[1]
 
-    def smooth_with_gradient(self, curves: FloatArray, curves_gradient: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def smooth_with_gradient(
+        self, curves: ChannelCurves, curves_gradient: CurvesGradient
+    ) -> tuple[Float[Array, "cases signals channels"], Float[Array, "parameters cases signals channels"]]:
         """Return `smooth` and `gradient` of one design.
 
         Parameters
@@ -90,7 +94,9 @@ class LinearModel(ForwardModel):
         response = self.readout.folded(unquantized(whole, self.readout.pixel))
         return response, self.readout.folded(slope * self.setup.camera.pixel.dn_per_e)
 
-    def lamps_with_gradient(self, curves: FloatArray, curves_gradient: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def lamps_with_gradient(
+        self, curves: ChannelCurves, curves_gradient: CurvesGradient
+    ) -> tuple[Float[Array, "cases signals channels"], Float[Array, "parameters cases signals channels"]]:
         """Return the response to the lamps alone, without black level, dark current and background.
 
         Parameters
@@ -111,7 +117,7 @@ class LinearModel(ForwardModel):
         dn_per_e = self.readout.pixel.dn_per_e
         return self.readout.folded(whole * dn_per_e), self.readout.folded(slope * dn_per_e)
 
-    def variance(self, curves: FloatArray) -> FloatArray:
+    def variance(self, curves: DesignCurves) -> DesignCases:
         """Return the variance of the noise.
 
         Parameters
@@ -128,7 +134,9 @@ class LinearModel(ForwardModel):
         variance_e2 = electrons + (pixel.prnu * electrons) ** 2 + pixel.read_noise_e**2
         return self.by_pixel.readout.spread(pixel.dn_per_e**2 * variance_e2 + STEPS_DN2)
 
-    def variance_gradient(self, curves: FloatArray, curves_gradient: FloatArray) -> FloatArray:
+    def variance_gradient(
+        self, curves: ChannelCurves, curves_gradient: CurvesGradient
+    ) -> Float[Array, "parameters cases signals channels"]:
         """Return the exact derivative of `variance` at one design.
 
         Parameters
@@ -149,8 +157,13 @@ class LinearModel(ForwardModel):
         return self.by_pixel.readout.spread(per_e * slope)
 
     def merged_with_gradient(
-        self, curves: FloatArray, curves_gradient: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        self, curves: ChannelCurves, curves_gradient: CurvesGradient
+    ) -> tuple[
+        Float[Array, "cases signals channels"],
+        Float[Array, "cases signals channels"],
+        Float[Array, "parameters cases signals channels"],
+        Float[Array, "parameters cases signals channels"],
+    ]:
         """Return mean and variance of the merged values of an HDR pixel at one design, and their derivatives.
 
         Unlike `smooth`, the mean is that of pixels which saturate.
@@ -196,7 +209,7 @@ class LinearModel(ForwardModel):
         longest_dn = np.sqrt(response.shape[-1]) * (response - unlit[:, None]).max(initial=0.0)
         return self.hdr is None and bool((room_dn(self.setup, response, unlit) >= 2 * longest_dn).all())
 
-    def lamps_over_brightness(self, curves: FloatArray, curves_gradient: FloatArray) -> list[LampSlopes]:
+    def lamps_over_brightness(self, curves: ChannelCurves, curves_gradient: CurvesGradient) -> list[LampSlopes]:
         """Return the readings of the lamps of one design over their brightness, one for each case, with derivatives.
 
         `curves`: QE of the modified channels, [n_modified, n_wavelengths]; `curves_gradient`: its derivatives.
@@ -216,7 +229,7 @@ class LinearModel(ForwardModel):
             result.append(LampSlopes(lamps, lit_by_u[:, case], dark_by_u[:, case]))
         return result
 
-    def spread_electrons(self, curves: FloatArray) -> FloatArray:
+    def spread_electrons(self, curves: DesignCurves) -> DesignCases:
         """Return expected electrons of the pixels, weighted by their shares of a channel's variance.
 
         Parameters
@@ -231,7 +244,7 @@ class LinearModel(ForwardModel):
         """
         return self.by_pixel.readout.spread(self.by_pixel._expected(curves))
 
-    def spread_shares(self) -> FloatArray:
+    def spread_shares(self) -> Float[Array, "cases channels"]:
         """Return the sum of the pixels' shares of a channel's variance.
 
         Returns
@@ -244,7 +257,7 @@ class LinearModel(ForwardModel):
         return np.repeat(response.spread.sum(axis=1), repeats, axis=0)
 
     @cached_property
-    def members(self) -> dict[str, IndexArray]:
+    def members(self) -> dict[str, MemberNumbers]:
         """Indices of the signals of each signal type."""
         return self.setup.members
 
@@ -259,14 +272,14 @@ class LinearModel(ForwardModel):
             raise SweepError(ValidationIssue(problem, value=f"{result.n_cases} phases", allowed=most))
         return result
 
-    def _expected(self, curves: FloatArray) -> FloatArray:
+    def _expected(self, curves: DesignCurves) -> DesignCases:
         """Return expected electrons, ndarray of shape (n_designs, n_cases, n_signals, n_elements)."""
         exposure_s = self.light.exposure_s(curves)
         return self.electrons.expected(curves, self.light.scales(exposure_s), exposure_s)
 
     def _with_slope(
-        self, curves: FloatArray, curves_gradient: FloatArray, *, lamps_only: bool = False
-    ) -> tuple[FloatArray, FloatArray]:
+        self, curves: ChannelCurves, curves_gradient: CurvesGradient, *, lamps_only: bool = False
+    ) -> tuple[Float[Array, "cases signals channels"], Float[Array, "parameters cases signals channels"]]:
         """Return expected electrons and their derivative."""
         electrons, n = self.electrons, len(curves_gradient)
         one = curves[None]
@@ -282,7 +295,9 @@ class LinearModel(ForwardModel):
         relative = relative_slope(self.setup, self.light.white, curves, curves_gradient)
         return whole, np.asarray(slope + relative[:, None, None, None] * whole, dtype=float)
 
-    def per_qe(self, modified: int, curves: FloatArray, *, lamps_only: bool = False) -> FloatArray:
+    def per_qe(
+        self, modified: int, curves: ChannelCurves, *, lamps_only: bool = False
+    ) -> Float[Array, "cases signals pixels wavelengths"]:
         """Return the response per unit of QE of one modified channel at every wavelength.
 
         The smooth response is linear in it if the channel does not set the exposure.
@@ -306,7 +321,7 @@ class LinearModel(ForwardModel):
         rates = self._per_qe(modified, curves, response.light[:, :, channel], uniform)
         return rates * self.setup.camera.pixel.dn_per_e
 
-    def spread_per_qe(self, modified: int, curves: FloatArray) -> FloatArray:
+    def spread_per_qe(self, modified: int, curves: ChannelCurves) -> Float[Array, "cases signals wavelengths"]:
         """Return electrons per unit of QE of one modified channel in its pixels, weighted by their shares of variance.
 
         Parameters
@@ -332,7 +347,13 @@ class LinearModel(ForwardModel):
         uniform = (share * response.uniform[:, :, channel]).sum(axis=1)
         return by_pixel._per_qe(modified, curves, light[:, None], uniform[:, None])[:, :, 0]
 
-    def _per_qe(self, modified: int, curves: FloatArray, light: FloatArray, uniform: FloatArray) -> FloatArray:
+    def _per_qe(
+        self,
+        modified: int,
+        curves: ChannelCurves,
+        light: Float[Array, "_ channels wavelengths"],
+        uniform: Float[Array, "rows channels"],
+    ) -> Float[Array, "_cases _signals channels wavelengths"]:
         """Return electrons per unit of QE of one modified channel, from light and uniform weights of its elements."""
         electrons, channel = self.electrons, self.setup.camera.modified[modified]
         exposure_s = self.light.exposure_s(curves[None])

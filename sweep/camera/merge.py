@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.types import BoolArray, FloatArray
+from ..base.types import Array, Bool, BoolArray, Float, FloatArray, PerCapture, PerDesign, SameShape
 from .noise.moments import DRAWN, LinearRange
 from .noise.subsets import Subset, SubsetMoments, subset_table, threshold_dn
 from .noise.table import unclipped_e
@@ -46,9 +46,9 @@ class Merged:
         True where the same captures are used in all but 1e-12 of the readouts.
     """
 
-    mean: FloatArray
-    variance: FloatArray
-    certain: BoolArray
+    mean: SameShape
+    variance: Float[Array, "*#batch"]
+    certain: Bool[BoolArray, "*#batch"]
 
 
 def limits_dn(pixel: Pixel) -> tuple[int | None, ...]:
@@ -84,7 +84,7 @@ def exposure_of(pixel: Pixel) -> list[int]:
     return [of[number] for number in range(len(pixel.captures))]
 
 
-def light_of(pixel: Pixel) -> FloatArray:
+def light_of(pixel: Pixel) -> Float[Array, " captures"]:
     """Return the light of each exposure relative to that of a pixel of full sensitivity.
 
     Parameters
@@ -100,7 +100,7 @@ def light_of(pixel: Pixel) -> FloatArray:
     return np.array([exposure.capture.light for exposure in pixel.exposures])
 
 
-def saturating_e(pixel: Pixel) -> FloatArray:
+def saturating_e(pixel: Pixel) -> Float[Array, " captures"]:
     """Return the expected electrons of each exposure from which on all its captures are saturated.
 
     Parameters
@@ -117,7 +117,7 @@ def saturating_e(pixel: Pixel) -> FloatArray:
     return np.array([last_e[list(exposure.numbers)].max() for exposure in pixel.exposures])
 
 
-def merged(electrons: FloatArray, light: FloatArray, pixel: Pixel) -> Merged:
+def merged(electrons: PerCapture, light: PerCapture, pixel: Pixel) -> Merged:
     """Merge noisy captures.
 
     Parameters
@@ -144,14 +144,14 @@ def merged(electrons: FloatArray, light: FloatArray, pixel: Pixel) -> Merged:
     return Merged(np.where(constant, np.round(mean, 6), mean), np.where(constant, 0.0, variance), result.certain)
 
 
-def _step_dn(dn: FloatArray, pixel: Pixel) -> FloatArray:
+def _step_dn(dn: PerDesign, pixel: Pixel) -> PerDesign:
     """Return the step of a code at merged values, DN."""
     knees_dn, codes = pixel.knees
     at = np.clip(np.searchsorted(knees_dn, dn, side="right") - 1, 0, codes.size - 2)
     return np.asarray((np.diff(knees_dn) / np.diff(codes))[at], dtype=float)
 
 
-def coded(dn: FloatArray, pixel: Pixel) -> FloatArray:
+def coded(dn: SameShape, pixel: Pixel) -> SameShape:
     """Store merged values as codes, and read them back.
 
     Parameters
@@ -172,7 +172,7 @@ def coded(dn: FloatArray, pixel: Pixel) -> FloatArray:
     return np.asarray(np.interp(np.floor(np.interp(dn, knees_dn, codes) + 0.5), codes, knees_dn), dtype=float)
 
 
-def _over_gains(electrons: FloatArray, light: FloatArray, pixel: Pixel) -> Merged:
+def _over_gains(electrons: PerCapture, light: PerCapture, pixel: Pixel) -> Merged:
     """Return the mean over Gaussian gains of the pixels, by the trapezoidal rule."""
     steps = math.ceil(DRAWN * _PER_DEVIATION * math.sqrt(1 + pixel.prnu**2 * max(saturating_e(pixel))))
     z = DRAWN * np.arange(-steps, steps + 1) / steps
@@ -190,7 +190,7 @@ def _over_gains(electrons: FloatArray, light: FloatArray, pixel: Pixel) -> Merge
     return Merged(about.mean + mean, spread + square - mean**2, certain)
 
 
-def _merged(electrons: FloatArray, light: FloatArray, pixel: Pixel) -> Merged:
+def _merged(electrons: PerCapture, light: PerCapture, pixel: Pixel) -> Merged:
     limits, moments = limits_dn(pixel), []
     for exposure, expected in zip(pixel.exposures, electrons, strict=True):
         captures = tuple(pixel.read_as[number] for number in exposure.numbers)
@@ -207,14 +207,14 @@ def _merged(electrons: FloatArray, light: FloatArray, pixel: Pixel) -> Merged:
     for share, mean, _ in parts:
         total = total + share * mean
     variance = sum(share * (spread + (mean - total) ** 2) for share, mean, spread in parts)
-    certain = np.any([share >= _CERTAIN for share, *_ in parts], axis=0)
+    certain = np.asarray(np.any([share >= _CERTAIN for share, *_ in parts], axis=0))
     gain = pixel.dn_per_e
     return Merged(gain * total + offset, np.asarray(gain**2 * variance, dtype=float), certain)
 
 
 def _combined(
-    moments: list[SubsetMoments], weights: Mapping[tuple[int, int], FloatArray], light: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+    moments: list[SubsetMoments], weights: Mapping[tuple[int, int], SameShape], light: PerCapture
+) -> tuple[SameShape, SameShape]:
     """Return mean and variance of the weighted sum, in electrons of a pixel of full sensitivity."""
     mean = variance = np.zeros(moments[0].share.shape)
     for (at, number), weight in weights.items():
@@ -227,8 +227,8 @@ def _combined(
 
 
 def shape_of_noise(
-    electrons: FloatArray, light: FloatArray, pixel: Pixel, certain: BoolArray
-) -> tuple[BoolArray, FloatArray]:
+    electrons: PerCapture, light: PerCapture, pixel: Pixel, certain: Bool[BoolArray, "*batch"]
+) -> tuple[Bool[BoolArray, "*batch"], SameShape]:
     """Return the shape of the noise of merged values.
 
     Parameters
@@ -269,8 +269,8 @@ def shape_of_noise(
 
 
 def weights_of(
-    usable: tuple[Subset, ...], electrons: FloatArray, light: FloatArray, pixel: Pixel
-) -> dict[tuple[int, int], FloatArray]:
+    usable: tuple[Subset, ...], electrons: Float[Array, " captures *batch"], light: PerCapture, pixel: Pixel
+) -> dict[tuple[int, int], SameShape]:
     """Return the weight of each usable capture.
 
     Parameters
@@ -308,7 +308,9 @@ def _read_noise_e2(pixel: Pixel) -> float:
     return float(pixel.read_noise_e**2 + 1 / (12 * pixel.dn_per_e**2))
 
 
-def without_noise(electrons: FloatArray, light: FloatArray, pixel: Pixel, *, rounds: bool = True) -> FloatArray:
+def without_noise(
+    electrons: Float[Array, " captures *batch"], light: PerCapture, pixel: Pixel, *, rounds: bool = True
+) -> SameShape:
     """Merge captures that are clipped and rounded, without noise.
 
     Parameters
@@ -335,7 +337,9 @@ def without_noise(electrons: FloatArray, light: FloatArray, pixel: Pixel, *, rou
     return coded(values, pixel) if rounds else values
 
 
-def draws(electrons: FloatArray, light: FloatArray, pixel: Pixel, rng: np.random.Generator) -> FloatArray:
+def draws(
+    electrons: Float[Array, " captures *batch"], light: PerCapture, pixel: Pixel, rng: np.random.Generator
+) -> SameShape:
     """Draw one merged value of each pixel (Monte Carlo).
 
     Parameters
@@ -364,8 +368,8 @@ def draws(electrons: FloatArray, light: FloatArray, pixel: Pixel, rng: np.random
 
 
 def merged_readings(
-    read_dn: Sequence[FloatArray], electrons: FloatArray, light: FloatArray, pixel: Pixel
-) -> FloatArray:
+    read_dn: Sequence[SameShape], electrons: Float[Array, " captures *batch"], light: PerCapture, pixel: Pixel
+) -> SameShape:
     """Merge what captures read.
 
     Parameters

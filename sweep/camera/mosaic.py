@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.errors import SweepError, ValidationIssue
-from ..base.types import IndexArray
+from ..base.types import IndexArray, Int
 
 _TOKEN = re.compile(r"[A-Z][a-z0-9]*")
 
@@ -99,11 +99,11 @@ class Mosaic:
         return Mosaic("", tuple(str(at) for at in range(len(self.channels))), self.tile)
 
     @property
-    def indices(self) -> IndexArray:
+    def indices(self) -> Int[IndexArray, "rows columns"]:
         """Tile as ndarray of shape (rows, columns) of channel indices."""
         return np.asarray(self.tile, dtype=np.intp)
 
     @property
-    def counts(self) -> IndexArray:
+    def counts(self) -> Int[IndexArray, " channels"]:
         """Pixels of each channel per tile, ndarray of shape (n_channels,)."""
         return np.bincount(self.indices.ravel(), minlength=len(self.channels))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, DesignNumbers, Float, IndexArray, Int, PerValue
 from .mosaic import Mosaic
 from .scene import Target
 from .setup import Setup
@@ -40,8 +40,8 @@ class Phases:
         Nearest pixel; halfway between two pixels it is either of them.
     """
 
-    center_px: FloatArray
-    nearest_px: FloatArray
+    center_px: Float[Array, "phases 2"]
+    nearest_px: Float[Array, "phases 2"]
 
     def __len__(self) -> int:
         return len(self.center_px)
@@ -51,7 +51,7 @@ class Phases:
         """Hashable key of each phase."""
         return [tuple(row) for row in np.concatenate([self.center_px, self.nearest_px], axis=1).tolist()]
 
-    def subset(self, which: slice | IndexArray) -> Phases:
+    def subset(self, which: slice | DesignNumbers) -> Phases:
         """Return some of the phases.
 
         Parameters
@@ -67,7 +67,7 @@ class Phases:
         return Phases(self.center_px[which], self.nearest_px[which])
 
 
-def lattice_px(mosaic: Mosaic, steps_per_px: int) -> FloatArray:
+def lattice_px(mosaic: Mosaic, steps_per_px: int) -> Float[Array, "phases 2"]:
     """Return the centers of a square lattice over the tile.
 
     Parameters
@@ -129,7 +129,7 @@ def scene_phases(setup: Setup) -> Phases:
     return Phases(centers, np.ceil(centers - 0.5))
 
 
-def different_phases(setup: Setup, phases: Phases) -> tuple[Phases, IndexArray]:
+def different_phases(setup: Setup, phases: Phases) -> tuple[Phases, Int[IndexArray, " phases"]]:
     """Return phases that differ by more than symmetry.
 
     With the mean over the light, mirrored phases are equal.
@@ -160,7 +160,7 @@ def different_phases(setup: Setup, phases: Phases) -> tuple[Phases, IndexArray]:
     return phases.subset(first[order]), np.argsort(order)[which.ravel()]
 
 
-def _folded(along: FloatArray, mirror: float | None, period: int) -> FloatArray:
+def _folded(along: Float[Array, " cells"], mirror: float | None, period: int) -> Float[Array, " cells"]:
     """Return positions along an axis folded at the mirror."""
     if mirror is None:
         return np.asarray(np.mod(along, period))
@@ -168,14 +168,14 @@ def _folded(along: FloatArray, mirror: float | None, period: int) -> FloatArray:
     return np.asarray(np.minimum(beyond, period - beyond))
 
 
-def _mirror(rows: IndexArray) -> float | None:
+def _mirror(rows: Int[IndexArray, "rows k"]) -> float | None:
     """Return the position at which rows are mirror-symmetric, pixels; None if there is none."""
     n = len(rows)
     mirrors = [m for m in range(n) if np.array_equal(rows[(m - np.arange(n)) % n], rows)]
     return mirrors[0] / 2 if mirrors else None
 
 
-def read_at(target: Target, centers_px: FloatArray) -> Phases:
+def read_at(target: Target, centers_px: Float[Array, "phases 2"]) -> Phases:
     """Return phases at some centers; a readout at the center has one phase for each of equally near pixels.
 
     Parameters
@@ -227,8 +227,12 @@ def fine_lattice(setup: Setup) -> tuple[Phases, float]:
 
 
 def refined_minima(
-    setup: Setup, lattice: Phases, step_px: float, values: FloatArray, evaluate: Callable[[Phases], FloatArray]
-) -> tuple[FloatArray, Phases]:
+    setup: Setup,
+    lattice: Phases,
+    step_px: float,
+    values: Float[Array, "values lattice"],
+    evaluate: Callable[[Phases], Float[Array, "_values phases"]],
+) -> tuple[PerValue, Phases]:
     """Refine the smallest values over all sampling phases.
 
     A pattern search: from each of the best known phases to the best neighbor at half the step of the lattice; then
@@ -288,8 +292,12 @@ def refined_minima(
 
 
 def _apart(
-    centers_px: FloatArray, values: FloatArray, n_starts: int, step_px: float, period_px: IndexArray
-) -> IndexArray:
+    centers_px: Float[Array, "phases 2"],
+    values: Float[Array, "values phases"],
+    n_starts: int,
+    step_px: float,
+    period_px: Int[IndexArray, " 2"],
+) -> Int[IndexArray, "values phases_apart"]:
     """Return the indices of the smallest values that are more than a step apart, shape (n_values, n_starts)."""
     starts, left = [values.argmin(axis=1)], values.copy()
     while len(starts) < n_starts:
@@ -300,8 +308,10 @@ def _apart(
 
 
 def _known_or_evaluated(
-    phases: Phases, known: dict[tuple[float, ...], FloatArray], evaluate: Callable[[Phases], FloatArray]
-) -> FloatArray:
+    phases: Phases,
+    known: dict[tuple[float, ...], Float[Array, " _values"]],
+    evaluate: Callable[[Phases], Float[Array, "_values phases"]],
+) -> Float[Array, "values phases"]:
     """Return values at phases, ndarray of shape (n_values, n_phases), and evaluate the unknown ones."""
     keys = phases.keys
     new = np.array([at for at, key in enumerate(keys) if key not in known], dtype=np.intp)

@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from ..base.types import FloatArray, Meters, NonNegative, Section, Share, from_to
+from ..base.types import Array, Float, Meters, NonNegative, SameShape, Section, Share, from_to
 from .captures import (
     MOST_CAPTURES,
     Bits,
@@ -119,7 +119,7 @@ class Pixel(Section):
         return self
 
     @property
-    def knees(self) -> FloatArray:
+    def knees(self) -> Float[Array, "2 knees"]:
         """DN of the merged value, and codes, at 0 and at each knee, ndarray of shape (2, n_knees + 1)."""
         return np.array([(0.0, 0.0), *self.companding]).T
 
@@ -200,7 +200,7 @@ def irradiance_factor(optics: Optics, magnification: float = 0.0, field_angle_ra
     return math.pi * optics.transmission * math.cos(field_angle_rad) ** 4 / cone
 
 
-def unquantized(electrons: FloatArray, pixel: Pixel) -> FloatArray:
+def unquantized(electrons: SameShape, pixel: Pixel) -> SameShape:
     """Apply gain and pedestal without clipping or rounding.
 
     Parameters
@@ -215,4 +215,4 @@ def unquantized(electrons: FloatArray, pixel: Pixel) -> FloatArray:
     ndarray of the same shape
         Digital numbers, DN.
     """
-    return electrons * pixel.dn_per_e + pixel.offset_dn
+    return np.asarray(electrons * pixel.dn_per_e + pixel.offset_dn)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, Float, IndexArray, Int, SameShape
 from . import merge
 from .noise import moments, table
 from .pixel import Pixel, unquantized
@@ -38,7 +38,7 @@ class PixelCurve:
     noisy: bool
 
     @cached_property
-    def knees_e(self) -> FloatArray:
+    def knees_e(self) -> Float[Array, " knees"]:
         """Electrons at which a capture hands over to the next, and from which on the last one is full."""
         pixel = self.pixel
         if not pixel.captures:
@@ -52,7 +52,7 @@ class PixelCurve:
         return np.array(ends)
 
     @cached_property
-    def knee_widths(self) -> FloatArray:
+    def knee_widths(self) -> Float[Array, " knees"]:
         """Noise at each knee relative to its electrons; 0 without noise."""
         if not self.noisy:
             return np.zeros(self.knees_e.size)
@@ -62,16 +62,16 @@ class PixelCurve:
         read_e = np.array([one.read_noise_e for one in pixel.read_as or (pixel,)])
         return np.asarray(np.sqrt(counts + read_e**2) / np.maximum(counts, 1e-9) + pixel.prnu, dtype=float)
 
-    def mean(self, electrons: FloatArray) -> FloatArray:
+    def mean(self, electrons: SameShape) -> SameShape:
         """Return the mean, DN."""
         return self._table.look_up(electrons, 0) if self.noisy else self._noiseless(electrons)
 
-    def moments(self, electrons: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def moments(self, electrons: SameShape) -> tuple[SameShape, SameShape]:
         """Return mean, DN, and variance, DN^2."""
         spread = self._table.look_up(electrons, 1) if self.noisy else np.zeros(electrons.shape)
         return self.mean(electrons), np.maximum(spread, 0.0)
 
-    def slopes(self, electrons: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def slopes(self, electrons: SameShape) -> tuple[SameShape, SameShape]:
         """Return the derivatives of mean and variance by the electrons."""
         if not self.noisy:
             linear = unquantized(electrons, self.pixel.read_once)
@@ -82,7 +82,7 @@ class PixelCurve:
         by_mean, by_variance = np.where(root < last, np.moveaxis(self._by_root(root), -1, 0) / (2 * root), 0.0)
         return by_mean, by_variance
 
-    def _noiseless(self, electrons: FloatArray) -> FloatArray:
+    def _noiseless(self, electrons: SameShape) -> SameShape:
         pixel = self.pixel
         if not pixel.captures:
             return unquantized(np.minimum(electrons, pixel.saturation_e), pixel)
@@ -128,13 +128,13 @@ def pixel_curve(pixel: Pixel, light: tuple[float, ...], *, noisy: bool) -> Pixel
     return PixelCurve(pixel, light, noisy)
 
 
-def same_electrons(one: FloatArray, other: FloatArray) -> bool:
+def same_electrons(one: SameShape, other: SameShape) -> bool:
     """Return whether electrons are the same but for rounding."""
     apart = np.abs(one - other)
     return bool((apart <= _EQUAL * np.abs(other) + _NONE).all())
 
 
-def groups_of(light: FloatArray) -> list[tuple[tuple[float, ...], IndexArray]]:
+def groups_of(light: Float[Array, "captures pixels"]) -> list[tuple[tuple[float, ...], Int[IndexArray, " _pixels"]]]:
     """Return the distinct columns of the light of exposures, [n_exposures, n_elements], and the elements of each."""
     columns, which = np.unique(light, axis=1, return_inverse=True)
     return [(tuple(column), np.flatnonzero(which.ravel() == at)) for at, column in enumerate(columns.T)]

@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 
 from ..base.cache import Cache
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, DesignPixels, Float, FloatArray, IndexArray, Int, PerWavelength
 from ..spectra.spectrum import linear_basis
 from . import disc_image, psf, sampling
 from .field import field_heights, over_field
@@ -56,12 +56,12 @@ class SplitLight:
         Channels of the mosaic.
     """
 
-    values: FloatArray
-    shares: FloatArray | None
-    factor: FloatArray
-    parts: FloatArray
-    place: IndexArray
-    through: IndexArray
+    values: Float[Array, "places functions"]
+    shares: Float[Array, "functions wavelengths"] | None
+    factor: Float[Array, "#wavelengths"]
+    parts: Float[Array, " parts"]
+    place: Int[IndexArray, "parts cases pixels"]
+    through: Int[IndexArray, "parts pixels"]
     n_channels: int
 
     @property
@@ -69,7 +69,7 @@ class SplitLight:
         """Shape (n_cases, n_elements, n_channels, n_wavelengths) of the array."""
         return (*self.place.shape[1:], self.n_channels, self.factor.size)
 
-    def whole(self) -> FloatArray:
+    def whole(self) -> Float[Array, "cases pixels channels wavelengths"]:
         """Return the array.
 
         Returns
@@ -84,13 +84,17 @@ class SplitLight:
             result[:, pixels, through] += share * by_place[place]
         return result
 
-    def _filtered_light(self, spectra: FloatArray) -> FloatArray:
+    def _filtered_light(
+        self, spectra: Float[Array, "designs channels signals wavelengths"]
+    ) -> Float[Array, "designs channels _functions signals"]:
         """Sum over the wavelengths at each place: [..., n, n_wavelengths] to [..., n_places, n]."""
         light = spectra * self.factor
         by_function = light.sum(axis=-1, keepdims=True) if self.shares is None else light @ self.shares.T
         return np.asarray(self.values @ np.swapaxes(by_function, -1, -2), dtype=float)
 
-    def add_sums(self, spectra: FloatArray, channels: Sequence[int], out: FloatArray) -> None:
+    def add_sums(
+        self, spectra: Float[Array, "designs channels signals wavelengths"], channels: Sequence[int], out: DesignPixels
+    ) -> None:
         """Add sums over channels and wavelengths in place.
 
         Results of one design do not depend on other designs, except for rounding.
@@ -110,7 +114,7 @@ class SplitLight:
         row[list(channels)] = np.arange(len(channels))
         gather(np.ascontiguousarray(self._filtered_light(spectra)), self.parts, self.place, row[self.through], out)
 
-    def folded(self, weights: FloatArray, channel: int) -> FloatArray:
+    def folded(self, weights: Float[Array, "cases pixels"], channel: int) -> Float[Array, "cases wavelengths"]:
         """Sum light through one channel's filter over the elements.
 
         Parameters
@@ -152,14 +156,14 @@ class PixelResponse:
         True if each element is a channel; else it is a pixel.
     """
 
-    source: FloatArray | SplitLight
-    uniform: FloatArray
-    readout: FloatArray
-    spread: FloatArray
+    source: Float[Array, "cases pixels channels _wavelengths"] | SplitLight
+    uniform: Float[Array, "cases pixels channels"]
+    readout: Float[Array, "cases pixels channels"]
+    spread: Float[Array, "cases pixels channels"]
     by_channel: bool
 
     @cached_property
-    def light(self) -> FloatArray:
+    def light(self) -> Float[Array, "cases pixels signals wavelengths"]:
         """Light on each element through each channel's filter, relative to a uniform field on axis in clear air.
 
         ndarray of shape (n_phases, n_elements, n_channels, n_wavelengths).
@@ -230,7 +234,7 @@ def pixel_response(setup: Setup, phases: Phases | None, *, by_pixel: bool) -> Pi
     return replace(made, source=(made.light if between is None else made.light @ between) * factor)
 
 
-def _one_light(source: FloatArray | SplitLight) -> bool:
+def _one_light(source: Float[Array, "cases pixels channels wavelengths"] | SplitLight) -> bool:
     """Return whether all wavelengths are equal."""
     return source.shares is None if isinstance(source, SplitLight) else bool(source.shape[-1] == 1)
 
@@ -345,7 +349,7 @@ def _joined(parts: list[PixelResponse]) -> PixelResponse:
     return PixelResponse(light, uniform, readout, spread, parts[0].by_channel)
 
 
-def _profile(setup: Setup, wavelength_nm: FloatArray) -> psf.DiscProfile | None:
+def _profile(setup: Setup, wavelength_nm: PerWavelength) -> psf.DiscProfile | None:
     """Return the light's blurred image as far as any pixel of the readout; None if blur is left out."""
     target = setup.scene.target
     if target is None or not setup.computes("blur"):
@@ -357,7 +361,7 @@ def _profile(setup: Setup, wavelength_nm: FloatArray) -> psf.DiscProfile | None:
     return psf.profile(*sizes, tuple(wavelength_nm * 1e-3), setup.scene.optics.f_number, w20_um)
 
 
-def _pixels(setup: Setup, wavelength_nm: FloatArray, phases: Phases, *, by_pixel: bool) -> PixelResponse:
+def _pixels(setup: Setup, wavelength_nm: PerWavelength, phases: Phases, *, by_pixel: bool) -> PixelResponse:
     """Return the response of every pixel of the readout at every phase."""
     target, pixel, n = setup.scene.target, setup.camera.pixel, len(setup.camera.mosaic.channels)
     assert target is not None
@@ -378,7 +382,9 @@ def _pixels(setup: Setup, wavelength_nm: FloatArray, phases: Phases, *, by_pixel
     return PixelResponse(folded, taken.sum(axis=(1, 2)), weights, weights, by_channel=True)
 
 
-def _weights(setup: Setup, phases: Phases) -> tuple[sampling.Window, FloatArray, FloatArray]:
+def _weights(
+    setup: Setup, phases: Phases
+) -> tuple[sampling.Window, Float[Array, "_cases _pixels _channels"], Float[Array, "_cases _rows _columns _channels"]]:
     """Return pixels around the light, their channels and their weights.
 
     Shapes (rows, columns, n_channels) and (n_cases, rows, columns, n_channels).
@@ -395,7 +401,12 @@ def _weights(setup: Setup, phases: Phases) -> tuple[sampling.Window, FloatArray,
     return window, of_channel, weights[..., None] * of_channel
 
 
-def _apart(light: disc_image.PixelLight, of_channel: FloatArray, apart: FloatArray, share: float) -> PixelResponse:
+def _apart(
+    light: disc_image.PixelLight,
+    of_channel: Float[Array, "_channels _rows _columns"],
+    apart: Float[Array, "_channels _cases _rows _columns"],
+    share: float,
+) -> PixelResponse:
     """Return the response of single pixels that have a weight in any readout."""
     used = (apart > 0).any(axis=(0, 3))
     rows, columns = np.nonzero(used)

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.cache import Cache
-from ..base.types import FloatArray
+from ..base.types import Array, Float, PerKnot, PerWavelength, SameShape
 
 if TYPE_CHECKING:
     from .pixel import Pixel
@@ -44,7 +44,7 @@ _MOST_AT_ONCE = 2_000_000
 
 
 @lru_cache(maxsize=64)
-def gauss_legendre(order: int) -> tuple[FloatArray, FloatArray]:
+def gauss_legendre(order: int) -> tuple[Float[Array, " order"], Float[Array, " order"]]:
     """Return nodes and weights of a Gauss-Legendre rule; cached, since long rules take milliseconds.
 
     Parameters
@@ -127,7 +127,9 @@ def psf_problem(scenario: Scene, pixel: Pixel) -> tuple[tuple[str, ...], str, st
     return None
 
 
-def otf(frequency_per_um: FloatArray, wavelength_um: FloatArray, f_number: float, w20_um: float) -> FloatArray:
+def otf(
+    frequency_per_um: Float[Array, " frequencies"], wavelength_um: PerWavelength, f_number: float, w20_um: float
+) -> Float[Array, "frequencies wavelengths"]:
     """Return the optical transfer function of a circular pupil with defocus.
 
     With s = lambda N nu, which is 1 at the cutoff,
@@ -167,7 +169,9 @@ def otf(frequency_per_um: FloatArray, wavelength_um: FloatArray, f_number: float
     return np.asarray((4 / math.pi) * limit * result, dtype=float)
 
 
-def _frequency_rule(reach_um: float, wavelength_um: FloatArray, f_number: float) -> tuple[FloatArray, FloatArray]:
+def _frequency_rule(
+    reach_um: float, wavelength_um: PerWavelength, f_number: float
+) -> tuple[Float[Array, " frequencies"], Float[Array, " frequencies"]]:
     """Return Gauss-Legendre rules side by side, up to the cutoff of the shortest wavelength.
 
     Parameters
@@ -187,7 +191,11 @@ def _frequency_rule(reach_um: float, wavelength_um: FloatArray, f_number: float)
     return frequency.ravel(), np.tile(weights / 2 * (cutoff / panels), panels)
 
 
-def _hankel_sums(radius_um: FloatArray, frequency_per_um: FloatArray, spectrum: FloatArray) -> FloatArray:
+def _hankel_sums(
+    radius_um: Float[Array, " radii"],
+    frequency_per_um: Float[Array, " frequencies"],
+    spectrum: Float[Array, "frequencies functions"],
+) -> Float[Array, "radii functions"]:
     """Sum J0(2 pi r nu) times a spectrum over the frequencies.
 
     Parameters
@@ -207,7 +215,7 @@ def _hankel_sums(radius_um: FloatArray, frequency_per_um: FloatArray, spectrum: 
     return np.concatenate([j0(np.outer(block, angular)) @ spectrum for block in blocks])
 
 
-def _chebyshev_nodes(reach_um: float, highest_per_um: float) -> FloatArray:
+def _chebyshev_nodes(reach_um: float, highest_per_um: float) -> Float[Array, " nodes"]:
     """Return the Chebyshev nodes in r^2 whose polynomial is h(r) from 0 to a reach, to 1e-15.
 
     J0(z x) has 2 J_k(z / 2)^2 of the Chebyshev polynomial of order k in 2 x^2 - 1, but for its sign (Graf's addition
@@ -253,7 +261,7 @@ class DiscProfile:
     """
 
     def __init__(
-        self, radius_um: float, reach_um: float, wavelength_um: FloatArray, f_number: float, w20_um: float
+        self, radius_um: float, reach_um: float, wavelength_um: PerWavelength, f_number: float, w20_um: float
     ) -> None:
         from scipy.fft import dct  # noqa: PLC0415  (slow to import)
         from scipy.interpolate import make_interp_spline  # noqa: PLC0415  (slow to import)
@@ -284,7 +292,7 @@ class DiscProfile:
         self._spline = make_interp_spline(table_um, table, k=3)
         self._coefficients = np.ascontiguousarray(self._spline.c)  # by columns, from some versions of SciPy
 
-    def at(self, r_um: FloatArray) -> FloatArray:
+    def at(self, r_um: SameShape) -> Float[Array, "*batch wavelengths"]:
         """Return the image at distances from the disc's center.
 
         Parameters
@@ -299,7 +307,7 @@ class DiscProfile:
         """
         return np.asarray(self._spline(r_um) @ self.shares, dtype=float)
 
-    def pixel_means(self, places_um: FloatArray, half_um: float) -> FloatArray:
+    def pixel_means(self, places_um: Float[Array, "places 2"], half_um: float) -> Float[Array, "places functions"]:
         """Return means of the functions of the radius over square pixels, by a Gauss-Legendre rule along each side.
 
         Parameters
@@ -352,7 +360,7 @@ def profile(
     return PROFILES.get(key, lambda: DiscProfile(radius_um, reach_um, np.array(wavelengths_um), f_number, w20_um))
 
 
-def psf_knots_nm(wavelength_nm: FloatArray, step_nm: float) -> FloatArray:
+def psf_knots_nm(wavelength_nm: PerWavelength, step_nm: float) -> PerKnot:
     """Return the wavelengths at which images are computed; between them they are interpolated linearly.
 
     Parameters

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.types import FloatArray
+from ..base.types import Array, Float, PerDesign, PerValue
 from .scene import PwmDrive
 from .setup import Setup
 
 
-def extremes(drive: PwmDrive, exposure_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+def extremes(drive: PwmDrive, exposure_s: PerDesign) -> tuple[PerDesign, PerDesign]:
     """Return the least and most light in an exposure relative to the mean, over all starting times.
 
     The light is on for `duty` of each period, 1 / duty as bright as its mean. In n whole periods and a rest r it is on
@@ -71,13 +71,13 @@ def largest(drive: PwmDrive, shortest_s: float, longest_s: float) -> float:
     return float(extremes(drive, _candidates(drive, shortest_s, longest_s, drive.duty))[1].max())
 
 
-def _candidates(drive: PwmDrive, shortest_s: float, longest_s: float, rest: float) -> FloatArray:
+def _candidates(drive: PwmDrive, shortest_s: float, longest_s: float, rest: float) -> Float[Array, " candidates"]:
     """Return the ends of a range of exposures, and the first exposures in it of whole periods and a rest."""
     times_s = (np.floor(shortest_s * drive.frequency_hz) + np.arange(3) + rest) / drive.frequency_hz
     return np.array([shortest_s, longest_s, *times_s[(times_s >= shortest_s) & (times_s <= longest_s)]])
 
 
-def on_time(drive: PwmDrive, periods: FloatArray) -> FloatArray:
+def on_time(drive: PwmDrive, periods: Float[Array, " *batch"] | float) -> Float[Array, " ..."]:
     """Return how long the light has been on since it was switched on, at the start of a period.
 
     Parameters
@@ -96,7 +96,9 @@ def on_time(drive: PwmDrive, periods: FloatArray) -> FloatArray:
     return np.asarray(whole * drive.duty + np.minimum(periods - whole, drive.duty), dtype=float)
 
 
-def light_in(drive: PwmDrive, start: FloatArray, length: FloatArray) -> FloatArray:
+def light_in(
+    drive: PwmDrive, start: Float[Array, " *batch"] | float, length: Float[Array, " ..."]
+) -> Float[Array, " ..."]:
     """Return the light in an exposure relative to its mean.
 
     Parameters
@@ -116,7 +118,9 @@ def light_in(drive: PwmDrive, start: FloatArray, length: FloatArray) -> FloatArr
     return np.asarray((on_time(drive, start + length) - on_time(drive, start)) / (length * drive.duty), dtype=float)
 
 
-def _windows(setup: Setup, exposure_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _windows(
+    setup: Setup, exposure_s: PerValue
+) -> tuple[Float[Array, "windows values"], Float[Array, "windows values"]]:
     """Return start and length of each exposure of an HDR pixel, ndarray of shape (n_exposures, n_designs), periods."""
     drive = setup.scene.drive
     assert drive is not None
@@ -126,7 +130,7 @@ def _windows(setup: Setup, exposure_s: FloatArray) -> tuple[FloatArray, FloatArr
     return np.array(starts)[:, None] * periods, np.array(lengths)[:, None] * periods
 
 
-def phases_of(setup: Setup, exposure_s: FloatArray, between: int) -> FloatArray:
+def phases_of(setup: Setup, exposure_s: PerDesign, between: int) -> Float[Array, "designs phases"]:
     """Return phases of a pulse: those at which an exposure begins or ends with a pulse, and some between them.
 
     The light in each exposure is linear between two such phases, so that its extremes are at them.
@@ -155,7 +159,9 @@ def phases_of(setup: Setup, exposure_s: FloatArray, between: int) -> FloatArray:
     return np.asarray((corners[:, None] + gaps[:, None] * steps[:, None]).reshape(-1, starts.shape[1]).T, dtype=float)
 
 
-def exposure_scales(setup: Setup, exposure_s: FloatArray, moments: FloatArray | None = None) -> FloatArray:
+def exposure_scales(
+    setup: Setup, exposure_s: PerDesign, moments: Float[Array, " moments"] | None = None
+) -> Float[Array, "captures designs moments"]:
     """Return the light in each exposure of an HDR pixel relative to its mean, at phases of the pulse.
 
     Parameters
@@ -183,7 +189,9 @@ def exposure_scales(setup: Setup, exposure_s: FloatArray, moments: FloatArray | 
     return light_in(drive, phases + starts[:, :, None], lengths[:, :, None])
 
 
-def scales(setup: Setup, exposure_s: FloatArray, moments: FloatArray | None = None) -> FloatArray:
+def scales(
+    setup: Setup, exposure_s: PerDesign, moments: Float[Array, " moments"] | None = None
+) -> Float[Array, "designs moments"]:
     """Return the light relative to its mean at the moments that are computed.
 
     Behind a linear readout the extremes are at the two ends. Behind a nonlinear one the distance of two signals may be

@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..base.types import BoolArray, FloatArray, IndexArray
+from ..base.types import Array, Bool, BoolArray, Float, IndexArray, Int, PerValue
 from .merge import exposure_of, limits_dn, saturating_e
 from .noise import gaussian
 from .noise.subsets import share_beyond
@@ -45,13 +45,13 @@ class Bins:
         Electrons and codes of a companded pixel, from (0, 0) on; of shape (2, 1) if it is none.
     """
 
-    edges_e: FloatArray
-    light: FloatArray
-    dark_e: FloatArray
-    knees: FloatArray
+    edges_e: Float[Array, " captures"]
+    light: Float[Array, " captures"]
+    dark_e: Float[Array, " captures"]
+    knees: Float[Array, "2 knees"]
 
     @classmethod
-    def of(cls, pixel: Pixel, light: FloatArray) -> Bins:
+    def of(cls, pixel: Pixel, light: Float[Array, " captures"]) -> Bins:
         """Return the bins of a pixel.
 
         Parameters
@@ -74,7 +74,7 @@ class Bins:
         return cls(np.maximum.accumulate([0.0, *ends]), light, dark, knees)
 
     @property
-    def _starts(self) -> FloatArray:
+    def _starts(self) -> Float[Array, " exposures"]:
         """Standard deviations of the noise below each of the edges."""
         ends = (
             2
@@ -83,7 +83,7 @@ class Bins:
         )
         return np.concatenate([[0.0], np.cumsum(ends)])
 
-    def number(self, electrons: FloatArray) -> IndexArray:
+    def number(self, electrons: PerValue) -> Int[IndexArray, " values"]:
         """Return the bins of merged values.
 
         Parameters
@@ -104,7 +104,7 @@ class Bins:
         widths = 2 * light * (np.sqrt(size + dark) - np.sqrt(edge + dark)) + self._starts[at]
         return np.asarray(np.floor(NOISE_BINS * np.copysign(widths, electrons)), dtype=np.intp)
 
-    def value(self, number: IndexArray | FloatArray) -> FloatArray:
+    def value(self, number: Int[IndexArray, " values"] | PerValue) -> PerValue:
         """Return the values in the middle of bins.
 
         Parameters
@@ -127,7 +127,9 @@ class Bins:
         return np.asarray(np.copysign(above, widths), dtype=float)
 
 
-def nodes_of(pixel: Pixel, light: FloatArray) -> tuple[FloatArray, BoolArray]:
+def nodes_of(
+    pixel: Pixel, light: Float[Array, " captures"]
+) -> tuple[Float[Array, " roots"], Bool[BoolArray, " roots"]]:
     """Return expected electrons at which a merged value is tabulated: one in each eighth of its noise.
 
     Parameters
@@ -154,7 +156,7 @@ def nodes_of(pixel: Pixel, light: FloatArray) -> tuple[FloatArray, BoolArray]:
     return roots_e, is_node
 
 
-def n_roots(pixel: Pixel, light: FloatArray) -> int:
+def n_roots(pixel: Pixel, light: Float[Array, " captures"]) -> int:
     """Return the number of multiples of `ROOT_STEP` up to the root of the electrons from which on all is saturated.
 
     Parameters
@@ -195,11 +197,11 @@ class Readings:
     """
 
     bins: Bins
-    exposure: IndexArray
-    passed: FloatArray
-    starts: IndexArray
-    columns: IndexArray
-    shares: FloatArray
+    exposure: Int[IndexArray, " captures"]
+    passed: Float[Array, "captures exposures counts"]
+    starts: Int[IndexArray, "captures counts+1"]
+    columns: Int[IndexArray, " entries"]
+    shares: Float[Array, " entries"]
     first: int
     n_bins: int
 
@@ -266,7 +268,9 @@ def readings_of(pixel: Pixel, light: tuple[float, ...]) -> Readings:
     return Readings(bins, exposure, passed, starts, columns, shares, first, n_bins)
 
 
-def _read(counts: FloatArray, pixel: Pixel, limit_dn: int | None) -> tuple[IndexArray, FloatArray, FloatArray]:
+def _read(
+    counts: Float[Array, " counts"], pixel: Pixel, limit_dn: int | None
+) -> tuple[Int[IndexArray, " _counts"], Float[Array, " _counts"], Float[Array, " _counts"]]:
     """Return row, digital number below the limit, and probability, of each count and number that occur."""
     sigma = pixel.dn_per_e * pixel.read_noise_e
     mean = pixel.dn_per_e * np.minimum(counts, pixel.well_e) + pixel.offset_dn

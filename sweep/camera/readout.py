@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.types import BoolArray, FloatArray, IndexArray
+from ..base.types import Array, Bool, BoolArray, DesignCases, DesignPixels, Float, IndexArray, Int, PerDesign, SameShape
 from . import merge
 from .noise import table
 from .pixel import Pixel, unquantized
@@ -26,7 +26,7 @@ _MANY = 50_000
 """Values from which on a compiled pass saves more time than it takes to load."""
 
 
-def draws_dn(electrons: FloatArray, pixel: Pixel, rng: np.random.Generator) -> FloatArray:
+def draws_dn(electrons: SameShape, pixel: Pixel, rng: np.random.Generator) -> SameShape:
     """Draw one readout of each pixel (Monte Carlo), with its own gain error.
 
     Parameters
@@ -77,14 +77,16 @@ class NoisyReadout:
         Exposure time, s.
     """
 
-    mean: FloatArray
-    variance: FloatArray
-    gaussian: BoolArray
-    reach_dn: FloatArray
-    exposure_s: FloatArray
+    mean: DesignCases
+    variance: DesignCases
+    gaussian: Bool[BoolArray, "designs cases signals channels"]
+    reach_dn: DesignCases
+    exposure_s: PerDesign
 
 
-def is_cut(electrons: FloatArray, pixel: Pixel) -> FloatArray:
+def is_cut(
+    electrons: Float[Array, "captures designs signals pixels"], pixel: Pixel
+) -> Float[Array, "captures designs signals pixels"]:
     """Return 1 where the full well or an end of the ADC cuts a pixel's noise, else 0.
 
     Parameters
@@ -103,7 +105,12 @@ def is_cut(electrons: FloatArray, pixel: Pixel) -> FloatArray:
     return ((electrons < low) | (electrons > high)).astype(float)
 
 
-def is_gaussian(variance: FloatArray, heaviest: FloatArray, cut: BoolArray, pixel: Pixel) -> BoolArray:
+def is_gaussian(
+    variance: DesignCases,
+    heaviest: Float[Array, "cases 1 channels"],
+    cut: Bool[BoolArray, "designs cases signals channels"],
+    pixel: Pixel,
+) -> Bool[BoolArray, "designs cases signals channels"]:
     """Return whether the noise of a channel may be taken as Gaussian; see `NoisyReadout`.
 
     Parameters
@@ -126,7 +133,7 @@ def is_gaussian(variance: FloatArray, heaviest: FloatArray, cut: BoolArray, pixe
     return np.asarray(~cut & (dithered | (variance >= MANY_STEPS * heaviest**2)), dtype=bool)
 
 
-def reach_dn(electrons: FloatArray, pixel: Pixel) -> FloatArray:
+def reach_dn(electrons: Float[Array, "*batch pixels"], pixel: Pixel) -> Float[Array, "*batch 1"]:
     """Return the largest distance of a pixel's number from its mean with a probability above 1e-15.
 
     Parameters
@@ -146,7 +153,7 @@ def reach_dn(electrons: FloatArray, pixel: Pixel) -> FloatArray:
     return np.asarray(reach.max(axis=-1, keepdims=True), dtype=float)
 
 
-def capture_light(setup: Setup, response: PixelResponse) -> FloatArray:
+def capture_light(setup: Setup, response: PixelResponse) -> Float[Array, "captures pixels"]:
     """Return the light of each exposure of an HDR pixel relative to that of a pixel of full sensitivity.
 
     Parameters
@@ -194,7 +201,7 @@ class Readout:
         one.weights, one.spread_weights = self.weights[place][None], self.spread_weights[place][None]
         return one
 
-    def transfer(self, electrons: FloatArray) -> FloatArray:
+    def transfer(self, electrons: Float[Array, "... pixels"]) -> Float[Array, "... pixels"]:
         """Convert expected electrons to digital numbers; under noise, to their means.
 
         Parameters
@@ -225,7 +232,7 @@ class Readout:
             return dn + table.mean_rounded(electrons, pixel) - table.mean_unrounded(electrons, pixel)
         return rounded(held * pixel.dn_per_e, pixel)
 
-    def _merged_means(self, electrons: FloatArray) -> FloatArray:
+    def _merged_means(self, electrons: Float[Array, "captures designs cases signals pixels"]) -> DesignPixels:
         """Return means of merged values: from a table where exposures have their fixed share of the electrons."""
         light = self.capture_light_of(electrons)
         full_e = electrons[0] / light[0]
@@ -239,7 +246,9 @@ class Readout:
             means[..., at] = pixel_curve(self.pixel, of_elements, noisy=True).mean(full_e[..., at])
         return means
 
-    def _whole_numbers(self, electrons: FloatArray, clips: bool) -> FloatArray:
+    def _whole_numbers(
+        self, electrons: Float[Array, "captures *batch pixels"], clips: bool
+    ) -> Float[Array, "captures *batch pixels"]:
         """Convert electrons to whole digital numbers without noise, in one pass."""
         from .compiled import whole_numbers  # noqa: PLC0415  (compiled: kept off the start-up path)
 
@@ -250,7 +259,7 @@ class Readout:
         whole_numbers(many.reshape(-1), *line, numbers.reshape(-1))
         return numbers
 
-    def capture_light_of(self, electrons: FloatArray) -> FloatArray:
+    def capture_light_of(self, electrons: Float[Array, "captures ... pixels"]) -> Float[Array, "captures ... pixels"]:
         """Return the relative light of exposures, broadcast to their electrons.
 
         Parameters
@@ -266,7 +275,9 @@ class Readout:
         shape = (len(electrons), *(1,) * (electrons.ndim - 2), electrons.shape[-1])
         return self.capture_light.reshape(shape)
 
-    def variance_dn(self, electrons: FloatArray) -> FloatArray:
+    def variance_dn(
+        self, electrons: Float[Array, "captures designs signals pixels"]
+    ) -> Float[Array, "captures designs signals pixels"]:
         """Return the variance of the digital numbers, with rounding.
 
         Parameters
@@ -281,7 +292,7 @@ class Readout:
         """
         return table.variance(electrons, self.pixel)
 
-    def folded(self, dn: FloatArray) -> FloatArray:
+    def folded(self, dn: Float[Array, "designs ... pixels"]) -> Float[Array, "designs ... channels"]:
         """Combine the elements to channels.
 
         Parameters
@@ -296,7 +307,7 @@ class Readout:
         """
         return dn if self.by_channel else self._weighed(dn, self.weights)
 
-    def spread(self, variance: FloatArray) -> FloatArray:
+    def spread(self, variance: DesignPixels) -> DesignCases:
         """Combine variances of the elements to those of the channels.
 
         Parameters
@@ -311,7 +322,9 @@ class Readout:
         """
         return self._weighed(variance, self.spread_weights)
 
-    def with_noise(self, electrons: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray, FloatArray]:
+    def with_noise(
+        self, electrons: Float[Array, "*captures designs cases signals pixels"]
+    ) -> tuple[DesignCases, DesignCases, Bool[BoolArray, "designs cases signals channels"], DesignCases]:
         """Read out a block with noise.
 
         Parameters
@@ -336,7 +349,7 @@ class Readout:
         mean, variance = self.folded(dn), self.spread(variance_dn)
         return (mean, variance, *self._shape_of_noise(electrons, variance))
 
-    def channels_of(self, pixels: FloatArray, phase_index: int) -> FloatArray:
+    def channels_of(self, pixels: Float[Array, "signals pixels"], phase_index: int) -> Float[Array, "signals channels"]:
         """Return the channels from their pixels at one sampling phase.
 
         Parameters
@@ -357,14 +370,14 @@ class Readout:
             return np.asarray(pixels @ (in_channel / setup.camera.mosaic.counts), dtype=float)
         return np.asarray(pixels @ self.weights[phase_index], dtype=float)
 
-    def of_pixels(self, values: FloatArray) -> FloatArray:
+    def of_pixels(self, values: Float[Array, " ..."]) -> Float[Array, " ..."]:
         """Return values of the pixels of a tile, row by row, from those of channels that fill the field."""
         if self.by_channel and self.setup.scene.target is None:
             return values[..., self.setup.camera.mosaic.indices.ravel()]
         return values
 
     @property
-    def few_pixels(self) -> tuple[IndexArray, ...] | None:
+    def few_pixels(self) -> tuple[Int[IndexArray, " _pixels"], ...] | None:
         """Pixels whose mean is each channel; None for a target, or if they are many."""
         setup = self.setup
         if setup.scene.target is not None or setup.camera.mosaic.counts.max() > _FEW:
@@ -372,27 +385,36 @@ class Readout:
         channels = setup.camera.mosaic.indices.ravel()
         return tuple(np.flatnonzero(channels == at) for at in range(len(setup.camera.mosaic.channels)))
 
-    def _weighed(self, values: FloatArray, weights: FloatArray) -> FloatArray:
+    def _weighed(self, values: DesignPixels, weights: Float[Array, "_positions pixels channels"]) -> DesignCases:
         """Sum over the elements with weights, ndarray of shape (n_cases, n_elements, n_channels)."""
         repeats = values.shape[1] // self.n_cases
         return np.asarray(values @ np.repeat(weights, repeats, axis=0))
 
-    def _shape_of_noise(self, electrons: FloatArray, variance: FloatArray) -> tuple[BoolArray, FloatArray]:
+    def _shape_of_noise(
+        self,
+        electrons: Float[Array, "captures designs signals pixels"],
+        variance: Float[Array, "captures designs signals _channels"],
+    ) -> tuple[
+        Bool[BoolArray, "captures designs signals _channels"], Float[Array, "captures designs signals _channels"]
+    ]:
         """Return `gaussian` and `reach_dn` of `NoisyReadout`."""
         heaviest = self._heaviest(variance)
         cut = self._weighed(is_cut(electrons, self.pixel), (self.weights > 0).astype(float)) > 0
         return is_gaussian(variance, heaviest, cut, self.pixel), reach_dn(electrons, self.pixel) * heaviest
 
     def _shape_of_merged(
-        self, pixels: merge.Merged, electrons: FloatArray, variance: FloatArray
-    ) -> tuple[BoolArray, FloatArray]:
+        self,
+        pixels: merge.Merged,
+        electrons: Float[Array, "captures designs cases signals pixels"],
+        variance: DesignCases,
+    ) -> tuple[Bool[BoolArray, "designs cases signals channels"], DesignCases]:
         """Return `gaussian` and `reach_dn` of `NoisyReadout` for HDR pixels."""
         light = self.capture_light_of(electrons)
         gaussian, reach_dn = merge.shape_of_noise(electrons, light, self.pixel, pixels.certain)
         others = self._weighed((~gaussian).astype(float), (self.weights > 0).astype(float))
         return others == 0, reach_dn.max(axis=-1, keepdims=True) * self._heaviest(variance)
 
-    def _heaviest(self, variance: FloatArray) -> FloatArray:
+    def _heaviest(self, variance: DesignPixels) -> Float[Array, "cases 1 channels"]:
         """Return the largest weight of a pixel in each channel, broadcast to the cases."""
         repeats = variance.shape[1] // self.n_cases
         heaviest = self.weights.max(axis=1) if self.setup.scene.target else 1 / self.setup.camera.mosaic.counts[None]

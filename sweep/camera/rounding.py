@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ..base.types import FloatArray
+from ..base.types import SameShape
 from .pixel import Pixel
 
 MOST_POISSON_E = 1e18
@@ -17,7 +17,7 @@ MANY_STEPS = 16.0
 """Variance in squared steps, from which on it shows in none, either."""
 
 
-def rounded(dn: FloatArray, pixel: Pixel) -> FloatArray:
+def rounded(dn: SameShape, pixel: Pixel) -> SameShape:
     """Add the pedestal, round half up, and clip to the range of the ADC.
 
     The whole part of the pedestal is added after rounding, so that values with and without a whole pedestal differ by

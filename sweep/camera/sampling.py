@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, Float, IndexArray, Int, Num
 from .mosaic import Mosaic
 from .scene import Target
 from .setup import Setup
@@ -29,17 +29,17 @@ class Window:
         Distance from the light's center along columns and rows, pixels.
     """
 
-    channel: IndexArray
-    dx: FloatArray
-    dy: FloatArray
+    channel: Int[IndexArray, "rows columns"]
+    dx: Num[Array, "cases rows columns"]
+    dy: Num[Array, "cases rows columns"]
 
     @property
-    def columns(self) -> FloatArray:
+    def columns(self) -> Float[Array, "rows columns"]:
         """`dx` of each column, ndarray of shape (n_cases, columns)."""
         return np.ascontiguousarray(self.dx[:, 0, :])
 
     @property
-    def rows(self) -> FloatArray:
+    def rows(self) -> Float[Array, "rows columns"]:
         """`dy` of each row, ndarray of shape (n_cases, rows)."""
         return np.ascontiguousarray(self.dy[:, :, 0])
 
@@ -84,7 +84,7 @@ def reach_px(setup: Setup, target: Target) -> float:
     return float(max(setup.camera.mosaic.indices.shape))
 
 
-def window(mosaic: Mosaic, phases_px: FloatArray, reach_px: float) -> Window:
+def window(mosaic: Mosaic, phases_px: Float[Array, "cases 2"], reach_px: float) -> Window:
     """Return all pixels near the centers of the light.
 
     Parameters
@@ -112,7 +112,7 @@ def window(mosaic: Mosaic, phases_px: FloatArray, reach_px: float) -> Window:
     return Window(channel, dx, dy)
 
 
-def mean_weights(window: Window, half: float, readout_px: float, n_channels: int) -> FloatArray:
+def mean_weights(window: Window, half: float, readout_px: float, n_channels: int) -> Float[Array, "cases rows columns"]:
     """Return the weight of each pixel in the mean of its channel.
 
     Parameters
@@ -140,7 +140,7 @@ def mean_weights(window: Window, half: float, readout_px: float, n_channels: int
     return weights
 
 
-def center_weights(window: Window, home: FloatArray, mosaic: Mosaic) -> FloatArray:
+def center_weights(window: Window, home: Float[Array, "cases 2"], mosaic: Mosaic) -> Float[Array, "cases rows columns"]:
     """Return the weight of each pixel in the demosaicked value of its channel at one pixel.
 
     Normalized convolution with a tent as wide as the tile, (1 - |dx| / columns)(1 - |dy| / rows), which for a Bayer
@@ -171,7 +171,9 @@ def center_weights(window: Window, home: FloatArray, mosaic: Mosaic) -> FloatArr
     return np.asarray(weights, dtype=float)
 
 
-def with_crosstalk(light: FloatArray, share: float, *, periodic: bool = False) -> FloatArray:
+def with_crosstalk(
+    light: Float[Array, "cases rows columns *batch"], share: float, *, periodic: bool = False
+) -> Float[Array, "cases rows columns *batch"]:
     """Mix each pixel with its neighbors: (1 - share) of its own light and share / 4 of each neighbor's.
 
     Parameters

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from ..base.errors import DataError, ValidationIssue, nearest
-from ..base.types import FloatArray
+from ..base.types import Array, Float, PerWavelength
 from ..designs.technology import Technology
 from ..spectra.builtin.ar0820 import ar0820, ir_cut_transmission
 from ..spectra.builtin.measured_sets import SENSORS, ir_cut
@@ -50,14 +50,14 @@ class SensorCurves:
     """
 
     name: str
-    qe: Mapping[str, FloatArray]
+    qe: Mapping[str, PerWavelength]
     clear: str
     source: str
     surrogate: bool = False
     variants: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     technologies: Mapping[str, Technology | None] = field(default_factory=dict)
     has_clear: bool = True
-    ir_cut: FloatArray | None = None
+    ir_cut: PerWavelength | None = None
 
     @property
     def brightest(self) -> str:
@@ -79,7 +79,7 @@ class SensorCurves:
         """
         return self.variants.get(cfa, {}).get(channel, channel)
 
-    def curve(self, name: str) -> FloatArray:
+    def curve(self, name: str) -> PerWavelength:
         """Return a curve.
 
         Parameters
@@ -109,7 +109,9 @@ class SensorCurves:
             )
         return self.qe[name]
 
-    def mosaic_qe(self, mosaic: Mosaic, replaced: Mapping[str, str] | None = None) -> FloatArray:
+    def mosaic_qe(
+        self, mosaic: Mosaic, replaced: Mapping[str, str] | None = None
+    ) -> Float[Array, "channels wavelengths"]:
         """Return the curves of a mosaic's channels.
 
         Parameters
@@ -145,7 +147,7 @@ class SensorCurves:
         return [names[channel] for channel in mosaic.channels]
 
 
-def make_sensor(name: str, qe: Mapping[str, FloatArray], source: str, clear: str | None = None) -> SensorCurves:
+def make_sensor(name: str, qe: Mapping[str, PerWavelength], source: str, clear: str | None = None) -> SensorCurves:
     """Make a sensor from curves on the grid.
 
     Parameters

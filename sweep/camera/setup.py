@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from ..base.types import IndexArray
+from ..base.types import MemberNumbers
 from ..spectra.lights import Lights
 from ..spectra.tasks import StudyTasks
 from .accuracy import STANDARD, Accuracy
@@ -63,7 +63,7 @@ class Setup:
         return replace(self, camera=replace(self.camera, **changes))
 
     @property
-    def members(self) -> dict[str, IndexArray]:
+    def members(self) -> dict[str, MemberNumbers]:
         """Indices of the signals of each signal type."""
         return self.lights.members
 

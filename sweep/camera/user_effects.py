@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.errors import SweepError, ValidationIssue
-from ..base.types import FloatArray
+from ..base.types import Array, Float, FloatArray, PerWavelength
 from ..base.user_code import UserCode, name_in_file
 
 
@@ -44,7 +44,7 @@ class UserEffect:
         """Name in plans and provenance."""
         return name_in_file(self.code.name)
 
-    def applied(self, irradiance: Irradiance, scene: object) -> tuple[FloatArray, FloatArray]:
+    def applied(self, irradiance: Irradiance, scene: object) -> tuple[Float[Array, "... wavelengths"], PerWavelength]:
         """Return the irradiance of signals and background behind the effect.
 
         Parameters

@@ -18,7 +18,7 @@ import pyarrow as pa
 from threadpoolctl import threadpool_limits
 
 from ..base.errors import SweepError, ValidationIssue
-from ..base.types import FloatArray, IndexArray, Progress
+from ..base.types import Array, DesignNumbers, Float, PerDesign, Progress
 from ..camera.accuracy import PRESETS, Accuracy
 from ..camera.forward import ForwardModel
 from ..camera.setup import Setup
@@ -47,7 +47,7 @@ class Measured:
     where there is none.
     """
 
-    csds: FloatArray
+    csds: PerDesign
     first_s: float
     following_s: float
 
@@ -98,13 +98,13 @@ def _in_words(table: pd.DataFrame) -> pd.DataFrame:
     return shown
 
 
-def spread(n: int) -> IndexArray:
+def spread(n: int) -> DesignNumbers:
     """Return 0 to n - 1 in an order whose every prefix covers the range evenly; 0 first."""
     golden = (math.sqrt(5) - 1) / 2
     return np.argsort(np.arange(n) * golden % 1.0, kind="stable")
 
 
-def _in_new_process(setup: Setup, space: Space, numbers: IndexArray) -> Measured:
+def _in_new_process(setup: Setup, space: Space, numbers: DesignNumbers) -> Measured:
     """Measure designs in a process of its own; raises SweepError when that is killed."""
     try:
         with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
@@ -113,7 +113,7 @@ def _in_new_process(setup: Setup, space: Space, numbers: IndexArray) -> Measured
         raise SweepError(ValidationIssue("the process of a measurement was killed", key="accuracy")) from None
 
 
-def _measure(setup: Setup, space: Space, numbers: IndexArray) -> Measured:
+def _measure(setup: Setup, space: Space, numbers: DesignNumbers) -> Measured:
     """Measure designs with one thread, in a process that has computed nothing but what warms it up."""
     with threadpool_limits(1):
         _warm_up(setup, space)
@@ -140,7 +140,7 @@ def _warm_up(setup: Setup, space: Space) -> None:
         _evaluated(model, one, np.zeros(n_designs, dtype=np.intp))
 
 
-def _evaluated(model: ForwardModel, space: Space, numbers: IndexArray) -> Columns:
+def _evaluated(model: ForwardModel, space: Space, numbers: DesignNumbers) -> Columns:
     """Columns of designs, by their edges where the space is separable, as in a run; else by their curves."""
     block = edges_of_some(space, numbers)
     if block is None:
@@ -148,7 +148,7 @@ def _evaluated(model: ForwardModel, space: Space, numbers: IndexArray) -> Column
     return evaluate(model, block)
 
 
-def _csds(model: ForwardModel, space: Space, numbers: IndexArray) -> FloatArray:
+def _csds(model: ForwardModel, space: Space, numbers: DesignNumbers) -> Float[Array, "csds designs"]:
     """All CSDs, at the best sampling phase too where all phases count, ndarray[n_csds, n_designs]."""
     columns = _evaluated(model, space, numbers)
     names = [csd_name(pair) for pair in class_pairs(model.setup.lights.classes)]

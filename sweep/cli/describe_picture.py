@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.types import FloatArray
+from ..base.types import PerValue
 from ..report.figures import CURVE_COLORS, CURVE_CYCLE, TYPE_COLORS, canvas_grid
 from ..spectra.color import REGIONS, display_colors
 from ..spectra.facts import Curve, Facts
@@ -95,7 +95,7 @@ def _draw_curves(axes: Axes, facts: Facts, paints: Mapping[str, Paint]) -> None:
             text.set_parse_math(False)
 
 
-def _thinned(curve: Curve) -> tuple[FloatArray, FloatArray]:
+def _thinned(curve: Curve) -> tuple[PerValue, PerValue]:
     """Return the samples to draw: of very many the smallest and the largest of each group, so that no peak is lost."""
     group = -(-2 * curve.values.size // _MOST_POINTS)
     if group <= 2:

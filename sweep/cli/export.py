@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import OutputError, SweepError, ValidationIssue
-from ..base.types import FloatArray
+from ..base.types import PerWavelength
 from ..report import Output, check_kept, read_output, study_of
 from ..report.parameter_map import specification
 from ..results.atomic import write_bytes
@@ -118,7 +118,7 @@ def export_design(
     return lines
 
 
-def relative_transmission(modified: FloatArray, base: FloatArray) -> FloatArray:
+def relative_transmission(modified: PerWavelength, base: PerWavelength) -> PerWavelength:
     """Return the transmission of a modified channel relative to the curve that it replaces.
 
     Parameters
@@ -138,7 +138,9 @@ def relative_transmission(modified: FloatArray, base: FloatArray) -> FloatArray:
         return np.divide(modified, base, out=unlit, where=base > 0)
 
 
-def _verify(output: Output, row: Row, modified: Mapping[str, FloatArray], base_qe: Mapping[str, FloatArray]) -> None:
+def _verify(
+    output: Output, row: Row, modified: Mapping[str, PerWavelength], base_qe: Mapping[str, PerWavelength]
+) -> None:
     """Compare the modified channels with what the run kept of them, and with the row's sensitivity."""
     check_kept(output, output.curves.designs.get(int(row["design_id"]), {}), modified)
     if modified:
@@ -205,7 +207,9 @@ def _lines(output: Output, row: Row, bases: Mapping[str, str]) -> list[str]:
     return lines
 
 
-def _remarks(wavelength_nm: FloatArray, bases: Mapping[str, str], transmissions: Mapping[str, FloatArray]) -> list[str]:
+def _remarks(
+    wavelength_nm: PerWavelength, bases: Mapping[str, str], transmissions: Mapping[str, PerWavelength]
+) -> list[str]:
     """Describe the transmissions for the manufacturer of the filter."""
     lines = []
     for (channel, base), (name, values) in zip(bases.items(), transmissions.items(), strict=True):

@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from ..base.types import FloatArray
+from ..base.types import Array, DesignParameters, Float, ParameterWeights, PerParameter, PerWavelength
 from .edge import SPAN_PER_WIDTH, edge, edge_gradient
 from .family import Parameter
 from .products import row_products
@@ -47,7 +47,7 @@ def band_parameters(number: int | None = None) -> tuple[Parameter, ...]:
 class Bands:
     """Sum of bands, each depth times e(l; left) - e(l; right), and the conditions that keep it between 0 and 1."""
 
-    def __init__(self, wavelength_nm: FloatArray, count: int) -> None:
+    def __init__(self, wavelength_nm: PerWavelength, count: int) -> None:
         self._wave = wavelength_nm
         self._count = count
         self.parameters = (
@@ -55,7 +55,7 @@ class Bands:
         )
         self._conditions = self._condition_matrix()
 
-    def shape(self, x: FloatArray) -> FloatArray:
+    def shape(self, x: DesignParameters) -> Float[Array, "designs wavelengths"]:
         """Return the sum of the bands.
 
         Parameters
@@ -70,7 +70,7 @@ class Bands:
         """
         return np.asarray(sum(self._depth(x, band) * self._open(x, band) for band in range(self._count)), dtype=float)
 
-    def gradient(self, x: FloatArray) -> FloatArray:
+    def gradient(self, x: PerParameter) -> Float[Array, "parameters wavelengths"]:
         """Return the derivative of `shape` at one design.
 
         Parameters
@@ -94,7 +94,7 @@ class Bands:
         rows[:, DEPTH] = edges[:, 0] - edges[:, 1]
         return rows.reshape(-1, self._wave.size)
 
-    def reach(self, low: FloatArray, high: FloatArray) -> FloatArray:
+    def reach(self, low: PerParameter, high: PerParameter) -> PerWavelength:
         """Return where a band of the box can be open.
 
         Parameters
@@ -114,7 +114,7 @@ class Bands:
             open_at[(self._wave >= start) & (self._wave <= end)] = 1.0
         return open_at
 
-    def range(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def range(self, low: PerParameter, high: PerParameter) -> tuple[PerWavelength, PerWavelength]:
         """Return bounds on `shape` in a box, for any order of the edges.
 
         An edge falls with its center; with its width it falls behind the center and rises before it. Its extremes are
@@ -161,7 +161,7 @@ class Bands:
         return Bands(off.nominal_nm(self._wave), self._count)
 
     @property
-    def dimensions(self) -> dict[str, FloatArray]:
+    def dimensions(self) -> dict[str, ParameterWeights]:
         """Rows whose smallest product with the parameters is the narrowest edge (10 to 90 %) and band, nm."""
         identity = np.eye(self._count * _PER_BAND)
         first = np.arange(self._count) * _PER_BAND
@@ -170,7 +170,7 @@ class Bands:
             "band_width_nm": identity[first + RIGHT] - identity[first + LEFT],
         }
 
-    def violation(self, x: FloatArray) -> FloatArray:
+    def violation(self, x: DesignParameters) -> Float[Array, "designs _conditions"]:
         """Return the order of the edges.
 
         Start and end of a left edge must not lie behind those of its right edge, and a band must end before the next
@@ -188,7 +188,7 @@ class Bands:
         """
         return row_products(x, self._conditions.T)
 
-    def violation_gradient(self, x: FloatArray) -> FloatArray:
+    def violation_gradient(self, x: PerParameter) -> ParameterWeights:
         """Return the derivative of `violation`, which is constant.
 
         Parameters
@@ -204,11 +204,11 @@ class Bands:
         assert x.shape == (self._count * _PER_BAND,)
         return self._conditions
 
-    def edges(self, centers_and_widths: FloatArray) -> FloatArray:
+    def edges(self, centers_and_widths: Float[Array, "bands 2"]) -> Float[Array, "bands wavelengths"]:
         """Return rising edges."""
         return edge(self._wave, centers_and_widths[:, :1], centers_and_widths[:, 1:])
 
-    def _open(self, x: FloatArray, band: int) -> FloatArray:
+    def _open(self, x: DesignParameters, band: int) -> Float[Array, "designs gaps"]:
         at = band * _PER_BAND
         if len(x) < _FEW:
             edges = self.edges(x[:, at : at + DEPTH].reshape(-1, 2)).reshape(len(x), 2, -1)
@@ -216,15 +216,15 @@ class Bands:
         left, right = (self._each_once(x[:, at + i : at + i + 2]) for i in (LEFT, RIGHT))
         return np.asarray(left - right, dtype=float)
 
-    def _each_once(self, centers_and_widths: FloatArray) -> FloatArray:
+    def _each_once(self, centers_and_widths: Float[Array, "bands 2"]) -> Float[Array, "bands wavelengths"]:
         """Return `edges`; each distinct edge of a grid is computed once."""
         unique, which = np.unique(centers_and_widths, axis=0, return_inverse=True)
         return self.edges(unique)[which.ravel()]
 
-    def _depth(self, x: FloatArray, band: int) -> FloatArray:
+    def _depth(self, x: DesignParameters, band: int) -> Float[Array, "designs depths"]:
         return x[:, band * _PER_BAND + DEPTH, None]
 
-    def _condition_matrix(self) -> FloatArray:
+    def _condition_matrix(self) -> Float[Array, "conditions parameters"]:
         rows = []
         for band in range(self._count):
             at = band * _PER_BAND
@@ -245,7 +245,7 @@ class Banded:
 
     start_dimensions: int | None = None
 
-    def __init__(self, wavelength_nm: FloatArray, bands: int) -> None:
+    def __init__(self, wavelength_nm: PerWavelength, bands: int) -> None:
         self._bands = Bands(wavelength_nm, bands)
 
     @property
@@ -254,7 +254,7 @@ class Banded:
         return self._bands.parameters
 
     @property
-    def dimensions(self) -> Mapping[str, FloatArray]:
+    def dimensions(self) -> Mapping[str, ParameterWeights]:
         """See `Bands.dimensions`."""
         return self._bands.dimensions
 
@@ -275,14 +275,14 @@ class Banded:
         made._bands = self._bands.perturbed(off)
         return made
 
-    def start(self, points: FloatArray) -> FloatArray:
+    def start(self, points: Float[Array, "starts start_dimensions"]) -> Float[Array, "starts parameters"]:
         """Raise an error: a search starts anywhere in the box."""
         return points
 
-    def violation(self, x: FloatArray) -> FloatArray:
+    def violation(self, x: DesignParameters) -> Float[Array, "designs _conditions"]:
         """Return edges out of order, nm; see `Bands.violation`."""
         return self._bands.violation(x)
 
-    def violation_gradient(self, x: FloatArray) -> FloatArray:
+    def violation_gradient(self, x: PerParameter) -> ParameterWeights:
         """Return the derivative; see `Bands.violation_gradient`."""
         return self._bands.violation_gradient(x)

@@ -16,7 +16,17 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from ..base.cache import Cache
-from ..base.types import FloatArray, IndexArray
+from ..base.types import (
+    Array,
+    ChannelCurves,
+    DesignCurves,
+    DesignNumbers,
+    Float,
+    IndexArray,
+    Int,
+    PerDesign,
+    PerWavelength,
+)
 from .family import SeparableFamily
 from .products import row_products
 from .space import Space
@@ -36,7 +46,7 @@ class Block(Protocol):
     def __len__(self) -> int:
         """Return the number of designs."""
 
-    def curves(self) -> FloatArray:
+    def curves(self) -> DesignCurves:
         """Return the QE of the modified channels.
 
         Returns
@@ -45,7 +55,9 @@ class Block(Protocol):
             QE of the modified channels.
         """
 
-    def product(self, weights: FloatArray, nodes: IndexArray) -> FloatArray:
+    def product(
+        self, weights: Float[Array, "_modified k"], nodes: Int[IndexArray, " nodes"]
+    ) -> Float[Array, "designs k"]:
         """Sum QE times weights over modified channels and wavelengths.
 
         Parameters
@@ -61,7 +73,7 @@ class Block(Protocol):
             Sums over modified channels and wavelengths.
         """
 
-    def shapes(self, base_qe: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def shapes(self, base_qe: ChannelCurves) -> tuple[PerDesign, PerDesign]:
         """Return slope and transmission of the curves, over all modified channels.
 
         Parameters
@@ -75,7 +87,7 @@ class Block(Protocol):
             Largest step between neighboring wavelengths, and smallest ratio to the base, 1 where the base is 0.
         """
 
-    def subset(self, which: IndexArray | slice) -> Block:
+    def subset(self, which: Int[IndexArray, " which"] | slice) -> Block:
         """Return some of the designs.
 
         Parameters
@@ -100,22 +112,24 @@ class CurveBlock:
         QE of the modified channels.
     """
 
-    qe: FloatArray
+    qe: DesignCurves
 
     def __len__(self) -> int:
         return len(self.qe)
 
-    def curves(self) -> FloatArray:
+    def curves(self) -> DesignCurves:
         """Return the QE of the modified channels."""
         return self.qe
 
-    def product(self, weights: FloatArray, nodes: IndexArray) -> FloatArray:
+    def product(
+        self, weights: Float[Array, "_modified k"], nodes: Int[IndexArray, " nodes"]
+    ) -> Float[Array, "designs k"]:
         """Sum QE times weights, in the precision of the weights."""
         seen = self.qe if nodes.size == self.qe.shape[2] else self.qe[:, :, nodes]
         flat = seen.reshape(len(self.qe), -1)
         return row_products(flat.astype(weights.dtype, copy=False), weights)
 
-    def subset(self, which: IndexArray | slice) -> CurveBlock:
+    def subset(self, which: Int[IndexArray, " which"] | slice) -> CurveBlock:
         """Return some of the designs.
 
         Parameters
@@ -130,7 +144,7 @@ class CurveBlock:
         """
         return CurveBlock(self.qe[which])
 
-    def shapes(self, base_qe: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def shapes(self, base_qe: ChannelCurves) -> tuple[PerDesign, PerDesign]:
         """Return slope and transmission of the curves."""
         steepest, lowest = np.zeros(len(self.qe)), np.full(len(self.qe), np.inf)
         for channel, base in enumerate(np.asarray(base_qe, dtype=float)):
@@ -154,43 +168,45 @@ class EdgeSums:
         Sums of each edge.
     """
 
-    base: FloatArray
-    left: FloatArray
-    right: FloatArray
+    base: Float[Array, " readings"]
+    left: Float[Array, "left_edges readings"]
+    right: Float[Array, "right_edges readings"]
 
 
 class KnownShapes(NamedTuple):
     """Shapes of a grid's edges for `compiled.shapes_of_edges`, computed before its designs."""
 
-    inverse: FloatArray
-    dark: FloatArray
-    before: FloatArray
-    after: FloatArray
-    steps: FloatArray
-    lows: FloatArray
-    of_left: FloatArray
-    of_right: FloatArray
+    inverse: Float[Array, " ..."]
+    dark: Float[Array, " ..."]
+    before: Float[Array, " ..."]
+    after: Float[Array, " ..."]
+    steps: Float[Array, " ..."]
+    lows: Float[Array, " ..."]
+    of_left: Float[Array, " ..."]
+    of_right: Float[Array, " ..."]
 
 
 @dataclass
 class Tables:
     """All edges of a grid and their products with weights."""
 
-    base: FloatArray
-    change: FloatArray
-    left: FloatArray
-    right: FloatArray
-    _products: Cache[tuple[Any, ...], tuple[FloatArray, EdgeSums]] = field(default_factory=lambda: Cache(_KEPT_TABLES))
+    base: Float[Array, " nodes"]
+    change: Float[Array, " nodes"]
+    left: Float[Array, "left_edges nodes"]
+    right: Float[Array, "right_edges nodes"]
+    _products: Cache[tuple[Any, ...], tuple[Float[Array, " _readings"], EdgeSums]] = field(
+        default_factory=lambda: Cache(_KEPT_TABLES)
+    )
     _shapes: Cache[tuple[float, bytes], KnownShapes] = field(default_factory=lambda: Cache(_KEPT_TABLES))
 
     @cached_property
-    def spans(self) -> tuple[IndexArray, IndexArray]:
+    def spans(self) -> tuple[Int[IndexArray, "_edges 2"], Int[IndexArray, "_edges 2"]]:
         """Range in which each edge rises, see `compiled.spans`."""
         from .compiled import spans  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         return spans(self.left), spans(self.right)
 
-    def shapes(self, base_qe: FloatArray, deep: float) -> KnownShapes:
+    def shapes(self, base_qe: PerWavelength, deep: float) -> KnownShapes:
         """Return the shapes of the grid's edges at one depth; cached.
 
         Parameters
@@ -216,7 +232,7 @@ class Tables:
 
         return self._shapes.get((deep, base_qe.tobytes()), made)
 
-    def product(self, weights: FloatArray, nodes: IndexArray) -> EdgeSums:
+    def product(self, weights: Float[Array, "_modified k"], nodes: Int[IndexArray, " nodes"]) -> EdgeSums:
         """Return weighted sums of the base and of the change times each edge; cached.
 
         Parameters
@@ -260,20 +276,20 @@ class EdgeBlock:
     """
 
     space: Space
-    numbers: IndexArray
+    numbers: DesignNumbers
     tables: Tables
-    at_left: IndexArray
-    at_right: IndexArray
-    depth: FloatArray
+    at_left: DesignNumbers
+    at_right: DesignNumbers
+    depth: PerDesign
 
     def __len__(self) -> int:
         return len(self.depth)
 
-    def curves(self) -> FloatArray:
+    def curves(self) -> DesignCurves:
         """Return the QE of the modified channel."""
         return self.space.curves(self.space.points_of(self.numbers), self.tables.base.size)
 
-    def subset(self, which: IndexArray | slice) -> EdgeBlock:
+    def subset(self, which: Int[IndexArray, " which"] | slice) -> EdgeBlock:
         """Return some of the designs.
 
         Parameters
@@ -289,7 +305,9 @@ class EdgeBlock:
         ends = (self.at_left[which], self.at_right[which], self.depth[which])
         return EdgeBlock(self.space, self.numbers[which], self.tables, *ends)
 
-    def product(self, weights: FloatArray, nodes: IndexArray) -> FloatArray:
+    def product(
+        self, weights: Float[Array, "_modified k"], nodes: Int[IndexArray, " nodes"]
+    ) -> Float[Array, "designs k"]:
         """Sum QE times weights by table lookup."""
         from .compiled import through_edges  # noqa: PLC0415  (compiled: kept off the start-up path)
 
@@ -298,7 +316,7 @@ class EdgeBlock:
         through_edges(sums.base, sums.left, sums.right, self.at_left, self.at_right, self.depth, sums_of_designs)
         return sums_of_designs
 
-    def shapes(self, base_qe: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def shapes(self, base_qe: ChannelCurves) -> tuple[PerDesign, PerDesign]:
         """Return slope and transmission of the curves by table lookup."""
         from .compiled import shapes_of_edges  # noqa: PLC0415  (compiled: kept off the start-up path)
 
@@ -311,12 +329,14 @@ class EdgeBlock:
         return steepest, lowest
 
 
-def _inverse(base: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _inverse(base: PerWavelength) -> tuple[PerWavelength, PerWavelength]:
     """Return 1 / base and 0; where the base is 0, 0 and 1, so that the ratio to it is 1."""
     return np.divide(1.0, base, out=np.zeros_like(base), where=base > 0), np.where(base > 0, 0.0, 1.0)
 
 
-def _shapes(curves: FloatArray, inverse: FloatArray, dark: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _shapes(
+    curves: ChannelCurves, inverse: PerWavelength, dark: PerWavelength
+) -> tuple[Float[Array, " modified"], Float[Array, " modified"]]:
     """Return slope and transmission of each curve, without compiled code for few curves."""
     if len(curves) < _MANY:
         steps = np.abs(np.diff(curves, axis=1))
@@ -349,7 +369,7 @@ def by_edges(space: Space) -> bool:
     return _separable(space) is not None
 
 
-def _separable(space: Space) -> tuple[SeparableFamily, FloatArray, FloatArray] | None:
+def _separable(space: Space) -> tuple[SeparableFamily, PerWavelength, PerWavelength] | None:
     """Return family, base and change of a grid; None if the family is not separable or its tables are too large."""
     family = None if space.filter is None else space.filter.family
     if not space.gridded or not isinstance(family, SeparableFamily):
@@ -377,7 +397,7 @@ def edges_of(space: Space, start: int, stop: int) -> EdgeBlock | None:
     return edges_of_some(space, np.arange(start, stop))
 
 
-def edges_of_some(space: Space, numbers: IndexArray) -> EdgeBlock | None:
+def edges_of_some(space: Space, numbers: DesignNumbers) -> EdgeBlock | None:
     """Return designs of a grid by their edges.
 
     Parameters

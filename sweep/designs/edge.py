@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.types import FloatArray
+from ..base.types import Array, Float
 
 _TENTH = 0.2466364532884666
 """Where the quintic 6 t^5 - 15 t^4 + 10 t^3 is 0.1; it is 0.9 at 1 - _TENTH."""
@@ -14,7 +14,9 @@ _WALL_NM = 1e-9
 """An edge that is not wider is a brick wall: 600 nm in float64 resolves 1e-13 nm."""
 
 
-def edge(wavelength_nm: FloatArray, center_nm: FloatArray, width_nm: FloatArray) -> FloatArray:
+def edge(
+    wavelength_nm: Float[Array, "*#points"], center_nm: Float[Array, "*#points"], width_nm: Float[Array, "*#points"]
+) -> Float[Array, "*points"]:
     """Return a rising edge, a quintic with two continuous derivatives (Perlin's smootherstep).
 
     Parameters
@@ -36,8 +38,8 @@ def edge(wavelength_nm: FloatArray, center_nm: FloatArray, width_nm: FloatArray)
 
 
 def edge_gradient(
-    wavelength_nm: FloatArray, center_nm: FloatArray, width_nm: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+    wavelength_nm: Float[Array, "*#points"], center_nm: Float[Array, "*#points"], width_nm: Float[Array, "*#points"]
+) -> tuple[Float[Array, "*points"], Float[Array, "*points"]]:
     """Return the derivatives of `edge`; 0 for a step, whose derivative is a distribution.
 
     Parameters
@@ -60,7 +62,9 @@ def edge_gradient(
     return by_center, by_width
 
 
-def _position(wavelength_nm: FloatArray, center_nm: FloatArray, width_nm: FloatArray) -> FloatArray:
+def _position(
+    wavelength_nm: Float[Array, "*#points"], center_nm: Float[Array, "*#points"], width_nm: Float[Array, "*#points"]
+) -> Float[Array, "*points"]:
     offset = np.asarray(wavelength_nm, dtype=float) - center_nm
     span = np.broadcast_to(np.asarray(width_nm, dtype=float) * SPAN_PER_WIDTH, offset.shape)
     wall = np.sign(offset) / 2

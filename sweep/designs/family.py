@@ -6,7 +6,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Protocol, Self, runtime_checkable
 
-from ..base.types import FloatArray, IndexArray, Section
+from ..base.types import (
+    Array,
+    ChannelCurves,
+    CurvesGradient,
+    DesignCurves,
+    DesignNumbers,
+    DesignParameters,
+    Float,
+    ParameterWeights,
+    PerParameter,
+    PerWavelength,
+    Section,
+)
 from .tolerance import ProductionError
 
 
@@ -44,7 +56,7 @@ class Family(Protocol):
 
     @classmethod
     def of_study(
-        cls, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None, options: Section
+        cls, wavelength_nm: PerWavelength, base: PerWavelength, target: PerWavelength | None, options: Section
     ) -> Family:
         """Make the family over curves of a study.
 
@@ -78,7 +90,7 @@ class Family(Protocol):
     def parameters(self) -> Sequence[Parameter]:
         """Parameters in the order of the columns of `x`."""
 
-    def curves(self, x: FloatArray) -> FloatArray:
+    def curves(self, x: DesignParameters) -> DesignCurves:
         """Return the QE of the modified channels.
 
         Parameters
@@ -92,7 +104,7 @@ class Family(Protocol):
             QE of the modified channels.
         """
 
-    def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
+    def upper(self, low: PerParameter, high: PerParameter) -> ChannelCurves:
         """Return an upper bound on all well-formed filters of a box.
 
         Parameters
@@ -106,7 +118,7 @@ class Family(Protocol):
             Upper bound on the QE.
         """
 
-    def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
+    def lower(self, low: PerParameter, high: PerParameter) -> ChannelCurves:
         """Return a lower bound on all well-formed filters of a box.
 
         Parameters
@@ -120,7 +132,7 @@ class Family(Protocol):
             Lower bound on the QE.
         """
 
-    def hull(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def hull(self, low: PerParameter, high: PerParameter) -> tuple[ChannelCurves, ChannelCurves]:
         """Return bounds on all filters of a box, well formed or not.
 
         Parameters
@@ -134,7 +146,7 @@ class Family(Protocol):
             Bounds on the QE.
         """
 
-    def gradient(self, x: FloatArray) -> FloatArray:
+    def gradient(self, x: PerParameter) -> CurvesGradient:
         """Return the derivative of `curves` at one design.
 
         Parameters
@@ -149,7 +161,7 @@ class Family(Protocol):
         """
 
     @property
-    def dimensions(self) -> Mapping[str, FloatArray]:
+    def dimensions(self) -> Mapping[str, ParameterWeights]:
         """Lengths in production by name: rows r, ndarray of shape (n, n_parameters); a length is min(r @ x), nm."""
 
     def perturbed(self, off: ProductionError) -> Self:
@@ -166,7 +178,7 @@ class Family(Protocol):
             Family with this production error.
         """
 
-    def start(self, points: FloatArray) -> FloatArray:
+    def start(self, points: Float[Array, "starts start_dimensions"]) -> Float[Array, "starts parameters"]:
         """Return well-formed designs to start a search from.
 
         Parameters
@@ -180,7 +192,7 @@ class Family(Protocol):
             Starting designs.
         """
 
-    def violation(self, x: FloatArray) -> FloatArray:
+    def violation(self, x: DesignParameters) -> Float[Array, "designs conditions"]:
         """Return the conditions of a well-formed design.
 
         Parameters
@@ -194,7 +206,7 @@ class Family(Protocol):
             Values of the conditions, met where <= 0.
         """
 
-    def violation_gradient(self, x: FloatArray) -> FloatArray:
+    def violation_gradient(self, x: PerParameter) -> Float[Array, "conditions parameters"]:
         """Return the derivative of `violation` at one design.
 
         Parameters
@@ -214,7 +226,7 @@ class MovedFamily(Protocol):
     """Family whose filter is fixed + base transmission times shape: production moves the shape alone."""
 
     @property
-    def moved(self) -> tuple[FloatArray, FloatArray]:
+    def moved(self) -> tuple[PerWavelength, PerWavelength]:
         """Fixed curve, and base transmission of the shape, ndarray of shape (n_wavelengths,) each."""
 
 
@@ -226,10 +238,10 @@ class SeparableFamily(Protocol):
     """
 
     @property
-    def separable(self) -> tuple[FloatArray, FloatArray]:
+    def separable(self) -> tuple[PerWavelength, PerWavelength]:
         """Base and change, ndarray of shape (n_wavelengths,) each."""
 
-    def edges(self, centers_and_widths: FloatArray) -> FloatArray:
+    def edges(self, centers_and_widths: Float[Array, "bands 2"]) -> Float[Array, "bands wavelengths"]:
         """Return rising edges.
 
         Parameters
@@ -252,7 +264,7 @@ class ChoosingFamily(Protocol):
     def slots(self) -> tuple[tuple[int, int], ...]:
         """Indices of a number and its amount."""
 
-    def only(self, numbers: IndexArray) -> Family:
+    def only(self, numbers: DesignNumbers) -> Family:
         """Return the family with some members of the catalog, under their numbers.
 
         Parameters

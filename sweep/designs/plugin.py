@@ -8,7 +8,17 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import SweepError, ValidationIssue
-from ..base.types import FloatArray
+from ..base.types import (
+    Array,
+    ChannelCurves,
+    CurvesGradient,
+    DesignCurves,
+    DesignParameters,
+    Float,
+    ParameterWeights,
+    PerParameter,
+    PerWavelength,
+)
 from ..base.user_code import UserCode
 from .family import Parameter
 from .tolerance import ProductionError
@@ -34,7 +44,7 @@ class PluginFamily:
     n_modified = 1
     start_dimensions: int | None = None
 
-    def __init__(self, code: UserCode, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None):
+    def __init__(self, code: UserCode, wavelength_nm: PerWavelength, base: PerWavelength, target: PerWavelength | None):
         self.kind = code.name
         self._given = code, wavelength_nm, base, target
         self._base = base
@@ -46,7 +56,7 @@ class PluginFamily:
     def __reduce__(self) -> tuple[type[PluginFamily], tuple[Any, ...]]:
         return PluginFamily, self._given
 
-    def _array(self, name: str, x: FloatArray, width: int | None) -> FloatArray:
+    def _array(self, name: str, x: DesignParameters, width: int | None) -> Float[Array, "designs columns"]:
         """Call a method of the class and check its result, ndarray of shape (n_designs, width)."""
         try:
             values = np.asarray(self._given[0].called(getattr(self._own, name), x.copy()), dtype=float)
@@ -61,7 +71,7 @@ class PluginFamily:
             raise SweepError(ValidationIssue(f"{self.kind}: {name} is not finite"))
         return values
 
-    def curves(self, x: FloatArray) -> FloatArray:
+    def curves(self, x: DesignParameters) -> DesignCurves:
         """Return the QE of the modified channel; see `Family.curves`.
 
         Parameters
@@ -88,33 +98,35 @@ class PluginFamily:
             raise SweepError(ValidationIssue(f"{self.kind}: a curve is out of its bounds", value=ends, allowed=allowed))
         return np.clip(curves, 0.0, 1.0)[:, None, :]
 
-    def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
+    def upper(self, low: PerParameter, high: PerParameter) -> ChannelCurves:
         """Return the base or 1, which every well-formed curve is checked against."""
         assert low.shape == high.shape
         return np.asarray((self._base if self.below_base else np.ones_like(self._base))[None], dtype=float)
 
-    def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
+    def lower(self, low: PerParameter, high: PerParameter) -> ChannelCurves:
         """Return 0."""
         assert low.shape == high.shape
         return np.zeros((1, self._base.size))
 
-    def hull(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def hull(self, low: PerParameter, high: PerParameter) -> tuple[ChannelCurves, ChannelCurves]:
         """Return 0 and 1, to which all curves are clipped."""
         return self.lower(low, high), np.ones((1, self._base.size))
 
-    def gradient(self, x: FloatArray) -> FloatArray:
+    def gradient(self, x: PerParameter) -> CurvesGradient:
         """Return central differences, one-sided at the ends of a parameter."""
         return self._differences(x, self.curves)
 
-    def violation(self, x: FloatArray) -> FloatArray:
+    def violation(self, x: DesignParameters) -> Float[Array, "designs _conditions"]:
         """Return the conditions of the class; a condition that is always met if it has none."""
         return self._array("violation", x, None) if hasattr(self._own, "violation") else np.zeros((len(x), 1))
 
-    def violation_gradient(self, x: FloatArray) -> FloatArray:
+    def violation_gradient(self, x: PerParameter) -> ParameterWeights:
         """Return differences of the conditions."""
         return self._differences(x, self.violation).T
 
-    def _differences(self, x: FloatArray, function: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    def _differences(
+        self, x: PerParameter, function: Callable[[Float[Array, "_points parameters"]], Float[Array, "_points ..."]]
+    ) -> Float[Array, "parameters ..."]:
         low, high = (np.array([getattr(p, end) for p in self.parameters]) for end in ("low", "high"))
         step = np.diag(_STEP * (high - low))
         above, below = np.minimum(x + step, high), np.maximum(x - step, low)
@@ -123,7 +135,7 @@ class PluginFamily:
         return np.asarray((values[: x.size] - values[x.size :]) / span, dtype=float)
 
     @property
-    def dimensions(self) -> Mapping[str, FloatArray]:
+    def dimensions(self) -> Mapping[str, ParameterWeights]:
         """None, since the edges are unknown."""
         return {}
 
@@ -144,7 +156,7 @@ class PluginFamily:
             raise SweepError(ValidationIssue(f"{self.kind} has no edges that production could shift"))
         return self
 
-    def start(self, points: FloatArray) -> FloatArray:
+    def start(self, points: Float[Array, "starts start_dimensions"]) -> Float[Array, "starts parameters"]:
         """Raise an error: a search starts anywhere in the box."""
         return points
 

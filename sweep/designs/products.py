@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.types import FloatArray
+from ..base.types import Array, Float
 
 _FEW_TERMS = 8
 """Sums of so many products are taken one after the other, all rows at once."""
 
 
-def row_products(rows: FloatArray, matrix: FloatArray) -> FloatArray:
+def row_products(rows: Float[Array, "rows k"], matrix: Float[Array, "k others"]) -> Float[Array, "rows others"]:
     """Multiply each row by a matrix in a call of its own.
 
     BLAS sums in an order that depends on shapes, strides and the place of a row among others. Here the sums of a row

@@ -8,7 +8,7 @@ from pydantic import Field, create_model
 
 from ..base.errors import SweepError, ValidationIssue, nearest
 from ..base.modules import files_in
-from ..base.types import FloatArray, Section
+from ..base.types import Array, Float, PerWavelength, Section
 from . import families
 from .families.mixture import Absorbing, Mixture
 from .family import Family
@@ -58,11 +58,11 @@ PIGMENTS = tuple(kind for kind, family in FAMILIES.items() if issubclass(family,
 
 def build_family(
     kind: str,
-    wavelength_nm: FloatArray,
-    base: FloatArray,
-    target: FloatArray | None,
+    wavelength_nm: PerWavelength,
+    base: PerWavelength,
+    target: PerWavelength | None,
     options: FamilyOptions,
-    colorants: FloatArray | None = None,
+    colorants: Float[Array, "colorants wavelengths"] | None = None,
 ) -> Family:
     """Make a family.
 

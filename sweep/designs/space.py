@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, DesignCurves, DesignNumbers, DesignParameters, Float, PerDesign
 from .family import Family
 from .technology import Technology
 from .tolerance import AS_DESIGNED, ProductionError
@@ -85,7 +85,7 @@ class Space:
         """Names of the family's parameters, with units."""
         return () if self.filter is None else tuple(p.name for p in self.filter.family.parameters)
 
-    def digits(self, numbers: IndexArray) -> list[IndexArray]:
+    def digits(self, numbers: DesignNumbers) -> list[DesignNumbers]:
         """Return the index on each axis of a grid.
 
         Parameters
@@ -106,7 +106,7 @@ class Space:
             rest = whole
         return digits[::-1]
 
-    def points(self, start: int, stop: int) -> FloatArray:
+    def points(self, start: int, stop: int) -> Float[Array, "_designs parameters"]:
         """Return the parameters of consecutive designs.
 
         Parameters
@@ -121,7 +121,7 @@ class Space:
         """
         return self.points_of(np.arange(start, stop))
 
-    def points_of(self, numbers: IndexArray) -> FloatArray:
+    def points_of(self, numbers: DesignNumbers) -> DesignParameters:
         """Return the parameters of designs.
 
         Parameters
@@ -141,7 +141,7 @@ class Space:
         columns = [np.asarray(axis, dtype=float)[digit] for axis, digit in digits]
         return np.stack(columns, axis=1) if columns else np.empty((len(numbers), 0))
 
-    def curves(self, points: FloatArray, n_wavelengths: int, off: ProductionError = AS_DESIGNED) -> FloatArray:
+    def curves(self, points: DesignParameters, n_wavelengths: int, off: ProductionError = AS_DESIGNED) -> DesignCurves:
         """Return the QE of the modified channels.
 
         Parameters
@@ -163,7 +163,7 @@ class Space:
         family = self.filter.family
         return (family.perturbed(off) if any(off) else family).curves(points)
 
-    def violation(self, points: FloatArray) -> FloatArray:
+    def violation(self, points: DesignParameters) -> PerDesign:
         """Return the largest violation of the family's own conditions.
 
         Parameters

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from ..base.types import FloatArray
+from ..base.types import PerWavelength
 
 SHIFTS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 """Where in the range of a tolerance the worst case is looked for, in units of its half width."""
@@ -30,7 +30,7 @@ class ProductionError(NamedTuple):
     thickness: float = 0.0
     broadening: float = 0.0
 
-    def nominal_nm(self, wavelength_nm: FloatArray) -> FloatArray:
+    def nominal_nm(self, wavelength_nm: PerWavelength) -> PerWavelength:
         """Return the designed wavelengths of features.
 
         Parameters

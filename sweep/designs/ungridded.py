@@ -9,7 +9,7 @@ from typing import Literal, Protocol
 import numpy as np
 
 from ..base.cache import Cache
-from ..base.types import FloatArray
+from ..base.types import Array, Float, FloatArray
 
 Axes = tuple[tuple[float, ...], ...]
 Method = Literal["sobol", "lhs"]
@@ -24,7 +24,7 @@ class ListedDesigns(Protocol):
     def size(self) -> int:
         """Number of designs."""
 
-    def points(self, axes: Axes, start: int, stop: int) -> FloatArray:
+    def points(self, axes: Axes, start: int, stop: int) -> Float[Array, "_designs parameters"]:
         """Return the parameters of consecutive designs.
 
         Parameters
@@ -53,13 +53,13 @@ class PairedDesigns:
 
     size: int
 
-    def points(self, axes: Axes, start: int, stop: int) -> FloatArray:
+    def points(self, axes: Axes, start: int, stop: int) -> Float[Array, "_designs parameters"]:
         """Return the parameters of consecutive designs."""
         columns = [np.asarray(axis[start:stop] if len(axis) > 1 else axis * (stop - start)) for axis in axes]
         return np.stack(columns, axis=1).astype(float)
 
 
-def sobol_points(dimensions: int, count: int, seed: int) -> FloatArray:
+def sobol_points(dimensions: int, count: int, seed: int) -> Float[Array, "count dimensions"]:
     """Return the first points of a scrambled Sobol sequence.
 
     Parameters
@@ -102,13 +102,13 @@ class SampledDesigns:
     size: int
     seed: int
 
-    def points(self, axes: Axes, start: int, stop: int) -> FloatArray:
+    def points(self, axes: Axes, start: int, stop: int) -> Float[Array, "_designs parameters"]:
         """Return the parameters of sampled designs; the whole sample is drawn at the first call and kept."""
         shares = _drawn.get((self, len(axes)), lambda: self._shares(len(axes)))[start:stop]
         low, high = (np.array([end(axis) for axis in axes], dtype=float) for end in (min, max))
         return np.asarray(np.minimum(low + shares * (high - low), high), dtype=float)
 
-    def _shares(self, n_parameters: int) -> FloatArray:
+    def _shares(self, n_parameters: int) -> Float[Array, "_size _parameters"]:
         """Return points of the unit cube, ndarray of shape (size, n_parameters)."""
         if self.method == "sobol":
             return sobol_points(n_parameters, self.size, self.seed)

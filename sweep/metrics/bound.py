@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from pydantic import model_validator
 
-from ..base.types import FloatArray, Number, Section
+from ..base.types import Number, PerDesign, SameShape, Section
 
 FEASIBLE = 1e-9
 """A design is feasible up to this violation (see `Bound.scale`), so that rounding cannot lose one on a bound."""
@@ -42,7 +42,7 @@ class Bound(Section):
         end = max(abs(self.min or 0.0), abs(self.max or 0.0))
         return max(end, _LEAST_SCALE) if end > 0 else 1.0
 
-    def violation(self, values: FloatArray) -> FloatArray:
+    def violation(self, values: SameShape) -> SameShape:
         """Return the violation of the bound.
 
         Parameters
@@ -57,7 +57,7 @@ class Bound(Section):
         """
         below = 0.0 if self.min is None else self.min - values
         above = 0.0 if self.max is None else values - self.max
-        return np.maximum(np.maximum(below, above), 0.0) / self.scale
+        return np.maximum(np.maximum(below, above), np.zeros_like(values)) / self.scale
 
     def __str__(self) -> str:
         ends = [f">= {self.min:g}"] if self.min is not None else []
@@ -65,11 +65,11 @@ class Bound(Section):
 
 
 def total_violation(
-    columns: Mapping[str, FloatArray],
+    columns: Mapping[str, PerDesign],
     constraints: Mapping[str, Bound],
-    family_violation: FloatArray,
+    family_violation: PerDesign,
     leave_out: Iterable[str] = (),
-) -> FloatArray:
+) -> PerDesign:
     """Return the largest violation of each design.
 
     Parameters

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.types import BoolArray, FloatArray, IndexArray
+from ..base.types import Array, Bool, BoolArray, DesignCurves, Float, IndexArray, Int
 from ..camera.brightness import LampReadings
 from ..camera.noise.gaussian import share_below
 from ..camera.setup import Setup
@@ -34,14 +34,14 @@ DARK_TO_FULL = (0.0, np.inf)
 class Nearest:
     """Nearest points of curves: signal that is read, signal of the curve, its brightness, and the squared distance."""
 
-    reading: IndexArray
-    curve: IndexArray
-    factor: FloatArray
-    squared: FloatArray
-    bracket: FloatArray
+    reading: Int[IndexArray, " nearest"]
+    curve: Int[IndexArray, " nearest"]
+    factor: Float[Array, " nearest"]
+    squared: Float[Array, " nearest"]
+    bracket: Float[Array, "nearest 2"]
     """Brightnesses between which the nearest point lies, [n, 2]."""
 
-    def subset(self, which: IndexArray | BoolArray) -> Nearest:
+    def subset(self, which: Int[IndexArray, " values"] | Bool[BoolArray, " values"]) -> Nearest:
         """Return some of the points."""
         return Nearest(
             self.reading[which], self.curve[which], self.factor[which], self.squared[which], self.bracket[which]
@@ -59,7 +59,7 @@ class BrightnessCurves:
         self,
         lamps: LampReadings,
         brightness: tuple[float, float] | None = None,
-        scales: Sequence[float] | FloatArray = (1.0,),
+        scales: Sequence[float] | Float[Array, " scales"] = (1.0,),
         steps: int = 1,
         least_dn2: float = LEAST_DN2,
     ) -> None:
@@ -74,7 +74,7 @@ class BrightnessCurves:
         return float(self._nodes.min())
 
     @cached_property
-    def _readings(self) -> tuple[FloatArray, FloatArray]:
+    def _readings(self) -> tuple[Float[Array, "readings channels"], Float[Array, "readings channels"]]:
         """Mean and variance of each lamp at each scale, [n_scales x n_signals, n_channels]."""
         every = np.arange(self.lamps.n_signals)
         moments = self.lamps.moments(every, np.broadcast_to(self._scales, (every.size, self._scales.size)))
@@ -82,15 +82,21 @@ class BrightnessCurves:
         return mean.reshape(-1, mean.shape[-1]), variance.reshape(-1, mean.shape[-1])
 
     @cached_property
-    def _means(self) -> FloatArray:
+    def _means(self) -> Float[Array, "signals factors channels"]:
         return self.lamps.means(np.arange(self.lamps.n_signals), self._nodes)
 
     @cached_property
-    def _variances(self) -> FloatArray:
+    def _variances(self) -> Float[Array, "signals factors channels"]:
         return self.lamps.moments(np.arange(self.lamps.n_signals), self._nodes)[1]
 
     def nearest(
-        self, first: IndexArray, second: IndexArray, *, noise: bool, margin: float = np.inf, nearest: float = np.inf
+        self,
+        first: Int[IndexArray, " first"],
+        second: Int[IndexArray, " second"],
+        *,
+        noise: bool,
+        margin: float = np.inf,
+        nearest: float = np.inf,
     ) -> Nearest:
         """Return the points of curves that are nearest to readings, of each reading of one type and curve of the other.
 
@@ -112,11 +118,11 @@ class BrightnessCurves:
         means = self.lamps.moments(found.curve, nodes) if noise else (self.lamps.means(found.curve, nodes),) * 2
         return self._on(means, nodes, found.reading, found.curve, rows, noise=noise)
 
-    def polished(self, found: Nearest, *, noise: bool) -> FloatArray:
+    def polished(self, found: Nearest, *, noise: bool) -> Float[Array, " nearest"]:
         """Return the brightnesses of nearest points by Newton's method, from where they are known between nodes."""
         (mean, variance), factor = (values[found.reading] for values in self._readings), found.factor.copy()
 
-        def slope(factors: FloatArray) -> FloatArray:
+        def slope(factors: Float[Array, " nearest"]) -> Float[Array, " nearest"]:
             there, spread, by_mean, by_spread = self.lamps.along(found.curve, factors)
             if not noise:
                 return np.asarray((-(mean - there) * by_mean).sum(axis=1))
@@ -140,11 +146,11 @@ class BrightnessCurves:
 
     def _on(
         self,
-        curves: tuple[FloatArray, FloatArray],
-        nodes: FloatArray,
-        reading: IndexArray,
-        curve: IndexArray,
-        rows: IndexArray,
+        curves: tuple[DesignCurves, DesignCurves],
+        nodes: Float[Array, "designs modified"],
+        reading: Int[IndexArray, " nearest"],
+        curve: Int[IndexArray, " nearest"],
+        rows: Int[IndexArray, " rows"],
         *,
         noise: bool,
         margin: float = np.inf,
@@ -180,7 +186,11 @@ def curves_of(cases: Iterable[LampReadings], setup: Setup) -> list[BrightnessCur
 
 
 def chromatic_distance(
-    cases: Sequence[BrightnessCurves], first: IndexArray, second: IndexArray, *, noise: bool
+    cases: Sequence[BrightnessCurves],
+    first: Int[IndexArray, " first"],
+    second: Int[IndexArray, " second"],
+    *,
+    noise: bool,
 ) -> float:
     """Return the smallest distance of two types over all cases, in units of the noise or in DN."""
     found: list[Nearest] = []
@@ -195,6 +205,6 @@ def chromatic_distance(
     return float(np.sqrt(min(float(points.squared.min(initial=np.inf)) for points in found)))
 
 
-def error_of(dprime: FloatArray) -> FloatArray:
+def error_of(dprime: Float[Array, " *batch"] | float) -> Float[Array, " ..."]:
     """Return the error of two Gaussians at a distance in units of their noise, Q(d' / 2)."""
     return share_below(-dprime / 2)

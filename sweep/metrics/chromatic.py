@@ -15,7 +15,7 @@ from functools import partial
 
 import numpy as np
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, DesignCurves, DesignSignals, Float, IndexArray, Int, MemberNumbers, PerDesign, SameShape
 from ..camera.brightness import LampSlopes
 from ..camera.linear import linear_model
 from ..camera.pixel_curve import STEPS_DN2
@@ -51,7 +51,7 @@ def parallelogram(first: Smooth, second: Smooth) -> Smooth:
     return total
 
 
-def squared_distance(first: FloatArray, second: FloatArray) -> FloatArray:
+def squared_distance(first: Float[Array, "*batch channels"], second: Float[Array, "*batch channels"]) -> SameShape:
     """Return the squared chromatic distance of two vectors.
 
     Parameters
@@ -71,7 +71,7 @@ def squared_distance(first: FloatArray, second: FloatArray) -> FloatArray:
     return np.where(beyond, smaller, np.divide(area, larger, out=np.zeros_like(area), where=larger != 0))
 
 
-def _sum(values: FloatArray) -> FloatArray:
+def _sum(values: Float[Array, "*batch channels"]) -> SameShape:
     """Return the sum over the channels, in their order."""
     total = values[..., 0].copy()
     for channel in range(1, values.shape[-1]):
@@ -79,7 +79,9 @@ def _sum(values: FloatArray) -> FloatArray:
     return total
 
 
-def chromatic_separation(response: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
+def chromatic_separation(
+    response: DesignSignals, first: Int[IndexArray, " first"], second: Int[IndexArray, " second"]
+) -> PerDesign:
     """Compute the smallest chromatic distance of two signal types.
 
     Parameters
@@ -100,7 +102,7 @@ def chromatic_separation(response: FloatArray, first: IndexArray, second: IndexA
     return np.sqrt(smallest)
 
 
-def chromatic_separations(response: FloatArray, members: Mapping[str, IndexArray]) -> dict[Pair, FloatArray]:
+def chromatic_separations(response: DesignSignals, members: Mapping[str, MemberNumbers]) -> dict[Pair, PerDesign]:
     """Compute the smallest chromatic distance of every pair of signal types.
 
     Parameters
@@ -161,7 +163,12 @@ def chromatic_rows(design: SmoothDesign, *, pairs: Sequence[Pair], noise: bool, 
 
 
 def _nearest_rows(
-    lamps: LampSlopes, curves: BrightnessCurves, first: IndexArray, second: IndexArray, *, noise: bool
+    lamps: LampSlopes,
+    curves: BrightnessCurves,
+    first: Int[IndexArray, " first"],
+    second: Int[IndexArray, " second"],
+    *,
+    noise: bool,
 ) -> Rows:
     """Return squared distances of readings from the nearest points of curves."""
     near = curves.nearest(first, second, noise=noise, margin=_SEEN)
@@ -205,7 +212,7 @@ def _closed_rows(design: SmoothDesign, pairs: Sequence[Pair]) -> Rows:
     return Rows(of(response), of(response + 1j * COMPLEX_STEP * by_u).imag.T / COMPLEX_STEP)
 
 
-def smooth_chromatic(setup: Setup, curves: FloatArray, pair: Pair) -> FloatArray:
+def smooth_chromatic(setup: Setup, curves: DesignCurves, pair: Pair) -> PerDesign:
     """Return the chromatic separation of the smooth response, the smallest over the cases.
 
     Parameters

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, Float, FloatArray, IndexArray, Int, MemberNumbers, PerDesign
 from ..camera.pixel import Pixel
 from ..camera.readings import countable
 from ..spectra.lights import class_pairs
@@ -46,9 +46,9 @@ class Errors:
         Bound over all types.
     """
 
-    error: dict[tuple[str, str], FloatArray]
-    bound: dict[tuple[str, str], FloatArray]
-    state_bound: FloatArray
+    error: dict[tuple[str, str], PerDesign]
+    bound: dict[tuple[str, str], PerDesign]
+    state_bound: PerDesign
 
 
 def _bins(pixel: Pixel) -> tuple[int, float, int]:
@@ -60,7 +60,7 @@ def _bins(pixel: Pixel) -> tuple[int, float, int]:
     return wide, pixel.read_noise_e * pixel.dn_per_e / wide, pixel.full_scale_dn // wide + 1
 
 
-def affordable(pixel: Pixel, channels: Sequence[IndexArray]) -> bool:
+def affordable(pixel: Pixel, channels: Sequence[Int[IndexArray, " _pixels"]]) -> bool:
     """Return whether the sums of any signal take at most `_MOST_SUMS` additions and `_MOST_BINS` bins.
 
     Parameters
@@ -91,8 +91,13 @@ def affordable(pixel: Pixel, channels: Sequence[IndexArray]) -> bool:
 
 
 def _numbers(
-    electrons: FloatArray, channels: Sequence[IndexArray], pixel: Pixel
-) -> tuple[IndexArray, IndexArray, FloatArray, IndexArray]:
+    electrons: Float[Array, "captures signals pixels"], channels: Sequence[Int[IndexArray, " _pixels"]], pixel: Pixel
+) -> tuple[
+    Int[IndexArray, " numbers"],
+    Int[IndexArray, " _parts"],
+    Float[Array, " _rows"],
+    Int[IndexArray, "_numbers captures signals"],
+]:
     """Return first bin, start and roots of shares of each distinct signal, and the row of each design's signal."""
     from .compiled import bin_shares, channel_numbers  # noqa: PLC0415  (compiled: kept off the start-up path)
 
@@ -115,11 +120,11 @@ def _numbers(
 
 
 def errors(
-    electrons: FloatArray,
-    channels: Sequence[IndexArray],
+    electrons: Float[Array, "*captures designs signals pixels"],
+    channels: Sequence[Int[IndexArray, " _pixels"]],
     pixel: Pixel,
-    members: Mapping[str, IndexArray],
-    light: FloatArray | None = None,
+    members: Mapping[str, MemberNumbers],
+    light: Float[Array, "captures pixels"] | None = None,
 ) -> Errors:
     """Compute errors and bounds of a batch of designs.
 

@@ -15,7 +15,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.types import BoolArray, FloatArray, IndexArray
+from ..base.types import (
+    Array,
+    Bool,
+    BoolArray,
+    DesignSignals,
+    Float,
+    IndexArray,
+    Int,
+    MemberNumbers,
+    PerDesign,
+    SameShape,
+)
 from ..camera.noise.gaussian import share_below
 from ..camera.readout import NoisyReadout
 from ..spectra.lights import Pair, class_pairs
@@ -28,7 +39,9 @@ _LEFT_OUT = 1e-12
 """A pixel of up to a thousand goes beyond its reach at most this often; Gaussian tails are trusted down to here."""
 
 
-def contrast_to_noise(mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
+def contrast_to_noise(
+    mean: DesignSignals, variance: DesignSignals, first: Int[IndexArray, " first"], second: Int[IndexArray, " second"]
+) -> PerDesign:
     """Return CSD over noise: the standard deviation along the line between the nearest two points.
 
     The noise is sqrt(u' (Sa + Sb) / 2 u) for the unit vector u from one point to the other. Of several pairs at
@@ -58,7 +71,9 @@ def contrast_to_noise(mean: FloatArray, variance: FloatArray, first: IndexArray,
     return ratio
 
 
-def detectability(mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
+def detectability(
+    mean: DesignSignals, variance: DesignSignals, first: Int[IndexArray, " first"], second: Int[IndexArray, " second"]
+) -> PerDesign:
     """Return d', the smallest over the pairs of two types: sqrt(D' S^-1 D), S the mean covariance of the two points.
 
     This is d_a of signal detection theory for unequal variances (Simpson and Fitter, 1973), in several channels.
@@ -83,8 +98,12 @@ def detectability(mean: FloatArray, variance: FloatArray, first: IndexArray, sec
 
 
 def pairwise_error(
-    mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray, shape: NoiseShape | None = None
-) -> FloatArray:
+    mean: DesignSignals,
+    variance: DesignSignals,
+    first: Int[IndexArray, " first"],
+    second: Int[IndexArray, " second"],
+    shape: NoiseShape | None = None,
+) -> PerDesign:
     """Return the largest probability that noise moves one point of a pair beyond the other.
 
     The pair is divided by a plane with normal S^-1 D, S the mean covariance, at which both points err equally often:
@@ -135,11 +154,13 @@ class NoiseShape:
         Largest effect of a pixel on a channel, DN.
     """
 
-    gaussian: BoolArray
-    reach_dn: FloatArray
+    gaussian: Bool[BoolArray, "designs signals channels"]
+    reach_dn: DesignSignals
 
     @classmethod
-    def of_cases(cls, read: NoisyReadout) -> tuple[FloatArray, FloatArray, NoiseShape]:
+    def of_cases(
+        cls, read: NoisyReadout
+    ) -> tuple[Float[Array, "_designs signals channels"], Float[Array, "_designs signals channels"], NoiseShape]:
         """Return mean, variance and shape of a readout, with cases and designs on one axis.
 
         Parameters
@@ -158,7 +179,9 @@ class NoiseShape:
         noise = cls(read.gaussian.reshape(shape), read.reach_dn.reshape(shape))
         return read.mean.reshape(shape), read.variance.reshape(shape), noise
 
-    def gaussian_only(self, block: slice, pair: _Both, difference: FloatArray) -> FloatArray:
+    def gaussian_only(
+        self, block: slice, pair: _Both, difference: Float[Array, "designs pairs channels"]
+    ) -> Float[Array, "designs pairs channels"]:
         """Return the differences in channels with Gaussian noise at both points, 0 in others.
 
         Parameters
@@ -178,7 +201,13 @@ class NoiseShape:
         gaussian = self.gaussian[block]
         return np.where(gaussian[:, pair[0]] & gaussian[:, pair[1]], difference, 0.0)
 
-    def bound(self, block: slice, pair: _Both, difference: FloatArray, total: FloatArray) -> FloatArray:
+    def bound(
+        self,
+        block: slice,
+        pair: _Both,
+        difference: Float[Array, "designs pairs channels"],
+        total: Float[Array, "designs pairs channels"],
+    ) -> Float[Array, "designs pairs"]:
         """Return a bound on the error on either side of a plane, for independent pixels of any distribution.
 
         Chernoff's bound exp((L_a(s) + L_b(-s)) / 2) for some s > 0, with the normal S^-1 D, and Bennett's inequality
@@ -220,8 +249,8 @@ class NoiseShape:
 
 
 def error_bounds(
-    mean: FloatArray, variance: FloatArray, members: Mapping[str, IndexArray], noise: NoiseShape | None = None
-) -> tuple[dict[Pair, FloatArray], FloatArray]:
+    mean: DesignSignals, variance: DesignSignals, members: Mapping[str, MemberNumbers], noise: NoiseShape | None = None
+) -> tuple[dict[Pair, PerDesign], PerDesign]:
     """Return bounds on the error of the best rule, for the worst signal.
 
     The sum over the signals of other types of each pair's Bhattacharyya coefficient (Kailath, 1967), at most 1.
@@ -267,7 +296,11 @@ def error_bounds(
     return bounds, np.minimum(state.max(axis=1), 1.0)
 
 
-def _distance(difference: FloatArray, ours: FloatArray, theirs: FloatArray) -> FloatArray:
+def _distance(
+    difference: Float[Array, "designs pairs channels"],
+    ours: Float[Array, "#designs pairs channels"],
+    theirs: Float[Array, "#designs pairs channels"],
+) -> Float[Array, "designs pairs"]:
     """Return the Bhattacharyya distance of Gaussians: D'S^-1 D / 8 + ln(S / sqrt(Sa Sb)) / 2.
 
     Where one variance is 0 the logarithm is left out, since digital numbers are steps; the coefficient is then larger,
@@ -282,13 +315,13 @@ def _distance(difference: FloatArray, ours: FloatArray, theirs: FloatArray) -> F
         return np.asarray((z**2 / 4 + np.log1p((1 - ratio) ** 2 / (2 * ratio)) / 2).sum(axis=-1), dtype=float)
 
 
-def _ratio(over: FloatArray, under: FloatArray) -> FloatArray:
+def _ratio(over: SameShape, under: SameShape) -> SameShape:
     """Return the ratio of non-negative numbers; 0 / 0 is 0, NaN stays NaN."""
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         return np.where((over == 0) & (under == 0), 0.0, over / under)
 
 
-def _length(vectors: FloatArray) -> FloatArray:
+def _length(vectors: Float[Array, "*batch channels"]) -> SameShape:
     """Return the L2 norm over the last axis without squares; NaN where a component is NaN."""
     length, unknown = np.abs(vectors[..., 0]), np.isnan(vectors[..., 0])
     for at in range(1, vectors.shape[-1]):  # few, and a reduction over few is slow
@@ -298,8 +331,16 @@ def _length(vectors: FloatArray) -> FloatArray:
 
 
 def _pairs(
-    mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray
-) -> Iterator[tuple[slice, _Both, FloatArray, FloatArray, FloatArray]]:
+    mean: DesignSignals, variance: DesignSignals, first: Int[IndexArray, " first"], second: Int[IndexArray, " second"]
+) -> Iterator[
+    tuple[
+        slice,
+        _Both,
+        Float[Array, "designs pairs channels"],
+        Float[Array, "designs pairs channels"],
+        Float[Array, "designs pairs channels"],
+    ]
+]:
     """Yield blocks of designs: slice, both signals of every pair, their difference and both variances."""
     for block, one, other in pair_blocks(mean.shape, first, second):
         ours, theirs = variance[block][:, one], variance[block][:, other]

@@ -16,7 +16,7 @@ from itertools import product
 
 import numpy as np
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, Float, IndexArray, Int, PerDesign
 from ..designs.tolerance import ProductionError, Tolerance
 from ..spectra.lights import Pair
 from ..spectra.members import Members
@@ -52,17 +52,19 @@ class Draws:
     """
 
     offs: tuple[ProductionError, ...]
-    starts: IndexArray
-    below: IndexArray
-    share: FloatArray
-    place: FloatArray
+    starts: Int[IndexArray, " starts"]
+    below: Int[IndexArray, "draws 2"]
+    share: Float[Array, "draws 2"]
+    place: Float[Array, " draws"]
 
     @property
     def size(self) -> int:
         """Number of draws."""
         return int(self.place.size)
 
-    def distances(self, off: int, response: FloatArray, out: FloatArray) -> None:
+    def distances(
+        self, off: int, response: Float[Array, "cases spectra channels"], out: Float[Array, " draws"]
+    ) -> None:
         """Compute the distances of the draws with one production error.
 
         Parameters
@@ -77,7 +79,9 @@ class Draws:
         draws = slice(int(self.starts[off]), int(self.starts[off + 1]))
         out[draws] = np.sqrt((self.differences(draws, response) ** 2).sum(axis=-1))
 
-    def differences(self, some: slice | IndexArray, response: FloatArray) -> FloatArray:
+    def differences(
+        self, some: slice | Int[IndexArray, " some"], response: Float[Array, "*batch cases spectra channels"]
+    ) -> Float[Array, "*batch some channels"]:
         """Return first minus second light of some draws.
 
         Parameters
@@ -144,7 +148,9 @@ def draws_of(members: Members, pair: Pair, tolerance: Tolerance, seed: Sequence[
     return Draws(offs, starts, (first + below)[order], (shifts - below)[order], place[order, 0])
 
 
-def _offs(tolerance: Tolerance, drawn: Sequence[FloatArray]) -> tuple[tuple[ProductionError, ...], IndexArray]:
+def _offs(
+    tolerance: Tolerance, drawn: Sequence[Float[Array, " draws"]]
+) -> tuple[tuple[ProductionError, ...], Int[IndexArray, " draws"]]:
     """Return production errors, and which of them each draw has, from numbers in 0..1 of edge, film and width."""
     kinds = [tolerance.edge_shift_nm > 0, tolerance.thickness > 0, tolerance.broadening > 0]
     counts = [_PARTS[sum(kinds)] if kind else 1 for kind in kinds]
@@ -201,7 +207,9 @@ class LampsAndCameras:
             self._draws[pair] = draws_of(self.population_model.members, pair, self._tolerance, (self._seed, 2))
         return self._draws[pair]
 
-    def kept(self, curves: FloatArray, pairs: Sequence[Pair]) -> dict[Pair, tuple[float, IndexArray]]:
+    def kept(
+        self, curves: Float[Array, "offs modified wavelengths"], pairs: Sequence[Pair]
+    ) -> dict[Pair, tuple[float, Int[IndexArray, " _kept"]]]:
         """Return the distance that the wanted share has, for one design.
 
         Parameters
@@ -233,7 +241,7 @@ class LampsAndCameras:
                     self.draws(pair).distances(off, response, distances)
         return {pair: self._of_share(distances) for pair, distances in distances_of.items()}
 
-    def _of_share(self, distances: FloatArray) -> tuple[float, IndexArray]:
+    def _of_share(self, distances: Float[Array, " draws"]) -> tuple[float, Int[IndexArray, " _kept"]]:
         """Return the distance that the wanted share has, and the draws whose mean it is."""
         below, count = self._ranks
         lowest = np.argpartition(distances, below - 1)[:below]
@@ -241,8 +249,11 @@ class LampsAndCameras:
         return (float(distances[chosen].mean()) if np.isfinite(distances).all() else np.nan), chosen
 
     def columns(
-        self, made: Callable[[ProductionError, slice], FloatArray], n_designs: int, pairs: Sequence[Pair]
-    ) -> dict[str, FloatArray]:
+        self,
+        made: Callable[[ProductionError, slice], Float[Array, "_draws modified wavelengths"]],
+        n_designs: int,
+        pairs: Sequence[Pair],
+    ) -> dict[str, PerDesign]:
         """Return the distance that the wanted share has, for several designs.
 
         Parameters

@@ -7,7 +7,17 @@ from functools import partial
 
 import numpy as np
 
-from ..base.types import BoolArray, FloatArray
+from ..base.types import (
+    Array,
+    Bool,
+    BoolArray,
+    DesignCases,
+    DesignCurves,
+    DesignParameters,
+    Float,
+    FloatArray,
+    PerDesign,
+)
 from ..camera.electrons import Changing
 from ..camera.field import field_heights, refined_heights, setup_at
 from ..camera.forward import ForwardModel, forward_model
@@ -45,7 +55,7 @@ _CSD = [metric for metric in METRICS if isinstance(metric, ColorSeparation)]
 _LAMPS = [metric for metric in METRICS if isinstance(metric, LampMetric)]
 
 
-def designed_quantities(setup: Setup, designs: FloatArray | Block) -> Columns:
+def designed_quantities(setup: Setup, designs: DesignCurves | Block) -> Columns:
     """Return the quantities of designs without light.
 
     Parameters
@@ -64,7 +74,7 @@ def designed_quantities(setup: Setup, designs: FloatArray | Block) -> Columns:
     return _joined([metric.of_designs(setup, block) for metric in METRICS if isinstance(metric, DesignMetric)])
 
 
-def family_quantities(family: Family | None, points: FloatArray) -> Columns:
+def family_quantities(family: Family | None, points: DesignParameters) -> Columns:
     """Return the quantities that the parameters of designs determine.
 
     Parameters
@@ -82,7 +92,7 @@ def family_quantities(family: Family | None, points: FloatArray) -> Columns:
     return _joined([metric.of_parameters(family, points) for metric in METRICS if isinstance(metric, FamilyMetric)])
 
 
-def image_quantities(setup: Setup, curves: FloatArray, vision: Vision | None, seed: int) -> Columns:
+def image_quantities(setup: Setup, curves: DesignCurves, vision: Vision | None, seed: int) -> Columns:
     """Return the quantities of images of signal heads.
 
     Parameters
@@ -107,7 +117,7 @@ def image_quantities(setup: Setup, curves: FloatArray, vision: Vision | None, se
     return _joined([metric.of_images(setup, curves, vision, seed) for metric in metrics])
 
 
-def _block(designs: FloatArray | Block) -> Block:
+def _block(designs: DesignCurves | Block) -> Block:
     return CurveBlock(np.asarray(designs, dtype=float)) if isinstance(designs, np.ndarray) else designs
 
 
@@ -119,14 +129,14 @@ def _csd_names(setup: Setup) -> list[str]:
     return [csd_name(pair) for pair in class_pairs(setup.lights.classes)]
 
 
-def _by_phase(model: ForwardModel, cases: Columns, n_places: int) -> FloatArray:
+def _by_phase(model: ForwardModel, cases: Columns, n_places: int) -> Float[Array, "designs pairs places"]:
     """Return CSDs at each phase or field position, the smallest over the moments, [n_designs, n_pairs, n_places]."""
     names = _csd_names(model.setup)
     distances = np.stack([cases[name] for name in names])  # [n_pairs, n_cases x n_moments, n_designs]
     return np.moveaxis(distances.reshape(len(names), n_places, -1, distances.shape[-1]).min(axis=2), -1, 0)
 
 
-def _csds(model: ForwardModel, curves: FloatArray) -> FloatArray:
+def _csds(model: ForwardModel, curves: Float[Array, "offs modified wavelengths"]) -> Float[Array, "designs pairs"]:
     """Return CSDs of one design at each phase, the smallest over the moments, ndarray of shape (n_pairs, n_phases)."""
     response = model.read(curves)[0]
     cases = {csd_name(pair): dn[:, None] for pair, dn in separations(response[0], model.setup.members).items()}
@@ -144,10 +154,12 @@ def _nonlinear_over_pulse(setup: Setup) -> bool:
     return drive is not None and setup.computes("flicker") and bends
 
 
-def _over_pulse(model: ForwardModel, curves: FloatArray, pairs: Sequence[int], phases: Phases | None) -> FloatArray:
+def _over_pulse(
+    model: ForwardModel, curves: Float[Array, "offs modified wavelengths"], pairs: Sequence[int], phases: Phases | None
+) -> PerDesign:
     """Return the smallest CSDs of some pairs of one design at one phase over field positions and moments of a pulse."""
 
-    def distances(moments: FloatArray) -> list[FloatArray]:
+    def distances(moments: Float[Array, " moments"]) -> list[Float[Array, " moments"]]:
         response = model.at(phases, moments).read(curves)[0][0]
         at_places = separations(response, model.setup.members).values()
         return [values.reshape(-1, moments.size).min(axis=0) for values in at_places]
@@ -191,7 +203,7 @@ def _refine_phases(model: ForwardModel, block: Block, columns: Columns) -> None:
     for design in np.flatnonzero(np.isfinite(columns[names[0]])):
         curves = block.subset(slice(design, design + 1)).curves()
 
-        def both_ends(at_phases: ForwardModel, curves: FloatArray = curves) -> FloatArray:
+        def both_ends(at_phases: ForwardModel, curves: DesignCurves = curves) -> Float[Array, "designs pairs"]:
             csds = _csds(at_phases, curves)
             return np.concatenate([csds, -csds])
 
@@ -219,7 +231,7 @@ def _refine_heights(model: ForwardModel, block: Block, cases: Columns, columns: 
     for design in np.flatnonzero(np.isfinite(at_heights).all(axis=(1, 2))):
         curves = block.subset(slice(design, design + 1)).curves()
 
-        def at_height(height: float, curves: FloatArray = curves) -> FloatArray:
+        def at_height(height: float, curves: DesignCurves = curves) -> PerDesign:
             csds = _csds(forward_model(setup_at(setup, height)), curves).min(axis=1)
             return np.concatenate([csds, -csds]) if best else csds
 
@@ -258,7 +270,10 @@ def _whole_readout(
 
 
 def by_case(
-    setup: Setup, response: FloatArray, metrics: Sequence[ReadoutMetric], unlit: FloatArray | None = None
+    setup: Setup,
+    response: DesignCases,
+    metrics: Sequence[ReadoutMetric],
+    unlit: Float[Array, "designs cases channels"] | None = None,
 ) -> Columns:
     """Evaluate metrics of the readout in each case, in blocks of the size of a cache.
 
@@ -323,7 +338,7 @@ def over_cases(imager: ForwardModel, cases: Columns) -> Columns:
 
 def evaluate(
     model: ForwardModel,
-    designs: FloatArray | Block,
+    designs: DesignCurves | Block,
     states: Sequence[str] = (),
     *,
     probabilities: bool = False,
@@ -402,7 +417,7 @@ def _over_brightness(setup: Setup, block: Block, columns: Columns, states: Seque
 
 
 def of_lamps(
-    setup: Setup, curves: FloatArray, states: Sequence[str], metrics: Sequence[LampMetric]
+    setup: Setup, curves: DesignCurves, states: Sequence[str], metrics: Sequence[LampMetric]
 ) -> dict[str, float]:
     """Return columns of lamps of unknown brightness of one design, ndarray of shape (1, n_modified, n_wavelengths)."""
     cases = curves_of(forward_model(setup.over_brightness).lamps(curves), setup)
@@ -410,7 +425,7 @@ def of_lamps(
 
 
 def evaluate_some(
-    model: ForwardModel, curves: FloatArray, quantities: Sequence[Quantity], states: Sequence[str]
+    model: ForwardModel, curves: DesignCurves, quantities: Sequence[Quantity], states: Sequence[str]
 ) -> dict[str, float]:
     """Return quantities of one design, by no more than their own metrics where these need none of the other columns."""
     wanted = {quantity.metric for quantity in quantities}
@@ -423,7 +438,9 @@ def evaluate_some(
     return {quantity.name: found[quantity.name] for quantity in quantities}
 
 
-def _merged(which: BoolArray, some: FloatArray, others: FloatArray) -> FloatArray:
+def _merged(
+    which: Bool[BoolArray, " designs"], some: Float[Array, " ..."], others: Float[Array, " ..."]
+) -> Float[Array, " ..."]:
     """Merge values of designs, the last axis, from two groups."""
     merged = np.empty((*some.shape[:-1], which.size))
     merged[..., which], merged[..., ~which] = some, others

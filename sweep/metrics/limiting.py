@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import DesignCases, IndexArray, Int
 from ..camera.forward import ForwardModel
 from ..camera.setup import Setup
 from ..designs.block import Block
@@ -34,7 +34,7 @@ def limited_by_name(pair: Pair) -> str:
     return pair_name("limited_by", pair)
 
 
-def limiting_lights(setup: Setup, response: FloatArray) -> LimitingLights:
+def limiting_lights(setup: Setup, response: DesignCases) -> LimitingLights:
     """Return the two lights that limit each CSD.
 
     Parameters
@@ -60,7 +60,7 @@ def limiting_lights(setup: Setup, response: FloatArray) -> LimitingLights:
     return {pair: _named(setup, nearest[:, at]) for at, pair in enumerate(pairs)}
 
 
-def _named(setup: Setup, lights: IndexArray) -> NDArray[np.object_]:
+def _named(setup: Setup, lights: Int[IndexArray, "rows 2"]) -> NDArray[np.object_]:
     """Return the names of two lights each; empty for -1."""
     distinct, which = np.unique(lights, axis=0, return_inverse=True)
     names = [

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.cache import Cache
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, DesignCurves, Float, IndexArray, Int, PerDesign
 from ..camera.linear import LinearModel, linear_model
 from ..camera.setup import Setup
 from ..spectra.lights import Pair, class_pairs
@@ -42,13 +42,13 @@ class NearestMembers:
         First spectrum of each light.
     """
 
-    squared: FloatArray
-    steps: IndexArray
-    shares: FloatArray
-    first: IndexArray
-    second: IndexArray
+    squared: Float[Array, "first second parts"]
+    steps: Int[IndexArray, "*batch 2"]
+    shares: Float[Array, "*batch 2"]
+    first: Int[IndexArray, " first"]
+    second: Int[IndexArray, " second"]
 
-    def of(self, values: FloatArray, side: int) -> FloatArray:
+    def of(self, values: Float[Array, "... spectra channels"], side: int) -> Float[Array, " ..."]:
         """Return values of the nearest members on one side.
 
         Parameters
@@ -84,7 +84,7 @@ class PopulationModel:
         """Linear model of every spectrum of the members."""
         return linear_model(self.setup)
 
-    def worst(self, curves: FloatArray, pairs: Sequence[Pair] = ()) -> dict[str, FloatArray]:
+    def worst(self, curves: DesignCurves, pairs: Sequence[Pair] = ()) -> dict[str, PerDesign]:
         """Return the smallest CSD of each pair over all members and field positions.
 
         Parameters
@@ -110,7 +110,9 @@ class PopulationModel:
                         smallest[pair][index] = np.sqrt(least)
         return {csd_name(pair): values for pair, values in smallest.items()}
 
-    def nearest(self, response: FloatArray, pair: Pair, *, parts: int = 1, alone: bool = False) -> NearestMembers:
+    def nearest(
+        self, response: Float[Array, "spectra channels"], pair: Pair, *, parts: int = 1, alone: bool = False
+    ) -> NearestMembers:
         """Return the nearest members of two types.
 
         Parameters

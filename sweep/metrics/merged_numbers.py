@@ -7,15 +7,23 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, Float, FloatArray, IndexArray, Int, PerValue
 from ..camera.merge import saturating_e
 from ..camera.pixel import Pixel
 from ..camera.readings import readings_of
 
 
 def merged_numbers(
-    electrons: FloatArray, light: FloatArray, channels: Sequence[IndexArray], pixel: Pixel
-) -> tuple[IndexArray, IndexArray, FloatArray, IndexArray]:
+    electrons: Float[Array, "captures designs signals pixels"],
+    light: Float[Array, "captures pixels"],
+    channels: Sequence[Int[IndexArray, " _pixels"]],
+    pixel: Pixel,
+) -> tuple[
+    Int[IndexArray, " numbers"],
+    Int[IndexArray, " _parts"],
+    Float[Array, " _rows"],
+    Int[IndexArray, "_numbers _captures signals"],
+]:
     """Return the distributions of the mean merged value of the pixels of channels.
 
     Parameters
@@ -55,7 +63,7 @@ def merged_numbers(
 
 
 @lru_cache(maxsize=4096)
-def _pixel(electrons: tuple[float, ...], pixel: Pixel, light: tuple[float, ...]) -> tuple[int, FloatArray]:
+def _pixel(electrons: tuple[float, ...], pixel: Pixel, light: tuple[float, ...]) -> tuple[int, PerValue]:
     """Return first bin and shares of one pixel; cached, since CFAs share channels."""
     from ..camera.noise.compiled import merged_shares  # noqa: PLC0415  (compiled: kept off the start-up path)
 
@@ -65,7 +73,7 @@ def _pixel(electrons: tuple[float, ...], pixel: Pixel, light: tuple[float, ...])
     return first + table.first, shares
 
 
-def _channel(pixels: FloatArray, pixel: Pixel, light: tuple[float, ...]) -> tuple[int, FloatArray]:
+def _channel(pixels: Float[Array, "signals pixels"], pixel: Pixel, light: tuple[float, ...]) -> tuple[int, PerValue]:
     """Return first bin and shares of the mean of independent pixels, ndarray of shape (n_pixels, n_exposures)."""
     from .compiled import mean_shares  # noqa: PLC0415  (compiled: kept off the start-up path)
 

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, DesignCurves, DesignParameters, DesignSignals, Float, MemberNumbers
 from ..camera.forward import ForwardModel
 from ..camera.readout import NoisyReadout
 from ..camera.setup import Setup
@@ -63,7 +63,7 @@ class ReadoutMetric(Metric):
     """Metric of the digital numbers of a scene."""
 
     @abstractmethod
-    def of_readout(self, setup: Setup, response: FloatArray, unlit: FloatArray) -> Columns:
+    def of_readout(self, setup: Setup, response: DesignSignals, unlit: Float[Array, "designs channels"]) -> Columns:
         """Compute the columns at one sampling phase and moment; the worst of all counts.
 
         Parameters
@@ -89,7 +89,7 @@ class NoiseMetric(Metric):
 
     @abstractmethod
     def of_noise(
-        self, imager: ForwardModel, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
+        self, imager: ForwardModel, curves: DesignCurves, read: NoisyReadout, members: Mapping[str, MemberNumbers]
     ) -> Columns:
         """Compute the columns, the worst over all phases and moments.
 
@@ -118,7 +118,7 @@ class LampMetric(Metric):
 
     @abstractmethod
     def of_lamps(
-        self, cases: Sequence[BrightnessCurves], members: Mapping[str, IndexArray], states: Sequence[str]
+        self, cases: Sequence[BrightnessCurves], members: Mapping[str, MemberNumbers], states: Sequence[str]
     ) -> dict[str, float]:
         """Compute the columns of one design, the worst over all phases and moments.
 
@@ -144,7 +144,7 @@ class PulseMetric(Metric):
     names: ClassVar[tuple[str, ...]]
 
     @abstractmethod
-    def of_pulses(self, model: ForwardModel, curves: FloatArray) -> Columns:
+    def of_pulses(self, model: ForwardModel, curves: DesignCurves) -> Columns:
         """Compute the columns over all phases of a pulse.
 
         Parameters
@@ -165,7 +165,7 @@ class VisionMetric(Metric):
     """Metric of images of signal heads."""
 
     @abstractmethod
-    def of_images(self, setup: Setup, curves: FloatArray, vision: Vision, seed: int) -> Columns:
+    def of_images(self, setup: Setup, curves: DesignCurves, vision: Vision, seed: int) -> Columns:
         """Compute the columns.
 
         Parameters
@@ -190,7 +190,7 @@ class FamilyMetric(Metric):
     """Metric of the parameters of a family."""
 
     @abstractmethod
-    def of_parameters(self, family: Family | None, points: FloatArray) -> Columns:
+    def of_parameters(self, family: Family | None, points: DesignParameters) -> Columns:
         """Compute the columns.
 
         Parameters

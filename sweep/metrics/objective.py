@@ -12,7 +12,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from ..base.modules import instances_in
-from ..base.types import FloatArray, Section
+from ..base.types import PerDesign, Section
 from . import rules
 from .quantity import LOG10, Quantity, RequestedQuantities
 from .registry import quantities_of
@@ -75,7 +75,7 @@ class Objective(create_model("_Rules", __base__=Section, **_FIELDS)):  # type: i
         alone = list(self.weights.values()) == [1.0] and self.rule.direction == "more"
         return next(iter(self.weights)) if alone else COMBINED
 
-    def of(self, columns: Mapping[str, FloatArray]) -> FloatArray:
+    def of(self, columns: Mapping[str, PerDesign]) -> PerDesign:
         """Return the value of the objective.
 
         Parameters

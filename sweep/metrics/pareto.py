@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.types import BoolArray, FloatArray
+from ..base.types import Array, Bool, BoolArray, Float
 
 
-def knee(values: FloatArray) -> int | None:
+def knee(values: Float[Array, "points 2"]) -> int | None:
     """Return the knee of a front: the point farthest beyond the line between its ends.
 
     Parameters
@@ -31,7 +31,9 @@ def knee(values: FloatArray) -> int | None:
     return best if beyond[best] > 1e-9 else None
 
 
-def non_dominated(values: FloatArray, eligible: BoolArray | None = None) -> BoolArray:
+def non_dominated(
+    values: Float[Array, "points objectives"], eligible: Bool[BoolArray, " points"] | None = None
+) -> Bool[BoolArray, " points"]:
     """Return the rows that no other eligible row dominates.
 
     Parameters

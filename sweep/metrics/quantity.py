@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from ..base.types import FloatArray
+from ..base.types import Array, Float, FloatArray
 from ..camera.setup import Setup
 from ..spectra.lights import Pair
 from ..spectra.tasks import TaskColumns
@@ -296,7 +296,9 @@ class Quantity(Column):
             return float(min(10.0**-row, 1.0))
         return math.sqrt(max(row, 0.0)) if self.scale == "squared" else row
 
-    def worse(self, values: FloatArray | Sequence[FloatArray]) -> FloatArray:
+    def worse(
+        self, values: Float[Array, " cases *conditions"] | Sequence[Float[Array, "*conditions"]]
+    ) -> Float[Array, "*conditions"]:
         """Return the worst of several cases.
 
         Parameters

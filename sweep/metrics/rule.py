@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import ClassVar, Literal
 
-from ..base.types import FloatArray
+from ..base.types import Array, Float, PerTerm, SameShape
 
 
 class Rule(ABC):
@@ -21,7 +21,7 @@ class Rule(ABC):
     smallest: ClassVar[bool] = False
 
     @abstractmethod
-    def of(self, terms: FloatArray) -> FloatArray:
+    def of(self, terms: Float[Array, " terms *batch"]) -> SameShape:
         """Return the objective.
 
         Parameters
@@ -36,7 +36,7 @@ class Rule(ABC):
         """
 
     @abstractmethod
-    def gradient(self, terms: FloatArray) -> FloatArray:
+    def gradient(self, terms: PerTerm) -> PerTerm:
         """Return the derivative by each term.
 
         Parameters

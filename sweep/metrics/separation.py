@@ -8,7 +8,20 @@ from collections.abc import Callable, Iterator, Mapping
 import numpy as np
 
 from ..base.cache import Cache
-from ..base.types import BoolArray, FloatArray, IndexArray
+from ..base.types import (
+    Array,
+    Bool,
+    BoolArray,
+    DesignSignals,
+    Float,
+    FloatArray,
+    IndexArray,
+    Int,
+    MemberNumbers,
+    PerDesign,
+    PerWavelength,
+    SameShape,
+)
 from ..spectra.lights import Pair, class_pairs, pair_name
 
 _BLOCK_PAIRS = 262_144
@@ -35,7 +48,9 @@ def csd_name(pair: Pair) -> str:
     return pair_name("csd", pair)
 
 
-def separation(response: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
+def separation(
+    response: DesignSignals, first: Int[IndexArray, " first"], second: Int[IndexArray, " second"]
+) -> PerDesign:
     """Compute the color separation distance of two signal types (the paper's CSD).
 
     The smallest L2 distance between a point of one type and a point of the other. Differences are taken before
@@ -74,8 +89,8 @@ def separation(response: FloatArray, first: IndexArray, second: IndexArray) -> F
 
 
 def pair_blocks(
-    shape: tuple[int, ...], first: IndexArray, second: IndexArray
-) -> Iterator[tuple[slice, IndexArray, IndexArray]]:
+    shape: tuple[int, ...], first: Int[IndexArray, " first"], second: Int[IndexArray, " second"]
+) -> Iterator[tuple[slice, Int[IndexArray, " _pairs"], Int[IndexArray, " _pairs"]]]:
     """Yield blocks of designs that are small enough for all pairs at once.
 
     Parameters
@@ -96,7 +111,7 @@ def pair_blocks(
         yield slice(start, min(start + step, shape[0])), one, other
 
 
-def separations(response: FloatArray, members: Mapping[str, IndexArray]) -> dict[Pair, FloatArray]:
+def separations(response: DesignSignals, members: Mapping[str, MemberNumbers]) -> dict[Pair, PerDesign]:
     """Compute the CSD of every pair of signal types.
 
     Parameters
@@ -122,7 +137,9 @@ def separations(response: FloatArray, members: Mapping[str, IndexArray]) -> dict
     return _distances(squared.T, np.zeros(n_designs, dtype=bool), members, lambda some: response[some])
 
 
-def packed_response(response: FloatArray, members: Mapping[str, IndexArray]) -> tuple[FloatArray, IndexArray] | None:
+def packed_response(
+    response: DesignSignals, members: Mapping[str, MemberNumbers]
+) -> tuple[Float[Array, "designs 4 signals"], Int[IndexArray, " _types"]] | None:
     """Return a response in the layout of the compiled kernels.
 
     Parameters
@@ -149,8 +166,11 @@ def packed_response(response: FloatArray, members: Mapping[str, IndexArray]) -> 
 
 
 def separations_along(
-    fixed: FloatArray, channel: int, values: FloatArray, members: Mapping[str, IndexArray]
-) -> dict[Pair, FloatArray]:
+    fixed: Float[Array, "signals channels"],
+    channel: int,
+    values: Float[Array, "designs signals"],
+    members: Mapping[str, MemberNumbers],
+) -> dict[Pair, PerDesign]:
     """Compute the CSD of every pair for designs that differ in one channel alone.
 
     Parameters
@@ -182,7 +202,7 @@ def separations_along(
         squared = np.empty((len(starts) - 1, len(values)))
         nearest_along_squared(np.ascontiguousarray(values), apart, first, second, starts, squared)
 
-    def whole(some: BoolArray) -> FloatArray:
+    def whole(some: Bool[BoolArray, " values"]) -> DesignSignals:
         response = np.repeat(fixed[None], int(some.sum()), axis=0)
         response[..., channel] = values[some]
         return response
@@ -191,8 +211,11 @@ def separations_along(
 
 
 def _distances(
-    squared: FloatArray, odd: BoolArray, members: Mapping[str, IndexArray], response: Callable[[BoolArray], FloatArray]
-) -> dict[Pair, FloatArray]:
+    squared: Float[Array, "pairs designs"],
+    odd: Bool[BoolArray, " designs"],
+    members: Mapping[str, MemberNumbers],
+    response: Callable[[Bool[BoolArray, "designs signals channels"]], DesignSignals],
+) -> dict[Pair, PerDesign]:
     """Return roots of ndarray of shape (n_pairs, n_designs); non-finite designs and extreme squares by `separation`."""
     distances = dict(zip(class_pairs(list(members)), np.sqrt(squared), strict=True))
     for (a, b), distance in distances.items():
@@ -207,7 +230,7 @@ _apart: Cache[bytes, _Apart] = Cache(16)
 """The blocks of a run share their fixed channels."""
 
 
-def _pairs_apart(others: FloatArray, members: Mapping[str, IndexArray]) -> _Apart:
+def _pairs_apart(others: Float[Array, "signals channels"], members: Mapping[str, MemberNumbers]) -> _Apart:
     """Return the pairs of signals as `nearest_along_squared` takes them, from DN of the shared channels."""
 
     def made() -> _Apart:
@@ -226,7 +249,9 @@ def _pairs_apart(others: FloatArray, members: Mapping[str, IndexArray]) -> _Apar
     return _apart.get(hashlib.sha256(b"".join(part.tobytes() for part in key_parts)).digest(), made)
 
 
-def cfa_sensitivity(total_qe: FloatArray, counts: IndexArray, clear_qe: FloatArray) -> FloatArray:
+def cfa_sensitivity(
+    total_qe: Float[Array, "*batch channels"], counts: Int[IndexArray, " channels"], clear_qe: PerWavelength
+) -> SameShape:
     """Return the total QE, averaged over the pixels of the tile, relative to the clear pixel.
 
     Parameters

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, DesignCases, DesignCurves, Float, IndexArray, Int, PerDesign, PerFree, PerParameter
 from ..camera.brightness import LampSlopes
 from ..camera.linear import LinearModel, linear_model
 from ..camera.pixel_curve import STEPS_DN2
@@ -41,8 +41,8 @@ class Rows:
         Derivatives by the free parameters.
     """
 
-    values: FloatArray
-    by_u: FloatArray
+    values: Float[Array, "*terms"]
+    by_u: Float[Array, "*terms free"]
 
     def scaled(self, factor: float, offset: float = 0.0) -> Rows:
         """Return factor times rows plus offset.
@@ -141,9 +141,9 @@ class SmoothDesign:
         self,
         imager: LinearModel,
         family: Family,
-        x: FloatArray,
-        free: IndexArray,
-        span: FloatArray,
+        x: PerParameter,
+        free: Int[IndexArray, " free"],
+        span: PerFree,
         members: PopulationModel | None = None,
         drawn: LampsAndCameras | None = None,
         images: SeededVision | None = None,
@@ -179,26 +179,33 @@ class SmoothDesign:
         return value
 
     @cached_property
-    def _response(self) -> tuple[FloatArray, FloatArray]:
+    def _response(self) -> tuple[Float[Array, "cases signals channels"], Float[Array, "free cases signals channels"]]:
         return self._imager.smooth_with_gradient(self.curves, self.by_u)
 
     @property
-    def response(self) -> FloatArray:
+    def response(self) -> Float[Array, "cases signals channels"]:
         """Unclipped, unrounded response, DN, ndarray of shape (n_cases, n_signals, n_channels)."""
         return self._response[0]
 
     @property
-    def response_by_u(self) -> FloatArray:
+    def response_by_u(self) -> Float[Array, "free cases signals channels"]:
         """Derivative of the response, ndarray of shape (n_free, n_cases, n_signals, n_channels)."""
         return self._response[1]
 
     @cached_property
-    def lamps(self) -> tuple[FloatArray, FloatArray]:
+    def lamps(self) -> tuple[Float[Array, "cases signals channels"], Float[Array, "free cases signals channels"]]:
         """Response to the lamps alone and its derivative, DN, in the shapes of `response` and `response_by_u`."""
         return self._imager.lamps_with_gradient(self.curves, self.by_u)
 
     @cached_property
-    def noisy(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    def noisy(
+        self,
+    ) -> tuple[
+        Float[Array, "cases signals channels"],
+        Float[Array, "cases signals channels"],
+        Float[Array, "free cases signals channels"],
+        Float[Array, "free cases signals channels"],
+    ]:
         """Mean, DN, and variance, DN^2, under noise, and their derivatives, in the shapes of `response_by_u`.
 
         The mean is `response`; of an HDR pixel it is that of the merged value, which saturates.
@@ -220,7 +227,7 @@ class SmoothDesign:
         cases = self._imager.lamps_over_brightness(self.curves, self.by_u)
         return [(lamps, BrightnessCurves(lamps.lamps, limits, least_dn2=STEPS_DN2)) for lamps in cases]
 
-    def linear(self, matrix: FloatArray) -> Rows:
+    def linear(self, matrix: Float[Array, "terms parameters"]) -> Rows:
         """Return linear functions of the parameters.
 
         Parameters
@@ -314,13 +321,15 @@ class SmoothDesign:
         return Rows(np.array([value]), slope[None] / chosen.size)
 
     @cached_property
-    def _response_of_members(self) -> tuple[FloatArray, FloatArray]:
+    def _response_of_members(
+        self,
+    ) -> tuple[Float[Array, "cases signals channels"], Float[Array, "free cases signals channels"]]:
         assert self._members is not None
         imager = self._members.imager
         return imager.smooth_with_gradient(self.curves, self.by_u)
 
 
-def smooth_response(setup: Setup, curves: FloatArray) -> FloatArray:
+def smooth_response(setup: Setup, curves: DesignCurves) -> DesignCases:
     """Return the unquantized, unclipped response.
 
     Parameters
@@ -338,7 +347,7 @@ def smooth_response(setup: Setup, curves: FloatArray) -> FloatArray:
     return linear_model(setup).smooth(curves)
 
 
-def smooth_csd(setup: Setup, curves: FloatArray, pair: Pair) -> FloatArray:
+def smooth_csd(setup: Setup, curves: DesignCurves, pair: Pair) -> PerDesign:
     """Return the CSD of the smooth response, the smallest over the cases.
 
     Parameters

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ..base.types import FloatArray
+from ..base.types import DesignCurves, PerDesign
 from ..camera.linear import linear_model
 from ..camera.setup import Setup
 from ..spectra.lights import Pair, class_pairs
@@ -212,7 +212,7 @@ def _of_signals(design: SmoothDesign, pair: Pair, of: _OfPairs) -> Rows:
     return Rows(of_pairs(mean, variance), along.imag.reshape(shape).T / COMPLEX_STEP)
 
 
-def smooth_detectability(setup: Setup, curves: FloatArray, pair: Pair) -> FloatArray:
+def smooth_detectability(setup: Setup, curves: DesignCurves, pair: Pair) -> PerDesign:
     """Return d' of the smooth response, the smallest over the cases.
 
     Parameters

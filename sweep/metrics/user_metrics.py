@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..base.errors import SweepError, ValidationIssue
-from ..base.types import FloatArray
+from ..base.types import Array, DesignCases, DesignSignals, Float, PerDesign
 from ..base.user_code import UserCode, name_in_file
 from ..camera.setup import Setup
 
@@ -35,14 +35,14 @@ class Readings:
         Pedestal, DN.
     """
 
-    dn: FloatArray
+    dn: DesignSignals
     types: tuple[str, ...]
     names: tuple[str, ...]
     channels: tuple[str, ...]
     pedestal_dn: float
 
     @staticmethod
-    def of_setup(setup: Setup, dn: FloatArray) -> Readings:
+    def of_setup(setup: Setup, dn: DesignSignals) -> Readings:
         """Return read-only digital numbers with the signals and channels of a setup.
 
         Parameters
@@ -62,7 +62,7 @@ class Readings:
         lights = setup.lights
         return Readings(fixed, lights.types, lights.names, setup.camera.mosaic.channels, setup.camera.pixel.offset_dn)
 
-    def of(self, kind: str) -> FloatArray:
+    def of(self, kind: str) -> DesignSignals:
         """Return the digital numbers of one signal type.
 
         Parameters
@@ -143,7 +143,7 @@ class UserMetric:
             raise SweepError(ValidationIssue(f"{self.code.name}: `{what}` is no short text", value=text))
         return text
 
-    def parts(self, readings: Readings, *, finite: bool = True) -> FloatArray | None:
+    def parts(self, readings: Readings, *, finite: bool = True) -> Float[Array, "designs parts"] | None:
         """Call the metric.
 
         Parameters
@@ -181,7 +181,7 @@ class UserMetric:
             raise SweepError(ValidationIssue(f"{self.code.name} is not finite", value=other))
         return np.asarray(values.reshape(n, -1), dtype=float)
 
-    def of_cases(self, setup: Setup, response: FloatArray) -> FloatArray:
+    def of_cases(self, setup: Setup, response: DesignCases) -> PerDesign:
         """Return the worst over the cases.
 
         Parameters
@@ -204,7 +204,7 @@ class UserMetric:
         return np.asarray(joined.min(axis=1) if self.direction == "more" else joined.max(axis=1), dtype=float)
 
 
-def user_quantities(metrics: Sequence[UserMetric], setup: Setup, response: FloatArray) -> dict[str, FloatArray]:
+def user_quantities(metrics: Sequence[UserMetric], setup: Setup, response: DesignCases) -> dict[str, PerDesign]:
     """Return the column of each metric of user code.
 
     Parameters

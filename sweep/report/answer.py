@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from ..base.types import FloatArray
+from ..base.types import Array, Float
 from ..metrics.columns.confusion import CNR, D_PRIME
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.limiting import limited_by_name
@@ -370,7 +370,7 @@ def unseen_lines(output: Output) -> Iterator[str]:
             yield f"A light that the search{of} has not seen costs {quantity.formatted(mean)} on average ({ends})."
 
 
-def generalization_gap(falls: FloatArray, seed: int) -> tuple[float, float, float]:
+def generalization_gap(falls: Float[Array, " lights"], seed: int) -> tuple[float, float, float]:
     """Return the mean fall of an optimum on a light that was left out, with its 95 % interval by a bootstrap.
 
     The interval is of lights like these, drawn at random (Efron and Tibshirani, An Introduction to the Bootstrap,

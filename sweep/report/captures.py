@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.types import FloatArray
+from ..base.types import Array, Float
 from ..results.output import Output
 from ..study.axes import series_of
 from .figures import TYPE_COLORS, Drawing, canvas, legend_beside
@@ -37,7 +37,7 @@ class CapturesFigure:
     """
 
     series: SeriesFigure
-    ends: Mapping[tuple[str, str, str], FloatArray]
+    ends: Mapping[tuple[str, str, str], Float[Array, " captures"]]
 
 
 def capture_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:

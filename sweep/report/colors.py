@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, Float, IndexArray, Int
 from ..results.output import Output
 from ..results.tables import CHART, NIGHT
 from .figures import CURVE_CYCLE, Drawing, canvas, legend_beside, panel_grid
@@ -75,7 +75,7 @@ def _draw_error_curves(light: str, curves: pd.DataFrame) -> Figure:
     return drawn
 
 
-def renderings(output: Output) -> dict[str, dict[str, FloatArray]]:
+def renderings(output: Output) -> dict[str, dict[str, Float[Array, "_rows _columns 3"]]]:
     """Return pictures as the eye and each design of the first scenario see them, with noise by the study's seed.
 
     Parameters
@@ -101,7 +101,7 @@ def renderings(output: Output) -> dict[str, dict[str, FloatArray]]:
     }
 
 
-def _image(picture: str, areas: pd.DataFrame, rng: np.random.Generator) -> FloatArray:
+def _image(picture: str, areas: pd.DataFrame, rng: np.random.Generator) -> Float[Array, "rows columns 3"]:
     """Return the pixels of a picture, each with its own noise."""
     names = list(areas["area"])
     if picture == CHART:
@@ -117,7 +117,7 @@ def _image(picture: str, areas: pd.DataFrame, rng: np.random.Generator) -> Float
     return np.asarray((mean[at] + noise) * _WHITE @ _TO_SRGB.T, dtype=float)
 
 
-def _street(areas: Mapping[str, int]) -> IndexArray:
+def _street(areas: Mapping[str, int]) -> Int[IndexArray, "rows columns"]:
     """Return the area of each pixel of a street at night: road, lines, signals, signs, a car and leaves."""
     height, width = 72, 108
     y, x = np.mgrid[0:height, 0:width]
@@ -150,7 +150,7 @@ def _street(areas: Mapping[str, int]) -> IndexArray:
     return street
 
 
-def _draw_renderings(pictures: Mapping[str, FloatArray], title: str) -> Figure:
+def _draw_renderings(pictures: Mapping[str, Float[Array, "_rows _columns 3"]], title: str) -> Figure:
     """Draw the pictures side by side, in sRGB; colors outside it are clipped."""
     figure, panels = panel_grid(len(pictures), 4, (2.6, 2.1), (0, 0.4))
     for axes, (name, image) in zip(panels, pictures.items(), strict=True):

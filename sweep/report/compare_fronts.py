@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from ..base.types import FloatArray
+from ..base.types import Array, Float
 from ..metrics.objective import COMBINED
 from ..metrics.quantity import DN, WORST_CASE
 from ..results.output import Output
@@ -41,7 +41,7 @@ class ComparedFront:
     run: str
     cfa: str
     traced: bool
-    points: FloatArray
+    points: Float[Array, "points 2"]
 
 
 def scene_names(runs: Mapping[str, Output]) -> dict[str, dict[str, str]]:
@@ -160,7 +160,7 @@ def fronts_in(runs: Mapping[str, tuple[Output, str]]) -> list[ComparedFront]:
     return fronts
 
 
-def _sorted(values: pd.DataFrame) -> FloatArray:
+def _sorted(values: pd.DataFrame) -> Float[Array, "points 2"]:
     points = np.unique(values.to_numpy(dtype=float), axis=0)
     return points[np.argsort(points[:, 1], kind="stable")]
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from ..base.types import FloatArray
+from ..base.types import Array, Float, PerWavelength
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,11 +69,11 @@ class CurvesFigure:
 
     title: str
     y_label: str
-    wavelength_nm: FloatArray
-    curves: Mapping[str, FloatArray]
+    wavelength_nm: PerWavelength
+    curves: Mapping[str, Float[Array, "... wavelengths"]]
     dashed: Sequence[str] = ()
     colors: Mapping[str, str] = field(default_factory=dict)
-    shades: Mapping[str, FloatArray] = field(default_factory=dict)
+    shades: Mapping[str, PerWavelength] = field(default_factory=dict)
 
 
 def draw_curves(figure: CurvesFigure) -> Figure:

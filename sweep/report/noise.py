@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
-from ..base.types import BoolArray, FloatArray
+from ..base.types import Array, Bool, BoolArray, Float, PerValue
 from ..metrics.columns.chromatic import CHROMATIC_ERROR
 from ..metrics.columns.confusion import D_PRIME, STATE_ERROR, STATE_ERROR_BOUND
 from ..results.output import Output
@@ -136,7 +136,9 @@ def _rate(allowed: float) -> str:
     return f"1 error in {one_in:,}" if math.isclose(one_in * allowed, 1, rel_tol=1e-9) else f"{allowed:g} errors"
 
 
-def usable_range(x: FloatArray, usable: BoolArray, unit: str, passes: FloatArray | None) -> str:
+def usable_range(
+    x: PerValue, usable: Bool[BoolArray, " values"], unit: str, passes: Float[Array, " passes"] | None
+) -> str:
     """Return the usable range of a design in words, by the computed crossings if there are any."""
     of = f" of {unit}" if " " in unit else f" {unit}".rstrip()
     if passes is None or passes.size % 2 != int(usable[0] != usable[-1]):
@@ -175,7 +177,7 @@ def rounded(value: float, *, up: bool) -> str:
     return f"{float(text):g}" if "e" in text else text
 
 
-def _crossings(output: Output, series: str, key: str, quantity: str) -> dict[str, FloatArray]:
+def _crossings(output: Output, series: str, key: str, quantity: str) -> dict[str, Float[Array, " _passes"]]:
     """Return the numbers at which each design has the allowed error, in order; empty for those that have it nowhere."""
     if output.crossings is None:
         return {}

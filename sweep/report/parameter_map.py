@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from ..base.types import FloatArray
+from ..base.types import Array, Float, PerWavelength
 from ..results.output import Output
 from ..results.tables import NAMED
 from .figures import Drawing, canvas
@@ -55,11 +55,11 @@ class MapFigure:
     title: str
     label: str
     names: tuple[str, str]
-    x: FloatArray
-    y: FloatArray
-    best: FloatArray
+    x: Float[Array, " x"]
+    y: Float[Array, " y"]
+    best: Float[Array, "y x"]
     levels: Sequence[tuple[str, float]]
-    points: FloatArray
+    points: Float[Array, "points 2"]
 
 
 def map_figure(output: Output) -> MapFigure | None:
@@ -99,7 +99,7 @@ def map_figure(output: Output) -> MapFigure | None:
     )
 
 
-def _peak_and_width(wavelength_nm: FloatArray, curve: FloatArray) -> tuple[float, float]:
+def _peak_and_width(wavelength_nm: PerWavelength, curve: PerWavelength) -> tuple[float, float]:
     """Return the peak of a curve and its width at half height, nm; NaN where it has no half height on a side."""
     peak, half = int(curve.argmax()), float(curve.max()) / 2
     sides = []
@@ -147,7 +147,7 @@ def map_lines(output: Output) -> Iterator[str]:
         )
 
 
-def _width_at(widths_nm: FloatArray, objectives: FloatArray, level: float) -> float:
+def _width_at(widths_nm: Float[Array, " widths"], objectives: Float[Array, " widths"], level: float) -> float:
     """Return a width, between those of the map, up to which the objective reaches a level; NaN if there is none.
 
     Beyond the last width that reaches it, a convex or concave curve is above one of two lines: the one that goes on as
@@ -164,7 +164,9 @@ def _width_at(widths_nm: FloatArray, objectives: FloatArray, level: float) -> fl
     return float(widths_nm[last] + (level - objectives[last]) / slopes.min())
 
 
-def _widest(peaks_nm: FloatArray, widths_nm: FloatArray, most_nm: float) -> tuple[float, float]:
+def _widest(
+    peaks_nm: Float[Array, " peaks"], widths_nm: Float[Array, " widths"], most_nm: float
+) -> tuple[float, float]:
     """Return the peak with the largest width, and that width, between the peaks of the map.
 
     Between two peaks a curve whose third derivative keeps its sign lies between the parabolas through both and the

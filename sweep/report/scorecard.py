@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from ..base.types import FloatArray
+from ..base.types import Array, Num, PerDesign
 from ..metrics.columns.tasks import PREFIX
 from ..metrics.quantity import Column
 from ..results.output import Output
@@ -43,7 +43,7 @@ class ScoreRow:
     """
 
     column: Column
-    values: FloatArray
+    values: Num[Array, " designs"]
     best: frozenset[int]
     worst: frozenset[int]
 
@@ -59,7 +59,7 @@ class ScoreRow:
         ]
 
     @property
-    def factors(self) -> FloatArray:
+    def factors(self) -> PerDesign:
         """Factors by which designs are better than the first; NaN where they are undefined."""
         of = self.values[0]
         ratio = np.full(self.values.shape, np.nan)
@@ -107,7 +107,7 @@ def scorecard(output: Output) -> Scorecard | None:
     return Scorecard(names, tuple(_row(column, rows[column.name].to_numpy(dtype=float)) for column in columns))
 
 
-def _row(column: Column, values: FloatArray) -> ScoreRow:
+def _row(column: Column, values: Num[Array, " designs"]) -> ScoreRow:
     known = values[np.isfinite(values)]
     if not known.size or np.ptp(known) <= _SAME * np.abs(known).max() or np.abs(known).max() < 10.0**-column.digits:
         return ScoreRow(column, values, frozenset(), frozenset())

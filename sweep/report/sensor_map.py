@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.types import FloatArray
+from ..base.types import PerDesign
 from ..results.output import Output
 from ..results.tables import REFERENCE, SEARCHED, SENSOR_MAP
 from .figures import Drawing, panel_grid
@@ -39,8 +39,8 @@ class SensorMap:
     """
 
     name: str
-    heights: FloatArray
-    dn: FloatArray
+    heights: PerDesign
+    dn: PerDesign
 
     @property
     def worst(self) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
-from ..base.types import FloatArray
+from ..base.types import Array, Float
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.quantity import Column
 from ..results.inventory import Inventory
@@ -288,7 +288,7 @@ def draw_sensors(figures: pd.DataFrame, words: str) -> Figure:
     return drawn
 
 
-def _ellipse(row: Mapping[Any, Any]) -> FloatArray:
+def _ellipse(row: Mapping[Any, Any]) -> Float[Array, "points 2"]:
     """Return the outline of the ellipse that holds 90 % of the random sensors, ndarray of shape (n, 2)."""
     angle = np.linspace(0, 2 * np.pi, 73)
     x, y = np.cos(angle), np.sin(angle)

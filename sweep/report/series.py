@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, Float, IndexArray, Int, Num, PerParameter
 from ..metrics.quantity import DN
 from ..results.output import Output
 from ..study.axes import series_of
@@ -54,11 +54,11 @@ class Line:
         Numbers at which it passes the level of the figure, and its value there.
     """
 
-    y: FloatArray
-    upper: FloatArray | None
+    y: Num[Array, " levels"]
+    upper: Num[Array, " levels"] | None
     passes: tuple[tuple[float, float], ...] = ()
 
-    def over(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def over(self, x: Float[Array, " levels"]) -> tuple[Float[Array, " _values"], Float[Array, " _values"]]:
         """Return numbers and values as drawn, with the crossing among them.
 
         Parameters
@@ -87,7 +87,7 @@ class SeriesFigure:
     title: str
     key: str
     y_label: str
-    x: FloatArray
+    x: PerParameter
     lines: Mapping[str, Line]
     band: str
     log_y: bool = False
@@ -96,7 +96,7 @@ class SeriesFigure:
     among: str = ""
     note: str = ""
     base: str = ""
-    marks: Mapping[str, FloatArray] = field(default_factory=dict)
+    marks: Mapping[str, Float[Array, " levels"]] = field(default_factory=dict)
 
     @property
     def x_label(self) -> str:
@@ -124,7 +124,7 @@ class SeriesFigure:
         return f"{self.x[place]:g} {quantity_of(self.key)[1]}".rstrip()
 
     @property
-    def values(self) -> dict[str, FloatArray]:
+    def values(self) -> dict[str, Num[Array, " _levels"]]:
         """Values of each design, with unknown ones as the least."""
         return {design: np.nan_to_num(line.y, nan=-np.inf) for design, line in self.lines.items()}
 
@@ -303,7 +303,7 @@ def _below(series: SeriesFigure) -> dict[str, list[str]]:
     return ranges
 
 
-def _run(series: SeriesFigure, run: IndexArray, article: str) -> str:
+def _run(series: SeriesFigure, run: Int[IndexArray, " run"], article: str) -> str:
     """Return a range of neighboring numbers in words."""
     first, last, (name, unit) = int(run[0]), int(run[-1]), quantity_of(series.key)
     if first == 0:
@@ -345,7 +345,9 @@ def leads_of(series: SeriesFigure) -> list[tuple[str | None, int, int]]:
     return leads
 
 
-def _between(at: FloatArray, x: FloatArray, y: FloatArray, series: SeriesFigure) -> FloatArray:
+def _between(
+    at: Float[Array, " at"], x: Float[Array, " levels"], y: Float[Array, " levels"], series: SeriesFigure
+) -> Float[Array, " at"]:
     """Return the height of a line, as drawn, at some numbers."""
     across, up = np.log if series.log_x else np.positive, np.log if series.log_y else np.positive
     height = np.interp(across(at), across(x), up(y))

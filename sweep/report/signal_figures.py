@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base.types import FloatArray
+from ..base.types import Array, Float, FloatArray
 from ..camera.mosaic import Mosaic
 from ..metrics.limiting import BETWEEN, limited_by_name
 from ..results.output import Output
@@ -28,7 +28,9 @@ _CLEAR = "#eeeeee"
 _MOST_TILES, _WIDE = 24, 8
 
 
-def signals_of(output: Output, design_id: object) -> tuple[list[str], list[tuple[str, str]], FloatArray]:
+def signals_of(
+    output: Output, design_id: object
+) -> tuple[list[str], list[tuple[str, str]], Float[Array, "channels signals"]]:
     """Return channels, (type, name) of the signals, and their digital numbers with a design.
 
     Parameters
@@ -146,7 +148,7 @@ def draw_clouds(designs: Sequence[Cloud], title: str, top_dn: float) -> Figure:
     return figure
 
 
-def chart_patches(output: Output) -> dict[str, FloatArray]:
+def chart_patches(output: Output) -> dict[str, Float[Array, "_ 3"]]:
     """Return the color chart of the signals.
 
     Parameters
@@ -163,7 +165,7 @@ def chart_patches(output: Output) -> dict[str, FloatArray]:
     return {kind: display_colors(grid, photons) for kind, photons in output.curves.bundles.items()}
 
 
-def draw_chart(patches: Mapping[str, FloatArray]) -> Figure:
+def draw_chart(patches: Mapping[str, Float[Array, "_ _"]]) -> Figure:
     """Draw the patches, one row per signal type, and gray steps.
 
     Parameters

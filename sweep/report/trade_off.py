@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base.types import FloatArray
+from ..base.types import PerDesign
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..results.output import Output
 from ..results.tables import NAMED, REFERENCE, SEARCHED, SWEPT
@@ -65,8 +65,8 @@ class Points:
         Labels of single points (empty: none).
     """
 
-    x: FloatArray
-    y: FloatArray
+    x: PerDesign
+    y: PerDesign
     labels: tuple[str, ...] = ()
 
 

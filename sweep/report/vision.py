@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import rankdata
 
-from ..base.types import BoolArray, FloatArray, IndexArray
+from ..base.types import Array, Bool, BoolArray, Float, IndexArray, Int
 from ..metrics.share import format_share
 from ..results.output import Output
 from ..results.tables import VISION, VISION_CONDITIONS
@@ -86,7 +86,7 @@ class Benchmark:
         return rows.pivot(index=["seed", "image"], columns="name", values="wrong")[self.designs]
 
     @lru_cache  # noqa: B019
-    def seeds(self, order: str, lamps: str = UNSEEN) -> IndexArray:
+    def seeds(self, order: str, lamps: str = UNSEEN) -> Int[IndexArray, " scenes"]:
         """Return the seed of each scene of `wrong`.
 
         Parameters
@@ -298,7 +298,9 @@ def ranks_of(benchmark: Benchmark) -> Ranks:
     return Ranks(everywhere, between, conditions)
 
 
-def _by_condition(wrong: pd.DataFrame, here: BoolArray, weights: FloatArray) -> FloatArray:
+def _by_condition(
+    wrong: pd.DataFrame, here: Bool[BoolArray, "conditions images"], weights: Float[Array, "draws images"]
+) -> Float[Array, "draws _readers conditions"]:
     """Return errors, ndarray of shape (n_rows, designs, conditions); NaN where a row has no scene of a condition."""
     values = wrong.to_numpy(dtype=float)
     errors = np.full((len(weights), values.shape[1], len(here)), np.nan)
@@ -309,7 +311,7 @@ def _by_condition(wrong: pd.DataFrame, here: BoolArray, weights: FloatArray) -> 
     return errors
 
 
-def _spearman(x: FloatArray, y: FloatArray) -> FloatArray:
+def _spearman(x: Float[Array, "draws values"], y: Float[Array, "draws values"]) -> Float[Array, " draws"]:
     """Return the rank correlation along the last axis, ndarray of shape (draws,); NaN if one side is constant."""
     a, b = (rankdata(values, axis=1) for values in (x, y))
     a, b = (ranks - ranks.mean(axis=1, keepdims=True) for ranks in (a, b))

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pyarrow as pa
 
-from ..base.types import FloatArray
+from ..base.types import Array, Float, FloatArray, PerWavelength
 
 _QE, _LIGHT, _TASK, _DESIGN, _ON_FRONT, _LIMIT = "qe", "light", "task", "design", "front", "limit"
 _COLORANT = "colorant"
@@ -41,14 +41,14 @@ class KeptCurves:
     files by task and class, and by file and column, absorbances of colorants in the order of their numbers.
     """
 
-    wavelength_nm: FloatArray
-    sensor: dict[str, FloatArray] = field(default_factory=dict)
-    lights: dict[tuple[str, str], FloatArray] = field(default_factory=dict)
+    wavelength_nm: PerWavelength
+    sensor: dict[str, PerWavelength] = field(default_factory=dict)
+    lights: dict[tuple[str, str], PerWavelength] = field(default_factory=dict)
     drawn: dict[int, FilterCurves] = field(default_factory=dict)
     on_front: dict[int, FilterCurves] = field(default_factory=dict)
-    limits: dict[str, FloatArray] = field(default_factory=dict)
-    tasks: dict[tuple[str, str], FloatArray] = field(default_factory=dict)
-    colorants: dict[str, FloatArray] = field(default_factory=dict)
+    limits: dict[str, PerWavelength] = field(default_factory=dict)
+    tasks: dict[tuple[str, str], PerWavelength] = field(default_factory=dict)
+    colorants: dict[str, PerWavelength] = field(default_factory=dict)
 
     @property
     def designs(self) -> dict[int, FilterCurves]:
@@ -56,14 +56,14 @@ class KeptCurves:
         return {**self.drawn, **self.on_front}
 
     @property
-    def bundles(self) -> dict[str, FloatArray]:
+    def bundles(self) -> dict[str, Float[Array, "_curves wavelengths"]]:
         """Photon spectra of each signal type, ndarray of shape (n_signals, n_wavelengths)."""
         types: dict[str, list[FloatArray]] = {}
         for (kind, _), photons in self.lights.items():
             types.setdefault(kind, []).append(photons)
         return {kind: np.stack(photons) for kind, photons in types.items()}
 
-    def _rows(self) -> Iterator[tuple[str, str, FloatArray, str | None, int | None, str | None]]:
+    def _rows(self) -> Iterator[tuple[str, str, PerWavelength, str | None, int | None, str | None]]:
         yield from ((_QE, name, values, None, None, None) for name, values in self.sensor.items())
         yield from ((_LIGHT, name, values, kind, None, None) for (kind, name), values in self.lights.items())
         yield from ((_TASK, name, values, owner, None, None) for (owner, name), values in self.tasks.items())

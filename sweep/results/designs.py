@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from ..base.errors import OutputError, SweepError, ValidationIssue, nearest
-from ..base.types import FloatArray
+from ..base.types import Array, Float, PerWavelength, SameShape
 from ..base.user_code import CODE_OF, is_code
 from ..designs.space import Space
 from ..study import Study, load_study
@@ -113,7 +113,7 @@ def named_rows(table: pd.DataFrame) -> list[dict[Any, Any]]:
 
 def rows_of_series(
     study: Study, table: pd.DataFrame
-) -> Iterator[tuple[str, str, dict[str, float], Mapping[Any, Any], FloatArray, Space]]:
+) -> Iterator[tuple[str, str, dict[str, float], Mapping[Any, Any], Float[Array, "1 modified wavelengths"], Space]]:
     """Yield each design that was computed in all scenarios of a series.
 
     Parameters
@@ -237,7 +237,7 @@ def study_of(output: Output, data: Path | None, *, allow_code: bool = False) -> 
     return study
 
 
-def check_kept(output: Output, kept: Mapping[_Key, FloatArray], made: Mapping[_Key, FloatArray]) -> None:
+def check_kept(output: Output, kept: Mapping[_Key, PerWavelength], made: Mapping[_Key, PerWavelength]) -> None:
     """Compare curves with those that the run kept.
 
     Parameters
@@ -253,7 +253,7 @@ def check_kept(output: Output, kept: Mapping[_Key, FloatArray], made: Mapping[_K
         If they differ.
     """
 
-    def same(one: FloatArray, other: FloatArray) -> bool:
+    def same(one: SameShape, other: SameShape) -> bool:
         return one.shape == other.shape and bool(np.abs(one - other).max(initial=0.0) <= _SAME)
 
     different = [str(name) for name, values in made.items() if name in kept and not same(kept[name], values)]

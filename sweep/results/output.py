@@ -15,7 +15,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from ..base.errors import OutputError, ValidationIssue
-from ..base.types import IndexArray
+from ..base.types import DesignNumbers
 from ..camera.mosaic import Mosaic
 from ..metrics.bound import Bound
 from ..metrics.objective import Objective
@@ -69,7 +69,7 @@ class Output:
     provenance: Provenance
     table: pd.DataFrame
     counts: Counts
-    swept_points: IndexArray
+    swept_points: DesignNumbers
     curves: KeptCurves
     points: pd.DataFrame
     front: pd.DataFrame | None

@@ -10,6 +10,7 @@ from dataclasses import fields, is_dataclass
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
+from jaxtyping import AbstractArray
 
 
 def to_json(value: object) -> bytes:
@@ -86,9 +87,13 @@ def _made(kind: Any, data: Any) -> Any:
     if origin in (Union, types.UnionType):
         (inner,) = (one for one in kinds if one is not types.NoneType)
         return None if data is None else _made(inner, data)
-    if origin is np.ndarray:
+    if isinstance(kind, type) and issubclass(kind, AbstractArray):
         content = base64.b64decode(data["base64"], validate=True)
-        return np.frombuffer(content, data["dtype"]).reshape(data["shape"]).astype(get_args(kinds[1])[0])
+        array = np.frombuffer(content, data["dtype"]).reshape(data["shape"])
+        array = array.astype(array.dtype.newbyteorder("="))
+        if not isinstance(array, kind):
+            raise ValueError(f"does not fit {kind}: {array.dtype} of shape {array.shape}")
+        return array
     if origin in (list, tuple, Sequence):
         if not isinstance(data, list):
             raise TypeError(f"no list: {str(data)[:40]!r}")

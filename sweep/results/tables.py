@@ -14,7 +14,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from ..base.errors import OutputError, ValidationIssue
-from ..base.types import BoolArray
+from ..base.types import Bool, BoolArray
 from .atomic import atomic, write_text
 
 if TYPE_CHECKING:
@@ -391,7 +391,7 @@ def rows_in(path: Path) -> int:
         return 0
 
 
-def word_mask(table: pa.Table, column: str, *words: str) -> BoolArray:
+def word_mask(table: pa.Table, column: str, *words: str) -> Bool[BoolArray, " rows"]:
     """Return where a dictionary-encoded column holds one of some words.
 
     Parameters

@@ -15,7 +15,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from ..base.errors import OutputError, ValidationIssue
-from ..base.types import BoolArray, IndexArray
+from ..base.types import Bool, BoolArray, DesignNumbers, IndexArray, Int
 from ..metrics.columns.exposure import EXPOSURE
 from .tables import REFERENCE, SWEPT, batches, word_mask
 
@@ -104,7 +104,7 @@ def per_exposure(separation: str) -> str:
     return f"{separation}_per_ms"
 
 
-def even(size: int, most: int) -> IndexArray:
+def even(size: int, most: int) -> Int[IndexArray, " numbers"]:
     """Return evenly spread indices that are not in step with a grid.
 
     Parameters
@@ -123,7 +123,7 @@ def even(size: int, most: int) -> IndexArray:
     return np.unique((golden * size).astype(np.intp))
 
 
-def swept_points(path: Path) -> IndexArray:
+def swept_points(path: Path) -> DesignNumbers:
     """Return the swept designs of a result table that a report draws as points.
 
     The feasible front of each CFA and scenario, and an even sample of the others. A design's id is its row number, so
@@ -157,7 +157,7 @@ def thinned(
     path: Path,
     order: Sequence[str],
     separation: str,
-    keep: IndexArray,
+    keep: Int[IndexArray, " kept"],
 ) -> tuple[pd.DataFrame, Counts]:
     """Read the table to show and the counts of the whole one, a row group at a time.
 
@@ -207,7 +207,7 @@ def thinned(
     return frame, Counts(counted)
 
 
-def row_groups(table: pa.Table) -> dict[tuple[str, str], IndexArray]:
+def row_groups(table: pa.Table) -> dict[tuple[str, str], Int[IndexArray, " _rows"]]:
     """Return the rows of each CFA and scenario.
 
     Parameters
@@ -228,7 +228,9 @@ def row_groups(table: pa.Table) -> dict[tuple[str, str], IndexArray]:
     return {group: at for group, at in groups.items() if at.size}
 
 
-def best_at(table: pa.Table, order: Sequence[str], most: int, among: BoolArray) -> IndexArray:
+def best_at(
+    table: pa.Table, order: Sequence[str], most: int, among: Bool[BoolArray, " rows"]
+) -> Int[IndexArray, " kept"]:
     """Return the indices of the best rows, best first; of equal ones the smallest `design_id` is first.
 
     Parameters
@@ -250,7 +252,9 @@ def best_at(table: pa.Table, order: Sequence[str], most: int, among: BoolArray) 
     return np.asarray(at[pc.sort_indices(few, sort_keys=keys)[:most].to_numpy()])
 
 
-def leading_rows(table: pa.Table, separation: str, among: BoolArray | None = None) -> IndexArray:
+def leading_rows(
+    table: pa.Table, separation: str, among: Bool[BoolArray, " rows"] | None = None
+) -> Int[IndexArray, " kept"]:
     """Return the rows with the largest separation, and the largest per exposure time, in each scenario.
 
     Parameters

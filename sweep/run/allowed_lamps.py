@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from ..base.types import FloatArray, Parallel, Progress, delayed
+from ..base.types import Array, DesignCurves, Float, Parallel, Progress, delayed
 from ..camera.forward import ForwardModel
 from ..camera.setup import Setup
 from ..results.designs import named_rows, row_curves
@@ -72,7 +72,7 @@ def regions_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
 
 
 def _cells(
-    setup: Setup, curves: FloatArray, allowed: Mapping[Norm, tuple[SingleLeds, SingleLeds]], wanted_dn: float
+    setup: Setup, curves: DesignCurves, allowed: Mapping[Norm, tuple[SingleLeds, SingleLeds]], wanted_dn: float
 ) -> list[dict[str, Any]]:
     """Return the rows of one design."""
     cells = []
@@ -97,7 +97,7 @@ def _cells(
     return cells
 
 
-def _read(setup: Setup, curves: FloatArray, leds: SingleLeds) -> FloatArray:
+def _read(setup: Setup, curves: DesignCurves, leds: SingleLeds) -> Float[Array, "phases _lights channels"]:
     """Return DN of LEDs with the photons of the study's lights, ndarray of shape (n_phases, n_leds, n_channels)."""
     photons, parts = leds.photons(setup.camera.grid), []
     for start in range(0, len(photons), _TOGETHER):
@@ -108,7 +108,9 @@ def _read(setup: Setup, curves: FloatArray, leds: SingleLeds) -> FloatArray:
     return np.concatenate(parts, axis=1)
 
 
-def least_csd(first: FloatArray, second: FloatArray) -> FloatArray:
+def least_csd(
+    first: Float[Array, "phases first channels"], second: Float[Array, "phases second channels"]
+) -> Float[Array, "first second"]:
     """Return the smallest CSD over all phases of each two lights, DN, ndarray[n_first, n_second].
 
     Parameters

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from ..base.types import FloatArray
+from ..base.types import PerValue
 from ..camera.scene import Scene
 from ..camera.setup import Setup
 from ..study import Study
@@ -69,7 +69,7 @@ def _leaves(section: Any, path: _Path = ()) -> Iterator[tuple[_Path, Any]]:
         yield path, section
 
 
-def inner_numbers(numbers: Sequence[float], steps: int = STEPS) -> FloatArray:
+def inner_numbers(numbers: Sequence[float], steps: int = STEPS) -> PerValue:
     """Return numbers with some between each two: of equal ratio where all are above 0, else of equal difference."""
     positions = np.log(numbers) if min(numbers) > 0 else np.array(numbers, dtype=float)
     fine = np.interp(np.arange((len(numbers) - 1) * (steps + 1) + 1) / (steps + 1), np.arange(len(numbers)), positions)

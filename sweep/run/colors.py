@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from ..base.types import FloatArray
+from ..base.types import Array, Float
 from ..results.designs import named_rows, row_curves
 from ..results.tables import CHART, NIGHT
 from ..spectra.tasks import Chart, StudyTasks
@@ -116,7 +116,11 @@ def rendered_table(study: Study, highlights: pd.DataFrame) -> pa.Table:
 
 
 def _areas(
-    design: dict[str, Any], picture: str, names: Any, xyz: FloatArray, covariance: FloatArray | None = None
+    design: dict[str, Any],
+    picture: str,
+    names: Any,
+    xyz: Float[Array, "colors 3"],
+    covariance: Float[Array, "colors _ _"] | None = None,
 ) -> list[dict[str, Any]]:
     """Return the rows of a picture; without a covariance there is no noise."""
     spread = np.zeros((len(xyz), 3, 3)) if covariance is None else covariance

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from ..base.types import FloatArray, Parallel, Progress, delayed
+from ..base.types import DesignCurves, Parallel, Progress, delayed
 from ..camera.forward import ForwardModel
 from ..metrics.columns.chromatic import CHROMATIC_ERROR, ChromaticConfusion
 from ..metrics.columns.confusion import STATE_ERROR, state_errors
@@ -65,7 +65,7 @@ def crossings_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progre
 class ErrorsBetween:
     """Errors of the worst pair of states of a design over the numbers of a series."""
 
-    def __init__(self, scenes: Between, curves: FloatArray, states: tuple[str, ...]) -> None:
+    def __init__(self, scenes: Between, curves: DesignCurves, states: tuple[str, ...]) -> None:
         self._scenes, self._curves, self._states = scenes, curves, states
         self._of_equal: dict[float, float] = {}
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from ..base.types import IndexArray, Parallel, Progress
+from ..base.types import IndexArray, Int, Parallel, Progress
 from ..results.curves import FilterCurves, KeptCurves
 from ..results.designs import computed_rows, row_curves, row_space
 from ..results.tables import (
@@ -79,7 +79,7 @@ class DerivedInput:
     rows: pd.DataFrame
     on_front: pd.DataFrame
     details: Mapping[int, Details]
-    points: IndexArray
+    points: Int[IndexArray, " points"]
     limit: Callable[[], Limit | None]
     parallel: Parallel
     kept: Callable[[str], Parallel]

@@ -9,7 +9,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pyarrow as pa
 
-from ..base.types import FloatArray, IndexArray, Parallel, Progress, delayed
+from ..base.types import (
+    Array,
+    DesignCurves,
+    DesignNumbers,
+    Float,
+    FloatArray,
+    IndexArray,
+    Int,
+    Parallel,
+    Progress,
+    delayed,
+)
 from ..camera.field import over_field, scene_at
 from ..camera.forward import forward_model
 from ..camera.setup import Setup
@@ -49,7 +60,7 @@ class Details:
     """
 
     limited_by: Mapping[Pair, str | None] | None = None
-    dn: FloatArray | None = None
+    dn: Float[Array, "signals channels"] | None = None
 
 
 def design_details(
@@ -115,7 +126,11 @@ def _details(setup: Setup, designs: Sequence[_Design]) -> dict[int, Details]:
 
 
 def limited_by_table(
-    study: Study, details: Mapping[int, Details], points: IndexArray, parallel: Parallel, progress: Progress
+    study: Study,
+    details: Mapping[int, Details],
+    points: Int[IndexArray, " points"],
+    parallel: Parallel,
+    progress: Progress,
 ) -> pa.Table:
     """Return the columns `design_id` and `limited_by_<a>_<b>`, the names of two lights, of the designs that are shown.
 
@@ -157,7 +172,7 @@ def limited_by_table(
     return pa.table({"design_id": pa.array(shown, pa.int64()), **limits})
 
 
-def _limits(setup: Setup, space: Space, numbers: IndexArray) -> LimitingLights:
+def _limits(setup: Setup, space: Space, numbers: DesignNumbers) -> LimitingLights:
     """Return the limiting lights of some designs of a space."""
     model, camera = forward_model(setup), setup.camera
     step = max(1, _MOST_VALUES // (model.n_cases * len(setup.lights.names) * len(camera.mosaic.channels)))
@@ -203,7 +218,7 @@ def sensor_map_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progr
     return pa.Table.from_pylist(maps, schema=schema).sort_by([("design_id", "ascending"), ("height", "ascending")])
 
 
-def _over_heights(setup: Setup, design_id: int, curves: FloatArray) -> list[dict[str, float]]:
+def _over_heights(setup: Setup, design_id: int, curves: DesignCurves) -> list[dict[str, float]]:
     """Return the rows of one design, the center of the image first."""
     field, rows = setup.scene.field, list[dict[str, float]]()
     assert field is not None

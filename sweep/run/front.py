@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pyarrow as pa
 
-from ..base.types import BoolArray, FloatArray, IndexArray
+from ..base.types import Array, Bool, BoolArray, Float, IndexArray, Int
 from ..metrics.pareto import non_dominated
 from ..results.tables import NAMED_KINDS, SWEPT, word_mask
 from ..results.thinning import best_at, leading_rows, row_groups
@@ -57,7 +57,7 @@ def report_rows(table: pa.Table, rules: Rules) -> pa.Table:
     return table.take(np.unique(np.concatenate(kept)).astype(np.int64)).combine_chunks()
 
 
-def _values(table: pa.Table, axes: tuple[str, str]) -> FloatArray:
+def _values(table: pa.Table, axes: tuple[str, str]) -> Float[Array, "rows objectives"]:
     return np.stack([table[name].to_numpy() for name in axes], axis=1)
 
 
@@ -161,7 +161,7 @@ class RunRows:
             at.append(rows[np.linspace(0, max(0, rows.size - 1), min(FRONT_ROWS, rows.size)).round().astype(int)])
         return self._frame(at)
 
-    def _drawn(self) -> BoolArray:
+    def _drawn(self) -> Bool[BoolArray, " points"]:
         """Return the feasible swept rows of the first scenario."""
         swept = word_mask(self._rows, "kind", SWEPT) & word_mask(self._rows, "scenario", self.scenario)
         return np.asarray(swept & self._rows["feasible"].to_numpy())
@@ -169,7 +169,7 @@ class RunRows:
     def _cfas(self) -> list[str]:
         return list(self._rows["cfa"].unique().to_pylist())
 
-    def _frame(self, at: list[IndexArray]) -> pd.DataFrame:
+    def _frame(self, at: list[Int[IndexArray, " _rows"]]) -> pd.DataFrame:
         """Return the rows at some indices, each once, in the order of their ids."""
         frame: pd.DataFrame = self.marked(self._rows.take(np.unique(np.concatenate(at)))).to_pandas()
         return frame

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from ..base.types import FloatArray, IndexArray, Parallel, Progress, delayed
+from ..base.types import Array, DesignCurves, Float, FloatArray, MemberNumbers, Parallel, PerDesign, Progress, delayed
 from ..camera.linear import linear_model
 from ..camera.merge import limits_dn
 from ..camera.setup import Setup
@@ -46,11 +46,11 @@ def handovers_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progre
     return pa.Table.from_pylist(made, schema=_SCHEMA)
 
 
-def _handovers(setup: Setup, scenes: Between, curves: FloatArray, numbers: FloatArray) -> list[dict[str, Any]]:
+def _handovers(setup: Setup, scenes: Between, curves: DesignCurves, numbers: PerDesign) -> list[dict[str, Any]]:
     """Return rows of the table without their keys."""
     pixel, known, made = setup.camera.pixel, dict[float, FloatArray](), []
 
-    def electrons(number: float) -> FloatArray:
+    def electrons(number: float) -> Float[Array, "signals channels"]:
         """Return expected electrons, the mean over phases, field positions and moments, [n_signals, n_channels]."""
         if number not in known:
             model = linear_model(scenes.at(number))
@@ -61,7 +61,7 @@ def _handovers(setup: Setup, scenes: Between, curves: FloatArray, numbers: Float
     for at, channel in enumerate(setup.camera.mosaic.channels):
         for kind, members in setup.members.items():
 
-            def typical_e(number: float, at: int = at, members: IndexArray = members) -> float:
+            def typical_e(number: float, at: int = at, members: MemberNumbers = members) -> float:
                 return float(np.median(electrons(number)[members, at]))
 
             for number, (capture, one, limit) in enumerate(
@@ -74,7 +74,7 @@ def _handovers(setup: Setup, scenes: Between, curves: FloatArray, numbers: Float
     return made
 
 
-def _reached(numbers: FloatArray, value: Callable[[float], float], limit: float) -> float:
+def _reached(numbers: PerDesign, value: Callable[[float], float], limit: float) -> float:
     """Return the first number at which ascending values reach a limit."""
     from scipy.optimize import brentq  # noqa: PLC0415  (few studies ask for it)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import pyarrow as pa
 
-from ..base.types import FloatArray, Parallel, Progress, delayed
+from ..base.types import Array, Float, Parallel, Progress, delayed
 from ..metrics.objective import Objective
 from ..metrics.quantity import WORST_CASE
 from ..search.problem import Evaluation, Problem, best_feasible, starting_points
@@ -119,7 +119,12 @@ def _left_out_signals(problem: Problem) -> list[int]:
 
 
 def _without(
-    problem: Problem, light: int, starts: Sequence[FloatArray], algorithm: str, evaluations: int, seed: int
+    problem: Problem,
+    light: int,
+    starts: Sequence[Float[Array, "starts free"]],
+    algorithm: str,
+    evaluations: int,
+    seed: int,
 ) -> tuple[float, float, float] | None:
     """Return the objective of the optimum without a light: without it, with it, and their difference."""
     lights = problem.setup.lights

@@ -19,7 +19,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from ..base.errors import OutputError, ValidationIssue
-from ..base.types import FloatArray, Parallel, Progress, delayed
+from ..base.types import ChannelCurves, Parallel, Progress, delayed
 from ..camera.setup import Setup
 from ..results.atomic import atomic, write_text
 from ..study import Study
@@ -82,7 +82,7 @@ class ImageFiles:
 
 
 def write_images(
-    designs: list[tuple[dict[str, Any], Setup, FloatArray]],
+    designs: list[tuple[dict[str, Any], Setup, ChannelCurves]],
     vision: Vision,
     seed: int,
     fingerprint: str,
@@ -201,7 +201,7 @@ def _key(row: Mapping[str, Any], seed: int) -> dict[str, Any]:
 def _write_part(
     row: Mapping[str, Any],
     setup: Setup,
-    curves: FloatArray,
+    curves: ChannelCurves,
     vision: Vision,
     seed: tuple[int, int],
     files: ImageFiles,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from ..base.types import FloatArray, Parallel, Progress, delayed
+from ..base.types import Array, Float, Parallel, Progress, delayed
 from ..camera.setup import Setup
 from ..designs.space import Space
 from ..designs.tolerance import AS_DESIGNED, NONE, ProductionError, Tolerance
@@ -46,7 +46,7 @@ class Candidate:
 
     setup: Setup
     space: Space
-    point: FloatArray
+    point: Float[Array, "1 parameters"]
     tolerance: Tolerance
 
     def imager(self, scale: float) -> PopulationModel:
@@ -68,7 +68,7 @@ class Candidate:
             replace(self.setup, lights=replace(self.setup.lights, population=population.scaled(scale)))
         )
 
-    def curves(self, off: ProductionError) -> FloatArray:
+    def curves(self, off: ProductionError) -> Float[Array, "1 modified wavelengths"]:
         """Return the filters as production makes them.
 
         Parameters
@@ -208,7 +208,7 @@ def _first(below: Callable[[float], bool]) -> float | None:
     return high
 
 
-def drawn_dn(design: Candidate, pair: Pair, seed: int) -> FloatArray:
+def drawn_dn(design: Candidate, pair: Pair, seed: int) -> Float[Array, " draws"]:
     """Return the CSD of two random members per draw, before clipping and rounding; equal draws for all designs.
 
     Parameters

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 import pyarrow as pa
 
-from ..base.types import FloatArray
+from ..base.types import Array, DesignParameters, Float
 from ..camera.forward import ForwardModel, forward_model
 from ..camera.plan import Plan
 from ..camera.setup import Setup
@@ -82,7 +82,7 @@ class Rules:
 
 
 def quantities_at(
-    space: Space, start: int, points: FloatArray, setup: Setup, rules: Rules
+    space: Space, start: int, points: DesignParameters, setup: Setup, rules: Rules
 ) -> tuple[Columns, dict[int, str]]:
     """Compute the quantities of designs of a space.
 
@@ -141,7 +141,9 @@ def text_of(error: Exception) -> str:
     return " ".join(f"{type(error).__name__}: {error}".split())[:_MOST_LETTERS]
 
 
-def _columns(space: Space, start: int, setup: Setup, points: FloatArray, rules: Rules) -> Columns:
+def _columns(
+    space: Space, start: int, setup: Setup, points: Float[Array, "points parameters"], rules: Rules
+) -> Columns:
     """Return the quantities of a block of designs, ndarray of shape (n_designs,) each."""
     size, requested = setup.camera.grid.size, rules.requested
     model = forward_model(setup)
@@ -165,7 +167,7 @@ def _columns(space: Space, start: int, setup: Setup, points: FloatArray, rules: 
 def worst_cases(
     space: Space,
     model: ForwardModel,
-    points: FloatArray,
+    points: DesignParameters,
     nominal: Columns,
     worst: Sequence[Quantity],
     tolerance: Tolerance,
@@ -199,7 +201,7 @@ def worst_cases(
     return {quantity.name: quantity.worse([case[quantity.of] for case in cases]) for quantity in worst}
 
 
-def _of_a_share(space: Space, setup: Setup, points: FloatArray, rules: Rules) -> Columns:
+def _of_a_share(space: Space, setup: Setup, points: Float[Array, "points 2"], rules: Rules) -> Columns:
     """Return the CSD that the wanted share of random lamps and cameras has."""
     from ..metrics.drawn import LampsAndCameras  # noqa: PLC0415  (only where a share of lamps and cameras counts)
     from ..metrics.members import population_model  # noqa: PLC0415

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pyarrow as pa
 
-from ..base.types import FloatArray, Parallel, Progress, delayed
+from ..base.types import DesignCurves, Parallel, Progress, delayed
 from ..camera.forward import forward_model
 from ..camera.setup import Setup
 from ..results.designs import named_rows, row_curves
@@ -31,7 +31,7 @@ def saturated_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progre
     return pa.table([ids, counts, [len(study.lights.names)] * len(ids)], schema=_SCHEMA)
 
 
-def full_signals(setup: Setup, curves: FloatArray) -> int:
+def full_signals(setup: Setup, curves: DesignCurves) -> int:
     """Return how many signals of a design fill a pixel in any case; of an HDR pixel, its last capture, too."""
     full = np.zeros(len(setup.lights.names), dtype=bool)
     for lamps in forward_model(setup.over_brightness).lamps(curves):

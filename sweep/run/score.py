@@ -18,7 +18,7 @@ from pyarrow import parquet as pq
 
 from ..base.disk import read_input
 from ..base.errors import DataError, SweepError, ValidationIssue, nearest
-from ..base.types import FloatArray
+from ..base.types import Array, Float
 from ..vision.batches import image_id
 from ..vision.detections import ALL
 from ..vision.lamps import TEST
@@ -289,7 +289,7 @@ def scores_of(reader: Reader, images: pd.DataFrame, unknown_cost: float) -> pd.D
     return pd.DataFrame(rows)
 
 
-def _by_seed(answers: pd.DataFrame, column: str) -> FloatArray:
+def _by_seed(answers: pd.DataFrame, column: str) -> Float[Array, " seeds"]:
     return answers.groupby("seed")[column].mean().to_numpy(dtype=float)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow as pa
 
 from ..base.errors import InfeasibleError, ValidationIssue
-from ..base.types import FloatArray, Parallel, Progress, delayed
+from ..base.types import Array, Float, Parallel, PerParameter, Progress, delayed
 from ..designs.families.mixture import THICKNESS_UM
 from ..designs.space import Space
 from ..metrics.bound import FEASIBLE
@@ -196,7 +196,7 @@ def _over_series(
 
 
 def _worst_scenes(
-    problem: Problem, scenes: Between, numbers: Sequence[float], x: FloatArray
+    problem: Problem, scenes: Between, numbers: Sequence[float], x: PerParameter
 ) -> list[tuple[float, float]]:
     """Return the numbers of a series at which the objective of a design is lowest, and its values."""
 
@@ -225,7 +225,7 @@ def limit_alone(study: Study, search: Search) -> Limit | None:
     return limit_of(problem) if reason_without_bound(problem) is None else None
 
 
-def _infeasible(study: Study, problem: Problem, starts: FloatArray, per_start: int) -> InfeasibleError:
+def _infeasible(study: Study, problem: Problem, starts: Float[Array, "starts free"], per_start: int) -> InfeasibleError:
     issues = [ValidationIssue(f"{study.name}: no feasible design was found")]
     for name, bound in problem.constraints.items():
         value = extreme_value(problem, name, starts, per_start)

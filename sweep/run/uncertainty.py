@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from ..base.types import FloatArray, Parallel, Progress, delayed
+from ..base.types import Array, ChannelCurves, Float, Parallel, PerSample, PerValue, Progress, delayed
 from ..camera.curve_errors import CurveErrors, drawn_curves, with_filters
 from ..camera.linear import linear_model
 from ..camera.scene import WhitePatchExposure
@@ -108,12 +108,12 @@ def _names(study: Study, space: Space) -> list[str]:
 
 def _on_sensors(
     setup: Setup,
-    curves: FloatArray,
+    curves: ChannelCurves,
     sensor: SensorCurves,
     names: list[str],
     errors: CurveErrors,
     seed: int,
-) -> tuple[dict[Pair, FloatArray], FloatArray, dict[Pair, float]]:
+) -> tuple[dict[Pair, PerValue], PerValue, dict[Pair, float]]:
     """Return CSDs by pair and the mean QE of the tile on every sensor, and lower bounds where there are some."""
     camera, pairs = setup.camera, class_pairs(setup.lights.classes)
     drawn = drawn_curves(sensor, camera.grid, names, errors, seed)
@@ -129,7 +129,7 @@ def _on_sensors(
     return csds, light, {pair: _at_least(free, designed, pair, errors) for pair in pairs} if errors.linear else {}
 
 
-def _at_least(setup: Setup, designed: FloatArray, pair: Pair, errors: CurveErrors) -> float:
+def _at_least(setup: Setup, designed: ChannelCurves, pair: Pair, errors: CurveErrors) -> float:
     """Return a lower bound on the CSD with any gains and noise within their errors.
 
     A channel's difference is the sum over curves c of (1 + g) (S + v) with S = sum of c(l) d(l) and |v| <= A sum of
@@ -151,7 +151,7 @@ def _at_least(setup: Setup, designed: FloatArray, pair: Pair, errors: CurveError
     return least / (1.0 if is_fixed else (1 + errors.gain) * (1 + errors.noise))
 
 
-def _quantiles(of: str, values: FloatArray) -> dict[str, float]:
+def _quantiles(of: str, values: PerSample) -> dict[str, float]:
     """Return quantiles with distribution-free intervals (order statistics)."""
     from scipy.stats import binom  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
@@ -163,7 +163,7 @@ def _quantiles(of: str, values: FloatArray) -> dict[str, float]:
     return quantiles
 
 
-def _spread(ratio: FloatArray, light: FloatArray) -> dict[str, float]:
+def _spread(ratio: Float[Array, " draws"], light: Float[Array, " captures"]) -> dict[str, float]:
     """Return the deviations of two ratios and their correlation; 0 where one does not change."""
     deviations = float(ratio.std()), float(light.std())
     known = min(deviations) > 0 and bool(np.isfinite(ratio).all())

@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from ..base.types import FloatArray, Parallel, Progress, delayed
+from ..base.types import ChannelCurves, DesignParameters, Parallel, Progress, delayed
 from ..camera.forward import ForwardModel
 from ..camera.setup import Setup
 from ..metrics.columns.confusion import D_PRIME, STATE_ERROR
@@ -113,7 +113,7 @@ def vision_tables(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
     return tables
 
 
-def vision_designs(study: Study, rows: pd.DataFrame) -> list[tuple[dict[Any, Any], Setup, FloatArray]]:
+def vision_designs(study: Study, rows: pd.DataFrame) -> list[tuple[dict[Any, Any], Setup, DesignParameters]]:
     """Return the designs of a benchmark: plain CFAs, named designs and the answer, each once.
 
     Parameters
@@ -176,7 +176,7 @@ def _pixels(picture: NDArray[np.uint8]) -> dict[str, Any]:
     return {"rows": len(picture), "columns": picture.shape[1], "pixels": picture.tobytes()}
 
 
-def predictors(setup: Setup, curves: FloatArray, vision: Vision) -> list[tuple[float, float, float]]:
+def predictors(setup: Setup, curves: ChannelCurves, vision: Vision) -> list[tuple[float, float, float]]:
     """Return figures of a design that need no images, at each distance and, there, each level of light.
 
     They are the smallest CSD (DN) and d' over the pairs of lenses, and the largest pairwise error, for the study's

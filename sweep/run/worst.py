@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import pyarrow as pa
 
-from ..base.types import FloatArray, Parallel, Progress, delayed
+from ..base.types import DesignCurves, Parallel, Progress, delayed
 from ..camera.forward import ForwardModel
 from ..metrics.columns.flicker import FALSE_HUE, LAMP_SEEN, MODULATION
 from ..metrics.evaluate import evaluate_some
@@ -58,7 +58,7 @@ def worst_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: 
 
 
 def worst_over(
-    scenes: Between, curves: FloatArray, quantities: list[Quantity], states: tuple[str, ...], numbers: list[float]
+    scenes: Between, curves: DesignCurves, quantities: list[Quantity], states: tuple[str, ...], numbers: list[float]
 ) -> list[dict[str, str | float]]:
     """Return the worst value of each quantity of a design, and the number at which it is."""
     known: dict[float, dict[str, float]] = {}

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..base.types import FloatArray
+from ..base.types import Array, Float, PerWavelength
 from ..camera.field import field_heights, refined_heights, setup_at
 from ..camera.linear import LinearModel, linear_model
 from ..camera.sensor_field import SensorField
@@ -54,11 +54,11 @@ class AnyHeight:
         scene = self._whole.setup.scene.model_copy(update={"field": field})
         return replace(self._whole, setup=replace(self._whole.setup, scene=scene))
 
-    def _worst(self, curve: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _worst(self, curve: PerWavelength) -> tuple[Float[Array, " pairs"], Float[Array, " pairs"]]:
         """Return the smallest distance of each pair, DN, and its height, ndarray of shape (n_pairs,) each."""
         setup = self._whole.setup
 
-        def at_height(height: float) -> FloatArray:
+        def at_height(height: float) -> Float[Array, " pairs"]:
             if height not in self._models:
                 self._models[height] = linear_model(setup_at(setup, height))
             distances = separations(self._models[height].smooth(curve[None, None])[0], setup.members)
@@ -67,7 +67,7 @@ class AnyHeight:
         known = np.stack([at_height(height) for height in self._looked_at], axis=1)
         return refined_heights(self._looked_at, known, at_height)
 
-    def least(self, curve: FloatArray) -> dict[str, float]:
+    def least(self, curve: PerWavelength) -> dict[str, float]:
         """Return the smallest distances over all field positions.
 
         Parameters
@@ -82,7 +82,7 @@ class AnyHeight:
         """
         return dict(zip(self._pairs, self._worst(curve)[0].tolist(), strict=True))
 
-    def more(self, curve: FloatArray) -> bool:
+    def more(self, curve: PerWavelength) -> bool:
         """Add the worst heights of a filter.
 
         Parameters

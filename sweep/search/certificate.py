@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, Float, IndexArray, Int, PerRow, PerWavelength
 
 ROUNDING = 1e-9
 """Filters may exceed their base by this share: rounding."""
@@ -27,7 +27,7 @@ class Sides:
     pairs: tuple[int, ...] = ()
     signs: tuple[float, ...] = ()
 
-    def joined(self, pairs: IndexArray, signs: FloatArray) -> Sides:
+    def joined(self, pairs: Int[IndexArray, " pairs"], signs: Float[Array, " pairs"]) -> Sides:
         """Return these and further decided sides.
 
         Parameters
@@ -59,10 +59,10 @@ class Certificate:
         V(y).
     """
 
-    rows: IndexArray
-    row_weights: FloatArray
-    pairs: IndexArray
-    pair_weights: FloatArray
+    rows: Int[IndexArray, " rows"]
+    row_weights: PerRow
+    pairs: Int[IndexArray, " pairs"]
+    pair_weights: Float[Array, " pairs"]
     most: float
 
 
@@ -86,6 +86,6 @@ class LinearSolution:
 
     beyond: float
     margin: float = -np.inf
-    curve: FloatArray | None = None
+    curve: PerWavelength | None = None
     needs: Sides = Sides()
     certificate: Certificate | None = None

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, Float, IndexArray, Int, PerWavelength
 from ..camera.linear import linear_model
 from .member_pairs import KnownPairs
 from .perturbed import Distances
@@ -26,12 +26,12 @@ _NEARER_DN = 0.001
 class _Known(KnownPairs):
     """Pairs with a brightness each: case, first and second signal, factors of both responses."""
 
-    case: IndexArray
-    first: IndexArray
-    second: IndexArray
-    factors: FloatArray
+    case: Int[IndexArray, " known"]
+    first: Int[IndexArray, " known"]
+    second: Int[IndexArray, " known"]
+    factors: Float[Array, "known 2"]
 
-    def difference(self, values: FloatArray) -> FloatArray:
+    def difference(self, values: Float[Array, "cases spectra channels"]) -> Float[Array, "known channels"]:
         """Return first minus second signal, each times its factor, ndarray of shape (n_known, n).
 
         `values` has shape (n_cases, n_signals, n).
@@ -79,7 +79,7 @@ class ChromaticPairs:
         squared = (known.difference(self._others) ** 2).sum(axis=1)
         return Distances(known.difference(self._gain), squared, np.zeros((squared.size, 2)))
 
-    def counted(self, name: str, curve: FloatArray) -> float:
+    def counted(self, name: str, curve: PerWavelength) -> float:
         """Return the smallest distance of known pairs as the program counts it.
 
         Parameters
@@ -96,7 +96,7 @@ class ChromaticPairs:
         """
         return self.distances(name).least(curve)
 
-    def least(self, name: str, curve: FloatArray) -> float:
+    def least(self, name: str, curve: PerWavelength) -> float:
         """Return the smallest distance over all brightnesses.
 
         Parameters
@@ -113,7 +113,7 @@ class ChromaticPairs:
         """
         return float(self._nearest(name, curve)[1].min())
 
-    def more(self, curve: FloatArray) -> bool:
+    def more(self, curve: PerWavelength) -> bool:
         """Add the worst brightnesses of a filter.
 
         Parameters
@@ -134,7 +134,7 @@ class ChromaticPairs:
                 added, self._known[name] = True, self._known[name].joined(pairs, nearer)
         return added
 
-    def _nearest(self, name: str, curve: FloatArray) -> tuple[_Known, FloatArray]:
+    def _nearest(self, name: str, curve: PerWavelength) -> tuple[_Known, Float[Array, " known"]]:
         """Return every pair at its worst brightness, and their distances, DN."""
         first, second = (self._members[kind] for kind in self._types[name])
         case, one, other = (at.ravel() for at in np.meshgrid(range(len(self._gain)), first, second, indexing="ij"))

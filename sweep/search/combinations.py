@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.types import IndexArray, Parallel, Progress, delayed
+from ..base.types import IndexArray, Int, Parallel, Progress, delayed
 from ..designs.family import ChoosingFamily
 from .held import fix_parameters, search_held
 from .problem import Evaluation, Problem
@@ -40,7 +40,7 @@ class Choice:
         return max((m for m in self.tried if len(m) == largest), key=lambda members: self.tried[members].rank)
 
 
-def numbers_of(problem: Problem) -> IndexArray:
+def numbers_of(problem: Problem) -> Int[IndexArray, " values"]:
     """Return the numbers of the members that a problem may choose from; none if it chooses nothing.
 
     Parameters

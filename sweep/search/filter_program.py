@@ -19,7 +19,7 @@ import numpy as np
 from scipy.optimize import linprog
 from scipy.sparse import csr_matrix, hstack, vstack
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, Float, FloatArray, IndexArray, Int, PerRow, PerValue, PerWavelength
 from ..camera.linear import LinearModel, linear_model
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.columns.sensitivity import SENSITIVITY
@@ -51,12 +51,12 @@ class _Rows:
     """
 
     matrix: csr_matrix
-    least: FloatArray
-    slack: FloatArray
-    rate: FloatArray
-    constant: FloatArray
+    least: PerRow
+    slack: PerRow
+    rate: PerRow
+    constant: PerRow
 
-    def needed(self, t: float, *, relaxed: bool = False) -> FloatArray:
+    def needed(self, t: float, *, relaxed: bool = False) -> PerRow:
         """Return h(t), ndarray of shape (n,); with `relaxed` for designs that only count as feasible.
 
         Parameters
@@ -105,7 +105,7 @@ class FilterProgram:
         self._sizes = abs(self._rows.matrix) @ self.base, own_sizes
         self.solved = 0
 
-    def _fixed_rows(self) -> tuple[_Rows, FloatArray]:
+    def _fixed_rows(self) -> tuple[_Rows, PerRow]:
         """Return the rows of constrained quantities that are linear in the filter.
 
         Also return `least` of each row relative to the least sensitivity; 0 for other rows.
@@ -184,7 +184,9 @@ class FilterProgram:
         reach = np.divide(most, self._rate[:, None], out=np.full(most.shape, np.inf), where=self._rate[:, None] > 0)
         self.reach = np.where(most < (self._least - self._slack)[:, None], -np.inf, reach)
 
-    def _noise(self, imager: LinearModel) -> tuple[FloatArray, FloatArray]:
+    def _noise(
+        self, imager: LinearModel
+    ) -> tuple[Float[Array, "pairs channels"], Float[Array, "pairs channels _wavelengths"]]:
         """Return the least variance in the modified channel and the others' variances, DN^2, [n_cases, n_signals]."""
         row, least = np.zeros_like(self.base), 0.0
         bound = self.problem.constraints.get(SENSITIVITY)
@@ -199,7 +201,7 @@ class FilterProgram:
         requested = {*self.problem.objective.weights, *self.problem.constraints} & self.problem.pairs.keys()
         return any(self.problem.quantities[name].distance_kind == "noise" for name in requested)
 
-    def reaches(self, curve: FloatArray) -> float:
+    def reaches(self, curve: PerWavelength) -> float:
         """Return the objective of a filter with the least noise, which is no less than its own.
 
         Parameters
@@ -217,12 +219,12 @@ class FilterProgram:
         linear = (self._rows.matrix @ curve + self._rows.constant)[rows] / self._rows.rate[rows]
         return float(min(self.top, far.min(initial=np.inf), linear.min(initial=np.inf)))
 
-    def _keep(self, wanted: IndexArray) -> None:
+    def _keep(self, wanted: Int[IndexArray, " rows"]) -> None:
         self.differences, self.added, self.reach = self.differences[wanted], self.added[wanted], self.reach[wanted]
         self._squared, self._least = self._squared[wanted], self._least[wanted]
         self._slack, self._rate = self._slack[wanted], self._rate[wanted]
 
-    def needed(self, t: float, margin: float = 0.0, *, relaxed: bool = False) -> FloatArray:
+    def needed(self, t: float, margin: float = 0.0, *, relaxed: bool = False) -> Float[Array, " pairs"]:
         """Return the difference in the modified channel that each pair needs to reach t.
 
         Parameters
@@ -284,11 +286,11 @@ class FilterProgram:
             return LinearSolution(beyond, needs=needs, certificate=certificate)
         return LinearSolution(beyond, float(solution[-1]), solution[:-1], needs, certificate)
 
-    def _added(self, pairs: IndexArray, signs: FloatArray) -> FloatArray:
+    def _added(self, pairs: Int[IndexArray, " pairs"], signs: Float[Array, " pairs"]) -> PerRow:
         """Return the largest additional difference of some pairs on their side, DN."""
         return np.asarray(self.added[pairs, (signs < 0).astype(np.intp)], dtype=float)
 
-    def differ(self, curve: FloatArray, side: float) -> FloatArray:
+    def differ(self, curve: PerWavelength, side: float) -> Float[Array, " pairs"]:
         """Return the largest difference of each pair on one side.
 
         Parameters
@@ -305,9 +307,7 @@ class FilterProgram:
         """
         return np.asarray(side * (self.differences @ curve) + self.added[:, int(side < 0)], dtype=float)
 
-    def _best_margin(
-        self, rows: csr_matrix, floor: FloatArray, rate: FloatArray
-    ) -> tuple[int, FloatArray | None, FloatArray | None]:
+    def _best_margin(self, rows: csr_matrix, floor: PerRow, rate: PerRow) -> tuple[int, PerRow | None, PerValue | None]:
         """Solve: maximize m subject to rows @ N >= floor + rate m; return status, row weights and (N, m)."""
         result = linprog(
             c=np.append(np.zeros(self.base.size), -1.0),
@@ -321,7 +321,9 @@ class FilterProgram:
             return int(result.status), None, None
         return _SOLVED, np.maximum(0.0, -result.ineqlin.marginals), result.x
 
-    def _certificate(self, weights: FloatArray, rows: csr_matrix, pairs: IndexArray, added: FloatArray) -> Certificate:
+    def _certificate(
+        self, weights: PerRow, rows: csr_matrix, pairs: Int[IndexArray, " pairs"], added: Float[Array, " pairs"]
+    ) -> Certificate:
         low, high = self._box
         summed = weights @ rows
         most = float(np.maximum(summed * low, summed * high).sum())

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import FloatArray, IndexArray, Int, PerFree, PerTerm
 from ..camera.linear import linear_model
 from ..camera.setup import Setup
 from ..designs.tolerance import AS_DESIGNED, ProductionError
@@ -67,12 +67,12 @@ class Point:
     evaluation: Evaluation
     terms: Rows
     power: int
-    term: IndexArray
+    term: Int[IndexArray, " terms"]
     conditions: Rows
     quantities: Mapping[str, Rows]
 
     @property
-    def term_values(self) -> FloatArray:
+    def term_values(self) -> PerTerm:
         """Value of each term, ndarray of shape (n_terms,)."""
         least = [self.terms.values[self.term == k].min() for k in range(int(self.term.max()) + 1)]
         return np.sqrt(least) if self.power == 2 else np.array(least)
@@ -137,7 +137,7 @@ class Model:
         self._back_off = {name: _back_off(problem, name, bound) for name, bound in problem.constraints.items()}
         self._points: dict[bytes, Point] = {}
 
-    def at(self, u: FloatArray) -> Point:
+    def at(self, u: PerFree) -> Point:
         """Simulate and log a point once; beyond the budget, or where `u` is NaN, stop the search.
 
         Parameters
@@ -182,7 +182,7 @@ class Model:
         near = near and max(violations) - min(violations) <= _SETTLED
         return near and bool((np.ptp(np.stack(latest), axis=0) <= _SETTLED).all())
 
-    def _simulate(self, u: FloatArray) -> Point:
+    def _simulate(self, u: PerFree) -> Point:
         problem, free = self._problem, self._free
         x = problem.from_unit(u)
         made = {

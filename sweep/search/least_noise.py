@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.types import FloatArray
+from ..base.types import Array, Float, PerWavelength
 from ..camera.linear import LinearModel
 
 _ROUNDING = 1e-12
@@ -22,8 +22,8 @@ _ROUNDING = 1e-12
 
 
 def least_variance(
-    imager: LinearModel, base: FloatArray, box: tuple[FloatArray, FloatArray], row: FloatArray, least: float
-) -> FloatArray:
+    imager: LinearModel, base: PerWavelength, box: tuple[PerWavelength, PerWavelength], row: PerWavelength, least: float
+) -> Float[Array, "cases signals"]:
     """Return a lower bound on the variance in the modified channel.
 
     Parameters
@@ -55,7 +55,9 @@ def least_variance(
     return np.asarray((pixel.dn_per_e**2 * variance_e2 + share / 12) * (1 - _ROUNDING), dtype=float)
 
 
-def _least_light(light: FloatArray, box: tuple[FloatArray, FloatArray], row: FloatArray, least: float) -> FloatArray:
+def _least_light(
+    light: Float[Array, "_ _ wavelengths"], box: tuple[PerWavelength, PerWavelength], row: PerWavelength, least: float
+) -> Float[Array, "rows columns"]:
     """Return a lower bound on light @ N for light of shape (..., n_wavelengths)."""
     low, high = box
     used = row > 0

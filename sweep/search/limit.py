@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.errors import SweepError, UpperBoundExceededError, ValidationIssue
-from ..base.types import FloatArray
+from ..base.types import PerWavelength
 from ..camera.exposure import may_be_brightest
 from ..camera.pixel import unquantized
 from ..metrics.bound import FEASIBLE, Bound
@@ -79,7 +79,7 @@ class Limit:
 
     attained: float
     proven: float
-    curve: FloatArray | None
+    curve: PerWavelength | None
     left_out: tuple[str, ...] = ()
     programs: int = 0
     open_parts: int = 0
@@ -219,7 +219,7 @@ def _proof(
 
     program = FilterProgram(problem, members)
 
-    def value(curve: FloatArray, inside: FloatArray | None) -> tuple[float, FloatArray]:
+    def value(curve: PerWavelength, inside: PerWavelength | None) -> tuple[float, PerWavelength]:
         attained, moved = _inside(program.problem, np.clip(curve, program.low, program.base), inside, members)
         return (program.reaches(moved) if program.noisy and attained > -np.inf else attained), moved
 
@@ -228,11 +228,11 @@ def _proof(
 
 def _attaining(
     problem: Problem,
-    curve: FloatArray,
+    curve: PerWavelength,
     members: MemberPairs | ChromaticPairs | None,
     heights: AnyHeight | None,
     tolerance: float,
-) -> tuple[float, FloatArray | None, int]:
+) -> tuple[float, PerWavelength | None, int]:
     """Return the value of a program's filter in all worst cases, the filter, and the number of further programs.
 
     A program knows some members and positions, so that its filter may miss a bounded worst case. Then the bounds are
@@ -375,7 +375,7 @@ def _shifts_left_out(nominal: Sequence[str], problem: Problem) -> list[str]:
     return [*some, *(f"edge shifts of {name}" for name in dict.fromkeys(nominal))]
 
 
-def _top(problem: Problem) -> FloatArray:
+def _top(problem: Problem) -> PerWavelength:
     """Return an upper bound on the filters of the box, in any worst case, ndarray of shape (n_wavelengths,)."""
     moved = perturbed_filters(problem)[1:] if _moves(problem) else ()
     tops = [problem.family.upper(problem.low, problem.high)[0], *(way.high for way in moved)]
@@ -391,8 +391,8 @@ def _clips(problem: Problem) -> bool:
 
 
 def _inside(
-    problem: Problem, curve: FloatArray, inside: FloatArray | None, members: MemberPairs | ChromaticPairs | None
-) -> tuple[float, FloatArray]:
+    problem: Problem, curve: PerWavelength, inside: PerWavelength | None, members: MemberPairs | ChromaticPairs | None
+) -> tuple[float, PerWavelength]:
     """Return the value of a solver's filter, moved by its tolerance toward a feasible one, and the filter.
 
     Worst cases are over the known members, as the program counts them.
@@ -408,7 +408,7 @@ def _inside(
     return -np.inf, curve
 
 
-def _attained(problem: Problem, curve: FloatArray, over: Mapping[str, float]) -> float:
+def _attained(problem: Problem, curve: PerWavelength, over: Mapping[str, float]) -> float:
     """Return the objective of a filter as the search evaluates it; -inf if it does not meet the constraints.
 
     `over` has worst cases, or smallest distances of the scene, that are already known.

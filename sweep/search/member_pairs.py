@@ -13,7 +13,7 @@ from typing import Self
 
 import numpy as np
 
-from ..base.types import BoolArray, FloatArray, IndexArray
+from ..base.types import Array, Bool, BoolArray, Float, IndexArray, Int, PerWavelength
 from ..metrics.members import population_model
 from ..spectra.population import Population
 from .perturbed import Distances, PerturbedFilter, perturbed_filters
@@ -27,7 +27,7 @@ _NEARER_DN = 0.01
 class KnownPairs:
     """Pairs of lights that the programs know; every field has one row per pair."""
 
-    def joined(self, others: Self, some: BoolArray) -> Self:
+    def joined(self, others: Self, some: Bool[BoolArray, " values"]) -> Self:
         """Return these and some other pairs.
 
         Parameters
@@ -62,12 +62,12 @@ class _Known(KnownPairs):
         Share of the next spectra.
     """
 
-    way: IndexArray
-    case: IndexArray
-    below: IndexArray
-    share: FloatArray
+    way: Int[IndexArray, " known"]
+    case: Int[IndexArray, " known"]
+    below: Int[IndexArray, "known 2"]
+    share: Float[Array, "known 2"]
 
-    def difference(self, values: FloatArray) -> FloatArray:
+    def difference(self, values: Float[Array, "cases spectra channels"]) -> Float[Array, "known channels"]:
         """Return first minus second member.
 
         Parameters
@@ -126,7 +126,7 @@ class MemberPairs:
             self._made[name] = Distances(rows, (known.difference(self._others) ** 2).sum(axis=1), added)
         return self._made[name]
 
-    def counted(self, name: str, curve: FloatArray) -> float:
+    def counted(self, name: str, curve: PerWavelength) -> float:
         """Return the smallest distance of known members as the program counts it.
 
         Parameters
@@ -143,7 +143,7 @@ class MemberPairs:
         """
         return self.distances(name).least(curve)
 
-    def least_known(self, name: str, curve: FloatArray) -> float:
+    def least_known(self, name: str, curve: PerWavelength) -> float:
         """Return the smallest distance of known members of the filter as produced.
 
         Parameters
@@ -163,7 +163,7 @@ class MemberPairs:
         apart = (known.difference(self._gain) * perturbed).sum(axis=1)
         return float(np.sqrt((apart**2 + (known.difference(self._others) ** 2).sum(axis=1)).min()))
 
-    def least(self, name: str, curve: FloatArray) -> float:
+    def least(self, name: str, curve: PerWavelength) -> float:
         """Return the smallest distance of all members.
 
         Parameters
@@ -180,7 +180,7 @@ class MemberPairs:
         """
         return float(np.sqrt(self._nearest(name, curve)[1].min()))
 
-    def more(self, curve: FloatArray) -> bool:
+    def more(self, curve: PerWavelength) -> bool:
         """Add the nearest members of a filter.
 
         Parameters
@@ -203,7 +203,9 @@ class MemberPairs:
                 self._made.pop(name, None)
         return added
 
-    def _nearest(self, name: str, curve: FloatArray, ways: Sequence[PerturbedFilter] = ()) -> tuple[_Known, FloatArray]:
+    def _nearest(
+        self, name: str, curve: PerWavelength, ways: Sequence[PerturbedFilter] = ()
+    ) -> tuple[_Known, Float[Array, " known"]]:
         """Return the nearest members of each two lights and part of their shifts, and their squared distances."""
         parts = []
         for number, way in enumerate(ways or self._ways):

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.types import BoolArray, FloatArray, IndexArray
+from ..base.types import Array, Bool, BoolArray, Float, IndexArray, Int, PerParameter, PerWavelength
 from ..designs.family import Family, MovedFamily
 from ..designs.tolerance import AS_DESIGNED
 from .problem import Problem
@@ -40,11 +40,11 @@ class Distances:
         Upper bounds on the unknown part and on its negative, DN.
     """
 
-    rows: FloatArray
-    squared: FloatArray
-    added: FloatArray
+    rows: Float[Array, "distances wavelengths"]
+    squared: Float[Array, " distances"]
+    added: Float[Array, "distances 2"]
 
-    def least(self, curve: FloatArray) -> float:
+    def least(self, curve: PerWavelength) -> float:
         """Return a lower bound on the smallest distance of a filter.
 
         Parameters
@@ -76,14 +76,14 @@ class PerturbedFilter:
         Coefficients and bounds.
     """
 
-    source: IndexArray
-    known: BoolArray
-    scale: FloatArray
-    constant: FloatArray
-    low: FloatArray
-    high: FloatArray
+    source: Int[IndexArray, " wavelengths"]
+    known: Bool[BoolArray, " wavelengths"]
+    scale: PerWavelength
+    constant: PerWavelength
+    low: PerWavelength
+    high: PerWavelength
 
-    def curve(self, curve: FloatArray) -> FloatArray:
+    def curve(self, curve: PerWavelength) -> PerWavelength:
         """Return the produced filter, at its upper bound where it is unknown.
 
         Parameters
@@ -98,7 +98,9 @@ class PerturbedFilter:
         """
         return np.where(self.known, self.scale * curve[self.source] + self.constant, self.high)
 
-    def rows(self, apart: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def rows(
+        self, apart: Float[Array, "distances wavelengths"]
+    ) -> tuple[Float[Array, "distances wavelengths"], Float[Array, "distances 2"]]:
         """Convert sums over the produced filter to sums over N.
 
         Parameters
@@ -155,7 +157,7 @@ def all_ways(problem: Problem) -> bool:
     return len(perturbed_filters(problem)) == len({AS_DESIGNED, *problem.tolerance.places})
 
 
-def _as_designed(base: FloatArray) -> PerturbedFilter:
+def _as_designed(base: PerWavelength) -> PerturbedFilter:
     nothing = np.zeros_like(base)
     return PerturbedFilter(
         np.arange(base.size), np.ones(base.size, dtype=bool), np.ones_like(base), nothing, nothing, nothing
@@ -175,7 +177,12 @@ def _moves(problem: Problem) -> Iterator[PerturbedFilter]:
 
 
 def _moved(
-    base: FloatArray, fixed: FloatArray, base_transmission: FloatArray, steps: int, low: FloatArray, high: FloatArray
+    base: PerWavelength,
+    fixed: Float[Array, " examples"],
+    base_transmission: PerWavelength,
+    steps: int,
+    low: PerParameter,
+    high: PerParameter,
 ) -> PerturbedFilter:
     source = np.arange(base.size) - steps
     inside = (source >= 0) & (source < base.size)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, Float, IndexArray, Int, PerParameter
 from ..camera.setup import Setup
 from ..designs.family import Family
 from ..designs.tolerance import AS_DESIGNED, NONE, ProductionError, Tolerance
@@ -55,8 +55,8 @@ class Problem:
 
     setup: Setup
     family: Family
-    low: FloatArray
-    high: FloatArray
+    low: PerParameter
+    high: PerParameter
     objective: Objective
     constraints: Mapping[str, Bound]
     tolerance: Tolerance = NONE
@@ -184,7 +184,7 @@ class Problem:
         return {q.name: q.pair for q in distances if q.pair is not None}
 
     @property
-    def free(self) -> IndexArray:
+    def free(self) -> Int[IndexArray, " parameters"]:
         """Indices of the parameters that are not fixed."""
         return np.flatnonzero(self.high > self.low)
 
@@ -203,7 +203,7 @@ class Problem:
         """
         return self.tolerance.places if self.quantities[quantity].extreme == WORST_CASE else (AS_DESIGNED,)
 
-    def from_unit(self, u: FloatArray) -> FloatArray:
+    def from_unit(self, u: Float[Array, "*batch free"]) -> Float[Array, "*batch parameters"]:
         """Convert free parameters in units of the box to parameters.
 
         Parameters
@@ -225,7 +225,7 @@ class Problem:
         )
         return x
 
-    def to_unit(self, x: FloatArray) -> FloatArray:
+    def to_unit(self, x: Float[Array, "*batch parameters"]) -> Float[Array, "*batch free"]:
         """Convert parameters to free ones in units of the box, clipped to it.
 
         Parameters
@@ -246,7 +246,7 @@ class Problem:
 class Evaluation:
     """Logged evaluation: parameters, smooth objective, sensitivities, and largest violation (0 if feasible)."""
 
-    x: FloatArray
+    x: PerParameter
     objective: float
     sensitivity: float
     cfa_sensitivity: float
@@ -293,7 +293,7 @@ def best_feasible(log: Sequence[Evaluation]) -> Evaluation | None:
     return max(feasible, key=lambda e: e.objective, default=None)
 
 
-def starting_points(problem: Problem, starts: int, seed: int) -> FloatArray:
+def starting_points(problem: Problem, starts: int, seed: int) -> Float[Array, "starts free"]:
     """Return starting points from a scrambled Sobol sequence.
 
     Parameters

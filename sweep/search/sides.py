@@ -15,7 +15,7 @@ from itertools import count
 
 import numpy as np
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import FloatArray, IndexArray, Int, PerWavelength
 from .certificate import Certificate, Sides
 from .filter_program import FilterProgram
 
@@ -46,7 +46,7 @@ class Proof:
     """
 
     attained: float
-    curve: FloatArray | None
+    curve: PerWavelength | None
     proven: float
     open_parts: int
     parts: tuple[SideRegion, ...] = ()
@@ -148,7 +148,7 @@ class _Conflicts:
         return sides
 
 
-def _literals(sides: Sides) -> IndexArray:
+def _literals(sides: Sides) -> Int[IndexArray, " literals"]:
     return np.array([2 * pair + (sign < 0) for pair, sign in zip(sides.pairs, sides.signs, strict=True)], dtype=np.intp)
 
 
@@ -164,7 +164,7 @@ class SideSearch:
     def __init__(
         self,
         program: FilterProgram,
-        value: Callable[[FloatArray, FloatArray | None], tuple[float, FloatArray]],
+        value: Callable[[PerWavelength, PerWavelength | None], tuple[float, PerWavelength]],
         tolerance: float,
         most_programs: int,
     ) -> None:
@@ -217,7 +217,7 @@ class SideSearch:
         """Bound at which a part is closed."""
         return self._best + self._tolerance
 
-    def _offer(self, curve: FloatArray) -> None:
+    def _offer(self, curve: PerWavelength) -> None:
         """Keep a filter if it is the best one."""
         value, moved = self._value(curve, self._curve)
         if value > self._best:

@@ -14,7 +14,7 @@ from dataclasses import replace
 import nlopt
 import numpy as np
 
-from ..base.types import FloatArray
+from ..base.types import Array, Float, PerFree, PerParameter, PerTerm
 from ..metrics.bound import FEASIBLE
 from .gradients import Model, Point
 from .problem import Evaluation, Problem, SearchRun
@@ -49,7 +49,7 @@ _UNKNOWN = 1e9
 
 
 def search_from(
-    problem: Problem, start: int, u0: FloatArray, algorithm: str, max_evaluations: int, seed: int = 1
+    problem: Problem, start: int, u0: PerFree, algorithm: str, max_evaluations: int, seed: int = 1
 ) -> SearchRun:
     """Search from one starting point.
 
@@ -117,7 +117,7 @@ def refinement_of(problem: Problem, algorithm: str) -> str | None:
     return _REFINEMENT if refined else None
 
 
-def smooth_evaluation(problem: Problem, x: FloatArray) -> Evaluation:
+def smooth_evaluation(problem: Problem, x: PerParameter) -> Evaluation:
     """Return one design's objective, sensitivities and violation before clipping and quantization.
 
     Parameters
@@ -135,7 +135,7 @@ def smooth_evaluation(problem: Problem, x: FloatArray) -> Evaluation:
     return Model(problem, SearchRun(0), 1).at(problem.to_unit(x)).evaluation
 
 
-def smooth_objective(problem: Problem, x: FloatArray) -> float:
+def smooth_objective(problem: Problem, x: PerParameter) -> float:
     """Return the objective of one design before clipping and quantization.
 
     Parameters
@@ -154,7 +154,7 @@ def smooth_objective(problem: Problem, x: FloatArray) -> float:
 
 
 def _epigraph(
-    problem: Problem, model: Model, first: Point, u0: FloatArray, algorithm: str
+    problem: Problem, model: Model, first: Point, u0: PerFree, algorithm: str
 ) -> tuple[nlopt.opt, list[float]]:
     """Set up: maximize the rule of the t_k subject to rows of term k >= t_k^2 and the conditions.
 
@@ -168,7 +168,7 @@ def _epigraph(
     row_scale = scale[first.term] ** power
     opt = nlopt.opt(GRADIENT[algorithm], n_free + scale.size)
 
-    def objective(z: FloatArray, gradient: FloatArray) -> float:
+    def objective(z: Float[Array, " variables"], gradient: Float[Array, " ..."]) -> float:
         model.at(z[:n_free])
         if model.settled:
             opt.force_stop()
@@ -177,7 +177,9 @@ def _epigraph(
             gradient[n_free:] = 1.0 if alone else rule.gradient(scale * z[n_free:]) * scale / unit
         return float(z[-1]) if alone else float(rule.of(scale * z[n_free:])) / unit
 
-    def constraints(result: FloatArray, z: FloatArray, gradient: FloatArray) -> None:
+    def constraints(
+        result: Float[Array, " conditions"], z: Float[Array, " variables"], gradient: Float[Array, " ..."]
+    ) -> None:
         point = model.at(z[:n_free])
         t = z[n_free:][point.term]
         result[:n_rows] = t**power - point.terms.values / row_scale
@@ -201,18 +203,16 @@ def _epigraph(
     return opt, [*u0, *np.minimum(values / scale, 1.0)]
 
 
-def _direct(
-    problem: Problem, model: Model, first: Point, u0: FloatArray, algorithm: str
-) -> tuple[nlopt.opt, list[float]]:
+def _direct(problem: Problem, model: Model, first: Point, u0: PerFree, algorithm: str) -> tuple[nlopt.opt, list[float]]:
     """Set up: maximize the objective itself, subject to the worst of the conditions."""
     rule = problem.objective.rule
 
-    def whole(terms: FloatArray) -> float:
+    def whole(terms: PerTerm) -> float:
         return float(terms.min() if rule.smallest else rule.of(terms))
 
     scale = whole(np.maximum(first.term_values, 1.0))
 
-    def objective(u: FloatArray, _: FloatArray) -> float:
+    def objective(u: PerFree, _: Float[Array, " ..."]) -> float:
         return whole(model.at(u).term_values) / scale
 
     opt = nlopt.opt(DIRECT[algorithm], u0.size)
@@ -223,7 +223,7 @@ def _direct(
     return opt, [*u0]
 
 
-def extreme_value(problem: Problem, quantity: str, starts: FloatArray, max_evaluations: int) -> float:
+def extreme_value(problem: Problem, quantity: str, starts: Float[Array, "starts free"], max_evaluations: int) -> float:
     """Return the extreme of a quantity in the box without other constraints.
 
     Parameters
@@ -250,7 +250,7 @@ def extreme_value(problem: Problem, quantity: str, starts: FloatArray, max_evalu
     return definition.of_row(best) if np.isfinite(best) else best
 
 
-def _extremes(problem: Problem, quantity: str, sign: float, u0: FloatArray, max_evaluations: int) -> list[float]:
+def _extremes(problem: Problem, quantity: str, sign: float, u0: PerFree, max_evaluations: int) -> list[float]:
     """Return the worst rows of a quantity on the way to its extreme: maximize t, sign times rows >= t."""
     n_own = problem.family.violation(problem.low[None]).shape[1]
     model = Model(problem, SearchRun(0), max_evaluations)
@@ -259,7 +259,7 @@ def _extremes(problem: Problem, quantity: str, sign: float, u0: FloatArray, max_
     n_rows = first.values.size
     values: list[float] = []
 
-    def objective(z: FloatArray, gradient: FloatArray) -> float:
+    def objective(z: Float[Array, " variables"], gradient: Float[Array, " ..."]) -> float:
         point = model.at(z[:-1])
         if point.evaluation.violation < np.inf and (point.conditions.values[:n_own] <= FEASIBLE).all():
             values.append(sign * float((sign * point.quantities[quantity].values).min()))
@@ -268,7 +268,9 @@ def _extremes(problem: Problem, quantity: str, sign: float, u0: FloatArray, max_
             gradient[-1] = 1.0
         return float(z[-1])
 
-    def conditions(result: FloatArray, z: FloatArray, gradient: FloatArray) -> None:
+    def conditions(
+        result: Float[Array, " conditions"], z: Float[Array, " variables"], gradient: Float[Array, " ..."]
+    ) -> None:
         point = model.at(z[:-1])
         rows = point.quantities[quantity]
         result[:n_rows] = z[-1] - sign * rows.values / scale

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.types import Call, FloatArray, Parallel, Progress, delayed
+from ..base.types import Array, Call, Float, Parallel, Progress, delayed
 from ..metrics.bound import Bound
 from ..metrics.columns.sensitivity import SENSITIVITY
 from .limit import Limit, check_bound, gap_between, limit_of
@@ -70,7 +70,7 @@ class Effort:
     """
 
     algorithm: str
-    starts: FloatArray
+    starts: Float[Array, "starts free"]
     evaluations: int
     seed: int
     refinement: str | None = None
@@ -243,7 +243,7 @@ def trade_off(
     return front
 
 
-def _searches(problem: Problem, effort: Effort, first: int, points: Iterable[FloatArray]) -> list[Call]:
+def _searches(problem: Problem, effort: Effort, first: int, points: Iterable[Float[Array, " _free"]]) -> list[Call]:
     """Return the call of a search from each point; `first` is the number of the first one."""
     settings = effort.algorithm, effort.evaluations, effort.seed
     return [delayed(search_from, problem, at, u, *settings) for at, u in enumerate(points, first)]

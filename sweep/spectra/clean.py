@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..base.errors import ValidationIssue
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, Float, IndexArray, PerSample
 
 _NOISE_SHARE = 0.02
 """Negatives up to this share of a curve's largest value are noise around 0."""
@@ -46,8 +46,8 @@ class Cleaner:
         self.issues.append(ValidationIssue(problem, self.file, None, name, value, allowed))
 
     def cleaned(
-        self, name: str, wave: FloatArray, values: FloatArray, *, noise: float, faulty: bool
-    ) -> tuple[FloatArray, FloatArray]:
+        self, name: str, wave: PerSample, values: PerSample, *, noise: float, faulty: bool
+    ) -> tuple[Float[Array, " kept"], Float[Array, " kept"]]:
         """Return samples in rising order, each wavelength once, without gaps and without negatives.
 
         `noise`: negatives down to so much are noise in any case; none is set to 0 if it is infinite. `faulty`: of
@@ -78,7 +78,7 @@ class Cleaner:
                 self._fault(name, f"negative value at {wave[at]:g} nm", float(values[at]), allowed)
         return wave, values
 
-    def _refuse_stacked(self, name: str, wave: FloatArray) -> None:
+    def _refuse_stacked(self, name: str, wave: PerSample) -> None:
         """Add an issue for spectra one below the other: wavelengths that begin again and go over most of them."""
         steps = np.diff(wave)
         falls = steps < 0 if np.count_nonzero(steps > 0) >= np.count_nonzero(steps < 0) else steps > 0
@@ -88,7 +88,9 @@ class Cleaner:
             at = float(most[1][0])
             self._fault(name, "wavelengths begin again: several spectra?", at, "one spectrum in a column")
 
-    def _averaged(self, name: str, wave: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _averaged(
+        self, name: str, wave: PerSample, values: PerSample
+    ) -> tuple[Float[Array, " kept"], Float[Array, " kept"]]:
         """Average samples at one wavelength; two spectra one after the other are an issue."""
         unique, first, counts = np.unique(wave, return_index=True, return_counts=True)
         if unique.size == wave.size:
@@ -109,7 +111,9 @@ class Cleaner:
         )
         return unique, mean
 
-    def _without_gaps(self, name: str, wave: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _without_gaps(
+        self, name: str, wave: PerSample, values: PerSample
+    ) -> tuple[Float[Array, " kept"], Float[Array, " kept"]]:
         """Drop missing values at the ends, and fill one between two samples by a straight line."""
         known: IndexArray = np.flatnonzero(np.isfinite(values))
         if known.size == values.size or not known.size:

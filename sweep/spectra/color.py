@@ -9,7 +9,7 @@ from importlib import resources
 
 import numpy as np
 
-from ..base.types import FloatArray
+from ..base.types import Array, Float, SameShape
 from .spectrum import WavelengthGrid, energy_from_photons
 
 
@@ -20,7 +20,7 @@ class ColorRegion:
     bounds: tuple[tuple[float, float, float], ...]
     source: str
 
-    def violation(self, xy: FloatArray) -> FloatArray:
+    def violation(self, xy: Float[Array, "colors 2"]) -> Float[Array, " colors"]:
         """Return the distance of points beyond the bounds.
 
         Parameters
@@ -53,7 +53,7 @@ green: y <= 0.726 - 0.726 x, x <= 0.625 y - 0.041, y >= 0.400."""
 
 
 @cache
-def _observer(grid: WavelengthGrid) -> FloatArray:
+def _observer(grid: WavelengthGrid) -> Float[Array, "4 wavelengths"]:
     """Return the CIE 1931 observer's x, y and z, and V(lambda) of 1924, on the grid, [4, n_wavelengths].
 
     Tables of colour-science; 0 outside 360 to 830 nm, where they are not defined.
@@ -63,7 +63,7 @@ def _observer(grid: WavelengthGrid) -> FloatArray:
     return np.stack([np.interp(grid.nodes_nm, wave, column, left=0, right=0) for column in columns])
 
 
-def color_matching(grid: WavelengthGrid) -> FloatArray:
+def color_matching(grid: WavelengthGrid) -> Float[Array, "3 wavelengths"]:
     """Return the CIE 1931 2 degree color-matching functions.
 
     Parameters
@@ -89,7 +89,9 @@ XYZ_TO_RGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0
 """Matrix of sRGB (IEC 61966-2-1)."""
 
 
-def luminance_per_photon_radiance(grid: WavelengthGrid, photons: FloatArray) -> FloatArray:
+def luminance_per_photon_radiance(
+    grid: WavelengthGrid, photons: Float[Array, "spectra wavelengths"]
+) -> Float[Array, " spectra"]:
     """Return the luminance per photon radiance: L = 683 integral(V h c / lambda S) d lambda, S in photons per nm.
 
     Parameters
@@ -108,7 +110,7 @@ def luminance_per_photon_radiance(grid: WavelengthGrid, photons: FloatArray) -> 
     return np.asarray(LUMINOUS_EFFICACY_LM_W * grid.integrate(power * _observer(grid)[3]), dtype=float)
 
 
-def chromaticity(grid: WavelengthGrid, photons: FloatArray) -> FloatArray:
+def chromaticity(grid: WavelengthGrid, photons: Float[Array, "spectra wavelengths"]) -> Float[Array, "spectra 2"]:
     """Return CIE 1931 x, y of photon spectra.
 
     Parameters
@@ -127,7 +129,7 @@ def chromaticity(grid: WavelengthGrid, photons: FloatArray) -> FloatArray:
     return np.asarray(xyz[:, :2] / xyz.sum(axis=1, keepdims=True), dtype=float)
 
 
-def display_colors(grid: WavelengthGrid, photons: FloatArray) -> FloatArray:
+def display_colors(grid: WavelengthGrid, photons: Float[Array, "spectra wavelengths"]) -> Float[Array, "spectra 3"]:
     """Return sRGB colors to draw lights with, as bright as their hues allow.
 
     Saturated lights are outside sRGB; negative primaries are clipped. Invisible spectra are gray.
@@ -153,7 +155,7 @@ def display_colors(grid: WavelengthGrid, photons: FloatArray) -> FloatArray:
     return colors
 
 
-def srgb_gamma(linear: FloatArray) -> FloatArray:
+def srgb_gamma(linear: SameShape) -> SameShape:
     """Return sRGB values of linear ones (IEC 61966-2-1).
 
     Parameters

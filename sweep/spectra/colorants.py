@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..base.errors import DataError, ValidationIssue
-from ..base.types import FloatArray
+from ..base.types import Array, Float, FloatArray, PerSample
 from .formats import is_curve_file, scan_curves
 from .spectrum import WavelengthGrid
 
@@ -44,8 +44,8 @@ class Colorants:
     """
 
     names: tuple[str, ...]
-    absorbance: FloatArray
-    peaks: FloatArray
+    absorbance: Float[Array, "colorants wavelengths"]
+    peaks: Float[Array, " colorants"]
     refused: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -169,7 +169,7 @@ def _files(place: Path) -> list[Path]:
     return sorted(file for file in place.iterdir() if file.is_file() and is_curve_file(file.name))
 
 
-def _unsuitable(wave_nm: FloatArray, values: FloatArray, grid: WavelengthGrid) -> str:
+def _unsuitable(wave_nm: PerSample, values: PerSample, grid: WavelengthGrid) -> str:
     """Return why a spectrum is not taken; empty if it is."""
     peak = values.max(initial=0.0)
     if not peak > 0:

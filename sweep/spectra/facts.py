@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..base.errors import ValidationIssue
-from ..base.types import FloatArray
+from ..base.types import PerSample, PerWavelength
 from . import LightUnit
 from .read_table import Scan
 from .signal_color import VISIBLE, LightColor, light_color
@@ -42,8 +42,8 @@ class Curve:
     """
 
     name: str
-    wavelength_nm: FloatArray
-    values: FloatArray
+    wavelength_nm: PerWavelength
+    values: PerWavelength
     unit: Unit = field(default_factory=Unit)
 
     @property
@@ -63,7 +63,7 @@ class Curve:
         """Wavelength of the largest value, nm."""
         return float(self.wavelength_nm[np.argmax(self.values)])
 
-    def on(self, grid: WavelengthGrid) -> FloatArray:
+    def on(self, grid: WavelengthGrid) -> PerWavelength:
         """Return the curve over its largest value.
 
         Parameters
@@ -107,7 +107,7 @@ class Facts:
     curves: tuple[Curve, ...]
 
     @property
-    def samples_nm(self) -> FloatArray:
+    def samples_nm(self) -> PerSample:
         """Wavelengths at which any curve has a sample, nm."""
         return np.unique(np.concatenate([curve.wavelength_nm for curve in self.curves]))
 

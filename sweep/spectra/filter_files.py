@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import IndexArray, Int, PerWavelength
 from .layouts import WAVELENGTH
 
 HINTS = "rgbcymwiuxzok"
@@ -44,7 +44,7 @@ def unique_names(names: Iterable[str]) -> list[str]:
     return unique
 
 
-def csv_text(wavelength_nm: FloatArray, curves: Mapping[str, FloatArray]) -> str:
+def csv_text(wavelength_nm: PerWavelength, curves: Mapping[str, PerWavelength]) -> str:
     """Return curves as CSV that `read_curves` reads back exactly.
 
     Parameters
@@ -115,7 +115,11 @@ def filter_names(hints: Sequence[str], channels: Iterable[str]) -> list[str]:
 
 
 def isetcam_mat(
-    wavelength_nm: FloatArray, curves: Mapping[str, FloatArray], hints: Sequence[str], tile: IndexArray, comment: str
+    wavelength_nm: PerWavelength,
+    curves: Mapping[str, PerWavelength],
+    hints: Sequence[str],
+    tile: Int[IndexArray, "rows columns"],
+    comment: str,
 ) -> bytes:
     """Return filters for ISETCam's `ieReadColorFilter` and `sensorCreate('custom', ...)`, MATLAB version 5.
 

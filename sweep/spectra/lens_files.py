@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..base.errors import DataError, ValidationIssue
-from ..base.types import FloatArray
+from ..base.types import Array, Float
 from .read_text import Sheet, number_of, text_sheet
 
 _FIRST = "height_mm"
@@ -30,8 +30,8 @@ _MOST_ROWS = 1000
 class ChiefRays:
     """Chief ray angles, degrees, at rising image heights relative to the corner, and notes on the file."""
 
-    heights: FloatArray
-    cra_deg: FloatArray
+    heights: Float[Array, " heights"]
+    cra_deg: Float[Array, " heights"]
     notes: tuple[str, ...] = ()
 
 
@@ -66,7 +66,7 @@ def read_chief_rays(path: Path, corner_mm: float | None = None) -> ChiefRays:
     return _to_corner(table, unit, _numbers(table, names, column), names, corner_mm)
 
 
-def _numbers(table: Sheet, names: list[str], column: int) -> FloatArray:
+def _numbers(table: Sheet, names: list[str], column: int) -> Float[Array, "rows 2"]:
     """Return heights and angles, [n_rows, 2]. Raises DataError for other cells, and for heights that do not rise."""
     values: list[list[float]] = []
     for line, row in table.rows[1:]:
@@ -110,7 +110,9 @@ def _columns(table: Sheet) -> tuple[str, int]:
     return units[0], angles[0]
 
 
-def _to_corner(table: Sheet, unit: str, values: FloatArray, names: list[str], corner_mm: float | None) -> ChiefRays:
+def _to_corner(
+    table: Sheet, unit: str, values: Float[Array, "heights 2"], names: list[str], corner_mm: float | None
+) -> ChiefRays:
     """Return the rays from the center of the sensor to its corner."""
 
     def check(passes: bool, problem: str, row: int, column: int, allowed: str | None = None) -> None:

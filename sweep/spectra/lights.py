@@ -8,7 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, Float, MemberNumbers, PerWavelength
 from .population import Population
 from .spectrum import WavelengthGrid, equal_photons
 
@@ -75,7 +75,7 @@ class Lights:
     name: str
     names: tuple[str, ...]
     types: tuple[str, ...]
-    photons: FloatArray
+    photons: Float[Array, "signals wavelengths"]
     photon_ratio: float
     source: str
     surrogate: bool
@@ -87,13 +87,13 @@ class Lights:
         return tuple(dict.fromkeys(self.types))
 
     @property
-    def members(self) -> dict[str, IndexArray]:
+    def members(self) -> dict[str, MemberNumbers]:
         """Indices of the signals of each type."""
         types = np.asarray(self.types)
         return {name: np.flatnonzero(types == name) for name in self.classes}
 
 
-def peak_normalized_ratio(grid: WavelengthGrid, photons: FloatArray) -> float:
+def peak_normalized_ratio(grid: WavelengthGrid, photons: Float[Array, "signals wavelengths"]) -> float:
     """Return K for peak-normalized spectra, the median over the signals.
 
     Photons of a spectrum with peak 1 over those of a flat white of height 1 on the same grid: equivalent bandwidth
@@ -118,7 +118,7 @@ def peak_normalized_ratio(grid: WavelengthGrid, photons: FloatArray) -> float:
 def make_lights(
     grid: WavelengthGrid,
     name: str,
-    signals: list[tuple[str, str, FloatArray]],
+    signals: list[tuple[str, str, PerWavelength]],
     source: str,
     *,
     photon_ratio: float | None = None,

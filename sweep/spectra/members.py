@@ -17,7 +17,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, Float, IndexArray, Int, MemberNumbers, PerValue, PerWavelength
 from .lights import Lights, Pair
 from .population import Population
 from .spectrum import WavelengthGrid
@@ -41,9 +41,9 @@ class ShiftRegion:
         Position along the region's length, 0 to 1.
     """
 
-    cells: IndexArray
-    shares: FloatArray
-    along: FloatArray
+    cells: Int[IndexArray, "cells 2"]
+    shares: Float[Array, "cells 3 2"]
+    along: Float[Array, " cells"]
 
 
 class Members:
@@ -70,7 +70,7 @@ class Members:
         self._regions: dict[tuple[float, ...], ShiftRegion] = {}
 
     @cached_property
-    def rows(self) -> dict[str, IndexArray]:
+    def rows(self) -> dict[str, MemberNumbers]:
         """First spectrum of each signal and width in `lights`, by signal type."""
         starts = {name: rows[:: self.n_steps] for name, rows in self.lights.members.items()}
         return {name: np.asarray(rows, dtype=np.intp) for name, rows in starts.items()}
@@ -90,7 +90,7 @@ class Members:
         """
         return row // (len(self.population.width) * self.n_steps)
 
-    def steps_of(self, shift_nm: FloatArray) -> FloatArray:
+    def steps_of(self, shift_nm: PerValue) -> PerValue:
         """Return the steps of a shift after the first one.
 
         Parameters
@@ -137,7 +137,7 @@ class Members:
         """
         return _drift_and_independent(self._lights, self.population, signal)
 
-    def regions(self, pair: Pair) -> tuple[list[ShiftRegion], IndexArray]:
+    def regions(self, pair: Pair) -> tuple[list[ShiftRegion], Int[IndexArray, "first second"]]:
         """Return the distinct regions of two types, and the region of each two signals and widths.
 
         Parameters
@@ -219,7 +219,7 @@ def _drift_and_independent(lights: Lights, population: Population, signal: int) 
     return drift, population.independent_nm(kind, name)
 
 
-def moved(photons: FloatArray, steps: int) -> FloatArray:
+def moved(photons: PerWavelength, steps: int) -> PerWavelength:
     """Return a spectrum shifted by whole steps toward the red.
 
     Parameters
@@ -241,7 +241,7 @@ def moved(photons: FloatArray, steps: int) -> FloatArray:
     return shifted
 
 
-def stretched(grid: WavelengthGrid, photons: FloatArray, factor: float) -> FloatArray:
+def stretched(grid: WavelengthGrid, photons: PerWavelength, factor: float) -> PerWavelength:
     """Return a spectrum stretched about its mean wavelength, with equal photons.
 
     Parameters
@@ -342,7 +342,7 @@ def _region(points: list[_Point]) -> ShiftRegion:
     return ShiftRegion(np.array(cells, dtype=np.intp), np.array(shares), _along(middles))
 
 
-def _along(points: FloatArray) -> FloatArray:
+def _along(points: Float[Array, "points 2"]) -> Float[Array, " points"]:
     """Return where points lie along the direction in which they are spread most, 0 to 1."""
     off = points - points.mean(axis=0)
     at = off @ np.linalg.svd(off, full_matrices=False)[2][0]

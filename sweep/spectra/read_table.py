@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.errors import DataError, ValidationIssue
-from ..base.types import FloatArray
+from ..base.types import Array, Float, PerWavelength
 from .clean import Cleaner
 from .heads import Series, Table, counting, heads_of, steps_by_one, table_units, wave_columns
 from .layouts import (
@@ -56,9 +56,9 @@ class Scan:
     `read_curves` stops at the first.
     """
 
-    wavelength_nm: FloatArray
+    wavelength_nm: PerWavelength
     names: tuple[str, ...]
-    values: FloatArray
+    values: Float[Array, "places functions"]
     units: tuple[Unit, ...]
     issues: tuple[tuple[ValidationIssue, ...], ...]
     notes: tuple[str, ...] = ()
@@ -243,7 +243,7 @@ def _numbered(columns: Sequence[_Column]) -> list[_Column]:
     return known
 
 
-def _numbers(table: Table, columns: Sequence[_Column]) -> tuple[FloatArray, set[int], list[int]]:
+def _numbers(table: Table, columns: Sequence[_Column]) -> tuple[Float[Array, "rows width"], set[int], list[int]]:
     """Return the numbers of a table, [n_rows, width], NaN for missing ones, and columns with faults, with % signs."""
     keys = {column.wave: WAVELENGTH for column in columns} | {column.at: column.name for column in columns}
     values, bad = np.full((len(table.body), table.width), np.nan), set[int]()
@@ -281,7 +281,7 @@ def _numbers(table: Table, columns: Sequence[_Column]) -> tuple[FloatArray, set[
     return values, bad, signed
 
 
-def _scan(table: Table, columns: Sequence[_Column], numbers: FloatArray, bad: set[int]) -> Scan:
+def _scan(table: Table, columns: Sequence[_Column], numbers: Float[Array, "rows columns"], bad: set[int]) -> Scan:
     """Bring curves to nm, order and common wavelengths, and clean them of what has one meaning."""
     sheet = table.sheet
     factor = table.factor_nm

@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from ..base.types import FloatArray
+from ..base.types import Array, Float, FloatArray
 from .color import REGIONS, VISIBLE_NM, chromaticity
 from .spectrum import WavelengthGrid
 
@@ -62,7 +62,7 @@ class LightColor:
         return kind if gap <= NEAR_NM else None
 
 
-def light_color(photons: FloatArray) -> LightColor | None:
+def light_color(photons: Float[Array, " 471"]) -> LightColor | None:
     """Return the color of a photon spectrum.
 
     Parameters
@@ -95,7 +95,7 @@ def light_color(photons: FloatArray) -> LightColor | None:
     )
 
 
-def _hue(xy: FloatArray) -> tuple[float, float | None]:
+def _hue(xy: Float[Array, " 2"]) -> tuple[float, float | None]:
     """Return excitation purity and dominant wavelength, to a nm, of a chromaticity (CIE 15, 9).
 
     Both are of the point where the line from white through it leaves the spectral locus; on the line of purples there
@@ -117,7 +117,7 @@ def _hue(xy: FloatArray) -> tuple[float, float | None]:
 
 
 @cache
-def spectral_locus() -> FloatArray:
+def spectral_locus() -> Float[Array, "471 2"]:
     """Return the chromaticities of monochromatic light on VISIBLE.
 
     Returns
@@ -129,7 +129,7 @@ def spectral_locus() -> FloatArray:
 
 
 @cache
-def outline(kind: str) -> FloatArray:
+def outline(kind: str) -> Float[Array, "corners 2"]:
     """Return the part of a color region that light can have, as a polygon.
 
     The spectral locus is cut at each bound (Sutherland and Hodgman, "Reentrant polygon clipping").
@@ -173,7 +173,7 @@ def dominant_ranges_nm() -> dict[str, tuple[float, float]]:
     return spans
 
 
-def _distance(xy: FloatArray, polygon: FloatArray) -> float:
+def _distance(xy: Float[Array, " 2"], polygon: Float[Array, "corners 2"]) -> float:
     """Return the distance from a point to a polygon's outline, ndarray[2] and ndarray[n, 2]."""
     along = np.roll(polygon, -1, axis=0) - polygon
     length = (along**2).sum(axis=1)

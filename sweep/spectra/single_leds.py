@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from ..base.types import FloatArray, Section, from_to
+from ..base.types import Array, Float, Section, from_to
 from .builtin.led import led_photons
 from .color import SIGNAL_REGIONS, chromaticity
 from .signal_color import VISIBLE
@@ -65,12 +65,12 @@ class RegionMap(Section):
         return self
 
     @property
-    def peaks_nm(self) -> FloatArray:
+    def peaks_nm(self) -> Float[Array, " peaks"]:
         """Peaks, nm, ndarray of shape (n_peaks,)."""
         return _steps(*self.peak_nm, self.peak_step_nm)
 
     @property
-    def widths_nm(self) -> FloatArray:
+    def widths_nm(self) -> Float[Array, " widths"]:
         """Full widths at half maximum, nm, ndarray of shape (n_widths,)."""
         return _steps(*self.fwhm_nm, self.fwhm_step_nm)
 
@@ -79,10 +79,10 @@ class RegionMap(Section):
 class SingleLeds:
     """LEDs by peak and full width at half maximum, nm, ndarray of shape (n,) each."""
 
-    peak_nm: FloatArray
-    fwhm_nm: FloatArray
+    peak_nm: Float[Array, " leds"]
+    fwhm_nm: Float[Array, " leds"]
 
-    def photons(self, grid: WavelengthGrid) -> FloatArray:
+    def photons(self, grid: WavelengthGrid) -> Float[Array, "leds wavelengths"]:
         """Return photon spectra that integrate to 1 on the grid.
 
         Parameters
@@ -115,7 +115,7 @@ class SingleLeds:
         inside = SIGNAL_REGIONS[norm][kind].violation(chromaticity(VISIBLE, self._shapes(VISIBLE))) <= 0
         return SingleLeds(self.peak_nm[inside], self.fwhm_nm[inside])
 
-    def _shapes(self, grid: WavelengthGrid) -> FloatArray:
+    def _shapes(self, grid: WavelengthGrid) -> Float[Array, "leds wavelengths"]:
         """Return photon spectra with a peak of 1, ndarray of shape (n, n_wavelengths)."""
         decays = self.fwhm_nm / _FWHM
         nodes = grid.nodes_nm
@@ -140,5 +140,5 @@ def all_leds(requested: RegionMap) -> SingleLeds:
     return SingleLeds(peaks.ravel(), widths.ravel())
 
 
-def _steps(low: float, high: float, step: float) -> FloatArray:
+def _steps(low: float, high: float, step: float) -> Float[Array, " steps"]:
     return np.asarray(low + step * np.arange(math.floor((high - low) / step + 1e-9) + 1), dtype=float)

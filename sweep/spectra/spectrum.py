@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from pydantic import model_validator
 
 from ..base.errors import DataError, ValidationIssue
-from ..base.types import FloatArray, Positive, Section
+from ..base.types import Array, Float, PerKnot, PerSample, PerWavelength, Positive, SameShape, Section
 
 Resampling = Literal["linear", "mean"]
 Outside = Literal["refuse", "zero"]
@@ -76,11 +76,11 @@ class WavelengthGrid(Section):
         return round((self.stop_nm - self.start_nm) / self.step_nm) + 1
 
     @property
-    def nodes_nm(self) -> FloatArray:
+    def nodes_nm(self) -> PerWavelength:
         """Wavelengths, nm, ndarray of shape (size,)."""
         return self.start_nm + self.step_nm * np.arange(self.size, dtype=float)
 
-    def integrate(self, values: FloatArray) -> FloatArray:
+    def integrate(self, values: Float[Array, "*batch nodes"]) -> SameShape:
         """Sum value times bin width over the last axis.
 
         Parameters
@@ -128,21 +128,21 @@ class Curves:
     `notes`: on the way a file was read. `units`: what the heads of its columns say.
     """
 
-    wavelength_nm: FloatArray
-    values: Mapping[str, FloatArray]
+    wavelength_nm: PerWavelength
+    values: Mapping[str, PerWavelength]
     source: str
     surrogate: bool = False
     notes: tuple[str, ...] = ()
     units: Mapping[str, Unit] = field(default_factory=dict)
 
-    def samples(self, name: str) -> tuple[FloatArray, FloatArray]:
+    def samples(self, name: str) -> tuple[PerSample, PerSample]:
         """Return wavelengths, nm, and values of a curve between its first and last sample."""
         known = np.isfinite(self.values[name])
         return self.wavelength_nm[known], self.values[name][known]
 
     def on(
         self, grid: WavelengthGrid, name: str, method: Resampling = "linear", outside: Outside = "refuse"
-    ) -> FloatArray:
+    ) -> PerWavelength:
         """Resample a curve to a grid; see `resample`.
 
         Parameters
@@ -169,7 +169,7 @@ class Curves:
             ) from None
 
 
-def _wavelength_issues(wave: FloatArray) -> Iterator[ValidationIssue]:
+def _wavelength_issues(wave: PerSample) -> Iterator[ValidationIssue]:
     if not np.isfinite(wave).all():
         yield ValidationIssue("wavelength is not a finite number", allowed="finite nm")
         return
@@ -188,7 +188,7 @@ def _wavelength_issues(wave: FloatArray) -> Iterator[ValidationIssue]:
         )
 
 
-def _value_issues(wave: FloatArray, data: FloatArray) -> Iterator[ValidationIssue]:
+def _value_issues(wave: PerSample, data: PerSample) -> Iterator[ValidationIssue]:
     bad = ~np.isfinite(data)
     if bad.any():
         yield ValidationIssue(
@@ -205,9 +205,7 @@ def _value_issues(wave: FloatArray, data: FloatArray) -> Iterator[ValidationIssu
         yield ValidationIssue("the largest value is too small", value=float(data.max()), allowed=allowed)
 
 
-def check_samples(
-    wavelength_nm: ArrayLike, values: ArrayLike, *, signed: bool = False
-) -> tuple[FloatArray, FloatArray]:
+def check_samples(wavelength_nm: ArrayLike, values: ArrayLike, *, signed: bool = False) -> tuple[PerSample, PerSample]:
     """Check samples of a curve.
 
     Parameters
@@ -242,7 +240,7 @@ def check_samples(
 
 
 def sample_issues(
-    file: str, wave: FloatArray, names: Sequence[str], data: FloatArray, signed: Container[int] = ()
+    file: str, wave: PerSample, names: Sequence[str], data: Float[Array, "samples curves"], signed: Container[int] = ()
 ) -> list[list[ValidationIssue]]:
     """Return the issues of the curves of a file, [n_samples, n_curves], by `check_samples`; `signed`: curves in dB."""
     groups = []
@@ -261,7 +259,7 @@ def resample(
     grid: WavelengthGrid,
     method: Resampling = "linear",
     outside: Outside = "refuse",
-) -> FloatArray:
+) -> PerWavelength:
     """Bring a sampled curve to a grid.
 
     `linear` is the value of the piecewise linear interpolant at each node. `mean` is its exact mean over each bin,
@@ -313,7 +311,7 @@ def resample(
     return np.divide(area, width, out=np.zeros_like(area), where=width > 0)
 
 
-def integral_between(wavelength_nm: FloatArray, values: FloatArray, low_nm: float, high_nm: float) -> float:
+def integral_between(wavelength_nm: PerWavelength, values: PerWavelength, low_nm: float, high_nm: float) -> float:
     """Return the integral of a curve, linear between its samples and 0 beyond them.
 
     Parameters
@@ -332,7 +330,7 @@ def integral_between(wavelength_nm: FloatArray, values: FloatArray, low_nm: floa
     return float(np.diff(_integral_to(wavelength_nm, values, ends))[0])
 
 
-def _integral_to(wave: FloatArray, data: FloatArray, at: FloatArray) -> FloatArray:
+def _integral_to(wave: PerSample, data: PerSample, at: Float[Array, " at"]) -> Float[Array, " at"]:
     """Return the integral of the piecewise linear interpolant from the first sample to `at`."""
     whole = np.concatenate([[0.0], np.cumsum(np.diff(wave) * (data[1:] + data[:-1]) / 2)])
     index = np.clip(np.searchsorted(wave, at, side="right") - 1, 0, wave.size - 2)
@@ -341,7 +339,9 @@ def _integral_to(wave: FloatArray, data: FloatArray, at: FloatArray) -> FloatArr
     return np.asarray(whole[index] + part * (data[index] + slope * part / 2), dtype=float)
 
 
-def photons_from_energy(wavelength_nm: FloatArray, energy: FloatArray) -> FloatArray:
+def photons_from_energy(
+    wavelength_nm: PerWavelength, energy: Float[Array, "*batch wavelengths"]
+) -> Float[Array, "*batch wavelengths"]:
     """Convert spectral radiant energy to photons: Q lambda / (h c) (Planck).
 
     Parameters
@@ -359,7 +359,9 @@ def photons_from_energy(wavelength_nm: FloatArray, energy: FloatArray) -> FloatA
     return energy * (wavelength_nm * 1e-9) / (PLANCK_J_S * LIGHT_M_S)
 
 
-def energy_from_photons(wavelength_nm: FloatArray, photons: FloatArray) -> FloatArray:
+def energy_from_photons(
+    wavelength_nm: PerWavelength, photons: Float[Array, "*batch wavelengths"]
+) -> Float[Array, "*batch wavelengths"]:
     """Convert photons to spectral radiant energy: Q h c / lambda (Planck).
 
     Parameters
@@ -377,7 +379,9 @@ def energy_from_photons(wavelength_nm: FloatArray, photons: FloatArray) -> Float
     return photons * (PLANCK_J_S * LIGHT_M_S) / (wavelength_nm * 1e-9)
 
 
-def equal_photons(grid: WavelengthGrid, photons: FloatArray) -> FloatArray:
+def equal_photons(
+    grid: WavelengthGrid, photons: Float[Array, "*batch wavelengths"]
+) -> Float[Array, "*batch wavelengths"]:
     """Scale spectra to an integral of one photon.
 
     Parameters
@@ -408,7 +412,7 @@ def equal_photons(grid: WavelengthGrid, photons: FloatArray) -> FloatArray:
     return photons / total[..., None]
 
 
-def linear_basis(at: FloatArray, knots: FloatArray) -> FloatArray:
+def linear_basis(at: Float[Array, " at"], knots: PerKnot) -> Float[Array, "knots at"]:
     """Return the linear basis of interpolation between knots; constant beyond the ends.
 
     Parameters

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, Float, IndexArray, Int, PerWavelength
 
 TaskMetric = Literal["color", "low_light", "separation"]
 """Kind of a task, which sets its figures: color reproduction, noise in low light, or separation of classes."""
@@ -91,10 +91,10 @@ class Chart:
         CIE 1931 tristimulus values of the perfect reflecting diffuser, Y = 1.
     """
 
-    photons: FloatArray
-    gray: FloatArray
-    xyz: FloatArray
-    white: FloatArray
+    photons: Float[Array, "lights patches wavelengths"]
+    gray: Float[Array, "lights wavelengths"]
+    xyz: Float[Array, "lights patches 3"]
+    white: Float[Array, "lights 3"]
 
 
 @dataclass(frozen=True)
@@ -119,12 +119,12 @@ class GriddedTask:
 
     columns: TaskColumns
     types: tuple[str, ...] = ()
-    photons: FloatArray | None = None
+    photons: Float[Array, "lights spectra wavelengths"] | None = None
     chart: Chart | None = None
     metamerism_chart: Chart | None = None
 
     @property
-    def pairs(self) -> tuple[IndexArray, IndexArray]:
+    def pairs(self) -> tuple[Int[IndexArray, " pairs"], Int[IndexArray, " pairs"]]:
         """Indices (first, second) of all pairs of spectra of different classes, each of shape (n_pairs,)."""
         types = np.asarray(self.types)
         first, second = np.triu_indices(len(types), 1)
@@ -168,7 +168,7 @@ class StudyTasks:
 
     conditions: Conditions
     tasks: tuple[GriddedTask, ...]
-    from_files: Mapping[tuple[str, str], FloatArray] = field(default_factory=dict)
+    from_files: Mapping[tuple[str, str], PerWavelength] = field(default_factory=dict)
 
     @property
     def columns(self) -> tuple[TaskColumns, ...]:

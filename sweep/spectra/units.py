@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from ..base.errors import DataError, ValidationIssue
-from ..base.types import FloatArray
+from ..base.types import PerSample, PerWavelength
 from .clean import several
 from .spectrum import LIGHT_M_S, PLANCK_J_S, Curves, Quantity, Unit
 
@@ -288,7 +288,7 @@ def _unclear(curves: Curves, name: str, problem: str, words: str, use: Use) -> V
     return ValidationIssue(problem, curves.source, None, name, words or None, allowed)
 
 
-def _check_share(curves: Curves, name: str, values: FloatArray, use: Use, quantity: Quantity) -> None:
+def _check_share(curves: Curves, name: str, values: PerSample, use: Use, quantity: Quantity) -> None:
     """Refuse responsivities that would be a QE above 1, and dB that would amplify."""
     top = float(np.nanmax(values, initial=0.0))
     if quantity in ("responsivity", "decibel", "density") and top > 1.0 + _NOISE:
@@ -296,7 +296,7 @@ def _check_share(curves: Curves, name: str, values: FloatArray, use: Use, quanti
         raise DataError(_unclear(curves, name, problem, SAID[quantity].split(",")[0], use))
 
 
-def converted(wavelength_nm: FloatArray, values: FloatArray, quantity: Quantity, unit: Unit) -> FloatArray:
+def converted(wavelength_nm: PerWavelength, values: PerSample, quantity: Quantity, unit: Unit) -> PerSample:
     """Return QE of responsivities (relative ones in a common scale), transmission of densities; others as they are."""
     if quantity == "responsivity":
         return np.asarray(values * A_PER_W_NM / wavelength_nm, dtype=float)

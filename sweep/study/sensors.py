@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.errors import DataError
-from ..base.types import FloatArray
+from ..base.types import Array, Float, FloatArray, PerWavelength
 from ..camera.angular import grazing_ray_issue
 from ..camera.sensor import BUILT_IN_SENSORS, SensorCurves, make_sensor
 from ..camera.sensor_field import PLACES, SensorField
@@ -103,8 +103,8 @@ def _sensor(section: SensorSection, sources: Sources) -> SensorCurves | None:
 
 
 def _curves_of_files(
-    sources: Sources, section: SensorSection, known: Mapping[str, FloatArray]
-) -> dict[str, FloatArray]:
+    sources: Sources, section: SensorSection, known: Mapping[str, Float[Array, " _values"]]
+) -> dict[str, PerWavelength]:
     """Return the QE of every curve of the files, those that are relative to others last; `known`: built-in curves."""
     curves: dict[str, FloatArray] = {}
     files = sorted(enumerate(section.files), key=lambda item: item[1].relative_to is not None)
@@ -124,7 +124,9 @@ def _curves_of_files(
     return curves
 
 
-def _columns(sources: Sources, path: KeyPath, entry: CurveFile, factor: float | FloatArray) -> dict[str, FloatArray]:
+def _columns(
+    sources: Sources, path: KeyPath, entry: CurveFile, factor: float | Float[Array, "#wavelengths"]
+) -> dict[str, PerWavelength]:
     """Return the curves of one file on the grid, times a factor; those that a finished run kept have it already."""
     use: Use = "sensor" if entry.relative_to is None else "filter"
     given = FITTING[use][0] if entry.file in sources.given and not sources.given[entry.file].units else None

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..base.disk import is_file, is_folder
 from ..base.errors import MOST_ISSUES, DataError, StudyError, SweepError, ValidationIssue, nearest
-from ..base.types import FloatArray
+from ..base.types import PerWavelength
 from ..camera.sensor import SensorCurves
 from ..spectra.builtin.surrogate import BUILT_IN_RANGE_NM
 from ..spectra.colorants import BUILTIN_COLORANTS, Colorants, read_colorants
@@ -46,10 +46,10 @@ class KeptSources:
     QE by name, photon spectra by signal type and name, spectra of tasks by class and name, absorbances of colorants.
     """
 
-    sensor: Mapping[str, FloatArray]
-    lights: Mapping[tuple[str, str], FloatArray]
-    tasks: Mapping[tuple[str, str], FloatArray] = field(default_factory=dict)
-    colorants: Mapping[str, FloatArray] = field(default_factory=dict)
+    sensor: Mapping[str, PerWavelength]
+    lights: Mapping[tuple[str, str], PerWavelength]
+    tasks: Mapping[tuple[str, str], PerWavelength] = field(default_factory=dict)
+    colorants: Mapping[str, PerWavelength] = field(default_factory=dict)
 
 
 @dataclass
@@ -195,7 +195,7 @@ class Sources:
 
     def photons(
         self, path: KeyPath, curves: Curves | None, column: str, entry: LightFile | TaskFile
-    ) -> FloatArray | None:
+    ) -> PerWavelength | None:
         """Return the photon spectrum of a light; warn about photons outside the wavelength grid or between its nodes.
 
         Parameters
@@ -243,7 +243,7 @@ class Sources:
             )
         return values
 
-    def column(self, path: KeyPath, curves: Curves | None, column: str, entry: _Entry) -> FloatArray | None:
+    def column(self, path: KeyPath, curves: Curves | None, column: str, entry: _Entry) -> PerWavelength | None:
         """Interpolate a column of a file on the study's wavelength grid.
 
         Parameters
@@ -274,7 +274,7 @@ class Sources:
                 self.add(path, f"{entry.file}, column {column}: {issue.problem}", issue.value, issue.allowed)
             return None
 
-    def kept_curve(self, path: KeyPath, curves: Mapping[_Key, FloatArray], name: _Key) -> FloatArray | None:
+    def kept_curve(self, path: KeyPath, curves: Mapping[_Key, PerWavelength], name: _Key) -> PerWavelength | None:
         """Return a curve stored with a finished run.
 
         Parameters

@@ -9,7 +9,7 @@ from typing import cast
 import numpy as np
 
 from ..base.errors import SweepError, nearest
-from ..base.types import FloatArray
+from ..base.types import PerWavelength
 from ..base.user_code import Offered, is_in_file, offers
 from ..camera.mosaic import Mosaic
 from ..camera.sensor import SensorCurves
@@ -200,7 +200,7 @@ class SpaceBuilder:
         if path[-1] == "box" and len({(min(axis), max(axis)) for axis in numbers if axis}) > 1:
             self.sources.add((*path, "colorant_2"), "the range is not that of `colorant_1`", None, "one range for all")
 
-    def _family(self, entry: Modification, base: FloatArray, target: FloatArray | None) -> Family:
+    def _family(self, entry: Modification, base: PerWavelength, target: PerWavelength | None) -> Family:
         """Return the family over its curves; raises SweepError."""
         nodes_nm = self.section.wavelengths.nodes_nm
         if not is_from_outside(entry.family, _FAMILIES, FAMILIES):

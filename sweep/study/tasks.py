@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ..base.types import FloatArray
+from ..base.types import FloatArray, PerWavelength
 from ..camera.pixel import Pixel, irradiance_factor
 from ..camera.scene import Scene
 from ..camera.sensor import SensorCurves
@@ -61,7 +61,7 @@ def tasks_of(section: TasksSection, sources: Sources) -> StudyTasks | None:
 
 
 def _user_task(
-    name: str, task: UserTask, from_files: dict[tuple[str, str], FloatArray], sources: Sources
+    name: str, task: UserTask, from_files: dict[tuple[str, str], PerWavelength], sources: Sources
 ) -> GriddedTask | None:
     """Return a task, or None after adding issues; its spectra of files go to `from_files`, see `StudyTasks`."""
     before, at = len(sources.issues), (*_AT, "own", name)
@@ -123,7 +123,7 @@ def _check_names(name: str, task: UserTask, path: KeyPath, sources: Sources) -> 
         sources.add((*path, "under"), "lamps are seen by their own light", task.under, "leave it out")
 
 
-def _kept(owner: str, path: KeyPath, entry: TaskFile, sources: Sources) -> dict[str, FloatArray]:
+def _kept(owner: str, path: KeyPath, entry: TaskFile, sources: Sources) -> dict[str, PerWavelength]:
     """Return the spectra of a file that a finished run kept."""
     assert sources.kept is not None
     start = f"{entry.file}:"
@@ -137,7 +137,7 @@ def _kept(owner: str, path: KeyPath, entry: TaskFile, sources: Sources) -> dict[
     return spectra
 
 
-def _read(path: KeyPath, entry: TaskFile, sources: Sources) -> dict[str, FloatArray]:
+def _read(path: KeyPath, entry: TaskFile, sources: Sources) -> dict[str, PerWavelength]:
     """Return column -> reflectance or relative photons on the grid; a column that is 0 there adds an issue."""
     use: Use = "surface" if entry.quantity == "reflectance" else "light"
     curves = sources.used(path, entry, use, entry.columns, entry.quantity, scaled=True)

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ..base.types import IndexArray
+from ..base.types import IndexArray, Int
 from .head import head_places_px, heights
 from .images import HeadCamera, Numbers
 from .isp import isp_of
@@ -209,7 +209,7 @@ def formed(camera: HeadCamera, scenes: Scenes, form: Form) -> NDArray[Any]:
     return in_form(camera, camera.images(scenes), scenes.level, form)
 
 
-def in_form(camera: HeadCamera, numbers: Numbers, levels: IndexArray, form: Form) -> NDArray[Any]:
+def in_form(camera: HeadCamera, numbers: Numbers, levels: Int[IndexArray, " values"], form: Form) -> NDArray[Any]:
     """Return drawn images in a form.
 
     Parameters

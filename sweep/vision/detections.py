@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..base.types import BoolArray, FloatArray
+from ..base.types import Array, Bool, BoolArray, Float
 from .scores import interval_of_seeds
 
 ALL = "all"
@@ -16,7 +16,7 @@ ALL = "all"
 _LEAST_RADIUS_PX = 2.0
 
 
-def match_radius_px(diameter_px: FloatArray) -> FloatArray:
+def match_radius_px(diameter_px: Float[Array, " detections"]) -> Float[Array, " detections"]:
     """Return how far a detection may be from the center of a lit lens: its diameter, and at least 2 pixels.
 
     Parameters
@@ -32,7 +32,9 @@ def match_radius_px(diameter_px: FloatArray) -> FloatArray:
     return np.asarray(np.maximum(diameter_px, _LEAST_RADIUS_PX), dtype=float)
 
 
-def average_precision(right: BoolArray, score: FloatArray, n_targets: int) -> float:
+def average_precision(
+    right: Bool[BoolArray, " detections"], score: Float[Array, " detections"], n_targets: int
+) -> float:
     """Return the area under the curve of precision over recall, of the largest precision at that recall or more.
 
     As of PASCAL VOC since 2010 (Everingham et al., IJCV 2015), over all recalls.
@@ -124,7 +126,7 @@ def precision_scores(table: pd.DataFrame, reference: str) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _right(targets: pd.DataFrame, detections: pd.DataFrame) -> BoolArray:
+def _right(targets: pd.DataFrame, detections: pd.DataFrame) -> Bool[BoolArray, " detections"]:
     """Return which detections, by falling score, have found a target."""
     rows = {name: np.asarray(at, dtype=np.intp) for name, at in targets.groupby("image_id").indices.items()}
     x_px, y_px, radius_px = (

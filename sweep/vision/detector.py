@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, median_filter, uniform_filter
 from scipy.special import softmax
 
-from ..base.types import BoolArray, FloatArray, IndexArray
+from ..base.types import Array, BoolArray, Float, IndexArray, Int
 from ..camera.mosaic import Mosaic
 from ..camera.pixel import Pixel
 from .batches import Batch
@@ -48,7 +48,9 @@ class Detector:
         self.pixel = pixel
         self.classes = (*lenses, _OTHER)
 
-    def _places(self, images: NDArray[np.generic]) -> tuple[IndexArray, FloatArray, FloatArray]:
+    def _places(
+        self, images: NDArray[np.generic]
+    ) -> tuple[Int[IndexArray, " places"], Float[Array, "places 2"], Float[Array, "places _"]]:
         """Return image and position of each place, (x, y) in pixels, and its features."""
         rows, columns = self.mosaic.indices.shape
         planes = tile_planes(in_noise(images, self.pixel), self.mosaic)
@@ -89,7 +91,9 @@ class Detector:
         self._weights = np.linalg.solve(within, means.T)
         self._offsets = np.log(np.maximum(counts, 1e-9) / max(len(x), 1)) - 0.5 * (means.T * self._weights).sum(axis=0)
 
-    def _classes_at(self, number: IndexArray, at_px: FloatArray, labels: pd.DataFrame) -> IndexArray:
+    def _classes_at(
+        self, number: Int[IndexArray, " places"], at_px: Float[Array, "places 2"], labels: pd.DataFrame
+    ) -> Int[IndexArray, " places"]:
         """Return the class of each place: the signal type of a lit lens within the radius, or other."""
         classes = np.full(len(number), len(self.classes) - 1)
         for i, (image, position) in enumerate(zip(number, at_px, strict=True)):

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.cache import Cache
-from ..base.types import FloatArray
+from ..base.types import Array, Float, PerKnot
 from ..camera import psf
 from ..camera.disc_image import light_on_pixels
 from ..camera.mosaic import Mosaic
@@ -46,13 +46,13 @@ class HeadMaps:
         Light of both, including the parts before them.
     """
 
-    knots_nm: FloatArray
-    lenses: FloatArray
-    housing: FloatArray
-    backplate: FloatArray
+    knots_nm: PerKnot
+    lenses: Float[Array, "places lenses side side knots"]
+    housing: Float[Array, "places side side knots"]
+    backplate: Float[Array, "places side side knots"]
 
 
-def heights(vision: Vision) -> FloatArray:
+def heights(vision: Vision) -> Float[Array, " lenses"]:
     """Return the positions of the lenses' centers below the head's center.
 
     Parameters
@@ -85,7 +85,7 @@ def housing_diameters(vision: Vision) -> tuple[float, float]:
     return _HOUSING[0], _HOUSING[1] + SPACING * (len(vision.lenses) - 1)
 
 
-def head_places_px(vision: Vision, mosaic: Mosaic) -> FloatArray:
+def head_places_px(vision: Vision, mosaic: Mosaic) -> Float[Array, "places 2"]:
     """Return the positions of the head's center from the image's first pixel.
 
     Parameters
@@ -142,7 +142,7 @@ def head_maps(setup: Setup, vision: Vision) -> HeadMaps:
     )
 
 
-def lamp_maps(setup: Setup, vision: Vision) -> tuple[FloatArray, FloatArray]:
+def lamp_maps(setup: Setup, vision: Vision) -> tuple[PerKnot, Float[Array, "places side side knots"]]:
     """Return the light of a disc as wide as a lens in the head's middle, relative to a uniform field of its radiance.
 
     Parameters
@@ -175,13 +175,17 @@ def _made(setup: Setup, vision: Vision, target: Target) -> HeadMaps:
     return HeadMaps(knots, np.stack(lenses, axis=1), housing, backplate)
 
 
-def _apart(vision: Vision, centers: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _apart(
+    vision: Vision, centers: Float[Array, "places 2"]
+) -> tuple[Float[Array, "places columns"], Float[Array, "places columns"]]:
     """Return columns and rows of the pixels (with margin) from each center, ndarray of shape (n_places, side) each."""
     at = np.arange(-MARGIN, vision.crop_px + MARGIN)
     return at - centers[:, :1], at - centers[:, 1:]
 
 
-def _disc(setup: Setup, vision: Vision, centers: FloatArray, knots_nm: FloatArray) -> FloatArray:
+def _disc(
+    setup: Setup, vision: Vision, centers: Float[Array, "places 2"], knots_nm: PerKnot
+) -> Float[Array, "places side side knots"]:
     """Return a lens by `disc_image`, ndarray of shape (n_places, side, side, n_knots)."""
     target, pixel = setup.scene.target, setup.camera.pixel
     assert target is not None
@@ -200,8 +204,8 @@ def _disc(setup: Setup, vision: Vision, centers: FloatArray, knots_nm: FloatArra
 
 
 def _rectangle(
-    setup: Setup, vision: Vision, centers: FloatArray, size_px: tuple[float, float], knots_nm: FloatArray
-) -> FloatArray:
+    setup: Setup, vision: Vision, centers: Float[Array, "places 2"], size_px: tuple[float, float], knots_nm: PerKnot
+) -> Float[Array, "places side side knots"]:
     """Return a rectangle through the same lens onto the same pixels, ndarray of shape (n_places, side, side, n_knots).
 
     The spectrum of rectangle and pixel times the transfer function, which ends at 1 / (lambda N): a cosine series of a

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, ChannelCurves, Float, FloatArray, ImageNumbers, PerKnot
 from ..camera.angular import AngularResponse
 from ..camera.irradiance import signal_irradiance
 from ..camera.pixel import Pixel, irradiance_factor
@@ -73,19 +73,19 @@ class HeadElectrons:
         Exposure time, s.
     """
 
-    unlit: FloatArray
-    phantoms: FloatArray
-    lamps: FloatArray
+    unlit: Float[Array, "places backgrounds pixels"]
+    phantoms: Float[Array, "places lenses lenses pixels"]
+    lamps: Float[Array, "places lenses signals pixels"]
     time_s: float
 
     def of(
         self,
-        place: IndexArray,
-        background: IndexArray,
-        order: IndexArray,
-        phantom_on: IndexArray,
-        lit: tuple[IndexArray, IndexArray, FloatArray],
-    ) -> FloatArray:
+        place: ImageNumbers,
+        background: ImageNumbers,
+        order: ImageNumbers,
+        phantom_on: ImageNumbers,
+        lit: tuple[ImageNumbers, ImageNumbers, Float[Array, " images"]],
+    ) -> Float[Array, "images pixels"]:
         """Return electrons of some heads.
 
         Parameters
@@ -122,7 +122,7 @@ class HeadCamera:
         Benchmark.
     """
 
-    def __init__(self, setup: Setup, curves: FloatArray, vision: Vision) -> None:
+    def __init__(self, setup: Setup, curves: ChannelCurves, vision: Vision) -> None:
         qe = setup.camera.qe.copy()
         qe[list(setup.camera.modified)] = curves
         self.vision = vision
@@ -176,19 +176,19 @@ class HeadCamera:
             time_s,
         )
 
-    def _of_white(self, level: LightLevel) -> FloatArray:
+    def _of_white(self, level: LightLevel) -> Float[Array, " channels"]:
         """Return the photons that arrive from a surface of reflectance 1."""
         grid = self.setup.camera.grid
         ambient = ambient_light(grid, level.light)
         radiance = level.illuminance_lx / math.pi / luminance_per_photon_radiance(grid, ambient[None])[0]
         return np.asarray(ambient * (radiance * irradiance_factor(self.vision.optics)), dtype=float)
 
-    def _around(self, level: LightLevel) -> FloatArray:
+    def _around(self, level: LightLevel) -> Float[Array, "backgrounds pixels"]:
         """Return the photons that arrive from each background, ndarray of shape (n_backgrounds, n_wavelengths)."""
         grid, white = self.setup.camera.grid, self._of_white(level)
         return np.stack([white * reflectance(grid, background) for background in self.vision.backgrounds])
 
-    def background(self, level: int) -> FloatArray:
+    def background(self, level: int) -> Float[Array, "backgrounds pixels"]:
         """Return expected electrons of images of each background without a head.
 
         Parameters
@@ -207,7 +207,7 @@ class HeadCamera:
         electrons = self._electrons(knots, uniform, self._around(settings))[0]
         return np.asarray((electrons + self.pixel.dark_e_per_s) * settings.exposure_s, dtype=float)
 
-    def lamps(self, distance: int, spectra: FloatArray) -> FloatArray:
+    def lamps(self, distance: int, spectra: Float[Array, "lamps wavelengths"]) -> Float[Array, "places lamps pixels"]:
         """Return electrons of other lamps, as wide as a lens, for one candela and second at each position.
 
         Parameters
@@ -227,7 +227,7 @@ class HeadCamera:
         per_cd = self._per_candela(setup) / luminance_per_photon_radiance(setup.camera.grid, spectra)
         return np.maximum(self._electrons(knots, discs, spectra * per_cd[:, None]), 0.0)
 
-    def _phantoms(self, maps: HeadMaps, setup: Setup, level: LightLevel) -> FloatArray:
+    def _phantoms(self, maps: HeadMaps, setup: Setup, level: LightLevel) -> Float[Array, "places lenses lenses pixels"]:
         """Return electrons/s of sun on each lens, reflected with its color."""
         spectra = np.stack([phantom(setup.camera.grid, kind) for kind in self.vision.lenses])
         per_cd = self._per_candela(setup) / luminance_per_photon_radiance(setup.camera.grid, spectra)
@@ -239,19 +239,26 @@ class HeadCamera:
         assert luminance is not None
         return luminance * irradiance_factor(self.vision.optics)
 
-    def _lamp_rates(self, distance: int, maps: HeadMaps, setup: Setup) -> FloatArray:
+    def _lamp_rates(self, distance: int, maps: HeadMaps, setup: Setup) -> Float[Array, "places lenses lamps pixels"]:
         """Return electrons/s of each lamp of one candela at each position; equal at all levels."""
         if distance not in self._lamps:
             self._lamps[distance] = self._of_lenses(maps, signal_irradiance(setup))
         return self._lamps[distance]
 
-    def _of_lenses(self, maps: HeadMaps, spectra: FloatArray) -> FloatArray:
+    def _of_lenses(
+        self, maps: HeadMaps, spectra: Float[Array, "spectra wavelengths"]
+    ) -> Float[Array, "wavelengths _ spectra _"]:
         """Return spectra on each lens, ndarray of shape (n_places, n_lenses, n_spectra, n_pixels)."""
         places, positions = maps.lenses.shape[:2]
         lens_electrons = self._electrons(maps.knots_nm, maps.lenses.reshape(-1, *maps.lenses.shape[2:]), spectra)
         return np.maximum(lens_electrons.reshape(places, positions, *lens_electrons.shape[1:]), 0.0)
 
-    def _electrons(self, knots_nm: FloatArray, light: FloatArray, spectra: FloatArray) -> FloatArray:
+    def _electrons(
+        self,
+        knots_nm: PerKnot,
+        light: Float[Array, "cases pixels _signals wavelengths"],
+        spectra: Float[Array, "spectra wavelengths"],
+    ) -> Float[Array, "cases spectra _"]:
         """Return electrons/s of images with spectra, through each pixel's filter, with crosstalk.
 
         `light` has shape (n, side, side, n_knots), the result (n, n_spectra, n_pixels).
@@ -280,7 +287,7 @@ class HeadCamera:
         """
         return int(self.setup.camera.mosaic.indices.size * self.vision.places_per_pixel**2)
 
-    def expected(self, scenes: Scenes) -> FloatArray:
+    def expected(self, scenes: Scenes) -> Float[Array, "images pixels"]:
         """Return expected electrons of scenes.
 
         Parameters
@@ -324,7 +331,7 @@ class HeadCamera:
         numbers = self.drawn(self.expected(scenes), scenes.key)
         return numbers.reshape(len(scenes), self.vision.crop_px, self.vision.crop_px)
 
-    def drawn(self, electrons: FloatArray, keys: IndexArray) -> Numbers:
+    def drawn(self, electrons: Float[Array, "images pixels"], keys: ImageNumbers) -> Numbers:
         """Return digital numbers with the photons of each image's key.
 
         Parameters

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.types import FloatArray
+from ..base.types import Array, Float
 from ..spectra.color import XYZ_TO_RGB, color_matching, srgb_gamma
 from ..spectra.spectrum import WavelengthGrid, energy_from_photons
 from .materials import ambient_light, chart_reflectances
@@ -20,10 +20,10 @@ _DISPLAY: Illuminant = "daylight"
 class Isp(NamedTuple):
     """White balance and color matrix: the channels of white, as shares of the largest, and the matrix after balance."""
 
-    white: FloatArray
-    matrix: FloatArray
+    white: Float[Array, " channels"]
+    matrix: Float[Array, "3 channels"]
 
-    def developed(self, share: FloatArray) -> NDArray[np.uint8]:
+    def developed(self, share: Float[Array, "... channels"]) -> NDArray[np.uint8]:
         """Return pictures of demosaicked images: channels are balanced and cut at white, so that what clips is white.
 
         Parameters
@@ -40,7 +40,7 @@ class Isp(NamedTuple):
         return np.asarray(np.rint(255 * srgb_gamma(np.clip(balanced @ self.matrix.T, 0.0, 1.0))), dtype=np.uint8)
 
 
-def isp_of(grid: WavelengthGrid, qe: FloatArray, light: Illuminant) -> Isp:
+def isp_of(grid: WavelengthGrid, qe: Float[Array, "channels wavelengths"], light: Illuminant) -> Isp:
     """Return a camera's ISP under a light: a color matrix by least squares over the ColorChecker, white to white.
 
     The target of a patch is its linear sRGB under D65. White is the light on a surface of reflectance 1; its brightest

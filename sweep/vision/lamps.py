@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.errors import SweepError, ValidationIssue
-from ..base.types import FloatArray, IndexArray
+from ..base.types import IndexArray, Int, PerWavelength
 from ..spectra.lights import Lights
 from .section import Vision
 
@@ -27,7 +27,7 @@ class Lamps:
         Signals, one array per lens.
     """
 
-    of_lens: tuple[IndexArray, ...]
+    of_lens: tuple[Int[IndexArray, " _lamps"], ...]
 
     def digests(self, lights: Lights) -> set[str]:
         """Return the digests of the spectra.
@@ -45,7 +45,7 @@ class Lamps:
         return {spectrum_digest(lights.photons[i]) for lamps in self.of_lens for i in lamps}
 
 
-def spectrum_digest(spectrum: FloatArray) -> str:
+def spectrum_digest(spectrum: PerWavelength) -> str:
     """Return the SHA-256 of a spectrum.
 
     Parameters

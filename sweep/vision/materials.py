@@ -11,7 +11,7 @@ from functools import cache
 
 import numpy as np
 
-from ..base.types import FloatArray
+from ..base.types import Array, Float, PerWavelength
 from ..spectra.builtin.task_sets import spectra_of_group
 from ..spectra.spectrum import WavelengthGrid
 from .section import Illuminant, Material
@@ -39,7 +39,7 @@ _LENS_WIDTH_NM = 6.0
 
 
 @cache
-def ambient_light(grid: WavelengthGrid, name: Illuminant) -> FloatArray:
+def ambient_light(grid: WavelengthGrid, name: Illuminant) -> PerWavelength:
     """Return the photons of an illuminant, normalized to an integral of 1.
 
     Parameters
@@ -62,7 +62,7 @@ def ambient_light(grid: WavelengthGrid, name: Illuminant) -> FloatArray:
 
 
 @cache
-def reflectance(grid: WavelengthGrid, name: Material) -> FloatArray:
+def reflectance(grid: WavelengthGrid, name: Material) -> PerWavelength:
     """Return the reflectance of a surface; constant beyond its range, 0 for those of a group.
 
     Parameters
@@ -86,7 +86,7 @@ def reflectance(grid: WavelengthGrid, name: Material) -> FloatArray:
 
 
 @cache
-def chart_reflectances(grid: WavelengthGrid) -> FloatArray:
+def chart_reflectances(grid: WavelengthGrid) -> Float[Array, "24 wavelengths"]:
     """Return the reflectances of the 24 patches of the ColorChecker; constant beyond their range.
 
     Parameters
@@ -105,7 +105,7 @@ def chart_reflectances(grid: WavelengthGrid) -> FloatArray:
     return np.stack([np.interp(grid.nodes_nm, patch.wavelengths, patch.values) for patch in held])
 
 
-def phantom(grid: WavelengthGrid, kind: str) -> FloatArray:
+def phantom(grid: WavelengthGrid, kind: str) -> PerWavelength:
     """Return the photons of daylight reflected by a colored lens, normalized to an integral of 1.
 
     The lens is modeled, not measured: a band with logistic edges, passed twice. A lens of another signal type than

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, Float, IndexArray, Int
 
 # Before JAX is loaded: workers have one thread each, and sums have one order; workers share a GPU's memory.
 os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1")
@@ -120,7 +120,7 @@ class Network:
     weights: _Weights
     n_states: int
 
-    def logits(self, planes: NDArray[np.float32], known: NDArray[np.float32]) -> FloatArray:
+    def logits(self, planes: NDArray[np.float32], known: NDArray[np.float32]) -> Float[Array, "images states"]:
         """Return the logarithm of the probability of each state, but for a constant of each image.
 
         Parameters
@@ -142,7 +142,13 @@ class Network:
         return np.concatenate([np.asarray(part, dtype=float) for part in parts])[:, : self.n_states]
 
 
-def train(inputs: Inputs, targets: IndexArray, sizes: tuple[int, ...], epochs: int, seed: tuple[int, ...]) -> Network:
+def train(
+    inputs: Inputs,
+    targets: Int[IndexArray, "images targets"],
+    sizes: tuple[int, ...],
+    epochs: int,
+    seed: tuple[int, ...],
+) -> Network:
     """Train a network by AdamW, with a rate that falls along a cosine.
 
     Parameters

@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ..base.types import BoolArray, FloatArray, IndexArray
+from ..base.types import Array, Bool, BoolArray, Float, ImageNumbers, IndexArray, Int
 from ..camera.mosaic import Mosaic
 from ..camera.pixel import Pixel
 from .batches import Batch
@@ -47,11 +47,11 @@ class _Examples:
 
     planes: Float32
     mirrored: Float32
-    condition: IndexArray
-    fixed: IndexArray
-    targets: IndexArray
+    condition: Int[IndexArray, " examples"]
+    fixed: Int[IndexArray, " examples"]
+    targets: Int[IndexArray, "examples 4"]
 
-    def subset(self, which: IndexArray | BoolArray) -> _Examples:
+    def subset(self, which: Int[IndexArray, " which"] | Bool[BoolArray, " which"]) -> _Examples:
         parts = {field.name: getattr(self, field.name) for field in fields(self)}
         return _Examples(**{name: part[which] if len(part) else part for name, part in parts.items()})
 
@@ -90,7 +90,7 @@ class NetworkReader:
         self._rows, self._columns = (np.arange(at - size, at + size) for at, size in zip(middle, crop, strict=True))
         self._mirror = self._mirrored_columns(middle[1])
 
-    def _mirrored_columns(self, middle: int) -> IndexArray | None:
+    def _mirrored_columns(self, middle: int) -> Int[IndexArray, " planes"] | None:
         """Return the columns of the mirror image that has the same tile, about the image's middle; None without one."""
         tile = self.mosaic.indices
         for shift in range(tile.shape[1]):
@@ -134,7 +134,7 @@ class NetworkReader:
         ]
         return _Examples.joined(parts)
 
-    def _targets(self, labels: pd.DataFrame) -> IndexArray:
+    def _targets(self, labels: pd.DataFrame) -> Int[IndexArray, "images 4"]:
         lit = labels["lit"].astype("Int64").fillna(-1).to_numpy(dtype=np.intp) + 1
         order = _codes(map(tuple, labels["lenses"]), self._kinds)
         state = _codes(labels["state"], states_of(self.vision))
@@ -168,7 +168,7 @@ class NetworkReader:
         sizes = (1 + n_lenses, 1 + n_lenses, len(self._kinds), 2)
         return _Fitted(train((planes, known), targets, sizes, self.vision.epochs, seed), inputs, 1.0)
 
-    def read(self, images: Iterable[Batch]) -> FloatArray:
+    def read(self, images: Iterable[Batch]) -> Float[Array, "images states"]:
         """Return the probability of each state.
 
         Parameters
@@ -210,7 +210,9 @@ class _Inputs:
         return np.column_stack([condition, examples.fixed.astype(np.float32)])
 
 
-def _shrunk(sums: FloatArray, counts: FloatArray, by_distance: tuple[int, int]) -> FloatArray:
+def _shrunk(
+    sums: Float[Array, " conditions *batch"], counts: Float[Array, "conditions ..."], by_distance: tuple[int, int]
+) -> Float[Array, " conditions *batch"]:
     """Return the means of conditions, each shrunk to that of all distances."""
     all_sums, all_counts = (part.reshape(*by_distance, *part.shape[1:]) for part in (sums, counts))
     of_all = all_sums.sum(axis=1, keepdims=True) / np.maximum(all_counts.sum(axis=1, keepdims=True), 1)
@@ -238,17 +240,17 @@ class _Fitted(NamedTuple):
 
         return self._replace(temperature=math.exp(minimize_scalar(loss, bounds=(-2.0, 3.0), method="bounded").x))
 
-    def _logits(self, examples: _Examples) -> FloatArray:
+    def _logits(self, examples: _Examples) -> Float[Array, "examples states"]:
         return self.network.logits(self.inputs.of(examples.planes, examples), self.inputs.known(examples))
 
-    def probabilities(self, examples: _Examples) -> FloatArray:
+    def probabilities(self, examples: _Examples) -> Float[Array, "examples states"]:
         """Return the probability of each state, ndarray of shape (n, n_states)."""
         from scipy.special import softmax  # noqa: PLC0415  (slow to import)
 
         return np.asarray(softmax(self._logits(examples) / self.temperature, axis=1), dtype=float)
 
 
-def _codes(values: Iterable[object], known: Iterable[object]) -> IndexArray:
+def _codes(values: Iterable[object], known: Iterable[object]) -> ImageNumbers:
     """Return the index of each value in a list."""
     index: Mapping[object, int] = {value: at for at, value in enumerate(known)}
     return np.array([index[value] for value in values], dtype=np.intp)

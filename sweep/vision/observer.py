@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, Float, IndexArray, Int
 from ..camera.readings import ROOT_STEP
 from .compiled_images import cases_on_table, log_likelihoods
 from .images import HeadCamera, HeadElectrons, Numbers
@@ -34,9 +34,9 @@ class _Cases:
         Intensity, cd, and probability within the state.
     """
 
-    table: IndexArray
-    candelas: FloatArray
-    share: FloatArray
+    table: Int[IndexArray, "cases 5"]
+    candelas: Float[Array, " cases"]
+    share: Float[Array, " cases"]
 
 
 def _cases(camera: HeadCamera, lamps: Lamps, order: str, sunny: bool) -> _Cases:
@@ -55,7 +55,9 @@ def _cases(camera: HeadCamera, lamps: Lamps, order: str, sunny: bool) -> _Cases:
     return _Cases(np.ascontiguousarray(table), np.ascontiguousarray(whole[first, 2]), weight)
 
 
-def posteriors(camera: HeadCamera, scenes: Scenes, images: Numbers, lamps: Lamps, order: str) -> FloatArray:
+def posteriors(
+    camera: HeadCamera, scenes: Scenes, images: Numbers, lamps: Lamps, order: str
+) -> Float[Array, "images states"]:
     """Return the probability of each state given each image; all states are equally frequent.
 
     Parameters
@@ -87,7 +89,9 @@ def posteriors(camera: HeadCamera, scenes: Scenes, images: Numbers, lamps: Lamps
     return probabilities
 
 
-def _of_states(camera: HeadCamera, images: Numbers, heads: HeadElectrons, background: int, cases: _Cases) -> FloatArray:
+def _of_states(
+    camera: HeadCamera, images: Numbers, heads: HeadElectrons, background: int, cases: _Cases
+) -> Float[Array, "cases 4"]:
     """Return the probability of each state before a background, ndarray of shape (n_images, n_states)."""
     n_cases, unlit = len(cases.table), heads.unlit[:, background]
     telling = np.argsort(-_telling(heads, unlit), kind="stable")
@@ -106,6 +110,6 @@ def _of_states(camera: HeadCamera, images: Numbers, heads: HeadElectrons, backgr
     return np.asarray(probabilities / probabilities.sum(axis=1, keepdims=True), dtype=float)
 
 
-def _telling(heads: HeadElectrons, unlit: FloatArray) -> FloatArray:
+def _telling(heads: HeadElectrons, unlit: Float[Array, "designs channels"]) -> Float[Array, " channels"]:
     """Return the approximate information of each pixel: effect of a mean lamp over its noise."""
     return np.asarray(heads.lamps.mean(axis=(0, 1, 2)) / np.sqrt(unlit.mean(axis=0) + 1), dtype=float)

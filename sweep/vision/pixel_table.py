@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.types import FloatArray
+from ..base.types import Array, Float, PerValue
 from ..camera.captures import Capture
 from ..camera.merge import light_of, saturating_e
 from ..camera.noise import gaussian
@@ -45,13 +45,13 @@ class PixelTable:
         Value of each reading, DN; of a merged one those of the first capture.
     """
 
-    nodes_e: FloatArray
+    nodes_e: Float[Array, " nodes"]
     node_of_root: NDArray[np.int32]
     shares: NDArray[np.float32]
     below: NDArray[np.float32]
-    values_dn: FloatArray
+    values_dn: Float[Array, " readings"]
 
-    def at(self, electrons: FloatArray) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    def at(self, electrons: Float[Array, " ..."]) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
         """Return the node below each expected number of electrons, and the share of the next one.
 
         Parameters
@@ -119,7 +119,9 @@ def _merged(pixel: Pixel) -> Pixel:
     return pixel if pixel.captures else pixel.model_copy(update=changes)
 
 
-def _with_prnu(shares: FloatArray, electrons: FloatArray, prnu: float) -> FloatArray:
+def _with_prnu(
+    shares: Float[Array, "functions wavelengths"], electrons: PerValue, prnu: float
+) -> Float[Array, "functions wavelengths"]:
     """Return the mean over Gaussian gains of the pixels, by the trapezoidal rule between the nodes."""
     if not prnu:
         return shares

@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import convolve1d
 
-from ..base.types import FloatArray
+from ..base.types import Array, Float
 from ..camera.mosaic import Mosaic
 from ..camera.pixel import Pixel
 
 _LEAST_PRNU = 1e-6
 
 
-def in_noise(raw: NDArray[np.generic], pixel: Pixel) -> FloatArray:
+def in_noise(raw: NDArray[np.generic], pixel: Pixel) -> Float[Array, "images rows columns"]:
     """Return raw values on a scale on which their noise is 1.
 
     With e electrons above the pedestal, (1/p) ln(1 + 2 p (sqrt(s^2 + e + p^2 e^2) + p e)) has a slope of 1 over the
@@ -38,7 +38,9 @@ def in_noise(raw: NDArray[np.generic], pixel: Pixel) -> FloatArray:
     return np.asarray(np.log1p(2 * prnu * (root + prnu * electrons)) / prnu, dtype=float)
 
 
-def tile_planes(images: FloatArray, mosaic: Mosaic) -> FloatArray:
+def tile_planes(
+    images: Float[Array, "images rows columns"], mosaic: Mosaic
+) -> Float[Array, "images _rows _columns positions"]:
     """Return each position of the tile as a plane.
 
     Parameters
@@ -59,7 +61,9 @@ def tile_planes(images: FloatArray, mosaic: Mosaic) -> FloatArray:
     return np.ascontiguousarray(np.moveaxis(parts, 2, 3).reshape(n, high // rows, wide // columns, rows * columns))
 
 
-def demosaicked(images: FloatArray, mosaic: Mosaic) -> FloatArray:
+def demosaicked(
+    images: Float[Array, "*batch rows columns"], mosaic: Mosaic
+) -> Float[Array, "... rows columns channels"]:
     """Return every channel at every pixel, for a tile of any size.
 
     Normalized convolution with a tent as wide as the tile, as in `camera.sampling.center_weights`.
@@ -90,7 +94,7 @@ def demosaicked(images: FloatArray, mosaic: Mosaic) -> FloatArray:
     return channels
 
 
-def _convolved(images: FloatArray, tents: list[FloatArray]) -> FloatArray:
+def _convolved(images: Float[Array, "... rows columns"], tents: list[Float[Array, " _taps"]]) -> Float[Array, " ..."]:
     """Convolve with the product of a tent along the rows' axis and one along the columns'."""
     result = images
     for axis, tent in zip((-2, -1), tents, strict=True):

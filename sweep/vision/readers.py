@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, ChannelCurves, Float, FloatArray, IndexArray, Int
 from ..camera.setup import Setup
 from .batches import batches, images_of_split, scene_key, scenes_of
 from .detections import precisions
@@ -36,7 +36,7 @@ class Answers:
     """Probability of each state from readers of the same images, ndarray of shape (n, n_states) each, by reader."""
 
     scenes: Scenes
-    probabilities: dict[str, FloatArray]
+    probabilities: dict[str, Float[Array, "images states"]]
 
 
 @dataclass(frozen=True)
@@ -50,12 +50,12 @@ class SeedReading:
 
     unseen: dict[str, Answers]
     seen: dict[str, Answers]
-    precision: FloatArray
-    lit: IndexArray
+    precision: Float[Array, "streets lenses"]
+    lit: Int[IndexArray, "streets lenses"]
     streets: NDArray[np.uint8]
 
 
-def read_images(setup: Setup, curves: FloatArray, vision: Vision, seed: tuple[int, int]) -> SeedReading:
+def read_images(setup: Setup, curves: ChannelCurves, vision: Vision, seed: tuple[int, int]) -> SeedReading:
     """Read the images of one design and one seed.
 
     Parameters
@@ -97,7 +97,7 @@ def read_images(setup: Setup, curves: FloatArray, vision: Vision, seed: tuple[in
 
 def _streets(
     camera: HeadCamera, lamps: dict[str, Lamps], seed: tuple[int, int]
-) -> tuple[FloatArray, IndexArray, NDArray[np.uint8]]:
+) -> tuple[Float[Array, "images lenses"], Int[IndexArray, "images lenses"], NDArray[np.uint8]]:
     """Return the precision of the simplest detector, the number of lit lenses, and pictures."""
     vision, design = camera.vision, camera.setup.camera
     if vision.street is None:
@@ -115,7 +115,7 @@ def _streets(
     return precision.reshape(shape), lit.reshape(shape), pictures
 
 
-def observer_error(setup: Setup, curves: FloatArray, vision: Vision, seed: tuple[int, int]) -> float:
+def observer_error(setup: Setup, curves: ChannelCurves, vision: Vision, seed: tuple[int, int]) -> float:
     """Return the expected error of the ideal observer on one seed's test images, with the lenses in any order.
 
     The mean of one less the probability of the most probable state, with less scatter than a count.

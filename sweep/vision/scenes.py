@@ -9,7 +9,7 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, Float, ImageNumbers, IndexArray, Int
 from .lamps import Lamps
 from .section import Vision
 
@@ -25,7 +25,7 @@ NETWORK = "network"
 
 
 @cache
-def orders_of_lenses(n_lenses: int) -> IndexArray:
+def orders_of_lenses(n_lenses: int) -> Int[IndexArray, "orders lenses"]:
     """Return the signal type of the lens at each position from the top; the street's order is first.
 
     Parameters
@@ -66,21 +66,21 @@ class Scenes:
     the head stands, as a share of all places; `key`: from which the photons are drawn.
     """
 
-    state: IndexArray
-    lamp: IndexArray
-    intensity: IndexArray
-    background: IndexArray
-    distance: IndexArray
-    level: IndexArray
-    order: IndexArray
-    phantom: IndexArray
-    place: FloatArray
-    key: IndexArray
+    state: ImageNumbers
+    lamp: ImageNumbers
+    intensity: ImageNumbers
+    background: ImageNumbers
+    distance: ImageNumbers
+    level: ImageNumbers
+    order: ImageNumbers
+    phantom: ImageNumbers
+    place: Float[Array, " images"]
+    key: ImageNumbers
 
     def __len__(self) -> int:
         return len(self.state)
 
-    def subset(self, which: IndexArray | NDArray[np.bool_] | slice) -> Scenes:
+    def subset(self, which: Int[IndexArray, " which"] | NDArray[np.bool_] | slice) -> Scenes:
         """Return some of the scenes.
 
         Parameters
@@ -141,7 +141,7 @@ def draw_scenes(vision: Vision, lamps: Lamps, order: str, count: int, key: tuple
     )
 
 
-def uniforms(keys: IndexArray, n_pixels: int) -> FloatArray:
+def uniforms(keys: ImageNumbers, n_pixels: int) -> Float[Array, "images pixels"]:
     """Return a random number from 0 to 1 for each pixel of each scene, equal for all CFAs.
 
     Each scene has its own counter-based generator (Philox), so that earlier draws do not matter.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.types import BoolArray, FloatArray, IndexArray
+from ..base.types import Array, Bool, BoolArray, Float, ImageNumbers, IndexArray, Int, PerValue
 
 _CONFIDENCE = 0.95
 
@@ -56,7 +56,7 @@ class Interval:
         return Interval(self.value, low, high)
 
 
-def interval_of_seeds(value: float, by_seed: FloatArray) -> Interval:
+def interval_of_seeds(value: float, by_seed: Float[Array, " seeds"]) -> Interval:
     """Return a value with Student's t interval from its values in each seed.
 
     Seeds are independent: each has scenes, and networks, of its own.
@@ -82,7 +82,7 @@ def interval_of_seeds(value: float, by_seed: FloatArray) -> Interval:
     return Interval(value, float(value - reach), float(value + reach))
 
 
-def mean_of(values: FloatArray | BoolArray, seeds: IndexArray) -> Interval:
+def mean_of(values: PerValue | Bool[BoolArray, " values"], seeds: Int[IndexArray, " values"]) -> Interval:
     """Return the mean of one value per scene.
 
     Parameters
@@ -102,7 +102,7 @@ def mean_of(values: FloatArray | BoolArray, seeds: IndexArray) -> Interval:
     return interval_of_seeds(float(numbers.mean()), by_seed)
 
 
-def confusion_matrix(truth: IndexArray, answered: IndexArray, n_states: int) -> IndexArray:
+def confusion_matrix(truth: ImageNumbers, answered: ImageNumbers, n_states: int) -> Int[IndexArray, "states states"]:
     """Return the number of answers by true state (row) and answer (column).
 
     Parameters
@@ -122,7 +122,7 @@ def confusion_matrix(truth: IndexArray, answered: IndexArray, n_states: int) -> 
     return counts
 
 
-def macro_f1(matrix: IndexArray) -> float:
+def macro_f1(matrix: Int[IndexArray, "states states"]) -> float:
     """Return the mean over the states of the harmonic mean of precision and recall; 0 for a state that is never right.
 
     Parameters
@@ -140,7 +140,9 @@ def macro_f1(matrix: IndexArray) -> float:
     return float(np.mean(np.divide(2 * right, total, out=np.zeros_like(right), where=total > 0)))
 
 
-def costs(wrong: BoolArray, probability: FloatArray, unknown_cost: float) -> tuple[FloatArray, BoolArray]:
+def costs(
+    wrong: Bool[BoolArray, " images"], probability: Float[Array, " images"], unknown_cost: float
+) -> tuple[Float[Array, " images"], Bool[BoolArray, " images"]]:
     """Return the cost of each answer; a reader answers "unknown" if that is expected to cost less than 1 for an error.
 
     Parameters

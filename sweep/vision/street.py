@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import Array, Float, IndexArray, Int
 from ..camera.mosaic import Mosaic
 from ..spectra.builtin.task_sets import spectra_of_group
 from .batches import Batch, Form, image_id, in_form
@@ -42,18 +42,18 @@ class StreetScenes:
     photons are drawn.
     """
 
-    level: IndexArray
-    background: IndexArray
-    phantom: IndexArray
-    key: IndexArray
-    cell: IndexArray
-    place: FloatArray
-    aside: FloatArray
-    below: FloatArray
-    distance: IndexArray
-    state: IndexArray
-    lamp: FloatArray
-    candelas: FloatArray
+    level: Int[IndexArray, " streets"]
+    background: Int[IndexArray, " streets"]
+    phantom: Int[IndexArray, " streets"]
+    key: Int[IndexArray, " streets"]
+    cell: Int[IndexArray, "streets heads"]
+    place: Float[Array, "streets heads"]
+    aside: Float[Array, "streets heads"]
+    below: Float[Array, "streets heads"]
+    distance: Int[IndexArray, "streets heads"]
+    state: Int[IndexArray, "streets heads"]
+    lamp: Float[Array, "streets heads"]
+    candelas: Float[Array, "streets heads"]
 
     def __len__(self) -> int:
         return len(self.level)
@@ -128,7 +128,7 @@ def draw_streets(vision: Vision, street: Street, split: str, seed: tuple[int, in
     )
 
 
-def kinds_of(street: Street) -> IndexArray:
+def kinds_of(street: Street) -> Int[IndexArray, " lamps"]:
     """Return the kind of each head and lamp: 0 for heads, 1 for brake lamps, 2 for street lamps.
 
     Parameters
@@ -206,7 +206,7 @@ class StreetCamera:
         self._rates = cache(lambda distance, kind: camera.lamps(distance, spectra[kind]))
         self._backgrounds = cache(camera.background)
 
-    def expected(self, scenes: StreetScenes, lamps: Lamps) -> FloatArray:
+    def expected(self, scenes: StreetScenes, lamps: Lamps) -> Float[Array, "images rows columns"]:
         """Return expected electrons.
 
         Parameters
@@ -237,7 +237,9 @@ class StreetCamera:
             images[i] = self._with_glare(np.maximum(images[i], dark_e) - dark_e) + dark_e
         return images
 
-    def _one(self, scenes: StreetScenes, lamps: Lamps, which: tuple[int, int, int], around: FloatArray) -> FloatArray:
+    def _one(
+        self, scenes: StreetScenes, lamps: Lamps, which: tuple[int, int, int], around: Float[Array, " pixels"]
+    ) -> Float[Array, " pixels"]:
         """Return electrons that one head or lamp (image, number, kind) adds to the background."""
         i, j, kind = which
         camera, level, distance = self.camera, int(scenes.level[i]), int(scenes.distance[i, j])
@@ -254,7 +256,7 @@ class StreetCamera:
         head = electrons.of(np.array([place]), behind, np.zeros(1, dtype=np.intp), phantom, lit)[0]
         return np.asarray(head - around, dtype=float)
 
-    def _with_glare(self, image: FloatArray) -> FloatArray:
+    def _with_glare(self, image: Float[Array, "rows columns"]) -> Float[Array, "rows columns"]:
         """Spread a share of the mean light of each position of the tile evenly."""
         share, (rows, columns) = self.street.veiling_glare, self._tile
         if not share:
@@ -294,7 +296,7 @@ class StreetCamera:
             yield Batch(images, labels.iloc[start : start + len(block)].reset_index(drop=True))
 
 
-def corners_px(vision: Vision, tile: tuple[int, ...], scenes: StreetScenes) -> IndexArray:
+def corners_px(vision: Vision, tile: tuple[int, ...], scenes: StreetScenes) -> Int[IndexArray, "images lamps 2"]:
     """Return the first row and column of each head's or lamp's image.
 
     Parameters

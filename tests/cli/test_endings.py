@@ -95,7 +95,7 @@ def _of_session(session: int) -> list[int]:
         (OSError(28, "No space left on device", "/x/y"), 2, "/x/y: No space left on device"),
         (RuntimeError("can't start new thread"), 2, "threads: can't start new thread"),
         (ImportError("libx.so: failed to map segment"), 2, "libx.so: failed to map segment"),
-        (UnicodeEncodeError("utf-8", "a\udcff", 1, 2, "surrogates not allowed"), 2, "no UTF-8"),
+        (UnicodeEncodeError("utf-8", "a\udcff", 1, 2, "surrogates not allowed"), 2, "file name is not UTF-8"),
         (KeyboardInterrupt(), 130, "interrupted"),
         (typer.Abort(), 130, "interrupted"),
         (InfeasibleError("out of\nreach"), 3, "out of reach"),

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ...base.types import FloatArray
+from ...base.types import Array, Float, PerValue, SameShape
 
 TAILS = 9.0
 """Beyond so many standard deviations everything is taken to be at the end."""
@@ -17,7 +17,7 @@ _TERMS = 6
 _EULER_DN = 4.0
 
 
-def density(z: FloatArray) -> FloatArray:
+def density(z: SameShape) -> SameShape:
     """Return the density of the standard normal distribution.
 
     Parameters
@@ -33,7 +33,7 @@ def density(z: FloatArray) -> FloatArray:
     return np.asarray(np.exp(-0.5 * z**2) / math.sqrt(2 * math.pi), dtype=float)
 
 
-def share_below(z: FloatArray) -> FloatArray:
+def share_below(z: Float[Array, " *batch"] | float) -> Float[Array, " ..."]:
     """Return the standard normal distribution function.
 
     Parameters
@@ -51,7 +51,7 @@ def share_below(z: FloatArray) -> FloatArray:
     return np.asarray(ndtr(z), dtype=float)
 
 
-def ramp(z: FloatArray) -> FloatArray:
+def ramp(z: SameShape) -> SameShape:
     """Return the mean of max(0, z + Z) for a standard normal Z.
 
     Parameters
@@ -67,7 +67,7 @@ def ramp(z: FloatArray) -> FloatArray:
     return np.asarray(z * share_below(z) + density(z), dtype=float)
 
 
-def clipped_gaussian(mean: FloatArray, sigma: float, low: float, high: float) -> tuple[FloatArray, FloatArray]:
+def clipped_gaussian(mean: PerValue, sigma: float, low: float, high: float) -> tuple[PerValue, PerValue]:
     """Return mean and variance of a clipped Gaussian.
 
     Parameters
@@ -96,7 +96,7 @@ def clipped_gaussian(mean: FloatArray, sigma: float, low: float, high: float) ->
     return held, np.where(outside, 0.0, sigma**2 * np.maximum(square - shift**2, 0.0))
 
 
-def clipped_and_rounded(mean: FloatArray, sigma: float, top: float) -> tuple[FloatArray, FloatArray]:
+def clipped_and_rounded(mean: PerValue, sigma: float, top: float) -> tuple[PerValue, PerValue]:
     """Return mean and variance of round(clip(x, 0, top)) for Gaussian x.
 
     The sum over the steps of the probability of passing each, or, where the noise spans many steps, the Euler-
@@ -139,7 +139,7 @@ def clipped_and_rounded(mean: FloatArray, sigma: float, top: float) -> tuple[Flo
     return held + first, np.maximum(variance + second - first**2, 0.0)
 
 
-def _by_series(rest: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _by_series(rest: PerValue, sigma: PerValue) -> tuple[PerValue, PerValue]:
     """Return mean of e = round(x) - x and variance of round(x), by the Fourier series of e in the mean of x.
 
     E[e] = sum over k of (-1)^k sin(2 pi k m) exp(-2 (pi k sigma)^2) / (pi k). Variance: sigma^2 + E[e^2] - E[e]^2 + 2
@@ -155,7 +155,7 @@ def _by_series(rest: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatAr
     return shift, sigma**2 * (1 + 2 * slope) + square - shift**2
 
 
-def _by_steps(rest: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _by_steps(rest: PerValue, sigma: PerValue) -> tuple[PerValue, PerValue]:
     """Return the same from the probabilities of passing each step, for little noise."""
     mean, square = np.zeros_like(rest), np.zeros_like(rest)
     least = np.maximum(sigma, 1e-12)
@@ -166,7 +166,7 @@ def _by_steps(rest: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArr
     return mean - rest, np.maximum(square - mean**2, 0.0)
 
 
-def rounding(mean_dn: FloatArray, sigma_dn: FloatArray) -> tuple[FloatArray, FloatArray]:
+def rounding(mean_dn: PerValue, sigma_dn: PerValue) -> tuple[PerValue, PerValue]:
     """Return mean of round(x) - x and variance of round(x) for Gaussian x far from both ends of the ADC.
 
     Parameters

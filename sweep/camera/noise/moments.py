@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...base.types import BoolArray, FloatArray
+from ...base.types import Array, Bool, BoolArray, Float, PerValue
 from ..pixel import Pixel
 from . import gaussian
 
@@ -35,7 +35,7 @@ _PER_DEVIATION = 1.3
 _FAR_ROOT = 16.0
 
 
-def linear_moments(electrons: FloatArray, pixel: Pixel) -> FloatArray:
+def linear_moments(electrons: PerValue, pixel: Pixel) -> Float[Array, "3 values"]:
     """Return the moments of a linear readout whose Gaussian noise dithers the steps.
 
     Parameters
@@ -56,7 +56,7 @@ def linear_moments(electrons: FloatArray, pixel: Pixel) -> FloatArray:
     return np.stack([mean, mean + shift, variance])
 
 
-def of_count(electrons: FloatArray, pixel: Pixel) -> FloatArray:
+def of_count(electrons: PerValue, pixel: Pixel) -> Float[Array, "3 values"]:
     """Return the moments for a given number of electrons, without photon noise.
 
     Parameters
@@ -125,7 +125,7 @@ def _least_exceeding(electrons: float) -> float:
     return ((_REACH + math.sqrt(_REACH**2 + 4 * max(electrons, 0.0))) / 2) ** 2
 
 
-def _felt(electrons: FloatArray, pixel: Pixel) -> BoolArray:
+def _felt(electrons: PerValue, pixel: Pixel) -> Bool[BoolArray, " values"]:
     """Return where counts of Poisson electrons reach an end or show steps of rounding."""
     ends = LinearRange.of(pixel)
     sigma = _REACH * np.sqrt(electrons)
@@ -151,7 +151,7 @@ def without_prnu(pixel: Pixel) -> Pixel:
     return pixel.model_copy(update={"prnu": 0.0})
 
 
-def counted(electrons: FloatArray, pixel: Pixel) -> FloatArray:
+def counted(electrons: PerValue, pixel: Pixel) -> Float[Array, "3 values"]:
     """Return the moments of pixels without PRNU.
 
     Parameters
@@ -174,7 +174,7 @@ def counted(electrons: FloatArray, pixel: Pixel) -> FloatArray:
     return result
 
 
-def runs(electrons: FloatArray, pixel: Pixel) -> Iterator[tuple[slice, int, FloatArray]]:
+def runs(electrons: PerValue, pixel: Pixel) -> Iterator[tuple[slice, int, Float[Array, "3 _values"]]]:
     """Yield runs of expected electrons whose counts are summed.
 
     Parameters
@@ -196,7 +196,7 @@ def runs(electrons: FloatArray, pixel: Pixel) -> Iterator[tuple[slice, int, Floa
         yield slice(left, right), first, of_count(np.arange(first, last + 1, dtype=float), pixel)
 
 
-def counts_of(electrons: FloatArray, pixel: Pixel) -> tuple[int, int]:
+def counts_of(electrons: PerValue, pixel: Pixel) -> tuple[int, int]:
     """Return the first and last count of expected numbers of electrons; the full well holds no more.
 
     Parameters
@@ -218,7 +218,7 @@ def counts_of(electrons: FloatArray, pixel: Pixel) -> tuple[int, int]:
     return min(first, full), max(min(most, full), min(first, full))
 
 
-def table_nodes(pixel: Pixel) -> FloatArray:
+def table_nodes(pixel: Pixel) -> Float[Array, " nodes"]:
     """Return the roots of the electrons at which a table without PRNU is computed.
 
     Parameters
@@ -265,7 +265,7 @@ def table_without_prnu(pixel: Pixel) -> CubicSpline:
     return CubicSpline(roots, counted(roots**2, pixel), axis=1)
 
 
-def with_prnu(electrons: FloatArray, pixel: Pixel) -> FloatArray:
+def with_prnu(electrons: PerValue, pixel: Pixel) -> Float[Array, "3 values"]:
     """Return the moments by the trapezoidal rule over Gaussian gains of the pixels.
 
     The integrand is a Gaussian times a function that is smooth over a deviation 2 / (prnu root of the electrons), so
@@ -298,7 +298,7 @@ def with_prnu(electrons: FloatArray, pixel: Pixel) -> FloatArray:
     return result
 
 
-def moments(electrons: FloatArray, pixel: Pixel) -> FloatArray:
+def moments(electrons: PerValue, pixel: Pixel) -> Float[Array, "3 values"]:
     """Return the moments of the digital number, by exact sums.
 
     Parameters

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...base.types import FloatArray
+from ...base.types import Array, Float, PerCapture, PerValue, SameShape
 from ..pixel import Pixel
 from . import gaussian
 from .moments import LinearRange, counts_of
@@ -66,9 +66,9 @@ class SubsetMoments:
         Conditional covariances, electrons squared.
     """
 
-    share: FloatArray
-    mean_e: FloatArray
-    covariance_e2: FloatArray
+    share: SameShape
+    mean_e: Float[Array, " captures *batch"]
+    covariance_e2: Float[Array, "captures captures *batch"]
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class SubsetTable:
     last_e: float
     n_captures: int
 
-    def at(self, electrons: FloatArray) -> dict[Subset, SubsetMoments]:
+    def at(self, electrons: PerCapture) -> dict[Subset, SubsetMoments]:
         """Look up expected electrons.
 
         Parameters
@@ -123,7 +123,7 @@ def _pairs(subset: Subset) -> list[tuple[int, int]]:
     return list(itertools.combinations_with_replacement(subset, 2))
 
 
-def share_beyond(counts: FloatArray, pixel: Pixel, limit_dn: int) -> FloatArray:
+def share_beyond(counts: PerValue, pixel: Pixel, limit_dn: int) -> PerValue:
     """Return the probability that a capture reads its limit or more, for given numbers of electrons.
 
     Parameters
@@ -145,9 +145,7 @@ def share_beyond(counts: FloatArray, pixel: Pixel, limit_dn: int) -> FloatArray:
     return gaussian.share_below(over / sigma) if sigma else (over >= 0).astype(float)
 
 
-def usable_of_count(
-    counts: FloatArray, pixel: Pixel, limit_dn: int | None
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def usable_of_count(counts: PerValue, pixel: Pixel, limit_dn: int | None) -> tuple[PerValue, PerValue, PerValue]:
     """Return the chance that a capture is usable, and its partial moments, for given numbers of electrons.
 
     Parameters
@@ -206,8 +204,8 @@ def subset_table(captures: tuple[Pixel, ...], limits_dn: tuple[int | None, ...])
 
 
 def _moments(
-    electrons: FloatArray, captures: Sequence[Pixel], limits_dn: Sequence[int | None]
-) -> dict[Subset, FloatArray]:
+    electrons: PerValue, captures: Sequence[Pixel], limits_dn: Sequence[int | None]
+) -> dict[Subset, Float[Array, "_moments _values"]]:
     """Return rows of `SubsetTable` at ascending expected electrons by summing over counts."""
     from .compiled import poisson_means  # noqa: PLC0415  (compiled: kept off the start-up path)
 
@@ -245,12 +243,12 @@ def _moments(
 
 
 def _product(
-    shares: dict[int, FloatArray],
+    shares: dict[int, Float[Array, " entries"]],
     of: Sequence[int],
-    rest: FloatArray,
-    means: dict[int, FloatArray],
-    squares: dict[int, FloatArray],
-) -> FloatArray:
+    rest: PerValue,
+    means: dict[int, Float[Array, " entries"]],
+    squares: dict[int, Float[Array, " entries"]],
+) -> PerValue:
     """Return the partial moment of captures for each count: the product over independent read noise."""
     value = rest
     for number, share in shares.items():

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...base.types import FloatArray, IndexArray
+from ...base.types import Array, Float, IndexArray, Int, SameShape
 from ..pixel import Pixel
 from . import moments
 
@@ -26,9 +26,9 @@ class MomentTable(NamedTuple):
     between them; `piece` is that at each multiple of `step` from 0 up. From `last_e` electrons on values are constant.
     """
 
-    nodes: FloatArray
-    coefficients: FloatArray
-    piece: IndexArray
+    nodes: Float[Array, " nodes"]
+    coefficients: Float[Array, "4 nodes-1 3"]
+    piece: Int[IndexArray, " pieces"]
     last_e: float
     step: float
 
@@ -39,7 +39,7 @@ class MomentTable(NamedTuple):
         piece = np.minimum(np.searchsorted(spline.x, multiples, side="right") - 1, spline.x.size - 2)
         return cls(spline.x, np.ascontiguousarray(spline.c.T), piece, last_e, step)
 
-    def look_up(self, electrons: FloatArray, row: int) -> FloatArray:
+    def look_up(self, electrons: SameShape, row: int) -> SameShape:
         """Return one of the values at some electrons."""
         from .compiled import cubic_of_electrons  # noqa: PLC0415  (compiled: kept off the start-up path)
 
@@ -50,7 +50,7 @@ class MomentTable(NamedTuple):
         return values
 
 
-def mean_unrounded(electrons: FloatArray, pixel: Pixel) -> FloatArray:
+def mean_unrounded(electrons: SameShape, pixel: Pixel) -> SameShape:
     """Return the mean before rounding.
 
     Parameters
@@ -68,7 +68,7 @@ def mean_unrounded(electrons: FloatArray, pixel: Pixel) -> FloatArray:
     return tables(pixel).look_up(electrons, moments.UNROUNDED)
 
 
-def mean_rounded(electrons: FloatArray, pixel: Pixel) -> FloatArray:
+def mean_rounded(electrons: SameShape, pixel: Pixel) -> SameShape:
     """Return the mean of the digital number.
 
     Parameters
@@ -86,7 +86,7 @@ def mean_rounded(electrons: FloatArray, pixel: Pixel) -> FloatArray:
     return tables(pixel).look_up(electrons, moments.ROUNDED)
 
 
-def variance(electrons: FloatArray, pixel: Pixel) -> FloatArray:
+def variance(electrons: SameShape, pixel: Pixel) -> SameShape:
     """Return the variance of the digital number.
 
     Parameters

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from ...base.types import FloatArray
+from ...base.types import Array, Float
 from ..pixel import Pixel
 
 _BELOW_ZERO = 1e-23
@@ -64,7 +64,7 @@ def mean_above(level_e: float, electrons: float, pixel: Pixel, read_noise_e: flo
     return float((np.exp(_exponents(level_e, electrons, pixel, read_noise_e) - 1) / _EXPONENTS).min())
 
 
-def _exponents(level_e: float, electrons: float, pixel: Pixel, read_noise_e: float) -> FloatArray:
+def _exponents(level_e: float, electrons: float, pixel: Pixel, read_noise_e: float) -> Float[Array, " exponents"]:
     """Return the exponent of the bound for every t of the grid."""
     more = electrons * np.expm1(_EXPONENTS)
     log_mean = np.logaddexp(more + (more * pixel.prnu) ** 2 / 2, math.log(_BELOW_ZERO))

@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from ...base.errors import SweepError, ValidationIssue
-from ...base.types import FloatArray, Section
+from ...base.types import (
+    ChannelCurves,
+    CurvesGradient,
+    DesignCurves,
+    DesignParameters,
+    PerParameter,
+    PerWavelength,
+    Section,
+)
 from ..bands import Banded
 
 
@@ -30,13 +38,15 @@ class Dual(Banded):
     needs_target = True
     Options = Section
 
-    def __init__(self, wavelength_nm: FloatArray, base: FloatArray, ceiling: FloatArray) -> None:
+    def __init__(self, wavelength_nm: PerWavelength, base: PerWavelength, ceiling: PerWavelength) -> None:
         super().__init__(wavelength_nm, 1)
         self._base = base
         self._room = np.minimum(base, np.maximum(ceiling - base, 0.0))
 
     @classmethod
-    def of_study(cls, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None, options: Section) -> Dual:
+    def of_study(
+        cls, wavelength_nm: PerWavelength, base: PerWavelength, target: PerWavelength | None, options: Section
+    ) -> Dual:
         """Make the family over curves of a study.
 
         Parameters
@@ -66,25 +76,25 @@ class Dual(Banded):
             raise SweepError(ValidationIssue("dual: `to` must exceed `base` somewhere"))
         return Dual(wavelength_nm, base, target)
 
-    def curves(self, x: FloatArray) -> FloatArray:
+    def curves(self, x: DesignParameters) -> DesignCurves:
         """Return the QE of both channels."""
         swing = self._room * self._bands.shape(x)
         return np.stack([self._base - swing, self._base + swing], axis=1)
 
-    def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
+    def upper(self, low: PerParameter, high: PerParameter) -> ChannelCurves:
         """Return the base, and the base plus the whole swing where the band can reach."""
         return np.stack([self._base, self._base + self._room * self._bands.reach(low, high)])
 
-    def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
+    def lower(self, low: PerParameter, high: PerParameter) -> ChannelCurves:
         """Return the base minus the whole swing where the band can reach, and the base."""
         return np.stack([self._base - self._room * self._bands.reach(low, high), self._base])
 
-    def hull(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def hull(self, low: PerParameter, high: PerParameter) -> tuple[ChannelCurves, ChannelCurves]:
         """Return the base with the least and the most swing."""
         least, most = (self._room * shape for shape in self._bands.range(low, high))
         return np.stack([self._base - most, self._base + least]), np.stack([self._base - least, self._base + most])
 
-    def gradient(self, x: FloatArray) -> FloatArray:
+    def gradient(self, x: PerParameter) -> CurvesGradient:
         """Return the derivative of `curves` at one design."""
         slope = self._room * self._bands.gradient(x)
         return np.stack([-slope, slope], axis=1)

@@ -8,7 +8,19 @@ import numpy as np
 from pydantic import model_validator
 
 from ...base.errors import SweepError, ValidationIssue
-from ...base.types import FloatArray, Positive, Section
+from ...base.types import (
+    Array,
+    ChannelCurves,
+    CurvesGradient,
+    DesignCurves,
+    DesignParameters,
+    Float,
+    ParameterWeights,
+    PerParameter,
+    PerWavelength,
+    Positive,
+    Section,
+)
 from ...spectra.spectrum import linear_basis
 from ..family import Parameter
 from ..products import row_products
@@ -69,7 +81,11 @@ class FreeForm:
         """Nodes of the transmission."""
 
     def __init__(
-        self, wavelength_nm: FloatArray, base: FloatArray, nodes_nm: FloatArray, off: ProductionError = AS_DESIGNED
+        self,
+        wavelength_nm: PerWavelength,
+        base: PerWavelength,
+        nodes_nm: Float[Array, " nodes"],
+        off: ProductionError = AS_DESIGNED,
     ) -> None:
         if nodes_nm.size < 2:
             raise SweepError(ValidationIssue("a free-form filter needs two nodes or more", value=nodes_nm.tolist()))
@@ -82,7 +98,7 @@ class FreeForm:
 
     @classmethod
     def of_study(
-        cls, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None, options: Section
+        cls, wavelength_nm: PerWavelength, base: PerWavelength, target: PerWavelength | None, options: Section
     ) -> FreeForm:
         """Make the family over curves of a study.
 
@@ -122,32 +138,32 @@ class FreeForm:
         """Transmission at each node."""
         return tuple(Parameter(f"transmission_{node:g}_nm", 0, 1, default=None) for node in self.nodes_nm)
 
-    def curves(self, x: FloatArray) -> FloatArray:
+    def curves(self, x: DesignParameters) -> DesignCurves:
         """Return the QE of the modified channel."""
         return np.asarray((self._fixed + row_products(x, self._linear_basis))[:, None, :], dtype=float)
 
-    def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
+    def upper(self, low: PerParameter, high: PerParameter) -> ChannelCurves:
         """Return the curve with every transmission at its largest."""
         assert low.shape == high.shape
         return np.asarray(self.curves(high[None])[0], dtype=float)
 
-    def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
+    def lower(self, low: PerParameter, high: PerParameter) -> ChannelCurves:
         """Return the curve with every transmission at its smallest."""
         assert low.shape == high.shape
         return np.asarray(self.curves(low[None])[0], dtype=float)
 
-    def hull(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def hull(self, low: PerParameter, high: PerParameter) -> tuple[ChannelCurves, ChannelCurves]:
         """Return the curves with every transmission at its smallest and largest."""
         lower, upper = self.curves(np.stack([low, high]))
         return lower, upper
 
-    def gradient(self, x: FloatArray) -> FloatArray:
+    def gradient(self, x: PerParameter) -> CurvesGradient:
         """Return the derivative of `curves`, which is constant."""
         assert x.shape == self.nodes_nm.shape
         return np.asarray(self._linear_basis[:, None, :], dtype=float)
 
     @property
-    def dimensions(self) -> Mapping[str, FloatArray]:
+    def dimensions(self) -> Mapping[str, ParameterWeights]:
         """None, since it has no bands."""
         return {}
 
@@ -167,22 +183,22 @@ class FreeForm:
         return FreeForm(*self._made_of, self.nodes_nm, off)
 
     @property
-    def moved(self) -> tuple[FloatArray, FloatArray]:
+    def moved(self) -> tuple[PerWavelength, PerWavelength]:
         """Zero, and the base, which the transmission multiplies; see `MovedFamily`."""
         base = self._made_of[1]
         return np.zeros_like(base), base
 
-    def start(self, points: FloatArray) -> FloatArray:
+    def start(self, points: Float[Array, "starts start_dimensions"]) -> Float[Array, "starts parameters"]:
         """Return smooth dips of different position, width and depth."""
         span = self.nodes_nm[-1] - self.nodes_nm[0]
         center = self.nodes_nm[0] + span * points[:, :1]
         breadth = span * (0.05 + 0.35 * points[:, 1:2])
         return np.asarray(1 - points[:, 2:] * np.exp(-0.5 * ((self.nodes_nm - center) / breadth) ** 2), dtype=float)
 
-    def violation(self, x: FloatArray) -> FloatArray:
+    def violation(self, x: DesignParameters) -> Float[Array, "designs _conditions"]:
         """Return zeros: every transmission from 0 to 1 is well formed."""
         return np.zeros((len(x), 1))
 
-    def violation_gradient(self, x: FloatArray) -> FloatArray:
+    def violation_gradient(self, x: PerParameter) -> ParameterWeights:
         """Return zeros."""
         return np.zeros((1, x.size))

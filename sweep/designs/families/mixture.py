@@ -11,7 +11,19 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field
 
-from ...base.types import FloatArray, IndexArray, Section
+from ...base.types import (
+    Array,
+    ChannelCurves,
+    CurvesGradient,
+    DesignCurves,
+    DesignNumbers,
+    DesignParameters,
+    Float,
+    ParameterWeights,
+    PerParameter,
+    PerWavelength,
+    Section,
+)
 from ...spectra.colorants import GAUSSIAN
 from ..family import Parameter
 from ..tolerance import ProductionError
@@ -45,13 +57,13 @@ class Absorbing(ABC):
     start_dimensions: int | None = None
     parameters: tuple[Parameter, ...]
 
-    def __init__(self, wavelength_nm: FloatArray, base: FloatArray) -> None:
+    def __init__(self, wavelength_nm: PerWavelength, base: PerWavelength) -> None:
         self._wavelength_nm, self._base = wavelength_nm, base
         # As production makes it: wavelengths, relative thickness of the film, and relative width of the bands.
         self._nominal_nm, self._film, self._width = wavelength_nm, 1.0, 1.0
 
     @abstractmethod
-    def absorbance(self, x: FloatArray) -> FloatArray:
+    def absorbance(self, x: DesignParameters) -> Float[Array, "designs wavelengths"]:
         """Return the absorbance.
 
         Parameters
@@ -66,7 +78,7 @@ class Absorbing(ABC):
         """
 
     @abstractmethod
-    def absorbance_gradient(self, x: FloatArray) -> FloatArray:
+    def absorbance_gradient(self, x: PerParameter) -> Float[Array, "parameters wavelengths"]:
         """Return the derivative of `absorbance` at one design.
 
         Parameters
@@ -80,30 +92,30 @@ class Absorbing(ABC):
             Absorbance per unit of parameter.
         """
 
-    def curves(self, x: FloatArray) -> FloatArray:
+    def curves(self, x: DesignParameters) -> DesignCurves:
         """Return the QE of the modified channel."""
         return np.asarray((self._base * np.power(10.0, -self._film * self.absorbance(x)))[:, None, :], dtype=float)
 
-    def gradient(self, x: FloatArray) -> FloatArray:
+    def gradient(self, x: PerParameter) -> CurvesGradient:
         """Return the derivative of `curves` at one design."""
         slope = -_LN10 * self._film * self.curves(x[None])[0] * self.absorbance_gradient(x)
         return np.asarray(slope[:, None, :], dtype=float)
 
-    def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
+    def upper(self, low: PerParameter, high: PerParameter) -> ChannelCurves:
         """Return the base behind the least absorbance of a box."""
         return self.hull(low, high)[1]
 
-    def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
+    def lower(self, low: PerParameter, high: PerParameter) -> ChannelCurves:
         """Return the base behind the largest absorbance of a box."""
         return self.hull(low, high)[0]
 
-    def hull(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def hull(self, low: PerParameter, high: PerParameter) -> tuple[ChannelCurves, ChannelCurves]:
         """Return the base behind the largest and the least absorbance of a box."""
         least, most = (self._film * end for end in self.absorbance_range(low, high))
         return (self._base * np.power(10.0, -most))[None], (self._base * np.power(10.0, -least))[None]
 
     @abstractmethod
-    def absorbance_range(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def absorbance_range(self, low: PerParameter, high: PerParameter) -> tuple[PerWavelength, PerWavelength]:
         """Return bounds on the absorbance in a box.
 
         Parameters
@@ -118,7 +130,7 @@ class Absorbing(ABC):
         """
 
     @property
-    def dimensions(self) -> Mapping[str, FloatArray]:
+    def dimensions(self) -> Mapping[str, ParameterWeights]:
         """None, since it has no edges."""
         return {}
 
@@ -130,19 +142,19 @@ class Absorbing(ABC):
         return made
 
     @property
-    def moved(self) -> tuple[FloatArray, FloatArray]:
+    def moved(self) -> tuple[PerWavelength, PerWavelength]:
         """Zero, and the base: the transmission moves with the bands; see `MovedFamily`."""
         return np.zeros_like(self._base), self._base
 
-    def start(self, points: FloatArray) -> FloatArray:
+    def start(self, points: Float[Array, "starts start_dimensions"]) -> Float[Array, "starts parameters"]:
         """Return the points: a search starts anywhere in the box."""
         return points
 
-    def violation(self, x: FloatArray) -> FloatArray:
+    def violation(self, x: DesignParameters) -> Float[Array, "designs _conditions"]:
         """Return zeros: every absorbance is well formed."""
         return np.zeros((len(x), 1))
 
-    def violation_gradient(self, x: FloatArray) -> FloatArray:
+    def violation_gradient(self, x: PerParameter) -> ParameterWeights:
         """Return zeros."""
         return np.zeros((1, x.size))
 
@@ -179,7 +191,7 @@ class AbsorptionBands(Absorbing):
         """`wavenumber`: absorption bands are Gaussian in it, as those of dyes; or `wavelength`."""
 
     def __init__(
-        self, wavelength_nm: FloatArray, base: FloatArray, bands: int, gaussian_in: GaussianIn = "wavenumber"
+        self, wavelength_nm: PerWavelength, base: PerWavelength, bands: int, gaussian_in: GaussianIn = "wavenumber"
     ) -> None:
         super().__init__(wavelength_nm, base)
         self._count, self._in_wavelength = bands, gaussian_in == "wavelength"
@@ -194,25 +206,29 @@ class AbsorptionBands(Absorbing):
 
     @classmethod
     def of_study(
-        cls, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None, options: Section
+        cls, wavelength_nm: PerWavelength, base: PerWavelength, target: PerWavelength | None, options: Section
     ) -> AbsorptionBands:
         """Make the family over curves of a study; see `Family.of_study`."""
         assert target is None
         assert isinstance(options, AbsorptionBands.Options)
         return AbsorptionBands(wavelength_nm, base, options.absorption_bands, options.gaussian_in)
 
-    def _offsets(self, peaks_nm: FloatArray, fwhm_nm: FloatArray) -> FloatArray:
+    def _offsets(
+        self, peaks_nm: Float[Array, " bands"], fwhm_nm: Float[Array, " bands"]
+    ) -> Float[Array, "bands wavelengths"]:
         """Return the distances from the peaks in widths; ndarray of shape (..., n_wavelengths)."""
         peak_nm, wave_nm = peaks_nm[..., None], self._nominal_nm
         away_nm = peak_nm - wave_nm if self._in_wavelength else (peak_nm / wave_nm - 1) * peak_nm
         return np.asarray(away_nm / fwhm_nm[..., None])
 
-    def _split(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _split(
+        self, x: Float[Array, "*batch parameters"]
+    ) -> tuple[Float[Array, "*batch _bands"], Float[Array, "*batch _bands"], Float[Array, "*batch _bands"]]:
         """Return peak, width and absorbance of each band, as production makes them."""
         bands = x[..., :-1].reshape(*x.shape[:-1], self._count, len(_BANDS))
         return bands[..., 0], bands[..., 1] * self._width, bands[..., 2] / self._width
 
-    def absorbance(self, x: FloatArray) -> FloatArray:
+    def absorbance(self, x: DesignParameters) -> Float[Array, "designs wavelengths"]:
         """Return the absorbance; see `Absorbing.absorbance`."""
         peaks_nm, fwhm_nm, absorbance = self._split(x)
         total = np.repeat(x[..., -1:], self._wavelength_nm.size, axis=-1)
@@ -221,7 +237,7 @@ class AbsorptionBands(Absorbing):
             total += absorbance[..., band, None] * np.exp(-GAUSSIAN * offsets**2)
         return total
 
-    def absorbance_gradient(self, x: FloatArray) -> FloatArray:
+    def absorbance_gradient(self, x: PerParameter) -> Float[Array, "parameters wavelengths"]:
         """Return the derivative of `absorbance`; see `Absorbing.absorbance_gradient`."""
         peaks_nm, fwhm_nm, absorbance = self._split(x)
         offsets = self._offsets(peaks_nm, fwhm_nm)
@@ -233,7 +249,7 @@ class AbsorptionBands(Absorbing):
         rows = np.stack([slope * by_peak, by_fwhm * self._width, shape / self._width], axis=1)
         return np.concatenate([rows.reshape(-1, shape.shape[1]), np.ones((1, shape.shape[1]))])
 
-    def absorbance_range(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def absorbance_range(self, low: PerParameter, high: PerParameter) -> tuple[PerWavelength, PerWavelength]:
         """Return every band where it is farthest and nearest; see `Absorbing.absorbance_range`."""
         wave_nm = self._nominal_nm
         (low_nm, narrowest_nm, least), (high_nm, widest_nm, most) = self._split(low), self._split(high)
@@ -284,11 +300,11 @@ class Mixture(Absorbing):
 
     def __init__(
         self,
-        wavelength_nm: FloatArray,
-        base: FloatArray,
-        spectra: FloatArray,
+        wavelength_nm: PerWavelength,
+        base: PerWavelength,
+        spectra: Float[Array, "spectra wavelengths"],
         at_most: int,
-        numbers: IndexArray | None = None,
+        numbers: DesignNumbers | None = None,
     ) -> None:
         super().__init__(wavelength_nm, base)
         self._spectra, self._slots = spectra, at_most
@@ -312,7 +328,7 @@ class Mixture(Absorbing):
         """Indices of number and absorbance of each colorant; see `ChoosingFamily`."""
         return tuple((at, at + 1) for at in range(0, 2 * self._slots, 2))
 
-    def only(self, numbers: IndexArray) -> Self:
+    def only(self, numbers: DesignNumbers) -> Self:
         """Return the family with some colorants of the catalog, under their numbers; see `ChoosingFamily`."""
         made = copy(self)
         made._spectra, made._numbers = self._spectra[np.searchsorted(self._numbers, numbers)], numbers
@@ -331,11 +347,11 @@ class Mixture(Absorbing):
         made._most = np.interp(nominal_nm, wave_nm, self._most) if width == 1 else np.ones(wave_nm.size) / width
         return made
 
-    def _chosen(self, x: FloatArray) -> FloatArray:
+    def _chosen(self, x: Float[Array, "*batch parameters"]) -> Float[Array, "*batch _slots wavelengths"]:
         """Return the spectra of each slot, ndarray of shape (..., at_most, n_wavelengths)."""
         return self._spectra[np.searchsorted(self._numbers, np.rint(x[..., : 2 * self._slots : 2]).astype(np.intp))]
 
-    def absorbance(self, x: FloatArray) -> FloatArray:
+    def absorbance(self, x: DesignParameters) -> Float[Array, "designs wavelengths"]:
         """Return the absorbance; see `Absorbing.absorbance`."""
         chosen, amounts = self._chosen(x), x[..., 1 : 2 * self._slots : 2]
         total = np.zeros((*x.shape[:-1], self._wavelength_nm.size))
@@ -343,14 +359,14 @@ class Mixture(Absorbing):
             total += amounts[..., slot, None] * chosen[..., slot, :]
         return np.asarray(x[..., -1:] / THICKNESS_UM * total, dtype=float)
 
-    def absorbance_gradient(self, x: FloatArray) -> FloatArray:
+    def absorbance_gradient(self, x: PerParameter) -> Float[Array, "parameters wavelengths"]:
         """Return the derivative of `absorbance`, 0 by a number; see `Absorbing.absorbance_gradient`."""
         rows = np.zeros((x.size, self._wavelength_nm.size))
         rows[1 : 2 * self._slots : 2] = self._chosen(x) * (x[-1] / THICKNESS_UM)
         rows[-1] = self.absorbance(x[None])[0] / x[-1]
         return rows
 
-    def absorbance_range(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def absorbance_range(self, low: PerParameter, high: PerParameter) -> tuple[PerWavelength, PerWavelength]:
         """Return the least and the largest of the colorants of each slot; see `Absorbing.absorbance_range`."""
         least, most = np.zeros((2, self._wavelength_nm.size))
         for number, amount in self.slots:
@@ -359,7 +375,7 @@ class Mixture(Absorbing):
             most = most + high[amount] * self._spectra[inside].max(axis=0)
         return low[-1] / THICKNESS_UM * least, high[-1] / THICKNESS_UM * most
 
-    def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
+    def lower(self, low: PerParameter, high: PerParameter) -> ChannelCurves:
         """Return the base behind the largest absorbance of the whole catalog, whatever is chosen of it."""
         assert low.shape == high.shape
         amount = float(sum(high[amount] for _, amount in self.slots))

@@ -5,7 +5,17 @@ from __future__ import annotations
 import numpy as np
 from pydantic import Field
 
-from ...base.types import FloatArray, Section
+from ...base.types import (
+    Array,
+    ChannelCurves,
+    CurvesGradient,
+    DesignCurves,
+    DesignParameters,
+    Float,
+    PerParameter,
+    PerWavelength,
+    Section,
+)
 from ..bands import Banded
 
 
@@ -38,14 +48,14 @@ class MultiStopband(Banded):
         bands: int = Field(ge=1, le=8)
         """Number of bands."""
 
-    def __init__(self, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray, bands: int) -> None:
+    def __init__(self, wavelength_nm: PerWavelength, base: PerWavelength, target: PerWavelength, bands: int) -> None:
         super().__init__(wavelength_nm, bands)
         self._base = base
         self._change = target - base
 
     @classmethod
     def of_study(
-        cls, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None, options: Section
+        cls, wavelength_nm: PerWavelength, base: PerWavelength, target: PerWavelength | None, options: Section
     ) -> MultiStopband:
         """Make the family over curves of a study.
 
@@ -69,29 +79,29 @@ class MultiStopband(Banded):
         assert isinstance(options, MultiStopband.Options)
         return MultiStopband(wavelength_nm, base, target, options.bands)
 
-    def curves(self, x: FloatArray) -> FloatArray:
+    def curves(self, x: DesignParameters) -> DesignCurves:
         """Return the QE of the modified channel."""
         return (self._base + self._change * self._bands.shape(x))[:, None, :]
 
-    def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
+    def upper(self, low: PerParameter, high: PerParameter) -> ChannelCurves:
         """Return the base, or the target where it is higher and a band can reach."""
         return (self._base + np.maximum(self._change, 0.0) * self._bands.reach(low, high))[None, :]
 
-    def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
+    def lower(self, low: PerParameter, high: PerParameter) -> ChannelCurves:
         """Return the base, or the target where it is lower and a band can reach."""
         return (self._base + np.minimum(self._change, 0.0) * self._bands.reach(low, high))[None, :]
 
-    def hull(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def hull(self, low: PerParameter, high: PerParameter) -> tuple[ChannelCurves, ChannelCurves]:
         """Return base and change with the bands least and most open."""
         ends = np.stack([self._base + self._change * shape for shape in self._bands.range(low, high)])
         return ends.min(axis=0)[None, :], ends.max(axis=0)[None, :]
 
-    def gradient(self, x: FloatArray) -> FloatArray:
+    def gradient(self, x: PerParameter) -> CurvesGradient:
         """Return the derivative of `curves` at one design."""
         return (self._change * self._bands.gradient(x))[:, None, :]
 
     @property
-    def moved(self) -> tuple[FloatArray, FloatArray]:
+    def moved(self) -> tuple[PerWavelength, PerWavelength]:
         """Base and change: bands move, the curves stay; see `MovedFamily`."""
         return self._base, self._change
 
@@ -110,12 +120,12 @@ class Stopband(MultiStopband):
     kind = "stopband"
     Options = Section  # type: ignore[assignment]  # it has none
 
-    def __init__(self, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray) -> None:
+    def __init__(self, wavelength_nm: PerWavelength, base: PerWavelength, target: PerWavelength) -> None:
         super().__init__(wavelength_nm, base, target, 1)
 
     @classmethod
     def of_study(
-        cls, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None, options: Section
+        cls, wavelength_nm: PerWavelength, base: PerWavelength, target: PerWavelength | None, options: Section
     ) -> Stopband:
         """Make the family over curves of a study.
 
@@ -140,10 +150,10 @@ class Stopband(MultiStopband):
         return Stopband(wavelength_nm, base, target)
 
     @property
-    def separable(self) -> tuple[FloatArray, FloatArray]:
+    def separable(self) -> tuple[PerWavelength, PerWavelength]:
         """See `SeparableFamily.separable`."""
         return self._base, self._change
 
-    def edges(self, centers_and_widths: FloatArray) -> FloatArray:
+    def edges(self, centers_and_widths: Float[Array, "bands 2"]) -> Float[Array, "bands wavelengths"]:
         """Return rising edges; see `SeparableFamily.edges`."""
         return self._bands.edges(centers_and_widths)

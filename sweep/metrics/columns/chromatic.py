@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from ...base.types import FloatArray, IndexArray
+from ...base.types import Array, DesignSignals, Float, MemberNumbers
 from ...camera.brightness import room_dn
 from ...camera.setup import Setup
 from ...spectra.lights import class_pairs, pair_name
@@ -47,7 +47,7 @@ class ChromaticSeparation(ReadoutMetric, LampMetric):
             for pair in class_pairs(requested.classes)
         )
 
-    def of_readout(self, setup: Setup, response: FloatArray, unlit: FloatArray) -> Columns:
+    def of_readout(self, setup: Setup, response: DesignSignals, unlit: Float[Array, "designs channels"]) -> Columns:
         """Compute the columns in closed form; NaN where a pixel may fill before lamps look most alike."""
         room = room_dn(setup, response, unlit)
         if not (room > 0).any():
@@ -60,7 +60,7 @@ class ChromaticSeparation(ReadoutMetric, LampMetric):
         }
 
     def of_lamps(
-        self, cases: Sequence[BrightnessCurves], members: Mapping[str, IndexArray], states: Sequence[str]
+        self, cases: Sequence[BrightnessCurves], members: Mapping[str, MemberNumbers], states: Sequence[str]
     ) -> dict[str, float]:
         """Compute the columns from brightness curves."""
         return {
@@ -115,7 +115,7 @@ class ChromaticConfusion(LampMetric):
         )
 
     def of_lamps(
-        self, cases: Sequence[BrightnessCurves], members: Mapping[str, IndexArray], states: Sequence[str]
+        self, cases: Sequence[BrightnessCurves], members: Mapping[str, MemberNumbers], states: Sequence[str]
     ) -> dict[str, float]:
         """Compute the columns from brightness curves; see `with_equal_brightness`."""
         columns = {}

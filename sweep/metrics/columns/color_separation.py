@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 
-from ...base.types import FloatArray
+from ...base.types import Array, DesignSignals, Float
 from ...camera.setup import Setup
 from ...spectra.lights import class_pairs
 from ..metric import ReadoutMetric
@@ -69,6 +69,6 @@ class ColorSeparation(ReadoutMetric):
         ]
         return (*nearest, *best) if requested.any_place else tuple(nearest)
 
-    def of_readout(self, setup: Setup, response: FloatArray, unlit: FloatArray) -> Columns:
+    def of_readout(self, setup: Setup, response: DesignSignals, unlit: Float[Array, "designs channels"]) -> Columns:
         """Compute the columns; see `separation.separations`."""
         return {csd_name(pair): distances for pair, distances in separations(response, setup.members).items()}

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from ...base.types import FloatArray, IndexArray
+from ...base.types import DesignCurves, FloatArray, MemberNumbers, PerDesign
 from ...camera.forward import ForwardModel
 from ...camera.readout import NoisyReadout
 from ...spectra.lights import Pair, class_pairs, pair_name
@@ -54,7 +54,7 @@ class Confusion(NoiseMetric):
         )
 
     def of_noise(
-        self, imager: ForwardModel, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
+        self, imager: ForwardModel, curves: DesignCurves, read: NoisyReadout, members: Mapping[str, MemberNumbers]
     ) -> Columns:
         """Compute exact sums over the digital numbers of a few pixels, else Gaussian errors or bounds."""
         mean, variance, _ = NoiseShape.of_cases(read)
@@ -97,7 +97,7 @@ def _quantity(metric: str, name: str, types: tuple[str, ...]) -> Quantity:
     )
 
 
-def state_errors(imager: ForwardModel, curves: FloatArray, states: Sequence[str]) -> FloatArray:
+def state_errors(imager: ForwardModel, curves: DesignCurves, states: Sequence[str]) -> PerDesign:
     """Return the error of the worst pair of states alone.
 
     Parameters
@@ -123,7 +123,7 @@ def state_errors(imager: ForwardModel, curves: FloatArray, states: Sequence[str]
 
 
 def _exact(
-    imager: ForwardModel, curves: FloatArray, members: Mapping[str, IndexArray]
+    imager: ForwardModel, curves: DesignCurves, members: Mapping[str, MemberNumbers]
 ) -> list[confusion.Errors] | None:
     """Return errors and bounds in each case by exact sums; None if these are too many."""
     few = imager.few_pixels
@@ -134,7 +134,7 @@ def _exact(
     return [confusion.errors(case, few, imager.readout.pixel, members, light) for case in np.moveaxis(electrons, -3, 0)]
 
 
-def _gaussian(read: NoisyReadout, members: Mapping[str, IndexArray]) -> _ByPair:
+def _gaussian(read: NoisyReadout, members: Mapping[str, MemberNumbers]) -> _ByPair:
     """Return the error of each pair, Gaussian or a bound: the largest over the cases."""
     mean, variance, shape = NoiseShape.of_cases(read)
     return {
@@ -144,8 +144,8 @@ def _gaussian(read: NoisyReadout, members: Mapping[str, IndexArray]) -> _ByPair:
 
 
 def _errors(
-    imager: ForwardModel, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
-) -> tuple[_ByPair, _ByPair, FloatArray]:
+    imager: ForwardModel, curves: DesignCurves, read: NoisyReadout, members: Mapping[str, MemberNumbers]
+) -> tuple[_ByPair, _ByPair, PerDesign]:
     """Return error and bound of each pair, and the bound of all states, the largest over the cases."""
     exact, pairs = _exact(imager, curves, members), class_pairs(list(members))
     if exact is not None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...base.types import FloatArray
+from ...base.types import Array, DesignCurves, Float
 from ...camera.brightness import LampReadings
 from ...camera.forward import ForwardModel, forward_model
 from ...camera.pwm import exposure_scales, phases_of
@@ -64,7 +64,7 @@ class Flicker(PulseMetric):
             ),
         )
 
-    def of_pulses(self, model: ForwardModel, curves: FloatArray) -> Columns:
+    def of_pulses(self, model: ForwardModel, curves: DesignCurves) -> Columns:
         """Compute the columns, design by design, since phases depend on the exposure."""
         setup = model.setup
         steady = forward_model(replace(setup, scene=setup.scene.model_copy(update={"drive": None})))
@@ -84,7 +84,7 @@ class Flicker(PulseMetric):
 def _of_lamps(lamps: LampReadings, setup: Setup, time_s: float) -> dict[str, float]:
     """Return the columns at one sampling phase and field position, with the largest hue refined between the phases."""
 
-    def lit(phases: FloatArray) -> FloatArray:
+    def lit(phases: Float[Array, " phases"]) -> Float[Array, "phases signals channels"]:
         scales = exposure_scales(setup, np.array([time_s]), phases)[:, 0]
         return np.asarray(lamps.means_of_exposures(scales) - dark, dtype=float)
 
@@ -105,7 +105,7 @@ def _of_lamps(lamps: LampReadings, setup: Setup, time_s: float) -> dict[str, flo
     part = np.divide(higher - _SEEN_DN, step, out=(higher >= _SEEN_DN).astype(float), where=step > 0)
     part = np.where(lower >= _SEEN_DN, 1.0, np.clip(part, 0.0, 1.0))
 
-    def hue(of_phases: FloatArray) -> FloatArray:
+    def hue(of_phases: Float[Array, "phases _signals _channels"]) -> Float[Array, " phases"]:
         distances = np.sqrt(squared_distance(of_phases, np.broadcast_to(mean, of_phases.shape)))
         return np.asarray(distances.max(axis=1), dtype=float)
 

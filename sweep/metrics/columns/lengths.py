@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from ...base.types import FloatArray
+from ...base.types import DesignParameters
 from ...designs.family import Family
 from ...designs.products import row_products
 from ..metric import FamilyMetric
@@ -41,7 +41,7 @@ class SmallestWidths(FamilyMetric):
             for name in _MEANINGS
         )
 
-    def of_parameters(self, family: Family | None, points: FloatArray) -> Columns:
+    def of_parameters(self, family: Family | None, points: DesignParameters) -> Columns:
         """Return the columns of the narrowest edge and band of each design, nm; NaN where the family has none."""
         rows = {} if family is None else family.dimensions
         nothing = np.full((len(points), 1), np.nan)

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ...base.types import FloatArray, IndexArray
+from ...base.types import Array, DesignCurves, IndexArray, Int, MemberNumbers, Num, PerDesign, SameShape
 from ...camera.forward import ForwardModel
 from ...camera.noise.gaussian import share_below
 from ...camera.readout import NoisyReadout
@@ -56,7 +56,7 @@ class Probabilities(NoiseMetric):
         )
 
     def of_noise(
-        self, imager: ForwardModel, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
+        self, imager: ForwardModel, curves: DesignCurves, read: NoisyReadout, members: Mapping[str, MemberNumbers]
     ) -> Columns:
         """Compute the columns from mean and variance of the digital numbers."""
         columns: Columns = {}
@@ -68,7 +68,12 @@ class Probabilities(NoiseMetric):
         return columns
 
 
-def detection(mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
+def detection(
+    mean: Num[Array, "designs signals channels"],
+    variance: Num[Array, "designs signals channels"],
+    first: Int[IndexArray, " first"],
+    second: Int[IndexArray, " second"],
+) -> PerDesign:
     """Return the CTA of the worst two signals of two types in their best channel.
 
     If the darker readout is above 0, the contrast of two Gaussians is within its ends if bright - r dark is above 0
@@ -102,7 +107,7 @@ def detection(mean: FloatArray, variance: FloatArray, first: IndexArray, second:
     return least
 
 
-def _beyond(apart: FloatArray, bright: FloatArray, dark: FloatArray, ratio: FloatArray) -> FloatArray:
+def _beyond(apart: SameShape, bright: Num[Array, "*batch"], dark: Num[Array, "*batch"], ratio: SameShape) -> SameShape:
     """Return a distance over the noise of bright - ratio times dark; 0 for no distance, infinite without noise."""
     noise = np.sqrt(bright + np.where(dark > 0, ratio**2 * dark, 0.0))
     return np.where(apart > 0, np.divide(apart, noise, out=np.full(apart.shape, np.inf), where=noise > 0), 0.0)

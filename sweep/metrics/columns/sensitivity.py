@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from ...base.types import FloatArray
+from ...base.types import CurvesGradient, PerRow
 from ...camera.setup import Setup
 from ...designs.block import Block, CurveBlock
 from ..metric import DesignMetric
@@ -82,7 +82,7 @@ class Sensitivity(DesignMetric):
         return {SENSITIVITY: sensitivity, CFA_SENSITIVITY: cfa_sensitivity(every, counts, setup.camera.clear_qe)}
 
 
-def sensitivities_gradient(setup: Setup, curves_gradient: FloatArray) -> Columns:
+def sensitivities_gradient(setup: Setup, curves_gradient: CurvesGradient) -> Columns:
     """Return exact derivatives of `sensitivity` and `cfa_sensitivity`.
 
     Parameters
@@ -162,7 +162,7 @@ def _whole_share(setup: Setup) -> LinearRows:
     return _one_row(np.full(setup.camera.grid.size, counts[modified] / whole), others / whole)
 
 
-def _one_row(weights: FloatArray, constant: float = 0.0) -> LinearRows:
+def _one_row(weights: PerRow, constant: float = 0.0) -> LinearRows:
     from scipy.sparse import csr_matrix  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
     return LinearRows(csr_matrix(weights[None]), constant)

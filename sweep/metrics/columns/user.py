@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from ...base.errors import SweepError, ValidationIssue
-from ...base.types import FloatArray
+from ...base.types import Array, DesignSignals, Float
 from ..metric import Metric
 from ..quantity import Quantity, RequestedQuantities
 from ..smooth import Rows, SmoothDesign
@@ -52,7 +52,7 @@ def _rows(design: SmoothDesign, *, metric: UserMetric) -> Rows:
     return Rows(values[0], (values[1 : n + 1] - values[n + 1 :]).T / (2 * _STEP))
 
 
-def _parts(metric: UserMetric, design: SmoothDesign, dn: FloatArray) -> FloatArray:
+def _parts(metric: UserMetric, design: SmoothDesign, dn: DesignSignals) -> Float[Array, "designs parts"]:
     parts = metric.parts(Readings.of_setup(design.setup, dn), finite=False)  # a design without light is not feasible
     if parts is None:
         raise SweepError(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.types import FloatArray
+from ...base.types import DesignCurves
 from ...camera.setup import Setup
 from ...vision.section import Vision
 from ..metric import VisionMetric
@@ -37,7 +37,7 @@ class ImageReading(VisionMetric):
         )
         return (error,) if requested.vision else ()
 
-    def of_images(self, setup: Setup, curves: FloatArray, vision: Vision, seed: int) -> Columns:
+    def of_images(self, setup: Setup, curves: DesignCurves, vision: Vision, seed: int) -> Columns:
         """Compute the mean over the images of one less the probability of the most probable state."""
         from ...vision.readers import observer_error  # noqa: PLC0415  (only where a study asks for images)
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...base.types import FloatArray
+from ...base.types import Array, Float, PerTerm, SameShape
 from ..rule import Rule
 
 _SMALLEST = 1e-300
@@ -20,10 +20,10 @@ class Least(Rule):
     smallest = True
     direction = "less"
 
-    def of(self, terms: FloatArray) -> FloatArray:
+    def of(self, terms: Float[Array, " terms *batch"]) -> SameShape:
         return np.asarray(-np.log10(np.maximum(terms.max(axis=0), _SMALLEST)), dtype=float)
 
-    def gradient(self, terms: FloatArray) -> FloatArray:
+    def gradient(self, terms: PerTerm) -> PerTerm:
         """Return the derivative of the largest term, the first of several.
 
         Parameters
@@ -51,10 +51,10 @@ class Minimum(Rule):
     name = "minimum"
     smallest = True
 
-    def of(self, terms: FloatArray) -> FloatArray:
+    def of(self, terms: Float[Array, " terms *batch"]) -> SameShape:
         return np.asarray(terms.min(axis=0), dtype=float)
 
-    def gradient(self, terms: FloatArray) -> FloatArray:
+    def gradient(self, terms: PerTerm) -> PerTerm:
         """Return 1 for the smallest term, the first of several.
 
         Parameters
@@ -78,10 +78,10 @@ class Sum(Rule):
 
     name = "sum"
 
-    def of(self, terms: FloatArray) -> FloatArray:
+    def of(self, terms: Float[Array, " terms *batch"]) -> SameShape:
         return np.asarray(terms.sum(axis=0), dtype=float)
 
-    def gradient(self, terms: FloatArray) -> FloatArray:
+    def gradient(self, terms: PerTerm) -> PerTerm:
         return np.ones(len(terms))
 
     def words(self, terms: Sequence[str]) -> str:

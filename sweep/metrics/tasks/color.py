@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.types import FloatArray
+from ...base.types import Array, ChannelCurves, Float
 from ...camera.pixel import irradiance_factor
 from ...camera.setup import Setup
 from .colorimetry import COMPLEX_STEP, Smooth, delta_e, lab, lab_slope
@@ -33,7 +33,7 @@ class ChannelNoise:
         Read noise, electrons.
     """
 
-    shares: FloatArray
+    shares: Float[Array, " channels"]
     read_noise_e: float
 
     def of(self, electrons: Smooth) -> Smooth:
@@ -67,7 +67,7 @@ class ChannelNoise:
         return np.asarray(electrons / (PIXELS * self.shares))
 
     @property
-    def read(self) -> FloatArray:
+    def read(self) -> Float[Array, " patches"]:
         """Part of read noise, ndarray of shape (n_channels,)."""
         return np.asarray(self.read_noise_e**2 / (PIXELS * self.shares), dtype=float)
 
@@ -88,7 +88,7 @@ class PatchCamera:
     modified: Smooth
 
     @classmethod
-    def along(cls, setup: Setup, curves: FloatArray, by_u: FloatArray) -> PatchCamera:
+    def along(cls, setup: Setup, curves: ChannelCurves, by_u: Float[Array, "free modified wavelengths"]) -> PatchCamera:
         """Return one design once per free parameter, with its derivative by that parameter.
 
         Parameters
@@ -107,7 +107,7 @@ class PatchCamera:
         """
         return cls(setup, curves + 1j * COMPLEX_STEP * by_u)
 
-    def electrons(self, photons: FloatArray, exposure_s: float) -> Smooth:
+    def electrons(self, photons: Float[Array, "... wavelengths"], exposure_s: float) -> Smooth:
         """Return expected electrons of a pixel of each channel.
 
         Parameters
@@ -164,7 +164,11 @@ class PatchCamera:
 
 
 def color_matrix(
-    electrons: Smooth, xyz: FloatArray, white: FloatArray, noise: ChannelNoise, regularization: float = 1.0
+    electrons: Smooth,
+    xyz: Float[Array, "patches 3"],
+    white: Float[Array, " 3"],
+    noise: ChannelNoise,
+    regularization: float = 1.0,
 ) -> Smooth:
     """Return the matrix from electrons to XYZ relative to white with the least expected error.
 
@@ -246,7 +250,7 @@ def least_illuminance(matrix: Smooth, gray: Smooth, noise: ChannelNoise, ratio: 
     return np.asarray((b + (b**2 + 4 * a**2 * c) ** 0.5) / (2 * a**2))
 
 
-def vora(responses: Smooth, matching: FloatArray) -> Smooth:
+def vora(responses: Smooth, matching: Float[Array, "3 wavelengths"]) -> Smooth:
     """Return the Vora value: share of the space of color-matching functions that the responses span.
 
     trace(P_V P_M) / 3 of the projections onto both spaces (Vora and Trussell, 1993).
@@ -270,7 +274,7 @@ def vora(responses: Smooth, matching: FloatArray) -> Smooth:
     return np.asarray(np.einsum("nck,nck->n", cross, np.linalg.solve(gram, cross)) / basis.shape[1])
 
 
-def metamerism_index(electrons: Smooth, xyz: FloatArray, white: FloatArray) -> Smooth:
+def metamerism_index(electrons: Smooth, xyz: Float[Array, "patches 3"], white: Float[Array, " 3"]) -> Smooth:
     """Return the sensitivity metamerism index of ISO 17321-1: 100 - 5.5 times the mean CIELAB distance of the patches.
 
     The matrix has the least mean, found by Gauss-Newton steps weighted by the inverse distances. 100 is a camera with
@@ -300,7 +304,7 @@ def metamerism_index(electrons: Smooth, xyz: FloatArray, white: FloatArray) -> S
     return np.asarray(100 - 5.5 * delta_e(lab(response @ matrix, np.ones(3)), target).mean(axis=-1))
 
 
-def _step(response: Smooth, matrix: Smooth, target: FloatArray) -> Smooth:
+def _step(response: Smooth, matrix: Smooth, target: Float[Array, "rows 3"]) -> Smooth:
     """Return the matrix after a Gauss-Newton step toward the least sum of distances."""
     n, patches, channels = response.shape
     ratio = response @ matrix

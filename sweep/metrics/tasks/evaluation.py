@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...base.types import FloatArray
+from ...base.types import Array, Float, FloatArray, PerDesign
 from ...camera.noise.gaussian import share_below
 from ...camera.setup import Setup
 from ...designs.block import Block
@@ -220,7 +220,7 @@ def task_columns(setup: Setup, block: Block) -> Columns:
 
 def error_against_noise(
     patch_camera: PatchCamera, chart: Chart, case: int, conditions: Conditions
-) -> tuple[FloatArray, FloatArray]:
+) -> tuple[PerDesign, PerDesign]:
     """Return color error against noise of one design under one light, for each of `REGULARIZATIONS`.
 
     Parameters
@@ -252,8 +252,12 @@ def error_against_noise(
 
 
 def rendered_areas(
-    patch_camera: PatchCamera, chart: Chart, case: int, photons: FloatArray, conditions: Conditions
-) -> tuple[FloatArray, FloatArray]:
+    patch_camera: PatchCamera,
+    chart: Chart,
+    case: int,
+    photons: Float[Array, "areas wavelengths"],
+    conditions: Conditions,
+) -> tuple[Float[Array, "areas 3"], Float[Array, "areas 3 3"]]:
     """Return the areas of a picture through the noise-optimal matrix, with the noise of four pixels.
 
     Parameters

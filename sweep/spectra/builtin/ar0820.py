@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...base.types import FloatArray
+from ...base.types import PerWavelength
 from ..spectrum import Curves, WavelengthGrid
 from .surrogate import LEAK_NODES_NM, ClearPixel, FilterParameters, SurrogateParameters
 
@@ -19,7 +19,7 @@ _LOGISTIC_PER_WIDTH = 2 * math.log(9)
 """A logistic rises from 0.1 to 0.9 within 2 ln 9 of its scale."""
 
 
-def monotone(nodes_nm: ArrayLike, values: ArrayLike, wavelength_nm: FloatArray) -> FloatArray:
+def monotone(nodes_nm: ArrayLike, values: ArrayLike, wavelength_nm: PerWavelength) -> PerWavelength:
     """Return the monotone cubic through nodes: Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5, 300 (1984).
 
     That of `scipy.interpolate.PchipInterpolator`, whose import takes longer than reading the file.
@@ -61,7 +61,7 @@ def _end_slope(step: float, next_step: float, rise: float, next_rise: float) -> 
     return 3 * rise if rise * next_rise < 0 and abs(slope) > 3 * abs(rise) else slope
 
 
-def clear_qe(wavelength_nm: FloatArray, clear: ClearPixel) -> FloatArray:
+def clear_qe(wavelength_nm: PerWavelength, clear: ClearPixel) -> PerWavelength:
     """Return the QE of the clear pixel.
 
     Parameters
@@ -79,7 +79,7 @@ def clear_qe(wavelength_nm: FloatArray, clear: ClearPixel) -> FloatArray:
     return monotone(clear.wavelength_nm, clear.qe, wavelength_nm)
 
 
-def transmission(wavelength_nm: FloatArray, parameters: FilterParameters) -> FloatArray:
+def transmission(wavelength_nm: PerWavelength, parameters: FilterParameters) -> PerWavelength:
     """Return the transmission of a color filter, between its leak and its peak.
 
     Parameters
@@ -103,12 +103,12 @@ def transmission(wavelength_nm: FloatArray, parameters: FilterParameters) -> Flo
     return leak + (parameters.peak - leak) * opened
 
 
-def _logistic(offset_widths: FloatArray) -> FloatArray:
+def _logistic(offset_widths: PerWavelength) -> PerWavelength:
     """Return a logistic edge over the offset from its center in units of its 10-90 % width."""
     return np.asarray(1 / (1 + np.exp(-_LOGISTIC_PER_WIDTH * offset_widths)), dtype=float)
 
 
-def ir_cut_transmission(wavelength_nm: FloatArray, parameters: SurrogateParameters) -> FloatArray:
+def ir_cut_transmission(wavelength_nm: PerWavelength, parameters: SurrogateParameters) -> PerWavelength:
     """Return the transmission of the IR cut.
 
     Parameters

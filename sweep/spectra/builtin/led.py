@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.types import FloatArray
+from ...base.types import PerWavelength
 
 
-def led_photons(wavelength_nm: FloatArray, peak_nm: float, blue_nm: float, red_nm: float) -> FloatArray:
+def led_photons(wavelength_nm: PerWavelength, peak_nm: float, blue_nm: float, red_nm: float) -> PerWavelength:
     """Return the photon spectrum of an LED, 1 at its peak.
 
     (a + b) / (a exp(-u/a) + b exp(u/b)), u = l - peak, a blue, b red: an asymmetric hyperbolic secant, which decays as

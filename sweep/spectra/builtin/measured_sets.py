@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from ...base.types import FloatArray
+from ...base.types import PerWavelength
 from ..formats import digest, read_curves
 from ..spectrum import Curves, WavelengthGrid, photons_from_energy
 
@@ -72,7 +72,7 @@ class MeasuredSet:
         """Curves."""
         return [name for file in self.files for name in file.columns]
 
-    def curves(self, grid: WavelengthGrid) -> dict[str, FloatArray]:
+    def curves(self, grid: WavelengthGrid) -> dict[str, PerWavelength]:
         """Return the curves on a grid.
 
         Parameters
@@ -96,7 +96,7 @@ class MeasuredSet:
             for name, column in file.columns.items()
         }
 
-    def photons(self, grid: WavelengthGrid) -> dict[str, FloatArray]:
+    def photons(self, grid: WavelengthGrid) -> dict[str, PerWavelength]:
         """Return photons of spectra of radiant power.
 
         Parameters
@@ -159,7 +159,7 @@ LUXEON = MeasuredSet(
 )
 
 
-def ir_cut(name: str, grid: WavelengthGrid) -> FloatArray | None:
+def ir_cut(name: str, grid: WavelengthGrid) -> PerWavelength | None:
     """Return the transmission of a sensor's IR cut.
 
     Parameters

@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from ...base.types import FloatArray
+from ...base.types import PerWavelength
 from ..spectrum import Resampling, WavelengthGrid, photons_from_energy, resample
 
 SpectrumKind = Literal["reflectance", "emission"]
@@ -25,8 +25,8 @@ class Spectrum:
 
     name: str
     kind: SpectrumKind
-    wavelength_nm: FloatArray
-    value: FloatArray
+    wavelength_nm: PerWavelength
+    value: PerWavelength
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ def spectrum_of(group: str, name: str) -> Spectrum:
     return next(spectrum for spectrum in shipped_groups()[group] if spectrum.name == name)
 
 
-def gridded(grid: WavelengthGrid, spectrum: Spectrum) -> FloatArray:
+def gridded(grid: WavelengthGrid, spectrum: Spectrum) -> PerWavelength:
     """Return a reflectance, or a relative photon spectrum, on the grid.
 
     On a grid that is coarser than its samples it is the mean over each bin, so that narrow lines keep their photons.

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.types import FloatArray
+from ...base.types import PerWavelength
 from ..color import LAMP_REGIONS, REGIONS, SHEETING_REGIONS, ColorRegion
 from ..spectrum import WavelengthGrid
 from .led import led_photons
@@ -31,7 +31,7 @@ class LedShape:
     blue_nm: float
     red_nm: float
 
-    def on(self, grid: WavelengthGrid) -> FloatArray:
+    def on(self, grid: WavelengthGrid) -> PerWavelength:
         """Return relative photons.
 
         Parameters
@@ -60,7 +60,7 @@ class EdgeShape:
     width_nm: float
     lit: bool = False
 
-    def on(self, grid: WavelengthGrid) -> FloatArray:
+    def on(self, grid: WavelengthGrid) -> PerWavelength:
         """Return the reflectance, or the lens's relative photons.
 
         Parameters
@@ -87,7 +87,7 @@ class BandShape:
     width_nm: float
     lit: bool = False
 
-    def on(self, grid: WavelengthGrid) -> FloatArray:
+    def on(self, grid: WavelengthGrid) -> PerWavelength:
         """Return the reflectance, or the lens's relative photons.
 
         Parameters
@@ -104,7 +104,7 @@ class BandShape:
         return _behind(grid, self.low + (self.high - self.low) * shape, lit=self.lit)
 
 
-def _behind(grid: WavelengthGrid, curve: FloatArray, *, lit: bool) -> FloatArray:
+def _behind(grid: WavelengthGrid, curve: PerWavelength, *, lit: bool) -> PerWavelength:
     return curve * gridded(grid, spectrum_of("cie_illuminants", "A")) if lit else curve
 
 

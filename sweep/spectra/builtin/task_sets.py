@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...base.types import FloatArray
+from ...base.types import Array, Float, FloatArray, PerWavelength
 from ..color import color_matching, luminance_per_photon_radiance
 from ..spectrum import WavelengthGrid, energy_from_photons, equal_photons, photons_from_energy
 from ..tasks import ILLUMINANTS, Chart, GriddedTask, TaskColumns
@@ -25,7 +25,7 @@ _MOST = 20
 """Spectra of a class of a shipped task: of larger groups an even share."""
 
 
-def illuminant(grid: WavelengthGrid, name: str) -> FloatArray:
+def illuminant(grid: WavelengthGrid, name: str) -> PerWavelength:
     """Return the relative photons of an illuminant; daylight and filament go on as black bodies beyond its samples."""
     spectrum = spectra.spectrum_of(*ILLUMINANTS[name])
     photons, nodes, last_nm = spectra.gridded(grid, spectrum), grid.nodes_nm, float(spectrum.wavelength_nm[-1])
@@ -67,7 +67,7 @@ def is_surface(spectra_of_group: str) -> bool:
     return spectra.shipped_groups()[spectra_of_group][0].kind == "reflectance"
 
 
-def spectra_of_group(grid: WavelengthGrid, name: str, most: int | None = None) -> FloatArray:
+def spectra_of_group(grid: WavelengthGrid, name: str, most: int | None = None) -> Float[Array, "spectra wavelengths"]:
     """Return the spectra of a named group on a grid, one per row.
 
     Parameters
@@ -92,7 +92,7 @@ def spectra_of_group(grid: WavelengthGrid, name: str, most: int | None = None) -
     return np.stack([spectra.gridded(grid, members[at]) for at in chosen])
 
 
-def chart(grid: WavelengthGrid, reflectances: FloatArray, lights: Sequence[str]) -> Chart:
+def chart(grid: WavelengthGrid, reflectances: Float[Array, "patches wavelengths"], lights: Sequence[str]) -> Chart:
     """Return patches under lights of 1 lx.
 
     Parameters
@@ -124,7 +124,7 @@ def chart(grid: WavelengthGrid, reflectances: FloatArray, lights: Sequence[str])
 
 
 def separation_task(
-    grid: WavelengthGrid, name: str, classes: Mapping[str, FloatArray], lights: Sequence[str] = ()
+    grid: WavelengthGrid, name: str, classes: Mapping[str, Float[Array, "_ wavelengths"]], lights: Sequence[str] = ()
 ) -> GriddedTask:
     """Return a task of classes of spectra.
 
@@ -167,10 +167,10 @@ def shipped(grid: WavelengthGrid, name: str) -> GriddedTask:
         Task.
     """
 
-    def groups(*names: str) -> dict[str, FloatArray]:
+    def groups(*names: str) -> dict[str, Float[Array, "_ wavelengths"]]:
         return {name: spectra_of_group(grid, name, _MOST) for name in names}
 
-    def white(*names: str) -> list[FloatArray]:
+    def white(*names: str) -> list[PerWavelength]:
         return [spectra.gridded(grid, spectra.spectrum_of("cie_illuminants", name)) for name in names]
 
     classes: dict[str, FloatArray] = {}
@@ -221,7 +221,7 @@ _NIGHT_LAMPS = {
 }
 
 
-def night_scene(grid: WavelengthGrid) -> dict[str, FloatArray]:
+def night_scene(grid: WavelengthGrid) -> dict[str, PerWavelength]:
     """Return the photon radiance of the areas of a street at night.
 
     Surfaces under white LEDs, and lamps with as much of X, Y or Z as white paper there, so that none is overexposed.
