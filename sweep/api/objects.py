@@ -72,7 +72,7 @@ class LoadedStudy:
 
     @property
     def wavelength_nm(self) -> np.ndarray:
-        """Wavelengths of all curves, nm, ndarray of shape (n_wavelengths,)."""
+        """Wavelengths of all curves, nm."""
         return self.study.grid.nodes_nm
 
     @property

@@ -26,20 +26,7 @@ class Cache(Generic[_Key, _Value]):
         return len(self._values)
 
     def get(self, key: _Key, make: Callable[[], _Value]) -> _Value:
-        """Return the value of `key`, computed by `make` when it is not cached.
-
-        Parameters
-        ----------
-        key : hashable
-            Key of the value.
-        make : callable
-            Computes the value; its exceptions pass through.
-
-        Returns
-        -------
-        value
-            The cached or new value.
-        """
+        """Return the value of `key`, computed by `make` when it is not cached."""
         with self._lock:
             if key not in self._values:
                 self._values[key] = make()

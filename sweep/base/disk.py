@@ -29,40 +29,14 @@ is_file, is_folder, is_link = os.path.isfile, os.path.isdir, os.path.islink
 
 
 def is_real_folder(path: Path) -> bool:
-    """Return True if a folder, and no link to one, exists.
-
-    Parameters
-    ----------
-    path : Path
-        The folder.
-
-    Returns
-    -------
-    bool
-        False for links, files and paths that do not exist.
-    """
+    """Return whether a folder, and no link to one, exists."""
     return is_folder(path) and not is_link(path)
 
 
 def opened(path: Path, *, links: bool = False) -> BufferedReader:
     """Open a regular file; pipes, devices and folders are never read.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    links : bool
-        Follow symbolic links.
-
-    Returns
-    -------
-    BufferedReader
-        The open file.
-
-    Raises
-    ------
-    OSError
-        If the path is no regular file, or a link and `links` is False.
+    Raises OSError if the path is no regular file, or a link and `links` is False.
     """
     # Without O_NONBLOCK, opening a pipe would wait for who writes into it. Windows has other flags, and no such files.
     flags = os.O_RDONLY | (0 if links else getattr(os, "O_NOFOLLOW", 0))
@@ -77,22 +51,7 @@ def opened(path: Path, *, links: bool = False) -> BufferedReader:
 def read_plain(path: Path, most: int) -> bytes:
     """Read a regular file of at most `most` bytes.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    most : int
-        Largest size, in bytes.
-
-    Returns
-    -------
-    bytes
-        The content.
-
-    Raises
-    ------
-    OSError
-        If the path is no regular file, is larger or cannot be read.
+    `most`: largest size, in bytes. Raises OSError if the path is no regular file, is larger or cannot be read.
     """
     with opened(path) as file:
         content = file.read(most + 1)
@@ -104,20 +63,7 @@ def read_plain(path: Path, most: int) -> bytes:
 def digest_of(path: Path) -> str:
     """Return the SHA-256 digest of a regular file.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    str
-        The digest, in hexadecimal.
-
-    Raises
-    ------
-    OSError
-        If the path is no regular file or cannot be read.
+    Raises OSError if the path is no regular file or cannot be read.
     """
     with opened(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
@@ -126,15 +72,7 @@ def digest_of(path: Path) -> str:
 def read_facts(path: Path) -> dict[str, Any]:
     """Read a JSON mapping.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    dict
-        The mapping; empty if there is no regular file with one.
+    Empty if there is no regular file with one.
     """
     try:
         return parsed_facts(read_plain(path, MOST_FACTS))
@@ -145,15 +83,7 @@ def read_facts(path: Path) -> dict[str, Any]:
 def parsed_facts(content: bytes) -> dict[str, Any]:
     """Parse a JSON mapping.
 
-    Parameters
-    ----------
-    content : bytes
-        The text.
-
-    Returns
-    -------
-    dict
-        The mapping; empty if the text holds anything else.
+    Empty if the text holds anything else.
     """
     try:
         facts = json.loads(content)
@@ -167,24 +97,8 @@ def read_input(path: Path, most_bytes: int, refused: type[SweepError]) -> bytes:
 
     Pipes, devices and folders are refused before they are opened, as reading them may never end.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    most_bytes : int
-        Largest size, in bytes.
-    refused : type
-        Class of the error to raise.
-
-    Returns
-    -------
-    bytes
-        The content.
-
-    Raises
-    ------
-    SweepError
-        Of class `refused`, if the file is missing, too large or no regular file.
+    `most_bytes`: largest size, in bytes. Raises SweepError of class `refused`, if the file is missing, too large or no
+    regular file.
     """
     try:
         if not stat.S_ISREG(path.stat().st_mode):
@@ -208,17 +122,7 @@ def read_input(path: Path, most_bytes: int, refused: type[SweepError]) -> bytes:
 def not_utf8(content: bytes, error: UnicodeDecodeError) -> tuple[str, bool]:
     """Describe a text that is not UTF-8.
 
-    Parameters
-    ----------
-    content : bytes
-        The text.
-    error : UnicodeDecodeError
-        Error of its decoding.
-
-    Returns
-    -------
-    tuple
-        Problem with the position, and True if the text starts like UTF-16.
+    Returns problem with the position, and True if the text starts like UTF-16.
     """
     wide = content[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
     return f"not UTF-8 text ({error.reason} at byte {error.start})", wide

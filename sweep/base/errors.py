@@ -21,17 +21,7 @@ def nearest(name: object, known: Iterable[str]) -> str | None:
     of
     up to 100 letters are compared, which bounds the time.
 
-    Parameters
-    ----------
-    name : object
-        The unknown name.
-    known : iterable of str
-        Valid names.
-
-    Returns
-    -------
-    str or None
-        None if no name is similar.
+    None if no name is similar.
     """
     if len(str(name)) > _MOST_LETTERS:
         return None

@@ -13,35 +13,14 @@ T = TypeVar("T")
 
 
 def files_in(folder: ModuleType) -> list[ModuleType]:
-    """Import the modules of a package, in alphabetical order.
-
-    Parameters
-    ----------
-    folder : module
-        The package.
-
-    Returns
-    -------
-    list of modules
-        Its modules.
-    """
+    """Import the modules of a package, in alphabetical order."""
     return [import_module(f"{folder.__name__}.{file.name}") for file in iter_modules(folder.__path__)]
 
 
 def instances_in(folder: ModuleType, base: Callable[[], T]) -> list[T]:
     """Instantiate each class derived from `base` that the modules of a package define.
 
-    Parameters
-    ----------
-    folder : module
-        The package.
-    base : callable
-        Base class.
-
-    Returns
-    -------
-    list
-        One instance per class, in the order of the modules.
+    Returns one instance per class, in the order of the modules.
     """
     kind_of: Any = base
     return [
@@ -58,17 +37,7 @@ def instances_in(folder: ModuleType, base: Callable[[], T]) -> list[T]:
 def lazy_import(names: dict[str, Any], homes: Mapping[str, str]) -> Callable[[str], Any]:
     """Return the `__getattr__` of a package that imports its names on first use (PEP 562).
 
-    Parameters
-    ----------
-    names : dict
-        `globals()` of the package.
-    homes : mapping
-        Name -> module that defines it.
-
-    Returns
-    -------
-    callable
-        The `__getattr__`.
+    `homes`: name -> module that defines it.
     """
 
     def loaded(name: str) -> Any:

@@ -64,34 +64,12 @@ Parallel = Callable[[Iterable[Call]], Iterator[Any]]
 
 
 def delayed(function: Callable[..., Any], *arguments: Any) -> Call:
-    """Record a call without making it.
-
-    Parameters
-    ----------
-    function : callable
-        The function.
-
-    Returns
-    -------
-    callable
-        Takes the arguments and returns the recorded call.
-    """
+    """Record a call without making it."""
     return function, arguments, {}
 
 
 def in_turn(calls: Iterable[Call]) -> Iterator[Any]:
-    """Make recorded calls one after the other in this process.
-
-    Parameters
-    ----------
-    calls : iterable of Call
-        The calls.
-
-    Yields
-    ------
-    value
-        Result of each call.
-    """
+    """Make recorded calls one after the other in this process."""
     for function, arguments, named in calls:
         yield function(*arguments, **named)
 
@@ -116,20 +94,7 @@ class Section(BaseModel):
 def from_to(value: Any) -> Any:
     """Convert a list of two numbers to a tuple.
 
-    Parameters
-    ----------
-    value : list or tuple
-        Lower and upper end.
-
-    Returns
-    -------
-    tuple
-        The ends.
-
-    Raises
-    ------
-    ValueError
-        If the value is no pair.
+    Raises ValueError if the value is no pair.
     """
     if not isinstance(value, list | tuple) or len(value) != 2:
         raise ValueError("two numbers, from and to")

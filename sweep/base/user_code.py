@@ -28,81 +28,32 @@ _begun: dict[str, str] = {}
 
 
 def is_in_file(name: str) -> bool:
-    """Return True if a name refers to a Python file, as `my_filters.py:Gauss` does.
-
-    Parameters
-    ----------
-    name : str
-        Name of a class or function.
-
-    Returns
-    -------
-    bool
-        True for `FILE.py:NAME`.
-    """
+    """Return True if a name refers to a Python file, as `my_filters.py:Gauss` does."""
     return _SEPARATOR in name
 
 
 def file_of(name: str) -> str:
-    """Return the file part of `FILE.py:NAME`.
-
-    Parameters
-    ----------
-    name : str
-        Name of a class or function.
-
-    Returns
-    -------
-    str
-        The file, as the study writes it.
-    """
+    """Return the file part of `FILE.py:NAME`."""
     return f"{name.partition(_SEPARATOR)[0]}.py"
 
 
 def name_in_file(name: str) -> str:
     """Return the name part of `FILE.py:NAME`.
 
-    Parameters
-    ----------
-    name : str
-        Name of a class or function.
-
-    Returns
-    -------
-    str
-        The name; unchanged if it has no file.
+    Unchanged if it has no file.
     """
     return name.partition(_SEPARATOR)[2] or name
 
 
 def kind_in_words(name: str) -> str:
-    """Return the name of a family for messages.
-
-    Parameters
-    ----------
-    name : str
-        Name of a family.
-
-    Returns
-    -------
-    str
-        Name with spaces; for a class in a Python file, the class.
-    """
+    """Return the name of a family for messages."""
     return name_in_file(name) if is_in_file(name) else name.replace("_", " ")
 
 
 def is_code(digested: str) -> bool:
     """Return True if an input digest of a run belongs to code.
 
-    Parameters
-    ----------
-    digested : str
-        Name of the input.
-
-    Returns
-    -------
-    bool
-        True for Python files and installed packages.
+    True for Python files and installed packages.
     """
     return digested.endswith(".py") or digested.startswith(CODE_OF)
 
@@ -127,20 +78,7 @@ class UserCode:
     def called(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """Call a function of the user's code.
 
-        Parameters
-        ----------
-        function : callable
-            The function, without arguments.
-
-        Returns
-        -------
-        value
-            Its result.
-
-        Raises
-        ------
-        SweepError
-            One line, for any exception that the function raises.
+        Raises SweepError, one line, for any exception of the function.
         """
         try:
             return function(*arguments)
@@ -198,20 +136,7 @@ def _of_file(name: str, source: str) -> Any:
 def read_code(path: Path) -> tuple[str, str]:
     """Read a Python file without running it.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    tuple of str
-        Source and SHA-256 digest.
-
-    Raises
-    ------
-    SweepError
-        If the file is missing, too large or not UTF-8.
+    Returns source and SHA-256 digest. Raises SweepError if the file is missing, too large or not UTF-8.
     """
     content = read_input(path, _MOST_BYTES, SweepError)
     try:
@@ -261,40 +186,14 @@ class Installed:
 
 
 def offers(group: Offered) -> list[str]:
-    """Return the entry points that installed packages provide, without importing them.
-
-    Parameters
-    ----------
-    group : Offered
-        Entry point group.
-
-    Returns
-    -------
-    list of str
-        Sorted names.
-    """
+    """Return the entry points that installed packages provide, without importing them."""
     return sorted({entry.name for entry in entry_points(group=group)})
 
 
 def installed(group: Offered, name: str) -> Installed | None:
     """Return the entry point of a name.
 
-    Parameters
-    ----------
-    group : Offered
-        Entry point group.
-    name : str
-        Name of the entry point.
-
-    Returns
-    -------
-    Installed or None
-        None if no package provides it.
-
-    Raises
-    ------
-    SweepError
-        If several packages provide it.
+    None if no package provides it. Raises SweepError if several packages provide it.
     """
     entries = {entry.value: entry for entry in entry_points(group=group) if entry.name == name}
     if len(entries) > 1:

@@ -56,12 +56,8 @@ _FEWER = 400
 class Cone:
     """Cone of rays.
 
-    Parameters
-    ----------
-    half_rad : float
-        Half angle, below 90 degrees, rad.
-    chief_rad : float
-        Angle of the chief ray to the normal, below 90 degrees, rad.
+    `half_rad`: half angle, below 90 degrees, rad; `chief_rad`: angle of the chief ray to the normal, below 90 degrees,
+    rad.
     """
 
     half_rad: float
@@ -71,15 +67,7 @@ class Cone:
 def half_angle_rad(f_number: float) -> float:
     """Return the half angle of a lens's cone, asin(1 / 2F).
 
-    Parameters
-    ----------
-    f_number : float
-        f-number; a lens faster than f/0.5 has all directions.
-
-    Returns
-    -------
-    float
-        Half angle, rad.
+    `f_number`: f-number; a lens faster than f/0.5 has all directions.
     """
     return math.asin(min(1.0, 0.5 / f_number))
 
@@ -87,34 +75,14 @@ def half_angle_rad(f_number: float) -> float:
 def stretch(sine_squared: SameShape, index: float) -> SameShape:
     """Return m: the transmission at wavelength l is that at l m for normal incidence.
 
-    Parameters
-    ----------
-    sine_squared : ndarray
-        Squared sine of the angle of the ray.
-    index : float
-        Effective index.
-
-    Returns
-    -------
-    ndarray of the same shape
-        m, at least 1.
+    Returns m, at least 1.
     """
     return np.asarray(1 / np.sqrt(1 - sine_squared / index**2), dtype=float)
 
 
 @dataclass(frozen=True)
 class _Arc:
-    """Part of a cone, parametrized by a number from 0 to 1 that grows with the angle.
-
-    Parameters
-    ----------
-    sine_squared : callable
-        Squared sine of the angle.
-    density : callable
-        Density of rays.
-    place : callable
-        Parameter at a squared sine.
-    """
+    """Part of a cone, parametrized by a number from 0 to 1 that grows with the angle."""
 
     sine_squared: Callable[[SameShape], SameShape]
     density: Callable[[SameShape], SameShape]
@@ -154,7 +122,7 @@ def _arcs(cone: Cone) -> list[_Arc]:
 
 
 def _points(edges: PerValue) -> tuple[Float[Array, "rays points"], Float[Array, "rays points"]]:
-    """Return Gauss-Legendre points and weights between neighboring edges, ndarray of shape (n_panels, order) each."""
+    """Return Gauss-Legendre points and weights between neighboring edges."""
     node, weight = _RULE
     half = np.diff(edges)[:, None] / 2
     return edges[:-1, None] + half * (1 + node), half * weight
@@ -165,17 +133,7 @@ def gauss_rays(cone: Cone, count: int) -> tuple[Float[Array, " count"], Float[Ar
 
     The Gauss rule of the cone's own distribution: exact for polynomials of the squared sine of degree 2 count - 1.
 
-    Parameters
-    ----------
-    cone : Cone
-        Cone of rays.
-    count : int
-        Number of rays.
-
-    Returns
-    -------
-    sine_squared, weight : ndarray of shape (count,)
-        Squared sines of their angles, and weights that sum to 1.
+    Returns squared sines of their angles, and weights that sum to 1.
     """
     panels = np.linspace(0.0, 1.0, _FEWER // _ORDER + 1)
     at, weight = _points(panels)
@@ -203,15 +161,7 @@ def gauss_rays(cone: Cone, count: int) -> tuple[Float[Array, " count"], Float[Ar
 
 
 class Stretches:
-    """Distribution of the stretch m over the rays of a cone.
-
-    Parameters
-    ----------
-    cone : Cone
-        Cone of rays.
-    index : float
-        Effective index.
-    """
+    """Distribution of the stretch m over the rays of a cone."""
 
     def __init__(self, cone: Cone, index: float) -> None:
         self._index = index
@@ -222,15 +172,7 @@ class Stretches:
     def below(self, m: PerValue) -> tuple[PerValue, PerValue]:
         """Return the share of rays with a smaller stretch, and the sum of their stretches.
 
-        Parameters
-        ----------
-        m : ndarray of shape (n,)
-            Stretches, ascending.
-
-        Returns
-        -------
-        shares, sums : ndarray of shape (n,)
-            Share of the rays and share-weighted sum of their stretches.
+        `m`: stretches, ascending.
         """
         shares, sums = np.zeros(m.size), np.zeros(m.size)
         sine_squared = np.clip(1 - 1 / np.maximum(m, 1.0) ** 2, 0.0, 1.0) * self._index**2
@@ -248,39 +190,20 @@ class Stretches:
 
 _STEEPEST_RAD = math.radians(85.0)
 _Entries = tuple[IndexArray, IndexArray, FloatArray]
-"""Rows, columns and values of a sparse matrix, ndarray[n] each."""
+"""Rows, columns and values of a sparse matrix."""
 _LEAST_BASE = 1e-9
 """A filter is not known where its base lets less than this share of its largest value through."""
 
 
 def cone_of(scene: Scene) -> Cone:
-    """Return the cone of rays of a scene's lens.
-
-    Parameters
-    ----------
-    scene : Scene
-        f-number and chief ray angle.
-
-    Returns
-    -------
-    Cone
-        The cone.
-    """
+    """Return the cone of rays of a scene's lens."""
     return Cone(half_angle_rad(scene.optics.f_number), math.radians(scene.optics.cra_deg))
 
 
 def grazing_ray_issue(scene: Scene) -> tuple[tuple[str, ...], str, str, str] | None:
     """Return the issue of a scene whose rays graze an interference filter.
 
-    Parameters
-    ----------
-    scene : Scene
-        Optics and field.
-
-    Returns
-    -------
-    tuple or None
-        Key, problem, value, and allowed values; None if there is no issue.
+    None if there is no issue.
     """
     chief_deg = scene.optics.cra_deg if scene.field is None else scene.field.steepest_deg
     steepest = cone_of(scene).half_rad + math.radians(chief_deg)
@@ -292,13 +215,7 @@ def grazing_ray_issue(scene: Scene) -> tuple[tuple[str, ...], str, str, str] | N
 
 
 class AngularResponse:
-    """Angular response of the filters of a setup in the cone of its lens.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-    """
+    """Angular response of the filters of a setup in the cone of its lens."""
 
     def __init__(self, setup: Setup) -> None:
         self.matrices: dict[int, csr_matrix] = {}
@@ -313,39 +230,13 @@ class AngularResponse:
     def curves(
         self, qe: Float[Array, "*batch channels wavelengths"], channels: Sequence[int]
     ) -> Float[Array, "*batch channels wavelengths"]:
-        """Return curves averaged over the cone of rays.
-
-        Parameters
-        ----------
-        qe : ndarray of shape (..., n, n_wavelengths)
-            QE at normal incidence.
-        channels : sequence of int
-            Channels of the second axis from the end.
-
-        Returns
-        -------
-        ndarray of the same shape
-            QE in the cone.
-        """
+        """Return curves averaged over the cone of rays."""
         return self._applied(qe, channels, of_light=False)
 
     def light(
         self, light: Float[Array, "*batch spectra wavelengths"], channels: Sequence[int]
     ) -> Float[Array, "*batch spectra wavelengths"]:
-        """Return weights of curves at normal incidence from weights of curves in the cone.
-
-        Parameters
-        ----------
-        light : ndarray of shape (..., n, n_wavelengths)
-            Light on the filters.
-        channels : sequence of int
-            Channels of the second axis from the end.
-
-        Returns
-        -------
-        ndarray of the same shape
-            Light that gives the same sums at normal incidence.
-        """
+        """Return weights of curves at normal incidence from weights of curves in the cone."""
         return self._applied(light, channels, of_light=True)
 
     def _applied(
@@ -363,18 +254,7 @@ class AngularResponse:
 
 
 def known_at(base_transmission: PerWavelength) -> Int[IndexArray, " wavelengths"]:
-    """Return the wavelengths at which a base transmission is large enough to know the filter on it.
-
-    Parameters
-    ----------
-    base_transmission : ndarray of shape (n_wavelengths,)
-        Base transmission.
-
-    Returns
-    -------
-    ndarray of int
-        Indices of wavelengths.
-    """
+    """Return the wavelengths at which a base transmission is large enough to know the filter on it."""
     return np.flatnonzero(base_transmission > _LEAST_BASE * base_transmission.max())
 
 

@@ -18,22 +18,10 @@ from .pixel import Pixel
 class Camera:
     """Camera that a batch of designs shares; its lens is part of the scene, since a study sets it by scene.
 
-    Parameters
-    ----------
-    grid : WavelengthGrid
-        Wavelengths of all curves, nm.
-    mosaic : Mosaic
-        CFA.
-    qe : ndarray of shape (n_channels, n_wavelengths)
-        QE of the mosaic's channels, electrons per photon; rows of `modified` hold the base curve.
-    modified : tuple of int
-        Channels whose curve a design replaces, one per curve of the family.
-    clear_qe : ndarray of shape (n_wavelengths,)
-        QE of the clear pixel, the reference of the CFA sensitivity.
-    pixel : Pixel
-        Pitch, full well, noise and ADC.
-    technologies : tuple of Technology or None
-        Physical principle of each channel's filter, None if it is not stated; empty if none is stated.
+    `grid`: wavelengths of all curves, nm; `qe`: QE of the mosaic's channels, electrons per photon; rows of `modified`
+    hold the base curve; `modified`: channels whose curve a design replaces, one per curve of the family; `clear_qe`: QE
+    of the clear pixel, the reference of the CFA sensitivity; `technologies`: physical principle of each channel's
+    filter, None if it is not stated; empty if none is stated.
     """
 
     grid: WavelengthGrid
@@ -46,7 +34,7 @@ class Camera:
 
     @property
     def base_qe(self) -> ChannelCurves:
-        """Curves that the modified channels replace, ndarray of shape (n_modified, n_wavelengths)."""
+        """Curves that the modified channels replace."""
         return self.qe[list(self.modified)]
 
     @property
@@ -57,15 +45,7 @@ class Camera:
     def effective_index(self, channel: int) -> float:
         """Return the effective index of a channel's filter.
 
-        Parameters
-        ----------
-        channel : int
-            Index of the channel.
-
-        Returns
-        -------
-        float
-            Effective index; infinite for a filter that does not move with the angle of the light.
+        Infinite for a filter that does not move with the angle of the light.
         """
         return index_of(self.technologies[channel]) if self.technologies else math.inf
 
@@ -77,15 +57,7 @@ class Camera:
     def base_transmission(self, channel: int) -> PerWavelength:
         """Return the base transmission of a channel, which is the same at every angle.
 
-        Parameters
-        ----------
-        channel : int
-            Index of the channel.
-
-        Returns
-        -------
-        ndarray of shape (n_wavelengths,)
-            Its base curve, or the clear pixel's for an unmodified channel.
+        Returns its base curve, or the clear pixel's for an unmodified channel.
         """
         return self.qe[channel] if channel in self.modified else self.clear_qe
 

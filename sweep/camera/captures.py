@@ -62,15 +62,7 @@ class Capture(Section):
 
 
 class Exposure(NamedTuple):
-    """Electrons that one or more captures read.
-
-    Parameters
-    ----------
-    capture : Capture
-        The first of them.
-    numbers : tuple of int
-        Indices of the captures.
-    """
+    """Electrons that one or more captures read."""
 
     capture: Capture
     numbers: tuple[int, ...]
@@ -97,38 +89,14 @@ taken to be that at 49 uV/e). `dual_gain`: its large photodiode alone. `staggere
 
 
 def as_tuple(value: Any) -> Any:
-    """Convert a list to a tuple, and leave anything else.
-
-    Parameters
-    ----------
-    value : object
-        Value of a study file.
-
-    Returns
-    -------
-    object
-        The tuple.
-    """
+    """Convert a list to a tuple, and leave anything else."""
     return tuple(value) if isinstance(value, list) else value
 
 
 def named_captures(value: Any) -> Any:
     """Look up a name, and convert a list to a tuple.
 
-    Parameters
-    ----------
-    value : str, list or tuple
-        Name of a pixel, or captures.
-
-    Returns
-    -------
-    tuple of Capture
-        Captures.
-
-    Raises
-    ------
-    ValueError
-        If there is no pixel of this name.
+    `value`: name of a pixel, or captures. Raises ValueError if there is no pixel of this name.
     """
     if isinstance(value, str):
         if value not in NAMED_CAPTURES:

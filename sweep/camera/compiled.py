@@ -28,22 +28,7 @@ def _area(x: float, y: float, radius: float) -> float:
 
 @njit(cache=True, nogil=True)
 def covered_share(x: float, y: float, half: float, radius: float) -> float:
-    """Return the exact share of a square that lies in a disc around the origin.
-
-    Parameters
-    ----------
-    x, y : float
-        Center of the square.
-    half : float
-        Half of its side.
-    radius : float
-        Radius of the disc; all lengths in one unit.
-
-    Returns
-    -------
-    float
-        0 to 1.
-    """
+    """Return the exact share of a square that lies in a disc around the origin, 0 to 1."""
     x, y, squared = abs(x), abs(y), radius * radius
     if (x + half) * (x + half) + (y + half) * (y + half) <= squared:
         return 1.0
@@ -57,22 +42,7 @@ def covered_share(x: float, y: float, half: float, radius: float) -> float:
 
 @njit(cache=True, nogil=True)
 def covered_shares(x: FloatArray, y: FloatArray, half: float, radius: float) -> FloatArray:
-    """Return `covered_share` of many squares.
-
-    Parameters
-    ----------
-    x, y : ndarray of shape (n,)
-        Centers of the squares.
-    half : float
-        Half of their side.
-    radius : float
-        Radius of the disc.
-
-    Returns
-    -------
-    ndarray of shape (n,)
-        0 to 1.
-    """
+    """Return `covered_share` of many squares, 0 to 1."""
     shares = np.empty(x.size)
     for at in range(x.size):
         shares[at] = covered_share(x[at], y[at], half, radius)
@@ -81,23 +51,9 @@ def covered_shares(x: FloatArray, y: FloatArray, half: float, radius: float) -> 
 
 @njit(cache=True, nogil=True)
 def covered_by_disc(x: FloatArray, y: FloatArray, half: float, radius: float) -> FloatArray:
-    """Return the share of each pixel in a disc.
+    """Return the share of each pixel in a disc, 0 to 1.
 
-    Parameters
-    ----------
-    x : ndarray of shape (n, n_columns)
-        Columns from the center of the disc.
-    y : ndarray of shape (n, n_rows)
-        Rows from the center of the disc.
-    half : float
-        Half of the side of a pixel.
-    radius : float
-        Radius of the disc.
-
-    Returns
-    -------
-    ndarray of shape (n, n_rows, n_columns)
-        0 to 1.
+    `half`: half of the side of a pixel.
     """
     shares = np.empty((len(x), y.shape[1], x.shape[1]))
     for case in range(len(x)):
@@ -111,18 +67,8 @@ def covered_by_disc(x: FloatArray, y: FloatArray, half: float, radius: float) ->
 def gather(light: FloatArray, shares: FloatArray, place: IndexArray, through: IndexArray, out: FloatArray) -> None:
     """Add the light of pixels in place, pixel by pixel.
 
-    Parameters
-    ----------
-    light : ndarray of shape (n_designs, n_channels, n_places, n_signals)
-        Light behind each channel's filter at each place.
-    shares : ndarray of shape (n_parts,)
-        Weight of each part of a pixel.
-    place : ndarray of int, shape (n_parts, n_cases, n_elements)
-        Place of each part.
-    through : ndarray of int, shape (n_parts, n_elements)
-        Row of `light`, or -1 for a channel that does not count.
-    out : ndarray of shape (n_designs, n_cases, n_signals, n_elements)
-        Array that is changed.
+    `light`: light behind each channel's filter at each place; `shares`: weight of each part of a pixel; `through`: row
+    of `light`, or -1 for a channel that does not count; `out`: array that is changed.
     """
     n_signals = out.shape[2]
     pixel_light = np.empty(n_signals)
@@ -147,16 +93,8 @@ def gather(light: FloatArray, shares: FloatArray, place: IndexArray, through: In
 def expose(rates: FloatArray, fixed: FloatArray, uniform: FloatArray, time_s: float) -> None:
     """Replace `rates` by (rates + fixed + uniform) time_s.
 
-    Parameters
-    ----------
-    rates : ndarray of shape (n_designs, n_cases, n_signals)
-        Electrons/s; changed in place.
-    fixed : ndarray of shape (n_cases, n_signals)
-        Electrons/s of fixed channels.
-    uniform : ndarray of shape (n_designs, n_cases)
-        Electrons/s of background and dark current.
-    time_s : float
-        Exposure time, s.
+    `rates`: electrons/s; changed in place; `fixed`: electrons/s of fixed channels; `uniform`: electrons/s of background
+    and dark current.
     """
     for d in range(rates.shape[0]):
         for case in range(rates.shape[1]):
@@ -170,16 +108,7 @@ def whole_numbers(
 ) -> None:
     """Convert electrons to whole digital numbers; NaN stays NaN.
 
-    Parameters
-    ----------
-    electrons : ndarray of shape (n,)
-        Expected electrons.
-    top_e : float
-        Electrons at saturation.
-    dn_per_e, offset_dn, full_scale_dn : float
-        Gain, pedestal and full scale, DN.
-    out : ndarray of shape (n,)
-        Digital numbers, DN.
+    `dn_per_e`, `offset_dn`, `full_scale_dn`: gain, pedestal and full scale, DN; `out`: digital numbers, DN.
     """
     whole = math.floor(offset_dn)
     rest = offset_dn - whole
@@ -217,7 +146,7 @@ def _inner_basis(t: float, result: FloatArray) -> None:
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
 def _add_four(shares: FloatArray, coefficients: FloatArray, result: FloatArray) -> None:
-    """Add up to four rows of coefficients, ndarray[n, n_values], times their shares."""
+    """Add up to four rows of coefficients, times their shares."""
     if len(coefficients) < 4:
         for node in range(len(coefficients)):
             for value in range(result.size):
@@ -244,18 +173,7 @@ def means_of_cubic(
     takes less than a third of the time of SciPy's `BSpline.design_matrix` and a sixth of that of calling the spline.
     Each square is summed by itself: the same values in whatever company it is asked for.
 
-    Parameters
-    ----------
-    places : ndarray[n, 2]
-        Centers of the squares.
-    nodes, weights : ndarray[m]
-        Nodes from the center, and weights that add up to 1.
-    knots : ndarray[n_coefficients + 4]
-        Equidistant but for the second and the last but one, which a not-a-knot spline leaves out.
-    coefficients : ndarray[n_coefficients, n_values]
-        Of the cubic B-splines. Beyond the end the last piece goes on.
-    out : ndarray[n, n_values]
-        Output array of the means.
+    `nodes`, `weights`: nodes from the center, and weights that add up to 1.
     """
     last, per_unit = len(coefficients) - 1, 1 / (knots[5] - knots[4])
     four, folded = np.empty(4), np.zeros(len(coefficients))

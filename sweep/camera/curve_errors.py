@@ -59,26 +59,7 @@ class CurveErrors(Section):
 def drawn_curves(
     sensor: SensorCurves, grid: WavelengthGrid, names: Sequence[str], errors: CurveErrors, seed: int
 ) -> Float[Array, "draws names wavelengths"]:
-    """Draw curves of a sensor; those of a name are the same whatever others are drawn.
-
-    Parameters
-    ----------
-    sensor : SensorCurves
-        Curves.
-    grid : WavelengthGrid
-        Their wavelengths.
-    names : sequence of str
-        Names of curves.
-    errors : CurveErrors
-        Errors and number of draws.
-    seed : int
-        Seed.
-
-    Returns
-    -------
-    ndarray of shape (n_draws, n_names, n_wavelengths)
-        QE.
-    """
+    """Draw curves of a sensor; those of a name are the same whatever others are drawn."""
     wave, cut = grid.nodes_nm, sensor.ir_cut
     known = np.ones(wave.size) if cut is None else np.maximum(cut, _LEAST_CUT)
     (moved,) = _evenly(_IR_CUT, errors, seed, 1) * errors.ir_cut_nm
@@ -101,7 +82,7 @@ def _rng(name: str, seed: int, part: int) -> np.random.Generator:
 
 
 def _evenly(name: str, errors: CurveErrors, seed: int, count: int) -> Float[Array, "rows columns"]:
-    """Return numbers from -1 to 1, ndarray of shape (count, n_draws)."""
+    """Return numbers from -1 to 1."""
     return np.asarray(_rng(name, seed, 0).uniform(-1, 1, (count, errors.draws)), dtype=float)
 
 
@@ -114,19 +95,6 @@ def _root(wave: PerSample, length_nm: float) -> Float[Array, "samples samples"]:
 def with_filters(
     curves: Float[Array, "draws wavelengths"], base: PerWavelength, designed: PerWavelength
 ) -> Float[Array, "draws wavelengths"]:
-    """Put a filter on drawn curves: its transmission relative to the curve that it replaces stays.
-
-    Parameters
-    ----------
-    curves : ndarray of shape (n_draws, n_wavelengths)
-        Drawn base curves.
-    base, designed : ndarray of shape (n_wavelengths,)
-        The base curve, and the curve of the filter on it.
-
-    Returns
-    -------
-    ndarray of shape (n_draws, n_wavelengths)
-        QE.
-    """
+    """Put a filter on drawn curves: its transmission relative to the curve that it replaces stays."""
     known = base > _LEAST_BASE * base.max()
     return curves * np.divide(designed, base, out=np.ones_like(base), where=known)

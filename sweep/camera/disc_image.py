@@ -21,21 +21,9 @@ _LATTICES: Cache[tuple[DiscProfile, float, bytes], FloatArray] = Cache(4)
 
 
 def covered(x: SameShape, y: SameShape, half: float, radius: float) -> SameShape:
-    """Return the share of a square that lies in a disc around the origin, from the exact areas.
+    """Return the share of a square that lies in a disc around the origin, from the exact areas, 0 to 1.
 
-    Parameters
-    ----------
-    x, y : ndarray[...]
-        Center of the square; their shapes are broadcast.
-    half : float
-        Half of its side.
-    radius : float
-        Radius of the disc; all lengths are in one unit, such as pixels.
-
-    Returns
-    -------
-    ndarray[...]
-        0 to 1.
+    `radius`: radius of the disc; all lengths are in one unit, such as pixels.
     """
     from .compiled import covered_shares  # noqa: PLC0415  (compiled: kept off the start-up path)
 
@@ -47,15 +35,8 @@ def covered(x: SameShape, y: SameShape, half: float, radius: float) -> SameShape
 class PixelLight:
     """Light of pixels relative to a uniform field, each distinct place once.
 
-    Parameters
-    ----------
-    values : ndarray of shape (n_places, n_functions)
-        Functions of the light at each place; the last place is dark.
-    place : ndarray of int, shape (n_cases, rows, columns)
-        Place of each pixel.
-    shares : ndarray of shape (n_functions, n_wavelengths) or None
-        Share of each function in each wavelength; None if all wavelengths are equal, which is then one
-        function.
+    `values`: functions of the light at each place; the last place is dark; `shares`: share of each function in each
+    wavelength; None if all wavelengths are equal, which is then one function.
     """
 
     values: Float[Array, "places functions"]
@@ -65,26 +46,12 @@ class PixelLight:
     def by_pixel(self) -> Float[Array, "cases rows columns _wavelengths"]:
         """Return the light of each pixel.
 
-        Returns
-        -------
-        ndarray of shape (n_cases, rows, columns, n_wavelengths or 1)
-            Light relative to a uniform field.
+        Returns light relative to a uniform field.
         """
         return self._at_wavelengths(self.values)[self.place]
 
     def folded(self, weights: Float[Array, "cases rows columns places"]) -> Float[Array, "cases places _wavelengths"]:
-        """Sum over the pixels of each case with weights.
-
-        Parameters
-        ----------
-        weights : ndarray of shape (n_cases, rows, columns, n)
-            Weight of each pixel in each of n sums.
-
-        Returns
-        -------
-        ndarray of shape (n_cases, n, n_wavelengths or 1)
-            Weighted sums.
-        """
+        """Sum over the pixels of each case with weights."""
         result = np.empty((len(weights), weights.shape[-1], self.values.shape[1]))
         for case, case_weights in enumerate(weights):
             used = np.flatnonzero(case_weights.any(axis=2))
@@ -101,19 +68,8 @@ def different(
 ) -> tuple[Float[Array, "places 2"], Int[IndexArray, " wanted"]]:
     """Return the distinct pixel positions around the light's center; mirrored ones are equal in a round image.
 
-    Parameters
-    ----------
-    window : Window
-        Pixels around the light, n_cases x rows x columns.
-    wanted : ndarray of bool, shape (n_cases, rows, columns)
-        Pixels that are requested.
-
-    Returns
-    -------
-    places_px : ndarray of shape (n_places, 2)
-        Distances from the center along rows and columns, the shorter one first, pixels.
-    place : ndarray of int, shape (n_wanted,)
-        Place of each requested pixel.
+    Returns `places_px`: distances from the center along rows and columns, the shorter one first, pixels; `place`: place
+    of each requested pixel.
     """
     x, y = window.dx[:, 0, :], window.dy[:, :, 0]
     along = np.round(np.abs(np.concatenate([x.ravel(), y.ravel()])), 12)
@@ -134,25 +90,8 @@ def light_on_pixels(
 ) -> PixelLight:
     """Return the light of the requested pixels; the others are dark.
 
-    Parameters
-    ----------
-    window : Window
-        Pixels around the light, n_cases x rows x columns.
-    wanted : ndarray[n_cases, rows, columns]
-        Which of them are asked for.
-    half_px : float
-        Half of the side of a pixel's light-sensitive square, pixels.
-    radius_px : float
-        Radius of the disc, pixels; a blurred one's is its profile's.
-    profile : DiscProfile or None
-        The blurred image; None for a sharp one.
-    pitch_um : float
-        Pixel pitch, micrometers.
-
-    Returns
-    -------
-    PixelLight
-        Means over the pixels, relative to a uniform field.
+    `radius_px`: radius of the disc, pixels; a blurred one's is its profile's; `profile`: the blurred image; None for a
+    sharp one. Returns means over the pixels, relative to a uniform field.
     """
     places_px, inverse = different(window, wanted)
     place = np.full(wanted.shape, len(places_px))

@@ -31,15 +31,7 @@ _STEEPEST_TERMS = 50
 
 @dataclass(frozen=True)
 class Box:
-    """Designs of a scene, with bounds on the QE of each channel.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-    low, high : ndarray of shape (n_channels, n_wavelengths)
-        Bounds on the QE.
-    """
+    """Designs of a scene, with bounds on the QE of each channel."""
 
     setup: Setup
     low: Float[Array, "channels wavelengths"]
@@ -64,7 +56,7 @@ class Box:
 
     @cached_property
     def _highest(self) -> ChannelCurves:
-        """Upper bound on the curves in the cone of rays, ndarray of shape (n_channels, n_wavelengths).
+        """Upper bound on the curves in the cone of rays.
 
         The transmission of an interference filter is nowhere above its maximum.
         """
@@ -107,15 +99,9 @@ def any_filter(setup: Setup) -> Box:
 class Effect:
     """One effect.
 
-    Parameters
-    ----------
-    name : str
-        Name.
-    inactive : callable
-        From a box to the reason why the effect changes nothing in it; None if it may.
-    bound_dn : callable, optional
-        From a box and the effects of the readout that are computed to the bound, DN. Left out, no closed
-        form is known, and an active effect is computed.
+    `inactive`: from a box to the reason why the effect changes nothing in it; None if it may; `bound_dn`: from a box
+    and the effects of the readout that are computed to the bound, DN. Left out, no closed form is known, and an active
+    effect is computed.
     """
 
     name: str

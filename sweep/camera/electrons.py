@@ -30,21 +30,9 @@ _MANY = 50_000
 class Changing:
     """Designs of a batch that differ in one channel alone: their electrons, or the digital numbers read from them.
 
-    Parameters
-    ----------
-    fixed : ndarray of shape (n_cases, n_signals, n_channels)
-        Values of the shared channels; those of `channel` are undefined.
-    channel : int
-        Index of the channel that differs.
-    make : callable
-        From a slice of the designs to their values of that channel, ndarray of shape (n, n_cases,
-        n_signals).
-    exposure_s : float
-        Exposure time of all of them, s.
-    which : ndarray of bool, shape (n_designs,)
-        Designs of the batch that these are.
-    unlit : callable
-        From a slice of the designs to all channels without the lamps, ndarray of shape (n, n_cases, n_channels).
+    `fixed`: values of the shared channels; those of `channel` are undefined; `make`: from a slice of the designs to
+    their values of that channel; `unlit`: from a slice of the designs to all channels without the lamps; `exposure_s`:
+    of all of them; `which`: designs of the batch that these are.
     """
 
     fixed: Float[Array, "cases signals channels"]
@@ -61,22 +49,11 @@ class Changing:
 
     @property
     def whole(self) -> Float[Array, "cases pixels channels wavelengths"]:
-        """All channels of all designs, ndarray of shape (n, n_cases, n_signals, n_channels)."""
+        """All channels of all designs."""
         return self.whole_of(slice(None))
 
     def whole_of(self, part: slice) -> DesignCases:
-        """Return all channels of some designs.
-
-        Parameters
-        ----------
-        part : slice
-            Designs.
-
-        Returns
-        -------
-        ndarray of shape (n, n_cases, n_signals, n_channels)
-            Values of every channel.
-        """
+        """Return all channels of some designs."""
         values = self.values[part] if "values" in self.__dict__ else self.make(part)
         whole = np.repeat(self.fixed[None], len(values), axis=0)
         whole[..., self.channel] = values
@@ -99,7 +76,7 @@ def _expose(
 
 
 def _background(setup: Setup) -> Float[Array, " channels"]:
-    """Return electrons/s of the background per unit of QE, behind air and lens, ndarray of shape (n_wavelengths,)."""
+    """Return electrons/s of the background per unit of QE, behind air and lens."""
     dimmed = path_factor(setup, setup.camera.grid.nodes_nm, background=True)
     return np.asarray(background_irradiance(setup) * setup.camera.area_step_m2_nm * dimmed, dtype=float)
 
@@ -107,9 +84,9 @@ def _background(setup: Setup) -> Float[Array, " channels"]:
 class Electrons:
     """Expected electrons of designs on the elements of a pixel response.
 
-    `light`, `response`: the scene's; `position`: of the field, of each case, ndarray[n_cases]. `background`:
-    electrons/s for each QE of the modified channels, ndarray[n_positions, n_modified, n_wavelengths]. `fixed`:
-    electrons/s of the unmodified channels, ndarray[n_cases, n_signals, n_elements].
+    `light`, `response`: the scene's; `position`: of the field, of each case. `background`:
+    electrons/s for each QE of the modified channels. `fixed`:
+    electrons/s of the unmodified channels.
     """
 
     def __init__(self, light: SceneLight, response: PixelResponse, *, once: bool = False) -> None:
@@ -153,20 +130,7 @@ class Electrons:
     def at_each_position(
         self, light: Float[Array, "cases *batch spectra wavelengths"], channels: Sequence[int]
     ) -> Float[Array, "cases *batch spectra wavelengths"]:
-        """Return light on some channels behind their filters at each field position.
-
-        Parameters
-        ----------
-        light : ndarray of shape (n_cases, ..., n, n_wavelengths)
-            Light on the elements.
-        channels : sequence of int
-            Channels of the second axis from the end.
-
-        Returns
-        -------
-        ndarray of the same shape
-            Light weighted by the angular response of the filters.
-        """
+        """Return light on some channels behind their filters at each field position."""
         return np.concatenate(
             [response.light(light[self.position == at], channels) for at, response in enumerate(self.light.angular)]
         )
@@ -214,18 +178,7 @@ class Electrons:
         return np.ascontiguousarray(product.reshape(-1, channels * size).T)
 
     def rates(self, curves: DesignCurves) -> DesignPixels:
-        """Return electrons/s of each signal.
-
-        Parameters
-        ----------
-        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
-            QE of the modified channels.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, n_cases, n_signals, n_elements)
-            Electrons/s of the signals, without background and dark current.
-        """
+        """Return electrons/s of each signal, without background and dark current."""
         rates = np.repeat(self.fixed[None], len(curves), axis=0)
         if self._split is not None and self.setup.camera.modified:
             self._add_pixels(self._split, curves, self.setup.camera.modified, rates)
@@ -244,19 +197,7 @@ class Electrons:
     ) -> Float[Array, "designs _cases signals pixels"]:
         """Return expected electrons before the full well.
 
-        Parameters
-        ----------
-        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
-            QE of the modified channels.
-        scales : ndarray of shape (n_designs, n_scales)
-            Light relative to its mean at each moment of a pulse.
-        exposure_s : ndarray of shape (n_designs,)
-            Exposure time, s.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, n_cases * n_scales, n_signals, n_elements)
-            Electrons.
+        `scales`: light relative to its mean at each moment of a pulse.
         """
         uniform, rates = self.unlit(curves), self.rates(curves)
         if scales.shape[1] > 1:
@@ -276,34 +217,12 @@ class Electrons:
         return np.asarray(electrons[:, :, None], dtype=float)
 
     def unlit(self, curves: DesignCurves) -> Float[Array, "designs cases pixels"]:
-        """Return electrons/s of the elements without the lamps: of the background, and dark current.
-
-        Parameters
-        ----------
-        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
-            QE of the modified channels.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, n_cases, n_elements)
-            Electrons/s.
-        """
+        """Return electrons/s of the elements without the lamps: of the background, and dark current."""
         uniform = self._fixed_uniform + self.through_filters(self.of_background(curves))
         return np.asarray(uniform + self.setup.camera.pixel.dark_e_per_s, dtype=float)
 
     def of_background(self, curves: DesignCurves) -> Float[Array, "designs positions modified"]:
-        """Return electrons/s of the background in the modified channels.
-
-        Parameters
-        ----------
-        curves : ndarray of shape (n, n_modified, n_wavelengths)
-            QE of the modified channels.
-
-        Returns
-        -------
-        ndarray of shape (n, n_positions, n_modified)
-            Electrons/s.
-        """
+        """Return electrons/s of the background in the modified channels."""
         return np.asarray(np.einsum("nml,pml->npm", curves, self.background), dtype=float)
 
     def through_filters(
@@ -311,15 +230,7 @@ class Electrons:
     ) -> Float[Array, "designs cases pixels"]:
         """Distribute uniform light of the modified channels over the elements.
 
-        Parameters
-        ----------
-        rates : ndarray of shape (n_designs, n_positions, n_modified)
-            Electrons/s of the modified channels.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, n_cases, n_elements)
-            Electrons/s.
+        `rates`: electrons/s of the modified channels.
         """
         total = np.zeros((len(rates), *self._modified_uniform.shape[:2]))
         for index in range(rates.shape[2]):
@@ -331,15 +242,7 @@ class Electrons:
 
         Designs whose modified channel sets the exposure are left out.
 
-        Parameters
-        ----------
-        block : Block
-            Designs of one family.
-
-        Returns
-        -------
-        Changing or None
-            None if other elements see the modified channel, or if the light is pulsed.
+        None if other elements see the modified channel, or if the light is pulsed.
         """
         setup = self.setup
         touched = np.flatnonzero((self._modified_uniform != 0).any(axis=(0, 2)))

@@ -25,18 +25,7 @@ from .setup import Setup
 
 
 def white_irradiance(setup: Setup) -> PerWavelength:
-    """Return the photon irradiance of the white patch, which is flat in photons.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene, lights and grid.
-
-    Returns
-    -------
-    ndarray of shape (n_wavelengths,)
-        Irradiance, photons/s/m2/nm.
-    """
+    """Return the photon irradiance of the white patch, which is flat in photons, photons/s/m2/nm."""
     scenario, grid = setup.scene, setup.camera.grid
     ratio = setup.lights.photon_ratio
     if isinstance(scenario.exposure, WhitePatchExposure) and scenario.exposure.photon_ratio is not None:
@@ -46,18 +35,7 @@ def white_irradiance(setup: Setup) -> PerWavelength:
 
 
 def fixed_white(setup: Setup) -> float:
-    """Return electrons/s on the white patch of the brightest channel that no design modifies.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-
-    Returns
-    -------
-    float
-        Electrons/s.
-    """
+    """Return electrons/s on the white patch of the brightest channel that no design modifies."""
     rates = setup.camera.qe[list(setup.camera.fixed)] @ white_irradiance(setup) * setup.camera.area_step_m2_nm
     return float(rates.max(initial=0.0))
 
@@ -67,19 +45,8 @@ def exposure_times(
 ) -> PerDesign:
     """Return the exposure time of each design.
 
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-    modified_white : ndarray of shape (n_designs, n_modified)
-        Electrons/s of the modified channels on the white patch.
-    fixed : float, optional
-        Result of `fixed_white`, if it is known.
-
-    Returns
-    -------
-    ndarray of shape (n_designs,)
-        Exposure time, s; infinite if a white-patch exposure sees no light.
+    `modified_white`: electrons/s of the modified channels on the white patch; `fixed`: result of `fixed_white`, if it
+    is known. Infinite if a white-patch exposure sees no light.
     """
     exposure = setup.scene.exposure
     if not isinstance(exposure, WhitePatchExposure):
@@ -93,17 +60,7 @@ def exposure_times(
 def may_be_brightest(setup: Setup, most: float = 1.0) -> bool:
     """Return whether a modified channel below its base curve may be the brightest on white and set the exposure.
 
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-    most : float
-        Largest sensitivity of the channel: the sum of its curve over that of its base.
-
-    Returns
-    -------
-    bool
-        True if it may set the exposure.
+    `most`: largest sensitivity of the channel: the sum of its curve over that of its base.
     """
     return isinstance(setup.scene.exposure, WhitePatchExposure) and not largest_sensitivity_not_brightest(setup) >= most
 
@@ -111,15 +68,7 @@ def may_be_brightest(setup: Setup, most: float = 1.0) -> bool:
 def largest_sensitivity_not_brightest(setup: Setup) -> float:
     """Return the largest sensitivity at which no modified channel is the brightest on white.
 
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-
-    Returns
-    -------
-    float
-        Sensitivity; infinite for dark base curves.
+    Infinite for dark base curves.
     """
     camera, rates = setup.camera, setup.camera.qe.sum(axis=1)
     kept, modified = (rates[list(some)].max(initial=0.0) for some in (camera.fixed, camera.modified))
@@ -129,23 +78,9 @@ def largest_sensitivity_not_brightest(setup: Setup) -> float:
 def relative_slope(
     setup: Setup, white: PerWavelength, curves: ChannelCurves, curves_gradient: CurvesGradient
 ) -> PerParameter:
-    """Return the derivative of one design's exposure time, relative to that time.
+    """Return the derivative of one design's exposure time, relative to that time, per unit of parameter.
 
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-    white : ndarray of shape (n_wavelengths,)
-        Electrons/s of the white patch per unit of QE.
-    curves : ndarray of shape (n_modified, n_wavelengths)
-        QE of the modified channels.
-    curves_gradient : ndarray of shape (n_parameters, n_modified, n_wavelengths)
-        Derivative of the QE.
-
-    Returns
-    -------
-    ndarray of shape (n_parameters,)
-        Relative derivative, per unit of parameter.
+    `white`: electrons/s of the white patch per unit of QE.
     """
     # By the same products: a filter that leaves its base as it is, beside a pixel of that curve, sets nothing.
     rates, kept = curves @ white, setup.camera.qe[list(setup.camera.fixed)] @ white
@@ -157,13 +92,7 @@ def relative_slope(
 
 
 class SceneLight:
-    """Light of a scene.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene, lights and camera.
-    """
+    """Light of a scene."""
 
     def __init__(self, setup: Setup) -> None:
         self.setup = setup
@@ -175,32 +104,13 @@ class SceneLight:
         self.angular = [AngularResponse(position) for position in self.positions]
 
     def exposure_s(self, curves: DesignCurves) -> PerDesign:
-        """Return the exposure time of each design.
-
-        Parameters
-        ----------
-        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
-            QE of the modified channels.
-
-        Returns
-        -------
-        ndarray of shape (n_designs,)
-            Exposure time, s.
-        """
+        """Return the exposure time of each design."""
         return exposure_times(self.setup, curves @ self.white, self.fixed_white)
 
     def scales(self, exposure_s: PerDesign) -> Float[Array, "... designs moments"]:
         """Return the light relative to its mean at the moments of a pulsed light.
 
-        Parameters
-        ----------
-        exposure_s : ndarray of shape (n_designs,)
-            Exposure time, s.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, n_moments)
-            Relative light; of an HDR pixel (n_exposures, n_designs, n_moments).
+        Of an HDR pixel those of each exposure, on the first axis.
         """
         if self.setup.camera.pixel.captures:
             scales = pwm.exposure_scales(self.setup, exposure_s, self.moments)

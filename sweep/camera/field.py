@@ -23,20 +23,7 @@ _HALVINGS = 4
 
 
 def scene_at(scene: Scene, height: float) -> Scene:
-    """Return the scene at one image height.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene with a field.
-    height : float
-        Image height, 0 to 1.
-
-    Returns
-    -------
-    Scene
-        Scene with chief ray angle and field angle at this height.
-    """
+    """Return the scene at one image height."""
     assert scene.field is not None
     corner = math.tan(math.radians(scene.off_axis_deg))
     optics = scene.optics.model_copy(update={"cra_deg": scene.field.cra_at(height)})
@@ -45,35 +32,14 @@ def scene_at(scene: Scene, height: float) -> Scene:
 
 
 def setup_at(setup: Setup, height: float) -> Setup:
-    """Return the setup at one image height.
-
-    Parameters
-    ----------
-    setup : Setup
-        Setup whose scene has a field.
-    height : float
-        Image height, 0 to 1.
-
-    Returns
-    -------
-    Setup
-        Setup at this height.
-    """
+    """Return the setup at one image height."""
     return replace(setup, scene=scene_at(setup.scene, height))
 
 
 def field_heights(setup: Setup) -> tuple[float, ...]:
-    """Return the image heights at which a scene is computed.
+    """Return the image heights at which a scene is computed, 0 to 1.
 
-    Parameters
-    ----------
-    setup : Setup
-        Scene and accuracy.
-
-    Returns
-    -------
-    tuple of float
-        Image heights, 0 to 1; (0,) if all of them are equal.
+    (0,) if all of them are equal.
     """
     scene = setup.scene
     if scene.field is None or not setup.positions_differ:
@@ -87,15 +53,7 @@ def field_heights(setup: Setup) -> tuple[float, ...]:
 def over_field(setup: Setup) -> tuple[Setup, ...]:
     """Return a setup for each field position that is computed.
 
-    Parameters
-    ----------
-    setup : Setup
-        Scene and accuracy.
-
-    Returns
-    -------
-    tuple of Setup
-        The setup itself if the scene has no field.
+    Returns the setup itself if the scene has no field.
     """
     if setup.scene.field is None:
         return (setup,)
@@ -112,21 +70,7 @@ def refined_heights(
     The steps around the two smallest known values are halved four times; it is not proven that no lower value lies
     elsewhere.
 
-    Parameters
-    ----------
-    heights : tuple of float
-        Known image heights, ascending.
-    values : ndarray of shape (n_values, n_heights)
-        Functions of the height at these.
-    evaluate : callable
-        From an image height to ndarray of shape (n_values,).
-
-    Returns
-    -------
-    values : ndarray of shape (n_values,)
-        Smallest values.
-    heights : ndarray of shape (n_values,)
-        Image height of each.
+    `heights`: known image heights, ascending.
     """
     known = dict(zip(heights, values.T, strict=True))
     at, lowest = np.zeros(len(values)), values.min(axis=1)

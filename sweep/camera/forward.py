@@ -40,14 +40,7 @@ _BLOCK = 2_000_000
 class ForwardModel:
     """Forward model of one scene and camera; the pixel response is computed at its first use.
 
-    Parameters
-    ----------
-    setup : Setup
-        Camera, lights, scene and accuracy.
-    phases : Phases, optional
-        Sampling phases instead of those of the scene.
-    once : bool
-        Evaluate once, so that no table of products is kept.
+    `phases`: sampling phases instead of those of the scene.
     """
 
     together = False
@@ -85,17 +78,7 @@ class ForwardModel:
     def at(self, phases: Phases | None, moments: Float[Array, " moments"] | None = None) -> ForwardModel:
         """Return the model of the same scene at other phases, for a single use.
 
-        Parameters
-        ----------
-        phases : Phases or None
-            Sampling phases of a target.
-        moments : ndarray of shape (n_moments,), optional
-            Moments of a pulsed light, 0 (least light) to 1 (most light).
-
-        Returns
-        -------
-        ForwardModel
-            The model at these phases and moments.
+        `moments`: moments of a pulsed light, 0 (least light) to 1 (most light).
         """
         model = ForwardModel(self.setup, phases, once=True)
         for part, light in ((model, self.light), *((position, position.light) for position in model._positions)):
@@ -149,16 +132,7 @@ class ForwardModel:
     def read_changing(self, block: Block) -> Changing | None:
         """Read designs that differ in one channel alone.
 
-        Parameters
-        ----------
-        block : Block
-            Designs of one family.
-
-        Returns
-        -------
-        Changing or None
-            Digital numbers, DN; None if the designs differ in more, or if a channel is read from several
-            elements.
+        Returns digital numbers, DN. None if the designs differ in more, or if a channel is read from several elements.
         """
         if self._in_parts or not self.readout.by_channel or self.setup.camera.pixel.captures:
             return None
@@ -176,20 +150,7 @@ class ForwardModel:
         return replace(electrons, fixed=transfer(electrons.fixed), make=make, unlit=unlit)
 
     def unlit(self, curves: DesignCurves, exposure_s: PerDesign) -> Float[Array, "designs cases channels"]:
-        """Return the response without the lamps: black level, dark current and background, unquantized.
-
-        Parameters
-        ----------
-        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
-            QE of the modified channels.
-        exposure_s : ndarray of shape (n_designs,)
-            Exposure time, s.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, n_cases, n_channels)
-            Response in each case, DN.
-        """
+        """Return the response without the lamps: black level, dark current and background, unquantized, DN."""
         if self._in_parts:
             return np.concatenate([part.unlit(curves, exposure_s) for part in self._parts()], axis=1)
         electrons = self.electrons.unlit(curves) * exposure_s[:, None, None]
@@ -199,17 +160,7 @@ class ForwardModel:
     def read(self, curves: DesignCurves) -> tuple[DesignCases, PerDesign]:
         """Read out a batch of designs.
 
-        Parameters
-        ----------
-        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
-            QE of the modified channels.
-
-        Returns
-        -------
-        dn : ndarray of shape (n_designs, n_cases, n_signals, n_channels)
-            Digital numbers, DN; means under noise.
-        exposure_s : ndarray of shape (n_designs,)
-            Exposure time, s.
+        Returns `dn`: digital numbers, DN; means under noise; `exposure_s`: exposure time, s.
         """
         return self._read_once("read", curves, self._read)
 
@@ -235,16 +186,6 @@ class ForwardModel:
         """Read out a batch of designs with the variance of the noise.
 
         Pixels are read one by one: saturation and quantization must be computed.
-
-        Parameters
-        ----------
-        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
-            QE of the modified channels.
-
-        Returns
-        -------
-        NoisyReadout
-            Mean and variance of each channel, and whether the noise is Gaussian.
         """
         return self._read_once("noise", curves, self._read_with_noise)
 
@@ -337,21 +278,8 @@ class ForwardModel:
     def pixel_electrons(self, curves: DesignCurves) -> Float[Array, "*captures designs cases signals pixels"]:
         """Return expected electrons of the pixels that are read.
 
-        Parameters
-        ----------
-        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
-            QE of the modified channels.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, n_cases, n_signals, n_pixels)
-            Electrons; for a patch that fills the field, the pixels of one tile, row by row. Of an HDR pixel those of
-            each exposure, on the first axis.
-
-        Raises
-        ------
-        SweepError
-            If the pixels of all phases do not fit into memory.
+        For a patch that fills the field, the pixels of one tile, row by row. Of an HDR pixel those of each exposure, on
+        the first axis. Raises SweepError if the pixels of all phases do not fit into memory.
         """
         if self._phase_blocks:
             most = f"at most those of {len(self._phase_blocks[0])} sampling phases: a smaller light, or a named phase"
@@ -364,17 +292,7 @@ class ForwardModel:
     def channels_of(self, pixels: Float[Array, "signals pixels"], case: int) -> Float[Array, "signals channels"]:
         """Return the channels from their pixels at one phase and field position.
 
-        Parameters
-        ----------
-        pixels : ndarray of shape (n, n_pixels)
-            Values of the pixels of `pixel_electrons`.
-        case : int
-            Index of the phase and field position.
-
-        Returns
-        -------
-        ndarray of shape (n, n_channels)
-            Readout of each channel.
+        `pixels`: values of the pixels of `pixel_electrons`.
         """
         for position in self._positions:
             if case < position.n_cases:
@@ -399,20 +317,7 @@ _known: Cache[tuple[type[ForwardModel], int], tuple[Setup, ForwardModel]] = Cach
 
 
 def forward_model(setup: Setup, kind: type[ForwardModel] = ForwardModel) -> ForwardModel:
-    """Return the forward model of a setup; recent models are cached.
-
-    Parameters
-    ----------
-    setup : Setup
-        Camera, lights, scene and accuracy.
-    kind : type
-        Class of the model.
-
-    Returns
-    -------
-    ForwardModel
-        The model.
-    """
+    """Return the forward model of a setup; recent models are cached."""
 
     def made() -> tuple[Setup, ForwardModel]:
         return setup, _models.get((kind, hashlib.sha256(pickle.dumps(setup)).digest()), lambda: kind(setup))

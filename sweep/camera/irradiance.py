@@ -24,18 +24,7 @@ _CONTRAST = 0.02
 
 
 def scene_irradiance(setup: Setup) -> Irradiance:
-    """Return the irradiance of a scene behind veiling glare and the effects of user code.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene, lights and camera.
-
-    Returns
-    -------
-    Irradiance
-        Irradiance of signals and background, photons/s/m2/nm.
-    """
+    """Return the irradiance of a scene behind veiling glare and the effects of user code, photons/s/m2/nm."""
     irradiance = Irradiance(setup.camera.grid.nodes_nm, _signals(setup), _uniform(setup, setup.scene.background_cd_m2))
     if setup.scene.veiling_glare is not None:
         glare = setup.scene.veiling_glare
@@ -50,19 +39,7 @@ def scene_irradiance(setup: Setup) -> Irradiance:
 def with_veiling_glare(irradiance: Irradiance, share: float, mean: PerWavelength) -> Irradiance:
     """Spread a share of the mean light of the field evenly over the field (integral of veiling glare, ISO 9358).
 
-    Parameters
-    ----------
-    irradiance : Irradiance
-        Irradiance of a lens without glare.
-    share : float
-        Share, 0 to 1, that each pixel loses of its own light.
-    mean : ndarray of shape (n_wavelengths,)
-        Mean irradiance of the field; the light of a signal, which is small in the field, is neglected.
-
-    Returns
-    -------
-    Irradiance
-        Irradiance with glare.
+    `irradiance`: irradiance of a lens without glare; `share`: share, 0 to 1, that each pixel loses of its own light.
     """
     kept = 1 - share
     background = kept * irradiance.background + share * mean
@@ -70,34 +47,12 @@ def with_veiling_glare(irradiance: Irradiance, share: float, mean: PerWavelength
 
 
 def signal_irradiance(setup: Setup) -> Float[Array, "signals wavelengths"]:
-    """Return the photon irradiance of each signal.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene, lights and camera.
-
-    Returns
-    -------
-    ndarray of shape (n_signals, n_wavelengths)
-        Irradiance where the image is whole, photons/s/m2/nm.
-    """
+    """Return the photon irradiance of each signal, photons/s/m2/nm."""
     return scene_irradiance(setup).signals
 
 
 def background_irradiance(setup: Setup) -> PerWavelength:
-    """Return the photon irradiance of the uniform background.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-
-    Returns
-    -------
-    ndarray of shape (n_wavelengths,)
-        Irradiance, photons/s/m2/nm.
-    """
+    """Return the photon irradiance of the uniform background, photons/s/m2/nm."""
     return scene_irradiance(setup).background
 
 
@@ -113,7 +68,7 @@ def _signals(setup: Setup) -> Float[Array, "signals wavelengths"]:
 
 
 def _uniform(setup: Setup, luminance_cd_m2: float) -> PerWavelength:
-    """Return the irradiance of a uniform light, flat in photons, ndarray of shape (n_wavelengths,)."""
+    """Return the irradiance of a uniform light, flat in photons."""
     grid = setup.camera.grid
     if not luminance_cd_m2:
         return np.zeros(grid.size)
@@ -125,15 +80,7 @@ def _uniform(setup: Setup, luminance_cd_m2: float) -> PerWavelength:
 def size_exponent(visibility_m: float) -> float:
     """Return the exponent of the wavelength in extinction (Kim, McArthur, Korevaar, 2001).
 
-    Parameters
-    ----------
-    visibility_m : float
-        Meteorological visibility, m.
-
-    Returns
-    -------
-    float
-        Exponent q: 0 in dense fog, 1.6 in clear air.
+    Returns exponent q: 0 in dense fog, 1.6 in clear air.
     """
     km = visibility_m / 1000
     if km < 0.5:
@@ -146,21 +93,9 @@ def size_exponent(visibility_m: float) -> float:
 
 
 def air_transmittance(scene: Scene, wavelength_nm: PerWavelength) -> PerWavelength:
-    """Return the transmittance of the air between target and camera.
+    """Return the transmittance of the air between target and camera, 0 to 1.
 
     exp(-beta D) with beta = ln(1 / 0.02) / visibility (lambda / 550 nm)^-q (Koschmieder).
-
-    Parameters
-    ----------
-    scene : Scene
-        Visibility and distance.
-    wavelength_nm : ndarray of shape (n_wavelengths,)
-        Wavelengths, nm.
-
-    Returns
-    -------
-    ndarray of shape (n_wavelengths,)
-        Transmittance, 0 to 1.
     """
     if scene.visibility_m is None or scene.target is None:
         return np.ones(wavelength_nm.size)
@@ -170,38 +105,12 @@ def air_transmittance(scene: Scene, wavelength_nm: PerWavelength) -> PerWaveleng
 
 
 def relative_illumination(scene: Scene) -> float:
-    """Return the relative illumination of a lens without vignetting, cos^4 of the field angle.
-
-    Parameters
-    ----------
-    scene : Scene
-        Field angle.
-
-    Returns
-    -------
-    float
-        Relative illumination, 0 to 1.
-    """
+    """Return the relative illumination of a lens without vignetting, cos^4 of the field angle, 0 to 1."""
     return math.cos(math.radians(scene.off_axis_deg)) ** 4
 
 
 def path_factor(setup: Setup, wavelength_nm: PerWavelength, *, background: bool = False) -> PerWavelength:
-    """Return the factor of air and lens on the light of a signal or of the background.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene and effects.
-    wavelength_nm : ndarray of shape (n_wavelengths,)
-        Wavelengths, nm.
-    background : bool
-        Return the factor on the background, which fog does not dim.
-
-    Returns
-    -------
-    ndarray of shape (n_wavelengths,)
-        Factor, 0 to 1.
-    """
+    """Return the factor of air and lens on the light of a signal or of the background, 0 to 1."""
     result = np.ones(wavelength_nm.size)
     if setup.computes("illumination"):
         result *= relative_illumination(setup.scene)

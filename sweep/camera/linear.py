@@ -38,18 +38,7 @@ class LinearModel(ForwardModel):
     hdr: Pixel | None = None
 
     def smooth(self, curves: DesignCurves) -> DesignCases:
-        """Return the unquantized, unclipped response.
-
-        Parameters
-        ----------
-        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
-            QE of the modified channels.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, n_cases, n_signals, n_channels)
-            Response, DN.
-        """
+        """Return the unquantized, unclipped response, DN."""
         return self.readout.folded(unquantized(self._expected(curves), self.readout.pixel))
 
     def gradient(
@@ -57,17 +46,7 @@ class LinearModel(ForwardModel):
     ) -> Float[Array, "parameters cases signals channels"]:
         """Return the exact derivative of `smooth` at one design, with that of its exposure; a pulse's share is held.
 
-        Parameters
-        ----------
-        curves : ndarray of shape (n_modified, n_wavelengths)
-            QE of the modified channels.
-        curves_gradient : ndarray of shape (n_parameters, n_modified, n_wavelengths)
-            Derivative of the QE.
-
-        Returns
-        -------
-        ndarray of shape (n_parameters, n_cases, n_signals, n_channels)
-            DN per unit of parameter.
+        Returns DN per unit of parameter.
         """
         return self.smooth_with_gradient(curves, curves_gradient)[1]
 
@@ -76,19 +55,7 @@ class LinearModel(ForwardModel):
     ) -> tuple[Float[Array, "cases signals channels"], Float[Array, "parameters cases signals channels"]]:
         """Return `smooth` and `gradient` of one design.
 
-        Parameters
-        ----------
-        curves : ndarray of shape (n_modified, n_wavelengths)
-            QE of the modified channels.
-        curves_gradient : ndarray of shape (n_parameters, n_modified, n_wavelengths)
-            Derivative of the QE.
-
-        Returns
-        -------
-        response : ndarray of shape (n_cases, n_signals, n_channels)
-            Response, DN.
-        gradient : ndarray of shape (n_parameters, n_cases, n_signals, n_channels)
-            DN per unit of parameter.
+        Returns `response`: response, DN; `gradient`: DN per unit of parameter.
         """
         whole, slope = self._with_slope(curves, curves_gradient)
         response = self.readout.folded(unquantized(whole, self.readout.pixel))
@@ -99,37 +66,14 @@ class LinearModel(ForwardModel):
     ) -> tuple[Float[Array, "cases signals channels"], Float[Array, "parameters cases signals channels"]]:
         """Return the response to the lamps alone, without black level, dark current and background.
 
-        Parameters
-        ----------
-        curves : ndarray of shape (n_modified, n_wavelengths)
-            QE of the modified channels.
-        curves_gradient : ndarray of shape (n_parameters, n_modified, n_wavelengths)
-            Derivative of the QE.
-
-        Returns
-        -------
-        response : ndarray of shape (n_cases, n_signals, n_channels)
-            Response, DN.
-        gradient : ndarray of shape (n_parameters, n_cases, n_signals, n_channels)
-            DN per unit of parameter.
+        Returns `response`: response, DN; `gradient`: DN per unit of parameter.
         """
         whole, slope = self._with_slope(curves, curves_gradient, lamps_only=True)
         dn_per_e = self.readout.pixel.dn_per_e
         return self.readout.folded(whole * dn_per_e), self.readout.folded(slope * dn_per_e)
 
     def variance(self, curves: DesignCurves) -> DesignCases:
-        """Return the variance of the noise.
-
-        Parameters
-        ----------
-        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
-            QE of the modified channels.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, n_cases, n_signals, n_channels)
-            Variance, DN^2.
-        """
+        """Return the variance of the noise, DN^2."""
         electrons, pixel = self.by_pixel._expected(curves), self.readout.pixel
         variance_e2 = electrons + (pixel.prnu * electrons) ** 2 + pixel.read_noise_e**2
         return self.by_pixel.readout.spread(pixel.dn_per_e**2 * variance_e2 + STEPS_DN2)
@@ -139,17 +83,7 @@ class LinearModel(ForwardModel):
     ) -> Float[Array, "parameters cases signals channels"]:
         """Return the exact derivative of `variance` at one design.
 
-        Parameters
-        ----------
-        curves : ndarray of shape (n_modified, n_wavelengths)
-            QE of the modified channels.
-        curves_gradient : ndarray of shape (n_parameters, n_modified, n_wavelengths)
-            Derivative of the QE.
-
-        Returns
-        -------
-        ndarray of shape (n_parameters, n_cases, n_signals, n_channels)
-            DN^2 per unit of parameter.
+        Returns DN^2 per unit of parameter.
         """
         pixel = self.readout.pixel
         whole, slope = self.by_pixel._with_slope(curves, curves_gradient)
@@ -168,19 +102,8 @@ class LinearModel(ForwardModel):
 
         Unlike `smooth`, the mean is that of pixels which saturate.
 
-        Parameters
-        ----------
-        curves : ndarray of shape (n_modified, n_wavelengths)
-            QE of the modified channels.
-        curves_gradient : ndarray of shape (n_parameters, n_modified, n_wavelengths)
-            Derivative of the QE.
-
-        Returns
-        -------
-        mean, variance : ndarray of shape (n_cases, n_signals, n_channels)
-            Mean, DN of the first capture, and variance, DN^2.
-        mean_by, variance_by : ndarray of shape (n_parameters, n_cases, n_signals, n_channels)
-            Derivatives, per unit of parameter.
+        Returns `mean, variance`: mean, DN of the first capture, and variance, DN^2; `mean_by, variance_by`:
+        derivatives, per unit of parameter.
         """
         assert self.hdr is not None
         by_pixel = self.by_pixel
@@ -230,28 +153,11 @@ class LinearModel(ForwardModel):
         return result
 
     def spread_electrons(self, curves: DesignCurves) -> DesignCases:
-        """Return expected electrons of the pixels, weighted by their shares of a channel's variance.
-
-        Parameters
-        ----------
-        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
-            QE of the modified channels.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, n_cases, n_signals, n_channels)
-            Electrons.
-        """
+        """Return expected electrons of the pixels, weighted by their shares of a channel's variance."""
         return self.by_pixel.readout.spread(self.by_pixel._expected(curves))
 
     def spread_shares(self) -> Float[Array, "cases channels"]:
-        """Return the sum of the pixels' shares of a channel's variance.
-
-        Returns
-        -------
-        ndarray of shape (n_cases, n_channels)
-            Sum of the shares.
-        """
+        """Return the sum of the pixels' shares of a channel's variance."""
         response = self.by_pixel.electrons.response
         repeats = self.by_pixel._expected(self.setup.camera.base_qe[None]).shape[1] // len(response.spread)
         return np.repeat(response.spread.sum(axis=1), repeats, axis=0)
@@ -273,7 +179,7 @@ class LinearModel(ForwardModel):
         return result
 
     def _expected(self, curves: DesignCurves) -> DesignCases:
-        """Return expected electrons, ndarray of shape (n_designs, n_cases, n_signals, n_elements)."""
+        """Return expected electrons."""
         exposure_s = self.light.exposure_s(curves)
         return self.electrons.expected(curves, self.light.scales(exposure_s), exposure_s)
 
@@ -302,19 +208,7 @@ class LinearModel(ForwardModel):
 
         The smooth response is linear in it if the channel does not set the exposure.
 
-        Parameters
-        ----------
-        modified : int
-            Index among the modified channels.
-        curves : ndarray of shape (n_modified, n_wavelengths)
-            QE of the design whose exposure is used.
-        lamps_only : bool
-            Leave out the background.
-
-        Returns
-        -------
-        ndarray of shape (n_cases, n_signals, n_elements, n_wavelengths)
-            DN per unit of QE.
+        Returns DN per unit of QE.
         """
         response, channel = self.electrons.response, self.setup.camera.modified[modified]
         uniform = response.uniform[:, :, channel] * (not lamps_only)
@@ -322,20 +216,7 @@ class LinearModel(ForwardModel):
         return rates * self.setup.camera.pixel.dn_per_e
 
     def spread_per_qe(self, modified: int, curves: ChannelCurves) -> Float[Array, "cases signals wavelengths"]:
-        """Return electrons per unit of QE of one modified channel in its pixels, weighted by their shares of variance.
-
-        Parameters
-        ----------
-        modified : int
-            Index among the modified channels.
-        curves : ndarray of shape (n_modified, n_wavelengths)
-            QE of the design whose exposure is used.
-
-        Returns
-        -------
-        ndarray of shape (n_cases, n_signals, n_wavelengths)
-            Electrons per unit of QE.
-        """
+        """Return electrons per unit of QE of one modified channel in its pixels, weighted by shares of variance."""
         by_pixel, channel = self.by_pixel, self.setup.camera.modified[modified]
         response = by_pixel.electrons.response
         share = response.spread[:, :, channel]
@@ -377,15 +258,7 @@ _models: Cache[bytes, LinearModel] = Cache(16)
 def linear_model(setup: Setup) -> LinearModel:
     """Return the linear model of a setup; recent models are cached.
 
-    Parameters
-    ----------
-    setup : Setup
-        Camera, lights, scene and accuracy; at most 9 field positions and 2 moments of a pulse are used.
-
-    Returns
-    -------
-    LinearModel
-        The model.
+    `setup`: camera, lights, scene and accuracy; at most 9 field positions and 2 moments of a pulse are used.
     """
     few = setup.accuracy.model_copy(
         update={"field_positions": min(setup.accuracy.field_positions, _FIELD_POSITIONS), "pwm_moments": 2}

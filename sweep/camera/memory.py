@@ -16,18 +16,7 @@ _COPIES = 4
 
 
 def pixels_per_phase(setup: Setup) -> int:
-    """Estimate the number of pixels that are computed around a light.
-
-    Parameters
-    ----------
-    setup : Setup
-        Target and mosaic.
-
-    Returns
-    -------
-    int
-        Pixels.
-    """
+    """Estimate the number of pixels that are computed around a light."""
     target, rows_columns = setup.scene.target, setup.camera.mosaic.indices.shape
     assert target is not None
     reach = reach_px(setup, target)
@@ -37,17 +26,7 @@ def pixels_per_phase(setup: Setup) -> int:
 def bytes_per_phase(setup: Setup, *, by_pixel: bool) -> int:
     """Estimate the memory of the response at one phase.
 
-    Parameters
-    ----------
-    setup : Setup
-        Scene, mosaic and grid.
-    by_pixel : bool
-        Single pixels, factored (see `SplitLight`), one field position after the other.
-
-    Returns
-    -------
-    int
-        Bytes.
+    `by_pixel`: single pixels, factored (see `SplitLight`), one field position after the other.
     """
     n = len(setup.camera.mosaic.channels)
     if by_pixel:
@@ -56,20 +35,7 @@ def bytes_per_phase(setup: Setup, *, by_pixel: bool) -> int:
 
 
 def blocks(setup: Setup, phases: Phases) -> list[Phases]:
-    """Split phases into blocks whose responses of single pixels fit into half of `MOST_BYTES`.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene, mosaic and grid.
-    phases : Phases
-        Sampling phases.
-
-    Returns
-    -------
-    list of Phases
-        Blocks.
-    """
+    """Split phases into blocks whose responses of single pixels fit into half of `MOST_BYTES`."""
     step = max(1, MOST_BYTES // 2 // bytes_per_phase(setup, by_pixel=True))
     return [phases.subset(slice(at, at + step)) for at in range(0, len(phases), step)]
 
@@ -77,15 +43,7 @@ def blocks(setup: Setup, phases: Phases) -> list[Phases]:
 def memory_problem(setup: Setup) -> tuple[str, str, str] | None:
     """Return the reason why a target's response is not computed.
 
-    Parameters
-    ----------
-    setup : Setup
-        Scene, mosaic and accuracy.
-
-    Returns
-    -------
-    tuple of str or None
-        Problem, value, and allowed values; None if it is computed.
+    None if it is computed.
     """
     if setup.scene.target is None:
         return None

@@ -38,12 +38,8 @@ _HELD = 200_000
 class Merged:
     """Merged values, ndarray of one shape each.
 
-    Parameters
-    ----------
-    mean, variance : ndarray
-        Mean, DN of the first capture, and variance, DN^2.
-    certain : ndarray of bool
-        True where the same captures are used in all but 1e-12 of the readouts.
+    `mean`, `variance`: mean, DN of the first capture, and variance, DN^2; `certain`: True where the same captures are
+    used in all but 1e-12 of the readouts.
     """
 
     mean: SameShape
@@ -52,34 +48,12 @@ class Merged:
 
 
 def limits_dn(pixel: Pixel) -> tuple[int | None, ...]:
-    """Return the digital number from which on each capture is not used; None for the last one.
-
-    Parameters
-    ----------
-    pixel : Pixel
-        HDR pixel.
-
-    Returns
-    -------
-    tuple of int or None
-        Digital numbers, DN.
-    """
+    """Return the digital number from which on each capture is not used; None for the last one."""
     return (*(threshold_dn(capture, pixel.threshold) for capture in pixel.read_as[:-1]), None)
 
 
 def exposure_of(pixel: Pixel) -> list[int]:
-    """Return the index of the exposure of each capture.
-
-    Parameters
-    ----------
-    pixel : Pixel
-        HDR pixel.
-
-    Returns
-    -------
-    list of int
-        Indices.
-    """
+    """Return the index of the exposure of each capture."""
     of = {number: at for at, exposure in enumerate(pixel.exposures) for number in exposure.numbers}
     return [of[number] for number in range(len(pixel.captures))]
 
@@ -87,32 +61,13 @@ def exposure_of(pixel: Pixel) -> list[int]:
 def light_of(pixel: Pixel) -> Float[Array, " captures"]:
     """Return the light of each exposure relative to that of a pixel of full sensitivity.
 
-    Parameters
-    ----------
-    pixel : Pixel
-        HDR pixel, whose captures have its QE and crosstalk.
-
-    Returns
-    -------
-    ndarray of shape (n_exposures,)
-        Relative light.
+    `pixel`: HDR pixel, whose captures have its QE and crosstalk.
     """
     return np.array([exposure.capture.light for exposure in pixel.exposures])
 
 
 def saturating_e(pixel: Pixel) -> Float[Array, " captures"]:
-    """Return the expected electrons of each exposure from which on all its captures are saturated.
-
-    Parameters
-    ----------
-    pixel : Pixel
-        HDR pixel.
-
-    Returns
-    -------
-    ndarray of shape (n_exposures,)
-        Electrons.
-    """
+    """Return the expected electrons of each exposure from which on all its captures are saturated."""
     last_e = np.array([LinearRange.of(capture).last_e for capture in pixel.read_as])
     return np.array([last_e[list(exposure.numbers)].max() for exposure in pixel.exposures])
 
@@ -120,19 +75,8 @@ def saturating_e(pixel: Pixel) -> Float[Array, " captures"]:
 def merged(electrons: PerCapture, light: PerCapture, pixel: Pixel) -> Merged:
     """Merge noisy captures.
 
-    Parameters
-    ----------
-    electrons : ndarray of shape (n_exposures, ...)
-        Expected electrons of each of `Pixel.exposures`.
-    light : ndarray, broadcast to it
-        Light of each exposure relative to that of a pixel of full sensitivity.
-    pixel : Pixel
-        HDR pixel.
-
-    Returns
-    -------
-    Merged
-        Merged values.
+    `electrons`: expected electrons of each of `Pixel.exposures`; `light`: light of each exposure relative to that of a
+    pixel of full sensitivity.
     """
     result = _over_gains(electrons, light, pixel) if pixel.prnu else _merged(electrons, light, pixel)
     mean, variance = result.mean, result.variance
@@ -154,17 +98,8 @@ def _step_dn(dn: PerDesign, pixel: Pixel) -> PerDesign:
 def coded(dn: SameShape, pixel: Pixel) -> SameShape:
     """Store merged values as codes, and read them back.
 
-    Parameters
-    ----------
-    dn : ndarray
-        Merged values, DN of the first capture.
-    pixel : Pixel
-        HDR pixel; without companding the values stay.
-
-    Returns
-    -------
-    ndarray of the same shape
-        Values of the codes, DN of the first capture.
+    `dn`: merged values, DN of the first capture; `pixel`: HDR pixel; without companding the values stay. Returns values
+    of the codes, DN of the first capture.
     """
     if not pixel.companding:
         return dn
@@ -231,23 +166,8 @@ def shape_of_noise(
 ) -> tuple[Bool[BoolArray, "*batch"], SameShape]:
     """Return the shape of the noise of merged values.
 
-    Parameters
-    ----------
-    electrons : ndarray of shape (n_exposures, ...)
-        Expected electrons.
-    light : ndarray, broadcast to it
-        Relative light.
-    pixel : Pixel
-        HDR pixel.
-    certain : ndarray of bool
-        Where the same captures are always used.
-
-    Returns
-    -------
-    gaussian : ndarray of bool
-        True where the noise may be taken as Gaussian.
-    reach_dn : ndarray
-        Largest distance from the mean with a probability above 1e-15, DN of the first capture.
+    Returns `gaussian`: True where the noise may be taken as Gaussian; `reach_dn`: largest distance from the mean with a
+    probability above 1e-15, DN of the first capture.
     """
     gaussian, reach_dn = certain.copy(), np.zeros(certain.shape)
     for at, exposure in enumerate(pixel.exposures):
@@ -273,21 +193,7 @@ def weights_of(
 ) -> dict[tuple[int, int], SameShape]:
     """Return the weight of each usable capture.
 
-    Parameters
-    ----------
-    usable : tuple of tuple of int
-        Usable captures of each exposure, by their place in it.
-    electrons : ndarray of shape (n_exposures, ...)
-        Expected electrons.
-    light : ndarray, broadcast to it
-        Relative light.
-    pixel : Pixel
-        HDR pixel.
-
-    Returns
-    -------
-    dict of (int, int) to ndarray
-        Exposure and place in it -> weight; their sum is 1.
+    Returns exposure and place in it -> weight. Their sum is 1.
     """
     places = [(at, number) for at, numbers in enumerate(usable) for number in numbers]
     order = {place: pixel.exposures[place[0]].numbers[place[1]] for place in places}
@@ -313,21 +219,7 @@ def without_noise(
 ) -> SameShape:
     """Merge captures that are clipped and rounded, without noise.
 
-    Parameters
-    ----------
-    electrons : ndarray of shape (n_exposures, ...)
-        Electrons of each of `Pixel.exposures`.
-    light : ndarray, broadcast to it
-        Relative light.
-    pixel : Pixel
-        HDR pixel.
-    rounds : bool
-        Round to digital numbers, and to codes.
-
-    Returns
-    -------
-    ndarray of shape (...)
-        Merged values, DN of the first capture.
+    Returns merged values, DN of the first capture.
     """
     read = []
     for at, one in zip(exposure_of(pixel), pixel.read_as, strict=True):
@@ -340,23 +232,9 @@ def without_noise(
 def draws(
     electrons: Float[Array, " captures *batch"], light: PerCapture, pixel: Pixel, rng: np.random.Generator
 ) -> SameShape:
-    """Draw one merged value of each pixel (Monte Carlo).
+    """Draw one merged value of each pixel (Monte Carlo), DN of the first capture.
 
-    Parameters
-    ----------
-    electrons : ndarray of shape (n_exposures, ...)
-        Expected electrons of each of `Pixel.exposures`.
-    light : ndarray, broadcast to it
-        Relative light.
-    pixel : Pixel
-        HDR pixel.
-    rng : numpy.random.Generator
-        Source of random numbers.
-
-    Returns
-    -------
-    ndarray of shape (...)
-        Merged values, DN of the first capture.
+    `electrons`: expected electrons of each of `Pixel.exposures`.
     """
     gain = 1 + pixel.prnu * rng.standard_normal(electrons.shape[1:])
     held = rng.poisson(np.clip(electrons * gain, 0.0, MOST_POISSON_E))
@@ -372,21 +250,8 @@ def merged_readings(
 ) -> SameShape:
     """Merge what captures read.
 
-    Parameters
-    ----------
-    read_dn : sequence of ndarray of shape (...)
-        Digital numbers of each capture, DN.
-    electrons : ndarray of shape (n_exposures, ...)
-        Expected electrons, which weights of `merge: weighted` depend on.
-    light : ndarray, broadcast to it
-        Relative light.
-    pixel : Pixel
-        HDR pixel.
-
-    Returns
-    -------
-    ndarray of shape (...)
-        Merged values, DN of the first capture.
+    `electrons`: expected electrons, which weights of `merge: weighted` depend on. Returns merged values, DN of the
+    first capture.
     """
     limits, result = limits_dn(pixel), np.zeros(electrons.shape[1:])
     everywhere = np.ones(result.shape, dtype=bool)

@@ -20,15 +20,6 @@ class Mosaic:
 
     Each channel is kept once, in the order of its first pixel, so that ``len(channels)`` is the paper's m_p (RGGB 3,
     RCCC 2, RCCB 3, RYYCy 3, RYNCy 4).
-
-    Parameters
-    ----------
-    name : str
-        Name.
-    channels : tuple of str
-        Names of the channels.
-    tile : tuple of tuple of int
-        ``tile[row][column]`` indexes `channels`; the tile repeats over the sensor.
     """
 
     name: str
@@ -39,22 +30,7 @@ class Mosaic:
     def from_rows(cls, name: str, rows: Sequence[Sequence[str]]) -> Mosaic:
         """Make a mosaic from rows of channel names.
 
-        Parameters
-        ----------
-        name : str
-            Name.
-        rows : sequence of sequence of str
-            Channel of each pixel of the tile.
-
-        Returns
-        -------
-        Mosaic
-            The mosaic.
-
-        Raises
-        ------
-        SweepError
-            If the tile is empty or ragged.
+        `rows`: channel of each pixel of the tile. Raises SweepError if the tile is empty or ragged.
         """
         if not rows or not rows[0] or any(len(row) != len(rows[0]) for row in rows):
             raise SweepError(
@@ -67,20 +43,7 @@ class Mosaic:
     def from_name(cls, name: str) -> Mosaic:
         """Make a 2 x 2 mosaic from its name, row by row: ``RYYCy`` is R Y / Y Cy.
 
-        Parameters
-        ----------
-        name : str
-            Four channels, each a capital letter and the small letters and digits that follow it.
-
-        Returns
-        -------
-        Mosaic
-            The mosaic.
-
-        Raises
-        ------
-        SweepError
-            If the name does not have exactly four channels.
+        Raises SweepError if the name does not have exactly four channels.
         """
         tokens = _TOKEN.findall(name)
         if "".join(tokens) != name or len(tokens) != 4:
@@ -100,10 +63,10 @@ class Mosaic:
 
     @property
     def indices(self) -> Int[IndexArray, "rows columns"]:
-        """Tile as ndarray of shape (rows, columns) of channel indices."""
+        """Tile of channel indices."""
         return np.asarray(self.tile, dtype=np.intp)
 
     @property
     def counts(self) -> Int[IndexArray, " channels"]:
-        """Pixels of each channel per tile, ndarray of shape (n_channels,)."""
+        """Pixels of each channel per tile."""
         return np.bincount(self.indices.ravel(), minlength=len(self.channels))

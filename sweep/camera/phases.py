@@ -32,12 +32,8 @@ _NEIGHBORS = np.array([[x, y] for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0
 class Phases:
     """Sampling phases and the pixel at which each is read out.
 
-    Parameters
-    ----------
-    center_px : ndarray of shape (n_phases, 2)
-        Center of the light as (column, row), pixels.
-    nearest_px : ndarray of shape (n_phases, 2)
-        Nearest pixel; halfway between two pixels it is either of them.
+    `center_px`: center of the light as (column, row), pixels; `nearest_px`: nearest pixel; halfway between two pixels
+    it is either of them.
     """
 
     center_px: Float[Array, "phases 2"]
@@ -52,35 +48,14 @@ class Phases:
         return [tuple(row) for row in np.concatenate([self.center_px, self.nearest_px], axis=1).tolist()]
 
     def subset(self, which: slice | DesignNumbers) -> Phases:
-        """Return some of the phases.
-
-        Parameters
-        ----------
-        which : slice or ndarray of int
-            Indices of phases.
-
-        Returns
-        -------
-        Phases
-            The selected phases.
-        """
+        """Return some of the phases."""
         return Phases(self.center_px[which], self.nearest_px[which])
 
 
 def lattice_px(mosaic: Mosaic, steps_per_px: int) -> Float[Array, "phases 2"]:
     """Return the centers of a square lattice over the tile.
 
-    Parameters
-    ----------
-    mosaic : Mosaic
-        Tile.
-    steps_per_px : int
-        Steps along each side of a pixel.
-
-    Returns
-    -------
-    ndarray of shape (n_phases, 2)
-        Centers as (column, row), pixels.
+    `steps_per_px`: steps along each side of a pixel.
     """
     rows, columns = mosaic.indices.shape
     x, y = np.meshgrid(np.arange(columns * steps_per_px) / steps_per_px, np.arange(rows * steps_per_px) / steps_per_px)
@@ -90,15 +65,7 @@ def lattice_px(mosaic: Mosaic, steps_per_px: int) -> Float[Array, "phases 2"]:
 def n_phases(setup: Setup) -> int:
     """Return the number of phases of a scene's lattice.
 
-    Parameters
-    ----------
-    setup : Setup
-        Scene, mosaic and accuracy.
-
-    Returns
-    -------
-    int
-        1 if the scene names the phase, or if the light fills the field.
+    1 if the scene names the phase, or if the light fills the field.
     """
     return setup.accuracy.phases_per_px * setup.camera.mosaic.indices.size if setup.all_phases else 1
 
@@ -107,16 +74,6 @@ def scene_phases(setup: Setup) -> Phases:
     """Return the phases of a scene: the whole lattice, or the named one.
 
     A named phase halfway between two pixels is read at the first of them.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene, mosaic and accuracy.
-
-    Returns
-    -------
-    Phases
-        Sampling phases.
     """
     target = setup.scene.target
     rows, columns = setup.camera.mosaic.indices.shape
@@ -133,20 +90,6 @@ def different_phases(setup: Setup, phases: Phases) -> tuple[Phases, Int[IndexArr
     """Return phases that differ by more than symmetry.
 
     With the mean over the light, mirrored phases are equal.
-
-    Parameters
-    ----------
-    setup : Setup
-        Target and mosaic.
-    phases : Phases
-        Sampling phases.
-
-    Returns
-    -------
-    different : Phases
-        The first phase of each set of equal ones.
-    which : ndarray of int, shape (n_phases,)
-        Index in `different` of each phase.
     """
     target, tile = setup.scene.target, setup.camera.mosaic.indices
     keys = np.concatenate([phases.center_px, phases.nearest_px], axis=1)
@@ -178,17 +121,7 @@ def _mirror(rows: Int[IndexArray, "rows k"]) -> float | None:
 def read_at(target: Target, centers_px: Float[Array, "phases 2"]) -> Phases:
     """Return phases at some centers; a readout at the center has one phase for each of equally near pixels.
 
-    Parameters
-    ----------
-    target : Target
-        Readout.
-    centers_px : ndarray of shape (n, 2)
-        Centers as (column, row), pixels.
-
-    Returns
-    -------
-    Phases
-        Phases; those beyond the first n are at further nearest pixels.
+    `centers_px`: centers as (column, row), pixels. Those beyond the first n are at further nearest pixels.
     """
     low, high = np.ceil(centers_px - 0.5), np.floor(centers_px + 0.5)
     result = Phases(centers_px, low)
@@ -205,17 +138,7 @@ def read_at(target: Target, centers_px: Float[Array, "phases 2"]) -> Phases:
 def fine_lattice(setup: Setup) -> tuple[Phases, float]:
     """Return the phases of the lattice from which extremes are refined.
 
-    Parameters
-    ----------
-    setup : Setup
-        Target, mosaic and accuracy.
-
-    Returns
-    -------
-    phases : Phases
-        Phases that differ by more than symmetry.
-    step_px : float
-        Step of the lattice, pixels.
+    Returns `step_px`: step of the lattice, pixels.
     """
     target, steps = setup.scene.target, _FINER * setup.accuracy.phase_steps_per_px
     assert target is not None
@@ -239,26 +162,6 @@ def refined_minima(
     again, from the best of all known phases, at half the step before; at the finest step as long as values fall. Where
     pixels saturate, extremes are kinks, which are missed by slope times step: steps are halved until neighbors
     differ by little. It finds minima near good phases; it does not prove that no lower one lies elsewhere.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene and accuracy.
-    lattice : Phases
-        Known phases, which differ by more than symmetry.
-    step_px : float
-        Their distance along rows and columns, pixels.
-    values : ndarray of shape (n_values, n_lattice)
-        Functions of the phase at these.
-    evaluate : callable
-        From phases to the values there, ndarray of shape (n_values, n_phases).
-
-    Returns
-    -------
-    values : ndarray of shape (n_values,)
-        Smallest values.
-    phases : Phases
-        Phase of each smallest value.
     """
     target, finest, n_starts = setup.scene.target, setup.accuracy.finest_phase_px, _STARTS
     assert target is not None
@@ -312,7 +215,7 @@ def _known_or_evaluated(
     known: dict[tuple[float, ...], Float[Array, " _values"]],
     evaluate: Callable[[Phases], Float[Array, "_values phases"]],
 ) -> Float[Array, "values phases"]:
-    """Return values at phases, ndarray of shape (n_values, n_phases), and evaluate the unknown ones."""
+    """Return values at phases, and evaluate the unknown ones."""
     keys = phases.keys
     new = np.array([at for at, key in enumerate(keys) if key not in known], dtype=np.intp)
     if new.size:

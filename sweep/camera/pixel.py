@@ -120,7 +120,7 @@ class Pixel(Section):
 
     @property
     def knees(self) -> Float[Array, "2 knees"]:
-        """DN of the merged value, and codes, at 0 and at each knee, ndarray of shape (2, n_knees + 1)."""
+        """DN of the merged value, and codes, at 0 and at each knee."""
         return np.array([(0.0, 0.0), *self.companding]).T
 
     @property
@@ -178,41 +178,16 @@ def _read_as(pixel: Pixel) -> tuple[Pixel, ...]:
 
 
 def irradiance_factor(optics: Optics, magnification: float = 0.0, field_angle_rad: float = 0.0) -> float:
-    """Return the ratio of irradiance on the sensor to radiance of the scene.
+    """Return the ratio of irradiance on the sensor to radiance of the scene, sr.
 
     pi T cos^4 / (1 + 4 N^2 (1 + |m|)^2), the camera equation without the small-aperture approximation, as in ISETCam.
 
-    Parameters
-    ----------
-    optics : Optics
-        f-number and transmission.
-    magnification : float
-        0 for a distant scene.
-    field_angle_rad : float
-        Field angle, rad.
-
-    Returns
-    -------
-    float
-        Ratio, sr.
+    `magnification`: 0 for a distant scene.
     """
     cone = 1 + 4 * optics.f_number**2 * (1 + abs(magnification)) ** 2
     return math.pi * optics.transmission * math.cos(field_angle_rad) ** 4 / cone
 
 
 def unquantized(electrons: SameShape, pixel: Pixel) -> SameShape:
-    """Apply gain and pedestal without clipping or rounding.
-
-    Parameters
-    ----------
-    electrons : ndarray
-        Electrons.
-    pixel : Pixel
-        Gain and pedestal.
-
-    Returns
-    -------
-    ndarray of the same shape
-        Digital numbers, DN.
-    """
+    """Apply gain and pedestal without clipping or rounding; returns DN."""
     return np.asarray(electrons * pixel.dn_per_e + pixel.offset_dn)

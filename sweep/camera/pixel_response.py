@@ -38,22 +38,7 @@ class SplitLight:
 
     A pixel is a sum of parts, each at a distinct place behind the filter of one channel.
 
-    Parameters
-    ----------
-    values : ndarray of shape (n_places, n_functions)
-        Functions of the light at each distinct place.
-    shares : ndarray of shape (n_functions, n_wavelengths) or None
-        Share of each function in each wavelength; None if all wavelengths are equal.
-    factor : ndarray of shape (n_wavelengths,)
-        Factor of air and lens.
-    parts : ndarray of shape (n_parts,)
-        Weight of each part.
-    place : ndarray of int, shape (n_parts, n_cases, n_elements)
-        Place of each part.
-    through : ndarray of int, shape (n_parts, n_elements)
-        Channel whose filter each part has.
-    n_channels : int
-        Channels of the mosaic.
+    `shares`: share of each function in each wavelength; None if all wavelengths are equal.
     """
 
     values: Float[Array, "places functions"]
@@ -70,13 +55,7 @@ class SplitLight:
         return (*self.place.shape[1:], self.n_channels, self.factor.size)
 
     def whole(self) -> Float[Array, "cases pixels channels wavelengths"]:
-        """Return the array.
-
-        Returns
-        -------
-        ndarray of shape (n_cases, n_elements, n_channels, n_wavelengths)
-            Product of the factors.
-        """
+        """Return the array."""
         by_place = (self.values if self.shares is None else self.values @ self.shares) * self.factor
         result = np.zeros(self.shape)
         pixels = np.arange(self.place.shape[2])
@@ -99,14 +78,7 @@ class SplitLight:
 
         Results of one design do not depend on other designs, except for rounding.
 
-        Parameters
-        ----------
-        spectra : ndarray of shape (n_designs, n_channels, n_signals, n_wavelengths)
-            QE times signals.
-        channels : sequence of int
-            Channels of the second axis.
-        found : ndarray of shape (n_designs, n_cases, n_signals, n_elements)
-            Array that is changed.
+        `found`: array that is changed.
         """
         from .compiled import gather  # noqa: PLC0415  (compiled: kept off the start-up path)
 
@@ -115,20 +87,7 @@ class SplitLight:
         gather(np.ascontiguousarray(self._filtered_light(spectra)), self.parts, self.place, row[self.through], out)
 
     def folded(self, weights: Float[Array, "cases pixels"], channel: int) -> Float[Array, "cases wavelengths"]:
-        """Sum light through one channel's filter over the elements.
-
-        Parameters
-        ----------
-        weights : ndarray of shape (n_cases, n_elements)
-            Weight of each element.
-        channel : int
-            Index of the channel.
-
-        Returns
-        -------
-        ndarray of shape (n_cases, n_wavelengths)
-            Weighted sums.
-        """
+        """Sum light through one channel's filter over the elements."""
         by_place = np.zeros((len(weights), len(self.values)))
         for share, place, through in zip(self.parts, self.place, self.through, strict=True):
             at = np.flatnonzero(through == channel)
@@ -142,18 +101,9 @@ class SplitLight:
 class PixelResponse:
     """Weights of a scene.
 
-    Parameters
-    ----------
-    source : ndarray or SplitLight
-        `light`, as an array or in factors.
-    uniform : ndarray of shape (n_phases, n_elements, n_channels)
-        Weights of a uniform background, not dimmed by air or lens.
-    readout : ndarray of shape (n_phases, n_elements, n_channels)
-        Weight of each element in the value of each channel.
-    spread : ndarray of shape (n_phases, n_elements, n_channels)
-        Weight of its variance in that of the channel.
-    by_channel : bool
-        True if each element is a channel; else it is a pixel.
+    `source`: light, as an array or in factors; `uniform`: weights of a uniform background, not dimmed by air or lens;
+    `readout`: weight of each element in the value of each channel; `spread`: weight of its variance in that of the
+    channel; `by_channel`: True if each element is a channel; else it is a pixel.
     """
 
     source: Float[Array, "cases pixels channels _wavelengths"] | SplitLight
@@ -166,7 +116,7 @@ class PixelResponse:
     def light(self) -> Float[Array, "cases pixels signals wavelengths"]:
         """Light on each element through each channel's filter, relative to a uniform field on axis in clear air.
 
-        ndarray of shape (n_phases, n_elements, n_channels, n_wavelengths).
+        .
         """
         return self.source.whole() if isinstance(self.source, SplitLight) else self.source
 
@@ -177,18 +127,7 @@ class PixelResponse:
 
 
 def without_filters(setup: Setup) -> Setup:
-    """Return the setup without filters, which responses do not depend on.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-
-    Returns
-    -------
-    Setup
-        The same for all CFAs with equal tiles.
-    """
+    """Return the setup without filters, which responses do not depend on."""
     camera = setup.camera
     dark = {"qe": np.zeros_like(camera.qe), "clear_qe": np.zeros_like(camera.clear_qe)}
     return setup.with_camera(mosaic=camera.mosaic.without_filters, modified=(), technologies=(), **dark)
@@ -197,19 +136,8 @@ def without_filters(setup: Setup) -> Setup:
 def pixel_response(setup: Setup, phases: Phases | None, *, by_pixel: bool) -> PixelResponse:
     """Compute the pixel response at every wavelength of the grid, one field position after the other.
 
-    Parameters
-    ----------
-    setup : Setup
-        Camera, scene and accuracy.
-    phases : Phases or None
-        Sampling phases of a target; None if the light fills the field.
-    by_pixel : bool
-        Keep single pixels, for a nonlinear readout.
-
-    Returns
-    -------
-    PixelResponse
-        Weights.
+    `phases`: sampling phases of a target; None if the light fills the field; `by_pixel`: keep single pixels, for a
+    nonlinear readout.
     """
     wavelength_nm = setup.camera.grid.nodes_nm
     if setup.scene.field is not None:
@@ -247,20 +175,7 @@ class ChannelResponses:
         self._one_at_a_time = threading.Lock()
 
     def at(self, setup: Setup, phases: Phases) -> PixelResponse:
-        """Return the response at some phases.
-
-        Parameters
-        ----------
-        setup : Setup
-            Scene and camera.
-        phases : Phases
-            Sampling phases.
-
-        Returns
-        -------
-        PixelResponse
-            Weights of the channels.
-        """
+        """Return the response at some phases."""
         keys = phases.keys
         with self._one_at_a_time:
             new = [at for at, key in enumerate(keys) if key not in self._known]
@@ -282,37 +197,14 @@ _RESPONSES: Cache[bytes, PixelResponse] = Cache(8)
 
 
 def channel_responses(setup: Setup) -> ChannelResponses:
-    """Return the cache of the responses of a target's channels in a scene.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-
-    Returns
-    -------
-    ChannelResponses
-        The cache.
-    """
+    """Return the cache of the responses of a target's channels in a scene."""
     return _CHANNELS.get(hashlib.sha256(pickle.dumps(without_filters(setup))).digest(), ChannelResponses)
 
 
 def kept_response(setup: Setup, phases: Phases | None, *, by_pixel: bool) -> PixelResponse:
     """Return the pixel response at the phases of the scene; small ones are cached.
 
-    Parameters
-    ----------
-    setup : Setup
-        Camera, scene and accuracy.
-    phases : Phases or None
-        Sampling phases of the scene.
-    by_pixel : bool
-        Keep single pixels.
-
-    Returns
-    -------
-    PixelResponse
-        Weights.
+    `by_pixel`: keep single pixels.
     """
     heights = field_heights(setup)  # filters that move need more positions than those that do not
     count = 1 if phases is None else len(phases)

@@ -19,17 +19,8 @@ _OWN = "an effect of the study's own: always computed"
 class Choice:
     """One effect of a plan.
 
-    Parameters
-    ----------
-    effect : str
-        Name of the effect.
-    computed : bool
-        False if it is left out.
-    bound_dn : float or None
-        Upper bound on the change of any CSD without it, DN; 0 if it is inactive, None if no closed form is
-        known.
-    reason : str
-        Reason of the choice.
+    `computed`: False if it is left out; `bound_dn`: upper bound on the change of any CSD without it, DN; 0 if it is
+    inactive, None if no closed form is known.
     """
 
     effect: str
@@ -81,23 +72,8 @@ def plan_scene(
     Active effects with the smallest bounds are left out first. Effects of the readout come before the optics, whose
     bounds depend on them.
 
-    Parameters
-    ----------
-    scenario : str
-        Name of the scene.
-    boxes : sequence of Box
-        Designs of the scene, one box per design space.
-    tolerance_dn : float
-        Tolerance of any CSD, DN.
-    accuracy : Accuracy
-        Settings of the study.
-    for_noise : bool
-        Errors under noise are requested, which need every pixel and its readout.
-
-    Returns
-    -------
-    Plan
-        The plan.
+    `boxes`: designs of the scene, one box per design space; `for_noise`: errors under noise are requested, which need
+    every pixel and its readout.
     """
     choices = {name: _inactive(effect, boxes) for name, effect in EFFECTS.items()}
     active = [name for name, choice in choices.items() if choice is None]

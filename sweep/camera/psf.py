@@ -47,15 +47,7 @@ _MOST_AT_ONCE = 2_000_000
 def gauss_legendre(order: int) -> tuple[Float[Array, " order"], Float[Array, " order"]]:
     """Return nodes and weights of a Gauss-Legendre rule; cached, since long rules take milliseconds.
 
-    Parameters
-    ----------
-    order : int
-        Number of nodes.
-
-    Returns
-    -------
-    nodes, weights : ndarray[order]
-        Nodes between -1 and 1, and weights that add up to 2; not to be written.
+    Returns nodes between -1 and 1, and weights that add up to 2.
     """
     nodes, weights = np.polynomial.legendre.leggauss(order)
     return nodes, weights
@@ -67,17 +59,8 @@ def defocus_um(scenario: Scene, pitch_um: float) -> float:
     W20 = dz / (8 N^2), with dz the distance between the images of the target and of what is in focus (Goodman, 3rd
     edition, section 6.4, on a focusing error; here for an image close to the focal plane).
 
-    Parameters
-    ----------
-    scenario : Scene
-        Its target and optics; without a target, or a distance that is in focus, there is no defocus.
-    pitch_um : float
-        Pixel pitch, which gives the focal length, micrometers.
-
-    Returns
-    -------
-    float
-        W20, micrometers, never negative.
+    `scenario`: its target and optics; without a target, or a distance that is in focus, there is no defocus;
+    `pitch_um`: pixel pitch, which gives the focal length, micrometers.
     """
     target, focus_m = scenario.target, scenario.optics.focus_m
     if target is None or focus_m is None:
@@ -92,17 +75,7 @@ def defocus_um(scenario: Scene, pitch_um: float) -> float:
 def psf_problem(scenario: Scene, pixel: Pixel) -> tuple[tuple[str, ...], str, str, str] | None:
     """Return the reason why a target's image is not computed.
 
-    Parameters
-    ----------
-    scenario : Scene
-        Target and optics.
-    pixel : Pixel
-        Pitch.
-
-    Returns
-    -------
-    tuple or None
-        Key of the scenario, problem, value, and allowed values; None if it is computed.
+    None if it is computed.
     """
     target, optics = scenario.target, scenario.optics
     if target is None:
@@ -138,21 +111,8 @@ def otf(
       OTF = (2 / pi) (acos s - s sqrt(1 - s^2))
     (Goodman, chapter 6).
 
-    Parameters
-    ----------
-    frequency_per_um : ndarray[n_frequencies]
-        Spatial frequency in the image, cycles per micrometer.
-    wavelength_um : ndarray[n_wavelengths]
-        Wavelength, micrometers.
-    f_number : float
-        f-number of the lens.
-    w20_um : float
-        Defocus, micrometers: see `defocus_um`.
-
-    Returns
-    -------
-    ndarray[n_frequencies, n_wavelengths]
-        1 at frequency 0, 0 from the cutoff on, negative where the contrast is reversed.
+    `w20_um`: defocus, micrometers: see `defocus_um`. 1 at frequency 0, 0 from the cutoff on, negative where the
+    contrast is reversed.
     """
     s = np.minimum(frequency_per_um[:, None] * wavelength_um * f_number, 1.0)
     limit = np.arccos(s)
@@ -174,15 +134,7 @@ def _frequency_rule(
 ) -> tuple[Float[Array, " frequencies"], Float[Array, " frequencies"]]:
     """Return Gauss-Legendre rules side by side, up to the cutoff of the shortest wavelength.
 
-    Parameters
-    ----------
-    reach_um : float
-        The integrand's phase is at most 2 pi nu times this, micrometers.
-
-    Returns
-    -------
-    frequency_per_um, weight_per_um : ndarray[n_frequencies]
-        Nodes, ascending, and weights, both in cycles per micrometer.
+    Returns nodes, ascending, and weights, both in cycles per micrometer.
     """
     cutoff = 1 / (wavelength_um.min() * f_number)
     panels = 8 + int(cutoff * reach_um / _CYCLES_PER_PANEL)
@@ -196,18 +148,7 @@ def _hankel_sums(
     frequency_per_um: Float[Array, " frequencies"],
     spectrum: Float[Array, "frequencies functions"],
 ) -> Float[Array, "radii functions"]:
-    """Sum J0(2 pi r nu) times a spectrum over the frequencies.
-
-    Parameters
-    ----------
-    radius_um : ndarray[n_radii]
-    frequency_per_um : ndarray[n_frequencies]
-    spectrum : ndarray[n_frequencies, n]
-
-    Returns
-    -------
-    ndarray[n_radii, n]
-    """
+    """Sum J0(2 pi r nu) times a spectrum over the frequencies."""
     from scipy.special import j0  # noqa: PLC0415  (slow to import)
 
     angular = 2 * math.pi * frequency_per_um
@@ -221,10 +162,7 @@ def _chebyshev_nodes(reach_um: float, highest_per_um: float) -> Float[Array, " n
     J0(z x) has 2 J_k(z / 2)^2 of the Chebyshev polynomial of order k in 2 x^2 - 1, but for its sign (Graf's addition
     theorem, Abramowitz and Stegun, 9.1.79), which falls fast from k = z / 2 on.
 
-    Returns
-    -------
-    ndarray[n_nodes]
-        2 (r / reach)^2 - 1, the largest first.
+    Returns 2 (r / reach)^2 - 1, the largest first.
     """
     finest = math.pi * highest_per_um * reach_um
     n_nodes = math.ceil(finest + 6 * finest ** (1 / 3) + 8)
@@ -237,27 +175,9 @@ class DiscProfile:
     The images at neighboring wavelengths are nearly the same, so that some tens of functions of r make those at
     hundreds of wavelengths, but for rounding: a QR decomposition with pivoting finds them. Each is a cubic spline.
 
-    Parameters
-    ----------
-    radius_um : float
-        Radius of the disc's sharp image, micrometers.
-    reach_um : float
-        The table's largest distance from the disc's center, micrometers.
-    wavelength_um : ndarray[n_wavelengths]
-        Wavelengths, micrometers.
-    f_number : float
-        f-number of the lens.
-    w20_um : float
-        Defocus, micrometers: see `defocus_um`.
-
-    Attributes
-    ----------
-    spectrum : tuple of ndarray[n_frequencies], ndarray[n_frequencies, n_wavelengths]
-        Frequencies, ascending, 1/um, and the factor of J0(2 pi r nu) at each: h is the sum of their products.
-    highest_per_um : float
-        The highest of these frequencies, 1/um.
-    shares : ndarray[n_functions, n_wavelengths]
-        How much of each function is in h at each wavelength; the first functions matter most.
+    `w20_um`: defocus, micrometers: see `defocus_um`; `spectrum`: frequencies, ascending, 1/um, and the factor of J0(2
+    pi r nu) at each: h is the sum of their products; `shares`: how much of each function is in h at each wavelength;
+    the first functions matter most.
     """
 
     def __init__(
@@ -295,32 +215,15 @@ class DiscProfile:
     def at(self, r_um: SameShape) -> Float[Array, "*batch wavelengths"]:
         """Return the image at distances from the disc's center.
 
-        Parameters
-        ----------
-        r_um : ndarray[...]
-            Distances, micrometers, up to the table's reach.
-
-        Returns
-        -------
-        ndarray[..., n_wavelengths]
-            h, relative to a uniform field.
+        `r_um`: distances, micrometers, up to the table's reach. Returns h, relative to a uniform field.
         """
         return np.asarray(self._spline(r_um) @ self.shares, dtype=float)
 
     def pixel_means(self, places_um: Float[Array, "places 2"], half_um: float) -> Float[Array, "places functions"]:
         """Return means of the functions of the radius over square pixels, by a Gauss-Legendre rule along each side.
 
-        Parameters
-        ----------
-        places_um : ndarray[n, 2]
-            Centers of the pixels from the disc's center, micrometers; within the table's reach.
-        half_um : float
-            Half of the side of a pixel's light-sensitive square, micrometers.
-
-        Returns
-        -------
-        ndarray[n, n_functions]
-            Means of each function; times `shares` those of h.
+        `places_um`: centers of the pixels from the disc's center, micrometers; within the table's reach. Times `shares`
+        those of h.
         """
         from .compiled import means_of_cubic  # noqa: PLC0415  (compiled: kept off the start-up path)
 
@@ -340,21 +243,7 @@ def profile(
 ) -> DiscProfile:
     """Return the image of a disc; recent ones are cached.
 
-    Parameters
-    ----------
-    radius_um, reach_um : float
-        Radius of the disc's sharp image, and largest distance from its center, micrometers.
-    wavelengths_um : tuple of float
-        Wavelengths, micrometers.
-    f_number : float
-        f-number of the lens.
-    w20_um : float
-        Defocus, micrometers.
-
-    Returns
-    -------
-    DiscProfile
-        The image.
+    `radius_um`, `reach_um`: radius of the disc's sharp image, and largest distance from its center, micrometers.
     """
     key = (radius_um, reach_um, wavelengths_um, f_number, w20_um)
     return PROFILES.get(key, lambda: DiscProfile(radius_um, reach_um, np.array(wavelengths_um), f_number, w20_um))
@@ -363,17 +252,7 @@ def profile(
 def psf_knots_nm(wavelength_nm: PerWavelength, step_nm: float) -> PerKnot:
     """Return the wavelengths at which images are computed; between them they are interpolated linearly.
 
-    Parameters
-    ----------
-    wavelength_nm : ndarray[n_wavelengths]
-        An equidistant grid, nm.
-    step_nm : float
-        Distance of the wavelengths, nm; 0 asks for all of the grid.
-
-    Returns
-    -------
-    ndarray[n_knots]
-        Every `step_nm` from the first wavelength on, and the last one, nm; the grid itself where it is no finer.
+    `step_nm`: distance of the wavelengths, nm; 0 asks for all of the grid.
     """
     if wavelength_nm.size < 3 or wavelength_nm[1] - wavelength_nm[0] >= step_nm:
         return wavelength_nm

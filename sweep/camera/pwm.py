@@ -14,18 +14,6 @@ def extremes(drive: PwmDrive, exposure_s: PerDesign) -> tuple[PerDesign, PerDesi
 
     The light is on for `duty` of each period, 1 / duty as bright as its mean. In n whole periods and a rest r it is on
     for n duty and, in the rest, for max(0, r - (1 - duty)) to min(r, duty).
-
-    Parameters
-    ----------
-    drive : PwmDrive
-        Duty and frequency.
-    exposure_s : ndarray
-        Exposure time, s.
-
-    Returns
-    -------
-    least, most : ndarray of the same shape
-        Light relative to its mean.
     """
     periods = exposure_s * drive.frequency_hz
     whole = np.floor(periods)
@@ -38,17 +26,7 @@ def extremes(drive: PwmDrive, exposure_s: PerDesign) -> tuple[PerDesign, PerDesi
 def smallest(drive: PwmDrive, shortest_s: float, longest_s: float) -> float:
     """Return the least relative light of any exposure in a range: at its ends, or where a dark interval was just added.
 
-    Parameters
-    ----------
-    drive : PwmDrive
-        Duty and frequency.
-    shortest_s, longest_s : float
-        Range of the exposure time, s.
-
-    Returns
-    -------
-    float
-        Light relative to its mean.
+    Returns light relative to its mean.
     """
     return float(extremes(drive, _candidates(drive, shortest_s, longest_s, 1 - drive.duty))[0].min())
 
@@ -56,17 +34,7 @@ def smallest(drive: PwmDrive, shortest_s: float, longest_s: float) -> float:
 def largest(drive: PwmDrive, shortest_s: float, longest_s: float) -> float:
     """Return the most relative light of any exposure in a range: at its ends, or where one more pulse just fits.
 
-    Parameters
-    ----------
-    drive : PwmDrive
-        Duty and frequency.
-    shortest_s, longest_s : float
-        Range of the exposure time, s.
-
-    Returns
-    -------
-    float
-        Light relative to its mean.
+    Returns light relative to its mean.
     """
     return float(extremes(drive, _candidates(drive, shortest_s, longest_s, drive.duty))[1].max())
 
@@ -78,20 +46,7 @@ def _candidates(drive: PwmDrive, shortest_s: float, longest_s: float, rest: floa
 
 
 def on_time(drive: PwmDrive, periods: Float[Array, " *batch"] | float) -> Float[Array, " ..."]:
-    """Return how long the light has been on since it was switched on, at the start of a period.
-
-    Parameters
-    ----------
-    drive : PwmDrive
-        Duty and frequency.
-    periods : ndarray
-        Time, periods.
-
-    Returns
-    -------
-    ndarray of the same shape
-        Periods.
-    """
+    """Return how long the light has been on since it was switched on, at the start of a period."""
     whole = np.floor(periods)
     return np.asarray(whole * drive.duty + np.minimum(periods - whole, drive.duty), dtype=float)
 
@@ -101,19 +56,7 @@ def light_in(
 ) -> Float[Array, " ..."]:
     """Return the light in an exposure relative to its mean.
 
-    Parameters
-    ----------
-    drive : PwmDrive
-        Duty and frequency.
-    start : ndarray
-        Start of the exposure after the start of a pulse, periods.
-    length : ndarray, broadcast to it
-        Exposure time, periods.
-
-    Returns
-    -------
-    ndarray
-        Relative light.
+    `start`: start of the exposure after the start of a pulse, periods; `length`: exposure time, periods.
     """
     return np.asarray((on_time(drive, start + length) - on_time(drive, start)) / (length * drive.duty), dtype=float)
 
@@ -121,7 +64,7 @@ def light_in(
 def _windows(
     setup: Setup, exposure_s: PerValue
 ) -> tuple[Float[Array, "windows values"], Float[Array, "windows values"]]:
-    """Return start and length of each exposure of an HDR pixel, ndarray of shape (n_exposures, n_designs), periods."""
+    """Return start and length of each exposure of an HDR pixel, periods."""
     drive = setup.scene.drive
     assert drive is not None
     captures = [exposure.capture for exposure in setup.camera.pixel.exposures]
@@ -135,19 +78,7 @@ def phases_of(setup: Setup, exposure_s: PerDesign, between: int) -> Float[Array,
 
     The light in each exposure is linear between two such phases, so that its extremes are at them.
 
-    Parameters
-    ----------
-    setup : Setup
-        Drive and HDR pixel.
-    exposure_s : ndarray of shape (n_designs,)
-        Exposure time of the scene, s.
-    between : int
-        Number of phases between two.
-
-    Returns
-    -------
-    ndarray of shape (n_designs, n_phases)
-        Start of the first exposure after the start of a pulse, periods, ascending.
+    `setup`: drive and HDR pixel. Returns start of the first exposure after the start of a pulse, periods, ascending.
     """
     drive = setup.scene.drive
     assert drive is not None
@@ -164,19 +95,7 @@ def exposure_scales(
 ) -> Float[Array, "captures designs moments"]:
     """Return the light in each exposure of an HDR pixel relative to its mean, at phases of the pulse.
 
-    Parameters
-    ----------
-    setup : Setup
-        Drive, pixel and accuracy.
-    exposure_s : ndarray of shape (n_designs,)
-        Exposure time of the scene, s.
-    moments : ndarray of shape (n_moments,), optional
-        Phases, in periods, instead of those of the accuracy.
-
-    Returns
-    -------
-    ndarray of shape (n_exposures, n_designs, n_moments)
-        Relative light.
+    `setup`: drive, pixel and accuracy; `moments`: phases, in periods, instead of those of the accuracy.
     """
     drive = setup.scene.drive
     if drive is None or not setup.computes("flicker"):
@@ -197,19 +116,7 @@ def scales(
     Behind a linear readout the extremes are at the two ends. Behind a nonlinear one the distance of two signals may be
     smallest at any moment between them.
 
-    Parameters
-    ----------
-    setup : Setup
-        Drive and accuracy.
-    exposure_s : ndarray of shape (n_designs,)
-        Exposure time, s.
-    moments : ndarray of shape (n_moments,), optional
-        Moments from 0 (least light) to 1 (most light), instead of those of the accuracy.
-
-    Returns
-    -------
-    ndarray of shape (n_designs, n_moments)
-        Relative light.
+    `moments`: moments from 0 (least light) to 1 (most light), instead of those of the accuracy.
     """
     drive = setup.scene.drive
     if drive is None or not setup.computes("flicker"):

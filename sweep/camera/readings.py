@@ -33,16 +33,9 @@ _LEAST = 1e-25
 class Bins:
     """Bins of merged values: an eighth of the noise of the capture that is used at them, or codes.
 
-    Parameters
-    ----------
-    edges_e : ndarray of shape (n_captures,)
-        Merged value from which on each capture is used, electrons of a pixel of full sensitivity, from 0 on.
-    light : ndarray of shape (n_captures,)
-        Relative light of each capture.
-    dark_e : ndarray of shape (n_captures,)
-        Electrons whose photons have the variance of its read noise.
-    knees : ndarray of shape (2, n_knees)
-        Electrons and codes of a companded pixel, from (0, 0) on; of shape (2, 1) if it is none.
+    `edges_e`: merged value from which on each capture is used, electrons of a pixel of full sensitivity, from 0 on;
+    `dark_e`: electrons whose photons have the variance of its read noise; `knees`: electrons and codes of a companded
+    pixel, from (0, 0) on; of shape (2, 1) if it is none.
     """
 
     edges_e: Float[Array, " captures"]
@@ -52,20 +45,7 @@ class Bins:
 
     @classmethod
     def of(cls, pixel: Pixel, light: Float[Array, " captures"]) -> Bins:
-        """Return the bins of a pixel.
-
-        Parameters
-        ----------
-        pixel : Pixel
-            HDR pixel.
-        light : ndarray of shape (n_captures,)
-            Relative light of each capture.
-
-        Returns
-        -------
-        Bins
-            Bins.
-        """
+        """Return the bins of a pixel."""
         read = [(*each, a) for *each, a in zip(pixel.read_as, limits_dn(pixel), light, strict=True)]
         ends = [(limit - one.offset_dn) / (one.dn_per_e * a) for one, limit, a in read if limit is not None]
         dark = np.array([max(one.read_noise_e**2, 1.0) / a for one, _, a in read])
@@ -86,15 +66,7 @@ class Bins:
     def number(self, electrons: PerValue) -> Int[IndexArray, " values"]:
         """Return the bins of merged values.
 
-        Parameters
-        ----------
-        electrons : ndarray
-            Merged values, electrons of a pixel of full sensitivity.
-
-        Returns
-        -------
-        ndarray of int, same shape
-            Bins; those below 0 mirror those above.
+        `electrons`: merged values, electrons of a pixel of full sensitivity. Those below 0 mirror those above.
         """
         if self.knees.shape[1] > 1:
             return np.asarray(np.floor(np.interp(electrons, *self.knees) + 0.5), dtype=np.intp)
@@ -107,15 +79,7 @@ class Bins:
     def value(self, number: Int[IndexArray, " values"] | PerValue) -> PerValue:
         """Return the values in the middle of bins.
 
-        Parameters
-        ----------
-        number : ndarray
-            Bins; half a bin less is a bin's lower edge.
-
-        Returns
-        -------
-        ndarray of the same shape
-            Electrons of a pixel of full sensitivity.
+        `number`: bins; half a bin less is a bin's lower edge. Returns electrons of a pixel of full sensitivity.
         """
         if self.knees.shape[1] > 1:
             return np.asarray(np.interp(number, *self.knees[::-1]), dtype=float)
@@ -132,20 +96,9 @@ def nodes_of(
 ) -> tuple[Float[Array, " roots"], Bool[BoolArray, " roots"]]:
     """Return expected electrons at which a merged value is tabulated: one in each eighth of its noise.
 
-    Parameters
-    ----------
-    pixel : Pixel
-        HDR pixel.
-    light : ndarray of shape (n_exposures,)
-        Light of each exposure relative to that of a pixel of full sensitivity.
-
-    Returns
-    -------
-    roots_e : ndarray of shape (n_roots,)
-        Squares of the multiples of `ROOT_STEP`, up to where all is saturated, electrons.
-    is_node : ndarray of bool, same shape
-        True for nodes. A step of the root is an eighth of the noise where all light is read, and less where a small
-        photodiode is.
+    `light`: light of each exposure relative to that of a pixel of full sensitivity. Returns `roots_e`: squares of the
+    multiples of `ROOT_STEP`, up to where all is saturated, electrons; `is_node`: True for nodes. A step of the root is
+    an eighth of the noise where all light is read, and less where a small photodiode is.
     """
     roots_e = np.square(np.arange(n_roots(pixel, light), dtype=float) * ROOT_STEP)
     is_node = np.ones(roots_e.size, dtype=bool)
@@ -157,20 +110,7 @@ def nodes_of(
 
 
 def n_roots(pixel: Pixel, light: Float[Array, " captures"]) -> int:
-    """Return the number of multiples of `ROOT_STEP` up to the root of the electrons from which on all is saturated.
-
-    Parameters
-    ----------
-    pixel : Pixel
-        HDR pixel.
-    light : ndarray of shape (n_exposures,)
-        Relative light.
-
-    Returns
-    -------
-    int
-        Number.
-    """
+    """Return the number of multiples of `ROOT_STEP` up to the root of the electrons from which on all is saturated."""
     return math.ceil(math.sqrt(float((saturating_e(pixel) / light).max())) / ROOT_STEP) + 2
 
 
@@ -178,22 +118,7 @@ def n_roots(pixel: Pixel, light: Float[Array, " captures"]) -> int:
 class Readings:
     """Distribution of the readings of each number of electrons, for all captures of an HDR pixel.
 
-    Parameters
-    ----------
-    bins : Bins
-        Bins of a pixel of full sensitivity.
-    exposure : ndarray of int, shape (n_captures,)
-        Exposure of each capture.
-    passed : ndarray of shape (n_captures, n_exposures, n_counts)
-        Probability that all captures of an exposure before this one are not usable, by count.
-    starts : ndarray of int, shape (n_captures, n_counts + 1)
-        Start of the entries of each count.
-    columns, shares : ndarray of shape (n_entries,)
-        Bins from `first` on, and probabilities that the capture is the first usable one of its exposure and reads it.
-    first : int
-        The lowest bin.
-    n_bins : int
-        Number of bins.
+    `bins`: bins of a pixel of full sensitivity.
     """
 
     bins: Bins
@@ -209,15 +134,7 @@ class Readings:
 def countable(pixel: Pixel) -> bool:
     """Return whether merged values are summed up.
 
-    Parameters
-    ----------
-    pixel : Pixel
-        HDR pixel.
-
-    Returns
-    -------
-    bool
-        True for `merge: saturated`, unless wells, PRNU or read noise are very large.
+    True for `merge: saturated`, unless wells, PRNU or read noise are very large.
     """
     well_e = max(capture.well_e for capture in pixel.read_as)
     sums = 2 * _REACH * math.sqrt(well_e) * (1 + 2 * _REACH * math.sqrt(1 + pixel.prnu**2 * well_e) * bool(pixel.prnu))
@@ -229,17 +146,8 @@ def countable(pixel: Pixel) -> bool:
 def readings_of(pixel: Pixel, light: tuple[float, ...]) -> Readings:
     """Compute the distribution of the readings of each number of electrons.
 
-    Parameters
-    ----------
-    pixel : Pixel
-        HDR pixel with `merge: saturated`.
-    light : tuple of float
-        Light of each exposure relative to that of a pixel of full sensitivity.
-
-    Returns
-    -------
-    Readings
-        The distributions.
+    `pixel`: HDR pixel with `merge: saturated`; `light`: light of each exposure relative to that of a pixel of full
+    sensitivity.
     """
     from scipy.sparse import csr_matrix  # noqa: PLC0415  (slow to import: kept off the start-up path)
 

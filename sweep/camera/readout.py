@@ -27,22 +27,7 @@ _MANY = 50_000
 
 
 def draws_dn(electrons: SameShape, pixel: Pixel, rng: np.random.Generator) -> SameShape:
-    """Draw one readout of each pixel (Monte Carlo), with its own gain error.
-
-    Parameters
-    ----------
-    electrons : ndarray
-        Expected electrons.
-    pixel : Pixel
-        Full well, gain, noise and ADC.
-    rng : numpy.random.Generator
-        Source of random numbers.
-
-    Returns
-    -------
-    ndarray of the same shape
-        Digital numbers, DN.
-    """
+    """Draw one readout of each pixel (Monte Carlo), with its own gain error."""
     # In place: to give memory to an array of millions of pixels takes as long as a sum over them.
     expected = rng.standard_normal(electrons.shape)
     expected *= pixel.prnu
@@ -62,19 +47,11 @@ def draws_dn(electrons: SameShape, pixel: Pixel, rng: np.random.Generator) -> Sa
 class NoisyReadout:
     """Readout with noise.
 
-    Parameters
-    ----------
-    mean, variance : ndarray of shape (n_designs, n_cases, n_signals, n_channels)
-        Mean, DN, and variance, DN^2, of each channel.
-    gaussian : ndarray of bool, same shape
-        True if the noise may be taken as Gaussian: no pixel is cut by the full well or an end of the ADC,
-        and read noise dithers each pixel (0.7 DN) or the deviation is at least 4 steps of the pixel that
-        weighs most. In random pixels and pairs the error of Gaussians was then never less than 1 / 1.2 of
-        the exact one, down to 1e-12 (`tests/metrics/test_confusion.py`): evidence, not a proof.
-    reach_dn : ndarray, same shape
-        Largest distance of a pixel's number from its mean with a probability above 1e-15, DN.
-    exposure_s : ndarray of shape (n_designs,)
-        Exposure time, s.
+    `mean`, `variance`: mean, DN, and variance, DN^2, of each channel; `gaussian`: True if the noise may be taken as
+    Gaussian: no pixel is cut by the full well or an end of the ADC, and read noise dithers each pixel (0.7 DN) or the
+    deviation is at least 4 steps of the pixel that weighs most. In random pixels and pairs the error of Gaussians was
+    then never less than 1 / 1.2 of the exact one, down to 1e-12 (`tests/metrics/test_confusion.py`): evidence, not a
+    proof.
     """
 
     mean: DesignCases
@@ -87,20 +64,7 @@ class NoisyReadout:
 def is_cut(
     electrons: Float[Array, "captures designs signals pixels"], pixel: Pixel
 ) -> Float[Array, "captures designs signals pixels"]:
-    """Return 1 where the full well or an end of the ADC cuts a pixel's noise, else 0.
-
-    Parameters
-    ----------
-    electrons : ndarray
-        Expected electrons.
-    pixel : Pixel
-        Full well, gain, noise and ADC.
-
-    Returns
-    -------
-    ndarray of the same shape
-        0 or 1.
-    """
+    """Return 1 where the full well or an end of the ADC cuts a pixel's noise, else 0."""
     low, high = table.unclipped_e(pixel)
     return ((electrons < low) | (electrons > high)).astype(float)
 
@@ -113,61 +77,22 @@ def is_gaussian(
 ) -> Bool[BoolArray, "designs cases signals channels"]:
     """Return whether the noise of a channel may be taken as Gaussian; see `NoisyReadout`.
 
-    Parameters
-    ----------
-    variance : ndarray
-        Variance of the channel, DN^2.
-    heaviest : ndarray
-        Largest weight of a pixel in the channel.
-    cut : ndarray of bool
-        True where a pixel of the channel is cut.
-    pixel : Pixel
-        Gain and read noise.
-
-    Returns
-    -------
-    ndarray of bool
-        True where the noise is Gaussian.
+    `variance`: of the channel, DN^2; `heaviest`: largest weight of a pixel in it; `cut`: True where one of its pixels
+    is cut.
     """
     dithered = pixel.dn_per_e * pixel.read_noise_e >= DITHERED_DN
     return np.asarray(~cut & (dithered | (variance >= MANY_STEPS * heaviest**2)), dtype=bool)
 
 
 def reach_dn(electrons: Float[Array, "*batch pixels"], pixel: Pixel) -> Float[Array, "*batch 1"]:
-    """Return the largest distance of a pixel's number from its mean with a probability above 1e-15.
-
-    Parameters
-    ----------
-    electrons : ndarray of shape (..., n_pixels)
-        Expected electrons.
-    pixel : Pixel
-        Full well, gain, noise and ADC.
-
-    Returns
-    -------
-    ndarray of shape (..., 1)
-        Distance, DN, for the brightest pixel.
-    """
+    """Return the largest distance of a pixel's number from its mean with a probability above 1e-15."""
     reach_e = 9 * (np.sqrt(electrons) + pixel.prnu * electrons + pixel.read_noise_e) + 27
     reach = np.minimum(pixel.dn_per_e * reach_e + 1, float(pixel.full_scale_dn))
     return np.asarray(reach.max(axis=-1, keepdims=True), dtype=float)
 
 
 def capture_light(setup: Setup, response: PixelResponse) -> Float[Array, "captures pixels"]:
-    """Return the light of each exposure of an HDR pixel relative to that of a pixel of full sensitivity.
-
-    Parameters
-    ----------
-    setup : Setup
-        Camera.
-    response : PixelResponse
-        Elements, each of one channel.
-
-    Returns
-    -------
-    ndarray of shape (n_exposures, n_elements)
-        Relative electrons.
-    """
+    """Return the light of each exposure of an HDR pixel relative to that of a pixel of full sensitivity."""
     channels = setup.camera.mosaic.channels
     of_element = [channels[at] for at in response.readout.max(axis=0).argmax(axis=1)]
     captures = [exposure.capture for exposure in setup.camera.pixel.exposures]
@@ -176,15 +101,7 @@ def capture_light(setup: Setup, response: PixelResponse) -> Float[Array, "captur
 
 
 class Readout:
-    """Readout of the elements of a pixel response.
-
-    Parameters
-    ----------
-    setup : Setup
-        Pixel, scene and effects.
-    response : PixelResponse
-        Weights of the elements in each channel.
-    """
+    """Readout of the elements of a pixel response."""
 
     def __init__(self, setup: Setup, response: PixelResponse) -> None:
         self.setup = setup
@@ -202,17 +119,9 @@ class Readout:
         return one
 
     def transfer(self, electrons: Float[Array, "... pixels"]) -> Float[Array, "... pixels"]:
-        """Convert expected electrons to digital numbers; under noise, to their means.
+        """Convert expected electrons to digital numbers; under noise, to their means, DN.
 
-        Parameters
-        ----------
-        electrons : ndarray
-            Expected electrons of the elements; of an HDR pixel those of each exposure, on the first axis.
-
-        Returns
-        -------
-        ndarray of the shape of the elements
-            Digital numbers, DN.
+        `electrons`: expected electrons of the elements; of an HDR pixel those of each exposure, on the first axis.
         """
         setup, pixel = self.setup, self.pixel
         noisy = setup.scene.noise is not None
@@ -260,65 +169,25 @@ class Readout:
         return numbers
 
     def capture_light_of(self, electrons: Float[Array, "captures ... pixels"]) -> Float[Array, "captures ... pixels"]:
-        """Return the relative light of exposures, broadcast to their electrons.
-
-        Parameters
-        ----------
-        electrons : ndarray of shape (n_exposures, ..., n_elements)
-            Expected electrons.
-
-        Returns
-        -------
-        ndarray of shape (n_exposures, 1, ..., n_elements)
-            Electrons relative to those of a pixel of full sensitivity.
-        """
+        """Return the relative light of exposures, broadcast to their electrons."""
         shape = (len(electrons), *(1,) * (electrons.ndim - 2), electrons.shape[-1])
         return self.capture_light.reshape(shape)
 
-    def variance_dn(
-        self, electrons: Float[Array, "captures designs signals pixels"]
-    ) -> Float[Array, "captures designs signals pixels"]:
-        """Return the variance of the digital numbers, with rounding.
-
-        Parameters
-        ----------
-        electrons : ndarray
-            Expected electrons of the elements.
-
-        Returns
-        -------
-        ndarray of the same shape
-            Variance, DN^2.
-        """
+    def variance_dn(self, electrons: SameShape) -> SameShape:
+        """Return the variance of the digital numbers, with rounding, DN^2."""
         return table.variance(electrons, self.pixel)
 
     def folded(self, dn: Float[Array, "designs ... pixels"]) -> Float[Array, "designs ... channels"]:
-        """Combine the elements to channels.
+        """Combine the elements to channels, DN.
 
-        Parameters
-        ----------
-        dn : ndarray of shape (n_designs, n_cases, n_signals, n_elements)
-            Digital numbers, DN.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, n_cases, n_signals, n_channels)
-            Digital numbers of the channels, DN.
+        `dn`: digital numbers, DN.
         """
         return dn if self.by_channel else self._weighed(dn, self.weights)
 
     def spread(self, variance: DesignPixels) -> DesignCases:
-        """Combine variances of the elements to those of the channels.
+        """Combine variances of the elements to those of the channels, DN^2.
 
-        Parameters
-        ----------
-        variance : ndarray of shape (n_designs, n_cases, n_signals, n_elements)
-            Variance, DN^2.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, n_cases, n_signals, n_channels)
-            Variance of the channels, DN^2.
+        `variance`: variance, DN^2.
         """
         return self._weighed(variance, self.spread_weights)
 
@@ -327,15 +196,7 @@ class Readout:
     ) -> tuple[DesignCases, DesignCases, Bool[BoolArray, "designs cases signals channels"], DesignCases]:
         """Read out a block with noise.
 
-        Parameters
-        ----------
-        electrons : ndarray of shape (n_designs, n_cases, n_signals, n_elements)
-            Expected electrons; elements are pixels. Of an HDR pixel those of each exposure, on the first axis.
-
-        Returns
-        -------
-        mean, variance, gaussian, reach_dn : ndarray
-            As in `NoisyReadout`.
+        `electrons`: expected electrons; elements are pixels. Of an HDR pixel those of each exposure, on the first axis.
         """
         if self.pixel.captures:
             merged = merge.merged(electrons, self.capture_light_of(electrons), self.pixel)
@@ -352,17 +213,7 @@ class Readout:
     def channels_of(self, pixels: Float[Array, "signals pixels"], phase_index: int) -> Float[Array, "signals channels"]:
         """Return the channels from their pixels at one sampling phase.
 
-        Parameters
-        ----------
-        pixels : ndarray of shape (n, n_pixels)
-            Values of the pixels of `ForwardModel.pixel_electrons`.
-        place : int
-            Index of the sampling phase.
-
-        Returns
-        -------
-        ndarray of shape (n, n_channels)
-            Readout of each channel.
+        `pixels`: values of the pixels of `ForwardModel.pixel_electrons`.
         """
         setup = self.setup
         if setup.scene.target is None:
@@ -386,7 +237,7 @@ class Readout:
         return tuple(np.flatnonzero(channels == at) for at in range(len(setup.camera.mosaic.channels)))
 
     def _weighed(self, values: DesignPixels, weights: Float[Array, "_positions pixels channels"]) -> DesignCases:
-        """Sum over the elements with weights, ndarray of shape (n_cases, n_elements, n_channels)."""
+        """Sum over the elements with weights."""
         repeats = values.shape[1] // self.n_cases
         return np.asarray(values @ np.repeat(weights, repeats, axis=0))
 

@@ -23,17 +23,8 @@ def rounded(dn: SameShape, pixel: Pixel) -> SameShape:
     The whole part of the pedestal is added after rounding, so that values with and without a whole pedestal differ by
     exactly that.
 
-    Parameters
-    ----------
-    dn : ndarray
-        Unrounded values without pedestal, DN.
-    pixel : Pixel
-        Pedestal and bits.
-
-    Returns
-    -------
-    ndarray of the same shape
-        Digital numbers, DN.
+    `dn`: without pedestal, DN. The whole part of the pedestal is added after rounding, so that values with and without
+    a whole pedestal differ by exactly that.
     """
     whole = math.floor(pixel.offset_dn)
     steps = np.asarray(dn + (pixel.offset_dn - whole), dtype=float)

@@ -21,12 +21,7 @@ from .setup import Setup
 class Window:
     """Pixels around a light for some phases, with a margin of one pixel that has no weight.
 
-    Parameters
-    ----------
-    channel : ndarray of int, shape (rows, columns)
-        Channel of each pixel.
-    dx, dy : ndarray of shape (n_cases, rows, columns)
-        Distance from the light's center along columns and rows, pixels.
+    `channel`: channel of each pixel; `dx`, `dy`: distance from the light's center along columns and rows, pixels.
     """
 
     channel: Int[IndexArray, "rows columns"]
@@ -35,50 +30,24 @@ class Window:
 
     @property
     def columns(self) -> Float[Array, "rows columns"]:
-        """`dx` of each column, ndarray of shape (n_cases, columns)."""
+        """`dx` of each column."""
         return np.ascontiguousarray(self.dx[:, 0, :])
 
     @property
     def rows(self) -> Float[Array, "rows columns"]:
-        """`dy` of each row, ndarray of shape (n_cases, rows)."""
+        """`dy` of each row."""
         return np.ascontiguousarray(self.dy[:, :, 0])
 
 
 def radii_px(setup: Setup, target: Target) -> tuple[float, float]:
-    """Return the radii of light and readout; the readout reaches a pixel of every channel.
-
-    Parameters
-    ----------
-    setup : Setup
-        Mosaic.
-    target : Target
-        Light.
-
-    Returns
-    -------
-    light_px, readout_px : float
-        Radii, pixels.
-    """
+    """Return the radii of light and readout; the readout reaches a pixel of every channel."""
     radius = target.object_resolution_px / 2
     rows, columns = setup.camera.mosaic.indices.shape
     return radius, max(radius, math.hypot(rows, columns) / 2)
 
 
 def reach_px(setup: Setup, target: Target) -> float:
-    """Return the largest distance along a row or column of a pixel with a weight.
-
-    Parameters
-    ----------
-    setup : Setup
-        Mosaic.
-    target : Target
-        Light and readout.
-
-    Returns
-    -------
-    float
-        Distance from the light's center, pixels.
-    """
+    """Return the largest distance along a row or column of a pixel with a weight."""
     if target.readout == "mean":
         return radii_px(setup, target)[1] + 0.5
     return float(max(setup.camera.mosaic.indices.shape))
@@ -87,19 +56,7 @@ def reach_px(setup: Setup, target: Target) -> float:
 def window(mosaic: Mosaic, phases_px: Float[Array, "cases 2"], reach_px: float) -> Window:
     """Return all pixels near the centers of the light.
 
-    Parameters
-    ----------
-    mosaic : Mosaic
-        Tile.
-    phases_px : ndarray of shape (n_cases, 2)
-        Centers as (column, row), pixels.
-    reach_px : float
-        Distance from the centers, pixels.
-
-    Returns
-    -------
-    Window
-        Pixels, with the margin.
+    `phases_px`: centers as (column, row), pixels.
     """
     low = np.floor(phases_px.min(axis=0) - reach_px).astype(int) - 1
     high = np.ceil(phases_px.max(axis=0) + reach_px).astype(int) + 1
@@ -115,21 +72,7 @@ def window(mosaic: Mosaic, phases_px: Float[Array, "cases 2"], reach_px: float) 
 def mean_weights(window: Window, half: float, readout_px: float, n_channels: int) -> Float[Array, "cases rows columns"]:
     """Return the weight of each pixel in the mean of its channel.
 
-    Parameters
-    ----------
-    window : Window
-        Pixels around the light.
-    half : float
-        Half of the side of a pixel's light-sensitive square, pixels.
-    readout_px : float
-        Radius of the readout, pixels.
-    n_channels : int
-        Channels of the mosaic.
-
-    Returns
-    -------
-    ndarray of shape (n_cases, rows, columns)
-        Weights; those of each channel sum to 1.
+    `half`: half of the side of a pixel's light-sensitive square, pixels. The weights of each channel sum to 1.
     """
     from .compiled import covered_by_disc  # noqa: PLC0415  (compiled: kept off the start-up path)
 
@@ -146,19 +89,8 @@ def center_weights(window: Window, home: Float[Array, "cases 2"], mosaic: Mosaic
     Normalized convolution with a tent as wide as the tile, (1 - |dx| / columns)(1 - |dy| / rows), which for a Bayer
     tile is bilinear interpolation.
 
-    Parameters
-    ----------
-    window : Window
-        Pixels around the light.
-    home : ndarray of shape (n_cases, 2)
-        Pixel that is read out, as (column, row) from the light's center, pixels.
-    mosaic : Mosaic
-        Tile.
-
-    Returns
-    -------
-    ndarray of shape (n_cases, rows, columns)
-        Weights; those of each channel sum to 1.
+    `home`: pixel that is read out, as (column, row) from the light's center, pixels. The weights of each channel sum to
+    1.
     """
     # From pixel to pixel: whole numbers, so that equal weights are equal to the last bit.
     dx, dy = (np.rint(a - home[:, axis, None, None]) for axis, a in enumerate((window.dx, window.dy)))
@@ -176,19 +108,7 @@ def with_crosstalk(
 ) -> Float[Array, "cases rows columns *batch"]:
     """Mix each pixel with its neighbors: (1 - share) of its own light and share / 4 of each neighbor's.
 
-    Parameters
-    ----------
-    light : ndarray of shape (n_cases, rows, columns, ...)
-        Light of the pixels.
-    share : float
-        Crosstalk, 0 to 1.
-    periodic : bool
-        Continue the tile of a uniform field at its other side; else nothing lies beyond the border.
-
-    Returns
-    -------
-    ndarray of the same shape
-        Light with crosstalk.
+    `periodic`: continue the tile of a uniform field at its other side; else nothing lies beyond the border.
     """
     mixed = (1 - share) * light
     given = share / 4 * light
@@ -206,14 +126,6 @@ def with_crosstalk(
 def crosstalk_share(setup: Setup) -> float:
     """Return the share of a pixel's light that comes through the filters of its neighbors.
 
-    Parameters
-    ----------
-    setup : Setup
-        Pixel and effects.
-
-    Returns
-    -------
-    float
-        0 if crosstalk is left out.
+    0 if crosstalk is left out.
     """
     return setup.camera.pixel.crosstalk if setup.computes("crosstalk") else 0.0

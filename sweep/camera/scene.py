@@ -66,18 +66,7 @@ class Geometry(Section):
         return self.width_px / self.fov_deg * angle_deg
 
     def focal_length_um(self, pitch_um: float) -> float:
-        """Return the focal length that gives the pixels per radian.
-
-        Parameters
-        ----------
-        pitch_um : float
-            Pixel pitch, micrometers.
-
-        Returns
-        -------
-        float
-            Focal length, micrometers.
-        """
+        """Return the focal length that gives the pixels per radian."""
         return pitch_um * self.width_px / math.radians(self.fov_deg)
 
 
@@ -145,15 +134,7 @@ class Noise(Section):
     def of(self, pixel: Pixel) -> Pixel:
         """Return a pixel with this noise.
 
-        Parameters
-        ----------
-        pixel : Pixel
-            Pixel of the study.
-
-        Returns
-        -------
-        Pixel
-            The pixel with the figures that are given here.
+        Returns the pixel with the figures that are given here.
         """
         return pixel.model_copy(update=self.model_dump(exclude_none=True))
 

@@ -27,26 +27,9 @@ _CLEAR_NAMES = ("c", "w", "clear", "white", "mono", "panchromatic")
 class SensorCurves:
     """QE curves of a sensor on the wavelength grid.
 
-    Parameters
-    ----------
-    name : str
-        Name of the sensor.
-    qe : mapping of str to ndarray of shape (n_wavelengths,)
-        QE by curve name, electrons per photon, or on one common relative scale.
-    clear : str
-        Curve that the CFA sensitivity is relative to: the clear pixel, or the brightest curve.
-    source : str
-        File or data set.
-    surrogate : bool
-        True for modeled curves.
-    variants : mapping
-        For a CFA: channels that use a curve with another name.
-    technologies : mapping of str to Technology or None
-        Physical principle of the filters, where it is stated.
-    has_clear : bool
-        True if `clear` is a pixel without a filter.
-    ir_cut : ndarray of shape (n_wavelengths,), optional
-        Transmission of the IR cut that is part of all curves, where it is known apart.
+    `qe`: QE by curve name, electrons per photon, or on one common relative scale; `clear`: curve that the CFA
+    sensitivity is relative to: the clear pixel, or the brightest curve; `surrogate`: True for modeled curves;
+    `has_clear`: True if `clear` is a pixel without a filter.
     """
 
     name: str
@@ -65,37 +48,13 @@ class SensorCurves:
         return "" if self.has_clear else self.clear
 
     def curve_name(self, cfa: str, channel: str) -> str:
-        """Return the name of the curve of a channel.
-
-        Parameters
-        ----------
-        cfa, channel : str
-            Names of CFA and channel.
-
-        Returns
-        -------
-        str
-            Name of the curve.
-        """
+        """Return the name of the curve of a channel."""
         return self.variants.get(cfa, {}).get(channel, channel)
 
     def curve(self, name: str) -> PerWavelength:
         """Return a curve.
 
-        Parameters
-        ----------
-        name : str
-            Name of the curve.
-
-        Returns
-        -------
-        ndarray of shape (n_wavelengths,)
-            QE.
-
-        Raises
-        ------
-        DataError
-            If there is no such curve, with the nearest name.
+        Raises DataError if there is no such curve, with the nearest name.
         """
         if name not in self.qe:
             known = list(self.qe)
@@ -112,36 +71,13 @@ class SensorCurves:
     def mosaic_qe(
         self, mosaic: Mosaic, replaced: Mapping[str, str] | None = None
     ) -> Float[Array, "channels wavelengths"]:
-        """Return the curves of a mosaic's channels.
-
-        Parameters
-        ----------
-        mosaic : Mosaic
-            CFA.
-        replaced : mapping of str to str, optional
-            Curve of channels that the sensor does not have (a modified channel and its base).
-
-        Returns
-        -------
-        ndarray of shape (n_channels, n_wavelengths)
-            QE.
-        """
+        """Return the curves of a mosaic's channels."""
         return np.stack([self.curve(name) for name in self.mosaic_curves(mosaic, replaced)])
 
     def mosaic_curves(self, mosaic: Mosaic, replaced: Mapping[str, str] | None = None) -> list[str]:
         """Return the names of the curves of a mosaic's channels.
 
-        Parameters
-        ----------
-        mosaic : Mosaic
-            CFA.
-        replaced : mapping of str to str, optional
-            Curve of channels that the sensor does not have.
-
-        Returns
-        -------
-        list of str
-            Names, one per channel.
+        Returns names, one per channel.
         """
         names = {**{c: self.curve_name(mosaic.name, c) for c in mosaic.channels}, **(replaced or {})}
         return [names[channel] for channel in mosaic.channels]
@@ -150,27 +86,8 @@ class SensorCurves:
 def make_sensor(name: str, qe: Mapping[str, PerWavelength], source: str, clear: str | None = None) -> SensorCurves:
     """Make a sensor from curves on the grid.
 
-    Parameters
-    ----------
-    name : str
-        Name of the sensor.
-    qe : mapping of str to ndarray of shape (n_wavelengths,)
-        QE by curve name.
-    source : str
-        File, for error messages.
-    clear : str, optional
-        Clear pixel; left out, the curve with the largest sum, which is a clear pixel only if its name says
-        so.
-
-    Returns
-    -------
-    SensorCurves
-        The sensor.
-
-    Raises
-    ------
-    DataError
-        If a QE exceeds 1 or is below 1e-9 everywhere, or if `clear` is no curve.
+    `clear`: clear pixel; left out, the curve with the largest sum, which is a clear pixel only if its name says so.
+    Raises DataError if a QE exceeds 1 or is below 1e-9 everywhere, or if `clear` is no curve.
     """
     issues = []
     for curve, values in qe.items():
@@ -193,34 +110,13 @@ def make_sensor(name: str, qe: Mapping[str, PerWavelength], source: str, clear: 
 def own_red(names: Collection[str]) -> dict[str, dict[str, str]]:
     """Return the channels that have another curve in RCCC and RCCB: a red of their own, where a sensor has one.
 
-    Parameters
-    ----------
-    names : collection of str
-        Curves of a built-in sensor.
-
-    Returns
-    -------
-    dict of str to dict of str to str
-        CFA -> channel -> curve.
+    Returns CFA -> channel -> curve.
     """
     return {cfa: {"R": "Rx"} for cfa in ("RCCC", "RCCB")} if "Rx" in names else {}
 
 
 def ar0820_sensor(grid: WavelengthGrid, parameters: SurrogateParameters) -> SensorCurves:
-    """Make the surrogate sensor from its parameters; RCCC and RCCB have a red of their own.
-
-    Parameters
-    ----------
-    grid : WavelengthGrid
-        Wavelengths, nm.
-    parameters : SurrogateParameters
-        Parameters of the model.
-
-    Returns
-    -------
-    SensorCurves
-        The sensor.
-    """
+    """Make the surrogate sensor from its parameters; RCCC and RCCB have a red of their own."""
     curves = ar0820(grid, parameters)
     cut = ir_cut_transmission(grid.nodes_nm, parameters)
     variants = own_red(curves.values)
@@ -230,22 +126,7 @@ def ar0820_sensor(grid: WavelengthGrid, parameters: SurrogateParameters) -> Sens
 def measured_sensor(name: str, grid: WavelengthGrid) -> SensorCurves:
     """Make a measured sensor that the package ships.
 
-    Parameters
-    ----------
-    name : str
-        Name in `measured_sets.SENSORS`.
-    grid : WavelengthGrid
-        Wavelengths, nm.
-
-    Returns
-    -------
-    SensorCurves
-        The sensor; RCCC and RCCB have a red of their own where it was measured.
-
-    Raises
-    ------
-    DataError
-        If the grid goes beyond the curves.
+    Raises DataError if the grid goes beyond the curves.
     """
     measured = SENSORS[name]
     curves = measured.curves(grid)

@@ -105,18 +105,7 @@ class SensorField(Section):
         return tuple(place / (count - 1) for place in range(count))
 
     def cra_at(self, height: float) -> float:
-        """Return the chief ray angle at a relative image height.
-
-        Parameters
-        ----------
-        height : float
-            Relative image height, 0 to 1.
-
-        Returns
-        -------
-        float
-            Chief ray angle, degrees.
-        """
+        """Return the chief ray angle at a relative image height, degrees."""
         return float(np.interp(height, *self.knots))
 
     @property

@@ -19,25 +19,7 @@ READOUT = frozenset({"noise", "quantization", "saturation"})
 
 @dataclass(frozen=True)
 class Setup:
-    """Camera, lights and scene that a batch of designs shares.
-
-    Parameters
-    ----------
-    camera : Camera
-        Pixel, mosaic and QE.
-    lights : Lights
-        Signals and their types.
-    scene : Scene
-        Scenario of the study.
-    tasks : StudyTasks, optional
-        Further tasks that designs are evaluated by.
-    accuracy : Accuracy
-        Numerical settings.
-    left_out : frozenset of str
-        Effects that are not computed (see `effects`).
-    user_effects : tuple of UserEffect
-        Effects of user code.
-    """
+    """Camera, lights and scene that a batch of designs shares."""
 
     camera: Camera
     lights: Lights
@@ -48,18 +30,7 @@ class Setup:
     user_effects: tuple[UserEffect, ...] = field(default=(), kw_only=True)
 
     def with_camera(self, **changes: Any) -> Setup:
-        """Return the setup with some attributes of its camera changed.
-
-        Parameters
-        ----------
-        **changes
-            Attributes of `Camera`.
-
-        Returns
-        -------
-        Setup
-            The changed setup.
-        """
+        """Return the setup with some attributes of its camera changed."""
         return replace(self, camera=replace(self.camera, **changes))
 
     @property
@@ -68,18 +39,7 @@ class Setup:
         return self.lights.members
 
     def computes(self, effect: str) -> bool:
-        """Return whether an effect is computed.
-
-        Parameters
-        ----------
-        effect : str
-            Name of an effect.
-
-        Returns
-        -------
-        bool
-            False if it is left out.
-        """
+        """Return whether an effect is computed."""
         return effect not in self.left_out
 
     @property

@@ -41,7 +41,7 @@ _WARM = Accuracy(phases_per_px=1, finest_phase_px=0.25, field_positions=2, pwm_m
 
 @dataclass(frozen=True)
 class Measured:
-    """CSDs, ndarray[n_csds, n_designs], DN, and times, s.
+    """CSDs, DN, and times, s.
 
     `first_s`: the first design, with everything that is computed once per scene; `following_s`: each following one, NaN
     where there is none.
@@ -149,7 +149,7 @@ def _evaluated(model: ForwardModel, space: Space, numbers: DesignNumbers) -> Col
 
 
 def _csds(model: ForwardModel, space: Space, numbers: DesignNumbers) -> Float[Array, "csds designs"]:
-    """All CSDs, at the best sampling phase too where all phases count, ndarray[n_csds, n_designs]."""
+    """All CSDs, at the best sampling phase too where all phases count."""
     columns = _evaluated(model, space, numbers)
     names = [csd_name(pair) for pair in class_pairs(model.setup.lights.classes)]
     if model.setup.all_phases:

@@ -71,15 +71,7 @@ class Audit:
 def sampled(table: pd.DataFrame) -> pd.DataFrame:
     """Select the rows to audit.
 
-    Parameters
-    ----------
-    table : DataFrame
-        Rows of a run.
-
-    Returns
-    -------
-    DataFrame
-        Pareto front, all rows that are not of a sweep, and 1 % of the others by the hash of their id.
+    Returns Pareto front, all rows that are not of a sweep, and 1 % of the others by the hash of their id.
     """
     digests = [hashlib.sha256(str(i).encode()).digest()[:4] for i in table["design_id"]]
     hashed = np.array([int.from_bytes(digest, "big") / 2**32 for digest in digests], dtype=float)
@@ -88,22 +80,7 @@ def sampled(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def audit_rows(study: Study, tables: Iterable[pd.DataFrame], progress: Progress = lambda *_: None) -> Audit:
-    """Compute the selected rows again at the reference settings.
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    tables : iterable of DataFrame
-        Rows of the run.
-    progress : callable
-        Shows the progress.
-
-    Returns
-    -------
-    Audit
-        Rows and errors.
-    """
+    """Compute the selected rows again at the reference settings."""
     samples, n_designs = [], 0
     for table in tables:
         samples.append(sampled(table))
@@ -123,28 +100,8 @@ def audit_output(
 ) -> Audit:
     """Audit a finished run and write the audited rows to its folder.
 
-    Parameters
-    ----------
-    folder : Path
-        Folder of the run.
-    data : Path, optional
-        Folder of the curve files; that of the study by default.
-    progress : callable
-        Shows the progress.
-    allow_code : bool
-        Run Python files that the study names.
-
-    Returns
-    -------
-    Audit
-        Rows and errors.
-
-    Raises
-    ------
-    OutputError
-        If the run is not finished or damaged, or the rows cannot be written.
-    StudyError
-        If the study of the run cannot be loaded.
+    Raises OutputError if the run is not finished or damaged, or the rows cannot be written. Raises StudyError if the
+    study of the run cannot be loaded.
     """
     output = read_output(folder, audited=False)
     study = study_of(output, data, allow_code=allow_code)
@@ -155,15 +112,7 @@ def audit_output(
 
 
 def audit_again(folder: Path, data: Path | None) -> None:
-    """Repeat the audit of a run whose audited rows are missing or damaged.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the run.
-    data : Path, optional
-        Folder of the curve files; that of the study by default.
-    """
+    """Repeat the audit of a run whose audited rows are missing or damaged."""
     inventory = Inventory(folder)
     if AUDIT in inventory.files and inventory.wrong([AUDIT]):
         audit_output(folder, data)

@@ -43,26 +43,9 @@ class Description:
 def described(path: Path, folder: Path, quantity: Quantity | None = None) -> Description:
     """Describe a file or folder of curves and plot it as `<folder>/<stem>.png`.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    folder : Path
-        Folder of the picture.
-    quantity : str, optional
-        Unit of the numbers; left out, what the heads say, else lights (in energy) or QE are guessed.
-
-    Returns
-    -------
-    Description
-        Text and JSON object.
-
-    Raises
-    ------
-    DataError
-        If nothing can be read.
-    OutputError
-        If the picture cannot be written, or a file of that name is no picture of a description.
+    `quantity`: unit of the numbers; left out, what the heads say, else lights (in energy) or QE are guessed. Raises
+    DataError if nothing can be read. Raises OutputError if the picture cannot be written, or a file of that name is no
+    picture of a description.
     """
     scan = scan_curves(path)
     issues = tuple(merge_equal_issues(list(chain.from_iterable(scan.issues))))

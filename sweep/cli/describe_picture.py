@@ -34,19 +34,7 @@ Paint = tuple[float, ...] | str
 def draw(title: str, facts: Facts, colors: Mapping[str, LightColor | None]) -> Figure:
     """Plot curves; of very many an even sample.
 
-    Parameters
-    ----------
-    title : str
-        Title of the plot.
-    facts : Facts
-        The curves.
-    colors : mapping of str to LightColor or None
-        Colors of lights; empty for QE.
-
-    Returns
-    -------
-    Figure
-        The plot.
+    `colors`: colors of lights; empty for QE.
     """
     lights = bool(colors)
     step = -(-len(facts.curves) // _MOST_DRAWN)

@@ -24,15 +24,7 @@ def ends_in_lines(command: Callable[[], object]) -> NoReturn:
 
     SIGTERM and SIGHUP end a command as SIGINT does. Errors of the program itself keep their traceback.
 
-    Parameters
-    ----------
-    command : callable
-        The command.
-
-    Raises
-    ------
-    SystemExit
-        With the result of the command, the code of its error, or 2.
+    Raises SystemExit: with the result of the command, the code of its error, or 2.
     """
     try:
         for stream in (sys.stdout, sys.stderr):
@@ -76,13 +68,7 @@ def _flush() -> None:
 
 
 def print_issues(issues: Iterable[object]) -> None:
-    """Print issues on stderr, one per line.
-
-    Parameters
-    ----------
-    issues : iterable
-        The issues.
-    """
+    """Print issues on stderr, one per line."""
     with suppress(OSError, ValueError):
         for issue in issues:
             typer.echo(f"sweep: {' '.join(str(issue).split())}", err=True)

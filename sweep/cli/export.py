@@ -41,33 +41,11 @@ def export_design(
 
     The filter is computed again and compared with what the run kept of it.
 
-    Parameters
-    ----------
-    folder : Path
-        Folder of the run.
-    key : str
-        A name, a design_id, or `best`.
-    data : Path or None
-        Folder of the study's files; without it, the curves that the run kept are taken.
-    to : Path or None
-        Folder of the new files, FOLDER/export without it.
-    with_specification : bool
-        True to write what an absorption band would have to be beside them.
-    allow_code : bool
-        True to run the code that the study names.
-
-    Returns
-    -------
-    list of str
-        Lines to print.
-
-    Raises
-    ------
-    SweepError
-        For an unknown key, a design that failed, and a specification without a map of absorption bands.
-    OutputError
-        For a folder without a finished run, for curves that are not those of the run, and where a file of other
-        content would be overwritten.
+    `data`: folder of the study's files; without it, the curves that the run kept are taken; `to`: folder of the new
+    files, FOLDER/export without it; `with_specification`: True to write what an absorption band would have to be beside
+    them; `allow_code`: True to run the code that the study names. Raises SweepError for an unknown key, a design that
+    failed, and a specification without a map of absorption bands. Raises OutputError for a folder without a finished
+    run, for curves that are not those of the run, and where a file of other content would be overwritten.
     """
     output = read_output(folder)
     row = find_design_row(output, key)
@@ -121,17 +99,7 @@ def export_design(
 def relative_transmission(modified: PerWavelength, base: PerWavelength) -> PerWavelength:
     """Return the transmission of a modified channel relative to the curve that it replaces.
 
-    Parameters
-    ----------
-    modified : ndarray of shape (n_wavelengths,)
-        QE of the modified channel.
-    base : ndarray of shape (n_wavelengths,)
-        QE of the replaced channel.
-
-    Returns
-    -------
-    ndarray of shape (n_wavelengths,)
-        1 where both are zero, infinite where only `base` is.
+    1 where both are zero, infinite where only `base` is.
     """
     unlit = np.where(modified > 0, np.inf, 1.0)
     with np.errstate(over="ignore"):

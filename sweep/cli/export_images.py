@@ -25,32 +25,9 @@ def export_images(
 ) -> list[str]:
     """Write the images of a run's benchmark with labels, and say what they are.
 
-    Parameters
-    ----------
-    folder : Path
-        Folder of the run.
-    files : ImageFiles
-        Folder and form of the images.
-    data : Path or None
-        Folder of the study's files; without it, the curves that the run kept are taken.
-    jobs : int or None
-        Workers.
-    progress : callable
-        Called with a phase, work done and work in total.
-    allow_code : bool
-        True to run the code that the study names.
-
-    Returns
-    -------
-    list of str
-        Lines to print.
-
-    Raises
-    ------
-    SweepError
-        If the study has no `vision`, or the form is no PNG, of which COCO's boxes are.
-    OutputError
-        As `read_output` and `write_images`.
+    `data`: folder of the study's files; without it, the curves that the run kept are taken; `allow_code`: True to run
+    the code that the study names. Raises SweepError if the study has no `vision`, or the form is no PNG, of which
+    COCO's boxes are. Raises OutputError as `read_output` and `write_images`.
     """
     output = read_output(folder)
     vision = output.study.vision

@@ -36,24 +36,7 @@ class StudyListing:
 def studies_of(folder: Path, outputs: Path, data: Path | None = None) -> list[StudyListing]:
     """List the studies of a folder and the states of their runs.
 
-    Parameters
-    ----------
-    folder : Path
-        Folder of `*.yaml` and `*.yml` files.
-    outputs : Path
-        Folder of the runs.
-    data : Path, optional
-        Folder of the curve files; that of the study by default.
-
-    Returns
-    -------
-    list of Listed
-        The studies.
-
-    Raises
-    ------
-    StudyError
-        If the folder does not exist.
+    Raises StudyError if the folder does not exist.
     """
     if not is_folder(folder):
         raise StudyError(ValidationIssue("no such folder", str(folder), allowed="a folder of study files"))
@@ -67,20 +50,7 @@ def studies_of(folder: Path, outputs: Path, data: Path | None = None) -> list[St
 
 
 def list_lines(folder: Path, studies: list[StudyListing]) -> list[str]:
-    """Format studies as a table: name, designs, state, question.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the studies.
-    studies : list of StudyListing
-        The studies.
-
-    Returns
-    -------
-    list of str
-        Lines of text.
-    """
+    """Format studies as a table: name, designs, state, question."""
     if not studies:
         return [f"No studies in {folder}. `sweep new NAME --folder {folder}` writes one."]
     counts = ["" if x.designs is None else f"{x.designs:,} designs" for x in studies]
@@ -96,18 +66,7 @@ def list_lines(folder: Path, studies: list[StudyListing]) -> list[str]:
 
 
 def list_facts(studies: list[StudyListing]) -> dict[str, Any]:
-    """Format studies as a JSON object.
-
-    Parameters
-    ----------
-    studies : list of StudyListing
-        The studies.
-
-    Returns
-    -------
-    dict
-        The object.
-    """
+    """Format studies as a JSON object."""
     return {"studies": [asdict(study) for study in studies]}
 
 

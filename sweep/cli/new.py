@@ -36,28 +36,8 @@ def new_study(
 ) -> list[str]:
     """Write `folder`/<name>.yaml, and the schema that editors complete it with where the folder has none.
 
-    Parameters
-    ----------
-    name, folder : str, Path
-        Name of the study, and its folder, which is made where it is not there.
-    qe, lights : sequence of Path
-        Files or folders of curves, which stay where they are; none takes built-in curves.
-    quantities : sequence of str
-        Stated units of the curves and of the lights.
-
-    Returns
-    -------
-    list of str
-        Lines to print.
-
-    Raises
-    ------
-    StudyError
-        For a bad name.
-    OutputError
-        Where the file exists or cannot be written.
-    DataError
-        For curves that a study cannot use.
+    Raises StudyError for a bad name. Raises OutputError where the file exists or cannot be written. Raises DataError
+    for curves that a study cannot use.
     """
     path = _new_path(name, folder)
     sources = Sources()
@@ -145,15 +125,7 @@ def _source_lines(sources: Sources) -> list[str]:
 def write_schema(path: Path) -> None:
     """Write the JSON Schema of study files.
 
-    Parameters
-    ----------
-    path : Path
-        The file to write.
-
-    Raises
-    ------
-    OutputError
-        If the file cannot be written, or holds anything except such a schema.
+    Raises OutputError if the file cannot be written, or holds anything except such a schema.
     """
     if os.path.lexists(path):
         # The title is the second key of a schema; in earlier versions it was the section's name.

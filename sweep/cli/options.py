@@ -35,15 +35,7 @@ def quantity_of(word: str | None) -> Any:
 def study_files(incomplete: str) -> list[str]:
     """Complete the path of a study file.
 
-    Parameters
-    ----------
-    incomplete : str
-        Text typed so far.
-
-    Returns
-    -------
-    list of str
-        Completions, down to one folder below.
+    Returns completions, down to one folder below.
     """
     return sorted(_paths(incomplete, ("*.yaml", "*.yml", "*/*.yaml", "*/*.yml")))
 
@@ -51,15 +43,7 @@ def study_files(incomplete: str) -> list[str]:
 def run_folders(incomplete: str) -> list[str]:
     """Complete the path of a run's folder.
 
-    Parameters
-    ----------
-    incomplete : str
-        Text typed so far.
-
-    Returns
-    -------
-    list of str
-        Completions, down to one folder below.
+    Returns completions, down to one folder below.
     """
     patterns = ("*/run.json", "*/provenance.json", "*/*/run.json", "*/*/provenance.json")
     return sorted({str(Path(path).parent) for path in _paths(incomplete, patterns)})
@@ -80,20 +64,7 @@ def _study_path(path: Path) -> Path:
 def changes_of(texts: list[str] | None) -> dict[str, str]:
     """Parse the values of `--set`.
 
-    Parameters
-    ----------
-    texts : list of str, optional
-        `KEY=VALUE` texts.
-
-    Returns
-    -------
-    dict
-        Values by dotted key.
-
-    Raises
-    ------
-    StudyError
-        If a text is not KEY=VALUE.
+    `texts`: `KEY=VALUE` texts. Raises StudyError if a text is not KEY=VALUE.
     """
     changes = {}
     for text in texts or ():

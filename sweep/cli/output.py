@@ -22,16 +22,7 @@ _LEAST_SHARE, _LEAST_S = 0.01, 60.0
 def print_result(lines: Iterable[str], facts: Mapping[str, Any], *, as_json: bool = False, quiet: bool = False) -> None:
     """Print the result of a command.
 
-    Parameters
-    ----------
-    lines : iterable of str
-        Text for people.
-    facts : mapping
-        JSON object; NaN and infinity become null.
-    as_json : bool
-        Print one JSON object on stdout; everything else goes to stderr.
-    quiet : bool
-        Print no progress and no summary.
+    `facts`: JSON object; NaN and infinity become null.
     """
     print_lines(lines, as_json=as_json, quiet=quiet)
     if as_json:
@@ -39,17 +30,7 @@ def print_result(lines: Iterable[str], facts: Mapping[str, Any], *, as_json: boo
 
 
 def print_lines(lines: Iterable[str], *, as_json: bool, quiet: bool) -> None:
-    """Print lines on stdout, or on stderr with `--json`.
-
-    Parameters
-    ----------
-    lines : iterable of str
-        Text for people.
-    as_json : bool
-        Print one JSON object on stdout; everything else goes to stderr.
-    quiet : bool
-        Print no progress and no summary.
-    """
+    """Print lines on stdout, or on stderr with `--json`."""
     for line in () if quiet else lines:
         typer.echo(line, err=as_json)
 
@@ -91,17 +72,7 @@ class ProgressDisplay(ExitStack):
             self._bars = self.enter_context(progress.Progress(*columns, console=Console(stderr=True)))
 
     def update(self, phase: str, done: int, total: int) -> None:
-        """Show the progress of a phase.
-
-        Parameters
-        ----------
-        phase : str
-            Name of the phase.
-        done : int
-            Finished steps.
-        total : int
-            All steps.
-        """
+        """Show the progress of a phase."""
         now = time.monotonic()
         new = phase != self._phase
         if new:

@@ -59,28 +59,8 @@ def run_one(
 ) -> dict[str, Any]:
     """Run a study, or continue it, draw its report and print the result.
 
-    Parameters
-    ----------
-    path : Path
-        Study file.
-    changes : dict
-        Dotted key -> value instead of the file's.
-    began_s : float
-        Time at which the user began to wait, by the monotonic clock, s.
-    data, output, jobs, backend, scheduler, dry_run, options, allow_code, opens, as_json, quiet
-        Options of `sweep run`.
-    member : SensorAndLights, optional
-        One of several sensors or light sets; its summary is not printed.
-
-    Returns
-    -------
-    dict
-        The same as plain values, for `--json`.
-
-    Raises
-    ------
-    SweepError
-        For a backend that is unknown, and as `run_study` does.
+    `changes`: dotted key -> value instead of the file's; `began_s`: time at which the user began to wait, by the
+    monotonic clock, s. Raises SweepError for a backend that is unknown, and as `run_study` does.
     """
 
     def note(text: str) -> None:
@@ -157,24 +137,7 @@ def run_sensors(
 ) -> dict[str, Any]:
     """Run a study for each of its sensors and light sets, and compare them.
 
-    Parameters
-    ----------
-    several : SensorStudies
-        Study.
-    run, load : callable
-        Runs a `member` into the folder `output`, and loads its study.
-    options : SensorsOptions
-        Options.
-
-    Returns
-    -------
-    dict
-        Folders and facts of the runs, for `--json`.
-
-    Raises
-    ------
-    SweepError
-        As `run_one`, for the first member that cannot be run, after all others.
+    Raises SweepError as `run_one`, for the first member that cannot be run, after all others.
     """
     began_s, quiet = time.monotonic(), options.quiet
     studies = {member: load(member=member) for member in several.members}  # mistakes before any work
@@ -259,30 +222,7 @@ def finish(
 ) -> dict[str, Any]:
     """Draw figures and report of a finished run, and print its summary.
 
-    Parameters
-    ----------
-    folder : Path
-        Folder of the run.
-    began_s : float
-        Start of the run, as in `run_one`.
-    repair : bool
-        Draw only missing or damaged files.
-    parallel : Parallel
-        Draws figures in parallel.
-    as_json : bool
-        Print one JSON object on stdout; everything else goes to stderr.
-    quiet : bool
-        Print no progress and no summary.
-
-    Returns
-    -------
-    dict
-        The summary as a JSON object.
-
-    Raises
-    ------
-    ErrorBoundExceededError
-        If the run's own check failed.
+    Raises ErrorBoundExceededError if the run's own check failed.
     """
     from ..report import make_report, read_output, summary_lines  # noqa: PLC0415  (loaded while workers compute)
 

@@ -29,22 +29,7 @@ class Status:
 def status_of(folder: Path, *, verify: bool = False) -> Status:
     """Return state, progress and files of a run.
 
-    Parameters
-    ----------
-    folder : Path
-        Folder of the run.
-    verify : bool
-        Compare the digests of all files, not only their existence.
-
-    Returns
-    -------
-    Status
-        State of the run.
-
-    Raises
-    ------
-    OutputError
-        If there is no run, or files of a finished run are missing or damaged.
+    Raises OutputError if there is no run, or files of a finished run are missing or damaged.
     """
     inventory = Inventory(folder)
     inventory.require_run()

@@ -32,22 +32,7 @@ class Sources:
 
 
 def study_text(name: str, sources: Sources, photon_ratio: float | None) -> str:
-    """Write a commented study that runs unchanged.
-
-    Parameters
-    ----------
-    name : str
-        Name of the study.
-    sources : Sources
-        Files of curves.
-    photon_ratio : float, optional
-        Photon ratio of the lights of a file.
-
-    Returns
-    -------
-    str
-        YAML text.
-    """
+    """Write a commented study that runs unchanged."""
     sensor, lights = sources.sensor, sources.lights
     layout = (
         Layout(("RGGB", "RCCC", "RCCB", "RYYCy"), "RYNCy", "Y", "G") if sensor is None else layout_of(sensor.totals)
@@ -171,34 +156,12 @@ def _left_out(columns: Mapping[str, str]) -> list[str]:
 
 
 def one_line(text: str) -> str:
-    """Return a name for use in a comment.
-
-    Parameters
-    ----------
-    text : str
-        The name.
-
-    Returns
-    -------
-    str
-        The name in one line.
-    """
+    """Return a name for use in a comment."""
     return text if text.isprintable() else repr(text)
 
 
 def scalar(text: str) -> str:
-    """Return a text as a YAML scalar, quoted if needed, also for flow collections.
-
-    Parameters
-    ----------
-    text : str
-        The text.
-
-    Returns
-    -------
-    str
-        The scalar.
-    """
+    """Return a text as a YAML scalar, quoted if needed, also for flow collections."""
     plain = re.fullmatch(r"[A-Za-z_][A-Za-z0-9_.-]*", text) and YAML(typ="safe", pure=True).load(text) == text
     if plain and text.casefold() not in ("yes", "no", "on", "off"):  # booleans of YAML 1.1
         return text

@@ -24,15 +24,7 @@ LEFT, LEFT_WIDTH, RIGHT, RIGHT_WIDTH, DEPTH = range(_PER_BAND)
 def band_parameters(number: int | None = None) -> tuple[Parameter, ...]:
     """Return the parameters of one band: edges, widths and depth.
 
-    Parameters
-    ----------
-    number : int, optional
-        Number of the band, part of the names if there are several.
-
-    Returns
-    -------
-    tuple of Parameter
-        Five parameters.
+    `number`: number of the band, part of the names if there are several.
     """
     n = "" if number is None else str(number)
     return (
@@ -56,33 +48,11 @@ class Bands:
         self._conditions = self._condition_matrix()
 
     def shape(self, x: DesignParameters) -> Float[Array, "designs wavelengths"]:
-        """Return the sum of the bands.
-
-        Parameters
-        ----------
-        x : ndarray of shape (n_designs, n_parameters)
-            Parameters.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, n_wavelengths)
-            Sum, 0 to 1 for well-formed designs.
-        """
+        """Return the sum of the bands, 0 to 1 for well-formed designs."""
         return np.asarray(sum(self._depth(x, band) * self._open(x, band) for band in range(self._count)), dtype=float)
 
     def gradient(self, x: PerParameter) -> Float[Array, "parameters wavelengths"]:
-        """Return the derivative of `shape` at one design.
-
-        Parameters
-        ----------
-        x : ndarray of shape (n_parameters,)
-            Parameters of one design.
-
-        Returns
-        -------
-        ndarray of shape (n_parameters, n_wavelengths)
-            Derivative, per unit of parameter.
-        """
+        """Return the derivative of `shape` at one design, per unit of parameter."""
         bands = x.reshape(self._count, _PER_BAND)
         ends = bands[:, :DEPTH].reshape(-1, 2)
         slopes = edge_gradient(self._wave, ends[:, :1], ends[:, 1:])
@@ -95,18 +65,7 @@ class Bands:
         return rows.reshape(-1, self._wave.size)
 
     def reach(self, low: PerParameter, high: PerParameter) -> PerWavelength:
-        """Return where a band of the box can be open.
-
-        Parameters
-        ----------
-        low, high : ndarray of shape (n_parameters,)
-            Ends of the box of parameters.
-
-        Returns
-        -------
-        ndarray of shape (n_wavelengths,)
-            0 or 1.
-        """
+        """Return where a band of the box can be open."""
         open_at = np.zeros(self._wave.size)
         for at in range(0, self._count * _PER_BAND, _PER_BAND):
             start = low[at + LEFT] - _HALF * high[at + LEFT_WIDTH]
@@ -119,16 +78,6 @@ class Bands:
 
         An edge falls with its center; with its width it falls behind the center and rises before it. Its extremes are
         therefore at the ends of both.
-
-        Parameters
-        ----------
-        low, high : ndarray of shape (n_parameters,)
-            Ends of the box of parameters.
-
-        Returns
-        -------
-        low, high : ndarray of shape (n_wavelengths,)
-            Bounds.
         """
         least, most = np.zeros(self._wave.size), np.zeros(self._wave.size)
         for at in range(0, self._count * _PER_BAND, _PER_BAND):
@@ -146,18 +95,7 @@ class Bands:
         return least, most
 
     def perturbed(self, off: ProductionError) -> Bands:
-        """Return the bands as production makes them.
-
-        Parameters
-        ----------
-        off : ProductionError
-            Production error.
-
-        Returns
-        -------
-        Bands
-            Shifted bands.
-        """
+        """Return the bands as production makes them."""
         return Bands(off.nominal_nm(self._wave), self._count)
 
     @property
@@ -171,36 +109,17 @@ class Bands:
         }
 
     def violation(self, x: DesignParameters) -> Float[Array, "designs _conditions"]:
-        """Return the order of the edges.
+        """Return the order of the edges, nm.
 
         Start and end of a left edge must not lie behind those of its right edge, and a band must end before the next
         begins.
 
-        Parameters
-        ----------
-        x : ndarray of shape (n_designs, n_parameters)
-            Parameters.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, 3 k - 1)
-            Edges out of order, nm; met where <= 0.
+        Met where <= 0.
         """
         return row_products(x, self._conditions.T)
 
     def violation_gradient(self, x: PerParameter) -> ParameterWeights:
-        """Return the derivative of `violation`, which is constant.
-
-        Parameters
-        ----------
-        x : ndarray of shape (n_parameters,)
-            Parameters of one design.
-
-        Returns
-        -------
-        ndarray of shape (3 k - 1, n_parameters)
-            Derivative.
-        """
+        """Return the derivative of `violation`, which is constant."""
         assert x.shape == (self._count * _PER_BAND,)
         return self._conditions
 
@@ -259,24 +178,13 @@ class Banded:
         return self._bands.dimensions
 
     def perturbed(self, off: ProductionError) -> Self:
-        """Return the family with shifted bands between the same curves; see `Family.perturbed`.
-
-        Parameters
-        ----------
-        off : ProductionError
-            Production error.
-
-        Returns
-        -------
-        Family
-            The family as production makes it.
-        """
+        """Return the family with shifted bands between the same curves; see `Family.perturbed`."""
         made = copy(self)
         made._bands = self._bands.perturbed(off)
         return made
 
     def start(self, points: Float[Array, "starts start_dimensions"]) -> Float[Array, "starts parameters"]:
-        """Raise an error: a search starts anywhere in the box."""
+        """Return the points: a search starts anywhere in the box."""
         return points
 
     def violation(self, x: DesignParameters) -> Float[Array, "designs _conditions"]:

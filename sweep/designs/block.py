@@ -47,70 +47,26 @@ class Block(Protocol):
         """Return the number of designs."""
 
     def curves(self) -> DesignCurves:
-        """Return the QE of the modified channels.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, n_modified, n_wavelengths)
-            QE of the modified channels.
-        """
+        """Return the QE of the modified channels."""
 
     def product(
         self, weights: Float[Array, "_modified k"], nodes: Int[IndexArray, " nodes"]
     ) -> Float[Array, "designs k"]:
-        """Sum QE times weights over modified channels and wavelengths.
-
-        Parameters
-        ----------
-        weights : ndarray of shape (n_modified * n_nodes, k)
-            Weights.
-        nodes : ndarray of int, shape (n_nodes,)
-            Wavelengths of the weights.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, k)
-            Sums over modified channels and wavelengths.
-        """
+        """Sum QE times weights over modified channels and wavelengths."""
 
     def shapes(self, base_qe: ChannelCurves) -> tuple[PerDesign, PerDesign]:
         """Return slope and transmission of the curves, over all modified channels.
 
-        Parameters
-        ----------
-        base_qe : ndarray of shape (n_modified, n_wavelengths)
-            QE of the replaced curves.
-
-        Returns
-        -------
-        steepest, lowest : ndarray of shape (n_designs,)
-            Largest step between neighboring wavelengths, and smallest ratio to the base, 1 where the base is 0.
+        Returns largest step between neighboring wavelengths, and smallest ratio to the base, 1 where the base is 0.
         """
 
     def subset(self, which: Int[IndexArray, " which"] | slice) -> Block:
-        """Return some of the designs.
-
-        Parameters
-        ----------
-        which : ndarray of int or slice
-            Indices of designs.
-
-        Returns
-        -------
-        Block
-            The selected designs.
-        """
+        """Return some of the designs."""
 
 
 @dataclass(frozen=True)
 class CurveBlock:
-    """Filters given by their curves; methods as in `Block`.
-
-    Parameters
-    ----------
-    qe : ndarray of shape (n_designs, n_modified, n_wavelengths)
-        QE of the modified channels.
-    """
+    """Filters given by their curves; methods as in `Block`."""
 
     qe: DesignCurves
 
@@ -130,18 +86,7 @@ class CurveBlock:
         return row_products(flat.astype(weights.dtype, copy=False), weights)
 
     def subset(self, which: Int[IndexArray, " which"] | slice) -> CurveBlock:
-        """Return some of the designs.
-
-        Parameters
-        ----------
-        which : ndarray of int or slice
-            Indices of designs.
-
-        Returns
-        -------
-        CurveBlock
-            The selected designs.
-        """
+        """Return some of the designs."""
         return CurveBlock(self.qe[which])
 
     def shapes(self, base_qe: ChannelCurves) -> tuple[PerDesign, PerDesign]:
@@ -158,15 +103,7 @@ class CurveBlock:
 
 @dataclass(frozen=True)
 class EdgeSums:
-    """Weighted sums of the base, and of the change times each edge.
-
-    Parameters
-    ----------
-    base : ndarray of shape (n,)
-        Sums of the base.
-    left, right : ndarray of shape (n_edges, n)
-        Sums of each edge.
-    """
+    """Weighted sums of the base, and of the change times each edge."""
 
     base: Float[Array, " readings"]
     left: Float[Array, "left_edges readings"]
@@ -207,20 +144,7 @@ class Tables:
         return spans(self.left), spans(self.right)
 
     def shapes(self, base_qe: PerWavelength, deep: float) -> KnownShapes:
-        """Return the shapes of the grid's edges at one depth; cached.
-
-        Parameters
-        ----------
-        base_qe : ndarray of shape (n_wavelengths,)
-            QE of the replaced curve.
-        deep : float
-            Depth.
-
-        Returns
-        -------
-        KnownShapes
-            Shapes.
-        """
+        """Return the shapes of the grid's edges at one depth; cached."""
         from .compiled import edge_shapes, outside, ranges_of  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         def made() -> KnownShapes:
@@ -233,20 +157,7 @@ class Tables:
         return self._shapes.get((deep, base_qe.tobytes()), made)
 
     def product(self, weights: Float[Array, "_modified k"], nodes: Int[IndexArray, " nodes"]) -> EdgeSums:
-        """Return weighted sums of the base and of the change times each edge; cached.
-
-        Parameters
-        ----------
-        weights : ndarray of shape (n_modified * n_nodes, k)
-            Weights.
-        nodes : ndarray of int, shape (n_nodes,)
-            Wavelengths of the weights.
-
-        Returns
-        -------
-        EdgeSums
-            Sums.
-        """
+        """Return weighted sums of the base and of the change times each edge; cached."""
 
         def made() -> EdgeSums:
             changed = self.change[nodes, None] * weights
@@ -259,21 +170,7 @@ class Tables:
 
 @dataclass(frozen=True)
 class EdgeBlock:
-    """Designs of a grid of stopbands by the indices of their edges; methods as in `Block`.
-
-    Parameters
-    ----------
-    space : Space
-        Grid.
-    numbers : ndarray of int, shape (n_designs,)
-        Numbers of the designs in the grid.
-    tables : Tables
-        Edges of the grid.
-    at_left, at_right : ndarray of int, shape (n_designs,)
-        Edges of each design.
-    depth : ndarray of shape (n_designs,)
-        Depth of each design.
-    """
+    """Designs of a grid of stopbands by the indices of their edges; methods as in `Block`."""
 
     space: Space
     numbers: DesignNumbers
@@ -290,18 +187,7 @@ class EdgeBlock:
         return self.space.curves(self.space.points_of(self.numbers), self.tables.base.size)
 
     def subset(self, which: Int[IndexArray, " which"] | slice) -> EdgeBlock:
-        """Return some of the designs.
-
-        Parameters
-        ----------
-        which : ndarray of int or slice
-            Indices of designs.
-
-        Returns
-        -------
-        EdgeBlock
-            The selected designs.
-        """
+        """Return some of the designs."""
         ends = (self.at_left[which], self.at_right[which], self.depth[which])
         return EdgeBlock(self.space, self.numbers[which], self.tables, *ends)
 
@@ -356,15 +242,7 @@ _known: Cache[int, tuple[Space, Tables | None]] = Cache(_KEPT_TABLES)
 def by_edges(space: Space) -> bool:
     """Return whether `edges_of` takes the designs of a space.
 
-    Parameters
-    ----------
-    space : Space
-        Designs.
-
-    Returns
-    -------
-    bool
-        True for grids of separable families whose tables are not too large.
+    True for grids of separable families whose tables are not too large.
     """
     return _separable(space) is not None
 
@@ -382,17 +260,7 @@ def _separable(space: Space) -> tuple[SeparableFamily, PerWavelength, PerWavelen
 def edges_of(space: Space, start: int, stop: int) -> EdgeBlock | None:
     """Return consecutive designs of a grid by their edges.
 
-    Parameters
-    ----------
-    space : Space
-        Grid.
-    start, stop : int
-        Range of the designs.
-
-    Returns
-    -------
-    EdgeBlock or None
-        None if the family is not separable or its tables are too large.
+    None if the family is not separable or its tables are too large.
     """
     return edges_of_some(space, np.arange(start, stop))
 
@@ -400,17 +268,7 @@ def edges_of(space: Space, start: int, stop: int) -> EdgeBlock | None:
 def edges_of_some(space: Space, numbers: DesignNumbers) -> EdgeBlock | None:
     """Return designs of a grid by their edges.
 
-    Parameters
-    ----------
-    space : Space
-        Grid.
-    numbers : ndarray of int, shape (n_designs,)
-        Numbers of the designs.
-
-    Returns
-    -------
-    EdgeBlock or None
-        None if the family is not separable or its tables are too large.
+    None if the family is not separable or its tables are too large.
     """
     _, tables = _known.get(id(space), lambda: (space, _tables_of(space)))
     if tables is None:

@@ -25,21 +25,7 @@ def through_edges(
     depth: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Compute base + depth (left - right) of each design.
-
-    Parameters
-    ----------
-    base : ndarray of shape (n,)
-        Values of the base.
-    left, right : ndarray of shape (n_edges, n)
-        Values of each edge.
-    at_left, at_right : ndarray of int, shape (n_designs,)
-        Edges of each design.
-    depth : ndarray of shape (n_designs,)
-        Depth of each design.
-    out : ndarray of shape (n_designs, n)
-        Results.
-    """
+    """Compute base + depth (left - right) of each design."""
     for d in range(depth.size):
         one, other, deep = at_left[d], at_right[d], depth[d]
         for s in range(base.size):
@@ -60,14 +46,7 @@ def _shape(curve: FloatArray, inverse: FloatArray, dark: FloatArray) -> tuple[fl
 def shapes(curves: FloatArray, inverse: FloatArray, dark: FloatArray, steepest: FloatArray, lowest: FloatArray) -> None:
     """Compute the largest step between neighboring wavelengths, and the smallest ratio to a base curve.
 
-    Parameters
-    ----------
-    curves : ndarray of shape (n_designs, n_wavelengths)
-        QE.
-    inverse, dark : ndarray of shape (n_wavelengths,)
-        1 / base and 0, or 0 and 1 where the base is 0.
-    steepest, lowest : ndarray of shape (n_designs,)
-        Results.
+    `inverse`, `dark`: 1 / base and 0, or 0 and 1 where the base is 0.
     """
     for d in range(curves.shape[0]):
         steepest[d], lowest[d] = _shape(curves[d], inverse, dark)
@@ -75,18 +54,7 @@ def shapes(curves: FloatArray, inverse: FloatArray, dark: FloatArray, steepest: 
 
 @njit(cache=True, nogil=True)
 def spans(edges: FloatArray) -> IndexArray:
-    """Return the range in which each edge rises: its first nonzero value, and one after its last value below 1.
-
-    Parameters
-    ----------
-    edges : ndarray of shape (n_edges, n_wavelengths)
-        Edges.
-
-    Returns
-    -------
-    ndarray of int, shape (n_edges, 2)
-        Ranges.
-    """
+    """Return the range in which each edge rises: its first nonzero value, and one after its last value below 1."""
     ranges = np.empty((edges.shape[0], 2), np.intp)
     for e in range(edges.shape[0]):
         begin, end = 0, edges.shape[1]
@@ -100,18 +68,7 @@ def spans(edges: FloatArray) -> IndexArray:
 
 @njit(cache=True, nogil=True, fastmath=_NUMBERS)
 def outside(base: FloatArray, inverse: FloatArray, dark: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the shape of the base curve's first w wavelengths, and of those from w on.
-
-    Parameters
-    ----------
-    base, inverse, dark : ndarray of shape (n_wavelengths,)
-        Base curve; see `shapes`.
-
-    Returns
-    -------
-    before, after : ndarray of shape (n_wavelengths + 1, 2)
-        Steepest step and lowest ratio for each w.
-    """
+    """Return the shape of the base curve's first w wavelengths, and of those from w on."""
     n = base.size
     before, after = np.empty((n + 1, 2)), np.empty((n + 1, 2))
     before[0, 0] = after[n, 0] = 0.0
@@ -129,18 +86,7 @@ def outside(base: FloatArray, inverse: FloatArray, dark: FloatArray) -> tuple[Fl
 
 @njit(cache=True, nogil=True, fastmath=_NUMBERS)
 def ranges_of(curve: FloatArray, inverse: FloatArray, dark: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return steepest step and lowest ratio of 2^k wavelengths from each on.
-
-    Parameters
-    ----------
-    curve, inverse, dark : ndarray of shape (n_wavelengths,)
-        Curve; see `shapes`.
-
-    Returns
-    -------
-    steps, lows : ndarray of shape (n_levels, n_wavelengths)
-        Steepest step and lowest ratio.
-    """
+    """Return steepest step and lowest ratio of 2^k wavelengths from each on."""
     n = curve.size
     levels = 1
     while 1 << levels <= n:
@@ -162,24 +108,7 @@ def ranges_of(curve: FloatArray, inverse: FloatArray, dark: FloatArray) -> tuple
 def edge_shapes(
     base: FloatArray, change: FloatArray, edges: FloatArray, spans: IndexArray, inverse: FloatArray, dark: FloatArray
 ) -> FloatArray:
-    """Return the shape where each edge rises or falls alone, with the steps to both sides.
-
-    Parameters
-    ----------
-    base, change : ndarray of shape (n_wavelengths,)
-        Base curve, and target minus base.
-    edges : ndarray of shape (n_edges, n_wavelengths)
-        Factor of the change.
-    spans : ndarray of int, shape (n_edges, 2)
-        Range of each edge.
-    inverse, dark : ndarray of shape (n_wavelengths,)
-        See `shapes`.
-
-    Returns
-    -------
-    ndarray of shape (n_edges, 2)
-        Steepest step and lowest ratio.
-    """
+    """Return the shape where each edge rises or falls alone, with the steps to both sides."""
     shapes, curve = np.empty((edges.shape[0], 2)), np.empty(base.size)
     for e in range(edges.shape[0]):
         near_edge = slice(max(spans[e, 0] - 1, 0), min(spans[e, 1] + 1, base.size))
@@ -238,25 +167,6 @@ def shapes_of_edges(
     Where both edges are 0, or both 1, the curve is its base: `before` and `after` of `outside`. Where one edge rises
     before the other, the curve between them follows from `steps` and `lows` of `ranges_of`; where one edge rises, from
     the `edge_shapes` `of_left` and `of_right`, for designs of depth `deep`.
-
-    Parameters
-    ----------
-    base, change : ndarray of shape (n_wavelengths,)
-        Base curve, and target minus base.
-    left, right : ndarray of shape (n_edges, n_wavelengths)
-        Edges.
-    left_spans, right_spans : ndarray of int, shape (n_edges, 2)
-        Ranges of the edges.
-    at_left, at_right, depth : ndarray of shape (n_designs,)
-        As in `through_edges`.
-    deep : float
-        Depth of the known shapes.
-    inverse, dark : ndarray of shape (n_wavelengths,)
-        See `shapes`.
-    before, after, steps, lows, of_left, of_right : ndarray
-        Known shapes.
-    steepest, lowest : ndarray of shape (n_designs,)
-        Results.
     """
     curve, n = np.empty(base.size), base.size
     for d in range(depth.size):

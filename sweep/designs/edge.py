@@ -17,21 +17,10 @@ _WALL_NM = 1e-9
 def edge(
     wavelength_nm: Float[Array, "*#points"], center_nm: Float[Array, "*#points"], width_nm: Float[Array, "*#points"]
 ) -> Float[Array, "*points"]:
-    """Return a rising edge, a quintic with two continuous derivatives (Perlin's smootherstep).
+    """Return a rising edge, a quintic with two continuous derivatives (Perlin's smootherstep), 0 to 1.
 
-    Parameters
-    ----------
-    wavelength_nm : ndarray
-        Wavelengths, nm; all arguments broadcast.
-    center_nm : ndarray
-        Center, where the edge is 0.5, nm.
-    width_nm : ndarray
-        Width from 10 to 90 %, nm; 0 is a step with 0.5 at its center.
-
-    Returns
-    -------
-    ndarray
-        0 to 1.
+    `wavelength_nm`: wavelengths, nm; all arguments broadcast; `center_nm`: center, where the edge is 0.5, nm;
+    `width_nm`: width from 10 to 90 %, nm; 0 is a step with 0.5 at its center.
     """
     t = _position(wavelength_nm, center_nm, width_nm)
     return np.asarray(t * t * t * (t * (6 * t - 15) + 10), dtype=float)
@@ -42,15 +31,7 @@ def edge_gradient(
 ) -> tuple[Float[Array, "*points"], Float[Array, "*points"]]:
     """Return the derivatives of `edge`; 0 for a step, whose derivative is a distribution.
 
-    Parameters
-    ----------
-    wavelength_nm, center_nm, width_nm : ndarray
-        As in `edge`.
-
-    Returns
-    -------
-    by_center, by_width : ndarray
-        Derivatives, 1/nm.
+    Returns derivatives, 1/nm.
     """
     t = _position(wavelength_nm, center_nm, width_nm)
     slope = 30 * t * t * (1 - t) * (1 - t)

@@ -162,7 +162,7 @@ class Family(Protocol):
 
     @property
     def dimensions(self) -> Mapping[str, ParameterWeights]:
-        """Lengths in production by name: rows r, ndarray of shape (n, n_parameters); a length is min(r @ x), nm."""
+        """Lengths in production by name: rows r; a length is min(r @ x), nm."""
 
     def perturbed(self, off: ProductionError) -> Self:
         """Return the family as production makes it.
@@ -227,7 +227,7 @@ class MovedFamily(Protocol):
 
     @property
     def moved(self) -> tuple[PerWavelength, PerWavelength]:
-        """Fixed curve, and base transmission of the shape, ndarray of shape (n_wavelengths,) each."""
+        """Fixed curve, and base transmission of the shape."""
 
 
 @runtime_checkable
@@ -239,7 +239,7 @@ class SeparableFamily(Protocol):
 
     @property
     def separable(self) -> tuple[PerWavelength, PerWavelength]:
-        """Base and change, ndarray of shape (n_wavelengths,) each."""
+        """Base and change."""
 
     def edges(self, centers_and_widths: Float[Array, "bands 2"]) -> Float[Array, "bands wavelengths"]:
         """Return rising edges.

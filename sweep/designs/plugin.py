@@ -32,8 +32,8 @@ class PluginFamily:
     """Family by a class of user code: FILE.py:CLASS, or the name by which an installed package offers it.
 
     Methods as in `Family`. The class has `parameters`, a list of (name, low, high) or (name, low, high, default), is
-    constructed with (wavelength_nm, base, target), and has `curves(x)`: ndarray of shape (n_designs, n_parameters) to
-    QE, ndarray of shape (n_designs, n_wavelengths). It may have `violation(x)`, ndarray of shape (n_designs, n), met
+    constructed with (wavelength_nm, base, target), and has `curves(x)`: to
+    QE. It may have `violation(x)`, met
     where <= 0, and `below_base = True`, which states that no curve of a well-formed design is above the base. Curves
     are checked to be within 0 and 1, and below the base if that is stated. Gradients are central differences. A row of
     `curves(x)` must not depend on the other rows.
@@ -57,7 +57,7 @@ class PluginFamily:
         return PluginFamily, self._given
 
     def _array(self, name: str, x: DesignParameters, width: int | None) -> Float[Array, "designs columns"]:
-        """Call a method of the class and check its result, ndarray of shape (n_designs, width)."""
+        """Call a method of the class and check its result."""
         try:
             values = np.asarray(self._given[0].called(getattr(self._own, name), x.copy()), dtype=float)
         except (TypeError, ValueError):
@@ -74,20 +74,7 @@ class PluginFamily:
     def curves(self, x: DesignParameters) -> DesignCurves:
         """Return the QE of the modified channel; see `Family.curves`.
 
-        Parameters
-        ----------
-        x : ndarray of shape (n_designs, n_parameters)
-            Parameters.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, n_modified, n_wavelengths)
-            QE of the modified channels.
-
-        Raises
-        ------
-        SweepError
-            If the curve of a well-formed design is out of its bounds; others are clipped to 0 and 1.
+        Raises SweepError if the curve of a well-formed design is out of its bounds; others are clipped to 0 and 1.
         """
         curves = self._array("curves", x, self._base.size)
         well_formed = curves[(self.violation(x) <= _SLACK).all(axis=1)]
@@ -140,24 +127,13 @@ class PluginFamily:
         return {}
 
     def perturbed(self, off: ProductionError) -> PluginFamily:
-        """Return the same family; a study with production tolerances refuses it.
-
-        Parameters
-        ----------
-        off : ProductionError
-            Production error.
-
-        Returns
-        -------
-        PluginFamily
-            The same family.
-        """
+        """Return the same family; a study with production tolerances refuses it."""
         if any(off):
             raise SweepError(ValidationIssue(f"{self.kind} has no edges that production could shift"))
         return self
 
     def start(self, points: Float[Array, "starts start_dimensions"]) -> Float[Array, "starts parameters"]:
-        """Raise an error: a search starts anywhere in the box."""
+        """Return the points: a search starts anywhere in the box."""
         return points
 
 

@@ -15,18 +15,6 @@ def row_products(rows: Float[Array, "rows k"], matrix: Float[Array, "k others"])
 
     BLAS sums in an order that depends on shapes, strides and the place of a row among others. Here the sums of a row
     are the same alone and in any block, on one machine.
-
-    Parameters
-    ----------
-    rows : ndarray of shape (n, k)
-        Rows.
-    matrix : ndarray of shape (k, m)
-        Matrix.
-
-    Returns
-    -------
-    ndarray of shape (n, m)
-        Products.
     """
     if 0 < len(matrix) <= _FEW_TERMS:
         columns = np.ascontiguousarray(rows.T)

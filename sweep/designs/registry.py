@@ -38,13 +38,7 @@ class FamilyOptions(create_model("_FamilyOptions", __base__=Section, **_optional
 
 
 def described_families() -> str:
-    """Return the families with their options, for messages.
-
-    Returns
-    -------
-    str
-        Text.
-    """
+    """Return the families with their options, for messages."""
     families = []
     for kind, family in FAMILIES.items():
         options = ", ".join(family.Options.model_fields)
@@ -66,26 +60,9 @@ def build_family(
 ) -> Family:
     """Make a family.
 
-    Parameters
-    ----------
-    kind : str
-        Name of the family.
-    wavelength_nm, base, target : ndarray of shape (n_wavelengths,)
-        Wavelengths, nm, and curves; see `Family.of_study`.
-    options : FamilyOptions
-        Options of the study.
-    colorants : ndarray of shape (n_colorants, n_wavelengths), optional
-        Absorbances of the study's catalog, each with a peak of 1.
-
-    Returns
-    -------
-    Family
-        The family.
-
-    Raises
-    ------
-    SweepError
-        If there is no such family, or if a target, option or catalog is missing or superfluous.
+    `wavelength_nm`, `base`, `target`: wavelengths, nm, and curves; see `Family.of_study`; `colorants`: absorbances of
+    the study's catalog, each with a peak of 1. Raises SweepError if there is no such family, or if a target, option or
+    catalog is missing or superfluous.
     """
     family = FAMILIES.get(kind)
     if family is None:

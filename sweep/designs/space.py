@@ -20,19 +20,7 @@ Kind = Literal["reference", "design", "sweep", "search"]
 
 @dataclass(frozen=True)
 class Filter:
-    """Family bound to its curves.
-
-    Parameters
-    ----------
-    family : Family
-        Family.
-    bases : mapping of str to str
-        Modified channel to the curve that it replaces.
-    target : str
-        Curve that the filter takes inside its band.
-    technology : Technology, optional
-        Physical principle.
-    """
+    """Family bound to its curves."""
 
     family: Family
     bases: Mapping[str, str]
@@ -49,20 +37,8 @@ class Filter:
 class Space:
     """Set of designs on one CFA: a full-factorial grid, `rows`, or a box that is searched but not swept.
 
-    Parameters
-    ----------
-    kind : str
-        `reference`, `design`, `sweep` or `search`.
-    name, cfa : str
-        Names of the space and its CFA.
-    filter : Filter, optional
-        Left out for a plain CFA, which has no axes and one design.
-    axes : tuple
-        Values of each parameter; in a grid the last one runs fastest.
-    gridded : bool
-        False for a box that is searched but not swept.
-    rows : ListedDesigns, optional
-        Designs that are no grid.
+    `filter`: left out for a plain CFA, which has no axes and one design; `gridded`: False for a box that is searched
+    but not swept.
     """
 
     kind: Kind
@@ -88,15 +64,7 @@ class Space:
     def digits(self, numbers: DesignNumbers) -> list[DesignNumbers]:
         """Return the index on each axis of a grid.
 
-        Parameters
-        ----------
-        numbers : ndarray of int, shape (n_designs,)
-            Numbers of designs.
-
-        Returns
-        -------
-        list of ndarray of int, shape (n_designs,)
-            Index of the value, one array per axis.
+        Returns index of the value, one array per axis.
         """
         rest = numbers
         digits = []
@@ -107,32 +75,13 @@ class Space:
         return digits[::-1]
 
     def points(self, start: int, stop: int) -> Float[Array, "_designs parameters"]:
-        """Return the parameters of consecutive designs.
-
-        Parameters
-        ----------
-        start, stop : int
-            Range of the designs.
-
-        Returns
-        -------
-        ndarray of shape (stop - start, n_parameters)
-            Parameters.
-        """
+        """Return the parameters of consecutive designs."""
         return self.points_of(np.arange(start, stop))
 
     def points_of(self, numbers: DesignNumbers) -> DesignParameters:
         """Return the parameters of designs.
 
-        Parameters
-        ----------
-        numbers : ndarray of int, shape (n_designs,)
-            Numbers of the designs, at least one.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, n_parameters)
-            Parameters.
+        `numbers`: numbers of the designs, at least one.
         """
         if self.rows is not None:
             start = int(numbers.min())
@@ -142,22 +91,7 @@ class Space:
         return np.stack(columns, axis=1) if columns else np.empty((len(numbers), 0))
 
     def curves(self, points: DesignParameters, n_wavelengths: int, off: ProductionError = AS_DESIGNED) -> DesignCurves:
-        """Return the QE of the modified channels.
-
-        Parameters
-        ----------
-        points : ndarray of shape (n_designs, n_parameters)
-            Parameters.
-        n_wavelengths : int
-            Size of the grid.
-        off : ProductionError
-            Production error.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, n_modified, n_wavelengths)
-            QE; n_modified is 0 for a plain CFA.
-        """
+        """Return the QE of the modified channels; a plain CFA has none."""
         if self.filter is None:
             return np.empty((len(points), 0, n_wavelengths))
         family = self.filter.family
@@ -166,15 +100,7 @@ class Space:
     def violation(self, points: DesignParameters) -> PerDesign:
         """Return the largest violation of the family's own conditions.
 
-        Parameters
-        ----------
-        points : ndarray of shape (n_designs, n_parameters)
-            Parameters.
-
-        Returns
-        -------
-        ndarray of shape (n_designs,)
-            0 where a design is well formed.
+        0 where a design is well formed.
         """
         if self.filter is None:
             return np.zeros(len(points))

@@ -60,14 +60,6 @@ Stated = Annotated[
 def index_of(technology: Technology | None) -> float:
     """Return the effective index of a technology.
 
-    Parameters
-    ----------
-    technology : Technology or None
-        Physical principle.
-
-    Returns
-    -------
-    float
-        Effective index; infinite for a filter that does not move, or if nothing is stated.
+    Infinite for a filter that does not move, or if nothing is stated.
     """
     return math.inf if technology is None else technology.index

@@ -14,35 +14,14 @@ _WIDTHS = (0.0, 1.0)
 
 
 class ProductionError(NamedTuple):
-    """Production error: a feature designed at l nm is at l (1 + thickness) + shift_nm.
-
-    Parameters
-    ----------
-    shift_nm : float
-        Shift, nm.
-    thickness : float
-        Relative error of the thickness.
-    broadening : float
-        Relative excess of the width of an absorption band, of equal area.
-    """
+    """Production error: a feature designed at l nm is at l (1 + thickness) + shift_nm."""
 
     shift_nm: float = 0.0
     thickness: float = 0.0
     broadening: float = 0.0
 
     def nominal_nm(self, wavelength_nm: PerWavelength) -> PerWavelength:
-        """Return the designed wavelengths of features.
-
-        Parameters
-        ----------
-        wavelength_nm : ndarray of shape (n_wavelengths,)
-            Wavelengths as produced, nm.
-
-        Returns
-        -------
-        ndarray of shape (n_wavelengths,)
-            Wavelengths as designed, nm.
-        """
+        """Return the designed wavelengths of features."""
         moved = wavelength_nm - self.shift_nm
         return moved / (1 + self.thickness) if self.thickness else moved
 
@@ -54,15 +33,8 @@ AS_DESIGNED = ProductionError()
 class Tolerance:
     """Tolerance of production.
 
-    Parameters
-    ----------
-    edge_shift_nm : float
-        Largest shift of all edges to either side, nm.
-    thickness : float
-        Largest relative error of the thickness of all films, which moves every wavelength of an
-        interference filter.
-    broadening : float
-        Largest relative excess of the width of the bands of colorants.
+    `thickness`: largest relative error of the thickness of all films, which moves every wavelength of an interference
+    filter; `broadening`: largest relative excess of the width of the bands of colorants.
     """
 
     edge_shift_nm: float = 0.0
@@ -73,34 +45,14 @@ class Tolerance:
         return self.edge_shift_nm > 0 or self.thickness > 0 or self.broadening > 0
 
     def scaled(self, factor: float) -> Tolerance:
-        """Return a tolerance that is larger by a factor.
-
-        Parameters
-        ----------
-        factor : float
-            Factor.
-
-        Returns
-        -------
-        Tolerance
-            Scaled tolerance.
-        """
+        """Return a tolerance that is larger by a factor."""
         return Tolerance(factor * self.edge_shift_nm, factor * self.thickness, factor * self.broadening)
 
     def at(self, edge: float, film: float, width: float = 0.0) -> ProductionError:
         """Return a production error within the tolerance.
 
-        Parameters
-        ----------
-        edge, film : float
-            Shift and thickness error, -1 to 1 times their tolerance.
-        width : float
-            Broadening, 0 to 1 times its tolerance.
-
-        Returns
-        -------
-        ProductionError
-            Production error.
+        `edge`, `film`: shift and thickness error, -1 to 1 times their tolerance; `width`: broadening, 0 to 1 times its
+        tolerance.
         """
         moved = edge * self.edge_shift_nm + 0.0, film * self.thickness + 0.0  # no negative zeros
         return ProductionError(*moved, width * self.broadening)

@@ -25,31 +25,12 @@ class ListedDesigns(Protocol):
         """Number of designs."""
 
     def points(self, axes: Axes, start: int, stop: int) -> Float[Array, "_designs parameters"]:
-        """Return the parameters of consecutive designs.
-
-        Parameters
-        ----------
-        axes : tuple
-            Values of each parameter.
-        start, stop : int
-            Range of the designs.
-
-        Returns
-        -------
-        ndarray of shape (stop - start, n_parameters)
-            Parameters.
-        """
+        """Return the parameters of consecutive designs."""
 
 
 @dataclass(frozen=True)
 class PairedDesigns:
-    """Designs of which the i-th has the i-th value of every axis; an axis of one value holds for all.
-
-    Parameters
-    ----------
-    size : int
-        Number of designs.
-    """
+    """Designs of which the i-th has the i-th value of every axis; an axis of one value holds for all."""
 
     size: int
 
@@ -60,20 +41,7 @@ class PairedDesigns:
 
 
 def sobol_points(dimensions: int, count: int, seed: int) -> Float[Array, "count dimensions"]:
-    """Return the first points of a scrambled Sobol sequence.
-
-    Parameters
-    ----------
-    dimensions, count : int
-        Numbers of dimensions and points.
-    seed : int
-        Seed.
-
-    Returns
-    -------
-    ndarray of shape (count, dimensions)
-        Points in the unit cube.
-    """
+    """Return the first points of a scrambled Sobol sequence."""
     from scipy.stats import qmc  # noqa: PLC0415  (slow to import; only drawn designs and searches need it)
 
     # In a thread of its own, which takes no signals: SciPy prints a traceback if Ctrl-C reaches it while it reads its
@@ -85,18 +53,7 @@ def sobol_points(dimensions: int, count: int, seed: int) -> Float[Array, "count 
 
 @dataclass(frozen=True)
 class SampledDesigns:
-    """Designs between the smallest and largest value of every axis, by SciPy's `qmc`.
-
-    Parameters
-    ----------
-    method : str
-        `sobol`: first points of a scrambled Sobol sequence, so that fewer designs are the first of more;
-        `lhs`: Latin hypercube.
-    size : int
-        Number of designs.
-    seed : int
-        Seed.
-    """
+    """Designs between the smallest and largest value of every axis, by SciPy's `qmc`."""
 
     method: Method
     size: int
@@ -109,7 +66,7 @@ class SampledDesigns:
         return np.asarray(np.minimum(low + shares * (high - low), high), dtype=float)
 
     def _shares(self, n_parameters: int) -> Float[Array, "_size _parameters"]:
-        """Return points of the unit cube, ndarray of shape (size, n_parameters)."""
+        """Return points of the unit cube."""
         if self.method == "sobol":
             return sobol_points(n_parameters, self.size, self.seed)
         from scipy.stats import qmc  # noqa: PLC0415  (slow to import; only a study that draws designs needs it)

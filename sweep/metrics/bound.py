@@ -45,15 +45,7 @@ class Bound(Section):
     def violation(self, values: SameShape) -> SameShape:
         """Return the violation of the bound.
 
-        Parameters
-        ----------
-        values : ndarray
-            Values of the quantity.
-
-        Returns
-        -------
-        ndarray of the same shape
-            Distance outside the range, relative to `scale`, >= 0; NaN where the value is NaN.
+        Returns distance outside the range, relative to `scale`, >= 0. NaN where the value is NaN.
         """
         below = 0.0 if self.min is None else self.min - values
         above = 0.0 if self.max is None else values - self.max
@@ -72,21 +64,8 @@ def total_violation(
 ) -> PerDesign:
     """Return the largest violation of each design.
 
-    Parameters
-    ----------
-    columns : mapping of str to ndarray of shape (n_designs,)
-        Quantities.
-    constraints : mapping of str to Bound
-        Constraints of the study.
-    family_violation : ndarray of shape (n_designs,)
-        Violation of the family's conditions.
-    leave_out : iterable of str
-        Quantities that are ignored.
-
-    Returns
-    -------
-    ndarray of shape (n_designs,)
-        Relative violation: 0 is feasible; NaN, where a quantity is unknown, is not.
+    `family_violation`: violation of the family's conditions. Returns relative violation: 0 is feasible. NaN, where a
+    quantity is unknown, is not.
     """
     worst = family_violation
     for quantity, bound in constraints.items():

@@ -34,15 +34,7 @@ the darkest point of the curve, which is no nearer."""
 def parallelogram(first: Smooth, second: Smooth) -> Smooth:
     """Return the squared area of the parallelogram of two vectors.
 
-    Parameters
-    ----------
-    first, second : ndarray of shape (..., n_channels)
-        Vectors; real, or complex with a derivative.
-
-    Returns
-    -------
-    ndarray of shape (...)
-        |first|^2 |second|^2 sin^2 of their angle.
+    Returns |first|^2 |second|^2 sin^2 of their angle.
     """
     total = np.zeros(np.broadcast_shapes(first.shape, second.shape)[:-1], dtype=np.result_type(first, second))
     for i in range(first.shape[-1]):
@@ -54,15 +46,7 @@ def parallelogram(first: Smooth, second: Smooth) -> Smooth:
 def squared_distance(first: Float[Array, "*batch channels"], second: Float[Array, "*batch channels"]) -> SameShape:
     """Return the squared chromatic distance of two vectors.
 
-    Parameters
-    ----------
-    first, second : ndarray of shape (..., n_channels)
-        Responses less those without lamps.
-
-    Returns
-    -------
-    ndarray of shape (...)
-        Squared distance; 0 for a vector of zeros.
+    `first`, `second`: responses less those without lamps. 0 for a vector of zeros.
     """
     lengths = [_sum(vector * vector) for vector in (first, second)]
     smaller, larger = np.minimum(*lengths), np.maximum(*lengths)
@@ -82,19 +66,9 @@ def _sum(values: Float[Array, "*batch channels"]) -> SameShape:
 def chromatic_separation(
     response: DesignSignals, first: Int[IndexArray, " first"], second: Int[IndexArray, " second"]
 ) -> PerDesign:
-    """Compute the smallest chromatic distance of two signal types.
+    """Compute the smallest chromatic distance of two signal types, DN.
 
-    Parameters
-    ----------
-    response : ndarray of shape (n_designs, n_signals, n_channels)
-        Readout less that without lamps, DN.
-    first, second : ndarray of int
-        Signals of each type.
-
-    Returns
-    -------
-    ndarray of shape (n_designs,)
-        Distance, DN.
+    `response`: readout less that without lamps, DN.
     """
     smallest = np.empty(len(response))
     for block, one, other in pair_blocks(response.shape, first, second):
@@ -103,19 +77,9 @@ def chromatic_separation(
 
 
 def chromatic_separations(response: DesignSignals, members: Mapping[str, MemberNumbers]) -> dict[Pair, PerDesign]:
-    """Compute the smallest chromatic distance of every pair of signal types.
+    """Compute the smallest chromatic distance of every pair of signal types, DN.
 
-    Parameters
-    ----------
-    response : ndarray of shape (n_designs, n_signals, n_channels)
-        Readout less that without lamps, DN.
-    members : mapping of str to ndarray of int
-        Signals of each type.
-
-    Returns
-    -------
-    dict of pair to ndarray of shape (n_designs,)
-        Distance, DN.
+    `response`: readout less that without lamps, DN.
     """
     pairs = class_pairs(list(members))
     packed = packed_response(response, members)
@@ -134,21 +98,8 @@ def chromatic_rows(design: SmoothDesign, *, pairs: Sequence[Pair], noise: bool, 
     The smallest row is the squared distance, each smooth. In closed form where readings are linear, by the nearest
     point of the brightness curve elsewhere; that point moves with the design, which adds nothing to the derivative.
 
-    Parameters
-    ----------
-    design : SmoothDesign
-        Design with derivatives.
-    pairs : sequence of pair
-        Pairs of signal types.
-    noise : bool
-        In units of the noise, otherwise in DN.
-    decades : bool
-        Return -log10 of the errors of Gaussians at these distances.
-
-    Returns
-    -------
-    Rows
-        Values and derivatives.
+    `noise`: in units of the noise, otherwise in DN; `decades`: return -log10 of the errors of Gaussians at these
+    distances.
     """
     if not noise and design.linear_over_brightness:
         return _closed_rows(design, pairs)
@@ -213,22 +164,7 @@ def _closed_rows(design: SmoothDesign, pairs: Sequence[Pair]) -> Rows:
 
 
 def smooth_chromatic(setup: Setup, curves: DesignCurves, pair: Pair) -> PerDesign:
-    """Return the chromatic separation of the smooth response, the smallest over the cases.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-    curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
-        QE of the modified channels.
-    pair : tuple of str
-        Two signal types.
-
-    Returns
-    -------
-    ndarray of shape (n_designs,)
-        Distance, DN.
-    """
+    """Return the chromatic separation of the smooth response, the smallest over the cases, DN."""
     model = linear_model(setup)
     first, second = (setup.members[name] for name in pair)
     if not model.linear_over_brightness:

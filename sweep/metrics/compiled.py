@@ -46,18 +46,7 @@ def _counts(electrons: float, prnu: float, most: int) -> tuple[int, FloatArray]:
 
 @njit(cache=True, nogil=True)
 def bin_shares(sigma: float) -> FloatArray:
-    """Return shares of a Gaussian in bins of width 1, for positions of its mean at most 1/64 sigma apart.
-
-    Parameters
-    ----------
-    sigma : float
-        Standard deviation, bins.
-
-    Returns
-    -------
-    ndarray of shape (n_positions + 1, 2 reach + 1)
-        Shares.
-    """
+    """Return shares of a Gaussian in bins of width 1, for positions of its mean at most 1/64 sigma apart."""
     reach = int(_TAIL * sigma) + 1
     places = int(64 / sigma) + 1
     bins = np.empty((places + 1, 2 * reach + 1))
@@ -84,27 +73,9 @@ def pixel_numbers(
 ) -> tuple[int, FloatArray]:
     """Return the distribution of the digital numbers of one pixel.
 
-    Parameters
-    ----------
-    electrons : float
-        Expected electrons.
-    most : int
-        Count at which the well is full.
-    well_e, prnu, read_e : float
-        Full well, electrons; PRNU; read noise, electrons.
-    line : tuple of float
-        Bins per electron, and position of no electron from the lower edge of the first bin.
-    n_bins : int
-        Number of bins.
-    table : ndarray
-        Result of `bin_shares`; of size 0 without read noise.
-
-    Returns
-    -------
-    first : int
-        First bin that occurs.
-    shares : ndarray
-        Probability of each bin from there on.
+    `well_e`, `prnu`, `read_e`: full well, electrons; PRNU; read noise, electrons; `line`: bins per electron, and
+    position of no electron from the lower edge of the first bin; `table`: result of `bin_shares`; of size 0 without
+    read noise.
     """
     first, shares = _counts(electrons, prnu, most)
     # Counts are taken together where that adds less than 1/700 to the variance of both and read noise hides it.
@@ -170,24 +141,7 @@ def channel_numbers(
     n_bins: int,
     table: FloatArray,
 ) -> tuple[IndexArray, IndexArray, FloatArray]:
-    """Return the distribution of sums of pixels.
-
-    Parameters
-    ----------
-    electrons : ndarray of shape (n, n_pixels)
-        Expected electrons.
-    most, well_e, prnu, read_e, line, n_bins, table
-        As in `pixel_numbers`.
-
-    Returns
-    -------
-    firsts : ndarray of int, shape (n,)
-        First bin of each sum.
-    starts : ndarray of int, shape (n + 1,)
-        Start of its shares.
-    shares : ndarray
-        All shares.
-    """
+    """Return the distribution of sums of pixels."""
     firsts, starts = np.empty(len(electrons), np.intp), np.zeros(len(electrons) + 1, np.intp)
     values = np.empty(4096)
     for i in range(len(electrons)):
@@ -218,21 +172,8 @@ def mean_shares(
 ) -> FloatArray:
     """Return the distribution of the mean of `weight` values and another one.
 
-    Parameters
-    ----------
-    value, other : ndarray of shape (n,) and (m,)
-        Values, ascending: means of `weight` pixels, and of one.
-    chance, shares : ndarray of the same shapes
-        Their probabilities.
-    edges : ndarray of shape (n_bins - 1,)
-        Edges between bins, ascending.
-    weight : int
-        Number of pixels.
-
-    Returns
-    -------
-    ndarray of shape (n_bins,)
-        Probability of each bin.
+    `value`, `other`: values, ascending: means of `weight` pixels, and of one; `edges`: edges between bins, ascending;
+    `weight`: number of pixels.
     """
     total = np.zeros(edges.size + 1)
     for i in range(value.size):
@@ -250,22 +191,7 @@ def mean_shares(
 
 @njit(cache=True, nogil=True)
 def overlaps(firsts: IndexArray, starts: IndexArray, roots: FloatArray, rows: IndexArray) -> FloatArray:
-    """Return the Bhattacharyya coefficient of each two signals of a design.
-
-    Parameters
-    ----------
-    firsts, starts : ndarray of int
-        As in `channel_numbers`.
-    roots : ndarray
-        Roots of the shares.
-    rows : ndarray of int, shape (n_channels, n_signals)
-        Row of each signal in each channel.
-
-    Returns
-    -------
-    ndarray of shape (n_signals, n_signals)
-        Coefficients.
-    """
+    """Return the Bhattacharyya coefficient of each two signals of a design."""
     products = np.ones((rows.shape[1], rows.shape[1]))
     for a in range(rows.shape[1]):
         for b in range(a):
@@ -380,26 +306,7 @@ def largest_error(
     rows: IndexArray,
     step: float,
 ) -> float:
-    """Return the largest error over the pairs of two types; pairs with a small overlap are skipped.
-
-    Parameters
-    ----------
-    overlap : ndarray of shape (n_signals, n_signals)
-        Result of `overlaps`.
-    first, second : ndarray of int
-        Signals of each type.
-    firsts, starts, roots, rows : ndarray
-        As in `overlaps`.
-    logs : ndarray
-        Logarithms of the roots.
-    step : float
-        Step of the logarithms.
-
-    Returns
-    -------
-    float
-        Error probability.
-    """
+    """Return the largest error over the pairs of two types; pairs with a small overlap are skipped."""
     largest = 0.0
     bound = 0.5 * overlap[first][:, second].ravel()
     while bound.max() > largest:  # few are looked at, so that sorting them all is not worth it

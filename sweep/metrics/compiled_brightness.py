@@ -44,18 +44,7 @@ def nearest_on_curves(  # noqa: PLR0912  (one pass over pairs, blocks, segments 
     mean of both variances, at least so much; else in DN. Pairs that are farther than `margin` times the nearest squared
     distance of all, or times `nearest`, may be left out: their distance is infinite.
 
-    Parameters
-    ----------
-    mean, variance : ndarray of shape (n_readings, n_channels)
-        Readings.
-    curve_mean, curve_variance : ndarray of shape (n_curves, n_nodes, n_channels)
-        Curves.
-    first, second : ndarray of int, shape (n_pairs,)
-        Reading and curve of each pair.
-    squared, share : ndarray of shape (n_pairs,)
-        Output: squared distance, and place of the nearest point in its segment, 0 to 1.
-    segment : ndarray of int, shape (n_pairs,)
-        Output: segment.
+    `squared`, `share`: output: squared distance, and place of the nearest point in its segment, 0 to 1.
     """
     n_curves, n_nodes, n_channels = curve_mean.shape
     n_blocks = (n_nodes - 2) // _BLOCK + 1

@@ -109,28 +109,10 @@ def nearest_members(
     interpolated between two whole steps of the wavelength grid. A region holds the pairs of shifts that two lights
     can have together, cut into triangles; the parts of a region divide it along its length.
 
-    Parameters
-    ----------
-    response : ndarray of shape (n_spectra, n_channels)
-        Response to each spectrum, DN; consecutive rows of a light are one step apart.
-    first_rows, second_rows : ndarray of int, shapes (n_first,) and (n_second,)
-        Row of `response` at the first step of each light.
-    region_of_pair : ndarray of int, shape (n_first, n_second)
-        Index of the region of each two lights.
-    region_starts : ndarray of int, shape (n_regions + 1,)
-        Index of the first triangle of each region, then the number of triangles.
-    cells : ndarray of int, shape (n_triangles, 2)
-        Whole steps of both lights below each triangle (see `ShiftRegion`).
-    shares : ndarray of shape (n_triangles, 3, 2)
-        Corners of each triangle above these steps, 0 to 1.
-    parts : ndarray of int, shape (n_triangles,)
-        Part of the region that each triangle belongs to.
-    smallest_only : bool
-        Skip triangles that cannot hold the smallest of all distances; other results may then be too large.
-    out_squared : ndarray of shape (n_first, n_second, n_parts)
-        Output: squared distances, DN^2; infinite where a part has no triangle or all of its triangles were skipped.
-    out_steps, out_shares : ndarray of shape (n_first, n_second, n_parts, 2)
-        Output: whole steps and shares of the two nearest members.
+    `response`: response to each spectrum, DN; consecutive rows of a light are one step apart; `cells`: whole steps of
+    both lights below each triangle (see `ShiftRegion`); `shares`: corners of each triangle above these steps, 0 to 1;
+    `out_squared`: output: squared distances, DN^2; infinite where a part has no triangle or all of its triangles were
+    skipped.
     """
     corners, weights = np.empty((3, response.shape[1])), np.empty(3)
     step_lengths = np.empty(response.shape[0] - 1)

@@ -36,15 +36,7 @@ _MOST_BINS = 1_000_000
 
 @dataclass(frozen=True)
 class Errors:
-    """Errors of a batch of designs, ndarray of shape (n_designs,) each.
-
-    Parameters
-    ----------
-    error, bound : dict of pair to ndarray
-        Error of the worst two signals, and bound, by pair of types.
-    state_bound : ndarray
-        Bound over all types.
-    """
+    """Errors of a batch of designs."""
 
     error: dict[tuple[str, str], PerDesign]
     bound: dict[tuple[str, str], PerDesign]
@@ -61,20 +53,7 @@ def _bins(pixel: Pixel) -> tuple[int, float, int]:
 
 
 def affordable(pixel: Pixel, channels: Sequence[Int[IndexArray, " _pixels"]]) -> bool:
-    """Return whether the sums of any signal take at most `_MOST_SUMS` additions and `_MOST_BINS` bins.
-
-    Parameters
-    ----------
-    pixel : Pixel
-        Full well, gain, noise and ADC.
-    channels : sequence of ndarray of int
-        Pixels of each channel.
-
-    Returns
-    -------
-    bool
-        True if exact sums are used.
-    """
+    """Return whether the sums of any signal take at most `_MOST_SUMS` additions and `_MOST_BINS` bins."""
     if pixel.captures:
         return countable(pixel)
     (wide, sigma, n_bins), prnu = _bins(pixel), pixel.prnu
@@ -132,23 +111,8 @@ def errors(
     of both probabilities over all readouts. The bound is the sum of the Bhattacharyya coefficients with signals of
     other types, for the worst signal.
 
-    Parameters
-    ----------
-    electrons : ndarray of shape (n_designs, n_signals, n_pixels)
-        Expected electrons of each pixel; of an HDR pixel those of each exposure, on the first axis.
-    channels : sequence of ndarray of int
-        Pixels of each channel.
-    pixel : Pixel
-        Full well, gain, noise and ADC.
-    members : mapping of str to ndarray of int
-        Signals of each type.
-    light : ndarray of shape (n_exposures, n_pixels), optional
-        Light of the exposures of an HDR pixel relative to that of a pixel of full sensitivity.
-
-    Returns
-    -------
-    Errors
-        Errors and bounds.
+    `electrons`: expected electrons of each pixel; of an HDR pixel those of each exposure, on the first axis; `light`:
+    light of the exposures of an HDR pixel relative to that of a pixel of full sensitivity.
     """
     from . import compiled as kernels  # noqa: PLC0415  (compiled: kept off the start-up path)
 

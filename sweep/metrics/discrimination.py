@@ -47,17 +47,7 @@ def contrast_to_noise(
     The noise is sqrt(u' (Sa + Sb) / 2 u) for the unit vector u from one point to the other. Of several pairs at
     exactly the same distance, the one with the most noise counts.
 
-    Parameters
-    ----------
-    mean, variance : ndarray of shape (n_designs, n_signals, n_channels)
-        Mean, DN, and variance, DN^2.
-    first, second : ndarray of int
-        Signals of each type.
-
-    Returns
-    -------
-    ndarray of shape (n_designs,)
-        Ratio; 0 for coincident points.
+    0 for coincident points.
     """
     ratio = np.empty(len(mean))
     for block, _, difference, ours, theirs in _pairs(mean, variance, first, second):
@@ -77,18 +67,6 @@ def detectability(
     """Return d', the smallest over the pairs of two types: sqrt(D' S^-1 D), S the mean covariance of the two points.
 
     This is d_a of signal detection theory for unequal variances (Simpson and Fitter, 1973), in several channels.
-
-    Parameters
-    ----------
-    mean, variance : ndarray of shape (n_designs, n_signals, n_channels)
-        Mean, DN, and variance, DN^2.
-    first, second : ndarray of int
-        Signals of each type.
-
-    Returns
-    -------
-    ndarray of shape (n_designs,)
-        d'.
     """
     smallest = np.empty(len(mean))
     for block, _, difference, ours, theirs in _pairs(mean, variance, first, second):
@@ -110,19 +88,7 @@ def pairwise_error(
     Q(D' S^-1 D / (s_a + s_b)), with the standard deviation s of each along the normal (Fukunaga, "Introduction to
     Statistical Pattern Recognition", linear classifiers).
 
-    Parameters
-    ----------
-    mean, variance : ndarray of shape (n_designs, n_signals, n_channels)
-        Mean, DN, and variance, DN^2.
-    first, second : ndarray of int
-        Signals of each type.
-    shape : NoiseShape, optional
-        Shape of the noise; left out, Gaussian.
-
-    Returns
-    -------
-    ndarray of shape (n_designs,)
-        Probability; 0.5 for coincident points.
+    `shape`: shape of the noise; left out, Gaussian. 0.5 for coincident points.
     """
     errors = np.empty((len(mean), len(first) * len(second)))
     for block, pair, difference, ours, theirs in _pairs(mean, variance, first, second):
@@ -146,12 +112,7 @@ def pairwise_error(
 class NoiseShape:
     """Shape of the noise.
 
-    Parameters
-    ----------
-    gaussian : ndarray of bool
-        True where it is Gaussian; same shape as the means.
-    reach_dn : ndarray
-        Largest effect of a pixel on a channel, DN.
+    `gaussian`: True where it is Gaussian; same shape as the means.
     """
 
     gaussian: Bool[BoolArray, "designs signals channels"]
@@ -163,17 +124,7 @@ class NoiseShape:
     ) -> tuple[Float[Array, "_designs signals channels"], Float[Array, "_designs signals channels"], NoiseShape]:
         """Return mean, variance and shape of a readout, with cases and designs on one axis.
 
-        Parameters
-        ----------
-        read : NoisyReadout
-            Readout with noise.
-
-        Returns
-        -------
-        mean, variance : ndarray of shape (n_designs * n_cases, n_signals, n_channels)
-            Moments, DN and DN^2.
-        shape : NoiseShape
-            Shape of the noise.
+        Returns `mean, variance`: moments, DN and DN^2.
         """
         shape = (-1, *read.mean.shape[2:])
         noise = cls(read.gaussian.reshape(shape), read.reach_dn.reshape(shape))
@@ -182,21 +133,9 @@ class NoiseShape:
     def gaussian_only(
         self, block: slice, pair: _Both, difference: Float[Array, "designs pairs channels"]
     ) -> Float[Array, "designs pairs channels"]:
-        """Return the differences in channels with Gaussian noise at both points, 0 in others.
+        """Return the differences in channels with Gaussian noise at both points, 0 in others, DN.
 
-        Parameters
-        ----------
-        block : slice
-            Designs.
-        both : tuple of ndarray of int
-            Signals of each pair.
-        difference : ndarray of shape (n, n_pairs, n_channels)
-            Differences of the means, DN.
-
-        Returns
-        -------
-        ndarray of the same shape
-            Differences, DN.
+        `difference`: differences of the means, DN.
         """
         gaussian = self.gaussian[block]
         return np.where(gaussian[:, pair[0]] & gaussian[:, pair[1]], difference, 0.0)
@@ -214,19 +153,7 @@ class NoiseShape:
         (1962) for the logarithms L of the moment generating functions: v / m^2 (exp(s m) - 1 - s m) for a sum of
         variance v whose terms are within m of their means.
 
-        Parameters
-        ----------
-        block : slice
-            Designs.
-        both : tuple of ndarray of int
-            Signals of each pair.
-        difference, total : ndarray of shape (n, n_pairs, n_channels)
-            Differences, DN, and sums of both variances, DN^2.
-
-        Returns
-        -------
-        ndarray of shape (n, n_pairs)
-            Bound.
+        `difference`, `total`: differences, DN, and sums of both variances, DN^2.
         """
         bound = np.full(difference.shape[:2], np.inf)
         # Each design for itself: what stands beside it in a block changes nothing.
@@ -255,21 +182,7 @@ def error_bounds(
 
     The sum over the signals of other types of each pair's Bhattacharyya coefficient (Kailath, 1967), at most 1.
 
-    Parameters
-    ----------
-    mean, variance : ndarray of shape (n_designs, n_signals, n_channels)
-        Mean, DN, and variance, DN^2.
-    members : mapping of str to ndarray of int
-        Signals of each type.
-    noise : NoiseShape, optional
-        Shape of the noise; left out, Gaussian.
-
-    Returns
-    -------
-    by_pair : dict of pair to ndarray of shape (n_designs,)
-        Bound of each pair of types.
-    state_bound : ndarray of shape (n_designs,)
-        Bound over all types.
+    `noise`: shape of the noise; left out, Gaussian.
     """
     bounds = {}
     state = np.zeros(mean.shape[:2])

@@ -37,18 +37,7 @@ _HELD = 4_000_000
 class Draws:
     """Two lights and a camera per draw, sorted by production error.
 
-    Parameters
-    ----------
-    offs : tuple of ProductionError
-        Production errors.
-    starts : ndarray of int
-        First draw of each production error, and the end.
-    below : ndarray of int, shape (n, 2)
-        Spectrum below the shift of both lights.
-    share : ndarray of shape (n, 2)
-        Share of the next spectrum.
-    place : ndarray of shape (n,)
-        Field position, 0 to 1.
+    `below`: spectrum below the shift of both lights; `place`: field position, 0 to 1.
     """
 
     offs: tuple[ProductionError, ...]
@@ -67,14 +56,7 @@ class Draws:
     ) -> None:
         """Compute the distances of the draws with one production error.
 
-        Parameters
-        ----------
-        off : int
-            Index of the production error.
-        response : ndarray of shape (n_cases, n_spectra, n_channels)
-            Response of that filter to every spectrum, DN.
-        out : ndarray of shape (n,)
-            Distances, DN; changed in place.
+        `response`: response of that filter to every spectrum, DN; `out`: distances, DN; changed in place.
         """
         draws = slice(int(self.starts[off]), int(self.starts[off + 1]))
         out[draws] = np.sqrt((self.differences(draws, response) ** 2).sum(axis=-1))
@@ -82,20 +64,7 @@ class Draws:
     def differences(
         self, some: slice | Int[IndexArray, " some"], response: Float[Array, "*batch cases spectra channels"]
     ) -> Float[Array, "*batch some channels"]:
-        """Return first minus second light of some draws.
-
-        Parameters
-        ----------
-        some : slice or ndarray of int
-            Draws.
-        response : ndarray of shape (..., n_cases, n_spectra, n)
-            Values of every spectrum.
-
-        Returns
-        -------
-        ndarray of shape (..., n_some, n)
-            Differences.
-        """
+        """Return first minus second light of some draws."""
         n_cases, below, share = response.shape[-3], self.below[some], self.share[some]
         case = np.minimum((self.place[some] * n_cases).astype(np.intp), n_cases - 1)
         low, high = (response[..., case[:, None], below + step, :] for step in (0, 1))
@@ -104,24 +73,7 @@ class Draws:
 
 
 def draws_of(members: Members, pair: Pair, tolerance: Tolerance, seed: Sequence[int]) -> Draws:
-    """Draw lights and production errors uniformly, independent of the design.
-
-    Parameters
-    ----------
-    members : Members
-        Population of the lights.
-    pair : tuple of str
-        Two signal types.
-    tolerance : Tolerance
-        Production tolerance.
-    seed : sequence of int
-        Seed.
-
-    Returns
-    -------
-    Draws
-        The draws.
-    """
+    """Draw lights and production errors uniformly, independent of the design."""
     population = members.population
     rng, n = np.random.default_rng(seed), population.draws
     ambient, heating, u, chosen, edge, place, film, broader = (rng.random((n, k)) for k in (2, 2, 2, 4, 1, 1, 1, 1))
@@ -164,18 +116,6 @@ def rank_below(draws: int, share: float) -> int:
     """Return the highest rank, from below and from 1, with no more than a share of all, but for `_MISTAKEN`.
 
     The number of draws in the rest of all is binomial (Clopper and Pearson, Biometrika 26, 404, 1934, one-sided).
-
-    Parameters
-    ----------
-    draws : int
-        Number of draws.
-    share : float
-        Share.
-
-    Returns
-    -------
-    int
-        Rank.
     """
     from scipy.special import bdtr  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
@@ -191,18 +131,7 @@ class LampsAndCameras:
         self._draws: dict[Pair, Draws] = {}
 
     def draws(self, pair: Pair) -> Draws:
-        """Return the draws of two types.
-
-        Parameters
-        ----------
-        pair : tuple of str
-            Two signal types.
-
-        Returns
-        -------
-        Draws
-            The draws.
-        """
+        """Return the draws of two types."""
         if pair not in self._draws:
             self._draws[pair] = draws_of(self.population_model.members, pair, self._tolerance, (self._seed, 2))
         return self._draws[pair]
@@ -210,19 +139,9 @@ class LampsAndCameras:
     def kept(
         self, curves: Float[Array, "offs modified wavelengths"], pairs: Sequence[Pair]
     ) -> dict[Pair, tuple[float, Int[IndexArray, " _kept"]]]:
-        """Return the distance that the wanted share has, for one design.
+        """Return the distance that the wanted share has, for one design, DN, and the draws whose mean it is.
 
-        Parameters
-        ----------
-        curves : ndarray of shape (n_offs, n_modified, n_wavelengths)
-            QE with each production error.
-        pairs : sequence of pair
-            Pairs of signal types.
-
-        Returns
-        -------
-        dict of pair to (float, ndarray of int)
-            Distance, DN, and the draws whose mean it is; NaN where a response is NaN.
+        NaN where a response is NaN.
         """
         imager = self.population_model.imager
         distances_of = {pair: np.empty(self.draws(pair).size) for pair in pairs}
@@ -254,23 +173,7 @@ class LampsAndCameras:
         n_designs: int,
         pairs: Sequence[Pair],
     ) -> dict[str, PerDesign]:
-        """Return the distance that the wanted share has, for several designs.
-
-        Parameters
-        ----------
-        made : callable
-            From production error and slice of designs to QE, ndarray of shape (n_some, n_modified,
-            n_wavelengths).
-        n_designs : int
-            Number of designs.
-        pairs : sequence of pair
-            Pairs of signal types.
-
-        Returns
-        -------
-        dict of str to ndarray of shape (n_designs,)
-            Distance, DN, by the name of the CSD.
-        """
+        """Return the distance that the wanted share has, for several designs, DN, by the name of the CSD."""
         offs, setup = self.draws(pairs[0]).offs, self.population_model.setup
         step = max(1, _HELD // (len(offs) * max(1, len(setup.camera.modified)) * setup.camera.grid.size))
         columns: dict[str, list[float]] = {csd_name(pair): [] for pair in pairs}

@@ -56,20 +56,7 @@ _LAMPS = [metric for metric in METRICS if isinstance(metric, LampMetric)]
 
 
 def designed_quantities(setup: Setup, designs: DesignCurves | Block) -> Columns:
-    """Return the quantities of designs without light.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-    designs : Block or ndarray of shape (n_designs, n_modified, n_wavelengths)
-        Designs, or QE of the modified channels.
-
-    Returns
-    -------
-    dict of str to ndarray of shape (n_designs,)
-        Column name -> values.
-    """
+    """Return the quantities of designs without light."""
     block = _block(designs)
     return _joined([metric.of_designs(setup, block) for metric in METRICS if isinstance(metric, DesignMetric)])
 
@@ -77,17 +64,7 @@ def designed_quantities(setup: Setup, designs: DesignCurves | Block) -> Columns:
 def family_quantities(family: Family | None, points: DesignParameters) -> Columns:
     """Return the quantities that the parameters of designs determine.
 
-    Parameters
-    ----------
-    family : Family or None
-        Family; None for plain CFAs.
-    points : ndarray of shape (n_designs, n_parameters)
-        Parameters.
-
-    Returns
-    -------
-    dict of str to ndarray of shape (n_designs,)
-        Column name -> values.
+    `family`: family; None for plain CFAs.
     """
     return _joined([metric.of_parameters(family, points) for metric in METRICS if isinstance(metric, FamilyMetric)])
 
@@ -95,21 +72,7 @@ def family_quantities(family: Family | None, points: DesignParameters) -> Column
 def image_quantities(setup: Setup, curves: DesignCurves, vision: Vision | None, seed: int) -> Columns:
     """Return the quantities of images of signal heads.
 
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-    curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
-        QE of the modified channels.
-    vision : Vision or None
-        Benchmark; None if the study has none.
-    seed : int
-        Seed of the study.
-
-    Returns
-    -------
-    dict of str to ndarray of shape (n_designs,)
-        Column name -> values.
+    `vision`: benchmark; None if the study has none.
     """
     if vision is None:
         return {}
@@ -137,7 +100,7 @@ def _by_phase(model: ForwardModel, cases: Columns, n_places: int) -> Float[Array
 
 
 def _csds(model: ForwardModel, curves: Float[Array, "offs modified wavelengths"]) -> Float[Array, "designs pairs"]:
-    """Return CSDs of one design at each phase, the smallest over the moments, ndarray of shape (n_pairs, n_phases)."""
+    """Return CSDs of one design at each phase, the smallest over the moments."""
     response = model.read(curves)[0]
     cases = {csd_name(pair): dn[:, None] for pair, dn in separations(response[0], model.setup.members).items()}
     return np.asarray(_by_phase(model, cases, model.n_cases)[0])
@@ -277,21 +240,7 @@ def by_case(
 ) -> Columns:
     """Evaluate metrics of the readout in each case, in blocks of the size of a cache.
 
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-    response : ndarray of shape (n_designs, n_cases, n_signals, n_channels)
-        Readout, DN.
-    metrics : sequence of ReadoutMetric
-        Metrics.
-    unlit : ndarray of shape (n_designs, n_cases, n_channels), optional
-        Response without lamps, DN; left out, 0.
-
-    Returns
-    -------
-    dict of str to ndarray of shape (n_cases, n_designs)
-        Columns.
+    `unlit`: response without lamps, DN; left out, 0.
     """
     n_designs, n_cases = response.shape[:2]
     step, parts = max(1, _COMPARED_AT_ONCE // max(1, n_designs)), []
@@ -308,20 +257,7 @@ def by_case(
 
 
 def over_cases(imager: ForwardModel, cases: Columns) -> Columns:
-    """Return the worst of all cases, and for CSDs the largest over the phases of the smallest over the moments.
-
-    Parameters
-    ----------
-    imager : ForwardModel
-        Model of the scene.
-    cases : mapping of str to ndarray of shape (n_cases, n_designs)
-        Columns.
-
-    Returns
-    -------
-    dict of str to ndarray of shape (n_designs,)
-        Column name -> values.
-    """
+    """Return the worst of all cases, and for CSDs the largest over the phases of the smallest over the moments."""
     quantities = quantities_of(RequestedQuantities(imager.setup.lights.classes, any_place=True))
     best = {quantity.of: name for name, quantity in quantities.items() if quantity.extreme == "best place"}
     columns: Columns = {}
@@ -349,24 +285,6 @@ def evaluate(
     CSDs are the smallest over sampling phases, field positions and moments of a pulse; ``best_phase_csd_<a>_<b>`` is
     the largest over the phases of the smallest over the moments. Where all phases or field positions count, CSDs are
     refined; other metrics are the worst over the lattice.
-
-    Parameters
-    ----------
-    model : ForwardModel
-        Model of the scene.
-    designs : Block or ndarray of shape (n_designs, n_modified, n_wavelengths)
-        Designs, or QE of the modified channels.
-    states : sequence of str
-        Signal types that noise may confuse.
-    probabilities : bool
-        Compute their contrast detection probability.
-    user_metrics : sequence of UserMetric
-        Metrics of user code.
-
-    Returns
-    -------
-    dict of str to ndarray of shape (n_designs,)
-        Column name -> values.
     """
     block, extra, setup = _block(designs), partial(_whole_readout, model, user_metrics), model.setup
     changing = None if states else model.read_changing(block)
@@ -419,7 +337,7 @@ def _over_brightness(setup: Setup, block: Block, columns: Columns, states: Seque
 def of_lamps(
     setup: Setup, curves: DesignCurves, states: Sequence[str], metrics: Sequence[LampMetric]
 ) -> dict[str, float]:
-    """Return columns of lamps of unknown brightness of one design, ndarray of shape (1, n_modified, n_wavelengths)."""
+    """Return columns of lamps of unknown brightness of one design."""
     cases = curves_of(forward_model(setup.over_brightness).lamps(curves), setup)
     return {k: v for metric in metrics for k, v in metric.of_lamps(cases, setup.members, states).items()}
 

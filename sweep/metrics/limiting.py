@@ -19,36 +19,12 @@ LimitingLights = Mapping[Pair, NDArray[np.object_]]
 
 
 def limited_by_name(pair: Pair) -> str:
-    """Return the column name of the two lights that limit a pair's CSD.
-
-    Parameters
-    ----------
-    pair : tuple of str
-        Two signal types.
-
-    Returns
-    -------
-    str
-        Name.
-    """
+    """Return the column name of the two lights that limit a pair's CSD."""
     return pair_name("limited_by", pair)
 
 
 def limiting_lights(setup: Setup, response: DesignCases) -> LimitingLights:
-    """Return the two lights that limit each CSD.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-    response : ndarray of shape (n_designs, n_cases, n_signals, n_channels)
-        Readout, DN.
-
-    Returns
-    -------
-    dict of str to ndarray of shape (n_designs,)
-        Names, the light of the first type first; over the lattice where all phases count.
-    """
+    """Return the two lights that limit each CSD."""
     from .nearest import nearest_pairs  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     members = [setup.members[name] for name in setup.lights.classes]
@@ -70,20 +46,7 @@ def _named(setup: Setup, lights: Int[IndexArray, "rows 2"]) -> NDArray[np.object
 
 
 def limiting_lights_of(imager: ForwardModel, block: Block) -> LimitingLights:
-    """Return the limiting lights of a batch of designs.
-
-    Parameters
-    ----------
-    imager : ForwardModel
-        Model of the scene.
-    block : Block
-        Designs.
-
-    Returns
-    -------
-    dict of str to ndarray of shape (n_designs,)
-        As `limiting_lights`.
-    """
+    """Return the limiting lights of a batch of designs."""
     changing = imager.read_changing(block)
     if changing is None:
         return limiting_lights(imager.setup, imager.read(block.curves())[0])

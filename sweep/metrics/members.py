@@ -32,14 +32,7 @@ _HELD = 4_000_000
 class NearestMembers:
     """Nearest members of each two lights of two types, in each part of their region.
 
-    Parameters
-    ----------
-    squared : ndarray of shape (n_first, n_second, n_parts)
-        Squared distance, DN^2; infinite where there are none.
-    steps, shares : ndarray of shape (..., 2)
-        Whole steps and shares of both members.
-    first, second : ndarray of int
-        First spectrum of each light.
+    `squared`: squared distance, DN^2; infinite where there are none.
     """
 
     squared: Float[Array, "first second parts"]
@@ -49,20 +42,7 @@ class NearestMembers:
     second: Int[IndexArray, " second"]
 
     def of(self, values: Float[Array, "... spectra channels"], side: int) -> Float[Array, " ..."]:
-        """Return values of the nearest members on one side.
-
-        Parameters
-        ----------
-        values : ndarray of shape (..., n_spectra, n)
-            Values of every spectrum.
-        side : int
-            0 or 1.
-
-        Returns
-        -------
-        ndarray
-            Shape (..., n_first, n_second, n_parts, n).
-        """
+        """Return values of the nearest members on one side."""
         starts = self.first[:, None, None] if side == 0 else self.second[None, :, None]
         rows, share = starts + self.steps[..., side], self.shares[..., side, None]
         return np.asarray(values[..., rows, :] * (1 - share) + values[..., rows + 1, :] * share, dtype=float)
@@ -85,19 +65,9 @@ class PopulationModel:
         return linear_model(self.setup)
 
     def worst(self, curves: DesignCurves, pairs: Sequence[Pair] = ()) -> dict[str, PerDesign]:
-        """Return the smallest CSD of each pair over all members and field positions.
+        """Return the smallest CSD of each pair over all members and field positions, DN.
 
-        Parameters
-        ----------
-        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
-            QE of the modified channels.
-        pairs : sequence of pair
-            Pairs; all if there are none.
-
-        Returns
-        -------
-        dict of str to ndarray of shape (n_designs,)
-            CSD by its name, DN; NaN where the response is NaN.
+        `pairs`: pairs; all if there are none. NaN where the response is NaN.
         """
         pairs = pairs or class_pairs(self.setup.lights.classes)
         smallest = {pair: np.full(len(curves), np.nan) for pair in pairs}
@@ -115,21 +85,7 @@ class PopulationModel:
     ) -> NearestMembers:
         """Return the nearest members of two types.
 
-        Parameters
-        ----------
-        response : ndarray of shape (n_spectra, n_channels)
-            Response to every spectrum, DN.
-        pair : tuple of str
-            Two signal types.
-        parts : int
-            Parts of a region of shifts whose nearest members are kept.
-        alone : bool
-            Only the smallest distance is requested.
-
-        Returns
-        -------
-        NearestMembers
-            Nearest members.
+        `response`: response to every spectrum, DN.
         """
         from .compiled_members import nearest_members  # noqa: PLC0415  (compiled: kept off the start-up path)
 
@@ -155,16 +111,5 @@ _imagers: Cache[bytes, PopulationModel] = Cache(16)
 
 
 def population_model(setup: Setup) -> PopulationModel:
-    """Return the population of a setup's lights; recent ones are cached.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-
-    Returns
-    -------
-    PopulationModel
-        Scene with all members.
-    """
+    """Return the population of a setup's lights; recent ones are cached."""
     return _imagers.get(hashlib.sha256(pickle.dumps(setup)).digest(), lambda: PopulationModel(setup))

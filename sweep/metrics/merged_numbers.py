@@ -26,22 +26,9 @@ def merged_numbers(
 ]:
     """Return the distributions of the mean merged value of the pixels of channels.
 
-    Parameters
-    ----------
-    electrons : ndarray of shape (n_exposures, n_designs, n_signals, n_pixels)
-        Expected electrons of each pixel.
-    light : ndarray of shape (n_exposures, n_pixels)
-        Light of exposures relative to that of a pixel of full sensitivity.
-    channels : sequence of ndarray of int
-        Pixels of each channel.
-    pixel : Pixel
-        HDR pixel.
-
-    Returns
-    -------
-    firsts, starts, roots, rows : ndarray
-        As in `confusion`: first bin, start and roots of the shares of each distinct signal, and the row of each
-        design's signal in each channel, ndarray of int of shape (n_channels, n_designs, n_signals).
+    `electrons`: expected electrons of each pixel; `light`: light of exposures relative to that of a pixel of full
+    sensitivity. Returns as in `confusion`: first bin, start and roots of the shares of each distinct signal, and the
+    row of each design's signal in each channel.
     """
     firsts, shares, rows = list[int](), list[FloatArray](), list[IndexArray]()
     electrons = np.minimum(electrons, np.reshape(saturating_e(pixel), (-1, 1, 1, 1)))
@@ -74,7 +61,7 @@ def _pixel(electrons: tuple[float, ...], pixel: Pixel, light: tuple[float, ...])
 
 
 def _channel(pixels: Float[Array, "signals pixels"], pixel: Pixel, light: tuple[float, ...]) -> tuple[int, PerValue]:
-    """Return first bin and shares of the mean of independent pixels, ndarray of shape (n_pixels, n_exposures)."""
+    """Return first bin and shares of the mean of independent pixels."""
     from .compiled import mean_shares  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     parts, bins = [_pixel(tuple(expected), pixel, light) for expected in pixels], readings_of(pixel, light).bins

@@ -22,14 +22,7 @@ _LANES, _AT_ONCE = 64, 16
 def nearest_squared(response: FloatArray, bounds: IndexArray, out: FloatArray) -> None:
     """Compute the smallest squared distance of each pair of classes.
 
-    Parameters
-    ----------
-    response : ndarray of shape (n_designs, 4, n_signals)
-        C-ordered and finite, one class after the other; missing channels are 0.
-    bounds : ndarray of int, shape (n_classes + 1,)
-        Start of each class.
-    out : ndarray of shape (n_designs, n_pairs)
-        Squared distances, in the order of `spectra.lights.class_pairs`.
+    `response`: C-ordered and finite, one class after the other; missing channels are 0.
     """
     for d in range(response.shape[0]):
         values = response[d]
@@ -53,14 +46,8 @@ def nearest_squared(response: FloatArray, bounds: IndexArray, out: FloatArray) -
 def nearest_chromatic_squared(response: FloatArray, bounds: IndexArray, out: FloatArray) -> None:
     """Compute the smallest squared chromatic distance of each pair of classes (see `chromatic.squared_distance`).
 
-    Parameters
-    ----------
-    response : ndarray of shape (n_designs, 4, n_signals)
-        Less the response without lamps, C-ordered and finite, one class after the other; missing channels are 0.
-    bounds : ndarray of int, shape (n_classes + 1,)
-        Start of each class.
-    out : ndarray of shape (n_designs, n_pairs)
-        Squared distances, in the order of `spectra.lights.class_pairs`.
+    `response`: less the response without lamps, C-ordered and finite, one class after the other; missing channels are
+    0.
     """
     for d in range(response.shape[0]):
         values = response[d]
@@ -91,16 +78,7 @@ def nearest_chromatic_squared(response: FloatArray, bounds: IndexArray, out: Flo
 def nearest_pairs(response: FloatArray, order: IndexArray, bounds: IndexArray, out: IndexArray) -> None:
     """Find the two nearest signals of each pair of classes over all cases; of equally near ones the first.
 
-    Parameters
-    ----------
-    response : ndarray of shape (n_designs, n_cases, n_signals, n_channels)
-        C-ordered.
-    order : ndarray of int
-        Signals, one class after the other.
-    bounds : ndarray of int, shape (n_classes + 1,)
-        Start of each class in `order`.
-    out : ndarray of int, shape (n_designs, n_pairs, 2)
-        Signals, in the order of `spectra.lights.class_pairs`; -1 where a distance is not finite.
+    `out`: signals, in the order of `spectra.lights.class_pairs`; -1 where a distance is not finite.
     """
     for d in range(response.shape[0]):
         pair = 0
@@ -129,18 +107,8 @@ def nearest_along_squared(
 ) -> None:
     """Compute the smallest squared distance of each pair of classes for designs that differ in one channel alone.
 
-    Parameters
-    ----------
-    values : ndarray of shape (n_designs, n_signals)
-        That channel, C-ordered.
-    fixed : ndarray
-        Squared distances in the other channels, ascending within each pair of classes.
-    first, second : ndarray of int
-        Signals of each pair.
-    starts : ndarray of int, shape (n_pairs + 1,)
-        Start of each pair of classes, and the end.
-    out : ndarray of shape (n_pairs, n_designs)
-        Squared distances; undefined for values that are not finite.
+    `fixed`: squared distances in the other channels, ascending within each pair of classes; `out`: squared distances;
+    undefined for values that are not finite.
     """
     for begin in range(0, len(values), _LANES):  # designs side by side, so that one instruction serves several
         block = np.ascontiguousarray(values[begin : begin + _LANES].T)

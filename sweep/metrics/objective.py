@@ -76,18 +76,7 @@ class Objective(create_model("_Rules", __base__=Section, **_FIELDS)):  # type: i
         return next(iter(self.weights)) if alone else COMBINED
 
     def of(self, columns: Mapping[str, PerDesign]) -> PerDesign:
-        """Return the value of the objective.
-
-        Parameters
-        ----------
-        columns : mapping of str to ndarray of shape (n_designs,)
-            Quantities.
-
-        Returns
-        -------
-        ndarray of shape (n_designs,)
-            Values.
-        """
+        """Return the value of the objective."""
         return self.rule.of(np.stack([weight * columns[name] for name, weight in self.weights.items()]))
 
     def __str__(self) -> str:
@@ -96,20 +85,7 @@ class Objective(create_model("_Rules", __base__=Section, **_FIELDS)):  # type: i
 
 
 def columns_of(requested: RequestedQuantities, objective: Objective) -> Mapping[str, Quantity]:
-    """Return the quantities of a study's result table.
-
-    Parameters
-    ----------
-    requested : RequestedQuantities
-        Requested quantities.
-    objective : Objective
-        Objective.
-
-    Returns
-    -------
-    mapping of str to Quantity
-        Quantities of all metrics, and a combined objective, in order.
-    """
+    """Return the quantities of a study's result table."""
     if objective.column != COMBINED:
         return quantities_of(requested)
     whole = Quantity(COMBINED, COMBINED, f"the study's objective: {objective}", direction="more")

@@ -10,15 +10,7 @@ from ..base.types import Array, Bool, BoolArray, Float
 def knee(values: Float[Array, "points 2"]) -> int | None:
     """Return the knee of a front: the point farthest beyond the line between its ends.
 
-    Parameters
-    ----------
-    values : ndarray of shape (n, 2)
-        Points, both objectives maximized and scaled to the range of the front.
-
-    Returns
-    -------
-    int or None
-        Row; None for fewer than three different points, or if none is beyond the line.
+    None for fewer than three different points, or if none is beyond the line.
     """
     if len(values) < 3 or not np.isfinite(values).all():
         return None
@@ -36,17 +28,8 @@ def non_dominated(
 ) -> Bool[BoolArray, " points"]:
     """Return the rows that no other eligible row dominates.
 
-    Parameters
-    ----------
-    values : ndarray of shape (n, n_objectives)
-        Points, all objectives maximized.
-    eligible : ndarray of bool, shape (n,), optional
-        Rows that may be in the set; other rows, and rows with NaN, dominate nothing.
-
-    Returns
-    -------
-    ndarray of bool, shape (n,)
-        True for non-dominated rows; equal rows are all kept.
+    `eligible`: rows that may be in the set; other rows, and rows with NaN, dominate nothing. True for non-dominated
+    rows.
     """
     import moocore  # noqa: PLC0415  (pulls in pandas: kept off the start-up path)
 

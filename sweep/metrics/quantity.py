@@ -41,28 +41,7 @@ End = Literal["min", "max"]
 class Column:
     """Column in words and facts, as a run keeps it.
 
-    Parameters
-    ----------
-    name : str
-        Column name.
-    metric : str
-        Metric, the same for all pairs of signal types.
-    meaning : str
-        Meaning.
-    unit : str
-        Unit; empty for a ratio.
-    label : str
-        Name in texts.
-    digits : int
-        Digits after the point.
-    direction : {'more', 'less', ''}
-        Direction of improvement.
-    role : {'separation', 'light', ''}
-        Separation of colors, or its cost.
-    extreme, of : str
-        Kind of extreme, and the quantity that it is of.
-    pair : tuple of str, optional
-        Signal types.
+    `unit`: unit; empty for a ratio.
     """
 
     name: str
@@ -90,49 +69,17 @@ class Column:
     def amount(self, value: float, digits: int | None = None) -> str:
         """Format a value with its unit.
 
-        Parameters
-        ----------
-        value : float
-            Value.
-        digits : int, optional
-            Digits after the point, instead of those of the column.
-
-        Returns
-        -------
-        str
-            Text.
+        `digits`: digits after the point, instead of those of the column.
         """
         places = self.digits if digits is None else digits
         return f"{value:.{places}f} {self.unit}" if self.unit else f"{value:.{self.digits}f}"
 
     def formatted(self, value: float) -> str:
-        """Format a value for sentences and plots: in DN whole from 10 on.
-
-        Parameters
-        ----------
-        value : float
-            Value.
-
-        Returns
-        -------
-        str
-            Text.
-        """
+        """Format a value for sentences and plots: in DN whole from 10 on."""
         return self.amount(value, 0 if self.unit == DN and abs(value) >= 10 else None)
 
     def format_bound(self, value: float) -> str:
-        """Format an upper bound, rounded up.
-
-        Parameters
-        ----------
-        value : float
-            Upper bound.
-
-        Returns
-        -------
-        str
-            Text.
-        """
+        """Format an upper bound, rounded up."""
         digits = 1 if self.unit == DN and abs(value) >= 10 else self.digits
         return self.amount(math.ceil(value * 10**digits) / 10**digits, digits)
 
@@ -142,13 +89,6 @@ class LinearRows:
     """Quantity as rows of the curve N of one modified channel: rows @ N + constant is `scale` times each of them.
 
     The smallest is the quantity if more is wanted, else the largest.
-
-    Parameters
-    ----------
-    rows : csr_matrix of shape (n, n_wavelengths)
-        Coefficients.
-    constant, scale : float
-        Constant and scale.
     """
 
     rows: csr_matrix
@@ -221,18 +161,7 @@ class Quantity(Column):
         return Column(**{column.name: getattr(self, column.name) for column in fields(Column)})
 
     def worst(self, over: Sequence[str]) -> Quantity:
-        """Return the worst case of the quantity.
-
-        Parameters
-        ----------
-        over : sequence of str
-            Sets that the worst case is over, in words.
-
-        Returns
-        -------
-        Quantity
-            Worst case.
-        """
+        """Return the worst case of the quantity."""
         meaning = f"the worst case of `{self.name}` over {' and '.join(over)}"
         label = f"worst-case {self.words}"
         return replace(
@@ -240,18 +169,7 @@ class Quantity(Column):
         )
 
     def of_share(self, share: float) -> Quantity:
-        """Return the value that a share of the drawn lamps and cameras has.
-
-        Parameters
-        ----------
-        share : float
-            Share.
-
-        Returns
-        -------
-        Quantity
-            Yield.
-        """
+        """Return the value that a share of the drawn lamps and cameras has."""
         percent = f"{100 * share:.10g} %"
         meaning = (
             f"at least {percent} of the drawn lamps and cameras (`population`, `production`) have this `{self.name}`, "
@@ -264,34 +182,12 @@ class Quantity(Column):
         return replace(unknown, scale="linear", smooth=self.yield_rows, yield_rows=None)
 
     def value(self, rows: Rows) -> float:
-        """Return the quantity from its smooth rows.
-
-        Parameters
-        ----------
-        rows : Rows
-            Smooth rows.
-
-        Returns
-        -------
-        float
-            Value.
-        """
+        """Return the quantity from its smooth rows."""
         most = self.direction == "less" and self.scale != "log10"
         return self.of_row(float(rows.values.max() if most else rows.values.min()))
 
     def of_row(self, row: float) -> float:
-        """Return the value that a smooth row stands for; a probability is at most 1.
-
-        Parameters
-        ----------
-        row : float
-            Smooth row.
-
-        Returns
-        -------
-        float
-            Value.
-        """
+        """Return the value that a smooth row stands for; a probability is at most 1."""
         if self.scale == "log10":
             return float(min(10.0**-row, 1.0))
         return math.sqrt(max(row, 0.0)) if self.scale == "squared" else row
@@ -299,18 +195,7 @@ class Quantity(Column):
     def worse(
         self, values: Float[Array, " cases *conditions"] | Sequence[Float[Array, "*conditions"]]
     ) -> Float[Array, "*conditions"]:
-        """Return the worst of several cases.
-
-        Parameters
-        ----------
-        values : sequence of ndarray of shape (n_designs,)
-            Values of each case.
-
-        Returns
-        -------
-        ndarray of shape (n_designs,)
-            Worst values.
-        """
+        """Return the worst of several cases."""
         return np.asarray(np.max(values, axis=0) if self.direction == "less" else np.min(values, axis=0), dtype=float)
 
 
@@ -318,22 +203,9 @@ class Quantity(Column):
 class RequestedQuantities:
     """Quantities requested by a study.
 
-    Parameters
-    ----------
-    classes, states : tuple of str
-        Signal types, and those that noise may confuse.
-    any_place, edge_shift, population : bool
-        Best sampling phase, worst case over edges, worst case over lamps.
-    wanted_yield : float
-        Share of random lamps and cameras; 0: none.
-    tasks : tuple of TaskColumns
-        Tasks.
-    probabilities, vision, flicker : bool
-        Contrast detection probability; benchmark of vision; pulsed lamps in an HDR pixel.
-    user_metrics : tuple of UserMetric
-        Metrics of user code.
-    brightest : str
-        Curve whose light is 1, if there is no clear pixel.
+    `wanted_yield`: share of random lamps and cameras; 0: none; `probabilities`, `vision`, `flicker`: contrast detection
+    probability; benchmark of vision; pulsed lamps in an HDR pixel; `brightest`: curve whose light is 1, if there is no
+    clear pixel.
     """
 
     classes: tuple[str, ...]

@@ -18,18 +18,7 @@ METRICS = tuple(sorted(instances_in(columns, Metric), key=lambda metric: metric.
 
 
 def listed(requested: RequestedQuantities) -> list[Quantity]:
-    """Return the columns of a study in order, worst cases and yields last.
-
-    Parameters
-    ----------
-    requested : RequestedQuantities
-        Requested quantities.
-
-    Returns
-    -------
-    list of Quantity
-        Columns; names of pairs may coincide.
-    """
+    """Return the columns of a study in order, worst cases and yields last."""
     quantities = [quantity for metric in METRICS for quantity in metric.quantities(requested)]
     worst = [worst_case for quantity in quantities if (worst_case := _worst(quantity, requested)) is not None]
     drawn = [quantity for quantity in quantities if requested.wanted_yield and quantity.yield_rows is not None]
@@ -49,16 +38,5 @@ def _worst(quantity: Quantity, requested: RequestedQuantities) -> Quantity | Non
 
 @lru_cache(maxsize=64)
 def quantities_of(requested: RequestedQuantities) -> dict[str, Quantity]:
-    """Return the columns of a study by name.
-
-    Parameters
-    ----------
-    requested : RequestedQuantities
-        Requested quantities.
-
-    Returns
-    -------
-    dict of str to Quantity
-        Columns in order.
-    """
+    """Return the columns of a study by name."""
     return {quantity.name: quantity for quantity in listed(requested)}

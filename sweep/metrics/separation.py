@@ -33,40 +33,17 @@ _SMALLEST = 1e-140
 
 
 def csd_name(pair: Pair) -> str:
-    """Return the column name of a pair's CSD.
-
-    Parameters
-    ----------
-    pair : tuple of str
-        Two signal types.
-
-    Returns
-    -------
-    str
-        Name.
-    """
+    """Return the column name of a pair's CSD."""
     return pair_name("csd", pair)
 
 
 def separation(
     response: DesignSignals, first: Int[IndexArray, " first"], second: Int[IndexArray, " second"]
 ) -> PerDesign:
-    """Compute the color separation distance of two signal types (the paper's CSD).
+    """Compute the color separation distance of two signal types (the paper's CSD), DN.
 
     The smallest L2 distance between a point of one type and a point of the other. Differences are taken before
     squares, so that nearly coincident points at large offsets lose no digits.
-
-    Parameters
-    ----------
-    response : ndarray of shape (n_designs, n_signals, n_channels)
-        Readout, DN.
-    first, second : ndarray of int
-        Signals of each type.
-
-    Returns
-    -------
-    ndarray of shape (n_designs,)
-        CSD, DN.
     """
     response = np.asarray(response, dtype=float)
     distances = np.empty(len(response))
@@ -91,20 +68,7 @@ def separation(
 def pair_blocks(
     shape: tuple[int, ...], first: Int[IndexArray, " first"], second: Int[IndexArray, " second"]
 ) -> Iterator[tuple[slice, Int[IndexArray, " _pairs"], Int[IndexArray, " _pairs"]]]:
-    """Yield blocks of designs that are small enough for all pairs at once.
-
-    Parameters
-    ----------
-    shape : tuple of int
-        (n_designs, n_signals, n_channels).
-    first, second : ndarray of int
-        Signals of each type.
-
-    Yields
-    ------
-    block, one, other : slice, ndarray of int, ndarray of int
-        Designs, and both signals of every pair.
-    """
+    """Yield blocks of designs that are small enough for all pairs at once."""
     one, other = np.repeat(first, len(second)), np.tile(second, len(first))
     step = max(1, _BLOCK_PAIRS // max(1, one.size * shape[2]))
     for start in range(0, shape[0], step):
@@ -112,20 +76,7 @@ def pair_blocks(
 
 
 def separations(response: DesignSignals, members: Mapping[str, MemberNumbers]) -> dict[Pair, PerDesign]:
-    """Compute the CSD of every pair of signal types.
-
-    Parameters
-    ----------
-    response : ndarray of shape (n_designs, n_signals, n_channels)
-        Readout, DN.
-    members : mapping of str to ndarray of int
-        Signals of each type.
-
-    Returns
-    -------
-    dict of pair to ndarray of shape (n_designs,)
-        CSD, DN.
-    """
+    """Compute the CSD of every pair of signal types, DN."""
     n_designs, pairs = len(response), class_pairs(list(members))
     packed = packed_response(response, members)
     if packed is None:
@@ -142,19 +93,8 @@ def packed_response(
 ) -> tuple[Float[Array, "designs 4 signals"], Int[IndexArray, " _types"]] | None:
     """Return a response in the layout of the compiled kernels.
 
-    Parameters
-    ----------
-    response : ndarray of shape (n_designs, n_signals, n_channels)
-        Readout, DN.
-    members : mapping of str to ndarray of int
-        Signals of each type.
-
-    Returns
-    -------
-    response : ndarray of shape (n_designs, 4, n_signals)
-        One type after the other; missing channels are 0.
-    bounds : ndarray of int, shape (n_types + 1,)
-        Start of each type. None in place of both for few designs, more channels, or values that are not finite.
+    Returns `response`: one type after the other; missing channels are 0; `bounds`: start of each type. None in place of
+    both for few designs, more channels, or values that are not finite.
     """
     n_designs, _, n_channels = response.shape
     if n_designs < _MANY or n_channels > _MOST_CHANNELS or not np.isfinite(response).all():
@@ -171,23 +111,9 @@ def separations_along(
     values: Float[Array, "designs signals"],
     members: Mapping[str, MemberNumbers],
 ) -> dict[Pair, PerDesign]:
-    """Compute the CSD of every pair for designs that differ in one channel alone.
+    """Compute the CSD of every pair for designs that differ in one channel alone, DN.
 
-    Parameters
-    ----------
-    fixed : ndarray of shape (n_signals, n_channels)
-        Shared channels, DN.
-    channel : int
-        Channel that differs.
-    values : ndarray of shape (n_designs, n_signals)
-        Values of that channel, DN.
-    members : mapping of str to ndarray of int
-        Signals of each type.
-
-    Returns
-    -------
-    dict of pair to ndarray of shape (n_designs,)
-        CSD, DN.
+    `fixed`: shared channels, DN; `values`: values of that channel, DN.
     """
     others = np.delete(fixed, channel, axis=1)
     odd = np.asarray(~np.isfinite(values).all(axis=1) | (not np.isfinite(others).all()))
@@ -216,7 +142,7 @@ def _distances(
     members: Mapping[str, MemberNumbers],
     response: Callable[[Bool[BoolArray, "designs signals channels"]], DesignSignals],
 ) -> dict[Pair, PerDesign]:
-    """Return roots of ndarray of shape (n_pairs, n_designs); non-finite designs and extreme squares by `separation`."""
+    """Return roots of; non-finite designs and extreme squares by `separation`."""
     distances = dict(zip(class_pairs(list(members)), np.sqrt(squared), strict=True))
     for (a, b), distance in distances.items():
         recomputed = odd | ~((distance >= _SMALLEST) & (distance <= 1 / _SMALLEST))
@@ -254,19 +180,7 @@ def cfa_sensitivity(
 ) -> SameShape:
     """Return the total QE, averaged over the pixels of the tile, relative to the clear pixel.
 
-    Parameters
-    ----------
-    total_qe : ndarray of shape (..., n_channels)
-        QE summed over the wavelengths.
-    counts : ndarray of int, shape (n_channels,)
-        Pixels of each channel per tile.
-    clear_qe : ndarray of shape (n_wavelengths,)
-        QE of the clear pixel.
-
-    Returns
-    -------
-    ndarray of shape (...)
-        1 for a sensor without color filters.
+    `counts`: pixels of each channel per tile. 1 for a sensor without color filters.
     """
     weighted = np.moveaxis(total_qe * counts, -1, 0)
     mean = sum(weighted[1:], start=weighted[0]) / counts.sum()  # few channels of many designs

@@ -13,38 +13,14 @@ _ROUNDING = 1e-12
 
 
 def share_interval(kept: int, n: int) -> tuple[float, float]:
-    """Return the 95 % interval of a share (Wilson, J. Am. Stat. Assoc. 22, 209, 1927).
-
-    Parameters
-    ----------
-    kept, n : int
-        Number of successes and of trials.
-
-    Returns
-    -------
-    low, high : float
-        Interval.
-    """
+    """Return the 95 % interval of a share (Wilson, J. Am. Stat. Assoc. 22, 209, 1927)."""
     share, z = kept / n, _Z**2 / n
     middle, half = share + z / 2, _Z * math.sqrt(share * (1 - share) / n + z / (4 * n))
     return max(0.0, (middle - half) / (1 + z)), min(1.0, (middle + half) / (1 + z))
 
 
 def format_share(share: float, digits: int = 1) -> str:
-    """Format a share in percent, with more digits where rounding would give 0 or 100 %.
-
-    Parameters
-    ----------
-    share : float
-        0 to 1.
-    digits : int
-        Digits after the point.
-
-    Returns
-    -------
-    str
-        Text.
-    """
+    """Format a share in percent, with more digits where rounding would give 0 or 100 %."""
     if min(abs(share), abs(1 - share)) < _ROUNDING:
         return f"{share:.0%}"
     enough = (few for few in range(digits, _MOST_DIGITS) if float(f"{share:.{few}%}"[:-1]) not in (0, 100))

@@ -31,82 +31,34 @@ _SMALLEST = 1e-300
 
 @dataclass(frozen=True)
 class Rows:
-    """Smooth functions at a point with their derivatives.
-
-    Parameters
-    ----------
-    values : ndarray of shape (n,)
-        Values.
-    by_u : ndarray of shape (n, n_free)
-        Derivatives by the free parameters.
-    """
+    """Smooth functions at a point with their derivatives."""
 
     values: Float[Array, "*terms"]
     by_u: Float[Array, "*terms free"]
 
     def scaled(self, factor: float, offset: float = 0.0) -> Rows:
-        """Return factor times rows plus offset.
-
-        Parameters
-        ----------
-        factor, offset : float
-            Numbers.
-
-        Returns
-        -------
-        Rows
-            Values and derivatives.
-        """
+        """Return factor times rows plus offset."""
         return Rows(factor * self.values + offset, factor * self.by_u)
 
     def squares(self) -> Rows:
-        """Return the squares.
-
-        Returns
-        -------
-        Rows
-            Values and derivatives.
-        """
+        """Return the squares."""
         return Rows(self.values**2, 2 * self.values[:, None] * self.by_u)
 
     def roots(self) -> Rows:
-        """Return the roots, with zero slope where they are 0.
-
-        Returns
-        -------
-        Rows
-            Values and derivatives.
-        """
+        """Return the roots, with zero slope where they are 0."""
         values = np.sqrt(np.maximum(self.values, 0.0))
         per = np.divide(0.5, values, out=np.zeros_like(values), where=values > 0)
         return Rows(values, per[:, None] * self.by_u)
 
     def logarithms(self) -> Rows:
-        """Return -log10 of the rows, with zero slope where they are 0 or less.
-
-        Returns
-        -------
-        Rows
-            Values and derivatives.
-        """
+        """Return -log10 of the rows, with zero slope where they are 0 or less."""
         values = np.maximum(self.values, _SMALLEST)
         per = np.where(self.values > _SMALLEST, -1 / (np.log(10) * values), 0.0)
         return Rows(-np.log10(values), per[:, None] * self.by_u)
 
     @staticmethod
     def joined(parts: list[Rows]) -> Rows:
-        """Concatenate rows.
-
-        Parameters
-        ----------
-        parts : list of Rows
-            Rows.
-
-        Returns
-        -------
-        Rows
-            Values and derivatives.
-        """
+        """Concatenate rows."""
         return Rows(np.concatenate([p.values for p in parts]), np.concatenate([p.by_u for p in parts]))
 
     @property
@@ -124,13 +76,7 @@ class Rows:
         return Rows(-tail / np.log(10), per[:, None] * z.by_u)
 
     def without_nan(self) -> Rows:
-        """Return the rows with zeros for NaN and infinity.
-
-        Returns
-        -------
-        Rows
-            Values and derivatives.
-        """
+        """Return the rows with zeros for NaN and infinity."""
         return Rows(*(np.nan_to_num(v, posinf=0, neginf=0) for v in (self.values, self.by_u)))
 
 
@@ -159,20 +105,7 @@ class SmoothDesign:
         self._made: dict[str, Any] = {}
 
     def cached(self, key: str, make: Callable[[], Made]) -> Made:
-        """Return a value that several quantities share, computed at its first use.
-
-        Parameters
-        ----------
-        key : str
-            Name.
-        make : callable
-            Computes the value.
-
-        Returns
-        -------
-        object
-            The value.
-        """
+        """Return a value that several quantities share, computed at its first use."""
         if key not in self._made:
             self._made[key] = make()
         value: Made = self._made[key]
@@ -184,12 +117,12 @@ class SmoothDesign:
 
     @property
     def response(self) -> Float[Array, "cases signals channels"]:
-        """Unclipped, unrounded response, DN, ndarray of shape (n_cases, n_signals, n_channels)."""
+        """Unclipped, unrounded response, DN."""
         return self._response[0]
 
     @property
     def response_by_u(self) -> Float[Array, "free cases signals channels"]:
-        """Derivative of the response, ndarray of shape (n_free, n_cases, n_signals, n_channels)."""
+        """Derivative of the response."""
         return self._response[1]
 
     @cached_property
@@ -228,33 +161,11 @@ class SmoothDesign:
         return [(lamps, BrightnessCurves(lamps.lamps, limits, least_dn2=STEPS_DN2)) for lamps in cases]
 
     def linear(self, matrix: Float[Array, "terms parameters"]) -> Rows:
-        """Return linear functions of the parameters.
-
-        Parameters
-        ----------
-        matrix : ndarray of shape (n, n_parameters)
-            Coefficients.
-
-        Returns
-        -------
-        Rows
-            Values and derivatives.
-        """
+        """Return linear functions of the parameters."""
         return Rows(matrix @ self.x, matrix[:, self._free] * self._span)
 
     def squared_distances(self, pair: Pair) -> Rows:
-        """Return squared distances of all pairs of signals of two types in every case, DN^2, with derivatives.
-
-        Parameters
-        ----------
-        pair : tuple of str
-            Two signal types.
-
-        Returns
-        -------
-        Rows
-            Values and derivatives.
-        """
+        """Return squared distances of all pairs of signals of two types in every case, DN^2, with derivatives."""
         first, second = (self._imager.members[name] for name in pair)
         response, by_u = self._response
         apart = (response[:, first, None] - response[:, None, second]).reshape(-1, response.shape[-1])
@@ -265,16 +176,6 @@ class SmoothDesign:
         """Return squared distances of the nearest members of each two lights, by case and part of their shifts, DN^2.
 
         Nearest members change with the design; where they do not jump, that adds nothing to the derivative.
-
-        Parameters
-        ----------
-        pair : tuple of str
-            Two signal types.
-
-        Returns
-        -------
-        Rows
-            Values and derivatives.
         """
         assert self._members is not None
         response, by_u = self._response_of_members
@@ -291,18 +192,7 @@ class SmoothDesign:
         return Rows(np.concatenate(values), np.concatenate(slopes, axis=1).T)
 
     def distance_of_a_share(self, pair: Pair) -> Rows:
-        """Return the distance that the wanted share of random lamps and cameras has, DN, as one row.
-
-        Parameters
-        ----------
-        pair : tuple of str
-            Two signal types.
-
-        Returns
-        -------
-        Rows
-            Values and derivatives.
-        """
+        """Return the distance that the wanted share of random lamps and cameras has, DN, as one row."""
         assert self._drawn is not None
         draws, imager = self._drawn.draws(pair), self._drawn.population_model.imager
         made = [self.family.perturbed(off) if any(off) else self.family for off in draws.offs]
@@ -330,40 +220,12 @@ class SmoothDesign:
 
 
 def smooth_response(setup: Setup, curves: DesignCurves) -> DesignCases:
-    """Return the unquantized, unclipped response.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-    curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
-        QE of the modified channels.
-
-    Returns
-    -------
-    ndarray of shape (n_designs, n_cases, n_signals, n_channels)
-        Response, DN.
-    """
+    """Return the unquantized, unclipped response, DN."""
     return linear_model(setup).smooth(curves)
 
 
 def smooth_csd(setup: Setup, curves: DesignCurves, pair: Pair) -> PerDesign:
-    """Return the CSD of the smooth response, the smallest over the cases.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-    curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
-        QE of the modified channels.
-    pair : tuple of str
-        Two signal types.
-
-    Returns
-    -------
-    ndarray of shape (n_designs,)
-        CSD, DN.
-    """
+    """Return the CSD of the smooth response, the smallest over the cases, DN."""
     response = smooth_response(setup, curves)
     first, second = (setup.members[name] for name in pair)
     over = [separation(response[:, case], first, second) for case in range(response.shape[1])]

@@ -26,35 +26,14 @@ _OfPairs = Callable[[Smooth, Smooth, Smooth], Smooth]
 
 
 def squared_detectability(difference: Smooth, first: Smooth, second: Smooth) -> Smooth:
-    """Return d'^2 = D' S^-1 D for the mean S of both variances.
-
-    Parameters
-    ----------
-    difference, first, second : ndarray of shape (..., n_pairs, n_channels)
-        Differences of the means, DN, and variances of both signals, DN^2; real, or complex with a
-        derivative.
-
-    Returns
-    -------
-    ndarray of shape (..., n_pairs)
-        Values.
-    """
+    """Return d'^2 = D' S^-1 D for the mean S of both variances."""
     return np.asarray((difference**2 / ((first + second) / 2)).sum(axis=-1))
 
 
 def squared_contrast(difference: Smooth, first: Smooth, second: Smooth) -> Smooth:
     """Return the squared distance over the variance along the line of the two points: (D'D)^2 / (D' S D).
 
-    Parameters
-    ----------
-    difference, first, second : ndarray of shape (..., n_pairs, n_channels)
-        Differences of the means, DN, and variances of both signals, DN^2; real, or complex with a
-        derivative.
-
-    Returns
-    -------
-    ndarray of shape (..., n_pairs)
-        Values; 0 where the points coincide.
+    0 where the points coincide.
     """
     length = (difference**2).sum(axis=-1)
     return np.asarray(length * _ratio(length, (difference**2 * ((first + second) / 2)).sum(axis=-1)))
@@ -65,16 +44,7 @@ def margin(difference: Smooth, first: Smooth, second: Smooth) -> Smooth:
 
     D' S^-1 D / (p + q), with the deviations p and q of both signals along the normal S^-1 D.
 
-    Parameters
-    ----------
-    difference, first, second : ndarray of shape (..., n_pairs, n_channels)
-        Differences of the means, DN, and variances of both signals, DN^2; real, or complex with a
-        derivative.
-
-    Returns
-    -------
-    ndarray of shape (..., n_pairs)
-        Values; 0 where the points coincide.
+    0 where the points coincide.
     """
     normal = difference / (first + second)
     p, q = (root((normal**2 * variance).sum(axis=-1)) for variance in (first, second))
@@ -82,19 +52,7 @@ def margin(difference: Smooth, first: Smooth, second: Smooth) -> Smooth:
 
 
 def error_decades(difference: Smooth, first: Smooth, second: Smooth) -> Smooth:
-    """Return -log10 of the error Q(z) on either side of the plane, z being the `margin`.
-
-    Parameters
-    ----------
-    difference, first, second : ndarray of shape (..., n_pairs, n_channels)
-        Differences of the means, DN, and variances of both signals, DN^2; real, or complex with a
-        derivative.
-
-    Returns
-    -------
-    ndarray of shape (..., n_pairs)
-        Values.
-    """
+    """Return -log10 of the error Q(z) on either side of the plane, z being the `margin`."""
     from scipy.special import log_ndtr  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
     z = margin(difference, first, second)
@@ -106,19 +64,7 @@ def error_decades(difference: Smooth, first: Smooth, second: Smooth) -> Smooth:
 
 
 def overlap(difference: Smooth, first: Smooth, second: Smooth) -> Smooth:
-    """Return the Bhattacharyya distance of two Gaussians: D' S^-1 D / 8 + ln(S / sqrt(a b)) / 2, summed over channels.
-
-    Parameters
-    ----------
-    difference, first, second : ndarray of shape (..., n_pairs, n_channels)
-        Differences of the means, DN, and variances of both signals, DN^2; real, or complex with a
-        derivative.
-
-    Returns
-    -------
-    ndarray of shape (..., n_pairs)
-        Values.
-    """
+    """Return the Bhattacharyya distance of two Gaussians, D' S^-1 D / 8 + ln(S / sqrt(a b)) / 2, over all channels."""
     total = first + second
     form = difference**2 / (4 * total) + np.log(total / (2 * np.sqrt(first * second))) / 2
     return np.asarray(form.sum(axis=-1))
@@ -129,40 +75,12 @@ def _ratio(over: Smooth, under: Smooth) -> Smooth:
 
 
 def pair_rows(design: SmoothDesign, *, of: _OfPairs, pairs: Sequence[Pair]) -> Rows:
-    """Return a row for each two signals of the pairs of types, in every case of the scene.
-
-    Parameters
-    ----------
-    design : SmoothDesign
-        Design with derivatives.
-    of : callable
-        Function of difference and variances.
-    pairs : sequence of pair
-        Pairs of signal types.
-
-    Returns
-    -------
-    Rows
-        Values and derivatives.
-    """
+    """Return a row for each two signals of the pairs of types, in every case of the scene."""
     return Rows.joined([_between(design, pair, of) for pair in pairs])
 
 
 def bound_rows(design: SmoothDesign, *, types: Sequence[str]) -> Rows:
-    """Return -log10 of the sum of the overlaps of each signal with those of other types, in every case of the scene.
-
-    Parameters
-    ----------
-    design : SmoothDesign
-        Design with derivatives.
-    types : sequence of str
-        Signal types.
-
-    Returns
-    -------
-    Rows
-        Values and derivatives.
-    """
+    """Return -log10 of the sum of the overlaps of each signal with those of other types, in every case of the scene."""
     sums: dict[str, list[Rows]] = {name: [] for name in types}  # [n_cases x n_own x n_others] of each other type
     n_cases, sizes = len(design.response), {name: len(index) for name, index in design.setup.members.items()}
     for a, b in class_pairs(tuple(types)):
@@ -213,22 +131,7 @@ def _of_signals(design: SmoothDesign, pair: Pair, of: _OfPairs) -> Rows:
 
 
 def smooth_detectability(setup: Setup, curves: DesignCurves, pair: Pair) -> PerDesign:
-    """Return d' of the smooth response, the smallest over the cases.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-    curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
-        QE of the modified channels.
-    pair : tuple of str
-        Two signal types.
-
-    Returns
-    -------
-    ndarray of shape (n_designs,)
-        Values.
-    """
+    """Return d' of the smooth response, the smallest over the cases."""
     imager = linear_model(setup)
     mean, variance = imager.smooth(curves), imager.variance(curves)
     members = setup.members[pair[0]], setup.members[pair[1]]

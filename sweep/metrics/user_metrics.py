@@ -23,16 +23,7 @@ _MOST_DIGITS = 12
 class Readings:
     """Readout of a batch of designs at one sampling phase and moment, the argument of a user's metric.
 
-    Parameters
-    ----------
-    dn : ndarray of shape (n_designs, n_signals, n_channels)
-        Digital numbers, DN, including the pedestal; neither clipped nor rounded in a search.
-    types, names : tuple of str
-        Signal type and name of each signal.
-    channels : tuple of str
-        Channels of the CFA.
-    pedestal_dn : float
-        Pedestal, DN.
+    `dn`: digital numbers, DN, including the pedestal; neither clipped nor rounded in a search.
     """
 
     dn: DesignSignals
@@ -43,38 +34,14 @@ class Readings:
 
     @staticmethod
     def of_setup(setup: Setup, dn: DesignSignals) -> Readings:
-        """Return read-only digital numbers with the signals and channels of a setup.
-
-        Parameters
-        ----------
-        setup : Setup
-            Scene and camera.
-        dn : ndarray of shape (n_designs, n_signals, n_channels)
-            Digital numbers, DN.
-
-        Returns
-        -------
-        Readings
-            Readings.
-        """
+        """Return read-only digital numbers with the signals and channels of a setup."""
         fixed = np.asarray(dn, dtype=float).view()
         fixed.flags.writeable = False
         lights = setup.lights
         return Readings(fixed, lights.types, lights.names, setup.camera.mosaic.channels, setup.camera.pixel.offset_dn)
 
     def of(self, kind: str) -> DesignSignals:
-        """Return the digital numbers of one signal type.
-
-        Parameters
-        ----------
-        kind : str
-            Signal type.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, n_of_the_type, n_channels)
-            Digital numbers, DN.
-        """
+        """Return the digital numbers of one signal type, DN."""
         return self.dn[:, [of_type == kind for of_type in self.types]]
 
 
@@ -82,7 +49,7 @@ class Readings:
 class UserMetric:
     """Metric of user code: a function of `Readings`, or a class with a method `of`, constructed without arguments.
 
-    It returns ndarray of shape (n_designs,); or (n_designs, n), of which the worst counts, so that a search sees each
+    It returns; or (n_designs, n), of which the worst counts, so that a search sees each
     of them; or None for a CFA that it does not apply to. A row must not depend on other rows. Optional attributes:
     `name`, `unit`, `label`, `digits` and `direction` (`more` or `less`).
     """
@@ -146,22 +113,7 @@ class UserMetric:
     def parts(self, readings: Readings, *, finite: bool = True) -> Float[Array, "designs parts"] | None:
         """Call the metric.
 
-        Parameters
-        ----------
-        readings : Readings
-            Readout.
-        finite : bool
-            Refuse values that are not finite.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, n) or None
-            Values, of which the worst counts; None if the CFA has none.
-
-        Raises
-        ------
-        SweepError
-            If the code raises, or returns something else.
+        None if the CFA has none. Raises SweepError if the code raises, or returns something else.
         """
         made, n = self._made, len(readings.dn)
         with np.errstate(all="ignore"):
@@ -184,17 +136,7 @@ class UserMetric:
     def of_cases(self, setup: Setup, response: DesignCases) -> PerDesign:
         """Return the worst over the cases.
 
-        Parameters
-        ----------
-        setup : Setup
-            Scene and camera.
-        response : ndarray of shape (n_designs, n_cases, n_signals, n_channels)
-            Readout, DN.
-
-        Returns
-        -------
-        ndarray of shape (n_designs,)
-            Values; NaN if the CFA has none.
+        NaN if the CFA has none.
         """
         by_case = [self.parts(Readings.of_setup(setup, response[:, case])) for case in range(response.shape[1])]
         some = [values for values in by_case if values is not None]
@@ -205,20 +147,5 @@ class UserMetric:
 
 
 def user_quantities(metrics: Sequence[UserMetric], setup: Setup, response: DesignCases) -> dict[str, PerDesign]:
-    """Return the column of each metric of user code.
-
-    Parameters
-    ----------
-    metrics : sequence of UserMetric
-        Metrics.
-    setup : Setup
-        Scene and camera.
-    response : ndarray of shape (n_designs, n_cases, n_signals, n_channels)
-        Readout, DN.
-
-    Returns
-    -------
-    dict of str to ndarray of shape (n_designs,)
-        Column name -> values.
-    """
+    """Return the column of each metric of user code."""
     return {metric.name: metric.of_cases(setup, response) for metric in metrics}

@@ -41,20 +41,7 @@ _BY_NOISE = (D_PRIME, CNR)
 
 
 def answer_parts(output: Output) -> tuple[list[str], list[str]]:
-    """Return the answer to the study's question, which stands above the first plot, and what else was found.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    answer : list of str
-        Results on images; else leaders over scenarios that differ in one number, tasks, or the best design.
-    further : list of str
-        Other lines.
-    """
+    """Return the answer to the study's question, which stands above the first plot, and what else was found."""
     answer, further = _of_designs(output)
     further = [*uncertain_lines(output), *further]
     if output.study.vision is None:
@@ -308,18 +295,7 @@ def _times(output: Output, best: Row, plain: Row | None) -> str:
 
 
 def largest_separation_elsewhere(output: Output) -> list[str]:
-    """Return the design with the largest separation, if it is not the best one, and the constraints that it violates.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    list of str
-        Lines.
-    """
+    """Return the design with the largest separation, if it is not the best, and the constraints that it violates."""
     leaders, separation = leaders_of(output), output.trade_off[0]
     best, most, where = leaders.chosen, leaders.separates, _in(output, leaders.scenario)
     verb, more = "separates most", "separates more"
@@ -342,18 +318,7 @@ _RESAMPLES = 10_000
 
 
 def unseen_lines(output: Output) -> Iterator[str]:
-    """Yield the loss of the search on lights that are left out of it.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Yields
-    ------
-    str
-        Sentences.
-    """
+    """Yield the loss of the search on lights that are left out of it."""
     if output.left_out is None:
         return
     several = output.left_out["objective"].nunique() > 1
@@ -371,22 +336,12 @@ def unseen_lines(output: Output) -> Iterator[str]:
 
 
 def generalization_gap(falls: Float[Array, " lights"], seed: int) -> tuple[float, float, float]:
-    """Return the mean fall of an optimum on a light that was left out, with its 95 % interval by a bootstrap.
+    """Return the mean fall of an optimum on a light that was left out, with its 95 % interval by a bootstrap, DN.
 
     The interval is of lights like these, drawn at random (Efron and Tibshirani, An Introduction to the Bootstrap,
     1993, chapter 13).
 
-    Parameters
-    ----------
-    falls : ndarray of shape (n_lights,)
-        Falls, DN.
-    seed : int
-        Seed.
-
-    Returns
-    -------
-    mean, low, high : float
-        Mean and interval, DN.
+    `falls`: falls, DN.
     """
     rng = np.random.default_rng([seed, 2])
     means = falls[rng.integers(falls.size, size=(_RESAMPLES, falls.size))].mean(axis=1)
@@ -398,16 +353,6 @@ def headline_numbers(output: Output) -> list[tuple[str, str, str]]:
     """Return separation, light and distance to the upper bound of the best design, with a comparison.
 
     Without a bound, its separation per exposure. Without a best design there are none.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    list of (value, name, comparison)
-        Texts.
     """
     leaders = leaders_of(output)
     best, plain, separation = leaders.chosen, leaders.plain, output.trade_off[0]

@@ -26,33 +26,14 @@ _TYPES = 2
 
 @dataclass(frozen=True)
 class CapturesFigure:
-    """Bars of captures.
-
-    Parameters
-    ----------
-    series : SeriesFigure
-        Numbers of the scenarios and their label.
-    ends : mapping of (str, str, str) to ndarray of shape (n_captures,)
-        Number up to which each capture is used, by design, channel and signal type.
-    """
+    """Bars of captures."""
 
     series: SeriesFigure
     ends: Mapping[tuple[str, str, str], Float[Array, " captures"]]
 
 
 def capture_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
-    """Yield name, title and drawing for each series of a study of an HDR pixel.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Yields
-    ------
-    tuple of (str, str, callable)
-        Drawings.
-    """
+    """Yield name, title and drawing for each series of a study of an HDR pixel."""
     if output.handovers is None:
         return
     pair = output.trade_off[0].pair
@@ -71,18 +52,7 @@ def capture_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
 
 
 def draw_captures(figure: CapturesFigure) -> Figure:
-    """Draw a bar for each design, channel and signal type; its shade is the capture.
-
-    Parameters
-    ----------
-    figure : CapturesFigure
-        Figure.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Figure.
-    """
+    """Draw a bar for each design, channel and signal type; its shade is the capture."""
     series, low, high = figure.series, float(figure.series.x[0]), float(figure.series.x[-1])
     names = list(dict.fromkeys(name for name, _, _ in figure.ends))
     rows = [key for name in names for key in figure.ends if key[0] == name]

@@ -27,18 +27,7 @@ _WHITE = np.array([0.9505, 1.0, 1.089])
 
 
 def error_curves(output: Output) -> dict[str, pd.DataFrame]:
-    """Return mean color error over luminance SNR of every design of the first scenario.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    dict of str to pandas.DataFrame
-        Curves by light.
-    """
+    """Return mean color error over luminance SNR of every design of the first scenario."""
     if output.error_against_noise is None:
         return {}
     rows = output.error_against_noise[output.error_against_noise["scenario"] == output.scenarios[0]]
@@ -46,18 +35,7 @@ def error_curves(output: Output) -> dict[str, pd.DataFrame]:
 
 
 def noise_optimal(curve: pd.DataFrame) -> tuple[float, float]:
-    """Return SNR and error of a design's noise-optimal matrix.
-
-    Parameters
-    ----------
-    curve : pandas.DataFrame
-        Curve of the design.
-
-    Returns
-    -------
-    snr, delta_e : float
-        Luminance SNR and mean color error.
-    """
+    """Return SNR and error of a design's noise-optimal matrix."""
     row = curve.iloc[(curve["regularization"] - 1).abs().argmin()]
     return float(row["snr"]), float(row["delta_e_mean"])
 
@@ -76,18 +54,7 @@ def _draw_error_curves(light: str, curves: pd.DataFrame) -> Figure:
 
 
 def renderings(output: Output) -> dict[str, dict[str, Float[Array, "_rows _columns 3"]]]:
-    """Return pictures as the eye and each design of the first scenario see them, with noise by the study's seed.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    dict of str to dict of str to ndarray of shape (rows, columns, 3)
-        Linear sRGB by picture and design.
-    """
+    """Return pictures as the eye and each design of the first scenario see them, with noise by the study's seed."""
     if output.rendered is None:
         return {}
     rows = output.rendered[output.rendered["design_id"].isna() | (output.rendered["scenario"] == output.scenarios[0])]
@@ -164,18 +131,7 @@ def _draw_renderings(pictures: Mapping[str, Float[Array, "_rows _columns 3"]], t
 
 
 def color_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
-    """Yield the drawings of colors.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Yields
-    ------
-    name, caption, drawing : str, str, Drawing
-        File name, caption and drawing.
-    """
+    """Yield the drawings of colors."""
     for number, (light, curves) in enumerate(error_curves(output).items(), 1):
         caption = f"Color error against noise under {light.upper()}, over how much the color matrix weighs noise"
         drawn = curves[["name", "snr", "delta_e_mean", "regularization"]]

@@ -55,24 +55,9 @@ class Comparison:
 def compare_runs(folders: Sequence[Path], to: Path | None) -> Comparison:
     """Compare finished runs, and write `compare.html`, `compare.csv`, `fronts.png` and `fronts.svg`.
 
-    Parameters
-    ----------
-    folders : sequence of Path
-        Output folders of 2 to 26 studies.
-    to : Path or None
-        Folder of the comparison; None: outputs/compare-<a>-<b>.
-
-    Returns
-    -------
-    Comparison
-        Result.
-
-    Raises
-    ------
-    SweepError
-        If there are fewer or more runs.
-    OutputError
-        If a folder holds no finished run, a file of others would be replaced, or the disk refuses.
+    `folders`: output folders of 2 to 26 studies; `to`: folder of the comparison; None: outputs/compare-<a>-<b>. Raises
+    SweepError if there are fewer or more runs. Raises OutputError if a folder holds no finished run, a file of others
+    would be replaced, or the disk refuses.
     """
     if not 2 <= len(folders) <= len(_LETTERS):
         allowed = f"2 to {len(_LETTERS)} folders"
@@ -123,22 +108,7 @@ def compare_runs(folders: Sequence[Path], to: Path | None) -> Comparison:
 
 
 def compare_fronts(runs: Mapping[str, Output]) -> tuple[dict[str, pd.DataFrame], Drawing | None, list[str]]:
-    """Compare the fronts of runs with the same axes, in equal scenes.
-
-    Parameters
-    ----------
-    runs : mapping of str to Output
-        Runs by name.
-
-    Returns
-    -------
-    fronts : dict of str to pandas.DataFrame
-        Fronts by scene, a row each.
-    drawing : Drawing or None
-        Plot of the first scene.
-    notes : list of str
-        Notes.
-    """
+    """Compare the fronts of runs with the same axes, in equal scenes."""
     group, notes = on_the_same_axes(runs)
     places: dict[str, dict[str, tuple[Output, str]]] = {}
     for run, scenarios in scene_names(group).items():

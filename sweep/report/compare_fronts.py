@@ -26,17 +26,7 @@ _MARKS_PER_LINE = 12
 
 @dataclass(frozen=True)
 class ComparedFront:
-    """Front of a CFA in a run.
-
-    Parameters
-    ----------
-    run, cfa : str
-        Names.
-    traced : bool
-        By the search, before quantization; else designs of the result table.
-    points : ndarray of shape (n, 2)
-        Separation and sensitivity, by rising sensitivity.
-    """
+    """Front of a CFA in a run."""
 
     run: str
     cfa: str
@@ -45,18 +35,7 @@ class ComparedFront:
 
 
 def scene_names(runs: Mapping[str, Output]) -> dict[str, dict[str, str]]:
-    """Return a name for each scene: scenarios of several runs share one only if their scenes are equal.
-
-    Parameters
-    ----------
-    runs : mapping of str to Output
-        Runs by name.
-
-    Returns
-    -------
-    dict of str to dict of str to str
-        Name of the scene, by run and scenario.
-    """
+    """Return a name for each scene: scenarios of several runs share one only if their scenes are equal."""
     names: dict[str, str] = {}
     taken = set[str]()
     shared = {}
@@ -72,20 +51,7 @@ def scene_names(runs: Mapping[str, Output]) -> dict[str, dict[str, str]]:
 
 
 def on_the_same_axes(runs: Mapping[str, Output]) -> tuple[dict[str, Output], list[str]]:
-    """Return the largest group of runs whose fronts have the same meaning.
-
-    Parameters
-    ----------
-    runs : mapping of str to Output
-        Runs by name.
-
-    Returns
-    -------
-    group : dict of str to Output
-        Runs.
-    notes : list of str
-        Sentence on the other runs.
-    """
+    """Return the largest group of runs whose fronts have the same meaning."""
     groups: dict[tuple[str, ...], dict[str, Output]] = {}
     for label, output in runs.items():
         groups.setdefault(_meaning(output), {})[label] = output
@@ -99,18 +65,7 @@ def on_the_same_axes(runs: Mapping[str, Output]) -> tuple[dict[str, Output], lis
 
 
 def dn_scale_label(output: Output) -> str:
-    """Return a text with bit depth and black level of a run.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    str
-        Text.
-    """
+    """Return a text with bit depth and black level of a run."""
     pixel = output.study.pixel
     return f"DN of {pixel.bits} bits" + (f", pedestal {pixel.offset_dn:g} DN" if pixel.offset_dn else "")
 
@@ -134,18 +89,7 @@ def _meaning(output: Output) -> tuple[str, ...]:
 
 
 def fronts_in(runs: Mapping[str, tuple[Output, str]]) -> list[ComparedFront]:
-    """Return all fronts of a scene: of designs that meet every constraint but those on the axes, and of the search.
-
-    Parameters
-    ----------
-    runs : mapping of str to (Output, str)
-        Runs by name, each with its scenario of the scene.
-
-    Returns
-    -------
-    list of ComparedFront
-        Fronts.
-    """
+    """Return all fronts of a scene: of designs that meet every constraint but those on the axes, and of the search."""
     fronts = []
     for label, (output, scenario) in runs.items():
         rows = output.table[output.table["pareto"] & (output.table["scenario"] == scenario)]
@@ -194,24 +138,6 @@ def draw_fronts(
 
     A front of designs is a staircase: between two designs there is none. Between the levels of the search, nothing is
     known.
-
-    Parameters
-    ----------
-    title : str
-        Title.
-    labels : tuple of str
-        Axes.
-    order : sequence of str
-        All runs.
-    fronts : sequence of ComparedFront
-        Fronts.
-    best : sequence of (run, x, y)
-        Best designs.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Figure.
     """
     drawn, axes = canvas(9.0, 5.0)
     for front, marker in zip(fronts, itertools.cycle(_MARKERS)):

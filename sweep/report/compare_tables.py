@@ -22,18 +22,7 @@ _MOST_PARAMETERS = 12
 
 
 def best_of_runs(runs: Mapping[str, Output]) -> pd.DataFrame:
-    """Return one row per run: its best feasible design with parameters, CSDs and sensitivities, if it has one.
-
-    Parameters
-    ----------
-    runs : mapping of str to Output
-        Runs by name.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Table.
-    """
+    """Return one row per run: its best feasible design with parameters, CSDs and sensitivities, if it has one."""
     rows, scenes = [], scene_names(runs)
     for name, output in runs.items():
         row: dict[str, Any] = {
@@ -55,19 +44,7 @@ def best_of_runs(runs: Mapping[str, Output]) -> pd.DataFrame:
 def side_by_side(best: pd.DataFrame, runs: Mapping[str, Output]) -> tuple[pd.DataFrame, int]:
     """Return the best designs as one column each, in words; figures of different scenes never share a row.
 
-    Parameters
-    ----------
-    best : pandas.DataFrame
-        Result of `best_of_runs`.
-    runs : mapping of str to Output
-        Runs by name.
-
-    Returns
-    -------
-    table : pandas.DataFrame
-        Table.
-    n : int
-        Parameters that were left out.
+    Returns `n`: parameters that were left out.
     """
     columns = {name: column for output in runs.values() for name, column in output.columns.items()}
     parameters = dict.fromkeys(name for output in runs.values() for name in output.parameters)
@@ -99,20 +76,7 @@ def _cell(name: str, row: Mapping[Any, Any], columns: Mapping[str, Column]) -> s
 
 
 def plain_differences(runs: Mapping[str, Output]) -> tuple[pd.DataFrame, str]:
-    """Return CSDs of plain CFAs and named designs that differ between runs, and a sentence on the others.
-
-    Parameters
-    ----------
-    runs : mapping of str to Output
-        Runs by name.
-
-    Returns
-    -------
-    table : pandas.DataFrame
-        Table.
-    note : str
-        Sentence.
-    """
+    """Return CSDs of plain CFAs and named designs that differ between runs, and a sentence on the others."""
     parts, keys = [], ["name", "scene", "CSD"]
     for run, scenes in scene_names(runs).items():
         named = runs[run].named[["name", "scenario", *runs[run].distances]].astype({"name": str, "scenario": str})
@@ -131,18 +95,7 @@ def plain_differences(runs: Mapping[str, Output]) -> tuple[pd.DataFrame, str]:
 
 
 def ranking(runs: Mapping[str, Output]) -> list[str]:
-    """Return the best run and its lead, among runs with equal objective, DN and scene, and runs without a best design.
-
-    Parameters
-    ----------
-    runs : mapping of str to Output
-        Runs by name.
-
-    Returns
-    -------
-    list of str
-        Lines.
-    """
+    """Return the best run and its lead among those with equal objective, DN and scene, and runs without a design."""
     lines, groups = [], dict[tuple[str, str, str], dict[str, float]]()
     scene_of = scene_names(runs)
     for run, output in runs.items():
@@ -184,18 +137,7 @@ def _maximized(output: Output) -> tuple[str, str]:
 
 
 def curve_notes(runs: Mapping[str, Output]) -> list[str]:
-    """Return a sentence for each run with other curves than the first, whose CSDs have another scale.
-
-    Parameters
-    ----------
-    runs : mapping of str to Output
-        Runs by name.
-
-    Returns
-    -------
-    list of str
-        Lines.
-    """
+    """Return a sentence for each run with other curves than the first, whose CSDs have another scale."""
     (first, reference), *others = runs.items()
     notes = []
     for name, output in others:

@@ -51,20 +51,8 @@ Drawing = Callable[[], "Figure"]
 class CurvesFigure:
     """Curves over wavelength.
 
-    Parameters
-    ----------
-    title, y_label : str
-        Texts.
-    wavelength_nm : ndarray of shape (n_wavelengths,)
-        Wavelengths, nm.
-    curves : mapping of str to ndarray of shape (n_wavelengths,) or (n, n_wavelengths)
-        Curves, or bundles of one name.
-    dashed : sequence of str
-        Names of dashed curves.
-    colors : mapping of str to str
-        Colors, instead of the usual ones.
-    shades : mapping of str to ndarray
-        Spectra of lights with a peak of 1 by signal type, behind the curves.
+    `colors`: colors, instead of the usual ones; `shades`: spectra of lights with a peak of 1 by signal type, behind the
+    curves.
     """
 
     title: str
@@ -77,18 +65,7 @@ class CurvesFigure:
 
 
 def draw_curves(figure: CurvesFigure) -> Figure:
-    """Draw curves over wavelength.
-
-    Parameters
-    ----------
-    figure : CurvesFigure
-        Data.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Figure.
-    """
+    """Draw curves over wavelength."""
     figure_, axes = canvas(8.0, 4.0)
     top = max((float(values.max(initial=0.0)) for values in figure.curves.values()), default=1.0)
     for name, shade in figure.shades.items():
@@ -113,52 +90,20 @@ def draw_curves(figure: CurvesFigure) -> Figure:
 
 
 def legend_beside(axes: Axes, title: str | None = None) -> None:
-    """Put a legend to the right of the axes, if there is anything in it.
-
-    Parameters
-    ----------
-    axes : Axes
-        Axes.
-    title : str, optional
-        Title of the legend.
-    """
+    """Put a legend to the right of the axes, if there is anything in it."""
     if axes.get_legend_handles_labels()[0]:
         place: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0), "borderaxespad": 0}
         axes.legend(title=title, fontsize=8, title_fontsize=8, frameon=False, **place)
 
 
 def canvas(width_in: float, height_in: float) -> tuple[Figure, Axes]:
-    """Return an empty figure with one pair of axes.
-
-    Parameters
-    ----------
-    width_in, height_in : float
-        Size, inches.
-
-    Returns
-    -------
-    figure, axes : Figure, Axes
-        Figure and axes.
-    """
+    """Return an empty figure with one pair of axes."""
     figure, (axes,) = canvas_grid(1, 1, width_in, height_in)
     return figure, axes
 
 
 def canvas_grid(rows: int, columns: int, width_in: float, height_in: float) -> tuple[Figure, list[Axes]]:
-    """Return an empty figure with a grid of axes, row by row.
-
-    Parameters
-    ----------
-    rows, columns : int
-        Grid.
-    width_in, height_in : float
-        Size, inches.
-
-    Returns
-    -------
-    figure, axes : Figure, list of Axes
-        Figure and axes.
-    """
+    """Return an empty figure with a grid of axes, row by row."""
     figure = empty_figure(width_in, height_in)
     panels = [figure.add_subplot(rows, columns, at + 1) for at in range(rows * columns)]
     for axes in panels:
@@ -171,17 +116,7 @@ def panel_grid(
 ) -> tuple[Figure, list[Axes]]:
     """Return an empty figure with undecorated axes, row by row.
 
-    Parameters
-    ----------
-    count, most_columns : int
-        Number of panels, and of columns at most.
-    panel_in, around_in : tuple of float
-        Size of a panel and of the margins, inches.
-
-    Returns
-    -------
-    figure, axes : Figure, list of Axes
-        Figure and axes.
+    `count`, `most_columns`: number of panels, and of columns at most.
     """
     columns = min(most_columns, count)
     rows = -(-count // columns)
@@ -190,18 +125,7 @@ def panel_grid(
 
 
 def empty_figure(width_in: float, height_in: float) -> Figure:
-    """Return a figure without axes.
-
-    Parameters
-    ----------
-    width_in, height_in : float
-        Size, inches.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Figure.
-    """
+    """Return a figure without axes."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415  (slow to import)
     from matplotlib.figure import Figure  # noqa: PLC0415
 
@@ -211,13 +135,7 @@ def empty_figure(width_in: float, height_in: float) -> Figure:
 
 
 def decorate(axes: Axes) -> None:
-    """Add grid and open frame to axes.
-
-    Parameters
-    ----------
-    axes : Axes
-        Axes.
-    """
+    """Add grid and open frame to axes."""
     axes.grid(visible=True, color="#e4e4e4", linewidth=0.6)
     axes.set_axisbelow(True)
     for side in ("top", "right"):
@@ -225,39 +143,13 @@ def decorate(axes: Axes) -> None:
 
 
 def pictures_of(draw: Drawing, kinds: Sequence[str]) -> dict[str, bytes]:
-    """Draw a figure and return it as files.
-
-    Parameters
-    ----------
-    draw : callable
-        Draws the figure.
-    kinds : sequence of str
-        `png`, `svg`.
-
-    Returns
-    -------
-    dict of str to bytes
-        Content by kind.
-    """
+    """Draw a figure and return it as files."""
     figure = draw()
     return {kind: rendered(figure, kind) for kind in kinds}
 
 
 def rendered(figure: Figure, kind: str) -> bytes:
-    """Return a drawn figure as a file; equal figures give equal bytes.
-
-    Parameters
-    ----------
-    figure : Figure
-        Figure.
-    kind : {'png', 'svg'}
-        Kind.
-
-    Returns
-    -------
-    bytes
-        File.
-    """
+    """Return a drawn figure as a file; equal figures give equal bytes."""
     import matplotlib as mpl  # noqa: PLC0415  (slow to import)
 
     for axes in figure.axes:  # a name is no formula; numbers along a logarithmic axis are

@@ -27,37 +27,13 @@ _MODELED = "single LEDs, modeled as hyperbolic secants"
 
 
 def over_population(output: Output) -> bool:
-    """Return whether the separation of the trade-off is a worst case over a population of lights.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    bool
-        True if it is.
-    """
+    """Return whether the separation of the trade-off is a worst case over a population of lights."""
     separation = output.trade_off[0]
     return output.study.population is not None and separation.extreme == WORST_CASE and separation.pair is not None
 
 
 def robustness_lines(output: Output, best: Row | None) -> Iterator[str]:
-    """Yield causes of failure, and yields; nothing without a population of lights.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-    best : mapping or None
-        Best design, whose scenario is used, else the first one.
-
-    Yields
-    ------
-    str
-        Sentences.
-    """
+    """Yield causes of failure, and yields; nothing without a population of lights."""
     if output.study.population is None:
         return
     scenario = output.scenarios[0] if best is None else best["scenario"]
@@ -83,17 +59,7 @@ def robustness_lines(output: Output, best: Row | None) -> Iterator[str]:
 def cost_of_worst_case(output: Output, best: Row | None) -> Iterator[str]:
     """Yield the best design of a worst case beside the named design with the largest nominal separation.
 
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-    best : mapping or None
-        Best design.
-
-    Yields
-    ------
-    str
-        Sentence, if the separation is a worst case over a population of lights.
+    Returns sentence, if the separation is a worst case over a population of lights.
     """
     if best is None or not over_population(output):
         return
@@ -139,18 +105,8 @@ def _breaks(output: Output, row: Row, plain: list[Row]) -> str:
 class LampMap:
     """Distances of the lamps of a norm with a design.
 
-    Parameters
-    ----------
-    row : mapping
-        Row of the design.
-    pairs : int
-        Pairs of LEDs.
-    share : float
-        Share of pairs with at least the wanted CSD.
-    nearest : mapping of str to float
-        Two nearest LEDs.
-    least_dn : pandas.DataFrame
-        Smallest CSD over widths, a row per yellow and a column per red peak, nm; NaN where none is allowed.
+    `share`: share of pairs with at least the wanted CSD; `least_dn`: smallest CSD over widths, a row per yellow and a
+    column per red peak, nm; NaN where none is allowed.
     """
 
     row: Row
@@ -166,34 +122,12 @@ class LampMap:
         return f"{value:.{0 if value >= 10 else 1}f} {DN}"
 
     def led(self, color: str) -> str:
-        """Describe one of the nearest two.
-
-        Parameters
-        ----------
-        color : str
-            `yellow` or `red`.
-
-        Returns
-        -------
-        str
-            Text.
-        """
+        """Describe one of the nearest two."""
         return f"{self.nearest[f'{color}_nm']:g} nm ({self.nearest[f'{color}_fwhm_nm']:g} nm wide)"
 
 
 def lamp_maps(output: Output) -> dict[str, list[LampMap]]:
-    """Return the maps of every design, in the scenario of the best design or in the first one.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    dict of str to list of LampMap
-        Maps by norm.
-    """
+    """Return the maps of every design, in the scenario of the best design or in the first one."""
     if output.regions is None:
         return {}
     rows = output.named_rows[output.named_rows["scenario"] == leaders_of(output).scenario]
@@ -211,18 +145,7 @@ def lamp_maps(output: Output) -> dict[str, list[LampMap]]:
 
 
 def lamp_lines(output: Output) -> Iterator[str]:
-    """Yield for each norm the share of the best design, else the largest one, beside that of the best plain CFA.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Yields
-    ------
-    str
-        Sentences.
-    """
+    """Yield for each norm the share of the best design, else the largest one, beside that of the best plain CFA."""
     best, regions = leaders_of(output).chosen, output.study.regions
     maps = lamp_maps(output)
     if not maps or regions is None:
@@ -246,18 +169,7 @@ def lamp_lines(output: Output) -> Iterator[str]:
 
 
 def lamp_table(output: Output) -> pd.DataFrame:
-    """Return one row per norm and design; empty if none are requested.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Table.
-    """
+    """Return one row per norm and design; empty if none are requested."""
     rows = [
         {
             "norm": norm,
@@ -275,18 +187,7 @@ def lamp_table(output: Output) -> pd.DataFrame:
 
 
 def lamp_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
-    """Yield the map of each norm.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Yields
-    ------
-    name, caption, drawing : str, str, Drawing
-        File name, caption and drawing.
-    """
+    """Yield the map of each norm."""
     regions = output.study.regions
     for number, (norm, designs) in enumerate(lamp_maps(output).items(), 1):
         assert regions is not None

@@ -25,19 +25,8 @@ Row = Mapping[Any, Any]
 class Leaders:
     """Leading rows of a scenario.
 
-    Parameters
-    ----------
-    scenario : str
-        Scenario.
-    chosen : mapping or None
-        Best swept or searched design that meets all constraints; without such designs, the CFA or named
-        design that does and separates most.
-    separates : mapping or None
-        Largest separation of all rows.
-    plain : mapping or None
-        Other plain CFA with the largest separation.
-    others : tuple of mapping
-        Best design of each other CFA.
+    `chosen`: best swept or searched design that meets all constraints; without such designs, the CFA or named design
+    that does and separates most.
     """
 
     scenario: str
@@ -50,17 +39,7 @@ class Leaders:
 def leaders_of(output: Output, scenario: str | None = None) -> Leaders:
     """Return the leaders of a scenario.
 
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-    scenario : str, optional
-        Scenario; left out, that of the search, or the first one.
-
-    Returns
-    -------
-    Leaders
-        Leaders.
+    `scenario`: scenario; left out, that of the search, or the first one.
     """
     scenario = output.scenario if scenario is None else scenario
     return output.cached(("leaders", scenario), partial(_leaders, output, scenario))
@@ -92,51 +71,18 @@ def _most(rows: pd.DataFrame, column: str) -> Row | None:
 
 
 def of_reference(output: Output) -> str:
-    """Return the unit of a CFA's light: a clear sensor's, or that of the brightest curve in every pixel.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    str
-        Text.
-    """
+    """Return the unit of a CFA's light: a clear sensor's, or that of the brightest curve in every pixel."""
     sensor = output.provenance.sensor
     return "of a clear sensor's light" if sensor.has_clear else f"of the light of {sensor.reference} pixels alone"
 
 
 def label(row: Row) -> str:
-    """Return a design's name, or its number.
-
-    Parameters
-    ----------
-    row : mapping
-        Row of the result table.
-
-    Returns
-    -------
-    str
-        Text.
-    """
+    """Return a design's name, or its number."""
     return str(row["name"]) if isinstance(row["name"], str) else f"filter {row['filter_id']}"
 
 
 def full_name(row: Row) -> str:
-    """Return a design's name for a sentence, with its CFA if the study does not name it.
-
-    Parameters
-    ----------
-    row : mapping
-        Row of the result table.
-
-    Returns
-    -------
-    str
-        Text.
-    """
+    """Return a design's name for a sentence, with its CFA if the study does not name it."""
     name = label(row)
     if row["kind"] in (REFERENCE, NAMED) or (row["kind"] == SEARCHED and not name.startswith("best ")):
         return name
@@ -144,18 +90,7 @@ def full_name(row: Row) -> str:
 
 
 def capital(text: str) -> str:
-    """Return a sentence that begins with an upper-case letter.
-
-    Parameters
-    ----------
-    text : str
-        Sentence.
-
-    Returns
-    -------
-    str
-        Text.
-    """
+    """Return a sentence that begins with an upper-case letter."""
     return text[:1].upper() + text[1:]
 
 
@@ -165,15 +100,7 @@ def upper_bound(output: Output) -> SearchFacts | None:
     `limit_proven` bounds any filter in one channel of a CFA, in one scenario, before quantization, under the study's
     constraints, between the least transmission and the replaced curve, of the kinds and spaces in `bounded`.
 
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    SearchFacts or None
-        None without one.
+    None without one.
     """
     search = output.provenance.search
     if search is None or search.limit_proven is None or output.goal.name != output.trade_off[0].name:
@@ -187,22 +114,7 @@ def upper_bound_beside(output: Output, row: Row) -> float | None:
     A value that is read out may exceed a bound before quantization by its rounding, at most sqrt(channels) DN; no
     bound stands beside such a value.
 
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-    row : mapping
-        Row of the result table.
-
-    Returns
-    -------
-    float or None
-        Upper bound.
-
-    Raises
-    ------
-    UpperBoundExceededError
-        If a value exceeds its bound by more.
+    Raises UpperBoundExceededError if a value exceeds its bound by more.
     """
     search = upper_bound(output)
     if search is None or not row["feasible"] or row["scenario"] != search.scenario or row["kind"] == REFERENCE:
@@ -219,22 +131,7 @@ def upper_bound_beside(output: Output, row: Row) -> float | None:
 
 
 def bounds_figure(output: Output, scenario: str, cfa: str) -> bool:
-    """Return whether the upper bound holds for all filters that are drawn of a CFA in a scenario.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-    scenario : str
-        Scenario.
-    cfa : str
-        CFA.
-
-    Returns
-    -------
-    bool
-        True if it does.
-    """
+    """Return whether the upper bound holds for all filters that are drawn of a CFA in a scenario."""
     search = upper_bound(output)
     if search is None or (scenario, cfa) != (search.scenario, search.cfa):
         return False

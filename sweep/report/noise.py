@@ -39,18 +39,7 @@ _HANDOVERS = (
 
 
 def all_series(output: Output) -> list[SeriesFigure]:
-    """Return every figure of a quantity over scenarios: errors, if requested, then separations.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    list of SeriesFigure
-        Figures.
-    """
+    """Return every figure of a quantity over scenarios: errors, if requested, then separations."""
     figures = [*_noise_figures(output), *series_figures(output)]
     if output.handovers is not None:
         figures = [_with_handovers(figure, output.handovers, output.trade_off[0].pair) for figure in figures]
@@ -93,18 +82,7 @@ def _noise_figures(output: Output) -> Iterator[SeriesFigure]:
 
 
 def usable_lines(output: Output) -> Iterator[str]:
-    """Yield for each series of scenarios the usable ranges of designs; equal ones together.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Yields
-    ------
-    str
-        Sentences.
-    """
+    """Yield for each series of scenarios the usable ranges of designs; equal ones together."""
     if output.study.recognition is None:
         return
     allowed = output.study.recognition.error_max
@@ -193,18 +171,7 @@ def _dprimes(output: Output) -> list[str]:
 
 
 def recognition_table(output: Output) -> pd.DataFrame:
-    """Return errors, one row per design and scenario.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Table.
-    """
+    """Return errors, one row per design and scenario."""
     if output.study.recognition is None:
         return pd.DataFrame()
     rows = output.named_rows

@@ -57,19 +57,7 @@ _SHOWN = {
 def make_report(output: Output, *, repair: bool = False, parallel: Parallel = in_turn) -> None:
     """Write `pareto.png`/`.svg`, `figures/*`, the comparison with published figures and `report.html`.
 
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-    repair : bool
-        Only files that are missing, damaged or out of date.
-    parallel : callable
-        Runs calls on the cores.
-
-    Raises
-    ------
-    OutputError
-        If a file of others has one of the names, or the disk refuses.
+    Raises OutputError if a file of others has one of the names, or the disk refuses.
     """
     with locked(output.folder):
         inventory = Inventory(output.folder)

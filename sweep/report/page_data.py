@@ -33,15 +33,7 @@ _PUBLISHED_LABEL = "model of the paper's RYN4Cy"
 def payload(output: Output) -> dict[str, Any]:
     """Return the data of the page's script, ready for JSON.
 
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    dict
-        Data; NaN only inside packed numbers.
+    NaN only inside packed numbers.
     """
     rows = content.drawn_rows(output)
     columns, named = _columns(output, rows), rows[rows["name"].notna()]

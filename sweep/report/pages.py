@@ -14,20 +14,7 @@ from markupsafe import Markup
 
 
 def page(template: str, **values: Any) -> str:
-    """Fill in a template; every value is escaped.
-
-    Parameters
-    ----------
-    template : str
-        Name of the template.
-    **values
-        Values.
-
-    Returns
-    -------
-    str
-        Text.
-    """
+    """Fill in a template; every value is escaped."""
     loader = PackageLoader("sweep.report", "templates")
     templates = Environment(
         loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
@@ -37,35 +24,13 @@ def page(template: str, **values: Any) -> str:
 
 
 def script(name: str) -> Markup:
-    """Return a script beside the templates for the page.
-
-    Parameters
-    ----------
-    name : str
-        Name of the file.
-
-    Returns
-    -------
-    Markup
-        Script.
-    """
+    """Return a script beside the templates for the page."""
     text = resources.files("sweep.report").joinpath("templates", name).read_text(encoding="utf-8")
     return Markup(text.replace("</script", "<\\/script"))
 
 
 def inlined(png: bytes) -> str:
-    """Return a picture for the page, in 256 colors, a third of the size.
-
-    Parameters
-    ----------
-    png : bytes
-        Picture.
-
-    Returns
-    -------
-    str
-        Data URL.
-    """
+    """Return a picture for the page, in 256 colors, a third of the size."""
     from PIL import Image  # noqa: PLC0415  (only where a page is written)
 
     buffer = io.BytesIO()
@@ -75,18 +40,7 @@ def inlined(png: bytes) -> str:
 
 
 def rows(table: pd.DataFrame) -> list[list[str]]:
-    """Return header and cells as text; a missing value is a dash.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        Table.
-
-    Returns
-    -------
-    list of list of str
-        Cells.
-    """
+    """Return header and cells as text; a missing value is a dash."""
     if table.empty:
         return []
     body = [[_cell(value) for value in row] for row in table.itertuples(index=False)]
@@ -102,18 +56,7 @@ def _cell(value: object) -> str:
 
 
 def aligned(table: pd.DataFrame) -> list[str]:
-    """Return a table as lines of text.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        Table.
-
-    Returns
-    -------
-    list of str
-        Lines.
-    """
+    """Return a table as lines of text."""
     cells = rows(table)
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     return ["  ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)).rstrip() for line in cells]

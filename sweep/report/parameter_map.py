@@ -34,22 +34,7 @@ _STYLES = ("-", "--", ":", "-.")
 class MapFigure:
     """Best objective over two parameters.
 
-    Parameters
-    ----------
-    title, label : str
-        Texts.
-    names : tuple of str
-        Parameters along x and y.
-    x : ndarray of shape (n,)
-        Values along x.
-    y : ndarray of shape (m,)
-        Values along y.
-    best : ndarray of shape (m, n)
-        Best objective; NaN where no design is feasible.
-    levels : sequence of (name, value)
-        Objectives of other designs.
-    points : ndarray of shape (k, 2)
-        Peak and width of the colorants of a catalog, nm.
+    `best`: best objective; NaN where no design is feasible; `points`: peak and width of the colorants of a catalog, nm.
     """
 
     title: str
@@ -65,15 +50,7 @@ class MapFigure:
 def map_figure(output: Output) -> MapFigure | None:
     """Return the map of a run's search.
 
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    MapFigure or None
-        None without a map.
+    None without a map.
     """
     search = output.study.search
     if output.map is None or search is None or search.map is None:
@@ -114,18 +91,7 @@ def _peak_and_width(wavelength_nm: PerWavelength, curve: PerWavelength) -> tuple
 
 
 def map_lines(output: Output) -> Iterator[str]:
-    """Yield the widest absorption band, between the cells of a map, that reaches each other design.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Yields
-    ------
-    str
-        Sentences, only of a map of absorption bands.
-    """
+    """Yield the widest absorption band, between the cells of a map, that reaches each other design."""
     figure = map_figure(output)
     if figure is None or figure.names != _BAND:
         return
@@ -228,18 +194,7 @@ def specification(output: Output) -> pd.DataFrame | None:
 
 
 def map_drawing(output: Output) -> Iterator[tuple[str, str, Drawing]]:
-    """Yield the map, if there is one.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Yields
-    ------
-    name, caption, drawing : str, str, Drawing
-        File name, caption and drawing.
-    """
+    """Yield the map, if there is one."""
     figure = map_figure(output)
     if figure is not None:
         lines = ", ".join(name for name, _ in figure.levels)

@@ -22,16 +22,8 @@ _SAME = 0.005
 def price_table(output: Output) -> pd.DataFrame:
     """Return gains and losses of the best design beside the plain CFA with the largest separation.
 
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row per figure: separation, chromatic separation, light, tasks of color and low light, and the smallest
-        other CSD of a pair; empty without tasks.
+    Returns one row per figure: separation, chromatic separation, light, tasks of color and low light, and the smallest
+    other CSD of a pair. Empty without tasks.
     """
     leaders, separation = leaders_of(output), output.trade_off[0]
     best, plain = leaders.chosen, leaders.plain
@@ -66,15 +58,7 @@ def _digits(value: float) -> int:
 def price_line(output: Output) -> str:
     """Return gains and losses in one sentence.
 
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    str
-        Text; empty without a table.
+    Empty without a table.
     """
     table = price_table(output)
     if table.empty:

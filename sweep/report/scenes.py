@@ -38,34 +38,12 @@ class SceneGroup:
 
 
 def format_scenes(names: Sequence[str]) -> str:
-    """Return scenes in a few words.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Names.
-
-    Returns
-    -------
-    str
-        Text.
-    """
+    """Return scenes in a few words."""
     return names[0] if len(names) == 1 else f"{names[0]} ... {names[-1]} ({len(names)} scenes)"
 
 
 def scene_groups(output: Output) -> list[SceneGroup]:
-    """Return all scenes, grouped by computed effects, each effect with its largest bound.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    list of SceneGroup
-        Groups.
-    """
+    """Return all scenes, grouped by computed effects, each effect with its largest bound."""
     groups: dict[tuple[str, ...], list[str]] = {}
     for name, plan in output.provenance.plans.items():
         groups.setdefault(tuple(plan.computed), []).append(name)
@@ -84,18 +62,7 @@ def scene_groups(output: Output) -> list[SceneGroup]:
 
 
 def scene_table(groups: Sequence[SceneGroup]) -> pd.DataFrame:
-    """Return the effects of each group, the bound on the others, and the error of an audit.
-
-    Parameters
-    ----------
-    groups : sequence of SceneGroup
-        Groups.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Table.
-    """
+    """Return the effects of each group, the bound on the others, and the error of an audit."""
     rows = [
         {
             "scenes": group.title,
@@ -110,18 +77,7 @@ def scene_table(groups: Sequence[SceneGroup]) -> pd.DataFrame:
 
 
 def effect_table(effects: Sequence[EffectFacts | Choice]) -> pd.DataFrame:
-    """Return every effect with its bound and reason.
-
-    Parameters
-    ----------
-    effects : sequence of EffectFacts or Choice
-        Effects.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Table.
-    """
+    """Return every effect with its bound and reason."""
     rows = [
         {
             "effect": effect.effect,
@@ -135,18 +91,7 @@ def effect_table(effects: Sequence[EffectFacts | Choice]) -> pd.DataFrame:
 
 
 def plan_lines(study: Study) -> Iterator[str]:
-    """Yield the effects of every scene with bound and reason; scenes of one plan together.
-
-    Parameters
-    ----------
-    study : Study
-        Planned study.
-
-    Yields
-    ------
-    str
-        Lines.
-    """
+    """Yield the effects of every scene with bound and reason; scenes of one plan together."""
     groups: dict[str, list[Plan]] = {}
     for plan in study.plans.values():
         groups.setdefault(plan.key, []).append(plan)
@@ -165,18 +110,7 @@ def plan_lines(study: Study) -> Iterator[str]:
 
 
 def plan_facts(study: Study) -> dict[str, Any]:
-    """Return accuracy, and tolerance, error bound (DN) and effects of each scene.
-
-    Parameters
-    ----------
-    study : Study
-        Planned study.
-
-    Returns
-    -------
-    dict
-        Facts.
-    """
+    """Return accuracy, and tolerance, error bound (DN) and effects of each scene."""
     scenes = {
         name: {
             "tolerance_dn": plan.tolerance_dn,

@@ -32,14 +32,8 @@ _SAME = 1e-9
 class ScoreRow:
     """Figure of a task over the designs.
 
-    Parameters
-    ----------
-    column : Column
-        Column.
-    values : ndarray of shape (n_designs,)
-        Values; NaN where a design has none.
-    best, worst : frozenset of int
-        Designs with the best and the worst value; empty if all are equal.
+    `values`: values; NaN where a design has none; `best`, `worst`: designs with the best and the worst value; empty if
+    all are equal.
     """
 
     column: Column
@@ -79,15 +73,7 @@ class Scorecard:
 def scorecard(output: Output) -> Scorecard | None:
     """Return the scores of plain CFAs, named designs and the answer in the first scenario.
 
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    Scorecard or None
-        None without tasks.
+    None without tasks.
     """
     columns = [c for c in output.columns.values() if c.metric.startswith(PREFIX) and not c.extreme]
     if columns:
@@ -117,18 +103,7 @@ def _row(column: Column, values: Num[Array, " designs"]) -> ScoreRow:
 
 
 def score_lines(card: Scorecard | None) -> list[str]:
-    """Return the numbers of best and worst figures of each design, in one line.
-
-    Parameters
-    ----------
-    card : Scorecard or None
-        Scorecard.
-
-    Returns
-    -------
-    list of str
-        Lines.
-    """
+    """Return the numbers of best and worst figures of each design, in one line."""
     if card is None:
         return []
     marked = [row for row in card.rows if row.best]
@@ -162,18 +137,7 @@ def _against(card: Scorecard, rows: Sequence[ScoreRow]) -> list[str]:
 
 
 def draw_scorecard(card: Scorecard) -> Figure:
-    """Draw factors relative to the reference, one line per figure; better is to the right.
-
-    Parameters
-    ----------
-    card : Scorecard
-        Scorecard.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Figure.
-    """
+    """Draw factors relative to the reference, one line per figure; better is to the right."""
     drawn = [(row.column.words, row.factors) for row in card.rows]
     drawn = [(words, factors) for words, factors in drawn if np.isfinite(factors).sum() > 1]
     figure, axes = canvas(9.0, 1.4 + 0.27 * len(drawn))

@@ -39,24 +39,8 @@ def score_readers(output: Output, predictions: Sequence[Path], to: Path) -> list
 
     Files with positions are detections in streets, whose scores are in `street_scores.parquet`.
 
-    Parameters
-    ----------
-    output : Output
-        Finished run with a benchmark of vision.
-    predictions : sequence of Path
-        Files, one per reader.
-    to : Path
-        Folder of table and page.
-
-    Returns
-    -------
-    list of str
-        Lines to print.
-
-    Raises
-    ------
-    SweepError
-        For predictions that are not of the test images, see `read_predictions`.
+    `predictions`: files, one per reader. Raises SweepError for predictions that are not of the test images, see
+    `read_predictions`.
     """
     vision = output.study.vision
     assert vision is not None
@@ -99,15 +83,8 @@ def _score_streets(output: Output, predictions: Sequence[Path], to: Path) -> lis
 def summary_table(scores: pd.DataFrame) -> pd.DataFrame:
     """Return errors over all distances and light levels, lenses in any order where there are such images.
 
-    Parameters
-    ----------
-    scores : pandas.DataFrame
-        Result of `scores_of`, of one reader or more.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row per reader and design: error, and difference from the first design and from the ideal observer, percent.
+    Returns a row per reader and design: error, and difference from the first design and from the ideal observer,
+    percent.
     """
     whole = whole_scores(scores)
     first = str(whole["name"].iloc[0])
@@ -121,18 +98,7 @@ def summary_table(scores: pd.DataFrame) -> pd.DataFrame:
 
 
 def draw_scores(scores: pd.DataFrame) -> Figure:
-    """Draw errors over distance, a line per reader and design, and the ideal observer's as thin lines.
-
-    Parameters
-    ----------
-    scores : pandas.DataFrame
-        Result of `scores_of`, of one reader or more.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Figure.
-    """
+    """Draw errors over distance, a line per reader and design, and the ideal observer's as thin lines."""
     shown = in_any_order(scores)
     by_distance = shown[(shown["level"] == ALL) & (shown["distance_m"] != ALL)]
     figure, axes = canvas(9.0, 5.0)

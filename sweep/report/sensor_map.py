@@ -30,12 +30,7 @@ BEST_FOUND = "best of the search"
 class SensorMap:
     """Separation over image height.
 
-    Parameters
-    ----------
-    name : str
-        Design.
-    heights, dn : ndarray of shape (n,)
-        Relative image heights, and CSD, DN.
+    `heights`, `dn`: relative image heights, and CSD, DN.
     """
 
     name: str
@@ -64,18 +59,7 @@ class SensorFigure:
 
 
 def sensor_figures(output: Output) -> Iterator[SensorFigure]:
-    """Yield the data of one figure per scene with a field: named designs and the answer, the last nine.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Yields
-    ------
-    SensorFigure
-        Figures.
-    """
+    """Yield the data of one figure per scene with a field: named designs and the answer, the last nine."""
     separation = output.trade_off[0]
     name = separation.of or separation.name
     if output.places is None or separation.pair is None or name not in output.places:
@@ -98,18 +82,7 @@ def sensor_figures(output: Output) -> Iterator[SensorFigure]:
 
 
 def map_caption(figure: SensorFigure) -> str:
-    """Return the caption of a map.
-
-    Parameters
-    ----------
-    figure : SensorFigure
-        Figure.
-
-    Returns
-    -------
-    str
-        Text.
-    """
+    """Return the caption of a map."""
     text = (
         f"The {figure.words} over the sensor, in {figure.scenario}, before clipping and rounding; the chief ray "
         f"falls in at {figure.corner_deg:g} degrees in the corner. Computed at {figure.maps[0].heights.size} image "
@@ -144,17 +117,6 @@ def _draw(figure: SensorFigure) -> Figure:
 
 
 def map_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
-    """Yield the maps.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Yields
-    ------
-    name, caption, drawing : str, str, Drawing
-        File name, caption and drawing.
-    """
+    """Yield the maps."""
     for number, figure in enumerate(sensor_figures(output), 1):
         yield f"places-{number}", map_caption(figure), partial(_draw, figure)

@@ -67,22 +67,7 @@ def report_sensors(inventory: Inventory, runs: Sequence[SensorRun]) -> list[str]
 
     The filters for several sensors are read from `all_sensors.parquet`, see `all_sensors_table`, if the folder has it.
 
-    Parameters
-    ----------
-    inventory : Inventory
-        Files of the study, in a locked folder.
-    runs : sequence of SensorRun
-        Finished runs.
-
-    Returns
-    -------
-    list of str
-        Answer, as it is printed.
-
-    Raises
-    ------
-    OutputError
-        For files that are damaged, or if the disk refuses.
+    Raises OutputError for files that are damaged, or if the disk refuses.
     """
     folder = inventory.folder
     inventory.require({ALL_SENSORS} & inventory.files.keys())
@@ -248,17 +233,7 @@ def _shown(figures: pd.DataFrame) -> pd.DataFrame:
 def draw_sensors(figures: pd.DataFrame, words: str) -> Figure:
     """Draw the ratio of separations against that of light: a color per design, a marker per sensor and lights.
 
-    Parameters
-    ----------
-    figures : pandas.DataFrame
-        Rows of `_figures`.
-    words : str
-        Name of the separation.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Figure; ellipses hold 90 % of the random sensors.
+    Ellipses hold 90 % of the random sensors.
     """
     from matplotlib.patches import Polygon  # noqa: PLC0415  (slow to import)
 
@@ -289,7 +264,7 @@ def draw_sensors(figures: pd.DataFrame, words: str) -> Figure:
 
 
 def _ellipse(row: Mapping[Any, Any]) -> Float[Array, "points 2"]:
-    """Return the outline of the ellipse that holds 90 % of the random sensors, ndarray of shape (n, 2)."""
+    """Return the outline of the ellipse that holds 90 % of the random sensors."""
     angle = np.linspace(0, 2 * np.pi, 73)
     x, y = np.cos(angle), np.sin(angle)
     along = row["correlation"] * x + np.sqrt(max(1 - row["correlation"] ** 2, 0.0)) * y

@@ -42,17 +42,7 @@ _LABELS = {
 
 @dataclass(frozen=True)
 class Line:
-    """Line of a design.
-
-    Parameters
-    ----------
-    y : ndarray of shape (n,)
-        Values.
-    upper : ndarray of shape (n,) or None
-        Upper end of its band.
-    passes : tuple of (float, float)
-        Numbers at which it passes the level of the figure, and its value there.
-    """
+    """Line of a design."""
 
     y: Num[Array, " levels"]
     upper: Num[Array, " levels"] | None
@@ -61,15 +51,7 @@ class Line:
     def over(self, x: Float[Array, " levels"]) -> tuple[Float[Array, " _values"], Float[Array, " _values"]]:
         """Return numbers and values as drawn, with the crossing among them.
 
-        Parameters
-        ----------
-        x : ndarray of shape (n,)
-            Numbers, ascending.
-
-        Returns
-        -------
-        x, y : ndarray
-            Points of the line.
+        `x`: numbers, ascending.
         """
         numbers = np.concatenate([x, [number for number, _ in self.passes]])
         values = np.concatenate([self.y, [value for _, value in self.passes]])
@@ -109,18 +91,7 @@ class SeriesFigure:
         return bool(self.x.min() > 0 and self.x.max() / self.x.min() > _WIDE)
 
     def at(self, place: int) -> str:
-        """Return a number of the scenarios with its unit.
-
-        Parameters
-        ----------
-        place : int
-            Index.
-
-        Returns
-        -------
-        str
-            Text.
-        """
+        """Return a number of the scenarios with its unit."""
         return f"{self.x[place]:g} {quantity_of(self.key)[1]}".rstrip()
 
     @property
@@ -132,15 +103,7 @@ class SeriesFigure:
 def quantity_of(key: str) -> tuple[str, str]:
     """Return name and unit of the number that scenarios differ in.
 
-    Parameters
-    ----------
-    key : str
-        Key of the study.
-
-    Returns
-    -------
-    name, unit : str
-        Texts; the unit may be empty.
+    The unit may be empty.
     """
     name, _, unit = _LABELS.get(key, key).partition(" / ")
     return name, unit.strip("()")
@@ -157,22 +120,7 @@ def scene_in_words(scenario: str) -> str:
 
 
 def over_series(rows: pd.DataFrame, scenarios: Mapping[str, float], column: str) -> dict[str, np.ndarray]:
-    """Return a column over a series' numbers for every design with all of them.
-
-    Parameters
-    ----------
-    rows : pandas.DataFrame
-        Rows.
-    scenarios : mapping of str to float
-        Number of each scenario.
-    column : str
-        Column name.
-
-    Returns
-    -------
-    dict of str to ndarray of shape (n_scenarios,)
-        Values by design.
-    """
+    """Return a column over a series' numbers for every design with all of them."""
     names = list(scenarios)
     rows = rows[rows["scenario"].isin(names)].dropna(subset=["name"]).astype({"name": str, "scenario": str})
     designs = {str(name): part.set_index("scenario")[column] for name, part in rows.groupby("name", sort=False)}
@@ -183,16 +131,6 @@ def series_figures(output: Output) -> list[SeriesFigure]:
     """Return the separation of every named design over each set of scenarios that differ in one number.
 
     Where separations fall below 1 DN, the axis is logarithmic; the series with most such designs comes first.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    list of SeriesFigure
-        Figures.
     """
     rows, separation, columns = output.named_rows, output.trade_off[0], output.columns.values()
     best_phase = [c.name for c in columns if (c.extreme, c.of) == ("best place", separation.name) and c.name in rows]
@@ -219,18 +157,7 @@ def _over_decades(figure: SeriesFigure) -> SeriesFigure:
 
 
 def lead_sentence(series: SeriesFigure) -> str:
-    """Return the leading design of each range, with its value and its rival's at the end.
-
-    Parameters
-    ----------
-    series : SeriesFigure
-        Series.
-
-    Returns
-    -------
-    str
-        Text.
-    """
+    """Return the leading design of each range, with its value and its rival's at the end."""
     what, _, unit = series.y_label.partition(" / ")
     values, leads = series.values, leads_of(series)
 
@@ -262,15 +189,7 @@ def lead_sentence(series: SeriesFigure) -> str:
 def vanishing_line(series: SeriesFigure) -> list[str]:
     """Return between which numbers separations fall below 1 DN.
 
-    Parameters
-    ----------
-    series : SeriesFigure
-        Series.
-
-    Returns
-    -------
-    list of str
-        Sentence, if a design does.
+    Returns sentence, if a design does.
     """
     ranges = _below(series)
     if not ranges:
@@ -317,16 +236,6 @@ def leads_of(series: SeriesFigure) -> list[tuple[str | None, int, int]]:
     """Return the leader of each range in order; None where no CFA reaches 1 DN.
 
     A leader stays one as long as no other design has more.
-
-    Parameters
-    ----------
-    series : SeriesFigure
-        Series.
-
-    Returns
-    -------
-    list of (leader, first, last)
-        Names and indices.
     """
     values = series.values
     least = _LEAST_LEAD if series.y_label.endswith(f" / {DN}") else 0.0
@@ -355,18 +264,7 @@ def _between(
 
 
 def draw_series(series: SeriesFigure) -> Figure:
-    """Draw one line with its band per design; numbers over more than a decade are on a logarithmic axis.
-
-    Parameters
-    ----------
-    series : SeriesFigure
-        Series.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Figure.
-    """
+    """Draw one line with its band per design; numbers over more than a decade are on a logarithmic axis."""
     figure, axes = canvas(8.0, 4.8)
     widths = iter(np.linspace(3.0, 1.5, len(series.lines)))  # of equal lines each is seen below the next
     for (name, line), color, dash in zip(series.lines.items(), CURVE_CYCLE * 4, DASHES * 7, strict=False):

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Nearest = tuple[tuple[str, str], tuple[str, str], str]
 """(type, name) of two lights, and their distance in words."""
 Cloud = tuple[str, list[str], list[tuple[str, str]], FloatArray, Nearest | None]
-"""Name, channels, (type, name) of the signals, DN (ndarray[n_channels, n_signals]) and nearest lights of a design."""
+"""Name, channels, (type, name) of the signals, DN and nearest lights of a design."""
 _CLEAR = "#eeeeee"
 _MOST_TILES, _WIDE = 24, 8
 
@@ -31,20 +31,7 @@ _MOST_TILES, _WIDE = 24, 8
 def signals_of(
     output: Output, design_id: object
 ) -> tuple[list[str], list[tuple[str, str]], Float[Array, "channels signals"]]:
-    """Return channels, (type, name) of the signals, and their digital numbers with a design.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-    design_id : int
-        Row id.
-
-    Returns
-    -------
-    channels, signals, dn : list, list, ndarray of shape (n_channels, n_signals)
-        Signals.
-    """
+    """Return channels, (type, name) of the signals, and their digital numbers with a design."""
     points = output.points[output.points["design_id"] == design_id]
     channels = list(dict.fromkeys(points["channel"]))
     first = points.iloc[:: max(1, len(channels))]
@@ -53,20 +40,7 @@ def signals_of(
 
 
 def clouds(output: Output, *kinds: str) -> list[Cloud]:
-    """Return signals of designs in the first scenario; a CFA of one channel has none.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-    *kinds : str
-        Kinds of rows.
-
-    Returns
-    -------
-    list of Cloud
-        Clouds.
-    """
+    """Return signals of designs in the first scenario; a CFA of one channel has none."""
     rows = output.kind(*kinds)
     rows = rows[(rows["scenario"] == output.scenarios[0]) & (rows["status"] == "ok")]
     designs = []
@@ -80,17 +54,7 @@ def clouds(output: Output, *kinds: str) -> list[Cloud]:
 def nearest_lights(output: Output, row: Mapping[Any, Any]) -> Nearest | None:
     """Return (type, name) of the two lights that limit a row's separation, and their distance in words.
 
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-    row : mapping
-        Row of the result table.
-
-    Returns
-    -------
-    tuple or None
-        None if they are unknown.
+    None if they are unknown.
     """
     separation = output.trade_off[0]
     if separation.pair is None or separation.role != "separation":
@@ -106,22 +70,7 @@ def nearest_lights(output: Output, row: Mapping[Any, Any]) -> Nearest | None:
 
 
 def draw_clouds(designs: Sequence[Cloud], title: str, top_dn: float) -> Figure:
-    """Draw a row of panels per design, its first channel against the others, with equal axes.
-
-    Parameters
-    ----------
-    designs : sequence of Cloud
-        Clouds.
-    title : str
-        Title.
-    top_dn : float
-        End of all axes, DN.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Figure.
-    """
+    """Draw a row of panels per design, its first channel against the others, with equal axes."""
     most = max(len(channels) for _, channels, *_ in designs) - 1
     figure = empty_figure(3.1 * most + 1.0, 2.9 * len(designs) + 0.6)
     panels = figure.subplots(len(designs), most, squeeze=False)
@@ -149,35 +98,13 @@ def draw_clouds(designs: Sequence[Cloud], title: str, top_dn: float) -> Figure:
 
 
 def chart_patches(output: Output) -> dict[str, Float[Array, "_ 3"]]:
-    """Return the color chart of the signals.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    dict of str to ndarray of shape (n, 3)
-        sRGB by signal type.
-    """
+    """Return the color chart of the signals."""
     grid = output.study.wavelengths
     return {kind: display_colors(grid, photons) for kind, photons in output.curves.bundles.items()}
 
 
 def draw_chart(patches: Mapping[str, Float[Array, "_ _"]]) -> Figure:
-    """Draw the patches, one row per signal type, and gray steps.
-
-    Parameters
-    ----------
-    patches : mapping of str to ndarray
-        Result of `chart_patches`.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Figure.
-    """
+    """Draw the patches, one row per signal type, and gray steps."""
     from matplotlib.patches import Rectangle  # noqa: PLC0415  (slow to import)
 
     figure = empty_figure(8.0, 0.55 * (len(patches) + 1) + 0.8)
@@ -194,18 +121,7 @@ def draw_chart(patches: Mapping[str, Float[Array, "_ _"]]) -> Figure:
 
 
 def replaced_channels(output: Output) -> dict[str, dict[str, str]]:
-    """Return the channels of each CFA that a filter of the study replaces, with their base.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    dict of str to dict of str to str
-        Bases by CFA and channel.
-    """
+    """Return the channels of each CFA that a filter of the study replaces, with their base."""
     replaced: dict[str, dict[str, str]] = {}
     for entry in modifications(output):
         if entry.base is not None:
@@ -214,36 +130,12 @@ def replaced_channels(output: Output) -> dict[str, dict[str, str]]:
 
 
 def first_mosaics(output: Output) -> dict[str, Mosaic]:
-    """Return the tiles of the first CFAs of a study.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    dict of str to Mosaic
-        Tiles.
-    """
+    """Return the tiles of the first CFAs of a study."""
     return {name: output.mosaic(name) for name in list(output.study.cfas)[:_MOST_TILES]}
 
 
 def draw_tiles(mosaics: Mapping[str, Mosaic], replaced: Mapping[str, Mapping[str, str]]) -> Figure:
-    """Draw the tiles side by side; a replaced channel is hatched in its base's color.
-
-    Parameters
-    ----------
-    mosaics : mapping of str to Mosaic
-        Tiles.
-    replaced : mapping
-        Result of `replaced_channels`.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Figure.
-    """
+    """Draw the tiles side by side; a replaced channel is hatched in its base's color."""
     from matplotlib.patches import Rectangle  # noqa: PLC0415  (slow to import)
 
     wide = min(_WIDE, len(mosaics))

@@ -30,20 +30,7 @@ def _named_line(output: Output) -> list[str]:
 
 
 def summary_lines(output: Output, took_s: float | None = None) -> list[str]:
-    """Return the summary of a run; its last line is the folder.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-    took_s : float, optional
-        Time of the whole command, s.
-
-    Returns
-    -------
-    list of str
-        Lines.
-    """
+    """Return the summary of a run; its last line is the folder."""
     facts = output.provenance
     answer, further = answer_parts(output)
     lines = [*answer, *stated_lines(output), *further, *_named_line(output)]
@@ -92,18 +79,7 @@ def _plan_line(output: Output) -> str:
 
 
 def counts_line(output: Output) -> str:
-    """Return the number of designs, and of those that the report draws.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    str
-        Text.
-    """
+    """Return the number of designs, and of those that the report draws."""
     counts = output.counts
     text = _count(output.provenance.filters, "filter")
     plain = output.kind(REFERENCE)["filter_id"].nunique()

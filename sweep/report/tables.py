@@ -20,15 +20,7 @@ _DIGITS = 4
 def comparison_table(output: Output) -> pd.DataFrame:
     """Return the table that compares plain CFAs, named designs and the answer of the search.
 
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row per design and scenario: name, CSDs, sensitivities, limiting lights, feasibility.
+    Returns one row per design and scenario: name, CSDs, sensitivities, limiting lights, feasibility.
     """
     rest = [*output.light, *output.further, *output.distances]
     return _shown(output, output.named_rows, ["name", "scenario"], [*rest, "feasible"])
@@ -37,18 +29,8 @@ def comparison_table(output: Output) -> pd.DataFrame:
 def best_table(output: Output, max_rows: int = 12) -> pd.DataFrame:
     """Return the table of the best feasible designs, best first.
 
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-    max_rows : int
-        Largest number of rows if the study has one scenario.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Ids, parameters, CSDs and sensitivities. With several scenarios: one row, the best design, per scenario
-        and CFA.
+    `max_rows`: largest number of rows if the study has one scenario. With several scenarios: one row, the best design,
+    per scenario and CFA.
     """
     ranked = output.best.head(max_rows)
     if len(output.scenarios) > 1:
@@ -82,18 +64,8 @@ def _shown(output: Output, rows: pd.DataFrame, keys: list[str], rest: list[str])
 def costliest_omission(output: Output, max_rows: int = 10) -> pd.DataFrame:
     """Return the lights whose omission from the search lowers the objective most.
 
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-    max_rows : int
-        Largest number of rows.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row per objective and left-out light, with `seen`, `with_it` and `fall` as in `left_out_table`, in the
-        unit of the objective; empty if the run left out no light.
+    Returns one row per objective and left-out light, with `seen`, `with_it` and `fall` as in `left_out_table`, in the
+    unit of the objective. Empty if the run left out no light.
     """
     if output.left_out is None:
         return pd.DataFrame()
@@ -104,16 +76,8 @@ def costliest_omission(output: Output, max_rows: int = 10) -> pd.DataFrame:
 def geometry_table(output: Output) -> pd.DataFrame:
     """Return the object resolution of each distance scenario (paper, Table 1).
 
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row per distance scenario: scenario, distance_m, fov_deg (degrees), object_resolution_px (pixels across
-        the light).
+    Returns one row per distance scenario: scenario, distance_m, fov_deg (degrees), object_resolution_px (pixels across
+    the light).
     """
     rows = [
         {
@@ -130,17 +94,9 @@ def geometry_table(output: Output) -> pd.DataFrame:
 def comparison_with_published(output: Output) -> pd.DataFrame:
     """Compare each published value with the value of this run in the first scenario.
 
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row per published value: table, cfa (for the object resolution, the distance scenario), quantity, paper
-        (published value), ours (rounded to the decimal places printed in the paper), error (ours - paper),
-        relative_error (error / paper; None if paper is 0), ours_exact (not rounded).
+    Returns one row per published value: table, cfa (for the object resolution, the distance scenario), quantity, paper
+    (published value), ours (rounded to the decimal places printed in the paper), error (ours - paper), relative_error
+    (error / paper. None if paper is 0), ours_exact (not rounded).
     """
     named = output.named[output.named["scenario"] == output.scenarios[0]].set_index("name")
     rows = []
@@ -160,18 +116,7 @@ def comparison_with_published(output: Output) -> pd.DataFrame:
 
 
 def comparison_lines(comparison: pd.DataFrame) -> list[str]:
-    """Format the comparison as text: our values, with the published values in parentheses.
-
-    Parameters
-    ----------
-    comparison : pandas.DataFrame
-        Result of `comparison_with_published`.
-
-    Returns
-    -------
-    list of str
-        Lines: for each published table a title, then quantities as rows and CFAs as columns.
-    """
+    """Format the comparison as text: our values, with the published values in parentheses."""
     lines = []
     for name, rows in comparison.groupby("table", sort=False):
         cells = rows["ours"].map("{:g}".format) + rows["paper"].map(" ({:g})".format)

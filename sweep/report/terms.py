@@ -19,22 +19,7 @@ _NO_TECHNOLOGY = "Filters without a stated technology are evaluated at normal in
 
 
 def format_constraint(output: Output, name: str, bound: Bound) -> str:
-    """Format a constraint, for example `slope at most 0.06 per nm`.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-    name : str
-        Column name.
-    bound : Bound
-        Allowed range, in the unit of the column.
-
-    Returns
-    -------
-    str
-        Text.
-    """
+    """Format a constraint, for example `slope at most 0.06 per nm`."""
     words, column = output.words(name), output.columns.get(name)
     if bound.max is None:
         return f"{words} at least {_with_unit(column, bound.min)}"
@@ -54,15 +39,7 @@ def _with_unit(column: Column | None, limit: float | None) -> str:
 def format_constraints(output: Output) -> str:
     """Format all constraints of the study, joined by `and`.
 
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    str
-        Text; empty without constraints.
+    Empty without constraints.
     """
     return " and ".join(format_constraint(output, name, bound) for name, bound in output.constraints.items())
 
@@ -70,17 +47,7 @@ def format_constraints(output: Output) -> str:
 def format_missed_constraints(output: Output, row: Row) -> str:
     """Format the constraints that a row violates, for example `its sensitivity is below 0.9`.
 
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-    row : mapping
-        Row of the result table.
-
-    Returns
-    -------
-    str
-        Text; empty if the row meets every constraint.
+    Empty if the row meets every constraint.
     """
     parts = list[str]()
     for name, bound in output.constraints.items():
@@ -96,18 +63,7 @@ def format_missed_constraints(output: Output, row: Row) -> str:
 
 
 def unknown_lines(output: Output) -> Iterator[str]:
-    """Yield a sentence for each constrained quantity that is unknown (NaN) for some designs.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Yields
-    ------
-    str
-        Sentence that names the filter families; a design with an unknown constrained quantity is infeasible.
-    """
+    """Yield a sentence for each constrained quantity that is unknown (NaN) for some designs."""
     rows = output.kind(NAMED, SWEPT, SEARCHED)
     rows = rows[rows["status"] == "ok"]
     for name in output.constraints:
@@ -120,15 +76,7 @@ def unknown_lines(output: Output) -> Iterator[str]:
 def term_definitions(output: Output) -> list[str]:
     """Define the separation, the constrained quantities, and the modified channels of each CFA.
 
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    list of str
-        One sentence per term, then one per CFA with modified channels.
+    Returns one sentence per term, then one per CFA with modified channels.
     """
     names = (output.trade_off[0].name, *output.constraints)
     columns = [output.columns[name] for name in names if name in output.columns]
@@ -165,17 +113,7 @@ def _technologies(output: Output, row: Row) -> list[Technology | None]:
 def technology_of(output: Output, row: Row) -> Technology | None:
     """Return the technology of a row's filter.
 
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-    row : mapping
-        Row of the result table.
-
-    Returns
-    -------
-    Technology or None
-        None if it is not stated or not unique.
+    None if it is not stated or not unique.
     """
     candidates = _technologies(output, row)
     return candidates[0] if len(candidates) == 1 else None
@@ -184,17 +122,7 @@ def technology_of(output: Output, row: Row) -> Technology | None:
 def angle_note(output: Output, row: Row) -> str:
     """Return a sentence on the angle dependence of a row's filter.
 
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-    row : mapping
-        Row of the result table.
-
-    Returns
-    -------
-    str
-        Sentence; empty if no technology is stated or it is not unique.
+    Empty if no technology is stated or it is not unique.
     """
     technology = technology_of(output, row)
     if technology is None:
@@ -208,17 +136,7 @@ def angle_note(output: Output, row: Row) -> str:
 def is_angle_dependent(output: Output, row: Row) -> bool:
     """Return whether the transmission of a row's filter may depend on the angle of incidence.
 
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-    row : mapping
-        Row of the result table.
-
-    Returns
-    -------
-    bool
-        True if any possible technology is an interference filter.
+    True if any possible technology is an interference filter.
     """
     return any(t is not None and t.interference is not None for t in _technologies(output, row))
 
@@ -237,15 +155,7 @@ def _format_incidence(scene: Scene) -> str:
 def assumptions_line(output: Output) -> str:
     """Return a note on what the run assumes: surrogate curves, and filters without a stated technology.
 
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    str
-        Text; empty if neither applies.
+    Empty if neither applies.
     """
     notes = []
     modeled = [one.name for one in (output.provenance.sensor, output.provenance.lights) if one.surrogate]

@@ -57,12 +57,7 @@ _STYLES: dict[str, dict[str, Any]] = {
 class Points:
     """Named group of designs.
 
-    Parameters
-    ----------
-    x, y : ndarray of shape (n,)
-        Coordinates.
-    labels : tuple of str
-        Labels of single points (empty: none).
+    `labels`: labels of single points (empty: none).
     """
 
     x: PerDesign
@@ -74,24 +69,8 @@ class Points:
 class TradeOff:
     """Separation against a sensitivity.
 
-    Parameters
-    ----------
-    title, x_label, y_label : str
-        Texts.
-    groups : mapping of str to Points
-        Designs.
-    traced : Points or None
-        Optima of the search at levels of sensitivity.
-    limit, limit_name : Points or None, str
-        Upper bound there, and the filters that it bounds.
-    levels : mapping of str to float
-        Separation of CFAs without a modified channel.
-    bound, bound_text : float or None, str
-        Constraint on the sensitivity.
-    counts : mapping of str to int
-        Size of the groups in the whole table.
-    fits : bool
-        Both axes are those of the overview: from 0, with room for names.
+    `levels`: separation of CFAs without a modified channel; `fits`: both axes are those of the overview: from 0, with
+    room for names.
     """
 
     title: str
@@ -109,22 +88,7 @@ class TradeOff:
 
 
 def pareto_figure(output: Output, scenario: str, cfa: str) -> TradeOff:
-    """Return separation against the sensitivity of the modified channel of one CFA.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-    scenario : str
-        Scenario.
-    cfa : str
-        CFA.
-
-    Returns
-    -------
-    TradeOff
-        Data.
-    """
+    """Return separation against the sensitivity of the modified channel of one CFA."""
     table = output.table[(output.table["scenario"] == scenario) & (output.table["status"] == "ok")]
     designs = table[table["cfa"] == cfa]
     swept, named, best = (designs[designs["kind"] == kind] for kind in (SWEPT, NAMED, SEARCHED))
@@ -165,18 +129,6 @@ def overview_figure(output: Output, scenario: str) -> TradeOff:
     """Return separation against the light of the whole CFA, for all CFAs of a scenario.
 
     Designs of the swept front meet every constraint except, in the group `outside`, those on the two axes.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-    scenario : str
-        Scenario.
-
-    Returns
-    -------
-    TradeOff
-        Data.
     """
     separation = output.trade_off[0]
     table = output.table[(output.table["scenario"] == scenario) & (output.table["status"] == "ok")]
@@ -193,20 +145,7 @@ def overview_figure(output: Output, scenario: str) -> TradeOff:
 
 
 def around_designs(output: Output, scenario: str) -> TradeOff:
-    """Return `overview_figure` without the designs.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-    scenario : str
-        Scenario.
-
-    Returns
-    -------
-    TradeOff
-        Data.
-    """
+    """Return `overview_figure` without the designs."""
     separation, sensor = output.trade_off[0], output.provenance.sensor
     traced, limit = _trade_offs(output, scenario)
     reference = "clear sensor" if sensor.has_clear else f"{sensor.reference} pixels alone"
@@ -251,18 +190,7 @@ def _trade_offs(output: Output, scenario: str, cfa: str | None = None) -> tuple[
 
 
 def traded_cfas(output: Output) -> list[str]:
-    """Return CFAs with designs, swept or searched, that trade sensitivity for separation.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    list of str
-        Names.
-    """
+    """Return CFAs with designs, swept or searched, that trade sensitivity for separation."""
     rows, cfas = output.kind(SWEPT), []
     for cfa in dict.fromkeys(m.cfa for m in modifications(output)):
         swept = rows[(rows["cfa"] == cfa) & (rows["status"] == "ok")]["sensitivity"].to_numpy(dtype=float)
@@ -275,18 +203,7 @@ def traded_cfas(output: Output) -> list[str]:
 
 
 def draw_trade_off(figure: TradeOff) -> Figure:
-    """Draw the trade-off; each group has its marker, and named designs their name.
-
-    Parameters
-    ----------
-    figure : TradeOff
-        Data.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Figure.
-    """
+    """Draw the trade-off; each group has its marker, and named designs their name."""
     drawn, axes = canvas(8.3, 5.0)
     for group, points in figure.groups.items():
         if points.x.size:

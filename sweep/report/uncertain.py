@@ -8,18 +8,7 @@ from ..results.output import Output
 
 
 def uncertain_lines(output: Output) -> Iterator[str]:
-    """Yield the separations of 90 % of the random sensors, of named designs and the answer in the leading scenario.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Yields
-    ------
-    str
-        Sentence.
-    """
+    """Yield the separations of 90 % of the random sensors, of named designs and the answer in the leading scenario."""
     errors, separation = output.study.uncertainty, output.trade_off[0]
     if output.uncertainty is None or errors is None:
         return

@@ -23,35 +23,13 @@ _MOST_POINTS = 2500
 
 
 def sensor_figure(output: Output) -> CurvesFigure:
-    """Return the sensor's QE curves.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    CurvesFigure
-        Data.
-    """
+    """Return the sensor's QE curves."""
     title = f"Quantum efficiency, {_name(output.provenance.sensor)}"
     return CurvesFigure(title, "QE", output.curves.wavelength_nm, output.curves.sensor, shades=light_shades(output))
 
 
 def lights_figure(output: Output) -> CurvesFigure:
-    """Return the photon spectra of all signals.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    CurvesFigure
-        Data.
-    """
+    """Return the photon spectra of all signals."""
     bundles = {f"{kind} ({len(photons)})": photons for kind, photons in output.curves.bundles.items()}
     colors = {name: TYPE_COLORS[kind] for kind in TYPE_COLORS for name in bundles if name.startswith(f"{kind} (")}
     title = f"Signals, {_name(output.provenance.lights)}"
@@ -61,18 +39,7 @@ def lights_figure(output: Output) -> CurvesFigure:
 
 
 def light_shades(output: Output) -> dict[str, np.ndarray]:
-    """Return the largest spectrum of each signal type at each wavelength, with peaks of 1.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    dict of str to ndarray of shape (n_wavelengths,)
-        Spectra.
-    """
+    """Return the largest spectrum of each signal type at each wavelength, with peaks of 1."""
     return {
         kind: np.max(photons / photons.max(axis=1, keepdims=True), axis=0)
         for kind, photons in output.curves.bundles.items()
@@ -80,55 +47,20 @@ def light_shades(output: Output) -> dict[str, np.ndarray]:
 
 
 def channel_curves(output: Output, cfa: str) -> list[str]:
-    """Return the names of the sensor's curves of a CFA's channels; a modified channel has none.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-    cfa : str
-        CFA.
-
-    Returns
-    -------
-    list of str
-        Lines.
-    """
+    """Return the names of the sensor's curves of a CFA's channels; a modified channel has none."""
     renamed = output.study.cfas[cfa].curves
     names = (renamed.get(channel, channel) for channel in output.mosaic(cfa).channels)
     return [name for name in dict.fromkeys(names) if name in output.curves.sensor]
 
 
 def modifications(output: Output) -> list[Modification]:
-    """Return the study's named designs, sweeps and boxes.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    list of Modification
-        Modifications.
-    """
+    """Return the study's named designs, sweeps and boxes."""
     study = output.study
     return [*study.designs.values(), *study.sweeps.values(), *study.boxes.values()]
 
 
 def drawn_rows(output: Output) -> pd.DataFrame:
-    """Return the rows that figures show as points: CFAs, named designs and answers, and an even sample of swept ones.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Table.
-    """
+    """Return the rows that figures show as points: CFAs, named designs, answers, and an even sample of swept ones."""
     table = output.table[output.table["status"] == "ok"]
     kept = (table["kind"] != SWEPT) | (table["feasible"] & table["pareto"])
     kept |= table["design_id"].isin(output.points["design_id"])
@@ -140,20 +72,7 @@ def drawn_rows(output: Output) -> pd.DataFrame:
 
 
 def filters_figure(output: Output, cfa: str) -> CurvesFigure:
-    """Return the modified channels of named and best designs of a CFA, beside the curves that they lie between.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-    cfa : str
-        CFA.
-
-    Returns
-    -------
-    CurvesFigure
-        Data.
-    """
+    """Return the modified channels of named and best designs of a CFA, beside the curves that they lie between."""
     rows = output.table[output.table["design_id"].isin(output.curves.drawn) & (output.table["cfa"] == cfa)]
     ends = end_curves(output, cfa)
     curves = {name: values for name, values in output.curves.sensor.items() if name in ends}
@@ -174,20 +93,7 @@ def filters_figure(output: Output, cfa: str) -> CurvesFigure:
 
 
 def end_curves(output: Output, cfa: str) -> list[str]:
-    """Return the names of the curves that a CFA's filters lie between, and those of the green and yellow pixel.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-    cfa : str
-        CFA.
-
-    Returns
-    -------
-    list of str
-        Lines.
-    """
+    """Return the names of the curves that a CFA's filters lie between, and those of the green and yellow pixel."""
     entries = [entry for entry in modifications(output) if entry.cfa == cfa]
     ends = {end for entry in entries for end in (entry.base, entry.to) if isinstance(end, str)} | {"G", "Y"}
     return [name for name in output.curves.sensor if name in ends]

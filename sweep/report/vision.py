@@ -71,15 +71,7 @@ class Benchmark:
     def wrong(self, reader: str, order: str, lamps: str = UNSEEN) -> pd.DataFrame:
         """Return 1 where an image was read wrongly.
 
-        Parameters
-        ----------
-        reader, order, lamps : str
-            Reader, order of the lenses, and lamps.
-
-        Returns
-        -------
-        pandas.DataFrame
-            One row per scene (seed, image), one column per design.
+        Returns one row per scene (seed, image), one column per design.
         """
         rows = self._answers(order, lamps)
         rows = rows.assign(wrong=(rows[reader] != rows["state"]).astype(float))
@@ -87,115 +79,38 @@ class Benchmark:
 
     @lru_cache  # noqa: B019
     def seeds(self, order: str, lamps: str = UNSEEN) -> Int[IndexArray, " scenes"]:
-        """Return the seed of each scene of `wrong`.
-
-        Parameters
-        ----------
-        order, lamps : str
-            Order of the lenses, and lamps.
-
-        Returns
-        -------
-        ndarray of int, shape (n_scenes,)
-            Seeds.
-        """
+        """Return the seed of each scene of `wrong`."""
         return np.asarray(self.scenes(order, lamps)["seed"].to_numpy(), dtype=np.intp)
 
     def error(self, design: str, reader: str, order: str, lamps: str = UNSEEN) -> Interval:
-        """Return the share of images that were read wrongly.
-
-        Parameters
-        ----------
-        design, reader, order, lamps : str
-            Design, reader, order of the lenses, and lamps.
-
-        Returns
-        -------
-        Interval
-            Share.
-        """
+        """Return the share of images that were read wrongly."""
         return mean_of(self.wrong(reader, order, lamps)[design].to_numpy(), self.seeds(order, lamps))
 
     def difference(self, design: str, order: str) -> Interval:
-        """Return the error of a design less that of the reference, on the same scenes.
-
-        Parameters
-        ----------
-        design, order : str
-            Design and order of the lenses.
-
-        Returns
-        -------
-        Interval
-            Difference.
-        """
+        """Return the error of a design less that of the reference, on the same scenes."""
         wrong = self.wrong(self.main_reader, order)
         return mean_of((wrong[design] - wrong[self.reference]).to_numpy(), self.seeds(order))
 
     def scenes(self, order: str, lamps: str = UNSEEN) -> pd.DataFrame:
-        """Return the scenes of `wrong` in the same order.
-
-        Parameters
-        ----------
-        order, lamps : str
-            Order of the lenses, and lamps.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Table.
-        """
+        """Return the scenes of `wrong` in the same order."""
         rows = self._answers(order, lamps)
         return rows[rows["name"] == self.designs[0]].sort_values(["seed", "image"])
 
     def answers(self, design: str, reader: str, order: str) -> pd.DataFrame:
-        """Return the answers on unseen lamps: columns state, said, p.
-
-        Parameters
-        ----------
-        design, reader, order : str
-            Design, reader and order of the lenses.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Table.
-        """
+        """Return the answers on unseen lamps: columns state, said, p."""
         rows = self._answers(order)
         rows = rows[rows["name"] == design]
         return rows[["state", reader, f"{reader}_p"]].set_axis(["state", "said", "p"], axis=1)
 
     def confusion(self, design: str, reader: str, order: str) -> pd.DataFrame:
-        """Return the number of answers by true state (row) and answer (column).
-
-        Parameters
-        ----------
-        design, reader, order : str
-            Design, reader and order of the lenses.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Table.
-        """
+        """Return the number of answers by true state (row) and answer (column)."""
         states, rows = list(states_of(self.vision)), self.answers(design, reader, order)
         truth, answered = (np.array([states.index(value) for value in rows[column]]) for column in ("state", "said"))
         return pd.DataFrame(confusion_matrix(truth, answered, len(states)), states, states)
 
 
 def benchmark_of(output: Output) -> Benchmark:
-    """Return the benchmark of a run whose study has one.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    Benchmark
-        Benchmark.
-    """
+    """Return the benchmark of a run whose study has one."""
     vision = output.study.vision
     assert vision is not None
     tables = output.vision[VISION], output.vision[VISION_CONDITIONS]
@@ -203,34 +118,12 @@ def benchmark_of(output: Output) -> Benchmark:
 
 
 def format_interval(interval: Interval) -> str:
-    """Format a value with its interval.
-
-    Parameters
-    ----------
-    interval : Interval
-        Value.
-
-    Returns
-    -------
-    str
-        Text.
-    """
+    """Format a value with its interval."""
     return f"{interval.value:.2f} ({interval.low:.2f} to {interval.high:.2f})"
 
 
 def format_percent(interval: Interval) -> str:
-    """Format a share with its interval, in percent, without the sign.
-
-    Parameters
-    ----------
-    interval : Interval
-        Share.
-
-    Returns
-    -------
-    str
-        Text.
-    """
+    """Format a share with its interval, in percent, without the sign."""
     value, low, high = (
         format_share(share).removesuffix("%") for share in (interval.value, interval.low, interval.high)
     )
@@ -252,18 +145,7 @@ class Ranks:
 
 @lru_cache(maxsize=4)
 def ranks_of(benchmark: Benchmark) -> Ranks:
-    """Return the rank correlations, lenses in any order, with intervals over the seeds.
-
-    Parameters
-    ----------
-    benchmark : Benchmark
-        Benchmark.
-
-    Returns
-    -------
-    Ranks
-        Correlations.
-    """
+    """Return the rank correlations, lenses in any order, with intervals over the seeds."""
     scenes, seeds = benchmark.scenes(SHUFFLED), benchmark.seeds(SHUFFLED)
     # The first row is of all scenes, then one of each seed.
     of_seed = seeds == np.unique(seeds)[:, None]
@@ -301,7 +183,7 @@ def ranks_of(benchmark: Benchmark) -> Ranks:
 def _by_condition(
     wrong: pd.DataFrame, here: Bool[BoolArray, "conditions images"], weights: Float[Array, "draws images"]
 ) -> Float[Array, "draws _readers conditions"]:
-    """Return errors, ndarray of shape (n_rows, designs, conditions); NaN where a row has no scene of a condition."""
+    """Return errors; NaN where a row has no scene of a condition."""
     values = wrong.to_numpy(dtype=float)
     errors = np.full((len(weights), values.shape[1], len(here)), np.nan)
     for at, scenes in enumerate(here):
@@ -312,7 +194,7 @@ def _by_condition(
 
 
 def _spearman(x: Float[Array, "draws values"], y: Float[Array, "draws values"]) -> Float[Array, " draws"]:
-    """Return the rank correlation along the last axis, ndarray of shape (draws,); NaN if one side is constant."""
+    """Return the rank correlation along the last axis; NaN if one side is constant."""
     a, b = (rankdata(values, axis=1) for values in (x, y))
     a, b = (ranks - ranks.mean(axis=1, keepdims=True) for ranks in (a, b))
     scale = np.sqrt((a**2).sum(axis=1) * (b**2).sum(axis=1))

@@ -42,18 +42,7 @@ _WELL = 0.5
 
 
 def vision_sentences(output: Output) -> Iterator[str]:
-    """Yield predictors of the errors, designs with fewer errors than the reference, and the network's excess error.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Yields
-    ------
-    str
-        Sentences.
-    """
+    """Yield predictors of the errors, designs with fewer errors than the reference, and the network's excess error."""
     benchmark = benchmark_of(output)
     ranks = ranks_of(benchmark)
     csd = ranks.between.get("csd")
@@ -160,18 +149,7 @@ def _ranks_table(ranks: Ranks) -> pd.DataFrame:
 
 
 def vision_parts(output: Output) -> dict[str, pd.DataFrame]:
-    """Return every table of the benchmark.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Returns
-    -------
-    dict of str to pandas.DataFrame
-        Tables by title.
-    """
+    """Return every table of the benchmark."""
     benchmark = benchmark_of(output)
     ranks = ranks_of(benchmark)
     who = READER_NAMES[benchmark.main_reader]
@@ -207,18 +185,7 @@ def _of_columns(row: Mapping[Any, Any], name: str) -> str:
 
 
 def vision_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
-    """Yield the drawings of the benchmark.
-
-    Parameters
-    ----------
-    output : Output
-        Finished run.
-
-    Yields
-    ------
-    name, caption, drawing : str, str, Drawing
-        File name, caption and drawing.
-    """
+    """Yield the drawings of the benchmark."""
     benchmark = benchmark_of(output)
     ranks = ranks_of(benchmark)
     levels = {name: level.illuminance_lx for name, level in benchmark.vision.levels.items()}
@@ -233,18 +200,7 @@ def vision_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
 
 
 def street_drawing(pictures: pd.DataFrame) -> Drawing:
-    """Return the drawing of streets, one column per design, one row per light level.
-
-    Parameters
-    ----------
-    pictures : pandas.DataFrame
-        Rows of `vision_street_pictures.parquet`.
-
-    Returns
-    -------
-    Drawing
-        Drawing.
-    """
+    """Return the drawing of streets, one column per design, one row per light level."""
     rows = pictures.assign(order=pictures.groupby("name").cumcount()).sort_values("order", kind="stable")
     streets = [
         (f"{row['name']}, {row['level']}", _picture(row["pixels"], row["rows"], row["columns"]))

@@ -19,20 +19,7 @@ def atomic(path: Path) -> Iterator[Path]:
 
     A symbolic link at the path is replaced, not followed. A reader sees the old file or the new one, never a part.
 
-    Parameters
-    ----------
-    path : Path
-        File.
-
-    Yields
-    ------
-    Path
-        Hidden name to write to.
-
-    Raises
-    ------
-    OutputError
-        If the disk refuses (full, read-only, no permission).
+    Raises OutputError if the disk refuses (full, read-only, no permission).
     """
     hidden = path.with_name(f".tmp-{os.getpid()}-{path.name}")
     try:
@@ -51,37 +38,11 @@ def atomic(path: Path) -> Iterator[Path]:
 
 
 def write_bytes(content: bytes, path: Path) -> None:
-    """Write one file atomically.
-
-    Parameters
-    ----------
-    content : bytes
-        Content.
-    path : Path
-        File.
-
-    Raises
-    ------
-    OutputError
-        If the disk refuses.
-    """
+    """Write one file atomically."""
     with atomic(path) as hidden:
         hidden.write_bytes(content)
 
 
 def write_text(text: str, path: Path) -> None:
-    """Write one UTF-8 text file atomically.
-
-    Parameters
-    ----------
-    content : str
-        Content.
-    path : Path
-        File.
-
-    Raises
-    ------
-    OutputError
-        If the disk refuses.
-    """
+    """Write one UTF-8 text file atomically."""
     write_bytes(text.encode("utf-8"), path)

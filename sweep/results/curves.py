@@ -29,12 +29,12 @@ SCHEMA = pa.schema(
 """`curve`: its name, the CFA's of a limit, `<design_id> <channel>` of a design. `signal_type`: of a task's spectrum its
 task and class."""
 FilterCurves = dict[str, FloatArray]
-"""Modified channel -> QE, ndarray[n_wavelengths]."""
+"""Modified channel -> QE."""
 
 
 @dataclass(frozen=True)
 class KeptCurves:
-    """Curves of a run, ndarray[n_wavelengths] each.
+    """Curves of a run.
 
     QE of the sensor by name, photons per nm by type and name of the signal, QE of the designs that are drawn and of
     others on the front by `design_id` and channel, of the limit's filter by CFA, spectra of own tasks that are from
@@ -57,7 +57,7 @@ class KeptCurves:
 
     @property
     def bundles(self) -> dict[str, Float[Array, "_curves wavelengths"]]:
-        """Photon spectra of each signal type, ndarray of shape (n_signals, n_wavelengths)."""
+        """Photon spectra of each signal type."""
         types: dict[str, list[FloatArray]] = {}
         for (kind, _), photons in self.lights.items():
             types.setdefault(kind, []).append(photons)
@@ -75,13 +75,7 @@ class KeptCurves:
         yield from ((_COLORANT, name, values, None, None, None) for name, values in self.colorants.items())
 
     def table(self) -> pa.Table:
-        """Return the long table.
-
-        Returns
-        -------
-        pyarrow.Table
-            Table of schema SCHEMA.
-        """
+        """Return the long table."""
         kinds, names, values, types, ids, channels = zip(*self._rows(), strict=True)
         at = np.repeat(np.arange(len(kinds)), self.wavelength_nm.size)
         columns = (
@@ -99,20 +93,7 @@ class KeptCurves:
     def of_table(cls, table: pa.Table) -> KeptCurves:
         """Make the curves from the long table.
 
-        Parameters
-        ----------
-        table : pyarrow.Table
-            Table.
-
-        Returns
-        -------
-        KeptCurves
-            Curves.
-
-        Raises
-        ------
-        ValueError
-            If they are not all on one grid.
+        Raises ValueError if they are not all on one grid.
         """
         table = table.select(SCHEMA.names).cast(SCHEMA)
         wavelength_nm = table["wavelength_nm"].to_numpy()

@@ -32,20 +32,7 @@ _Key = TypeVar("_Key")
 
 
 def row_space(study: Study, row: Mapping[Any, Any]) -> Space:
-    """Return the design space of a row.
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    row : mapping
-        Row of the result table.
-
-    Returns
-    -------
-    Space
-        Space.
-    """
+    """Return the design space of a row."""
     if row["kind"] == "search":
         assert study.search is not None
         return study.search.space
@@ -54,40 +41,14 @@ def row_space(study: Study, row: Mapping[Any, Any]) -> Space:
 
 
 def row_curves(study: Study, row: Mapping[Any, Any]) -> tuple[Space, Any]:
-    """Return the design space and the curves of a row.
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    row : mapping
-        Row of the result table.
-
-    Returns
-    -------
-    space : Space
-        Space.
-    curves : ndarray of shape (1, n_modified, n_wavelengths)
-        QE.
-    """
+    """Return the design space and the curves of a row."""
     space = row_space(study, row)
     point = np.array([[row[name] for name in space.parameters]], dtype=float)
     return space, space.curves(point, study.grid.size)
 
 
 def computed_rows(*tables: pd.DataFrame) -> list[dict[Any, Any]]:
-    """Return the rows of tables, each design once, without those that failed.
-
-    Parameters
-    ----------
-    *tables : pandas.DataFrame
-        Result tables.
-
-    Returns
-    -------
-    list of dict
-        Rows.
-    """
+    """Return the rows of tables, each design once, without those that failed."""
     rows: dict[Any, dict[Any, Any]] = {}
     for table in tables:
         for row in table[table["status"] == "ok"].to_dict("records"):
@@ -96,46 +57,14 @@ def computed_rows(*tables: pd.DataFrame) -> list[dict[Any, Any]]:
 
 
 def named_rows(table: pd.DataFrame) -> list[dict[Any, Any]]:
-    """Return the rows of plain CFAs, named designs and the search's answer, without those that failed.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        Result table.
-
-    Returns
-    -------
-    list of dict
-        Rows.
-    """
+    """Return the rows of plain CFAs, named designs and the search's answer, without those that failed."""
     return computed_rows(table[table["kind"].isin(NAMED_KINDS)])
 
 
 def rows_of_series(
     study: Study, table: pd.DataFrame
 ) -> Iterator[tuple[str, str, dict[str, float], Mapping[Any, Any], Float[Array, "1 modified wavelengths"], Space]]:
-    """Yield each design that was computed in all scenarios of a series.
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    table : pandas.DataFrame
-        Result table.
-
-    Yields
-    ------
-    series, key : str
-        Name of the series, and key in which its scenarios differ.
-    scenarios : dict of str to float
-        Number of each scenario.
-    row : mapping
-        Row of the first scenario.
-    curves : ndarray of shape (1, n_modified, n_wavelengths)
-        QE.
-    space : Space
-        Design space.
-    """
+    """Yield each design that was computed in all scenarios of a series."""
     few = named_rows(table)
     for (series, key), scenarios in series_of(study.scenarios).items():
         by_name: dict[str, dict[str, Mapping[Any, Any]]] = {}
@@ -152,22 +81,7 @@ def rows_of_series(
 def find_design_row(output: Output, key: str) -> Mapping[Any, Any]:
     """Return the row of a run's design by name, design_id or `best`.
 
-    Parameters
-    ----------
-    output : Output
-        Run.
-    key : str
-        Name, filter_id, or `best`.
-
-    Returns
-    -------
-    mapping
-        Row.
-
-    Raises
-    ------
-    SweepError
-        If there is no such design, with the nearest name, or if it failed.
+    Raises SweepError if there is no such design, with the nearest name, or if it failed.
     """
     table = output.table
     named = table[table["name"] == key]
@@ -201,20 +115,8 @@ def find_design_row(output: Output, key: str) -> Mapping[Any, Any]:
 def study_of(output: Output, data: Path | None, *, allow_code: bool = False) -> Study:
     """Make the study of a finished run again.
 
-    Parameters
-    ----------
-    output : Output
-    data : Path or None
-        Folder of the study's files; without it the curves that the run kept are taken.
-    allow_code : bool
-        Code that the run was made with may run, and no other.
-
-    Raises
-    ------
-    OutputError
-        Code is not allowed, or the curves are not those of the run.
-    StudyError
-        The code is another one.
+    `data`: folder of the study's files; without it the curves that the run kept are taken. Raises OutputError: code is
+    not allowed, or the curves are not those of the run. Raises StudyError: the code is another one.
     """
     path, digests = output.folder / RESOLVED, output.provenance.data_sha256
     code = {name: digest for name, digest in digests.items() if is_code(name)}
@@ -240,17 +142,7 @@ def study_of(output: Output, data: Path | None, *, allow_code: bool = False) -> 
 def check_kept(output: Output, kept: Mapping[_Key, PerWavelength], made: Mapping[_Key, PerWavelength]) -> None:
     """Compare curves with those that the run kept.
 
-    Parameters
-    ----------
-    output : Output
-        Run.
-    kept, made : mapping of key to ndarray
-        Curves of the run, and curves to compare.
-
-    Raises
-    ------
-    OutputError
-        If they differ.
+    Raises OutputError if they differ.
     """
 
     def same(one: SameShape, other: SameShape) -> bool:

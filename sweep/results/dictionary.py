@@ -67,20 +67,7 @@ KEYS = tuple(name for names in (*_KEYS, *_VERDICTS) for name in names)
 
 
 def described(schema: pa.Schema, columns: Mapping[str, Column]) -> pa.Schema:
-    """Return a schema whose fields carry `unit` and `meaning`, which pandas reads as `DataFrame.attrs`.
-
-    Parameters
-    ----------
-    schema : pyarrow.Schema
-        Schema.
-    columns : mapping of str to Column
-        Quantities of a study.
-
-    Returns
-    -------
-    pyarrow.Schema
-        Schema with metadata.
-    """
+    """Return a schema whose fields carry `unit` and `meaning`, which pandas reads as `DataFrame.attrs`."""
     meanings = {name: text for names, text in (_KEYS | _VERDICTS).items() for name in names}
     meanings |= {name: column.meaning for name, column in columns.items()}
     units = {name: column.unit for name, column in columns.items()}
@@ -100,10 +87,7 @@ def described(schema: pa.Schema, columns: Mapping[str, Column]) -> pa.Schema:
 def columns_table() -> list[str]:
     """Return a Markdown table of columns, units and meanings.
 
-    Returns
-    -------
-    list of str
-        Lines; `<a>`, `<b>` stand for any two signal types, `<task>` for a task.
+    `<a>`, `<b>` stand for any two signal types, `<task>` for a task.
     """
     types = ("<a>", "<b>")
     rows = [_row(names, "", meaning) for names, meaning in _KEYS.items()]
@@ -199,13 +183,7 @@ FILES = {
 
 
 def files_table() -> list[str]:
-    """Return a Markdown table of files and contents.
-
-    Returns
-    -------
-    list of str
-        Lines.
-    """
+    """Return a Markdown table of files and contents."""
     return ["| file | contents |", "| --- | --- |", *(f"| `{name}` | {what} |" for name, what in FILES.items())]
 
 

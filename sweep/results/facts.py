@@ -160,20 +160,7 @@ class Provenance(_Facts):
 
 
 def missing_keys(kind: type[BaseModel], facts: Mapping[str, Any]) -> list[str]:
-    """Return the keys that facts lack, or have with another type.
-
-    Parameters
-    ----------
-    kind : type
-        Class of facts.
-    facts : mapping
-        Content of a file.
-
-    Returns
-    -------
-    list of str
-        Keys.
-    """
+    """Return the keys that facts lack, or have with another type."""
     try:
         kind.model_validate(facts)
     except ValidationError as error:
@@ -184,24 +171,7 @@ def missing_keys(kind: type[BaseModel], facts: Mapping[str, Any]) -> list[str]:
 def checked_facts(path: Path, kind: type[_Model], facts: Mapping[str, Any]) -> _Model:
     """Convert the facts of a file to an object.
 
-    Parameters
-    ----------
-    path : Path
-        File.
-    kind : type
-        Class of facts.
-    facts : mapping
-        Content of the file.
-
-    Returns
-    -------
-    object
-        Facts.
-
-    Raises
-    ------
-    OutputError
-        If keys are missing, with their names.
+    Raises OutputError if keys are missing, with their names.
     """
     if lacks := missing_keys(kind, facts):
         raise missing_parts_error(path, lacks[:_MOST_SHOWN])
@@ -209,19 +179,6 @@ def checked_facts(path: Path, kind: type[_Model], facts: Mapping[str, Any]) -> _
 
 
 def missing_parts_error(path: Path, names: Sequence[str]) -> OutputError:
-    """Return the error of a file with missing parts.
-
-    Parameters
-    ----------
-    path : Path
-        File.
-    names : sequence of str
-        Missing parts.
-
-    Returns
-    -------
-    OutputError
-        Error.
-    """
+    """Return the error of a file with missing parts."""
     again = "delete it, and `sweep run` of the study makes it again"
     return OutputError(ValidationIssue(f"lacks {', '.join(names)}; {again}", str(path)))

@@ -22,22 +22,7 @@ def run_in(folder: Path) -> Inventory | None:
 
 
 def output_folder(base: Path, facts: Mapping[str, Any]) -> tuple[Path, str | None]:
-    """Return the folder of a run: `base`, or `base-2` and so on if that holds another run or files of others.
-
-    Parameters
-    ----------
-    base : Path
-        Preferred folder.
-    facts : mapping
-        Content of its `run.json`.
-
-    Returns
-    -------
-    folder : Path
-        Folder.
-    note : str or None
-        Difference to the run in `base`.
-    """
+    """Return the folder of a run: `base`, or `base-2` and so on if that holds another run or files of others."""
     note = None
     for number in count(1):
         folder = base if number == 1 else base.with_name(f"{base.name}-{number}")
@@ -56,10 +41,7 @@ def output_folder(base: Path, facts: Mapping[str, Any]) -> tuple[Path, str | Non
 def begin(folder: Path, facts: Mapping[str, Any]) -> Inventory:
     """Write into the folder which run it holds, and return its files.
 
-    Raises
-    ------
-    OutputError
-        If it holds another run, or files of others.
+    Raises OutputError if it holds another run, or files of others.
     """
     inventory = Inventory(folder)
     if inventory.is_of(facts):

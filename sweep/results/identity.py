@@ -16,18 +16,7 @@ CHUNK = 4096
 
 
 def identity(study: Study) -> dict[str, Any]:
-    """Return everything that a run depends on.
-
-    Parameters
-    ----------
-    study : Study
-        Study.
-
-    Returns
-    -------
-    dict
-        Checked study, digests of its curves, and version of the model.
-    """
+    """Return everything that a run depends on."""
     curves, lights = hashlib.sha256(), hashlib.sha256()
     for name, curve in sorted(study.sensor.qe.items()):
         curves.update(name.encode() + curve.tobytes())

@@ -42,15 +42,8 @@ _MISSING, _DAMAGED, _UNLISTED = "is missing", "is damaged", f"is not listed in {
 class Inventory:
     """The files of a run's folder, empty where there is no run.
 
-    Attributes
-    ----------
-    folder : Path
-    facts : dict
-        Contents of `run.json`: `fingerprint` and `identity` of the study, and its number of designs.
-    files : dict of str
-        Name (`figures/chart.png`) -> SHA-256 of the file.
-    damaged : bool
-        `run.json` is there, but not as the run wrote it; `facts` then has the fingerprint of the provenance, if any.
+    `files`: name (`figures/chart.png`) -> SHA-256 of the file; `damaged`: `run.json` is there, but not as the run wrote
+    it; `facts` then has the fingerprint of the provenance, if any.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -127,29 +120,13 @@ class Inventory:
         return PROVENANCE in listed and not self.wrong(listed, quick=True)
 
     def path(self, name: str) -> Path:
-        """Return the path of a file of the run.
-
-        Parameters
-        ----------
-        name : str
-            Name of the file.
-
-        Returns
-        -------
-        Path
-            Path.
-        """
+        """Return the path of a file of the run."""
         return self.folder / name
 
     def wrong(self, names: Iterable[str] | None = None, *, quick: bool = False) -> dict[str, str]:
         """Return the files that differ from those of the run, and their issues.
 
-        Parameters
-        ----------
-        names : iterable of str, optional
-            Files that are looked at; without it those that the list names, and of a finished run those it should.
-        quick : bool
-            Only say which are missing.
+        `names`: files that are looked at; without it those that the list names, and of a finished run those it should.
         """
         issues = dict.fromkeys(self.unlisted() if names is None else (), _UNLISTED)
         if names is None and self._lines > len(self.files):
@@ -168,13 +145,7 @@ class Inventory:
         return issues
 
     def unlisted(self) -> list[str]:
-        """Return the files of a finished run that a damaged list does not name; provenance is written last.
-
-        Returns
-        -------
-        list of str
-            Names.
-        """
+        """Return the files of a finished run that a damaged list does not name; provenance is written last."""
         finished = os.path.lexists(self.path(PROVENANCE))
         return [name for name in self._present() if finished and _is_listed(name) and name not in self.files]
 
@@ -189,28 +160,14 @@ class Inventory:
     def require(self, names: Iterable[str]) -> None:
         """Check that files are as the run wrote them, but for those that damaged lists cannot vouch for.
 
-        Parameters
-        ----------
-        names : iterable of str
-            Names of files.
-
-        Raises
-        ------
-        OutputError
-            If a file is missing or damaged, with its name.
+        Raises OutputError if a file is missing or damaged, with its name.
         """
         unverified = self.unverified
         if wrong := self.wrong([name for name in names if name not in unverified]):
             raise OutputError(issues_of(self.folder, wrong))
 
     def foreign_files(self) -> list[str]:
-        """Return the files of others under names that the run's commands give; none in the folder of a run.
-
-        Returns
-        -------
-        list of str
-            Names.
-        """
+        """Return the files of others under names that the run's commands give; none in the folder of a run."""
         if self.facts or self.damaged:
             return []
         return [name for name in self._present() if is_of_run(name) or name == SUMS]
@@ -218,15 +175,7 @@ class Inventory:
     def begin(self, facts: Mapping[str, Any]) -> None:
         """Write which study the folder is of.
 
-        Parameters
-        ----------
-        facts : mapping
-            Content of `run.json`.
-
-        Raises
-        ------
-        OutputError
-            If files of others are there, or the disk refuses.
+        Raises OutputError if files of others are there, or the disk refuses.
         """
         for name in self.foreign_files():
             raise OutputError(ValidationIssue("file not created by sweep; move it", str(self.folder / name)))
@@ -234,18 +183,7 @@ class Inventory:
         self.write({RUN: json_of(self.facts).encode("utf-8")})
 
     def write(self, contents: Mapping[str, bytes]) -> None:
-        """Write files of the run and list them.
-
-        Parameters
-        ----------
-        contents : mapping of str to bytes
-            Content by name.
-
-        Raises
-        ------
-        OutputError
-            If the disk refuses.
-        """
+        """Write files of the run and list them."""
         for name, content in contents.items():
             if self._linked(name):
                 raise OutputError(ValidationIssue("file not created by sweep; move it", str(self.folder / FIGURES)))
@@ -257,52 +195,17 @@ class Inventory:
         self._save()
 
     def write_table(self, name: str, table: pa.Table) -> None:
-        """Write a table of the run and list it.
-
-        Parameters
-        ----------
-        name : str
-            Name of the file.
-        table : pyarrow.Table
-            Table.
-
-        Raises
-        ------
-        OutputError
-            If the disk refuses.
-        """
+        """Write a table of the run and list it."""
         write_table(table, self.path(name))
         self.list_file(name)
 
     def list_file(self, name: str) -> None:
-        """List a file that was written.
-
-        Parameters
-        ----------
-        name : str
-            Name of the file.
-
-        Raises
-        ------
-        OutputError
-            If the disk refuses.
-        """
+        """List a file that was written."""
         self.files[name] = digest_of(self.path(name))
         self._save()
 
     def remove(self, names: Iterable[str]) -> None:
-        """Remove files of the run and their entries.
-
-        Parameters
-        ----------
-        names : iterable of str
-            Names of files.
-
-        Raises
-        ------
-        OutputError
-            If the disk refuses.
-        """
+        """Remove files of the run and their entries."""
         gone = [name for name in names if name in self.files or os.path.lexists(self.path(name))]
         for name in gone:
             path = self.path(name)
@@ -334,20 +237,7 @@ class Inventory:
 
 
 def issues_of(folder: Path, wrong: Mapping[str, str]) -> list[ValidationIssue]:
-    """Return a line for each file that is not as the run wrote it.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder.
-    wrong : mapping of str to str
-        Problem by name.
-
-    Returns
-    -------
-    list of Fault
-        Lines.
-    """
+    """Return a line for each file that is not as the run wrote it."""
     return [
         ValidationIssue(f"{what}; `sweep run` of its study makes it again", str(folder / n))
         for n, what in wrong.items()

@@ -35,20 +35,7 @@ def locked(output: Path) -> Iterator[None]:
     The system releases the lock with its process; where it cannot, the next command on the same host does. Hidden files
     of killed commands and workers are removed.
 
-    Parameters
-    ----------
-    output : Path
-        Output folder.
-
-    Yields
-    ------
-    None
-        The folder is locked.
-
-    Raises
-    ------
-    OutputError
-        If it is in use or cannot be written.
+    Raises OutputError if it is in use or cannot be written.
     """
     try:
         output.mkdir(parents=True, exist_ok=True)
@@ -93,18 +80,7 @@ def _is_lock(path: Path) -> bool:
 
 
 def in_use(output: Path) -> bool:
-    """Return whether a command holds the folder.
-
-    Parameters
-    ----------
-    output : Path
-        Output folder.
-
-    Returns
-    -------
-    bool
-        True if it is in use.
-    """
+    """Return whether a command holds the folder."""
     if not (output / LOCK).is_file() and not (output / OWNER).is_file():
         return False
     try:

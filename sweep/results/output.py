@@ -90,20 +90,7 @@ class Output:
     _made: dict[object, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def cached(self, key: object, make: Callable[[], _Made]) -> _Made:
-        """Return a value that several parts of a report share, computed at its first use.
-
-        Parameters
-        ----------
-        key : object
-            Name.
-        make : callable
-            Computes the value.
-
-        Returns
-        -------
-        object
-            Value.
-        """
+        """Return a value that several parts of a report share, computed at its first use."""
         if key not in self._made:
             self._made[key] = make()
         made: _Made = self._made[key]
@@ -173,18 +160,7 @@ class Output:
         return list(self.study.scenarios)
 
     def words(self, column: str) -> str:
-        """Return a column's name in texts.
-
-        Parameters
-        ----------
-        column : str
-            Column name.
-
-        Returns
-        -------
-        str
-            Text.
-        """
+        """Return a column's name in texts."""
         return self.columns[column].words if column in self.columns else column
 
     @property
@@ -209,34 +185,12 @@ class Output:
         )
 
     def mosaic(self, cfa: str) -> Mosaic:
-        """Return the mosaic of a CFA.
-
-        Parameters
-        ----------
-        cfa : str
-            Name of a CFA.
-
-        Returns
-        -------
-        Mosaic
-            Mosaic.
-        """
+        """Return the mosaic of a CFA."""
         tile = self.study.cfas[cfa].tile
         return Mosaic.from_name(cfa) if tile is None else Mosaic.from_rows(cfa, tile)
 
     def kind(self, *kinds: str) -> pd.DataFrame:
-        """Return the rows of some kinds.
-
-        Parameters
-        ----------
-        *kinds : str
-            Kinds, see `tables.REFERENCE`.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Rows.
-        """
+        """Return the rows of some kinds."""
         return self.table[self.table["kind"].isin(kinds)]
 
     @cached_property
@@ -253,16 +207,7 @@ class Output:
 def read_output(folder: Path, *, audited: bool = True) -> Output:
     """Read a finished run.
 
-    Parameters
-    ----------
-    folder : Path
-    audited : bool
-        Read the rows of `sweep audit`, too, where there are some.
-
-    Raises
-    ------
-    OutputError
-        Files, which it names, are missing or not as the run wrote them.
+    Raises OutputError: files, which it names, are missing or not as the run wrote them.
     """
     inventory = Inventory(folder)
     inventory.require_run()

@@ -31,19 +31,7 @@ def _digest(key: str, content: bytes) -> str:
 
 
 def write_part(folder: Path, key: str, kind: str, content: bytes) -> str:
-    """Write a part and return its name; raises OutputError when the disk refuses.
-
-    Parameters
-    ----------
-    folder : Path
-        That of the parts.
-    key : str
-        SHA-256 of everything that the work depends on.
-    kind : {'parquet', 'json'}
-        What it holds.
-    content : bytes
-        The file.
-    """
+    """Write a part and return its name; raises OutputError when the disk refuses."""
     name = f"{key[:_DIGITS]}-{_digest(key, content)}.{kind}"
     write_bytes(content, folder / name)
     return name
@@ -52,15 +40,7 @@ def write_part(folder: Path, key: str, kind: str, content: bytes) -> str:
 class Parts:
     """Part files in the folder of a run.
 
-    Parameters
-    ----------
-    output : Path
-        Output folder.
-
-    Raises
-    ------
-    OutputError
-        If something else has the name of the folder of parts.
+    Raises OutputError if something else has the name of the folder of parts.
     """
 
     def __init__(self, output: Path) -> None:
@@ -75,62 +55,22 @@ class Parts:
         return key[:_DIGITS] in self._names
 
     def add(self, name: str) -> None:
-        """Register a part that was written; other names are ignored.
-
-        Parameters
-        ----------
-        name : str
-            Name of the file.
-        """
+        """Register a part that was written; other names are ignored."""
         if named := _NAME.fullmatch(name):
             self._names[named.group(1)] = name
 
     def save(self, key: str, kind: str, content: bytes) -> None:
-        """Write a part.
-
-        Parameters
-        ----------
-        key : str
-            SHA-256 of everything that the work depends on.
-        kind : {'parquet', 'json'}
-            Content.
-        content : bytes
-            File.
-
-        Raises
-        ------
-        OutputError
-            If the disk refuses.
-        """
+        """Write a part."""
         self.add(write_part(self.folder, key, kind, content))
 
     def paths(self, kind: str) -> list[Path]:
-        """Return the files of a kind.
-
-        Parameters
-        ----------
-        kind : {'parquet', 'json'}
-            Content.
-
-        Returns
-        -------
-        list of Path
-            Files.
-        """
+        """Return the files of a kind."""
         return [self.folder / name for name in self._names.values() if name.endswith(f".{kind}")]
 
     def read(self, key: str) -> bytes | None:
         """Return the content of a part.
 
-        Parameters
-        ----------
-        key : str
-            SHA-256 of everything that the work depends on.
-
-        Returns
-        -------
-        bytes or None
-            None, and the part is removed, if it is missing or damaged.
+        None, and the part is removed, if it is missing or damaged.
         """
         name = self._names.get(key[:_DIGITS])
         if name is None:
@@ -143,13 +83,7 @@ class Parts:
         return None
 
     def forget(self, key: str) -> None:
-        """Remove a part, so that its work is done again.
-
-        Parameters
-        ----------
-        key : str
-            SHA-256 of everything that the work depends on.
-        """
+        """Remove a part, so that its work is done again."""
         name = self._names.pop(key[:_DIGITS], None)
         if name is not None:
             with suppress(OSError):

@@ -16,20 +16,7 @@ from jaxtyping import AbstractArray
 def to_json(value: object) -> bytes:
     """Convert dataclasses, arrays, sequences, mappings and plain values to JSON.
 
-    Parameters
-    ----------
-    value : object
-        The value.
-
-    Returns
-    -------
-    bytes
-        JSON text.
-
-    Raises
-    ------
-    TypeError
-        If the value, or a part of it, has no JSON form.
+    Raises TypeError if the value, or a part of it, has no JSON form.
     """
     return json.dumps(value, default=_plain).encode("utf-8")
 
@@ -37,22 +24,7 @@ def to_json(value: object) -> bytes:
 def from_json(kind: Any, content: bytes) -> Any:
     """Convert JSON back to the value that `to_json` was given.
 
-    Parameters
-    ----------
-    kind : type
-        Type of the value.
-    content : bytes
-        JSON text.
-
-    Returns
-    -------
-    value
-        Of the type `kind`.
-
-    Raises
-    ------
-    ValueError
-        If the text is no such value.
+    Raises ValueError if the text is no such value.
     """
     try:
         return _made(kind, json.loads(content))

@@ -90,50 +90,17 @@ _LEAST_GROUP = ROW_GROUP // 4
 
 
 def is_drawn(name: str) -> bool:
-    """Return whether a file belongs to the report.
-
-    Parameters
-    ----------
-    name : str
-        Name of a file.
-
-    Returns
-    -------
-    bool
-        True if it does.
-    """
+    """Return whether a file belongs to the report."""
     return _DRAWN.fullmatch(name) is not None
 
 
 def is_of_run(name: str) -> bool:
-    """Return whether a name is one that commands give to files of a run, beside its two lists.
-
-    Parameters
-    ----------
-    name : str
-        Name of a file.
-
-    Returns
-    -------
-    bool
-        True if it is.
-    """
+    """Return whether a name is one that commands give to files of a run, beside its two lists."""
     return name in MADE_BY_RUN or name == AUDIT or is_drawn(name)
 
 
 def result_schema(parameters: Sequence[str], quantities: Sequence[str]) -> pa.Schema:
-    """Return the columns of the result table.
-
-    Parameters
-    ----------
-    parameters, quantities : sequence of str
-        Column names.
-
-    Returns
-    -------
-    pyarrow.Schema
-        Keys, parameters, quantities, feasibility and status.
-    """
+    """Return the columns of the result table."""
     number = pa.float64()
     fields = list(_KEYS) + [pa.field(name, number) for name in (*parameters, *quantities)] + list(_VERDICTS)
     return pa.schema(fields, metadata={"cfa_sweep_schema": SCHEMA_VERSION, _PARAMETERS: json.dumps(list(parameters))})
@@ -143,16 +110,6 @@ def search_schema(parameters: Sequence[str]) -> pa.Schema:
     """Return the columns of the search's log: one row per evaluation of the smooth response.
 
     `sensitivity_min` is the level of the front that the evaluation belongs to; null in the search itself.
-
-    Parameters
-    ----------
-    parameters : sequence of str
-        Column names.
-
-    Returns
-    -------
-    pyarrow.Schema
-        Schema.
     """
     text, number = pa.dictionary(pa.int32(), pa.string()), pa.float64()
     fields = [pa.field("scenario", text), pa.field("sensitivity_min", number)]
@@ -166,16 +123,6 @@ def front_schema(parameters: Sequence[str]) -> pa.Schema:
     """Return the columns of the trade-off of the search: one row per level of sensitivity.
 
     `cfa_sensitivity_min` is the same level for the whole CFA; null if several channels are modified.
-
-    Parameters
-    ----------
-    parameters : sequence of str
-        Column names.
-
-    Returns
-    -------
-    pyarrow.Schema
-        Schema.
     """
     number = pa.float64()
     names = ("sensitivity_min", "cfa_sensitivity_min", "objective", "sensitivity", "cfa_sensitivity", "limit", "gap")
@@ -184,20 +131,7 @@ def front_schema(parameters: Sequence[str]) -> pa.Schema:
 
 
 def write_table(table: pa.Table, path: Path) -> None:
-    """Write one Parquet file atomically, with a checksum of each page.
-
-    Parameters
-    ----------
-    table : pyarrow.Table
-        Table.
-    path : Path
-        File.
-
-    Raises
-    ------
-    OutputError
-        If the disk refuses.
-    """
+    """Write one Parquet file atomically, with a checksum of each page."""
     write_tables([table], table.schema, path)
 
 
@@ -205,20 +139,6 @@ def write_tables(tables: Iterable[pa.Table], schema: pa.Schema, path: Path) -> N
     """Write tables of one schema to one Parquet file as they come.
 
     A row group has at most `ROW_GROUP` rows; short tables are joined. One row group and one table are in memory.
-
-    Parameters
-    ----------
-    tables : iterable of pyarrow.Table
-        Tables.
-    schema : pyarrow.Schema
-        Schema.
-    path : Path
-        File.
-
-    Raises
-    ------
-    OutputError
-        If the disk refuses.
     """
     waiting: list[pa.Table] = []
     with atomic(path) as hidden, pq.ParquetWriter(hidden, schema, **_how(schema)) as writer:
@@ -236,68 +156,22 @@ def write_tables(tables: Iterable[pa.Table], schema: pa.Schema, path: Path) -> N
 
 
 def write_csv(table: pd.DataFrame, path: Path) -> None:
-    """Write one CSV file with every digit, atomically.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        Table.
-    path : Path
-        File.
-
-    Raises
-    ------
-    OutputError
-        If the disk refuses.
-    """
+    """Write one CSV file with every digit, atomically."""
     write_text(csv_of(table), path)
 
 
 def csv_of(table: pd.DataFrame) -> str:
-    """Return a table as CSV with every digit, whatever NumPy's print options are.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        Table.
-
-    Returns
-    -------
-    str
-        CSV.
-    """
+    """Return a table as CSV with every digit, whatever NumPy's print options are."""
     return table.to_csv(index=False, float_format=lambda value: repr(float(value)))  # type: ignore[arg-type]
 
 
 def json_of(data: Mapping[str, Any]) -> str:
-    """Return a mapping as JSON with sorted keys.
-
-    Parameters
-    ----------
-    data : mapping
-        Content.
-
-    Returns
-    -------
-    str
-        JSON.
-    """
+    """Return a mapping as JSON with sorted keys."""
     return json.dumps(data, indent=2, sort_keys=True, allow_nan=False) + "\n"
 
 
 def encoded(table: pa.Table) -> bytes:
-    """Return a table as the bytes of a Parquet file.
-
-    Parameters
-    ----------
-    table : pyarrow.Table
-        Table.
-
-    Returns
-    -------
-    bytes
-        File.
-    """
+    """Return a table as the bytes of a Parquet file."""
     sink = pa.BufferOutputStream()
     pq.write_table(table, sink, **_how(table.schema))
     return bytes(sink.getvalue().to_pybytes())
@@ -308,19 +182,7 @@ def decoded(content: bytes, schema: pa.Schema, rows: int) -> pa.Table | None:
 
     Size and schema are checked before rows are read, so that no more memory is taken than they need.
 
-    Parameters
-    ----------
-    content : bytes
-        File.
-    schema : pyarrow.Schema
-        Expected schema.
-    rows : int
-        Expected rows.
-
-    Returns
-    -------
-    pyarrow.Table or None
-        None if there is no such table.
+    None if there is no such table.
     """
     try:
         file = pq.ParquetFile(pa.BufferReader(content), page_checksum_verification=True)
@@ -346,22 +208,7 @@ def _how(schema: pa.Schema) -> dict[str, Any]:
 def batches(path: Path, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
     """Yield a Parquet file one row group at a time.
 
-    Parameters
-    ----------
-    path : Path
-        File.
-    columns : sequence of str, optional
-        Columns; left out, all of them.
-
-    Yields
-    ------
-    pyarrow.Table
-        Rows.
-
-    Raises
-    ------
-    OutputError
-        If the file is missing or damaged.
+    `columns`: columns; left out, all of them. Raises OutputError if the file is missing or damaged.
     """
     try:
         # Buffered ahead, a whole file would be in memory.
@@ -375,15 +222,7 @@ def batches(path: Path, columns: Sequence[str] | None = None) -> Iterator[pa.Tab
 def rows_in(path: Path) -> int:
     """Return the number of rows of a Parquet file.
 
-    Parameters
-    ----------
-    path : Path
-        File.
-
-    Returns
-    -------
-    int
-        0 if the file is missing or damaged.
+    0 if the file is missing or damaged.
     """
     try:
         return int(pq.read_metadata(path).num_rows)
@@ -392,42 +231,14 @@ def rows_in(path: Path) -> int:
 
 
 def word_mask(table: pa.Table, column: str, *words: str) -> Bool[BoolArray, " rows"]:
-    """Return where a dictionary-encoded column holds one of some words.
-
-    Parameters
-    ----------
-    table : pyarrow.Table
-        Table.
-    column : str
-        Column name.
-    *words : str
-        Words.
-
-    Returns
-    -------
-    ndarray of bool, shape (n_rows,)
-        True where it does.
-    """
+    """Return where a dictionary-encoded column holds one of some words."""
     return np.asarray(pc.is_in(table[column].cast(pa.string()), pa.array(words)).to_numpy(), dtype=bool)
 
 
 def read_table(path: Path) -> pa.Table:
     """Read a Parquet file.
 
-    Parameters
-    ----------
-    path : Path
-        File.
-
-    Returns
-    -------
-    pyarrow.Table
-        Table.
-
-    Raises
-    ------
-    OutputError
-        If it is missing or damaged.
+    Raises OutputError if it is missing or damaged.
     """
     try:
         return pq.read_table(path, page_checksum_verification=True)

@@ -52,32 +52,14 @@ class Counts:
     def feasible(self, scenario: str | None = None, cfa: str | None = None, *, met: bool = True) -> int:
         """Return the number of designs that meet all constraints.
 
-        Parameters
-        ----------
-        scenario, cfa : str, optional
-            Names; left out, all of them.
-        met : bool
-            False: those that do not.
-
-        Returns
-        -------
-        int
-            Number.
+        `scenario`, `cfa`: names; left out, all of them; `met`: False: those that do not.
         """
         return sum(n for _, n in self._designs(scenario, cfa, met))
 
     def front(self, scenario: str | None = None, cfa: str | None = None) -> int:
         """Return the number of feasible designs on the Pareto front.
 
-        Parameters
-        ----------
-        scenario, cfa : str, optional
-            Names; left out, all of them.
-
-        Returns
-        -------
-        int
-            Number.
+        `scenario`, `cfa`: names; left out, all of them.
         """
         return sum(n for pareto, n in self._designs(scenario, cfa, met=True) if pareto)
 
@@ -89,33 +71,14 @@ class Counts:
 
 
 def per_exposure(separation: str) -> str:
-    """Return the name of the column of separation per millisecond of exposure.
-
-    Parameters
-    ----------
-    separation : str
-        Column of a separation.
-
-    Returns
-    -------
-    str
-        Name.
-    """
+    """Return the name of the column of separation per millisecond of exposure."""
     return f"{separation}_per_ms"
 
 
 def even(size: int, most: int) -> Int[IndexArray, " numbers"]:
     """Return evenly spread indices that are not in step with a grid.
 
-    Parameters
-    ----------
-    size, most : int
-        Number of all indices, and of those returned at most.
-
-    Returns
-    -------
-    ndarray of int
-        Indices in order.
+    `size`, `most`: number of all indices, and of those returned at most.
     """
     if size <= most:
         return np.arange(size)
@@ -128,16 +91,6 @@ def swept_points(path: Path) -> DesignNumbers:
 
     The feasible front of each CFA and scenario, and an even sample of the others. A design's id is its row number, so
     that a long table takes one byte per row.
-
-    Parameters
-    ----------
-    path : Path
-        File.
-
-    Returns
-    -------
-    ndarray of int
-        Design ids in order.
     """
     parts = [np.zeros(0, dtype=np.uint8)]
     for table in batches(path, ["kind", "feasible", "pareto", "status"]):
@@ -164,20 +117,7 @@ def thinned(
     A long table keeps all rows that are no sweep, the whole Pareto front, the best feasible designs of each CFA in each
     scenario, those with most of `separation`, and most of it for their exposure, in each scenario, and every n-th.
 
-    Parameters
-    ----------
-    path : Path
-    order : sequence of str
-        Columns that say which design is best, all maximized.
-    separation : str
-        A column, DN.
-    keep : ndarray[n_kept]
-        Ids of further designs to keep.
-
-    Raises
-    ------
-    OutputError
-        The file is missing or damaged.
+    `separation`: a column, DN. Raises OutputError: the file is missing or damaged.
     """
     try:
         total = int(pq.read_metadata(path).num_rows)
@@ -208,18 +148,7 @@ def thinned(
 
 
 def row_groups(table: pa.Table) -> dict[tuple[str, str], Int[IndexArray, " _rows"]]:
-    """Return the rows of each CFA and scenario.
-
-    Parameters
-    ----------
-    table : pyarrow.Table
-        Table.
-
-    Returns
-    -------
-    dict of (str, str) to ndarray of int
-        Indices.
-    """
+    """Return the rows of each CFA and scenario."""
     cfas, scenarios = (
         {name: word_mask(table, column, name) for name in table[column].unique().to_pylist()}
         for column in ("cfa", "scenario")
@@ -231,18 +160,7 @@ def row_groups(table: pa.Table) -> dict[tuple[str, str], Int[IndexArray, " _rows
 def best_at(
     table: pa.Table, order: Sequence[str], most: int, among: Bool[BoolArray, " rows"]
 ) -> Int[IndexArray, " kept"]:
-    """Return the indices of the best rows, best first; of equal ones the smallest `design_id` is first.
-
-    Parameters
-    ----------
-    table : pyarrow.Table
-    order : sequence of str
-        Columns that are maximized.
-    most : int
-        Number of rows.
-    among : ndarray[n_rows]
-        Rows that take part.
-    """
+    """Return the indices of the best rows, best first; of equal ones the smallest `design_id` is first."""
     at = np.flatnonzero(among)
     if len(at) > most:
         first = np.nan_to_num(table[order[0]].to_numpy()[at], nan=-np.inf, posinf=np.inf, neginf=-np.inf)
@@ -257,13 +175,8 @@ def leading_rows(
 ) -> Int[IndexArray, " kept"]:
     """Return the rows with the largest separation, and the largest per exposure time, in each scenario.
 
-    Parameters
-    ----------
-    table : pyarrow.Table
-    separation : str
-        A column, DN. Of equal rows the one with the smallest `design_id` counts.
-    among : ndarray[n_rows], optional
-        Rows that take part; all without it.
+    `separation`: a column, DN. Of equal rows the one with the smallest `design_id` counts; `among`: rows that take
+    part; all without it.
     """
     among = np.ones(table.num_rows, dtype=bool) if among is None else among
     csd, ids = table[separation].to_numpy(), table["design_id"].to_numpy()

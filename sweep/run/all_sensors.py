@@ -36,19 +36,7 @@ def all_sensors_table(
     `judged` (whether it was not designed on this one), objective and sensitivities there before clipping and rounding,
     the `violation` of the constraints, and `own_best`, the objective of the best filter found for this one alone.
 
-    Parameters
-    ----------
-    studies : sequence of (SensorAndLights, Study)
-        Studies of the members, each with a search.
-    parallel : callable
-        Runs calls on the cores.
-    progress : callable
-        Called with a phase, work done and work in total.
-
-    Returns
-    -------
-    pyarrow.Table or None
-        Table, for each space that is searched on two sensors or more; None if there is none.
+    None if there is none.
     """
     by_space: dict[str, list[tuple[SensorAndLights, Problem, Search]]] = {}
     for member, study in studies:

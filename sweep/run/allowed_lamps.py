@@ -40,22 +40,6 @@ def regions_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
 
     One row per design, norm, peak of the yellow and peak of the red LED. `pairs` counts allowed pairs of widths,
     `separated` those with at least the wanted CSD; `least_dn` is the smallest CSD, with the widths of both LEDs.
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    rows : pandas.DataFrame
-        Rows of plain CFAs, named designs and the answer.
-    parallel : callable
-        Runs calls on the cores.
-    progress : callable
-        Called with a phase, work done and work in total.
-
-    Returns
-    -------
-    pyarrow.Table
-        Table.
     """
     regions = study.section.regions
     assert regions is not None
@@ -98,7 +82,7 @@ def _cells(
 
 
 def _read(setup: Setup, curves: DesignCurves, leds: SingleLeds) -> Float[Array, "phases _lights channels"]:
-    """Return DN of LEDs with the photons of the study's lights, ndarray of shape (n_phases, n_leds, n_channels)."""
+    """Return DN of LEDs with the photons of the study's lights."""
     photons, parts = leds.photons(setup.camera.grid), []
     for start in range(0, len(photons), _TOGETHER):
         part = photons[start : start + _TOGETHER]
@@ -111,12 +95,6 @@ def _read(setup: Setup, curves: DesignCurves, leds: SingleLeds) -> Float[Array, 
 def least_csd(
     first: Float[Array, "phases first channels"], second: Float[Array, "phases second channels"]
 ) -> Float[Array, "first second"]:
-    """Return the smallest CSD over all phases of each two lights, DN, ndarray[n_first, n_second].
-
-    Parameters
-    ----------
-    first, second : ndarray[n_phases, n_lights, n_channels]
-        DN.
-    """
+    """Return the smallest CSD over all phases of each two lights, DN."""
     csd = [np.linalg.norm(a[:, None] - b[None], axis=2) for a, b in zip(first, second, strict=True)]
     return np.asarray(np.min(csd, axis=0), dtype=float)

@@ -29,18 +29,7 @@ class CachedCalls:
     _limits: list[str] = field(default_factory=list)
 
     def __call__(self, calls: Iterable[Call]) -> Iterator[Any]:
-        """Yield the answers of calls in order.
-
-        Parameters
-        ----------
-        calls : iterable of Call
-            Calls.
-
-        Yields
-        ------
-        object
-            Answers.
-        """
+        """Yield the answers of calls in order."""
         self._round += 1
         waiting = list(calls)
         keys = [

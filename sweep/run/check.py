@@ -38,18 +38,8 @@ Row = Mapping[str, Any]
 def compared_rows(study: Study, rows: Sequence[Row]) -> Iterator[list[dict[str, Any]]]:
     """Compare rows of the result table with the reference, one block of designs of a space and scene at a time.
 
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    rows : sequence of mapping
-        Rows.
-
-    Yields
-    ------
-    list of dict
-        `design_id`, `filter_id`, `scenario`, `plan`, `allowed_dn`, `realized_dn` (largest difference of any
-        CSD, infinite if only one is a number), and its `quantity`.
+    Returns `design_id`, `filter_id`, `scenario`, `plan`, `allowed_dn`, `realized_dn` (largest difference of any CSD,
+    infinite if only one is a number), and its `quantity`.
     """
     groups: dict[tuple[int, str], tuple[Space, list[Row]]] = {}
     for row in rows:
@@ -101,23 +91,7 @@ def _allowed_dn(setup: Setup, tolerance_dn: float) -> float:
 def check_run(study: Study, results: Path, seconds: float, pool: Workers) -> tuple[CheckFacts | None, list[str]]:
     """Compare a seeded sample of a run's rows with the reference within a time, at least one row.
 
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    results : Path
-        Result table.
-    seconds : float
-        Time, s; each worker takes a part of it.
-    pool : Workers
-        Workers.
-
-    Returns
-    -------
-    check : CheckFacts or None
-        None if no row could be compared.
-    warnings : list of str
-        One for each row that could not.
+    `seconds`: time, s; each worker takes a part of it. Returns `check`: None if no row could be compared.
     """
     sample = _sampled(study, results)
     parts = [sample[at :: pool.count] for at in range(pool.count)]

@@ -15,22 +15,7 @@ from ..vision.street import street_shape
 
 
 def coco(labels: pd.DataFrame, vision: Vision, tile: tuple[int, ...]) -> dict[str, Any]:
-    """Return images, boxes around housings, cut at the image, and categories, which are states.
-
-    Parameters
-    ----------
-    labels : pandas.DataFrame
-        Rows of a manifest, of single heads or of streets.
-    vision : Vision
-        Benchmark.
-    tile : tuple of int
-        Rows and columns of the tile.
-
-    Returns
-    -------
-    dict
-        Content of a JSON file.
-    """
+    """Return images, boxes around housings, cut at the image, and categories, which are states."""
     states = states_of(vision)
     is_street = "head_x_px" in labels
     rows, columns = street_shape(vision, tile) if is_street else (vision.crop_px, vision.crop_px)

@@ -47,17 +47,7 @@ def _chart_of(tasks: StudyTasks) -> tuple[tuple[str, ...], Chart]:
 def error_against_noise_table(study: Study, highlights: pd.DataFrame) -> pa.Table:
     """Compute color error against noise.
 
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    highlights : pandas.DataFrame
-        Rows of plain CFAs, named designs and the answer.
-
-    Returns
-    -------
-    pyarrow.Table
-        One row per design, light and regularization of the color matrix.
+    Returns one row per design, light and regularization of the color matrix.
     """
     from ..metrics.tasks.evaluation import REGULARIZATIONS, error_against_noise  # noqa: PLC0415  (few studies have tasks)
 
@@ -76,17 +66,7 @@ def error_against_noise_table(study: Study, highlights: pd.DataFrame) -> pa.Tabl
 def rendered_table(study: Study, highlights: pd.DataFrame) -> pa.Table:
     """Compute the areas of two pictures: the chart in daylight, and a night scene under white LEDs.
 
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    highlights : pandas.DataFrame
-        Rows of plain CFAs, named designs and the answer.
-
-    Returns
-    -------
-    pyarrow.Table
-        One row per design, picture and area; those of the eye itself have no design.
+    Returns one row per design, picture and area.
     """
     from ..metrics.tasks.evaluation import rendered_areas  # noqa: PLC0415
     from ..spectra.builtin.task_sets import NIGHT_LIGHT, NIGHT_LX, night_scene  # noqa: PLC0415  (few studies have tasks)

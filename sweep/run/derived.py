@@ -53,27 +53,7 @@ _POINTS = pa.schema(
 
 @dataclass(frozen=True)
 class DerivedInput:
-    """Input of the derived tables.
-
-    Parameters
-    ----------
-    study : Study
-        Study.
-    rows, on_front : pandas.DataFrame
-        Rows to draw, and rows on the front.
-    details : mapping of int to Details
-        Details by row id.
-    points : ndarray of int
-        Swept designs that figures show as points.
-    limit : callable
-        Upper bound of the search.
-    parallel : callable
-        Runs calls on the cores.
-    kept : callable
-        Calls whose results are kept as parts under a name.
-    progress : callable
-        Progress.
-    """
+    """Input of the derived tables."""
 
     study: Study
     rows: pd.DataFrame
@@ -99,18 +79,7 @@ class DerivedInput:
 
 
 def row_tables(study: Study) -> dict[str, Callable[[DerivedInput], pa.Table]]:
-    """Return the derived tables of a study.
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-
-    Returns
-    -------
-    dict of str to callable
-        Function of each table, by file name, in the order of their computation.
-    """
+    """Return the derived tables of a study."""
     tasks = study.tasks
     tables: dict[str, Callable[[DerivedInput], pa.Table]] = {
         CURVES: _curves_table,

@@ -44,20 +44,12 @@ _HEIGHTS = 41
 _MOST_VALUES = 2_000_000
 """Digital numbers that are held at once."""
 _Design = tuple[int, FloatArray]
-"""A design's id, and its curves, ndarray[1, n_modified, n_wavelengths]."""
+"""A design's id, and its curves."""
 
 
 @dataclass(frozen=True)
 class Details:
-    """Details of one design.
-
-    Parameters
-    ----------
-    limited_by : mapping of pair to str
-        Two lights that limit each separation.
-    dn : ndarray of shape (n_signals, n_channels)
-        Digital numbers at the first sampling phase.
-    """
+    """Details of one design."""
 
     limited_by: Mapping[Pair, str | None] | None = None
     dn: Float[Array, "signals channels"] | None = None
@@ -71,28 +63,7 @@ def design_details(
     parallel: Parallel,
     progress: Progress,
 ) -> dict[int, Details]:
-    """Compute the details of drawn rows and of the front.
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    tables : collection of str
-        Tables that are made from them.
-    rows : pandas.DataFrame
-        Rows of plain CFAs, named designs and the answer.
-    on_front : pandas.DataFrame
-        Rows on the front.
-    parallel : callable
-        Runs calls on the cores.
-    progress : callable
-        Called with a phase, work done and work in total.
-
-    Returns
-    -------
-    dict of int to Details
-        Details by row id.
-    """
+    """Compute the details of drawn rows and of the front."""
     first, front = next(iter(study.scenarios)), {*on_front["design_id"]}
     groups: dict[tuple[str, ...], tuple[Setup, list[_Design]]] = {}
     for row in computed_rows(rows, on_front):
@@ -132,23 +103,7 @@ def limited_by_table(
     parallel: Parallel,
     progress: Progress,
 ) -> pa.Table:
-    """Return the columns `design_id` and `limited_by_<a>_<b>`, the names of two lights, of the designs that are shown.
-
-    Parameters
-    ----------
-    study : Study
-    details : mapping of int to Details
-        Details of some designs by their ids.
-    points : ndarray[n_points]
-        Ids of the swept designs that figures show as points.
-    parallel, progress : callable
-        Runner of calls, and what is called with their progress.
-
-    Returns
-    -------
-    pyarrow.Table
-        In the order of the ids.
-    """
+    """Return `design_id` and `limited_by_<a>_<b>`, the names of two lights, of the designs that are shown."""
     names = {at: detail.limited_by for at, detail in details.items() if detail.limited_by is not None}
     ids = points[~np.isin(points, list(names))]
     ends = np.cumsum([space.size for space in study.spaces])
@@ -190,21 +145,7 @@ def sensor_map_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progr
 
     For a pulsed light, the smallest over its moments.
 
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    rows : pandas.DataFrame
-        Rows of plain CFAs, named designs and the answer.
-    parallel : callable
-        Runs calls on the cores.
-    progress : callable
-        Called with a phase, work done and work in total.
-
-    Returns
-    -------
-    pyarrow.Table
-        One row per image height and design, in a scene with a field.
+    Returns one row per image height and design, in a scene with a field.
     """
     calls = []
     for row in named_rows(rows):

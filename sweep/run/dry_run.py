@@ -21,19 +21,7 @@ from .workers import Workers
 
 @dataclass(frozen=True)
 class RemainingWork:
-    """Remaining work of a study.
-
-    Parameters
-    ----------
-    study : Study
-        Study with its plans.
-    finished : int
-        Rows that are kept.
-    chunks : int
-        Jobs that hold the others.
-    searches : bool
-        The search remains.
-    """
+    """Remaining work of a study."""
 
     study: Study
     finished: int
@@ -42,22 +30,7 @@ class RemainingWork:
 
 
 def remaining_work(study: Study, output: Path, n_jobs: int) -> RemainingWork:
-    """Plan a study and read which parts are kept, without computing or writing.
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    output : Path
-        Output folder.
-    n_jobs : int
-        Workers.
-
-    Returns
-    -------
-    RemainingWork
-        Remaining work.
-    """
+    """Plan a study and read which parts are kept, without computing or writing."""
     held = run_in(output)
     whole = held is not None and held.is_of(run_facts(study)) and not held.wrong([RESULTS], quick=True)
     study = study.with_plans()
@@ -69,20 +42,7 @@ def remaining_work(study: Study, output: Path, n_jobs: int) -> RemainingWork:
 
 
 def remaining_work_lines(todo: RemainingWork, output: Path) -> Iterator[str]:
-    """Yield lines that describe the remaining work.
-
-    Parameters
-    ----------
-    todo : RemainingWork
-        Remaining work.
-    output : Path
-        Output folder.
-
-    Yields
-    ------
-    str
-        Lines.
-    """
+    """Yield lines that describe the remaining work."""
     study, search = todo.study, todo.study.search
     plain = sum(space.size for space in study.spaces if space.kind == REFERENCE)
     yield (

@@ -31,18 +31,6 @@ def report_rows(table: pa.Table, rules: Rules) -> pa.Table:
 
     Plain CFAs, named designs and answers are all kept. `pareto` marks the front of any part of a run's rows, so that
     the function may be applied again to concatenated results.
-
-    Parameters
-    ----------
-    table : pyarrow.Table
-        Rows.
-    rules : Rules
-        Rules of the study.
-
-    Returns
-    -------
-    pyarrow.Table
-        Table.
     """
     few, on_front = word_mask(table, "kind", *NAMED_KINDS), table["pareto"].to_numpy()
     feasible = table["feasible"].to_numpy()
@@ -62,15 +50,7 @@ def _values(table: pa.Table, axes: tuple[str, str]) -> Float[Array, "rows object
 
 
 class RunRows:
-    """Rows of a run that its report shows, and the Pareto front of each CFA and scenario.
-
-    Parameters
-    ----------
-    rules : Rules
-        Rules by which designs became rows; both quantities of the front are maximized.
-    scenario : str
-        The first scenario: its swept designs are drawn.
-    """
+    """Rows of a run that its report shows, and the Pareto front of each CFA and scenario."""
 
     def __init__(self, rules: Rules, scenario: str) -> None:
         self.rules, self.scenario = rules, scenario
@@ -79,13 +59,7 @@ class RunRows:
         self._front: dict[_Group, set[tuple[float, ...]]] = {}
 
     def add(self, few: pa.Table) -> None:
-        """Add the result of `report_rows` for a part of the rows.
-
-        Parameters
-        ----------
-        few : pyarrow.Table
-            Rows.
-        """
+        """Add the result of `report_rows` for a part of the rows."""
         self._waiting.append(few)
         if sum(table.num_rows for table in self._waiting) > _AT_ONCE:
             self._waiting = [report_rows(self._all(), self.rules)]
@@ -107,18 +81,7 @@ class RunRows:
             self._front[group] = set(map(tuple, values[non_dominated(values)].tolist()))
 
     def marked(self, table: pa.Table) -> pa.Table:
-        """Return a table of the run with `pareto` only where a row is on the front of the whole run.
-
-        Parameters
-        ----------
-        table : pyarrow.Table
-            Rows.
-
-        Returns
-        -------
-        pyarrow.Table
-            Table.
-        """
+        """Return a table of the run with `pareto` only where a row is on the front of the whole run."""
         front: BoolArray = np.zeros(table.num_rows, dtype=bool)
         local = np.flatnonzero(table["pareto"].to_numpy())
         few = table.take(local)
@@ -129,13 +92,7 @@ class RunRows:
         return table.set_column(at, table.schema.field(at), pa.array(front))
 
     def frame(self) -> pd.DataFrame:
-        """Return the rows to draw: all that are not swept, and of the first scenario the best swept rows of each CFA.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Rows.
-        """
+        """Return the rows to draw: all that are not swept, and the first scenario's best swept rows of each CFA."""
         few, drawn = word_mask(self._rows, "kind", *NAMED_KINDS), self._drawn()
         best = [
             best_at(self._rows, self.rules.order, BEST_PER_CFA, drawn & word_mask(self._rows, "cfa", cfa))
@@ -144,13 +101,7 @@ class RunRows:
         return self._frame([np.flatnonzero(few), *best])
 
     def front_frame(self) -> pd.DataFrame:
-        """Return swept rows: an even sample of the first scenario's feasible front, and those that lead a scenario.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Rows.
-        """
+        """Return swept rows: an even sample of the first scenario's feasible front, and those that lead a scenario."""
         leaders = leading_rows(self._rows, self.rules.front[0])
         at = [leaders[word_mask(self._rows, "kind", SWEPT)[leaders]]]
         front = self._drawn() & self.marked(self._rows)["pareto"].to_numpy()

@@ -31,24 +31,7 @@ def left_out_table(study: Study, search: Search, best: Evaluation, parallel: Par
     Each search starts from the study's answer and a few other points. For a worst case the nominal quantity is
     searched, too. A light that is alone in its type cannot be left out.
 
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    search : Search
-        Search.
-    best : Evaluation
-        Answer of the study.
-    parallel : callable
-        Runs calls on the cores.
-    progress : callable
-        Called with a phase, work done and work in total.
-
-    Returns
-    -------
-    pyarrow.Table
-        `objective`, `signal_type`, `signal`; `seen`: optimum without the light, `with_it`: the same design
-        with all lights, `fall`: the difference; before quantization.
+    `seen`: optimum without the light, `with_it`: the same design with all lights, `fall`: the difference.
     """
     problem, seed, lights = study.problem(search), study.section.seed, study.lights
     points = starting_points(problem, _LEFT_OUT_STARTS - 1, seed)
@@ -76,20 +59,7 @@ def left_out_table(study: Study, search: Search, best: Evaluation, parallel: Par
 
 
 def most_evaluations_left_out(study: Study, search: Search) -> int:
-    """Return the largest number of evaluations of `left_out_table`.
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    search : Search
-        Search.
-
-    Returns
-    -------
-    int
-        Evaluations.
-    """
+    """Return the largest number of evaluations of `left_out_table`."""
     problem = study.problem(search)
     optima = 2 if _has_nominal(problem) else 1
     searches = optima * len(_left_out_signals(problem)) + optima - 1

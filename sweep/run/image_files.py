@@ -60,18 +60,8 @@ _STREET_SCHEMA = pa.schema([(name, kind) for kind, names in _STREET_KINDS.items(
 class ImageFiles:
     """Folder and form of exported images.
 
-    Parameters
-    ----------
-    folder : Path
-        Folder.
-    form : {'raw', 'demosaicked', 'isp'}
-        Form.
-    png : bool
-        A PNG for each image instead of arrays of 1,024.
-    splits : tuple of str
-        Splits to write.
-    coco : bool
-        True for boxes of COCO, too, for the PNGs of each design and split.
+    `png`: a PNG for each image instead of arrays of 1,024; `coco`: True for boxes of COCO, too, for the PNGs of each
+    design and split.
     """
 
     folder: Path
@@ -94,32 +84,7 @@ def write_images(
 
     Deterministic; what an interrupted export has finished, a design with a seed each, is kept and not repeated.
 
-    Parameters
-    ----------
-    designs : list of (dict, Setup, ndarray)
-        `design_id`, `name` and `cfa`, camera, and QE of the modified channels, of each design.
-    vision : Vision
-        Benchmark.
-    seed : int
-        Seed of the study.
-    fingerprint : str
-        Of the run: a folder holds images of one run in one form.
-    files : ImageFiles
-        Files.
-    parallel : callable
-        Runs calls on the cores.
-    progress : callable
-        Called with a phase, work done and work in total.
-
-    Returns
-    -------
-    pyarrow.Table
-        Manifest, a row per image.
-
-    Raises
-    ------
-    OutputError
-        If the folder holds other images, or the disk refuses.
+    Returns manifest, a row per image. Raises OutputError if the folder holds other images, or the disk refuses.
     """
     settings = {"fingerprint": fingerprint, "form": files.form, "png": files.png, "splits": list(files.splits)}
     known = files.folder / _SETTINGS
@@ -164,26 +129,7 @@ def _of_streets(part: Path) -> Path:
 
 
 def images_of_run(study: Study, rows: pd.DataFrame, split: str, names: Sequence[str], form: Form) -> Iterator[Batch]:
-    """Yield the images of a run's benchmark, without files, design by design and seed by seed.
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    rows : pandas.DataFrame
-        Rows of plain CFAs, named designs and the answer.
-    split : str
-        One of `SPLITS`.
-    names : sequence of str
-        Names of designs.
-    form : {'raw', 'demosaicked', 'isp'}
-        Form of the images.
-
-    Yields
-    ------
-    Batch
-        Images with labels.
-    """
+    """Yield the images of a run's benchmark, without files, design by design and seed by seed."""
     vision = study.section.vision
     assert vision is not None
     for row, setup, curves in vision_designs(study, rows):

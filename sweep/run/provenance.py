@@ -18,18 +18,7 @@ _PACKAGES = ("cfa-sweep", "numpy", "scipy", "numba", "pandas", "pyarrow", "jobli
 
 
 def resolved_yaml(study: Study) -> str:
-    """Return the study with all defaults written out; a study file itself.
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-
-    Returns
-    -------
-    str
-        YAML.
-    """
+    """Return the study with all defaults written out; a study file itself."""
     section = study.section.model_dump(mode="json", by_alias=True, exclude_none=True)
     for key in ("sensor", "lights"):
         named = not section[key]["files"] and not section[key].get("technology")
@@ -40,18 +29,7 @@ def resolved_yaml(study: Study) -> str:
 
 
 def plan_facts(study: Study) -> dict[str, Any]:
-    """Return the plan of each scene for the provenance.
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-
-    Returns
-    -------
-    dict
-        Plans.
-    """
+    """Return the plan of each scene for the provenance."""
     return {
         name: {
             "key": plan.key,
@@ -65,20 +43,7 @@ def plan_facts(study: Study) -> dict[str, Any]:
 
 
 def provenance(study: Study, how: Mapping[str, Any]) -> dict[str, Any]:
-    """Return versions, digests, seed and machine.
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    how : mapping
-        `command`, `duration_s`, `backend`, `scheduler` and `workers` of the run.
-
-    Returns
-    -------
-    dict
-        Facts.
-    """
+    """Return versions, digests, seed and machine."""
     vision = study.section.vision
     packages = (*_PACKAGES, "jax", "optax") if vision is not None and vision.network else _PACKAGES
     return {

@@ -50,18 +50,7 @@ class Candidate:
     tolerance: Tolerance
 
     def imager(self, scale: float) -> PopulationModel:
-        """Return the scene with a scaled population of its lights.
-
-        Parameters
-        ----------
-        scale : float
-            Factor of the stated ranges.
-
-        Returns
-        -------
-        PopulationModel
-            Scene with all members.
-        """
+        """Return the scene with a scaled population of its lights."""
         population = self.setup.lights.population
         assert population is not None
         return population_model(
@@ -69,37 +58,11 @@ class Candidate:
         )
 
     def curves(self, off: ProductionError) -> Float[Array, "1 modified wavelengths"]:
-        """Return the filters as production makes them.
-
-        Parameters
-        ----------
-        off : ProductionError
-            Production error.
-
-        Returns
-        -------
-        ndarray of shape (1, n_modified, n_wavelengths)
-            QE.
-        """
+        """Return the filters as production makes them."""
         return np.asarray(self.space.curves(self.point, self.setup.camera.grid.size, off), dtype=float)
 
     def worst(self, pair: Pair, scale: float) -> tuple[float, ProductionError]:
-        """Return the smallest CSD over a scaled population and scaled tolerances.
-
-        Parameters
-        ----------
-        pair : tuple of str
-            Signal types.
-        scale : float
-            Factor of the stated ranges.
-
-        Returns
-        -------
-        csd_dn : float
-            CSD, DN.
-        off : ProductionError
-            Its production error.
-        """
+        """Return the smallest CSD over a scaled population and scaled tolerances."""
         imager, made = self.imager(scale), self.space.filter is not None
         errors = self.tolerance.scaled(scale).places if made else (AS_DESIGNED,)
         csds = imager.worst(np.concatenate([self.curves(off) for off in errors]), [pair])[csd_name(pair)]
@@ -114,21 +77,7 @@ def robustness_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progr
     CFA that has most at 1 (null if it does not up to 3, in steps of 0.25), with CSD, lights, shifts and temperature
     there; `yield` is the share of lamps and cameras with the wanted CSD, with its 95 % interval (Wilson, 1927).
 
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    rows : pandas.DataFrame
-        Rows of plain CFAs, named designs and the answer.
-    parallel : callable
-        Runs calls on the cores.
-    progress : callable
-        Called with a phase, work done and work in total.
-
-    Returns
-    -------
-    pyarrow.Table
-        One row per design.
+    Returns one row per design.
     """
     pair = study.pair_over_population
     assert pair is not None
@@ -209,22 +158,7 @@ def _first(below: Callable[[float], bool]) -> float | None:
 
 
 def drawn_dn(design: Candidate, pair: Pair, seed: int) -> Float[Array, " draws"]:
-    """Return the CSD of two random members per draw, before clipping and rounding; equal draws for all designs.
-
-    Parameters
-    ----------
-    design : Candidate
-        Design.
-    pair : tuple of str
-        Signal types.
-    seed : int
-        Seed.
-
-    Returns
-    -------
-    ndarray of shape (n_draws,)
-        CSD, DN.
-    """
+    """Return the CSD of two random members per draw, before clipping and rounding; equal draws for all designs."""
     imager = population_model(design.setup)
     tolerance = design.tolerance if design.space.filter is not None else NONE
     draws = draws_of(imager.members, pair, tolerance, (seed, 1))

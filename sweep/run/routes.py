@@ -31,29 +31,7 @@ _CHUNKS_BY_EDGES = 4
 
 @dataclass(frozen=True)
 class Rules:
-    """Rules by which designs become rows.
-
-    Parameters
-    ----------
-    schema : pyarrow.Schema
-        Schema of the result table.
-    requested : RequestedQuantities
-        Requested quantities.
-    objective : Objective
-        Objective.
-    constraints : mapping of str to Bound
-        Constraints.
-    front : tuple of str
-        Quantities of the Pareto front, whose constraints designs on it need not meet.
-    tolerance : Tolerance
-        Production tolerance.
-    plans : mapping of str to Plan
-        Plan of each scenario.
-    vision : Vision, optional
-        Benchmark of vision.
-    seed : int
-        Seed of the study.
-    """
+    """Rules by which designs become rows."""
 
     schema: pa.Schema
     requested: RequestedQuantities
@@ -88,22 +66,6 @@ def quantities_at(
 
     They are computed in blocks that stay in the cache: by their edges where the family is separable, else from their
     curves. A block that fails is halved, down to the design that does.
-
-    Parameters
-    ----------
-    space : Space
-    start : int
-        Number of the first design in its space.
-    points : ndarray[n_designs, n_parameters]
-        Their parameters.
-    setup : Setup
-    rules : Rules
-
-    Returns
-    -------
-    columns : dict of str to ndarray[n_designs]
-    issues : dict of int to str
-        Text of the issue of each design that failed, or that has a quantity that is not finite.
     """
     issues: dict[int, str] = {}
 
@@ -126,25 +88,14 @@ def quantities_at(
 
 
 def text_of(error: Exception) -> str:
-    """Return an error on one line, cut if it is long.
-
-    Parameters
-    ----------
-    error : Exception
-        Error.
-
-    Returns
-    -------
-    str
-        Text.
-    """
+    """Return an error on one line, cut if it is long."""
     return " ".join(f"{type(error).__name__}: {error}".split())[:_MOST_LETTERS]
 
 
 def _columns(
     space: Space, start: int, setup: Setup, points: Float[Array, "points parameters"], rules: Rules
 ) -> Columns:
-    """Return the quantities of a block of designs, ndarray of shape (n_designs,) each."""
+    """Return the quantities of a block of designs."""
     size, requested = setup.camera.grid.size, rules.requested
     model = forward_model(setup)
     edges = edges_of(space, start, start + len(points))
@@ -173,22 +124,7 @@ def worst_cases(
     tolerance: Tolerance,
     user_metrics: Sequence[UserMetric] = (),
 ) -> Columns:
-    """Return worst cases over production errors, and of CSDs over the population of the lights, ndarray[n_designs].
-
-    Parameters
-    ----------
-    space : Space
-    model : ForwardModel
-    points : ndarray[n_designs, n_parameters]
-    nominal : dict of str to ndarray[n_designs]
-        Result of `evaluate` for the designs.
-    worst : sequence of Quantity
-        Worst cases to compute.
-    tolerance : Tolerance
-        Production errors.
-    user_metrics : sequence of UserMetric
-        See `evaluate`.
-    """
+    """Return worst cases over production errors, and of CSDs over the population of the lights."""
     setup = model.setup
     errors = [off for off in tolerance.places if any(off)] if space.filter is not None else []
     curves = [space.curves(points, setup.camera.grid.size, off) for off in (AS_DESIGNED, *errors)]

@@ -31,19 +31,7 @@ _DRAWN_DESIGNS = 32
 
 @dataclass(frozen=True)
 class Job:
-    """Consecutive designs of one space in one scenario.
-
-    Parameters
-    ----------
-    space : Space
-        Designs.
-    scenario : str
-        Scenario.
-    start, stop : int
-        Range of the designs.
-    first_id, first_filter : int
-        Row id, and filter number, of the first design.
-    """
+    """Consecutive designs of one space in one scenario."""
 
     space: Space
     scenario: str
@@ -59,18 +47,7 @@ class Job:
 
 
 def jobs_of(study: Study) -> Iterator[Job]:
-    """Yield all jobs in the order of their rows.
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-
-    Yields
-    ------
-    Job
-        Jobs.
-    """
+    """Yield all jobs in the order of their rows."""
     first_id = 0
     for scenario in study.scenarios:
         first_filter = 0
@@ -93,39 +70,13 @@ def _job_size(study: Study, space: Space) -> int:
 
 
 def job_key(job: Job, fingerprint: str, plan: Plan | None) -> str:
-    """Return the SHA-256 of everything that a job's rows depend on.
-
-    Parameters
-    ----------
-    job : Job
-        Job.
-    fingerprint : str
-        Fingerprint of study, data and model.
-    plan : Plan or None
-        Plan of the scene.
-
-    Returns
-    -------
-    str
-        Hexadecimal digest.
-    """
+    """Return the SHA-256 of everything that a job's rows depend on."""
     parts = [fingerprint, "" if plan is None else plan.key, job.scenario, job.space.kind, job.space.name]
     return hashlib.sha256(json.dumps([*parts, job.start, job.stop]).encode()).hexdigest()
 
 
 def rules_of(study: Study) -> Rules:
-    """Return the rules of a study.
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-
-    Returns
-    -------
-    Rules
-        Rules.
-    """
+    """Return the rules of a study."""
     section = study.section
     return Rules(
         schema=described(result_schema(study.parameters, list(study.quantities)), study.quantities),
@@ -146,17 +97,7 @@ def run_job(job: Job, setup: Setup, rules: Rules) -> pa.Table:
     `pareto` marks the non-dominated designs of this job alone, among those that meet every constraint but those on the
     front's axes; `front.RunRows` finds those of the whole table.
 
-    Parameters
-    ----------
-    job : Job
-    setup : Setup
-        Scene and camera of the job's scenario and space.
-    rules : Rules
-
-    Returns
-    -------
-    pyarrow.Table
-        A row per design, of `rules.schema`.
+    `setup`: scene and camera of the job's scenario and space. Returns a row per design, of `rules.schema`.
     """
     points = job.space.points(job.start, job.stop)
     columns, issues = quantities_at(job.space, job.start, points, setup, rules)
@@ -179,22 +120,7 @@ def run_job(job: Job, setup: Setup, rules: Rules) -> pa.Table:
 
 
 def failed_rows(job: Job, rules: Rules, status: str) -> pa.Table:
-    """Return the rows of a job that could not be computed.
-
-    Parameters
-    ----------
-    job : Job
-        Job.
-    rules : Rules
-        Rules of the study.
-    status : str
-        Status of the rows.
-
-    Returns
-    -------
-    pyarrow.Table
-        Table.
-    """
+    """Return the rows of a job that could not be computed."""
     no = np.zeros(job.size, dtype=bool)
     return _table(job, rules, {"feasible": no, "pareto": no, "status": _word(status, job.size)})
 

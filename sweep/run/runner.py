@@ -76,18 +76,7 @@ _CHECK_S, _CHECK_SHARE = 1.0, 0.1
 
 
 def files_of(study: Study) -> set[str]:
-    """Return the names of the files that a run makes.
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-
-    Returns
-    -------
-    set of str
-        Names.
-    """
+    """Return the names of the files that a run makes."""
     vision, of_streets = study.section.vision, (VISION_STREET, VISION_STREETS)
     of_vision = [name for name in VISION_TABLES if vision and (vision.street or name not in of_streets)]
     return {RESOLVED, *_whole(study), *row_tables(study), *of_vision}
@@ -121,38 +110,9 @@ def run_study(
     or
     provenance are, the whole run is.
 
-    Parameters
-    ----------
-    study : Study
-        A checked study.
-    output : Path
-        The folder of the results.
-    n_jobs : int
-        Workers.
-    progress : callable
-        Called with a phase, how much of it is done, and how much there is.
-    command : sequence of str
-        The command line, for provenance.
-    backend, scheduler : str
-        See `workers`.
-    options : RunOptions
-        What to do about designs that fail.
-
-    Returns
-    -------
-    tuple of str
-        Names of the files that were made; none when nothing was left to do.
-
-    Raises
-    ------
-    OutputError
-        The folder is in use, holds another study or files of others, or cannot be written.
-    InfeasibleError
-        The search finds no feasible design; nothing is left behind.
-    FailedDesignError
-        A design failed, with `fail_fast`.
-    InterruptedRunError
-        SIGINT or SIGTERM came; finished parts are kept.
+    Raises OutputError: the folder is in use, holds another study or files of others, or cannot be written. Raises
+    InfeasibleError: the search finds no feasible design; nothing is left behind. Raises FailedDesignError: a design
+    failed, with `fail_fast`. Raises InterruptedRunError: SIGINT or SIGTERM came; finished parts are kept.
     """
     started = time.monotonic()
     refuse_unreachable(study)
@@ -199,18 +159,7 @@ class _Run:
         self.gathered = RunRows(self.rules, next(iter(self.study.scenarios)))
 
     def make(self, wrong: set[str]) -> tuple[str, ...]:
-        """Make files and those that depend on them; provenance comes last, and marks a finished run.
-
-        Parameters
-        ----------
-        wrong : set of str
-            Names of missing or damaged files.
-
-        Returns
-        -------
-        tuple of str
-            Names of the files that were made.
-        """
+        """Make files and those that depend on them; provenance comes last, and marks a finished run."""
         study = self.study
         if wrong & _whole(study):
             wrong = files_of(study)

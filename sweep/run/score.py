@@ -40,12 +40,8 @@ _CONTROLS = re.compile(rb"[\x00-\x08\x0e-\x1f]")
 class Reader:
     """Answers of a reader to the test images.
 
-    Parameters
-    ----------
-    name : str
-        Name of the reader.
-    answers : pandas.DataFrame
-        `image_id`, `answer` (a state or `unknown`), and `confidence`, the probability of the answered state, or NaN.
+    `answers`: `image_id`, `answer` (a state or `unknown`), and `confidence`, the probability of the answered state, or
+    NaN.
     """
 
     name: str
@@ -53,36 +49,14 @@ class Reader:
 
 
 def images_of_test(images: pd.DataFrame) -> pd.DataFrame:
-    """Return the images of a run that predictions are of, with their names.
-
-    Parameters
-    ----------
-    images : pandas.DataFrame
-        Table of images of a run.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Images of lamps that no network has seen, with `image_id`.
-    """
+    """Return the images of a run that predictions are of, with their names."""
     unseen = images[images["lamps"] == UNSEEN]
     keys = zip(unseen["design_id"], unseen["seed"], unseen["order"], unseen["image"], strict=True)
     return unseen.assign(**{_ID: [image_id(d, seed, order, TEST, at) for d, seed, order, at in keys]})
 
 
 def network_of(images: pd.DataFrame) -> Reader:
-    """Return the run's own network as a reader.
-
-    Parameters
-    ----------
-    images : pandas.DataFrame
-        Result of `images_of_test`, of a run with a network.
-
-    Returns
-    -------
-    Reader
-        Reader.
-    """
+    """Return the run's own network as a reader."""
     columns = {_ID: _ID, NETWORK: "answer", f"{NETWORK}_p": "confidence"}
     return Reader(NETWORK, images[list(columns)].rename(columns=columns))
 
@@ -122,24 +96,7 @@ def _parquet(path: Path, content: bytes) -> pd.DataFrame:
 def read_predictions(path: Path, images: pd.DataFrame, states: Sequence[str]) -> Reader:
     """Read a file of predictions: `image_id`, and a `state` (or `unknown`) or a probability of each state.
 
-    Parameters
-    ----------
-    path : Path
-        CSV or Parquet.
-    images : pandas.DataFrame
-        Result of `images_of_test`.
-    states : sequence of str
-        States.
-
-    Returns
-    -------
-    Reader
-        The reader, by the name of the file.
-
-    Raises
-    ------
-    SweepError
-        For a file that cannot be read, and as `reader_of`.
+    Raises SweepError for a file that cannot be read, and as `reader_of`.
     """
     table = table_of(path)
     return reader_of(table, path, images, states)
@@ -148,26 +105,8 @@ def read_predictions(path: Path, images: pd.DataFrame, states: Sequence[str]) ->
 def reader_of(table: pd.DataFrame, path: Path, images: pd.DataFrame, states: Sequence[str]) -> Reader:
     """Return the reader of a table of predictions.
 
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        Columns `image_id`, and `state` (or `unknown`) or a probability of each state.
-    path : Path
-        Where the table comes from; its stem is the reader's name.
-    images : pandas.DataFrame
-        Result of `images_of_test`.
-    states : sequence of str
-        States.
-
-    Returns
-    -------
-    Reader
-        Reader.
-
-    Raises
-    ------
-    DataError
-        For other columns, other, double or missing images, other states, and numbers that are no probabilities.
+    `path`: where the table comes from; its stem is the reader's name. Raises DataError for other columns, other, double
+    or missing images, other states, and numbers that are no probabilities.
     """
     columns = [_ID, *([_STATE] if _STATE in table else states)]
     missing = [name for name in columns if name not in table]
@@ -215,26 +154,7 @@ def issue_of(
     allowed: str | None = None,
     near: str | None = None,
 ) -> ValidationIssue:
-    """Return an issue with the first of the wrong values, its line and how many more there are.
-
-    Parameters
-    ----------
-    problem : str
-        Problem.
-    path : Path
-        File.
-    wrong : pandas.Series
-        Wrong values, by row.
-    key : str or None
-        Column.
-    allowed, near : str, optional
-        What is allowed, and the nearest of it.
-
-    Returns
-    -------
-    ValidationIssue
-        Issue.
-    """
+    """Return an issue with the first of the wrong values, its line and how many more there are."""
     more = f" (and {len(wrong) - 1:,} more)" if len(wrong) > 1 else ""
     return ValidationIssue(f"{problem}{more}", str(path), int(wrong.index[0]) + 2, key, wrong.iloc[0], allowed, near)
 
@@ -246,20 +166,6 @@ def scores_of(reader: Reader, images: pd.DataFrame, unknown_cost: float) -> pd.D
     Student's t over the seeds, of 95 %; differences are paired, since all designs show the same scenes: `apart` from
     the first design, `above_observer` from the ideal observer. `calibration_error`: mean over ten bins of confidence of
     the distance from the share of right answers, weighted by their answers.
-
-    Parameters
-    ----------
-    reader : Reader
-        Reader.
-    images : pandas.DataFrame
-        Result of `images_of_test`.
-    unknown_cost : float
-        Cost of `unknown`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Scores.
     """
     table = images.merge(reader.answers, on=_ID, validate="one_to_one")
     table["unknown"] = table["answer"] == UNKNOWN
@@ -316,50 +222,20 @@ def _calibration(answers: pd.DataFrame) -> float:
 def whole_scores(scores: pd.DataFrame) -> pd.DataFrame:
     """Return the scores of all distances and light levels, lenses in any order where there are such images.
 
-    Parameters
-    ----------
-    scores : pandas.DataFrame
-        Result of `scores_of`, of one reader or more.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row per reader and design.
+    Returns a row per reader and design.
     """
     shown = in_any_order(scores)
     return shown[(shown["distance_m"] == ALL) & (shown["level"] == ALL)]
 
 
 def in_any_order(scores: pd.DataFrame) -> pd.DataFrame:
-    """Return the scores of lenses in any order, or where there are none of those there are.
-
-    Parameters
-    ----------
-    scores : pandas.DataFrame
-        Result of `scores_of`, of one reader or more.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Scores.
-    """
+    """Return the scores of lenses in any order, or where there are none of those there are."""
     order = SHUFFLED if (scores["order"] == SHUFFLED).any() else scores["order"].iloc[0]
     return scores[scores["order"] == order]
 
 
 def score_lines(scores: pd.DataFrame) -> Iterator[str]:
-    """Yield a line per reader and design, of all test images with lenses in any order.
-
-    Parameters
-    ----------
-    scores : pandas.DataFrame
-        Result of `scores_of`, of one reader or more.
-
-    Yields
-    ------
-    str
-        Line.
-    """
+    """Yield a line per reader and design, of all test images with lenses in any order."""
     whole = whole_scores(scores)
     first = str(whole["name"].iloc[0])
     for row in whole.to_dict("records"):
@@ -384,15 +260,7 @@ def _percent(row: Mapping[Any, Any], name: str) -> str:
 def check_unique(names: Sequence[str]) -> None:
     """Raise an error if two readers have one name.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Names of the readers.
-
-    Raises
-    ------
-    SweepError
-        If they have.
+    Raises SweepError if they have.
     """
     if len(set(names)) < len(names):
         raise SweepError(ValidationIssue("two files of predictions have one name", value=", ".join(names)))

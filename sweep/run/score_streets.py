@@ -22,15 +22,7 @@ COLUMNS = ("image_id", "x_px", "y_px", "state", "score")
 def is_of_streets(path: Path) -> bool:
     """Return whether a file of answers has positions.
 
-    Parameters
-    ----------
-    path : Path
-        CSV or Parquet.
-
-    Returns
-    -------
-    bool
-        True for detections.
+    True for detections.
     """
     return "x_px" in table_of(path)
 
@@ -38,15 +30,7 @@ def is_of_streets(path: Path) -> bool:
 def labels_of_test(output: Output) -> pd.DataFrame:
     """Return the labels of a run's test images of streets.
 
-    Parameters
-    ----------
-    output : Output
-        Finished run with streets.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row per image, see `street_labels`.
+    Returns a row per image, see `street_labels`.
     """
     vision = output.study.vision
     assert vision is not None
@@ -64,24 +48,8 @@ def labels_of_test(output: Output) -> pd.DataFrame:
 def read_detections(path: Path, labels: pd.DataFrame, lenses: Sequence[str]) -> pd.DataFrame:
     """Read a file of detections: a row each, with `image_id`, `x_px`, `y_px`, `state` and `score`.
 
-    Parameters
-    ----------
-    path : Path
-        CSV or Parquet; positions are from the center of the first pixel.
-    labels : pandas.DataFrame
-        Result of `labels_of_test`.
-    lenses : sequence of str
-        Signal types.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Detections.
-
-    Raises
-    ------
-    DataError
-        For a file that cannot be read, other columns, images or states, and what is no number.
+    `path`: CSV or Parquet; positions are from the center of the first pixel. Raises DataError for a file that cannot be
+    read, other columns, images or states, and what is no number.
     """
     table = table_of(path)
     missing = [name for name in COLUMNS if name not in table]
@@ -106,25 +74,7 @@ def read_detections(path: Path, labels: pd.DataFrame, lenses: Sequence[str]) -> 
 
 
 def street_scores(reader: str, detections: pd.DataFrame, labels: pd.DataFrame, lenses: Sequence[str]) -> pd.DataFrame:
-    """Score a detector: one row per design and light level, and all levels, with 95 % intervals over the seeds.
-
-    Parameters
-    ----------
-    reader : str
-        Name of the detector.
-    detections : pandas.DataFrame
-        Result of `read_detections`.
-    labels : pandas.DataFrame
-        Result of `labels_of_test`.
-    lenses : sequence of str
-        Signal types.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns `reader`, `name`, `level`, `average_precision` (mean over signal types) and `apart`, its difference from
-        the first design, paired; both with `_low` and `_high`.
-    """
+    """Score a detector: one row per design and light level, and all levels, with 95 % intervals over the seeds."""
     parts = [
         precisions(images, detections, lenses).assign(name=images["name"].iloc[0], seed=images["seed"].iloc[0])
         for _, images in labels.groupby(["name", "seed"], sort=False)
@@ -135,18 +85,7 @@ def street_scores(reader: str, detections: pd.DataFrame, labels: pd.DataFrame, l
 
 
 def street_lines(scores: pd.DataFrame) -> Iterator[str]:
-    """Yield a line per detector and design, over all light levels.
-
-    Parameters
-    ----------
-    scores : pandas.DataFrame
-        Result of `street_scores`, of one detector or more.
-
-    Yields
-    ------
-    str
-        Line.
-    """
+    """Yield a line per detector and design, over all light levels."""
     whole = scores[scores["level"] == ALL]
     first = whole["name"].iloc[0]
     for row in whole.to_dict("records"):

@@ -72,28 +72,8 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
     A derivative-free search ends near its optimum at best: where derivatives exist, SLSQP continues from there, with
     as many evaluations as a start.
 
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    search : Search
-        Search.
-    parallel : callable
-        Runs calls on the cores.
-    progress : callable
-        Called with a phase, work done and work in total.
-
-    Returns
-    -------
-    SearchAnswer
-        Answer.
-
-    Raises
-    ------
-    InfeasibleError
-        If no start finds a feasible design, with the best reachable value of each constraint.
-    UpperBoundExceededError
-        If a design exceeds its upper bound.
+    Raises InfeasibleError if no start finds a feasible design, with the best reachable value of each constraint. Raises
+    UpperBoundExceededError if a design exceeds its upper bound.
     """
     problem = study.problem(search)
     n_starts, refinement = min(search.starts, search.max_evaluations), refinement_of(problem, search.algorithm)
@@ -160,17 +140,7 @@ def _over_series(
     parallel: Parallel,
     progress: Progress,
 ) -> tuple[Evaluation, list[SearchRun], int]:
-    """Search for the worst value over all numbers of a series: add the scenes where the answer is worse, and go on.
-
-    Returns
-    -------
-    best : Evaluation
-        Best design, whose objective is that over all scenes.
-    runs : list of SearchRun
-        Further searches: from the best design, and from that of another start.
-    added : int
-        Number of scenes between the scenarios.
-    """
+    """Search for the worst value over all numbers of a series: add the scenes where the answer is worse, and go on."""
     algorithm, more, added = effort.refinement or effort.algorithm, list[SearchRun](), 0
     others = [e for run in runs if (e := best_feasible(run.log)) is not None and e.objective < best.objective]
     other = max(others, key=lambda e: e.objective, default=best)
@@ -209,17 +179,7 @@ def _worst_scenes(
 def limit_alone(study: Study, search: Search) -> Limit | None:
     """Compute the upper bound of `run_search` without a search.
 
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    search : Search
-        Search.
-
-    Returns
-    -------
-    Limit or None
-        None if there is no upper bound.
+    None if there is no upper bound.
     """
     problem = study.problem(search)
     return limit_of(problem) if reason_without_bound(problem) is None else None
@@ -236,24 +196,7 @@ def _infeasible(study: Study, problem: Problem, starts: Float[Array, "starts fre
 
 
 def answer_rows(study: Study, answer: SearchAnswer, rules: Rules, parallel: Parallel) -> list[pa.Table]:
-    """Return the search's answer as the camera reads it out in each scenario, with its upper bound and gap.
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    answer : SearchAnswer
-        Answer.
-    rules : Rules
-        Rules of the study.
-    parallel : callable
-        Runs calls on the cores.
-
-    Returns
-    -------
-    list of pyarrow.Table
-        One row each; upper bound and gap stand in the scenario that they hold for.
-    """
+    """Return the search's answer as the camera reads it out in each scenario, with its upper bound and gap."""
     space = answer.search.space
     best = Space(
         "search", answer.search.name, space.cfa, space.filter, tuple((float(value),) for value in answer.best.x)
@@ -276,20 +219,7 @@ def answer_rows(study: Study, answer: SearchAnswer, rules: Rules, parallel: Para
 
 
 def search_facts(study: Study, answer: SearchAnswer) -> dict[str, Any]:
-    """Return the search in figures, for provenance and summary.
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    answer : SearchAnswer
-        Answer.
-
-    Returns
-    -------
-    dict
-        Facts.
-    """
+    """Return the search in figures, for provenance and summary."""
     search, space, limit = answer.search, answer.search.space, answer.limit
     return {
         "algorithm": search.algorithm,
@@ -325,18 +255,6 @@ def bounded_spaces(study: Study, search: Search) -> list[str]:
 
     They are in the same channel of the same CFA, replace the same curve, nowhere exceed it, and have the same
     technology.
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    search : Search
-        Search.
-
-    Returns
-    -------
-    list of str
-        Kinds and names.
     """
     searched = search.space.filter
     assert searched is not None
@@ -353,18 +271,7 @@ def bounded_spaces(study: Study, search: Search) -> list[str]:
 
 
 def search_log(answer: SearchAnswer) -> pa.Table:
-    """Return every evaluation of every start, of the search and then of each level of the front.
-
-    Parameters
-    ----------
-    answer : SearchAnswer
-        Answer.
-
-    Returns
-    -------
-    pyarrow.Table
-        Table.
-    """
+    """Return every evaluation of every start, of the search and then of each level of the front."""
     names = answer.search.space.parameters
     rows = [
         {
@@ -389,21 +296,7 @@ def search_log(answer: SearchAnswer) -> pa.Table:
 def map_table(study: Study, search: Search, parallel: Parallel, progress: Progress) -> pa.Table:
     """Return the best objective over the values of two parameters, with all other parameters free.
 
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    search : Search
-        Search with a map.
-    parallel : callable
-        Runs calls on the cores.
-    progress : callable
-        Called with a phase, work done and work in total.
-
-    Returns
-    -------
-    pyarrow.Table
-        One row per pair of values: all parameters, objective and sensitivity before clipping and quantization.
+    Returns one row per pair of values: all parameters, objective and sensitivity before clipping and quantization.
     """
     problem, names = study.problem(search), search.space.parameters
     indices = [names.index(name) for name in search.map]
@@ -432,18 +325,6 @@ def combinations_table(study: Study, answer: SearchAnswer) -> pa.Table:
 
     The concentration of a colorant whose catalog has molar extinctions e is absorbance / (e 0.8 um) (law of Beer and
     Lambert).
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    answer : SearchAnswer
-        Answer of a search that chooses.
-
-    Returns
-    -------
-    pyarrow.Table
-        Table.
     """
     assert answer.choice is not None
     assert study.colorants is not None
@@ -466,20 +347,7 @@ def combinations_table(study: Study, answer: SearchAnswer) -> pa.Table:
 
 
 def front_table(study: Study, answer: SearchAnswer) -> pa.Table:
-    """Return one row per level of sensitivity, and rows in between with the upper bound alone.
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    answer : SearchAnswer
-        Answer.
-
-    Returns
-    -------
-    pyarrow.Table
-        Table.
-    """
+    """Return one row per level of sensitivity, and rows in between with the upper bound alone."""
     names, setup = answer.search.space.parameters, study.setup(answer.search.space, answer.search.scenario)
     rows = []
     for point in answer.front:

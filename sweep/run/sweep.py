@@ -34,14 +34,7 @@ _KeyedJob = tuple[Job, str, Setup]
 class FinishedJob:
     """Finished job.
 
-    Parameters
-    ----------
-    part : str or bytes
-        Name of its part file, or its content if the worker could not write it.
-    named_rows : pyarrow.Table
-        Result of `report_rows`.
-    failed : int
-        Designs that failed.
+    `part`: name of its part file, or its content if the worker could not write it.
     """
 
     part: str | bytes
@@ -51,15 +44,7 @@ class FinishedJob:
 
 @dataclass(frozen=True)
 class RunOptions:
-    """Failure policy.
-
-    Parameters
-    ----------
-    fail_fast : bool
-        Stop at the first design that fails.
-    retry_failed : bool
-        Compute a finished run again in which some failed.
-    """
+    """Failure policy."""
 
     fail_fast: bool = False
     retry_failed: bool = False
@@ -107,19 +92,7 @@ class Sweep:
     def run(self, gathered: RunRows, progress: Progress, options: RunOptions) -> None:
         """Compute the remaining jobs.
 
-        Parameters
-        ----------
-        gathered : RunRows
-            Receives all rows.
-        progress : callable
-            Called with a phase, work done and work in total.
-        options : RunOptions
-            Failure policy.
-
-        Raises
-        ------
-        FailedDesignError
-            If a design failed, with `fail_fast`; its part is kept.
+        Raises FailedDesignError if a design failed, with `fail_fast`; its part is kept.
         """
         done = 0
         for index, key in enumerate(self.keys):
@@ -150,29 +123,12 @@ class Sweep:
             progress("designs", done, self.study.n_designs)
 
     def tables(self) -> Iterator[pa.Table]:
-        """Yield the rows of all jobs in order.
-
-        Yields
-        ------
-        pyarrow.Table
-            Rows.
-        """
+        """Yield the rows of all jobs in order."""
         for index in range(len(self.jobs)):
             yield self.table(index)
 
     def table(self, index: int) -> pa.Table:
-        """Return the rows of a finished job; a damaged part is computed again.
-
-        Parameters
-        ----------
-        index : int
-            Number of the job.
-
-        Returns
-        -------
-        pyarrow.Table
-            Table.
-        """
+        """Return the rows of a finished job; a damaged part is computed again."""
         job, table = self.jobs[index], self._kept(index)
         return run_job(job, self._setup(job), self.rules) if table is None else table
 

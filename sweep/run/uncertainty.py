@@ -51,22 +51,6 @@ def uncertainty_table(study: Study, rows: pd.DataFrame, parallel: Parallel, prog
     of all sensors; `ratio_...` and `light_ratio_...`: the same of CSD and light relative to the `reference` on the same
     sensor; `ratio_sd`, `light_ratio_sd`, `correlation`: deviations of both ratios and their correlation. `at_least_dn`:
     no sensor within the errors has less; only where curves have neither shifts.
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    rows : pandas.DataFrame
-        Rows of plain CFAs, named designs and the answer.
-    parallel : callable
-        Runs calls on the cores.
-    progress : callable
-        Called with a phase, work done and work in total.
-
-    Returns
-    -------
-    pyarrow.Table
-        Table.
     """
     errors = study.section.uncertainty
     assert errors is not None

@@ -57,22 +57,6 @@ def vision_tables(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
     """Compute the tables of `VISION_TABLES`; a design in several scenarios counts once.
 
     Random numbers follow from the study's seed: all designs see the same scenes and photons.
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    rows : pandas.DataFrame
-        Rows of plain CFAs, named designs and the answer.
-    parallel : callable
-        Runs calls on the cores.
-    progress : callable
-        Called with a phase, work done and work in total.
-
-    Returns
-    -------
-    dict of str to pyarrow.Table
-        Tables by file name.
     """
     vision = study.section.vision
     assert vision is not None
@@ -114,20 +98,7 @@ def vision_tables(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
 
 
 def vision_designs(study: Study, rows: pd.DataFrame) -> list[tuple[dict[Any, Any], Setup, DesignParameters]]:
-    """Return the designs of a benchmark: plain CFAs, named designs and the answer, each once.
-
-    Parameters
-    ----------
-    study : Study
-        Study of the run.
-    rows : pandas.DataFrame
-        Result table.
-
-    Returns
-    -------
-    list of (dict, Setup, ndarray)
-        Row, camera, and QE of the modified channels, ndarray of shape (n_modified, n_wavelengths).
-    """
+    """Return the designs of a benchmark: plain CFAs, named designs and the answer, each once."""
     first, by_name = next(iter(study.scenarios)), dict[str, dict[Any, Any]]()
     for row in named_rows(rows):
         if row["scenario"] == first or row["kind"] == SEARCHED:
@@ -181,12 +152,6 @@ def predictors(setup: Setup, curves: ChannelCurves, vision: Vision) -> list[tupl
 
     They are the smallest CSD (DN) and d' over the pairs of lenses, and the largest pairwise error, for the study's
     middle intensity, no background, and the mean over the disc.
-
-    Parameters
-    ----------
-    setup : Setup
-    curves : ndarray[n_modified, n_wavelengths]
-    vision : Vision
     """
     middle_cd = sorted(vision.intensities_cd)[len(vision.intensities_cd) // 2]
     pairs = class_pairs(tuple(kind for kind in setup.lights.classes if kind in vision.lenses))

@@ -44,12 +44,7 @@ class WorkerKilledError(SweepError):
 class Workers:
     """Workers of a backend, each with one thread for its libraries.
 
-    Attributes
-    ----------
-    n_jobs : int
-        Workers on this machine, at most one for each core; those of a cluster are used as they are.
-    backend : {'loky', 'threading', 'dask'}
-        Processes, threads, or a cluster.
+    `n_jobs`: workers on this machine, at most one for each core; those of a cluster are used as they are.
     """
 
     n_jobs: int
@@ -61,20 +56,7 @@ class Workers:
         return max(1, min(self.n_jobs, os.cpu_count() or 1))
 
     def __call__(self, calls: Iterable[Call], killed: Callable[[Call], Any] | None = None) -> Iterator[Any]:
-        """Yield the results of calls in order; see `unordered`.
-
-        Parameters
-        ----------
-        calls : iterable of Call
-            Calls.
-        killed : callable, optional
-            Result of a call that kills its worker twice.
-
-        Yields
-        ------
-        object
-            Results.
-        """
+        """Yield the results of calls in order; see `unordered`."""
         early: dict[int, Any] = {}
         turn = 0
         for at, result in self.unordered(calls, killed):
@@ -91,22 +73,7 @@ class Workers:
         If a worker dies, the calls under way run again, one at a time. One that kills its worker again goes to
         `killed`.
 
-        Parameters
-        ----------
-        calls : iterable of Call
-            Calls.
-        killed : callable, optional
-            Result of a call that kills its worker twice.
-
-        Yields
-        ------
-        number, result : int, object
-            Number and result.
-
-        Raises
-        ------
-        WorkerKilledError
-            Without `killed`.
+        Raises WorkerKilledError: without `killed`.
         """
         waiting = dict(enumerate(calls))
         n_jobs = -1 if self.backend == "dask" else self.count
@@ -140,20 +107,7 @@ class Workers:
     def alone(self, call: Call) -> Any:
         """Return the result of a call with no other under way.
 
-        Parameters
-        ----------
-        call : Call
-            Call.
-
-        Returns
-        -------
-        object
-            Result.
-
-        Raises
-        ------
-        WorkerKilledError
-            If its worker dies.
+        Raises WorkerKilledError if its worker dies.
         """
         try:
             ((_, result),) = joblib.Parallel(max(2, self.count))([(_numbered, (0, call), {})])
@@ -168,24 +122,7 @@ class Workers:
 def workers(n_jobs: int, backend: str = "loky", scheduler: str | None = None) -> Iterator[Workers]:
     """Start a backend and give its workers within a `with` block.
 
-    Parameters
-    ----------
-    n_jobs : int
-        Workers.
-    backend : {'loky', 'threading', 'dask'}
-        Backend.
-    scheduler : str, optional
-        Address of a Dask scheduler.
-
-    Yields
-    ------
-    Workers
-        Workers.
-
-    Raises
-    ------
-    SweepError
-        If Dask is not installed, or its scheduler does not answer.
+    Raises SweepError if Dask is not installed, or its scheduler does not answer.
     """
     settings: dict[str, Any] = {}
     backend = backend_here(backend)
@@ -241,24 +178,7 @@ def _remove_what_the_dead_left() -> None:
 
 
 def run_with_progress(parallel: Parallel, calls: Sequence[Call], phase: str, progress: Progress) -> Iterator[Any]:
-    """Run calls on the cores and yield their answers in order, with the progress of a phase.
-
-    Parameters
-    ----------
-    parallel : callable
-        Runs calls on the cores.
-    calls : sequence of Call
-        Calls.
-    phase : str
-        Name of the phase.
-    progress : callable
-        Called with a phase, work done and work in total.
-
-    Yields
-    ------
-    object
-        Answers.
-    """
+    """Run calls on the cores and yield their answers in order, with the progress of a phase."""
     for done, answer in enumerate(parallel(calls), 1):
         progress(phase, done, len(calls))
         yield answer
@@ -271,15 +191,7 @@ def stopped_by_signals() -> Iterator[None]:
     joblib ends its workers when the exception reaches it; finished parts are on the disk. Python handles signals in
     the main thread alone; elsewhere nothing changes.
 
-    Yields
-    ------
-    None
-        Signals are handled.
-
-    Raises
-    ------
-    InterruptedRunError
-        After SIGINT or SIGTERM.
+    Raises InterruptedRunError: after SIGINT or SIGTERM.
     """
     if threading.current_thread() is not threading.main_thread():
         yield

@@ -26,13 +26,7 @@ _MOST_HEIGHTS = 60
 
 
 class AnyHeight:
-    """Problem at the known image heights.
-
-    Parameters
-    ----------
-    whole : Problem
-        Problem over all field positions.
-    """
+    """Problem at the known image heights."""
 
     def __init__(self, whole: Problem) -> None:
         field = whole.setup.scene.field
@@ -55,7 +49,7 @@ class AnyHeight:
         return replace(self._whole, setup=replace(self._whole.setup, scene=scene))
 
     def _worst(self, curve: PerWavelength) -> tuple[Float[Array, " pairs"], Float[Array, " pairs"]]:
-        """Return the smallest distance of each pair, DN, and its height, ndarray of shape (n_pairs,) each."""
+        """Return the smallest distance of each pair, DN, and its height."""
         setup = self._whole.setup
 
         def at_height(height: float) -> Float[Array, " pairs"]:
@@ -68,32 +62,13 @@ class AnyHeight:
         return refined_heights(self._looked_at, known, at_height)
 
     def least(self, curve: PerWavelength) -> dict[str, float]:
-        """Return the smallest distances over all field positions.
-
-        Parameters
-        ----------
-        curve : ndarray of shape (n_wavelengths,)
-            QE of the filter.
-
-        Returns
-        -------
-        dict of str to float
-            CSD by column name, DN.
-        """
+        """Return the smallest distances over all field positions, DN."""
         return dict(zip(self._pairs, self._worst(curve)[0].tolist(), strict=True))
 
     def more(self, curve: PerWavelength) -> bool:
         """Add the worst heights of a filter.
 
-        Parameters
-        ----------
-        curve : ndarray of shape (n_wavelengths,)
-            QE of the filter.
-
-        Returns
-        -------
-        bool
-            False if they are no worse than the known ones.
+        False if they are no worse than the known ones.
         """
         known, setup = len(self._heights), self.problem.setup
         for pair, distance_dn, height in zip(self._pairs.values(), *self._worst(curve), strict=True):

@@ -16,32 +16,14 @@ ROUNDING = 1e-9
 class Sides:
     """Pairs of signals with a decided side.
 
-    Parameters
-    ----------
-    pairs : tuple of int
-        Indices of pairs.
-    signs : tuple of float
-        +1 if the first signal is above the other, -1 if it is below.
+    `signs`: +1 if the first signal is above the other, -1 if it is below.
     """
 
     pairs: tuple[int, ...] = ()
     signs: tuple[float, ...] = ()
 
     def joined(self, pairs: Int[IndexArray, " pairs"], signs: Float[Array, " pairs"]) -> Sides:
-        """Return these and further decided sides.
-
-        Parameters
-        ----------
-        pairs : ndarray of int, shape (n,)
-            Indices of pairs.
-        signs : ndarray of shape (n,)
-            Their sides.
-
-        Returns
-        -------
-        Sides
-            All of them.
-        """
+        """Return these and further decided sides."""
         return Sides((*self.pairs, *map(int, pairs)), (*self.signs, *map(float, signs)))
 
 
@@ -49,14 +31,7 @@ class Sides:
 class Certificate:
     """Weights y of rows and decided pairs, and V(y), which bound filters at any sensitivity.
 
-    Parameters
-    ----------
-    rows, pairs : ndarray of int
-        Rows and pairs with a weight above 0.
-    row_weights, pair_weights : ndarray
-        Their weights.
-    most : float
-        V(y).
+    `rows`, `pairs`: rows and pairs with a weight above 0.
     """
 
     rows: Int[IndexArray, " rows"]
@@ -70,18 +45,7 @@ class Certificate:
 class LinearSolution:
     """Result of a linear program for a t and some sides, in the objective's unit.
 
-    Parameters
-    ----------
-    beyond : float
-        Upper bound on filters with these sides (-inf: there is none).
-    margin : float
-        Largest margin above t.
-    curve : ndarray of shape (n_wavelengths,), optional
-        QE of the filter with this margin.
-    needs : Sides
-        Sides that suffice for the bound.
-    certificate : Certificate, optional
-        Proof of the bound.
+    `margin`: largest margin above t.
     """
 
     beyond: float

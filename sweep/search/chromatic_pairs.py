@@ -32,7 +32,7 @@ class _Known(KnownPairs):
     factors: Float[Array, "known 2"]
 
     def difference(self, values: Float[Array, "cases spectra channels"]) -> Float[Array, "known channels"]:
-        """Return first minus second signal, each times its factor, ndarray of shape (n_known, n).
+        """Return first minus second signal, each times its factor.
 
         `values` has shape (n_cases, n_signals, n).
         """
@@ -41,15 +41,7 @@ class _Known(KnownPairs):
 
 
 class ChromaticPairs:
-    """Known brightnesses of each pair of signals; at first the worst ones of the base curve.
-
-    Parameters
-    ----------
-    problem : Problem
-        Problem with one modified channel.
-    names : sequence of str
-        Columns of chromatic separations.
-    """
+    """Known brightnesses of each pair of signals; at first the worst ones of the base curve."""
 
     def __init__(self, problem: Problem, names: Sequence[str]) -> None:
         setup = problem.setup
@@ -63,68 +55,23 @@ class ChromaticPairs:
         self._known = {name: self._nearest(name, base[0])[0] for name in names}
 
     def distances(self, name: str) -> Distances:
-        """Return the distances of known pairs, for every filter.
-
-        Parameters
-        ----------
-        name : str
-            Column name.
-
-        Returns
-        -------
-        Distances
-            Distances.
-        """
+        """Return the distances of known pairs, for every filter."""
         known = self._known[name]
         squared = (known.difference(self._others) ** 2).sum(axis=1)
         return Distances(known.difference(self._gain), squared, np.zeros((squared.size, 2)))
 
     def counted(self, name: str, curve: PerWavelength) -> float:
-        """Return the smallest distance of known pairs as the program counts it.
-
-        Parameters
-        ----------
-        name : str
-            Column name.
-        curve : ndarray of shape (n_wavelengths,)
-            QE of the filter.
-
-        Returns
-        -------
-        float
-            Distance, DN.
-        """
+        """Return the smallest distance of known pairs as the program counts it, DN."""
         return self.distances(name).least(curve)
 
     def least(self, name: str, curve: PerWavelength) -> float:
-        """Return the smallest distance over all brightnesses.
-
-        Parameters
-        ----------
-        name : str
-            Column name.
-        curve : ndarray of shape (n_wavelengths,)
-            QE of the filter.
-
-        Returns
-        -------
-        float
-            Distance, DN.
-        """
+        """Return the smallest distance over all brightnesses, DN."""
         return float(self._nearest(name, curve)[1].min())
 
     def more(self, curve: PerWavelength) -> bool:
         """Add the worst brightnesses of a filter.
 
-        Parameters
-        ----------
-        curve : ndarray of shape (n_wavelengths,)
-            QE of the filter.
-
-        Returns
-        -------
-        bool
-            False if no pair is nearer than the known ones.
+        False if no pair is nearer than the known ones.
         """
         added = False
         for name in self.names:

@@ -43,15 +43,7 @@ class Choice:
 def numbers_of(problem: Problem) -> Int[IndexArray, " values"]:
     """Return the numbers of the members that a problem may choose from; none if it chooses nothing.
 
-    Parameters
-    ----------
-    problem : Problem
-        Search problem.
-
-    Returns
-    -------
-    ndarray of int, shape (n,)
-        Numbers, from 1 on.
+    Returns numbers, from 1 on.
     """
     if not isinstance(problem.family, ChoosingFamily):
         return np.array([], dtype=np.intp)
@@ -62,17 +54,7 @@ def numbers_of(problem: Problem) -> Int[IndexArray, " values"]:
 def with_members(problem: Problem, members: Members) -> Problem:
     """Return the problem with its members chosen; slots without one have no amount.
 
-    Parameters
-    ----------
-    problem : Problem
-        Search problem of a family that chooses.
-    members : tuple of int
-        Numbers, at most as many as the family has slots.
-
-    Returns
-    -------
-    Problem
-        Problem whose numbers are fixed.
+    `members`: numbers, at most as many as the family has slots.
     """
     assert isinstance(problem.family, ChoosingFamily)
     held = {}
@@ -86,26 +68,7 @@ def with_members(problem: Problem, members: Members) -> Problem:
 def amounts_of(
     problem: Problem, combinations: Sequence[Members], algorithm: str, max_evaluations: int, seed: int
 ) -> list[Evaluation]:
-    """Search the amounts of combinations, from little and from more of each.
-
-    Parameters
-    ----------
-    problem : Problem
-        Search problem of a family that chooses.
-    combinations : sequence of tuple of int
-        Combinations.
-    algorithm : str
-        Algorithm of nlopt.
-    max_evaluations : int
-        Evaluations of each start at most.
-    seed : int
-        Seed.
-
-    Returns
-    -------
-    list of Evaluation
-        Results of `search_held`, in order.
-    """
+    """Search the amounts of combinations, from little and from more of each."""
     return [search_held(with_members(problem, members), algorithm, max_evaluations, seed) for members in combinations]
 
 
@@ -122,28 +85,6 @@ def choose(
 
     An exchange begins at the best combinations of one member less with every further member. It replaces one member of
     the best combination by every other, until none is better. The order of the calls does not depend on the workers.
-
-    Parameters
-    ----------
-    problem : Problem
-        Search problem of a family that chooses.
-    algorithm : str
-        Algorithm of nlopt.
-    max_evaluations : int
-        Evaluations of each start at most.
-    seed : int
-        Seed.
-    parallel : callable
-        Runs calls on the cores.
-    progress : callable
-        Called with a phase, work done and work in total.
-    exhaustive : int
-        Combinations of one size that are all tried.
-
-    Returns
-    -------
-    Choice
-        Combinations.
     """
     assert isinstance(problem.family, ChoosingFamily)
     family, numbers = problem.family, numbers_of(problem)

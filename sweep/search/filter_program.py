@@ -45,7 +45,7 @@ _SOLVED, _INFEASIBLE = 0, 2
 
 @dataclass(frozen=True)
 class _Rows:
-    """Rows a @ N >= h(t) = max(least, rate t) - constant, each an ndarray of shape (n,).
+    """Rows a @ N >= h(t) = max(least, rate t) - constant, each.
 
     `slack` is the amount by which a feasible design may be below `least`; `rate` is 0 where t does not matter.
     """
@@ -57,34 +57,13 @@ class _Rows:
     constant: PerRow
 
     def needed(self, t: float, *, relaxed: bool = False) -> PerRow:
-        """Return h(t), ndarray of shape (n,); with `relaxed` for designs that only count as feasible.
-
-        Parameters
-        ----------
-        t : float
-            Value of the objective.
-        relaxed : bool
-            Subtract the slack.
-
-        Returns
-        -------
-        ndarray of shape (n,)
-            h(t).
-        """
+        """Return h(t); with `relaxed` for designs that only count as feasible."""
         least = self.least - self.slack if relaxed else self.least
         return np.asarray(np.maximum(least, np.where(self.rate > 0, self.rate * t, -np.inf)) - self.constant)
 
 
 class FilterProgram:
-    """Filters of a problem, and every pair of signals that may come too near.
-
-    Parameters
-    ----------
-    problem : Problem
-        Problem with one modified channel.
-    members : MemberPairs or ChromaticPairs, optional
-        Members of worst cases, or brightnesses of chromatic separations.
-    """
+    """Filters of a problem, and every pair of signals that may come too near."""
 
     def __init__(self, problem: Problem, members: MemberPairs | ChromaticPairs | None = None) -> None:
         """Compute the rows of constraints and pairs."""
@@ -202,18 +181,7 @@ class FilterProgram:
         return any(self.problem.quantities[name].distance_kind == "noise" for name in requested)
 
     def reaches(self, curve: PerWavelength) -> float:
-        """Return the objective of a filter with the least noise, which is no less than its own.
-
-        Parameters
-        ----------
-        curve : ndarray of shape (n_wavelengths,)
-            QE of the filter.
-
-        Returns
-        -------
-        float
-            Objective.
-        """
+        """Return the objective of a filter with the least noise, which is no less than its own."""
         pairs, rows = self._rate > 0, self._rows.rate > 0
         far = np.sqrt(self._squared + (self.differences @ curve) ** 2)[pairs] / self._rate[pairs]
         linear = (self._rows.matrix @ curve + self._rows.constant)[rows] / self._rows.rate[rows]
@@ -225,21 +193,9 @@ class FilterProgram:
         self._slack, self._rate = self._slack[wanted], self._rate[wanted]
 
     def needed(self, t: float, margin: float = 0.0, *, relaxed: bool = False) -> Float[Array, " pairs"]:
-        """Return the difference in the modified channel that each pair needs to reach t.
+        """Return the difference in the modified channel that each pair needs to reach t, DN.
 
-        Parameters
-        ----------
-        t : float
-            Value of the objective.
-        margin : float
-            Additional margin, in the objective's unit.
-        relaxed : bool
-            For designs that only count as feasible.
-
-        Returns
-        -------
-        ndarray of shape (n_pairs,)
-            Difference, DN; 0 if none is needed.
+        `margin`: additional margin, in the objective's unit. 0 if none is needed.
         """
         least = self._least - self._slack if relaxed else self._least
         requested = np.maximum(least, t * self._rate)
@@ -248,20 +204,7 @@ class FilterProgram:
         return np.asarray(np.where(difference > 0, difference + inside + self._rate * margin, 0.0), dtype=float)
 
     def solve(self, t: float, sides: Sides) -> LinearSolution:
-        """Find the filter with the largest margin above t, and a bound for all filters with these sides.
-
-        Parameters
-        ----------
-        t : float
-            Value of the objective.
-        sides : Sides
-            Decided sides.
-
-        Returns
-        -------
-        LinearSolution
-            Filter and bound.
-        """
+        """Find the filter with the largest margin above t, and a bound for all filters with these sides."""
         self.solved += 1
         pairs, signs = np.array(sides.pairs, dtype=np.intp), np.array(sides.signs)
         some = self.needed(t)[pairs] > 0
@@ -291,19 +234,9 @@ class FilterProgram:
         return np.asarray(self.added[pairs, (signs < 0).astype(np.intp)], dtype=float)
 
     def differ(self, curve: PerWavelength, side: float) -> Float[Array, " pairs"]:
-        """Return the largest difference of each pair on one side.
+        """Return the largest difference of each pair on one side, DN.
 
-        Parameters
-        ----------
-        curve : ndarray of shape (n_wavelengths,)
-            QE of the filter.
-        side : float
-            1 with the first signal above, -1 with it below.
-
-        Returns
-        -------
-        ndarray of shape (n_pairs,)
-            Difference, DN.
+        `side`: 1 with the first signal above, -1 with it below.
         """
         return np.asarray(side * (self.differences @ curve) + self.added[:, int(side < 0)], dtype=float)
 
@@ -338,21 +271,8 @@ class FilterProgram:
     ) -> float:
         """Return the bound of a certificate at another sensitivity.
 
-        Parameters
-        ----------
-        certificate : Certificate
-            Weights.
-        sensitivity : float, optional
-            Least sensitivity, instead of the problem's.
-        at_least : float
-            Smaller bounds are returned as -inf.
-        near : float
-            Accuracy: the result may exceed the bound of the weights by this.
-
-        Returns
-        -------
-        float
-            Upper bound on filters with the certificate's sides; inf if the weights give none.
+        `sensitivity`: least sensitivity, instead of the problem's. Returns upper bound on filters with the
+        certificate's sides. Inf if the weights give none.
         """
         rows, per = self._rows, self._per_sensitivity
         if sensitivity is not None:

@@ -47,21 +47,9 @@ _CONDITION_NM = 100.0
 class Point:
     """Result of one simulation.
 
-    Parameters
-    ----------
-    evaluation : Evaluation
-        Logged values.
-    terms : Rows
-        Rows of the objective's weighted quantities: squared, as they are if they may be negative, or as
-        decades below 1.
-    power : int
-        2 for squared rows, else 1.
-    term : ndarray of int, shape (n,)
-        Term of each row (all 0 for a minimum).
-    conditions : Rows
-        Met where <= 0.
-    quantities : mapping of str to Rows
-        Rows of each constrained quantity.
+    `terms`: rows of the objective's weighted quantities: squared, as they are if they may be negative, or as decades
+    below 1; `power`: 2 for squared rows, else 1; `term`: term of each row (all 0 for a minimum); `conditions`: met
+    where <= 0.
     """
 
     evaluation: Evaluation
@@ -73,7 +61,7 @@ class Point:
 
     @property
     def term_values(self) -> PerTerm:
-        """Value of each term, ndarray of shape (n_terms,)."""
+        """Value of each term."""
         least = [self.terms.values[self.term == k].min() for k in range(int(self.term.max()) + 1)]
         return np.sqrt(least) if self.power == 2 else np.array(least)
 
@@ -138,18 +126,7 @@ class Model:
         self._points: dict[bytes, Point] = {}
 
     def at(self, u: PerFree) -> Point:
-        """Simulate and log a point once; beyond the budget, or where `u` is NaN, stop the search.
-
-        Parameters
-        ----------
-        u : ndarray of shape (n_free,)
-            Free parameters in units of the box.
-
-        Returns
-        -------
-        Point
-            Result of the simulation.
-        """
+        """Simulate and log a point once; beyond the budget, or where `u` is NaN, stop the search."""
         # A copy, since `u` is nlopt's own buffer.
         u = np.clip(np.array(u, dtype=float), 0.0, 1.0)
         key = u.tobytes()

@@ -15,20 +15,7 @@ _STARTS = (0.02, 0.3)
 
 
 def fix_parameters(problem: Problem, values: Mapping[int, float]) -> Problem:
-    """Return the problem with parameters held at values.
-
-    Parameters
-    ----------
-    problem : Problem
-        Search problem.
-    values : mapping of int to float
-        Index of a parameter to its value.
-
-    Returns
-    -------
-    Problem
-        Problem with fewer free parameters.
-    """
+    """Return the problem with parameters held at values."""
     low, high = problem.low.copy(), problem.high.copy()
     for index, value in values.items():
         low[index] = high[index] = value
@@ -36,24 +23,7 @@ def fix_parameters(problem: Problem, values: Mapping[int, float]) -> Problem:
 
 
 def search_held(problem: Problem, algorithm: str, max_evaluations: int, seed: int) -> Evaluation:
-    """Search what is free, from two starts.
-
-    Parameters
-    ----------
-    problem : Problem
-        Search problem with a free parameter.
-    algorithm : str
-        Algorithm of nlopt.
-    max_evaluations : int
-        Evaluations of each start at most.
-    seed : int
-        Seed.
-
-    Returns
-    -------
-    Evaluation
-        The best feasible one, else the least infeasible one.
-    """
+    """Search what is free, from two starts."""
     starts = [np.full(problem.free.size, share) for share in _STARTS]
     runs = [search_from(problem, i, u0, algorithm, max_evaluations, seed) for i, u0 in enumerate(starts)]
     return max((evaluation for run in runs for evaluation in run.log), key=lambda evaluation: evaluation.rank)
@@ -62,24 +32,5 @@ def search_held(problem: Problem, algorithm: str, max_evaluations: int, seed: in
 def search_cells(
     problem: Problem, cells: Sequence[Mapping[int, float]], algorithm: str, max_evaluations: int, seed: int
 ) -> list[Evaluation]:
-    """Search what is free with other parameters held at the values of each cell.
-
-    Parameters
-    ----------
-    problem : Problem
-        Search problem.
-    cells : sequence of mapping of int to float
-        Index of a parameter to its value.
-    algorithm : str
-        Algorithm of nlopt.
-    max_evaluations : int
-        Evaluations of each start at most.
-    seed : int
-        Seed.
-
-    Returns
-    -------
-    list of Evaluation
-        Results of `search_held`, in order.
-    """
+    """Search what is free with other parameters held at the values of each cell."""
     return [search_held(fix_parameters(problem, cell), algorithm, max_evaluations, seed) for cell in cells]

@@ -24,25 +24,9 @@ _ROUNDING = 1e-12
 def least_variance(
     imager: LinearModel, base: PerWavelength, box: tuple[PerWavelength, PerWavelength], row: PerWavelength, least: float
 ) -> Float[Array, "cases signals"]:
-    """Return a lower bound on the variance in the modified channel.
+    """Return a lower bound on the variance in the modified channel, DN^2.
 
-    Parameters
-    ----------
-    imager : LinearModel
-        Scene and camera with one modified channel.
-    base : ndarray of shape (n_wavelengths,)
-        Curve at which the variance is known; it grows with the light.
-    box : tuple of ndarray of shape (n_wavelengths,)
-        Bounds on the filters.
-    row : ndarray of shape (n_wavelengths,)
-        Coefficients of the sensitivity, >= 0.
-    least : float
-        Least sensitivity: row @ N >= least.
-
-    Returns
-    -------
-    ndarray of shape (n_cases, n_signals)
-        Lower bound, DN^2.
+    `row`: coefficients of the sensitivity, >= 0; `least`: least sensitivity: row @ N >= least.
     """
     pixel, channel = imager.readout.pixel, imager.setup.camera.modified[0]
     per_qe = imager.spread_per_qe(0, base[None])

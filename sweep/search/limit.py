@@ -59,22 +59,9 @@ _DISTANCES = {DN: smooth_csd, "noise": smooth_detectability, "chromatic": smooth
 class Limit:
     """Upper bound, and a filter near it, in the objective's unit.
 
-    Parameters
-    ----------
-    attained : float
-        Objective of `curve`, evaluated like any design; -inf if no feasible filter is known.
-    proven : float
-        Upper bound on any filter; -inf if no filter meets the constraints.
-    curve : ndarray of shape (n_wavelengths,) or None
-        QE of the filter.
-    left_out : tuple of str
-        Constraints of the study that the bound does not use.
-    programs : int
-        Linear programs that were solved.
-    open_parts : int
-        Parts of the proof that were left open, so that the bracket is wider; 0 if none.
-    elsewhere : tuple of float
-        Upper bounds at other least sensitivities.
+    `attained`: objective of `curve`, evaluated like any design; -inf if no feasible filter is known; `proven`: upper
+    bound on any filter; -inf if no filter meets the constraints; `open_parts`: parts of the proof that were left open,
+    so that the bracket is wider; 0 if none.
     """
 
     attained: float
@@ -94,26 +81,9 @@ def limit_of(
 ) -> Limit:
     """Compute the upper bound of a problem with one modified channel.
 
-    Parameters
-    ----------
-    problem : Problem
-        Objective, constraints and scene.
-    tolerance_dn : float
-        Width of the bracket, DN (1e-6 for an objective without a CSD).
-    most_programs : int
-        Linear programs, approximately at most; the bracket is wider if they are too few.
-    sensitivities : sequence of float
-        Least sensitivities for `Limit.elsewhere`.
-
-    Returns
-    -------
-    Limit
-        The upper bound.
-
-    Raises
-    ------
-    SweepError
-        If the response is not linear; see `reason_without_bound`.
+    `tolerance_dn`: width of the bracket, DN (1e-6 for an objective without a CSD); `most_programs`: linear programs,
+    approximately at most; the bracket is wider if they are too few. Raises SweepError if the response is not linear;
+    see `reason_without_bound`.
     """
     refused = reason_without_bound(problem)
     if refused is not None:
@@ -143,19 +113,7 @@ def limit_of(
 def check_bound(value: float, proven: float, where: str = "") -> None:
     """Raise an error if a value before quantization exceeds its upper bound.
 
-    Parameters
-    ----------
-    value : float
-        Objective of a filter.
-    proven : float
-        Upper bound.
-    where : str
-        Scene, for the message.
-
-    Raises
-    ------
-    UpperBoundExceededError
-        If the value exceeds the bound.
+    Raises UpperBoundExceededError if the value exceeds the bound.
     """
     if not value <= proven + _PROOF_TOLERANCE * max(1.0, proven):
         raise UpperBoundExceededError(
@@ -169,22 +127,7 @@ def check_bound(value: float, proven: float, where: str = "") -> None:
 def gap_between(value: float, proven: float) -> float:
     """Return the relative gap of a value to its upper bound.
 
-    Parameters
-    ----------
-    value : float
-        Objective of a filter.
-    proven : float
-        Upper bound.
-
-    Returns
-    -------
-    float
-        (proven - value) / proven.
-
-    Raises
-    ------
-    UpperBoundExceededError
-        If the value exceeds the bound.
+    (proven - value) / proven. Raises UpperBoundExceededError if the value exceeds the bound.
     """
     check_bound(value, proven)
     return 1 - min(value, proven) / proven
@@ -263,15 +206,7 @@ def _attaining(
 def reason_without_bound(problem: Problem) -> str | None:
     """Return the reason why a problem has no linear upper bound.
 
-    Parameters
-    ----------
-    problem : Problem
-        Search problem.
-
-    Returns
-    -------
-    str or None
-        None if it has one.
+    None if it has one.
     """
     unknown = [name for name in problem.objective.weights if not problem.quantities[name].has_limit]
     why = _NOT_LINEAR
@@ -376,7 +311,7 @@ def _shifts_left_out(nominal: Sequence[str], problem: Problem) -> list[str]:
 
 
 def _top(problem: Problem) -> PerWavelength:
-    """Return an upper bound on the filters of the box, in any worst case, ndarray of shape (n_wavelengths,)."""
+    """Return an upper bound on the filters of the box, in any worst case."""
     moved = perturbed_filters(problem)[1:] if _moves(problem) else ()
     tops = [problem.family.upper(problem.low, problem.high)[0], *(way.high for way in moved)]
     return np.asarray(np.max(tops, axis=0), dtype=float)

@@ -28,20 +28,7 @@ class KnownPairs:
     """Pairs of lights that the programs know; every field has one row per pair."""
 
     def joined(self, others: Self, some: Bool[BoolArray, " values"]) -> Self:
-        """Return these and some other pairs.
-
-        Parameters
-        ----------
-        others : KnownPairs
-            Further pairs.
-        some : ndarray of bool
-            Pairs that are added.
-
-        Returns
-        -------
-        KnownPairs
-            All of them.
-        """
+        """Return these and some other pairs."""
         columns = ((getattr(self, field.name), getattr(others, field.name)) for field in fields(self))
         return type(self)(*(np.concatenate([known, new[some]]) for known, new in columns))
 
@@ -50,16 +37,7 @@ class KnownPairs:
 class _Known(KnownPairs):
     """Known pairs of members.
 
-    Parameters
-    ----------
-    way : ndarray of int, shape (n,)
-        Production error.
-    case : ndarray of int, shape (n,)
-        Field position.
-    below : ndarray of int, shape (n, 2)
-        Spectra below the shifts.
-    share : ndarray of shape (n, 2)
-        Share of the next spectra.
+    `below`: spectra below the shifts.
     """
 
     way: Int[IndexArray, " known"]
@@ -68,18 +46,7 @@ class _Known(KnownPairs):
     share: Float[Array, "known 2"]
 
     def difference(self, values: Float[Array, "cases spectra channels"]) -> Float[Array, "known channels"]:
-        """Return first minus second member.
-
-        Parameters
-        ----------
-        values : ndarray of shape (n_cases, n_spectra, n)
-            Values of the spectra.
-
-        Returns
-        -------
-        ndarray of shape (n_known, n)
-            Differences.
-        """
+        """Return first minus second member."""
         low, high = (values[self.case[:, None], self.below + step] for step in (0, 1))
         ends = low + self.share[..., None] * (high - low)
         return np.asarray(ends[:, 0] - ends[:, 1], dtype=float)
@@ -105,18 +72,7 @@ class MemberPairs:
         self._known = {name: self._nearest(name, base[0], self._ways[:1])[0] for name in names}
 
     def distances(self, name: str) -> Distances:
-        """Return the distances of known pairs, for every filter.
-
-        Parameters
-        ----------
-        name : str
-            Column name of a CSD.
-
-        Returns
-        -------
-        Distances
-            Distances.
-        """
+        """Return the distances of known pairs, for every filter."""
         known = self._known[name]
         if name not in self._made:
             rows, added = known.difference(self._gain), np.zeros((known.case.size, 2))
@@ -127,71 +83,24 @@ class MemberPairs:
         return self._made[name]
 
     def counted(self, name: str, curve: PerWavelength) -> float:
-        """Return the smallest distance of known members as the program counts it.
-
-        Parameters
-        ----------
-        name : str
-            Column name of a CSD.
-        curve : ndarray of shape (n_wavelengths,)
-            QE of the filter.
-
-        Returns
-        -------
-        float
-            Distance, DN.
-        """
+        """Return the smallest distance of known members as the program counts it, DN."""
         return self.distances(name).least(curve)
 
     def least_known(self, name: str, curve: PerWavelength) -> float:
-        """Return the smallest distance of known members of the filter as produced.
-
-        Parameters
-        ----------
-        name : str
-            Column name of a CSD.
-        curve : ndarray of shape (n_wavelengths,)
-            QE of the filter.
-
-        Returns
-        -------
-        float
-            Distance, DN.
-        """
+        """Return the smallest distance of known members of the filter as produced, DN."""
         known = self._known[name]
         perturbed = np.stack([way.curve(curve) for way in self._ways])[known.way]
         apart = (known.difference(self._gain) * perturbed).sum(axis=1)
         return float(np.sqrt((apart**2 + (known.difference(self._others) ** 2).sum(axis=1)).min()))
 
     def least(self, name: str, curve: PerWavelength) -> float:
-        """Return the smallest distance of all members.
-
-        Parameters
-        ----------
-        name : str
-            Column name of a CSD.
-        curve : ndarray of shape (n_wavelengths,)
-            QE of the filter.
-
-        Returns
-        -------
-        float
-            Distance, DN.
-        """
+        """Return the smallest distance of all members, DN."""
         return float(np.sqrt(self._nearest(name, curve)[1].min()))
 
     def more(self, curve: PerWavelength) -> bool:
         """Add the nearest members of a filter.
 
-        Parameters
-        ----------
-        curve : ndarray of shape (n_wavelengths,)
-            QE of the filter.
-
-        Returns
-        -------
-        bool
-            False if they are no nearer than the known ones.
+        False if they are no nearer than the known ones.
         """
         added = False
         for name in self.names:

@@ -30,14 +30,8 @@ _WHOLE = 1e-9
 class Distances:
     """Squared distances of pairs of lights: `squared` + (rows @ N + unknown part)^2.
 
-    Parameters
-    ----------
-    rows : ndarray of shape (n, n_wavelengths)
-        Differences in the modified channel, DN per QE.
-    squared : ndarray of shape (n,)
-        In the other channels, DN^2.
-    added : ndarray of shape (n, 2)
-        Upper bounds on the unknown part and on its negative, DN.
+    `rows`: differences in the modified channel, DN per QE; `squared`: in the other channels, DN^2; `added`: upper
+    bounds on the unknown part and on its negative, DN.
     """
 
     rows: Float[Array, "distances wavelengths"]
@@ -45,18 +39,7 @@ class Distances:
     added: Float[Array, "distances 2"]
 
     def least(self, curve: PerWavelength) -> float:
-        """Return a lower bound on the smallest distance of a filter.
-
-        Parameters
-        ----------
-        curve : ndarray of shape (n_wavelengths,)
-            QE of the filter.
-
-        Returns
-        -------
-        float
-            Distance, DN.
-        """
+        """Return a lower bound on the smallest distance of a filter, DN."""
         apart = self.rows @ curve
         most = np.maximum(apart + self.added[:, 0], self.added[:, 1] - apart)
         return float(np.sqrt(self.squared + most**2).min())
@@ -66,14 +49,7 @@ class Distances:
 class PerturbedFilter:
     """Filter as produced: scale times N[source] + constant where it is `known`, else between `low` and `high`.
 
-    Parameters
-    ----------
-    source : ndarray of int, shape (n_wavelengths,)
-        Wavelength of the designed filter.
-    known : ndarray of bool, shape (n_wavelengths,)
-        True where N determines the filter.
-    scale, constant, low, high : ndarray of shape (n_wavelengths,)
-        Coefficients and bounds.
+    `known`: True where N determines the filter.
     """
 
     source: Int[IndexArray, " wavelengths"]
@@ -84,37 +60,13 @@ class PerturbedFilter:
     high: PerWavelength
 
     def curve(self, curve: PerWavelength) -> PerWavelength:
-        """Return the produced filter, at its upper bound where it is unknown.
-
-        Parameters
-        ----------
-        curve : ndarray of shape (n_wavelengths,)
-            QE of the filter.
-
-        Returns
-        -------
-        ndarray of shape (n_wavelengths,)
-            QE.
-        """
+        """Return the produced filter, at its upper bound where it is unknown."""
         return np.where(self.known, self.scale * curve[self.source] + self.constant, self.high)
 
     def rows(
         self, apart: Float[Array, "distances wavelengths"]
     ) -> tuple[Float[Array, "distances wavelengths"], Float[Array, "distances 2"]]:
-        """Convert sums over the produced filter to sums over N.
-
-        Parameters
-        ----------
-        apart : ndarray of shape (n, n_wavelengths)
-            Weights.
-
-        Returns
-        -------
-        rows : ndarray of shape (n, n_wavelengths)
-            Weights of N.
-        added : ndarray of shape (n, 2)
-            Upper bounds on the unknown part of the sums and on its negative.
-        """
+        """Convert sums over the produced filter to sums over N."""
         rows = np.zeros_like(apart)
         known = np.flatnonzero(self.known)  # each has a source of its own
         rows[:, self.source[known]] = apart[:, known] * self.scale[known]
@@ -125,35 +77,13 @@ class PerturbedFilter:
 
 
 def perturbed_filters(problem: Problem) -> tuple[PerturbedFilter, ...]:
-    """Return the filters as produced that a program knows: as designed, and moved by whole steps.
-
-    Parameters
-    ----------
-    problem : Problem
-        Search problem.
-
-    Returns
-    -------
-    tuple of Produced
-        Only as designed where all sampling phases or field positions count.
-    """
+    """Return the filters as produced that a program knows: as designed, and moved by whole steps."""
     anywhere = problem.setup.all_heights or problem.setup.all_phases
     return (_as_designed(problem.setup.camera.base_qe[0]), *(() if anywhere else _moves(problem)))
 
 
 def all_ways(problem: Problem) -> bool:
-    """Return whether these are all production errors at which a worst case is searched.
-
-    Parameters
-    ----------
-    problem : Problem
-        Search problem.
-
-    Returns
-    -------
-    bool
-        True if they are.
-    """
+    """Return whether these are all production errors at which a worst case is searched."""
     return len(perturbed_filters(problem)) == len({AS_DESIGNED, *problem.tolerance.places})
 
 

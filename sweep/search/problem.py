@@ -24,34 +24,7 @@ from ..vision.section import SeededVision
 
 @dataclass(frozen=True)
 class Problem:
-    """Maximize an objective over a box under constraints.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-    family : Family
-        Filters.
-    low, high : ndarray of shape (n_parameters,)
-        Box.
-    objective : Objective
-        Objective.
-    constraints : mapping of str to Bound
-        Bounds of quantities.
-    tolerance : Tolerance
-        Production tolerance of worst cases.
-    states : tuple of str
-        Signal types that noise may confuse.
-    user_metrics : tuple of UserMetric
-        Metrics of user code.
-    seed : int
-        Seed of random lamps and cameras.
-    vision : SeededVision, optional
-        Images for readers of signal heads.
-    others : tuple of (Setup, Family)
-        Further scenarios, or sensors with the same family on their own curves: a quantity counts with its worst value
-        over all.
-    """
+    """Maximize an objective over a box under constraints."""
 
     setup: Setup
     family: Family
@@ -91,15 +64,7 @@ class Problem:
     def n_scenes_of(self, quantity: str) -> int:
         """Return over how many of `scenes` a quantity is the worst.
 
-        Parameters
-        ----------
-        quantity : str
-            Column name.
-
-        Returns
-        -------
-        int
-            1 for quantities of a filter alone, which are the same in all scenarios of one sensor.
+        1 for quantities of a filter alone, which are the same in all scenarios of one sensor.
         """
         of_filter = self.quantities[quantity].needs in ("modified", "family") or quantity == CFA_SENSITIVITY
         one_sensor = all(family is self.family for _, family in self.others)
@@ -108,62 +73,21 @@ class Problem:
     def in_scenario(self, number: int) -> Problem:
         """Return the problem of one scenario or sensor.
 
-        Parameters
-        ----------
-        number : int
-            Its number: 0 is `setup`.
-
-        Returns
-        -------
-        Problem
-            Problem without other scenarios.
+        `number`: its number: 0 is `setup`. Returns problem without other scenarios.
         """
         setup, family = self.scenes[number]
         return replace(self, setup=setup, family=family, others=())
 
     def over_population(self, quantity: str) -> bool:
-        """Return whether a quantity is a worst case over the population of the lights.
-
-        Parameters
-        ----------
-        quantity : str
-            Column name.
-
-        Returns
-        -------
-        bool
-            True if it is.
-        """
+        """Return whether a quantity is a worst case over the population of the lights."""
         return self.population and self.worst_distance(quantity)
 
     def of_a_share(self, quantity: str) -> bool:
-        """Return whether a quantity is the value that a share of random lamps and cameras has.
-
-        Parameters
-        ----------
-        quantity : str
-            Column name.
-
-        Returns
-        -------
-        bool
-            True if it is.
-        """
+        """Return whether a quantity is the value that a share of random lamps and cameras has."""
         return self.quantities[quantity].extreme == OF_A_SHARE
 
     def worst_distance(self, quantity: str) -> bool:
-        """Return whether a quantity is the worst case of a CSD.
-
-        Parameters
-        ----------
-        quantity : str
-            Column name.
-
-        Returns
-        -------
-        bool
-            True if it is.
-        """
+        """Return whether a quantity is the worst case of a CSD."""
         requested = self.quantities[quantity]
         return requested.extreme == WORST_CASE and requested.distance_kind == DN
 
@@ -189,33 +113,11 @@ class Problem:
         return np.flatnonzero(self.high > self.low)
 
     def perturbed(self, quantity: str) -> tuple[ProductionError, ...]:
-        """Return the production errors over which a quantity is the smallest.
-
-        Parameters
-        ----------
-        quantity : str
-            Column name.
-
-        Returns
-        -------
-        tuple of Off
-            Production errors.
-        """
+        """Return the production errors over which a quantity is the smallest."""
         return self.tolerance.places if self.quantities[quantity].extreme == WORST_CASE else (AS_DESIGNED,)
 
     def from_unit(self, u: Float[Array, "*batch free"]) -> Float[Array, "*batch parameters"]:
-        """Convert free parameters in units of the box to parameters.
-
-        Parameters
-        ----------
-        u : ndarray of shape (..., n_free)
-            Free parameters in units of the box.
-
-        Returns
-        -------
-        ndarray of shape (..., n_parameters)
-            Parameters.
-        """
+        """Convert free parameters in units of the box to parameters."""
         x = np.broadcast_to(self.low, (*u.shape[:-1], self.low.size)).copy()
         # Clipped: low + 1 * (high - low) may round to above high.
         x[..., self.free] = np.clip(
@@ -226,18 +128,7 @@ class Problem:
         return x
 
     def to_unit(self, x: Float[Array, "*batch parameters"]) -> Float[Array, "*batch free"]:
-        """Convert parameters to free ones in units of the box, clipped to it.
-
-        Parameters
-        ----------
-        x : ndarray of shape (..., n_parameters)
-            Parameters.
-
-        Returns
-        -------
-        ndarray of shape (..., n_free)
-            Free parameters in units of the box.
-        """
+        """Convert parameters to free ones in units of the box, clipped to it."""
         low, span = self.low[self.free], (self.high - self.low)[self.free]
         return np.asarray(np.clip((x[..., self.free] - low) / span, 0.0, 1.0), dtype=float)
 
@@ -279,37 +170,14 @@ class SearchRun:
 def best_feasible(log: Sequence[Evaluation]) -> Evaluation | None:
     """Return the feasible evaluation with the largest objective, the first one on a tie.
 
-    Parameters
-    ----------
-    log : sequence of Evaluation
-        Evaluations.
-
-    Returns
-    -------
-    Evaluation or None
-        None if none is feasible.
+    None if none is feasible.
     """
     feasible = [e for e in log if e.feasible]
     return max(feasible, key=lambda e: e.objective, default=None)
 
 
 def starting_points(problem: Problem, starts: int, seed: int) -> Float[Array, "starts free"]:
-    """Return starting points from a scrambled Sobol sequence.
-
-    Parameters
-    ----------
-    problem : Problem
-        Search problem.
-    starts : int
-        Number of points.
-    seed : int
-        Seed.
-
-    Returns
-    -------
-    ndarray of shape (starts, n_free)
-        Points in units of the box.
-    """
+    """Return starting points from a scrambled Sobol sequence."""
     free = problem.free
     dimensions = problem.family.start_dimensions or max(1, free.size)
     points = sobol_points(dimensions, starts, seed)

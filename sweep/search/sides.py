@@ -29,21 +29,7 @@ _MET = 1e-7
 
 @dataclass(frozen=True)
 class Proof:
-    """Result of branch and bound, in the objective's unit.
-
-    Parameters
-    ----------
-    attained : float
-        Objective of `curve`.
-    curve : ndarray of shape (n_wavelengths,) or None
-        Best filter.
-    proven : float
-        Upper bound on any filter.
-    open_parts : int
-        Parts that were not closed.
-    parts : tuple of SideRegion
-        Parts that cover all filters, with their bounds.
-    """
+    """Result of branch and bound, in the objective's unit."""
 
     attained: float
     curve: PerWavelength | None
@@ -55,18 +41,6 @@ class Proof:
         """Return the upper bound at another least sensitivity.
 
         The weights of a linear program stay a proof where its right side changes, so this is a tangent, to `_NEAR`.
-
-        Parameters
-        ----------
-        program : FilterProgram
-            Linear programs of the proof.
-        sensitivity : float
-            Least sensitivity.
-
-        Returns
-        -------
-        float
-            Upper bound.
         """
         most = -np.inf
         for part in self.parts:
@@ -81,15 +55,7 @@ class Proof:
 
 @dataclass(frozen=True)
 class SideRegion:
-    """Part of the choices of sides.
-
-    Parameters
-    ----------
-    cap : float
-        Upper bound on its filters.
-    certificates : tuple of Certificate
-        Further bounds.
-    """
+    """Part of the choices of sides."""
 
     cap: float
     certificates: tuple[Certificate, ...] = ()
@@ -107,13 +73,7 @@ class _Conflicts:
         self._starts: list[int] = []
 
     def add(self, sides: Sides) -> None:
-        """Store a closed set of sides.
-
-        Parameters
-        ----------
-        sides : Sides
-            Sides.
-        """
+        """Store a closed set of sides."""
         if sides.pairs:
             self._starts.append(len(self._literals))
             self._literals += _literals(sides).tolist()
@@ -121,15 +81,7 @@ class _Conflicts:
     def applied(self, sides: Sides) -> Sides | None:
         """Return the sides with all that follow from them.
 
-        Parameters
-        ----------
-        sides : Sides
-            Sides.
-
-        Returns
-        -------
-        Sides or None
-            None if they are closed.
+        None if they are closed.
         """
         literals, starts = np.array(self._literals, dtype=np.intp), np.array(self._starts, dtype=np.intp)
         while starts.size:
@@ -155,10 +107,7 @@ def _literals(sides: Sides) -> Int[IndexArray, " literals"]:
 class SideSearch:
     """Branch and bound over the sides of a program's pairs.
 
-    Parameters
-    ----------
-    value : callable
-        Objective of a filter, moved inside the constraints by rounding; -inf if it does not meet them.
+    `value`: objective of a filter, moved inside the constraints by rounding; -inf if it does not meet them.
     """
 
     def __init__(
@@ -178,13 +127,7 @@ class SideSearch:
         self._curve: FloatArray | None = None
 
     def run(self) -> Proof:
-        """Close every part, the one with the largest bound first, within the number of programs.
-
-        Returns
-        -------
-        Proof
-            The proof.
-        """
+        """Close every part, the one with the largest bound first, within the number of programs."""
         if self._program.top < 0:
             return Proof(-np.inf, None, -np.inf, 0)
         self._offer(self._program.base)

@@ -53,25 +53,8 @@ def search_from(
 ) -> SearchRun:
     """Search from one starting point.
 
-    Parameters
-    ----------
-    problem : Problem
-        Search problem.
-    start : int
-        Number of the start, part of the seed of random algorithms.
-    u0 : ndarray of shape (n_free,)
-        Starting point in units of the box.
-    algorithm : str
-        Algorithm of nlopt.
-    max_evaluations : int
-        Simulations at most.
-    seed : int
-        Seed of random algorithms (ISRES).
-
-    Returns
-    -------
-    SearchRun
-        Log, with nlopt's status, or `settled` if a gradient search stayed at one point.
+    `max_evaluations`: simulations at most. Returns log, with nlopt's status, or `settled` if a gradient search stayed
+    at one point.
     """
     run = SearchRun(start)
     model = Model(problem, run, max_evaluations)
@@ -100,17 +83,7 @@ def search_from(
 def refinement_of(problem: Problem, algorithm: str) -> str | None:
     """Return the gradient algorithm that continues from the best point of a derivative-free search.
 
-    Parameters
-    ----------
-    problem : Problem
-        Search problem.
-    algorithm : str
-        Algorithm of the search.
-
-    Returns
-    -------
-    str or None
-        None for a search by gradients, and where a quantity has no derivatives.
+    None for a search by gradients, and where a quantity has no derivatives.
     """
     names = (*problem.objective.weights, *problem.constraints)
     refined = algorithm in DIRECT and all(problem.quantities[name].slopes for name in names)
@@ -118,38 +91,12 @@ def refinement_of(problem: Problem, algorithm: str) -> str | None:
 
 
 def smooth_evaluation(problem: Problem, x: PerParameter) -> Evaluation:
-    """Return one design's objective, sensitivities and violation before clipping and quantization.
-
-    Parameters
-    ----------
-    problem : Problem
-        Search problem.
-    x : ndarray of shape (n_parameters,)
-        Parameters.
-
-    Returns
-    -------
-    Evaluation
-        Values.
-    """
+    """Return one design's objective, sensitivities and violation before clipping and quantization."""
     return Model(problem, SearchRun(0), 1).at(problem.to_unit(x)).evaluation
 
 
 def smooth_objective(problem: Problem, x: PerParameter) -> float:
-    """Return the objective of one design before clipping and quantization.
-
-    Parameters
-    ----------
-    problem : Problem
-        Search problem.
-    x : ndarray of shape (n_parameters,)
-        Parameters.
-
-    Returns
-    -------
-    float
-        Objective.
-    """
+    """Return the objective of one design before clipping and quantization."""
     return smooth_evaluation(problem, x).objective
 
 
@@ -226,21 +173,8 @@ def _direct(problem: Problem, model: Model, first: Point, u0: PerFree, algorithm
 def extreme_value(problem: Problem, quantity: str, starts: Float[Array, "starts free"], max_evaluations: int) -> float:
     """Return the extreme of a quantity in the box without other constraints.
 
-    Parameters
-    ----------
-    problem : Problem
-        Search problem.
-    quantity : str
-        Column name.
-    starts : ndarray of shape (n, n_free)
-        Starting points in units of the box.
-    max_evaluations : int
-        Simulations of each start at most.
-
-    Returns
-    -------
-    float
-        Largest value if the study asks for a minimum, else the smallest one.
+    `max_evaluations`: simulations of each start at most. Returns largest value if the study asks for a minimum, else
+    the smallest one.
     """
     alone = replace(problem, constraints={quantity: problem.constraints[quantity]})
     definition = problem.quantities[quantity]

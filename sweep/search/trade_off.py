@@ -30,18 +30,7 @@ _NO_LIMIT = 0.05
 class FrontPoint:
     """Best design with at least one level of sensitivity.
 
-    Parameters
-    ----------
-    level : float
-        Least sensitivity.
-    best : Evaluation or None
-        Best design; None if none was found.
-    runs : tuple of SearchRun
-        Searches.
-    limit : Limit or None
-        Upper bound.
-    onward : tuple of (float, float)
-        Sensitivities up to the next level, and the upper bound at each.
+    `best`: best design; None if none was found.
     """
 
     level: float
@@ -55,18 +44,7 @@ class FrontPoint:
 class Effort:
     """Effort of a search.
 
-    Parameters
-    ----------
-    algorithm : str
-        Algorithm of nlopt.
-    starts : ndarray of shape (n_starts, n_free)
-        Starting points in units of the box.
-    evaluations : int
-        Simulations of each start at most.
-    seed : int
-        Seed of random algorithms.
-    refinement : str, optional
-        Algorithm that continues from the best points.
+    `evaluations`: simulations of each start at most.
     """
 
     algorithm: str
@@ -79,19 +57,7 @@ class Effort:
 def check_proof(best: Evaluation | None, limit: Limit | None, where: str = "") -> None:
     """Raise an error if a design of the search exceeds the upper bound.
 
-    Parameters
-    ----------
-    best : Evaluation or None
-        Answer of the search.
-    limit : Limit or None
-        Upper bound.
-    where : str
-        Scene, for the message.
-
-    Raises
-    ------
-    UpperBoundExceededError
-        If it does.
+    Raises UpperBoundExceededError if it does.
     """
     if best is not None and limit is not None:
         check_bound(best.objective, limit.proven, where)
@@ -100,40 +66,13 @@ def check_proof(best: Evaluation | None, limit: Limit | None, where: str = "") -
 def gap_of(best: Evaluation, limit: Limit) -> float | None:
     """Return the relative gap of an answer to the upper bound.
 
-    Parameters
-    ----------
-    best : Evaluation
-        Answer of the search.
-    limit : Limit
-        Upper bound.
-
-    Returns
-    -------
-    float or None
-        None if the bound is within its own accuracy of 0.
+    None if the bound is within its own accuracy of 0.
     """
     return None if limit.proven <= _NO_LIMIT else gap_between(best.objective, limit.proven)
 
 
 def calls_at_levels(problem: Problem, levels: Sequence[float], effort: Effort, *, limited: bool) -> list[Call]:
-    """Return the independent calls: the upper bound and the first searches at each level.
-
-    Parameters
-    ----------
-    problem : Problem
-        Search problem.
-    levels : sequence of float
-        Least sensitivities.
-    effort : Effort
-        Effort of each search.
-    limited : bool
-        The problem has an upper bound.
-
-    Returns
-    -------
-    list of Call
-        Calls.
-    """
+    """Return the independent calls: the upper bound and the first searches at each level."""
     if not levels:
         return []
     at_level = [with_least(problem, SENSITIVITY, level) for level in levels]
@@ -152,20 +91,7 @@ def calls_at_levels(problem: Problem, levels: Sequence[float], effort: Effort, *
 
 
 def most_searches(n_levels: int, n_starts: int, *, refined: bool) -> int:
-    """Return the largest number of searches of `trade_off`.
-
-    Parameters
-    ----------
-    n_levels, n_starts : int
-        Numbers of levels and starts.
-    refined : bool
-        Another algorithm continues from the best points.
-
-    Returns
-    -------
-    int
-        Searches.
-    """
+    """Return the largest number of searches of `trade_off`."""
     return n_levels * (min(n_starts, _FRONT_STARTS) + refined) + 2 * max(0, n_levels - 1)
 
 
@@ -183,32 +109,7 @@ def trade_off(
 
     A refinement begins at the level's own answer, too.
 
-    Parameters
-    ----------
-    problem : Problem
-        Search problem.
-    levels : sequence of float
-        Least sensitivities.
-    effort : Effort
-        Effort of each search.
-    answers : iterator
-        Answers of `calls_at_levels`.
-    parallel : callable
-        Runs further calls on the cores.
-    progress : callable
-        Called with a phase, work done and work in total.
-    limited : bool
-        The problem has an upper bound.
-
-    Returns
-    -------
-    tuple of FrontPoint
-        One point per level.
-
-    Raises
-    ------
-    UpperBoundExceededError
-        If a design exceeds its upper bound.
+    Returns one point per level. Raises UpperBoundExceededError if a design exceeds its upper bound.
     """
     limits: list[Limit | None] = [*islice(answers, len(levels))] if limited else [None] * len(levels)
     runs: list[list[SearchRun]] = [[] for _ in levels]
@@ -267,22 +168,7 @@ def _tangents(
 
 
 def with_least(problem: Problem, name: str, level: float) -> Problem:
-    """Return the problem with a least value of a quantity; a smaller upper bound on it is dropped.
-
-    Parameters
-    ----------
-    problem : Problem
-        Search problem.
-    name : str
-        Column name.
-    level : float
-        Least value.
-
-    Returns
-    -------
-    Problem
-        The problem.
-    """
+    """Return the problem with a least value of a quantity; a smaller upper bound on it is dropped."""
     given = problem.constraints.get(name)
     top = None if given is None or given.max is None or given.max < level else given.max
     return replace(problem, constraints={**problem.constraints, name: Bound(min=level, max=top)})

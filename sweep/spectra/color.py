@@ -23,15 +23,7 @@ class ColorRegion:
     def violation(self, xy: Float[Array, "colors 2"]) -> Float[Array, " colors"]:
         """Return the distance of points beyond the bounds.
 
-        Parameters
-        ----------
-        xy : ndarray of shape (n, 2)
-            Chromaticities.
-
-        Returns
-        -------
-        ndarray of shape (n,)
-            Distance in x, y; inside where <= 0.
+        Inside where <= 0.
         """
         a, b, c = np.array(self.bounds).T
         return np.asarray((xy[:, :1] * a + xy[:, 1:] * b - c).max(axis=1), dtype=float)
@@ -64,18 +56,7 @@ def _observer(grid: WavelengthGrid) -> Float[Array, "4 wavelengths"]:
 
 
 def color_matching(grid: WavelengthGrid) -> Float[Array, "3 wavelengths"]:
-    """Return the CIE 1931 2 degree color-matching functions.
-
-    Parameters
-    ----------
-    grid : WavelengthGrid
-        Wavelengths, nm.
-
-    Returns
-    -------
-    ndarray of shape (3, n_wavelengths)
-        x, y and z.
-    """
+    """Return the CIE 1931 2 degree color-matching functions."""
     return _observer(grid)[:3]
 
 
@@ -94,17 +75,7 @@ def luminance_per_photon_radiance(
 ) -> Float[Array, " spectra"]:
     """Return the luminance per photon radiance: L = 683 integral(V h c / lambda S) d lambda, S in photons per nm.
 
-    Parameters
-    ----------
-    grid : WavelengthGrid
-        Wavelengths, nm.
-    photons : ndarray of shape (n, n_wavelengths)
-        Spectra that integrate to one photon.
-
-    Returns
-    -------
-    ndarray of shape (n,)
-        cd/m2 per photon/s/sr/m2; 0 for spectra outside VISIBLE_NM.
+    `photons`: spectra that integrate to one photon. Returns cd/m2 per photon/s/sr/m2. 0 for spectra outside VISIBLE_NM.
     """
     power = energy_from_photons(grid.nodes_nm, photons)
     return np.asarray(LUMINOUS_EFFICACY_LM_W * grid.integrate(power * _observer(grid)[3]), dtype=float)
@@ -113,38 +84,18 @@ def luminance_per_photon_radiance(
 def chromaticity(grid: WavelengthGrid, photons: Float[Array, "spectra wavelengths"]) -> Float[Array, "spectra 2"]:
     """Return CIE 1931 x, y of photon spectra.
 
-    Parameters
-    ----------
-    grid : WavelengthGrid
-        Wavelengths, nm.
-    photons : ndarray of shape (n, n_wavelengths)
-        Photon spectra, photons per nm.
-
-    Returns
-    -------
-    ndarray of shape (n, 2)
-        Chromaticities; NaN for invisible spectra.
+    `photons`: photon spectra, photons per nm. NaN for invisible spectra.
     """
     xyz = energy_from_photons(grid.nodes_nm, photons) @ color_matching(grid).T
     return np.asarray(xyz[:, :2] / xyz.sum(axis=1, keepdims=True), dtype=float)
 
 
 def display_colors(grid: WavelengthGrid, photons: Float[Array, "spectra wavelengths"]) -> Float[Array, "spectra 3"]:
-    """Return sRGB colors to draw lights with, as bright as their hues allow.
+    """Return sRGB colors to draw lights with, as bright as their hues allow, 0 to 1.
 
     Saturated lights are outside sRGB; negative primaries are clipped. Invisible spectra are gray.
 
-    Parameters
-    ----------
-    grid : WavelengthGrid
-        Wavelengths, nm.
-    photons : ndarray of shape (n, n_wavelengths)
-        Photon spectra, photons per nm.
-
-    Returns
-    -------
-    ndarray of shape (n, 3)
-        sRGB, 0 to 1.
+    `photons`: photon spectra, photons per nm.
     """
     xyz = energy_from_photons(grid.nodes_nm, photons) @ color_matching(grid).T
     seen = xyz.max(axis=1) > 0
@@ -156,18 +107,7 @@ def display_colors(grid: WavelengthGrid, photons: Float[Array, "spectra waveleng
 
 
 def srgb_gamma(linear: SameShape) -> SameShape:
-    """Return sRGB values of linear ones (IEC 61966-2-1).
-
-    Parameters
-    ----------
-    linear : ndarray
-        0 to 1.
-
-    Returns
-    -------
-    ndarray of the same shape
-        0 to 1.
-    """
+    """Return sRGB values of linear ones (IEC 61966-2-1), 0 to 1."""
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
 
 
@@ -207,20 +147,7 @@ NORM_NAMES: Mapping[str, str] = {"en_12368": "EN 12368", "ite": "ITE (1985, 1998
 
 
 def corners(*points: tuple[float, float], source: str) -> ColorRegion:
-    """Return the convex region with some corners.
-
-    Parameters
-    ----------
-    *points : tuple of float
-        Corners (x, y), in either order of rotation.
-    source : str
-        Source.
-
-    Returns
-    -------
-    ColorRegion
-        Region.
-    """
+    """Return the convex region with some corners."""
     area = sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(points, (*points[1:], points[0]), strict=True))
     ordered = points if area > 0 else points[::-1]
     bounds = []

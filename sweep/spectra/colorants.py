@@ -29,18 +29,8 @@ GAUSSIAN = 4 * math.log(2)
 class Colorants:
     """Absorption spectra with a peak of 1, and what was not read.
 
-    Parameters
-    ----------
-    names : tuple of str
-        Names.
-    absorbance : ndarray of shape (n_colorants, n_wavelengths)
-        Absorbance relative to the peak of the whole spectrum, which may lie outside the wavelength grid.
-    peaks : ndarray of shape (n_colorants,)
-        Value of the file at the peak: l/(mol cm) for molar extinction.
-    refused : tuple of str
-        Name and reason of each spectrum that was left out.
-    notes : tuple of str
-        Changes of spectra that were read.
+    `absorbance`: absorbance relative to the peak of the whole spectrum, which may lie outside the wavelength grid;
+    `refused`: name and reason of each spectrum that was left out.
     """
 
     names: tuple[str, ...]
@@ -62,16 +52,6 @@ def modeled_colorants(grid: WavelengthGrid) -> Colorants:
     """Return modeled absorption bands with peaks at 560 to 700 nm and widths of 30, 40 and 50 nm.
 
     Gaussians in wavenumber (Siano and Metzler, J. Chem. Phys. 51, 1856, 1969), with widths in nm at the peak.
-
-    Parameters
-    ----------
-    grid : WavelengthGrid
-        Wavelengths, nm.
-
-    Returns
-    -------
-    Colorants
-        Catalog.
     """
     bands = [(float(peak), float(fwhm)) for peak in _PEAKS_NM for fwhm in _FWHM_NM]
     peak_nm, fwhm_nm = np.array(bands).T[:, :, None]
@@ -86,16 +66,6 @@ def measured_films(grid: WavelengthGrid) -> Colorants:
     4 pi k d / (ln 10 l), the absorbance of a pure film of d = 0.8 um, by the extinction coefficient k of light at
     normal incidence in the database refractiveindex.info (CC0): Seckin et al., ACS Appl. Mater. Interfaces 15, 43124,
     2023; Kamptner et al., ChemPhysChem, e202400233, 2024; Bernhardt et al., Aggregate, e698, 2024.
-
-    Parameters
-    ----------
-    grid : WavelengthGrid
-        Wavelengths, nm.
-
-    Returns
-    -------
-    Colorants
-        Catalog.
     """
     films = read_colorants([_FILMS], grid)
     return replace(films, names=tuple(name.removeprefix(f"{_FILMS.stem} ") for name in films.names))
@@ -107,22 +77,7 @@ def read_colorants(places: Sequence[Path], grid: WavelengthGrid) -> Colorants:
     Negative values of up to 2 % of the peak become 0. A spectrum that ends inside the grid is 0 from there on, if it
     ends below 2 % of its peak.
 
-    Parameters
-    ----------
-    places : sequence of Path
-        Files and folders.
-    grid : WavelengthGrid
-        Wavelengths, nm.
-
-    Returns
-    -------
-    Colorants
-        Catalog.
-
-    Raises
-    ------
-    DataError
-        If no spectrum can be read, or there are more than 10,000.
+    Raises DataError if no spectrum can be read, or there are more than 10,000.
     """
     names: list[str] = []
     rows: list[FloatArray] = []

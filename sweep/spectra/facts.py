@@ -33,12 +33,7 @@ NORMALIZED = (
 class Curve:
     """Curve with its finite samples.
 
-    Parameters
-    ----------
-    name : str
-        Name.
-    wavelength_nm, values : ndarray of shape (n,)
-        Samples, wavelengths increasing; n >= 0.
+    `wavelength_nm`, `values`: samples, wavelengths increasing; n >= 0.
     """
 
     name: str
@@ -66,15 +61,7 @@ class Curve:
     def on(self, grid: WavelengthGrid) -> PerWavelength:
         """Return the curve over its largest value.
 
-        Parameters
-        ----------
-        grid : WavelengthGrid
-            Wavelengths, nm.
-
-        Returns
-        -------
-        ndarray of shape (n_wavelengths,)
-            Relative values; 0 where the curve is negative or has no samples.
+        0 where the curve is negative or has no samples.
         """
         if self.values.size < 2 or not self.peak > 0:
             return np.zeros(grid.size)
@@ -123,18 +110,7 @@ class Facts:
         return bool(lit) and fits
 
     def colors(self, quantity: LightUnit) -> Mapping[str, LightColor | None]:
-        """Return the color of each curve read as a light.
-
-        Parameters
-        ----------
-        quantity : {'energy', 'photons'}
-            Unit of the values.
-
-        Returns
-        -------
-        dict of str to LightColor or None
-            Colors.
-        """
+        """Return the color of each curve read as a light."""
         return {curve.name: curve.color(quantity) for curve in self.curves}
 
 
@@ -153,20 +129,7 @@ def facts_of(scan: Scan) -> Facts:
 
 
 def notes(facts: Facts, *, as_qe: bool) -> list[str]:
-    """Return notes on readable curves.
-
-    Parameters
-    ----------
-    facts : Facts
-        Facts of the file.
-    as_qe : bool
-        Curves are QE.
-
-    Returns
-    -------
-    list of str
-        Notes.
-    """
+    """Return notes on readable curves."""
     lines = []
     wave = facts.samples_nm
     if wave.size and (wave[0] > _NEEDED.start_nm or wave[-1] < _NEEDED.stop_nm):
@@ -192,34 +155,12 @@ def notes(facts: Facts, *, as_qe: bool) -> list[str]:
 
 
 def is_normalized_response(top: float) -> bool:
-    """Return whether QE curves are relative responses: no pixel has a QE of just 1.
-
-    Parameters
-    ----------
-    top : float
-        Largest value.
-
-    Returns
-    -------
-    bool
-        True if they are.
-    """
+    """Return whether QE curves are relative responses: no pixel has a QE of just 1."""
     return abs(top - 1) <= _NEARLY
 
 
 def merge_equal_issues(issues: Sequence[ValidationIssue]) -> list[ValidationIssue]:
-    """Combine equal issues of many columns to one, with their number and the first place.
-
-    Parameters
-    ----------
-    issues : sequence of ValidationIssue
-        Faults.
-
-    Returns
-    -------
-    list of Fault
-        Faults.
-    """
+    """Combine equal issues of many columns to one, with their number and the first place."""
     alike: dict[tuple[str, str | None], list[ValidationIssue]] = {}
     for issue in issues:
         alike.setdefault((issue.problem, issue.key), []).append(issue)

@@ -21,18 +21,7 @@ _HEADER_BYTES = 116
 
 
 def unique_names(names: Iterable[str]) -> list[str]:
-    """Return stripped one-line names; a repeated one gets a number.
-
-    Parameters
-    ----------
-    names : iterable of str
-        Names.
-
-    Returns
-    -------
-    list of str
-        Names.
-    """
+    """Return stripped one-line names; a repeated one gets a number."""
     unique: list[str] = []
     for name in names:
         plain = " ".join(name.split()) or "_"
@@ -45,20 +34,7 @@ def unique_names(names: Iterable[str]) -> list[str]:
 
 
 def csv_text(wavelength_nm: PerWavelength, curves: Mapping[str, PerWavelength]) -> str:
-    """Return curves as CSV that `read_curves` reads back exactly.
-
-    Parameters
-    ----------
-    wavelength_nm : ndarray of shape (n_wavelengths,)
-        Wavelengths, nm.
-    curves : mapping of str to ndarray of shape (n_wavelengths,)
-        Curves.
-
-    Returns
-    -------
-    str
-        Text.
-    """
+    """Return curves as CSV that `read_curves` reads back exactly."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([WAVELENGTH, *unique_names(curves)])
@@ -69,17 +45,8 @@ def csv_text(wavelength_nm: PerWavelength, curves: Mapping[str, PerWavelength]) 
 def color_hints(channels: Sequence[str], bases: Mapping[str, str]) -> list[str]:
     """Return ISETCam's hint letter for each channel of a CFA, each used once (`k` when all are used).
 
-    Parameters
-    ----------
-    channels : sequence of str
-        Channels; `C` is the clear pixel, ISETCam's `w`; `Cy` is its `c`.
-    bases : mapping of str to str
-        Modified channel to the replaced curve, whose color it takes if that is free.
-
-    Returns
-    -------
-    list of str
-        Letters.
+    `channels`: channels; `C` is the clear pixel, ISETCam's `w`; `Cy` is its `c`; `bases`: modified channel to the
+    replaced curve, whose color it takes if that is free.
     """
     hints: dict[str, str] = {}
     for channel in sorted(channels, key=lambda channel: channel in bases):  # a plain channel keeps its own letter
@@ -97,20 +64,7 @@ def _column_hint(name: str) -> str:
 
 
 def filter_names(hints: Sequence[str], channels: Iterable[str]) -> list[str]:
-    """Return the names of ISETCam's filters: hint letter and channel.
-
-    Parameters
-    ----------
-    hints : sequence of str
-        Letters.
-    channels : iterable of str
-        Channels.
-
-    Returns
-    -------
-    list of str
-        Names.
-    """
+    """Return the names of ISETCam's filters: hint letter and channel."""
     return [hint + name for hint, name in zip(hints, unique_names(channels), strict=True)]
 
 
@@ -126,23 +80,7 @@ def isetcam_mat(
     Variables: `wavelength` (a column, nm), `data` (n_wavelengths x n_filters), `filterNames` (a cell array: hint and
     name), `filterOrder` (the tile, from 1 on), `comment`. Equal filters give equal bytes.
 
-    Parameters
-    ----------
-    wavelength_nm : ndarray of shape (n_wavelengths,)
-        Wavelengths, nm.
-    curves : mapping of str to ndarray of shape (n_wavelengths,)
-        QE of each channel, clipped to 1, since ISETCam rescales larger values.
-    hints : sequence of str
-        Hint letters.
-    tile : ndarray of int, shape (rows, columns)
-        Channel indices.
-    comment : str
-        Comment.
-
-    Returns
-    -------
-    bytes
-        File.
+    `curves`: QE of each channel, clipped to 1, since ISETCam rescales larger values.
     """
     from scipy.io import savemat  # noqa: PLC0415  (slow to import, seldom needed)
 

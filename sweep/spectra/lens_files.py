@@ -38,23 +38,9 @@ class ChiefRays:
 def read_chief_rays(path: Path, corner_mm: float | None = None) -> ChiefRays:
     """Read a table of image height and chief ray angle, from the center of the sensor to its corner or beyond.
 
-    Parameters
-    ----------
-    path : Path
-        File.
-    corner_mm : float, optional
-        Image height of the corner, mm; left out, the last row. Heights are in mm, percent or relative, by
-        the head of their column.
-
-    Returns
-    -------
-    ChiefRays
-        Angles.
-
-    Raises
-    ------
-    DataError
-        If the file cannot be read or is not clean, with file, line, column and value.
+    `corner_mm`: image height of the corner, mm; left out, the last row. Heights are in mm, percent or relative, by the
+    head of their column. Raises DataError if the file cannot be read or is not clean, with file, line, column and
+    value.
     """
     table = text_sheet(path, f"a header `{_FIRST},...` and rows of numbers")
     unit, column = _columns(table)

@@ -17,36 +17,12 @@ Pair = tuple[str, str]
 
 
 def class_pairs(classes: Sequence[str]) -> tuple[Pair, ...]:
-    """Return all unordered pairs of signal types.
-
-    Parameters
-    ----------
-    classes : sequence of str
-        Signal types.
-
-    Returns
-    -------
-    tuple of pair
-        Pairs in the order of the types.
-    """
+    """Return all unordered pairs of signal types."""
     return tuple(combinations(classes, 2))
 
 
 def pair_name(what: str, pair: Pair) -> str:
-    """Return the column name of a pair: `what_a_b`.
-
-    Parameters
-    ----------
-    what : str
-        Metric.
-    pair : tuple of str
-        Signal types.
-
-    Returns
-    -------
-    str
-        Text.
-    """
+    """Return the column name of a pair: `what_a_b`."""
     return f"{what}_{pair[0]}_{pair[1]}"
 
 
@@ -54,22 +30,8 @@ def pair_name(what: str, pair: Pair) -> str:
 class Lights:
     """Signals with equal photon counts.
 
-    Parameters
-    ----------
-    name : str
-        Data set.
-    names, types : tuple of str
-        Name and signal type of each signal, grouped by type.
-    photons : ndarray of shape (n_signals, n_wavelengths)
-        Spectra that integrate to 1.
-    photon_ratio : float
-        Photons of a signal patch over those of the white patch (K).
-    source : str
-        Source.
-    surrogate : bool
-        True for modeled spectra.
-    population : Population, optional
-        Lamps that they stand for.
+    `photons`: spectra that integrate to 1; `photon_ratio`: photons of a signal patch over those of the white patch (K);
+    `surrogate`: True for modeled spectra.
     """
 
     name: str
@@ -98,18 +60,6 @@ def peak_normalized_ratio(grid: WavelengthGrid, photons: Float[Array, "signals w
 
     Photons of a spectrum with peak 1 over those of a flat white of height 1 on the same grid: equivalent bandwidth
     over the span of the grid.
-
-    Parameters
-    ----------
-    grid : WavelengthGrid
-        Wavelengths, nm.
-    photons : ndarray of shape (n_signals, n_wavelengths)
-        Spectra in any scale.
-
-    Returns
-    -------
-    float
-        K.
     """
     peak_one = photons / photons.max(axis=1, keepdims=True)
     return float(np.median(grid.integrate(peak_one))) / (grid.size * grid.step_nm)
@@ -126,30 +76,8 @@ def make_lights(
 ) -> Lights:
     """Group photon spectra into a data set with equal photon counts.
 
-    Parameters
-    ----------
-    grid : WavelengthGrid
-        Wavelengths, nm.
-    name : str
-        Data set.
-    signals : list of (name, type, ndarray of shape (n_wavelengths,))
-        Spectra.
-    source : str
-        Source.
-    photon_ratio : float, optional
-        K; left out, that of peak-normalized spectra.
-    surrogate : bool
-        True for modeled spectra.
-
-    Returns
-    -------
-    Lights
-        Lights.
-
-    Raises
-    ------
-    DataError
-        If a light has no photons on the grid.
+    `photon_ratio`: K; left out, that of peak-normalized spectra; `surrogate`: True for modeled spectra. Raises
+    DataError if a light has no photons on the grid.
     """
     photons = equal_photons(grid, np.stack([spectrum for _, _, spectrum in signals]))
     ratio = peak_normalized_ratio(grid, photons) if photon_ratio is None else photon_ratio

@@ -31,14 +31,8 @@ _Point = tuple[float, float]
 class ShiftRegion:
     """Triangles of the shifts of two lights that occur together, in steps of the grid from the first shift.
 
-    Parameters
-    ----------
-    cells : ndarray of int, shape (n, 2)
-        Whole steps below each triangle.
-    shares : ndarray of shape (n, 3, 2)
-        Corners above these, 0 to 1.
-    along : ndarray of shape (n,)
-        Position along the region's length, 0 to 1.
+    `cells`: whole steps below each triangle; `shares`: corners above these, 0 to 1; `along`: position along the
+    region's length, 0 to 1.
     """
 
     cells: Int[IndexArray, "cells 2"]
@@ -76,82 +70,26 @@ class Members:
         return {name: np.asarray(rows, dtype=np.intp) for name, rows in starts.items()}
 
     def signal(self, row: int) -> int:
-        """Return the signal of a spectrum.
-
-        Parameters
-        ----------
-        row : int
-            Index of its first spectrum.
-
-        Returns
-        -------
-        int
-            Signal.
-        """
+        """Return the signal of a spectrum."""
         return row // (len(self.population.width) * self.n_steps)
 
     def steps_of(self, shift_nm: PerValue) -> PerValue:
         """Return the steps of a shift after the first one.
 
-        Parameters
-        ----------
-        shift_nm : ndarray
-            Shifts, nm.
-
-        Returns
-        -------
-        ndarray of the same shape
-            Steps, 0 or more.
+        Returns steps, 0 or more.
         """
         return np.asarray(np.clip(shift_nm / self._step_nm - self._first, 0.0, self.n_steps - 1), dtype=float)
 
     def shift_nm(self, cell: int, share: float) -> float:
-        """Return a shift.
-
-        Parameters
-        ----------
-        cell : int
-            Whole steps after the first one.
-        share : float
-            Share of the next step.
-
-        Returns
-        -------
-        float
-            Shift, nm.
-        """
+        """Return a shift."""
         return (self._first + cell + share) * self._step_nm
 
     def drift_and_independent(self, signal: int) -> tuple[float, tuple[float, float]]:
-        """Return drift and independent shifts of a signal.
-
-        Parameters
-        ----------
-        signal : int
-            Signal.
-
-        Returns
-        -------
-        drift, shifts : float, tuple of float
-            nm/K, and range of shifts by binning and ageing, nm.
-        """
+        """Return drift and independent shifts of a signal, nm."""
         return _drift_and_independent(self._lights, self.population, signal)
 
     def regions(self, pair: Pair) -> tuple[list[ShiftRegion], Int[IndexArray, "first second"]]:
-        """Return the distinct regions of two types, and the region of each two signals and widths.
-
-        Parameters
-        ----------
-        pair : tuple of str
-            Signal types.
-
-        Returns
-        -------
-        regions : list of ShiftRegion
-            Regions.
-        which : ndarray of int, shape (n_first, n_second)
-            Index of the region.
-        """
+        """Return the distinct regions of two types, and the region of each two signals and widths."""
         first, second = (self.rows[name] for name in pair)
         known: dict[int, int] = {}
         regions: list[ShiftRegion] = []
@@ -166,18 +104,7 @@ class Members:
         return regions, indices
 
     def region(self, one: int, other: int) -> ShiftRegion:
-        """Return the shifts of two signals that occur together.
-
-        Parameters
-        ----------
-        one, other : int
-            Signals.
-
-        Returns
-        -------
-        ShiftRegion
-            Shifts.
-        """
+        """Return the shifts of two signals that occur together."""
         (a, own_a), (b, own_b) = self.drift_and_independent(one), self.drift_and_independent(other)
         key = (a, *own_a, b, *own_b)
         if key not in self._regions:
@@ -189,20 +116,7 @@ class Members:
 
 
 def spans_nm(lights: Lights, population: Population) -> list[tuple[float, float]]:
-    """Return the range of shifts of each signal.
-
-    Parameters
-    ----------
-    lights : Lights
-        Signals.
-    population : Population
-        Population.
-
-    Returns
-    -------
-    list of tuple of float
-        Ranges, nm.
-    """
+    """Return the range of shifts of each signal."""
     spans = []
     for signal in range(len(lights.names)):
         drift, (low, high) = _drift_and_independent(lights, population, signal)
@@ -220,20 +134,7 @@ def _drift_and_independent(lights: Lights, population: Population, signal: int) 
 
 
 def moved(photons: PerWavelength, steps: int) -> PerWavelength:
-    """Return a spectrum shifted by whole steps toward the red.
-
-    Parameters
-    ----------
-    photons : ndarray of shape (n_wavelengths,)
-        Spectrum.
-    steps : int
-        Steps of the grid.
-
-    Returns
-    -------
-    ndarray of shape (n_wavelengths,)
-        Values.
-    """
+    """Return a spectrum shifted by whole steps toward the red."""
     shifted = np.zeros_like(photons)
     size = photons.size
     if abs(steps) < size:
@@ -242,22 +143,7 @@ def moved(photons: PerWavelength, steps: int) -> PerWavelength:
 
 
 def stretched(grid: WavelengthGrid, photons: PerWavelength, factor: float) -> PerWavelength:
-    """Return a spectrum stretched about its mean wavelength, with equal photons.
-
-    Parameters
-    ----------
-    grid : WavelengthGrid
-        Wavelengths, nm.
-    photons : ndarray of shape (n_wavelengths,)
-        Spectrum.
-    factor : float
-        Factor.
-
-    Returns
-    -------
-    ndarray of shape (n_wavelengths,)
-        Values.
-    """
+    """Return a spectrum stretched about its mean wavelength, with equal photons."""
     if factor == 1:
         return photons
     wave = grid.nodes_nm

@@ -124,18 +124,7 @@ class Population(Section):
         return low - self.reference_c, high + self.self_heating_k - self.reference_c
 
     def scaled(self, factor: float) -> Population:
-        """Return a population with scaled shifts.
-
-        Parameters
-        ----------
-        factor : float
-            Factor.
-
-        Returns
-        -------
-        Population
-            Population.
-        """
+        """Return a population with scaled shifts."""
         low, high = (self.reference_c + factor * warmer for warmer in self.warmer_k)
         update = {
             "temperature_c": (low, high),
@@ -148,17 +137,7 @@ class Population(Section):
     def temperature_of(self, kind: str, name: str, shift_nm: float) -> tuple[float, float]:
         """Return the range of junction temperatures at which a signal may be shifted by an amount.
 
-        Parameters
-        ----------
-        kind, name : str
-            Signal type and name of the signal.
-        shift_nm : float
-            Shift, nm.
-
-        Returns
-        -------
-        low_c, high_c : float
-            Temperatures, degrees Celsius.
+        Returns temperatures, degrees Celsius.
         """
         drift, (low, high) = self.drift(kind, name), self.independent_nm(kind, name)
         ends = self.warmer_k
@@ -170,31 +149,12 @@ class Population(Section):
     def drift(self, kind: str, name: str) -> float | None:
         """Return the drift of a signal.
 
-        Parameters
-        ----------
-        kind, name : str
-            Signal type and name of the signal.
-
-        Returns
-        -------
-        float or None
-            nm/K; None if neither the study nor a default states it.
+        Returns nm/K. None if neither the study nor a default states it.
         """
         return _of(self.drift_nm_per_k, kind, name, DRIFT_NM_PER_K.get(kind))
 
     def independent_nm(self, kind: str, name: str) -> tuple[float, float]:
-        """Return the range of shifts by binning and ageing alone.
-
-        Parameters
-        ----------
-        kind, name : str
-            Signal type and name of the signal.
-
-        Returns
-        -------
-        low_nm, high_nm : float
-            Range, nm.
-        """
+        """Return the range of shifts by binning and ageing alone."""
         binning = _of(self.binning_nm, kind, name, 0.0)
         low, high = _of(self.ageing_nm, kind, name, (0.0, 0.0))
         return low - binning, high + binning

@@ -27,20 +27,8 @@ LEAST_PURITY = 0.5
 class LightColor:
     """Color of one light.
 
-    Parameters
-    ----------
-    xy : tuple of float
-        CIE 1931, 2 degree observer.
-    dominant_nm : float or None
-        Dominant wavelength, nm; None for white and purple.
-    purity : float
-        Excitation purity, 1 on the spectral locus.
-    region : str or None
-        Region of the light.
-    nearest : str
-        Nearest region.
-    distance : float
-        Distance to it in x, y (0 inside).
+    `xy`: CIE 1931, 2 degree observer; `dominant_nm`: dominant wavelength, nm; None for white and purple; `purity`:
+    excitation purity, 1 on the spectral locus; `distance`: distance to it in x, y (0 inside).
     """
 
     xy: tuple[float, float]
@@ -65,15 +53,7 @@ class LightColor:
 def light_color(photons: Float[Array, " 471"]) -> LightColor | None:
     """Return the color of a photon spectrum.
 
-    Parameters
-    ----------
-    photons : ndarray of shape (471,)
-        Spectrum on VISIBLE.
-
-    Returns
-    -------
-    LightColor or None
-        None without visible light.
+    None without visible light.
     """
     peak = float(photons.max())
     if not peak > 0:
@@ -118,13 +98,7 @@ def _hue(xy: Float[Array, " 2"]) -> tuple[float, float | None]:
 
 @cache
 def spectral_locus() -> Float[Array, "471 2"]:
-    """Return the chromaticities of monochromatic light on VISIBLE.
-
-    Returns
-    -------
-    ndarray of shape (471, 2)
-        x, y.
-    """
+    """Return the chromaticities of monochromatic light on VISIBLE."""
     return chromaticity(VISIBLE, np.eye(VISIBLE.size))
 
 
@@ -133,16 +107,6 @@ def outline(kind: str) -> Float[Array, "corners 2"]:
     """Return the part of a color region that light can have, as a polygon.
 
     The spectral locus is cut at each bound (Sutherland and Hodgman, "Reentrant polygon clipping").
-
-    Parameters
-    ----------
-    kind : str
-        Signal type.
-
-    Returns
-    -------
-    ndarray of shape (n, 2)
-        Corners.
     """
     polygon = spectral_locus()
     for a, b, c in REGIONS[kind].bounds:
@@ -159,13 +123,7 @@ def outline(kind: str) -> Float[Array, "corners 2"]:
 
 @cache
 def dominant_ranges_nm() -> dict[str, tuple[float, float]]:
-    """Return the dominant wavelengths of each region; red is open.
-
-    Returns
-    -------
-    dict of str to tuple of float
-        Ranges of monochromatic light inside it, nm.
-    """
+    """Return the dominant wavelengths of each region; red is open."""
     spans = {}
     for kind, region in REGIONS.items():
         inside = VISIBLE.nodes_nm[region.violation(spectral_locus()) <= 0]
@@ -174,7 +132,7 @@ def dominant_ranges_nm() -> dict[str, tuple[float, float]]:
 
 
 def _distance(xy: Float[Array, " 2"], polygon: Float[Array, "corners 2"]) -> float:
-    """Return the distance from a point to a polygon's outline, ndarray[2] and ndarray[n, 2]."""
+    """Return the distance from a point to a polygon's outline and."""
     along = np.roll(polygon, -1, axis=0) - polygon
     length = (along**2).sum(axis=1)
     share = np.divide(((xy - polygon) * along).sum(axis=1), length, out=np.zeros_like(length), where=length > 0)

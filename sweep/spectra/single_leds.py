@@ -66,57 +66,33 @@ class RegionMap(Section):
 
     @property
     def peaks_nm(self) -> Float[Array, " peaks"]:
-        """Peaks, nm, ndarray of shape (n_peaks,)."""
+        """Peaks, nm."""
         return _steps(*self.peak_nm, self.peak_step_nm)
 
     @property
     def widths_nm(self) -> Float[Array, " widths"]:
-        """Full widths at half maximum, nm, ndarray of shape (n_widths,)."""
+        """Full widths at half maximum, nm."""
         return _steps(*self.fwhm_nm, self.fwhm_step_nm)
 
 
 @dataclass(frozen=True)
 class SingleLeds:
-    """LEDs by peak and full width at half maximum, nm, ndarray of shape (n,) each."""
+    """LEDs by peak and full width at half maximum, nm."""
 
     peak_nm: Float[Array, " leds"]
     fwhm_nm: Float[Array, " leds"]
 
     def photons(self, grid: WavelengthGrid) -> Float[Array, "leds wavelengths"]:
-        """Return photon spectra that integrate to 1 on the grid.
-
-        Parameters
-        ----------
-        grid : WavelengthGrid
-            Wavelengths, nm.
-
-        Returns
-        -------
-        ndarray of shape (n, n_wavelengths)
-            Photons per nm.
-        """
+        """Return photon spectra that integrate to 1 on the grid."""
         return equal_photons(grid, self._shapes(grid))
 
     def allowed(self, norm: Norm, kind: str) -> SingleLeds:
-        """Return the LEDs whose color is inside a norm's region.
-
-        Parameters
-        ----------
-        norm : str
-            Norm.
-        kind : str
-            Signal type.
-
-        Returns
-        -------
-        SingleLeds
-            LEDs.
-        """
+        """Return the LEDs whose color is inside a norm's region."""
         inside = SIGNAL_REGIONS[norm][kind].violation(chromaticity(VISIBLE, self._shapes(VISIBLE))) <= 0
         return SingleLeds(self.peak_nm[inside], self.fwhm_nm[inside])
 
     def _shapes(self, grid: WavelengthGrid) -> Float[Array, "leds wavelengths"]:
-        """Return photon spectra with a peak of 1, ndarray of shape (n, n_wavelengths)."""
+        """Return photon spectra with a peak of 1."""
         decays = self.fwhm_nm / _FWHM
         nodes = grid.nodes_nm
         shapes = [led_photons(nodes, peak, a, a) for peak, a in zip(self.peak_nm, decays, strict=True)]
@@ -124,18 +100,7 @@ class SingleLeds:
 
 
 def all_leds(requested: RegionMap) -> SingleLeds:
-    """Return all peaks with all widths.
-
-    Parameters
-    ----------
-    requested : RegionMap
-        Ranges.
-
-    Returns
-    -------
-    SingleLeds
-        LEDs.
-    """
+    """Return all peaks with all widths."""
     peaks, widths = np.meshgrid(requested.peaks_nm, requested.widths_nm, indexing="ij")
     return SingleLeds(peaks.ravel(), widths.ravel())
 

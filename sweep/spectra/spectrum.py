@@ -77,7 +77,7 @@ class WavelengthGrid(Section):
 
     @property
     def nodes_nm(self) -> PerWavelength:
-        """Wavelengths, nm, ndarray of shape (size,)."""
+        """Wavelengths, nm."""
         return self.start_nm + self.step_nm * np.arange(self.size, dtype=float)
 
     def integrate(self, values: Float[Array, "*batch nodes"]) -> SameShape:
@@ -145,21 +145,7 @@ class Curves:
     ) -> PerWavelength:
         """Resample a curve to a grid; see `resample`.
 
-        Parameters
-        ----------
-        grid : WavelengthGrid
-            Wavelengths, nm.
-        name : str
-            Name of the curve.
-        method : {'linear', 'mean'}
-            Resampling.
-        outside : {'refuse', 'zero'}
-            Values beyond the samples.
-
-        Returns
-        -------
-        ndarray of shape (n_wavelengths,)
-            Values.
+        `outside`: values beyond the samples.
         """
         try:
             return resample(*self.samples(name), grid, method, outside)
@@ -208,22 +194,7 @@ def _value_issues(wave: PerSample, data: PerSample) -> Iterator[ValidationIssue]
 def check_samples(wavelength_nm: ArrayLike, values: ArrayLike, *, signed: bool = False) -> tuple[PerSample, PerSample]:
     """Check samples of a curve.
 
-    Parameters
-    ----------
-    wavelength_nm, values : array-like of shape (n,)
-        Samples.
-    signed : bool
-        Values may be negative.
-
-    Returns
-    -------
-    wavelength_nm, values : ndarray of shape (n,)
-        Samples as floats.
-
-    Raises
-    ------
-    DataError
-        With one issue for everything that is wrong.
+    Raises DataError: with one issue for everything that is wrong.
     """
     wave = np.asarray(wavelength_nm, dtype=float)
     data = np.asarray(values, dtype=float)
@@ -266,26 +237,8 @@ def resample(
     which keeps the integral (of bins inside the samples) if the source is finer than the grid. Splines are not
     offered: they ring below zero at LED peaks.
 
-    Parameters
-    ----------
-    wavelength_nm, values : array-like of shape (n,)
-        Samples.
-    grid : WavelengthGrid
-        Wavelengths, nm.
-    method : {'linear', 'mean'}
-        Resampling.
-    outside : {'refuse', 'zero'}
-        If the samples end inside the grid: an error, or 0.
-
-    Returns
-    -------
-    ndarray of shape (n_wavelengths,)
-        Values.
-
-    Raises
-    ------
-    DataError
-        If samples are not clean, or end inside the grid with `refuse`.
+    `outside`: if the samples end inside the grid: an error, or 0. Raises DataError if samples are not clean, or end
+    inside the grid with `refuse`.
     """
     wave, data = check_samples(wavelength_nm, values)
     nodes = grid.nodes_nm
@@ -312,20 +265,7 @@ def resample(
 
 
 def integral_between(wavelength_nm: PerWavelength, values: PerWavelength, low_nm: float, high_nm: float) -> float:
-    """Return the integral of a curve, linear between its samples and 0 beyond them.
-
-    Parameters
-    ----------
-    wavelength_nm, values : ndarray of shape (n,)
-        Samples.
-    low_nm, high_nm : float
-        Range.
-
-    Returns
-    -------
-    float
-        Integral.
-    """
+    """Return the integral of a curve, linear between its samples and 0 beyond them."""
     ends = np.clip(np.array([low_nm, high_nm]), wavelength_nm[0], wavelength_nm[-1])
     return float(np.diff(_integral_to(wavelength_nm, values, ends))[0])
 
@@ -344,17 +284,7 @@ def photons_from_energy(
 ) -> Float[Array, "*batch wavelengths"]:
     """Convert spectral radiant energy to photons: Q lambda / (h c) (Planck).
 
-    Parameters
-    ----------
-    wavelength_nm : ndarray of shape (n_wavelengths,)
-        Wavelengths, nm.
-    energy : ndarray of shape (..., n_wavelengths)
-        Energy per nm.
-
-    Returns
-    -------
-    ndarray of the same shape
-        Photons per nm.
+    `energy`: energy per nm.
     """
     return energy * (wavelength_nm * 1e-9) / (PLANCK_J_S * LIGHT_M_S)
 
@@ -364,17 +294,7 @@ def energy_from_photons(
 ) -> Float[Array, "*batch wavelengths"]:
     """Convert photons to spectral radiant energy: Q h c / lambda (Planck).
 
-    Parameters
-    ----------
-    wavelength_nm : ndarray of shape (n_wavelengths,)
-        Wavelengths, nm.
-    photons : ndarray of shape (..., n_wavelengths)
-        Photons per nm.
-
-    Returns
-    -------
-    ndarray of the same shape
-        Energy per nm.
+    `photons`: photons per nm. Returns energy per nm.
     """
     return photons * (PLANCK_J_S * LIGHT_M_S) / (wavelength_nm * 1e-9)
 
@@ -384,22 +304,7 @@ def equal_photons(
 ) -> Float[Array, "*batch wavelengths"]:
     """Scale spectra to an integral of one photon.
 
-    Parameters
-    ----------
-    grid : WavelengthGrid
-        Wavelengths, nm.
-    photons : ndarray of shape (..., n_wavelengths)
-        Spectra.
-
-    Returns
-    -------
-    ndarray of the same shape
-        Scaled spectra.
-
-    Raises
-    ------
-    DataError
-        If a spectrum has no photons on the grid.
+    Raises DataError if a spectrum has no photons on the grid.
     """
     total = grid.integrate(photons)
     if not (total >= LEAST_PEAK).all():
@@ -415,17 +320,7 @@ def equal_photons(
 def linear_basis(at: Float[Array, " at"], knots: PerKnot) -> Float[Array, "knots at"]:
     """Return the linear basis of interpolation between knots; constant beyond the ends.
 
-    Parameters
-    ----------
-    at : ndarray of shape (n_at,)
-        Points.
-    knots : ndarray of shape (n_knots,)
-        Knots, ascending.
-
-    Returns
-    -------
-    ndarray of shape (n_knots, n_at)
-        Weights: any f of shape (..., n_knots) is f @ weights at the points.
+    `knots`: knots, ascending.
     """
     if knots.size == 1:
         return np.ones((1, at.size))

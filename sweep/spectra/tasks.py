@@ -41,17 +41,7 @@ ILLUMINANTS: Mapping[str, tuple[str, str]] = {
 
 @dataclass(frozen=True)
 class TaskColumns:
-    """Columns of a task in the result table.
-
-    Parameters
-    ----------
-    name : str
-        Name of the task, with which its columns begin.
-    metric : TaskMetric
-        Metric, which sets the figures.
-    lights : tuple of LightName
-        Lights under which the figures are computed; `("",)` for a task of lamps.
-    """
+    """Columns of a task in the result table."""
 
     name: str
     metric: TaskMetric
@@ -60,17 +50,7 @@ class TaskColumns:
     def column(self, figure: str, light: LightName = "") -> str:
         """Return the name of a column: `<task>_<figure>_<light>`, or `<task>_<figure>` without a light.
 
-        Parameters
-        ----------
-        figure : str
-            Key of a figure, such as `csd`.
-        light : LightName
-            Light; empty for a figure that depends on none.
-
-        Returns
-        -------
-        str
-            Column name.
+        `light`: light; empty for a figure that depends on none.
         """
         return "_".join(part for part in (self.name, figure, light) if part)
 
@@ -79,16 +59,9 @@ class TaskColumns:
 class Chart:
     """Patches of a chart under each light.
 
-    Parameters
-    ----------
-    photons : ndarray of shape (n_lights, n_patches, n_wavelengths)
-        Photon radiance of the patches at an illuminance of 1 lx, photons/s/sr/m2/nm.
-    gray : ndarray of shape (n_lights, n_wavelengths)
-        Photon radiance of an 18 % gray patch at 1 lx, photons/s/sr/m2/nm.
-    xyz : ndarray of shape (n_lights, n_patches, 3)
-        CIE 1931 tristimulus values of the patches, relative to Y = 1 of the perfect reflecting diffuser.
-    white : ndarray of shape (n_lights, 3)
-        CIE 1931 tristimulus values of the perfect reflecting diffuser, Y = 1.
+    `photons`: photon radiance of the patches at an illuminance of 1 lx, photons/s/sr/m2/nm; `gray`: photon radiance of
+    an 18 % gray patch at 1 lx, photons/s/sr/m2/nm; `xyz`: CIE 1931 tristimulus values of the patches, relative to Y = 1
+    of the perfect reflecting diffuser; `white`: CIE 1931 tristimulus values of the perfect reflecting diffuser, Y = 1.
     """
 
     photons: Float[Array, "lights patches wavelengths"]
@@ -103,18 +76,8 @@ class GriddedTask:
 
     A separation has `types` and `photons`; the other metrics have a `chart`.
 
-    Parameters
-    ----------
-    columns : TaskColumns
-        Columns of the task.
-    types : tuple of str
-        Class of each spectrum, n_spectra.
-    photons : ndarray of shape (n_lights, n_spectra, n_wavelengths), optional
-        Photon spectra, each scaled to an integral of 1 over the grid, 1/nm.
-    chart : Chart, optional
-        Test chart.
-    metamerism_chart : Chart, optional
-        Patches of ISO 17321-1 under D50, for the sensitivity metamerism index of a color task.
+    `photons`: photon spectra, each scaled to an integral of 1 over the grid, 1/nm; `metamerism_chart`: patches of ISO
+    17321-1 under D50, for the sensitivity metamerism index of a color task.
     """
 
     columns: TaskColumns
@@ -134,17 +97,7 @@ class GriddedTask:
 
 @dataclass(frozen=True)
 class Conditions:
-    """Conditions of all tasks.
-
-    Parameters
-    ----------
-    exposure_s : float
-        Exposure time, s.
-    read_noise_e : float
-        Read noise, electrons.
-    illuminance_lx : float
-        Illuminance on the charts, lx.
-    """
+    """Conditions of all tasks."""
 
     exposure_s: float
     read_noise_e: float
@@ -155,15 +108,8 @@ class Conditions:
 class StudyTasks:
     """Tasks of a study.
 
-    Parameters
-    ----------
-    conditions : Conditions
-        Conditions of all tasks.
-    tasks : tuple of GriddedTask
-        Built-in tasks, then the study's own.
-    from_files : mapping of (str, str) to ndarray of shape (n_wavelengths,)
-        Spectra read from the study's files, by (`<task> <class>`, `<file>:<column>`): reflectance, or relative
-        photons.
+    `tasks`: built-in tasks, then the study's own; `from_files`: spectra read from the study's files, by (`<task>
+    <class>`, `<file>:<column>`): reflectance, or relative photons.
     """
 
     conditions: Conditions

@@ -96,18 +96,7 @@ class ScenarioTemplate(Scene):
 
 
 def expanded(value: Any) -> Any:
-    """Replace scenarios that have `each: {key: values}` by one scenario per combination of values.
-
-    Parameters
-    ----------
-    value : mapping or any
-        Scenarios of a study, before validation.
-
-    Returns
-    -------
-    mapping or any
-        Scenarios named after their values; other values unchanged.
-    """
+    """Replace scenarios that have `each: {key: values}` by one scenario per combination of values."""
     if not isinstance(value, dict):
         return value
     scenarios: dict[str, Any] = {}
@@ -169,15 +158,7 @@ def _set(mapping: dict[str, Any], path: list[str], number: float) -> None:
 def series_of(scenarios: Iterable[str]) -> dict[tuple[str, str], dict[str, float]]:
     """Group scenarios that differ in a single number.
 
-    Parameters
-    ----------
-    scenarios : iterable of str
-        Names of scenarios.
-
-    Returns
-    -------
-    dict
-        (name, key) -> scenario -> number, in ascending order.
+    (name, key) -> scenario -> number, in ascending order.
     """
     groups: dict[tuple[str, str], dict[str, float]] = {}
     for name in scenarios:

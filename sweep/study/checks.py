@@ -38,15 +38,7 @@ _MOST_DESIGNS = 10**9
 
 
 def check_scenes(section: StudySection, sources: Sources) -> None:
-    """Check LED norms and that every target forms an image that can be computed.
-
-    Parameters
-    ----------
-    section : StudySection
-        The keys of the study, checked against the schema.
-    sources : Sources
-        Files, curves and the issues so far.
-    """
+    """Check LED norms and that every target forms an image that can be computed."""
     _check_regions(section, sources)
     for name, scene in section.scenarios.items():
         if (refused := psf.psf_problem(scene, section.pixel)) is not None:
@@ -71,21 +63,7 @@ def check_lights(
     requested: RequestedQuantities,
     sources: Sources,
 ) -> None:
-    """Check keys that name signal types or columns, or that need lamps.
-
-    Parameters
-    ----------
-    section : StudySection
-        The keys of the study, checked against the schema.
-    lights : Lights
-        The lights of the study.
-    mosaics : mapping of str to Mosaic
-        CFAs by name.
-    requested : RequestedQuantities
-        Quantities of the study.
-    sources : Sources
-        Files, curves and the issues so far.
-    """
+    """Check keys that name signal types or columns, or that need lamps."""
     _check_columns(requested, sources)
     _check_recognition(section, lights, sources)
     if section.validation is not None and section.validation.leave_one_out and section.search is None:
@@ -173,17 +151,7 @@ def _check_regions(section: StudySection, sources: Sources) -> None:
 def check_size(study: Study, sources: Sources) -> None:
     """Check that the kernels of every scene and CFA fit into memory.
 
-    Parameters
-    ----------
-    study : Study
-        The study.
-    sources : Sources
-        Files, curves and the issues so far.
-
-    Raises
-    ------
-    StudyError
-        If they do not fit.
+    Raises StudyError if they do not fit.
     """
     for name in study.scenarios:
         for space in study.spaces:
@@ -196,17 +164,7 @@ def check_size(study: Study, sources: Sources) -> None:
 def check_count(study: Study, sources: Sources) -> None:
     """Check that the study has designs, and not too many.
 
-    Parameters
-    ----------
-    study : Study
-        The study.
-    sources : Sources
-        Files, curves and the issues so far.
-
-    Raises
-    ------
-    StudyError
-        If it has none or too many.
+    Raises StudyError if it has none or too many.
     """
     if not study.n_designs and study.search is None:
         sources.add(("cfas",), "no designs", None, "a CFA with a curve for each channel, a design, a sweep or a search")

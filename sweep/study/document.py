@@ -85,34 +85,12 @@ class Tree:
     def place(self, node: Any, key: Key) -> Place | None:
         """Return the position of a mapping's key or of a list's entry in the file.
 
-        Parameters
-        ----------
-        node : mapping or list
-            Node of the document.
-        key : str or int
-            Key or index.
-
-        Returns
-        -------
-        Place or None
-            None if the file does not contain it.
+        None if the file does not contain it.
         """
         return self._lines[id(node)][1].get(key) if id(node) in self._lines else None
 
     def put(self, node: Any, key: Key, value: Any, place: Place) -> None:
-        """Set a mapping's key or a list's entry to a value from another position.
-
-        Parameters
-        ----------
-        node : mapping or list
-            Node of the document.
-        key : str or int
-            Key or index.
-        value : any
-            The value.
-        place : Place
-            Position of the value.
-        """
+        """Set a mapping's key or a list's entry to a value from another position."""
         node[key] = value
         self._lines.setdefault(id(node), (node, {}))[1][key] = place
 
@@ -198,20 +176,7 @@ class Tree:
 def yaml_text(data: Mapping[str, Any]) -> str:
     """Format keys with plain values as a YAML document.
 
-    Parameters
-    ----------
-    data : mapping
-        Keys of a study.
-
-    Returns
-    -------
-    str
-        The document.
-
-    Raises
-    ------
-    StudyError
-        If a value has no YAML form.
+    Raises StudyError if a value has no YAML form.
     """
     text = StringIO()
     yaml = YAML(typ="safe", pure=True)
@@ -244,17 +209,7 @@ class Document:
     def change(self, key: str, text: str) -> None:
         """Set a key, as the option `--set` does.
 
-        Parameters
-        ----------
-        key : str
-            Dotted key, `scenarios.near.distance_m`.
-        text : str
-            Value in YAML.
-
-        Raises
-        ------
-        StudyError
-            If the value cannot be set there.
+        Raises StudyError if the value cannot be set there.
         """
         option = f"--set {key}={text}"
         try:
@@ -279,32 +234,14 @@ class Document:
         self._tree.put(node, int(last) if isinstance(node, list) else last, value, option)
 
     def take(self, key: str, at: int, to: str) -> None:
-        """Set a key to an entry of another one's list, with its position.
-
-        Parameters
-        ----------
-        key : str
-            Key of the list.
-        at : int
-            Index of the entry.
-        to : str
-            Key to set.
-        """
+        """Set a key to an entry of another one's list, with its position."""
         entries = self.data[key]
         self._tree.put(self.data, to, entries[at], self._tree.place(entries, at) or self.place((key,)))
 
     def place(self, path: Sequence[Key]) -> Place:
         """Return the position of the deepest existing key of a path.
 
-        Parameters
-        ----------
-        path : sequence of str and int
-            Keys that lead to the value.
-
-        Returns
-        -------
-        Place
-            Position in the file, or the option that changed the key.
+        Returns position in the file, or the option that changed the key.
         """
         node: Any = self.data
         place: Place = 1
@@ -327,45 +264,13 @@ class Document:
         allowed: str | None = None,
         near: str | None = None,
     ) -> ValidationIssue:
-        """Create an issue with the position of a key.
-
-        Parameters
-        ----------
-        path : sequence of str and int
-            Keys that lead to the value.
-        problem : str
-            Description of the problem.
-        value : object
-            The value that was given.
-        allowed : str, optional
-            Allowed values.
-        near : str, optional
-            Nearest valid name.
-
-        Returns
-        -------
-        ValidationIssue
-            The issue.
-        """
+        """Create an issue with the position of a key."""
         place = None if self.file is None else self.place(path)
         file, line = (place, None) if isinstance(place, str) else (self.file, place)
         return ValidationIssue(problem, file, line, dotted(path), value, allowed, near)
 
     def issues(self, error: ValidationError, model: type[BaseModel]) -> list[ValidationIssue]:
-        """Convert pydantic's errors to issues of this file.
-
-        Parameters
-        ----------
-        error : pydantic.ValidationError
-            Errors of the validation.
-        model : type
-            Model that was validated, for the names of its keys.
-
-        Returns
-        -------
-        list of Fault
-            Sorted by line.
-        """
+        """Convert pydantic's errors to issues of this file."""
         issues: dict[tuple[KeyPath, str], ValidationIssue] = {}
         # A default that follows from other keys is no error of its own where these are wrong.
         items = [item for item in error.errors(include_url=False) if item["type"] != "default_factory_not_called"]
@@ -468,32 +373,13 @@ def _written(node: Any, key: Key) -> Key:
 def by_line(issues: Iterable[ValidationIssue]) -> list[ValidationIssue]:
     """Sort issues by line.
 
-    Parameters
-    ----------
-    issues : iterable of ValidationIssue
-        The issues.
-
-    Returns
-    -------
-    list of Fault
-        Sorted; issues without a line last.
+    Issues without a line last.
     """
     return sorted(issues, key=lambda issue: (issue.line is None, issue.file or "", issue.line or 0))
 
 
 def dotted(path: Sequence[Key]) -> str:
-    """Format a path of keys: `sweeps.main.grid`, `sensor.files[0].file`.
-
-    Parameters
-    ----------
-    path : sequence of str and int
-        Keys that lead to the value.
-
-    Returns
-    -------
-    str
-        The dotted key.
-    """
+    """Format a path of keys: `sweeps.main.grid`, `sensor.files[0].file`."""
     return "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path).removeprefix(".")
 
 

@@ -36,17 +36,7 @@ _LEAST_ERROR = 1e-12
 
 
 def check_goals(section: StudySection, sources: Sources, requested: RequestedQuantities) -> None:
-    """Check that objective and constraints name quantities the study has.
-
-    Parameters
-    ----------
-    section : StudySection
-        The keys of the study, checked against the schema.
-    sources : Sources
-        Files, curves and the issues so far.
-    requested : RequestedQuantities
-        Quantities of the study, and the states they are computed for.
-    """
+    """Check that objective and constraints name quantities the study has."""
     known, rule = quantities_of(requested), section.objective.rule
     counted = [name for name in section.objective.weights if name in known and known[name].role == "separation"]
     if counted and not all(scene.equal_photons for scene in section.scenarios.values()):
@@ -133,19 +123,7 @@ def _names(what: str, requested: RequestedQuantities) -> list[str]:
 def search_of(section: StudySection, spaces: Sequence[Space], sources: Sources) -> Search | None:
     """Construct the search of a study.
 
-    Parameters
-    ----------
-    section : StudySection
-        The keys of the study, checked against the schema.
-    spaces : sequence of Space
-        Design spaces of the study.
-    sources : Sources
-        Files, curves and the issues so far.
-
-    Returns
-    -------
-    Search or None
-        None if the study has no search, or after adding issues.
+    None if the study has no search, or after adding issues.
     """
     requested = section.search
     if requested is None:
@@ -237,19 +215,7 @@ def _map_of(requested: Mapping[str, Axis], space: Space, sources: Sources) -> di
 
 
 def check_searched(section: StudySection, space: Space, known: Mapping[str, Quantity], sources: Sources) -> None:
-    """Check that the searched family has the constrained quantities and suits the objective.
-
-    Parameters
-    ----------
-    section : StudySection
-        The keys of the study, checked against the schema.
-    space : Space
-        Design space of the search.
-    known : mapping of str to Quantity
-        Quantities by name.
-    sources : Sources
-        Files, curves and the issues so far.
-    """
+    """Check that the searched family has the constrained quantities and suits the objective."""
     assert space.filter is not None
     assert section.search is not None
     dimensions, goals = space.filter.family.dimensions, section.objective.weights
@@ -290,19 +256,7 @@ def unreachable_constraints(study: Study, space: Space, scenario: str) -> list[V
     distance
     between digital numbers. A constraint that is not listed may still be infeasible.
 
-    Parameters
-    ----------
-    study : Study
-        The study.
-    space : Space
-        Design space.
-    scenario : str
-        Name of the scenario.
-
-    Returns
-    -------
-    list of Fault
-        One per constraint.
+    Returns one per constraint.
     """
     issues = []
     most = dict(_most(study, space, scenario))

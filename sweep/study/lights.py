@@ -36,22 +36,7 @@ _LEAST_VISIBLE = 1e-6
 def with_light_files(section: StudySection, sources: Sources) -> StudySection:
     """Read the files of lights; the colors of their columns define signal types.
 
-    Parameters
-    ----------
-    section : StudySection
-        The keys of the study, checked against the schema.
-    sources : Sources
-        Files, curves and the issues so far.
-
-    Returns
-    -------
-    StudySection
-        The study with spectra instead of file names.
-
-    Raises
-    ------
-    StudyError
-        If a file cannot be used.
+    Returns the study with spectra instead of file names. Raises StudyError if a file cannot be used.
     """
 
     def read(lights: LightsSection, path: KeyPath) -> LightsSection:
@@ -106,24 +91,7 @@ def _built_in(section: LightsSection, sources: Sources, at: KeyPath) -> Lights |
 def lights_of(section: LightsSection, sources: Sources, at: KeyPath = ("lights",)) -> Lights | None:
     """Construct the lights of a section.
 
-    Parameters
-    ----------
-    section : LightsSection
-        Keys of the lights.
-    sources : Sources
-        Files, curves and the issues so far.
-    at : sequence of str and int
-        Keys that lead to the section.
-
-    Returns
-    -------
-    Lights or None
-        None after adding issues.
-
-    Raises
-    ------
-    StudyError
-        With every issue so far, if the study cannot be used.
+    Raises StudyError: with every issue so far, if the study cannot be used.
     """
     section = offered_curves(sources, at, section, "sweep.lights", BUILT_IN_LIGHTS)
     if section.builtin is not None:
@@ -164,22 +132,7 @@ def lights_of(section: LightsSection, sources: Sources, at: KeyPath = ("lights",
 
 
 def with_population(lights: Lights, section: StudySection, sources: Sources) -> Lights:
-    """Add the lamp population that the study defines.
-
-    Parameters
-    ----------
-    lights : Lights
-        Lights of the study.
-    section : StudySection
-        The keys of the study, checked against the schema.
-    sources : Sources
-        Files, curves and the issues so far.
-
-    Returns
-    -------
-    Lights
-        Lights with their population; issues are added to `sources`.
-    """
+    """Add the lamp population that the study defines."""
     population, at = section.population, ("population",)
     if population is None:
         return lights
@@ -218,17 +171,7 @@ def check_range(study: Study, sources: Sources) -> None:
 
     Worst cases over a population are computed for a response without saturation.
 
-    Parameters
-    ----------
-    study : Study
-        The study.
-    sources : Sources
-        Files, curves and the issues so far.
-
-    Raises
-    ------
-    StudyError
-        If a lamp saturates.
+    Raises StudyError if a lamp saturates.
     """
     if study.lights.population is None:
         return
@@ -247,17 +190,7 @@ def check_range(study: Study, sources: Sources) -> None:
 
 
 def check_luminances(section: StudySection, lights: Lights, sources: Sources) -> None:
-    """Check that luminances are given only for visible lights and backgrounds.
-
-    Parameters
-    ----------
-    section : StudySection
-        The keys of the study, checked against the schema.
-    lights : Lights
-        Lights of the study.
-    sources : Sources
-        Files, curves and the issues so far.
-    """
+    """Check that luminances are given only for visible lights and backgrounds."""
     nodes = section.wavelengths.nodes_nm
     visible = (nodes >= VISIBLE_NM[0]) & (nodes <= VISIBLE_NM[1])
     share = section.wavelengths.integrate(lights.photons * visible)

@@ -31,25 +31,9 @@ def load_study(
 ) -> Study:
     """Read and check a study file.
 
-    Parameters
-    ----------
-    path
-        The study file.
-    data
-        Folder in which the files that it names are looked for first; then beside the study.
-    kept
-        Curves on that grid to take instead of those in files.
-    changes
-        Dotted key -> value to take instead, as a study file would have it.
-    allow_code
-        Code that the study names may run, or only code with these digests.
-    member
-        One of several sensors or light sets.
-
-    Raises
-    ------
-    StudyError
-        With one issue per problem: file:line, key, value, allowed values, nearest name.
+    `kept`: curves on that grid to take instead of those in files; `changes`: dotted key -> value to take instead, as a
+    study file would have it. Raises StudyError: with one issue per problem: file:line, key, value, allowed values,
+    nearest name.
     """
     document = _changed(path, changes)
     members = members_of(document)
@@ -75,22 +59,8 @@ def load_study(
 def sensor_studies_in(path: Path, changes: Mapping[str, str] = {}) -> SensorStudies | None:
     """Return the sensors and light sets of a study file; None if it is a plain study.
 
-    Parameters
-    ----------
-    path : Path
-        The study file.
-    changes : mapping of str to str
-        Dotted key -> value to take instead, as a study file would have it.
-
-    Returns
-    -------
-    SensorStudies or None
-        The study.
-
-    Raises
-    ------
-    StudyError
-        If the file is no YAML, or its lists have no names.
+    `changes`: dotted key -> value to take instead, as a study file would have it. Raises StudyError if the file is no
+    YAML, or its lists have no names.
     """
     document = _changed(path, changes)
     members = members_of(document)
@@ -110,26 +80,7 @@ def study_of_keys(
 ) -> Study:
     """Construct a study from keys instead of a file.
 
-    Parameters
-    ----------
-    keys : mapping
-        The keys of a study, with plain values.
-    folder : Path
-        Folder of relative file names.
-    given : mapping of str to Curves
-        Curves for file names that are not on disk.
-    allow_code : bool
-        Run Python files that the study names.
-
-    Returns
-    -------
-    Study
-        The study.
-
-    Raises
-    ------
-    StudyError
-        As `load_study`, without file and line.
+    `folder`: folder of relative file names. Raises StudyError as `load_study`, without file and line.
     """
     document = Document(keys)
     section = _checked(document)
@@ -145,17 +96,6 @@ def _checked(document: Document) -> StudySection:
 
 
 def folder_name(study_name: str) -> str:
-    """Return a valid folder name for the results of a study.
-
-    Parameters
-    ----------
-    study_name : str
-        Name of the study.
-
-    Returns
-    -------
-    str
-        The name, with `_` for everything except letters, digits, `-`, `_` and `.`.
-    """
+    """Return a valid folder name for the results of a study."""
     name = re.sub(r"[^a-zA-Z0-9_.-]", "_", study_name)
     return name if name.strip(".") else "_"

@@ -151,20 +151,7 @@ class Study:
         return self.n_filters * len(self.scenarios)
 
     def setup(self, space: Space, scenario: str) -> Setup:
-        """Return the setup shared by the designs of a space.
-
-        Parameters
-        ----------
-        space : Space
-            Design space.
-        scenario : str
-            Name of the scenario.
-
-        Returns
-        -------
-        Setup
-            Camera, scene and plan.
-        """
+        """Return the setup shared by the designs of a space."""
         bases = {} if space.filter is None else space.filter.bases
         technology = None if space.filter is None else space.filter.technology
         setup = self.setup_of(space.cfa, scenario, bases, technology)
@@ -184,21 +171,7 @@ class Study:
     ) -> Setup:
         """Return the setup of a CFA.
 
-        Parameters
-        ----------
-        cfa : str
-            Name of the CFA.
-        scenario : str
-            Name of the scenario.
-        bases : mapping of str to str
-            Modified channel -> curve that it replaces.
-        technology : Technology, optional
-            Filter technology of the modified channels.
-
-        Returns
-        -------
-        Setup
-            Camera, scene and plan.
+        `bases`: modified channel -> curve that it replaces.
         """
         mosaic, scene = self.mosaics[cfa], self.scenarios[scenario]
         replaced = {**self.section.cfas[cfa].curves, **bases}
@@ -226,35 +199,11 @@ class Study:
         )
 
     def pixel_in(self, scene: Scene) -> Pixel:
-        """Return the study's pixel with the noise of a scene.
-
-        Parameters
-        ----------
-        scene : Scene
-            The scene.
-
-        Returns
-        -------
-        Pixel
-            The pixel.
-        """
+        """Return the study's pixel with the noise of a scene."""
         return self.pixel if scene.noise is None else scene.noise.of(self.pixel)
 
     def box(self, space: Space, scenario: str) -> Box:
-        """Return the parameter range of a space, for a plan of the scenario.
-
-        Parameters
-        ----------
-        space : Space
-            Design space.
-        scenario : str
-            Name of the scenario.
-
-        Returns
-        -------
-        Box
-            Largest and smallest curves of the designs.
-        """
+        """Return the parameter range of a space, for a plan of the scenario."""
         setup = self.setup(space, scenario).with_all_effects
         low, high = setup.camera.qe.copy(), setup.camera.qe.copy()
         if space.filter is not None:
@@ -268,22 +217,8 @@ class Study:
     def plan(self, scenario: str, tolerance_dn: float | None = None) -> Plan:
         """Plan which effects a scene is simulated with.
 
-        Parameters
-        ----------
-        scenario : str
-            Name of the scenario.
-        tolerance_dn : float, optional
-            Tolerance in DN; that of the study by default.
-
-        Returns
-        -------
-        Plan
-            The plan, for all designs of the study.
-
-        Raises
-        ------
-        StudyError
-            If numbers that are valid one by one overflow together.
+        `tolerance_dn`: tolerance in DN; that of the study by default. Raises StudyError if numbers that are valid one
+        by one overflow together.
         """
         tolerance_dn = self.section.tolerance_dn if tolerance_dn is None else tolerance_dn
         searched = None if self.search is None or scenario not in self.search.scenarios else self.search.space
@@ -298,36 +233,12 @@ class Study:
     def with_plans(self, tolerance_dn: float | None = None) -> Study:
         """Plan all scenarios.
 
-        Parameters
-        ----------
-        tolerance_dn : float, optional
-            Tolerance in DN; that of the study by default.
-
-        Returns
-        -------
-        Study
-            The study with its plans.
-
-        Raises
-        ------
-        StudyError
-            As `plan`.
+        `tolerance_dn`: tolerance in DN; that of the study by default. Raises StudyError as `plan`.
         """
         return replace(self, plans={name: self.plan(name, tolerance_dn) for name in self.scenarios})
 
     def problem(self, search: Search) -> Problem:
-        """Formulate the search as an optimization problem.
-
-        Parameters
-        ----------
-        search : Search
-            The search.
-
-        Returns
-        -------
-        Problem
-            Objective, constraints and box.
-        """
+        """Formulate the search as an optimization problem."""
         assert search.space.filter is not None
         return Problem(
             setup=self.setup(search.space, search.scenario),
@@ -360,24 +271,7 @@ class Study:
 def requested_quantities(
     section: StudySection, lights: Lights, tasks: StudyTasks | None, user_metrics: tuple[UserMetric, ...]
 ) -> RequestedQuantities:
-    """Return the quantities that a study computes, as far as its lights and tasks determine them.
-
-    Parameters
-    ----------
-    section : StudySection
-        The keys of the study, checked against the schema.
-    lights : Lights
-        Lights of the study.
-    tasks : StudyTasks or None
-        Tasks of the study.
-    user_metrics : tuple of UserMetric
-        Metrics of the user.
-
-    Returns
-    -------
-    RequestedQuantities
-        The quantities.
-    """
+    """Return the quantities that a study computes, as far as its lights and tasks determine them."""
     recognition = section.recognition
     return RequestedQuantities(
         lights.classes,

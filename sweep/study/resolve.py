@@ -24,22 +24,7 @@ _Made = TypeVar("_Made")
 def resolve(section: StudySection, sources: Sources) -> Study:
     """Construct the study that validated keys describe.
 
-    Parameters
-    ----------
-    section : StudySection
-        The keys of the study, checked against the schema.
-    sources : Sources
-        Files, curves and the issues so far.
-
-    Returns
-    -------
-    Study
-        The study.
-
-    Raises
-    ------
-    StudyError
-        With every issue so far, if the study cannot be used.
+    Raises StudyError: with every issue so far, if the study cannot be used.
     """
 
     def attempt(make: Callable[[], _Made]) -> _Made | None:

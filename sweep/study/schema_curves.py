@@ -135,34 +135,12 @@ class LightsSection(Section):
 
 
 def named(names: Iterable[str]) -> Any:
-    """Return the type of a built-in name, with the choices that editors complete.
-
-    Parameters
-    ----------
-    names : iterable of str
-        Built-in names.
-
-    Returns
-    -------
-    type
-        String type; installed packages may provide more names.
-    """
+    """Return the type of a built-in name, with the choices that editors complete."""
     return Annotated[str, WithJsonSchema({"anyOf": [{"type": "string", "enum": list(names)}, {"type": "string"}]})]
 
 
 def builtin(value: Any) -> Any:
-    """Read a plain name as `{builtin: NAME}`.
-
-    Parameters
-    ----------
-    value : any
-        Value of the key.
-
-    Returns
-    -------
-    any
-        The mapping; other values unchanged.
-    """
+    """Read a plain name as `{builtin: NAME}`."""
     return {"builtin": value} if isinstance(value, str) else value
 
 
@@ -181,34 +159,12 @@ _TaskName = Annotated[str, Field(min_length=1, max_length=40, pattern="^[a-z][a-
 
 
 def listed(value: Any) -> Any:
-    """Read a single entry as a list of one.
-
-    Parameters
-    ----------
-    value : any
-        Value of the key.
-
-    Returns
-    -------
-    any
-        The list.
-    """
+    """Read a single entry as a list of one."""
     return value if isinstance(value, list) else [value]
 
 
 def catalog(value: Any) -> Any:
-    """Read a name, or a list of names, as `{catalog: [...]}`.
-
-    Parameters
-    ----------
-    value : any
-        Value of the key.
-
-    Returns
-    -------
-    any
-        The mapping; other values unchanged.
-    """
+    """Read a name, or a list of names, as `{catalog: [...]}`."""
     return {"catalog": listed(value)} if isinstance(value, str | list) else value
 
 

@@ -22,12 +22,7 @@ _SPACES = ("cfas", "designs", "sweeps", "boxes")
 class SensorAndLights(NamedTuple):
     """One sensor under one set of lights.
 
-    Parameters
-    ----------
-    sensor, lights : str
-        Names.
-    indices : tuple of (int, int)
-        Their places in the lists of the study; -1 where there is no list.
+    `indices`: their places in the lists of the study; -1 where there is no list.
     """
 
     sensor: str
@@ -50,20 +45,7 @@ class SensorStudies(NamedTuple):
 def members_of(document: Document) -> list[SensorAndLights]:
     """Return the sensors and lights of a study, each pair once; a plain study has one member.
 
-    Parameters
-    ----------
-    document : Document
-        Study file.
-
-    Returns
-    -------
-    list of SensorAndLights
-        Members.
-
-    Raises
-    ------
-    StudyError
-        If `sensors` stands beside `sensor`, or a list is empty, too long, or names one twice.
+    Raises StudyError if `sensors` stands beside `sensor`, or a list is empty, too long, or names one twice.
     """
     data = document.data
     if data.get("sensors") is not None and "sensor" in data:
@@ -94,18 +76,7 @@ def _name(entry: Any, key: str, at: int) -> str:
 
 
 def way_to_one(document: Document) -> str:
-    """Return the options that choose a member.
-
-    Parameters
-    ----------
-    document : Document
-        Study file.
-
-    Returns
-    -------
-    str
-        Text.
-    """
+    """Return the options that choose a member."""
     options = []
     for key in ("sensors", "lights"):
         entries = document.data.get(key)
@@ -118,12 +89,7 @@ def way_to_one(document: Document) -> str:
 def choose(document: Document, member: SensorAndLights) -> None:
     """Leave one sensor and one set of lights in a document.
 
-    Parameters
-    ----------
-    document : Document
-        Study file; changed in place.
-    member : SensorAndLights
-        SensorAndLights.
+    `document`: study file; changed in place.
     """
     for key, to, at in (("sensors", "sensor", member.indices[0]), ("lights", "lights", member.indices[1])):
         if at >= 0:
@@ -134,19 +100,7 @@ def choose(document: Document, member: SensorAndLights) -> None:
 def narrowed(section: StudySection, member: SensorAndLights) -> tuple[StudySection, list[str]]:
     """Return a member's study: the wavelengths that its curves have, and the CFAs that the sensor has.
 
-    Parameters
-    ----------
-    section : StudySection
-        The whole study with this member's sensor and lights.
-    member : SensorAndLights
-        SensorAndLights.
-
-    Returns
-    -------
-    section : StudySection
-        Its study.
-    notes : list of str
-        What was left out.
+    `section`: the whole study with this member's sensor and lights. Returns `notes`: what was left out.
     """
     grid, notes = section.wavelengths, list[str]()
     ends = [_MEASURED[n].range_nm for n in (section.sensor.builtin, section.lights.builtin) if n in _MEASURED]

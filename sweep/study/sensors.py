@@ -31,22 +31,7 @@ def sensor_of(section: SensorSection, sources: Sources) -> SensorCurves | None:
     file
     replaces that of the built-in sensor.
 
-    Parameters
-    ----------
-    section : SensorSection
-        Keys of the sensor.
-    sources : Sources
-        Files, curves and the issues so far.
-
-    Returns
-    -------
-    SensorCurves or None
-        None after adding issues.
-
-    Raises
-    ------
-    StudyError
-        With every issue so far, if the study cannot be used.
+    Raises StudyError: with every issue so far, if the study cannot be used.
     """
     section = offered_curves(sources, ("sensor",), section, "sweep.sensors", BUILT_IN_SENSORS)
     made = _sensor(section, sources)
@@ -162,17 +147,7 @@ def _columns(
 def with_chief_rays(section: StudySection, sources: Sources) -> StudySection:
     """Read the files of lenses.
 
-    Parameters
-    ----------
-    section : StudySection
-        The keys of the study, checked against the schema.
-    sources : Sources
-        Files, curves and the issues so far.
-
-    Returns
-    -------
-    StudySection
-        The study with chief ray angles instead of file names; issues are added to `sources`.
+    Returns the study with chief ray angles instead of file names.
     """
     scenarios = dict(section.scenarios)
     read: dict[tuple[str, float | None], SensorField] = {}
@@ -201,22 +176,7 @@ def _moves(sensor: SensorCurves, curve: str) -> bool:
 
 
 def with_technologies(sensor: SensorCurves, section: StudySection, sources: Sources) -> SensorCurves:
-    """Add the filter technologies that the study states.
-
-    Parameters
-    ----------
-    sensor : SensorCurves
-        Sensor of the study.
-    section : StudySection
-        The keys of the study, checked against the schema.
-    sources : Sources
-        Files, curves and the issues so far.
-
-    Returns
-    -------
-    SensorCurves
-        The sensor with them; issues are added to `sources`.
-    """
+    """Add the filter technologies that the study states."""
     clear = sensor.curve(sensor.clear)
     kind = "clear" if sensor.has_clear else "brightest"
     stated = replace(sensor, technologies=section.sensor.technology)
@@ -231,19 +191,7 @@ def with_technologies(sensor: SensorCurves, section: StudySection, sources: Sour
 
 
 def check_filter(space: Space, path: KeyPath, sensor: SensorCurves, sources: Sources) -> None:
-    """Check that the base of a filter is no interference filter and that no filter exceeds its base.
-
-    Parameters
-    ----------
-    space : Space
-        Design space of the filter.
-    path : sequence of str and int
-        Keys that lead to the value.
-    sensor : SensorCurves
-        Sensor of the study.
-    sources : Sources
-        Files, curves and the issues so far.
-    """
+    """Check that the base of a filter is no interference filter and that no filter exceeds its base."""
     made = space.filter
     assert made is not None
     for base in dict.fromkeys(made.bases.values()):
@@ -261,19 +209,7 @@ def check_filter(space: Space, path: KeyPath, sensor: SensorCurves, sources: Sou
 
 
 def check_lenses(section: StudySection, sensor: SensorCurves, spaces: Sequence[Space], sources: Sources) -> None:
-    """Check that no ray reaches interference filters at grazing angles.
-
-    Parameters
-    ----------
-    section : StudySection
-        The keys of the study, checked against the schema.
-    sensor : SensorCurves
-        Sensor of the study.
-    spaces : sequence of Space
-        Design spaces.
-    sources : Sources
-        Files, curves and the issues so far.
-    """
+    """Check that no ray reaches interference filters at grazing angles."""
     filters = [space.filter.technology for space in spaces if space.filter is not None]
     if all(t is None or t.interference is None for t in (*filters, *sensor.technologies.values())):
         return
@@ -284,19 +220,7 @@ def check_lenses(section: StudySection, sensor: SensorCurves, spaces: Sequence[S
 
 
 def check_uncertainty(section: StudySection, sensor: SensorCurves, spaces: Sequence[Space], sources: Sources) -> None:
-    """Check that uncertain curves are of filters that do not move, and say where an IR cut is not known.
-
-    Parameters
-    ----------
-    section : StudySection
-        The keys of the study, checked against the schema.
-    sensor : SensorCurves
-        Sensor of the study.
-    spaces : sequence of Space
-        Design spaces.
-    sources : Sources
-        Files, curves and the issues so far.
-    """
+    """Check that uncertain curves are of filters that do not move, and say where an IR cut is not known."""
     if section.uncertainty is None:
         return
     filters = [space.filter.technology for space in spaces if space.filter is not None]

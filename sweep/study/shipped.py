@@ -34,20 +34,7 @@ def shipped_names() -> list[str]:
 def study_path(given: Path) -> Path:
     """Find a study file by its path, or by its name in `studies/` and the package.
 
-    Parameters
-    ----------
-    given : Path
-        Path or name.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    StudyError
-        If there is none; names the nearest.
+    Raises StudyError if there is none; names the nearest.
     """
     name = given.name
     if is_file(given) or is_folder(given) or name != str(given) or given.suffix in _KINDS:

@@ -79,74 +79,23 @@ class Sources:
     def add(
         self, path: KeyPath, problem: str, value: object = None, allowed: str | None = None, near: str | None = None
     ) -> None:
-        """Add an issue.
-
-        Parameters
-        ----------
-        path : sequence of str and int
-            Keys that lead to the value.
-        problem : str
-            Description of the problem.
-        value : object
-            The value that was given.
-        allowed : str, optional
-            Allowed values.
-        near : str, optional
-            Nearest valid name.
-        """
+        """Add an issue."""
         self.issues.append(self.document.issue(path, problem, value, allowed, near))
 
     def add_error(self, path: KeyPath, error: SweepError) -> None:
-        """Add the issues of an error.
-
-        Parameters
-        ----------
-        path : sequence of str and int
-            Keys that lead to the value.
-        error : SweepError
-            The error.
-        """
+        """Add the issues of an error."""
         for issue in error.issues:
             problem = f"{issue.file}: {issue.problem}" if issue.file else issue.problem
             self.add(path, problem, issue.value, issue.allowed, issue.nearest)
 
     def unknown(self, path: KeyPath, what: str, value: str, known: Iterable[str], others: Iterable[str] = ()) -> None:
-        """Add an issue for an unknown name.
-
-        Parameters
-        ----------
-        path : sequence of str and int
-            Keys that lead to the value.
-        what : str
-            Kind of the name, for the message.
-        value : str
-            The name.
-        known : iterable of str
-            Valid names.
-        others : iterable of str
-            Further names to suggest.
-        """
+        """Add an issue for an unknown name."""
         known = list(known)
         near = nearest(value, [*known, *others]) if len(self.issues) < MOST_ISSUES else None
         self.add(path, f"unknown {what}", value, ", ".join(known), near)
 
     def fits(self, path: KeyPath, what: str, count: int) -> bool:
-        """Return True if curves on the wavelength grid fit into memory; add an issue otherwise.
-
-        Parameters
-        ----------
-        path : sequence of str and int
-            Keys that lead to the value.
-        what : str
-            Kind of the curves, for the message.
-        count : int
-            Number of curves.
-
-        Returns
-        -------
-        bool
-            True if they fit.
-        """
+        """Return True if curves on the wavelength grid fit into memory; add an issue otherwise."""
         most = _MOST_VALUES // self.grid.size
         if count > most:
             self.add(path, f"too many {what} for a grid of {self.grid.size:,} wavelengths", count, f"at most {most:,}")
@@ -173,18 +122,7 @@ class Sources:
             return None
 
     def in_built_in_range(self, what: str) -> bool:
-        """Return True if the wavelength grid lies inside that of the built-in curves; add one issue otherwise.
-
-        Parameters
-        ----------
-        what : str
-            Kind of the curves, for the message.
-
-        Returns
-        -------
-        bool
-            True if it does.
-        """
+        """Return True if the wavelength grid lies inside that of the built-in curves; add one issue otherwise."""
         low, high = BUILT_IN_RANGE_NM
         inside = low <= self.grid.start_nm < self.grid.stop_nm <= high
         grid = f"{self.grid.start_nm:g} to {self.grid.stop_nm:g} nm"
@@ -198,21 +136,7 @@ class Sources:
     ) -> PerWavelength | None:
         """Return the photon spectrum of a light; warn about photons outside the wavelength grid or between its nodes.
 
-        Parameters
-        ----------
-        path : sequence of str and int
-            Keys that lead to the value.
-        curves : Curves or None
-            Curves of the file.
-        column : str
-            Column of the light.
-        entry : LightFile or TaskFile
-            Keys of the file.
-
-        Returns
-        -------
-        ndarray of shape (n_wavelengths,) or None
-            Relative photons per nm; None after adding issues.
+        Returns relative photons per nm. None after adding issues.
         """
         values = self.column(path, curves, column, entry)
         if values is None or curves is None:
@@ -244,24 +168,7 @@ class Sources:
         return values
 
     def column(self, path: KeyPath, curves: Curves | None, column: str, entry: _Entry) -> PerWavelength | None:
-        """Interpolate a column of a file on the study's wavelength grid.
-
-        Parameters
-        ----------
-        path : sequence of str and int
-            Keys that lead to the value.
-        curves : Curves or None
-            Curves of the file.
-        column : str
-            Name of the column.
-        entry : section
-            Keys of the file.
-
-        Returns
-        -------
-        ndarray of shape (n_wavelengths,) or None
-            None after adding issues.
-        """
+        """Interpolate a column of a file on the study's wavelength grid."""
         if curves is None:
             return None
         if column not in curves.values:
@@ -277,39 +184,14 @@ class Sources:
     def kept_curve(self, path: KeyPath, curves: Mapping[_Key, PerWavelength], name: _Key) -> PerWavelength | None:
         """Return a curve stored with a finished run.
 
-        Parameters
-        ----------
-        path : sequence of str and int
-            Keys that lead to the value.
-        curves : mapping
-            Stored curves.
-        name : hashable
-            Key of the curve.
-
-        Returns
-        -------
-        ndarray of shape (n_wavelengths,) or None
-            None after adding an issue.
+        None after adding an issue.
         """
         if name not in curves:
             self.add(path, "the run kept no such curve", name)
         return curves.get(name)
 
     def curves(self, path: KeyPath, entry: _Entry) -> Curves | None:
-        """Read all curves of a file, once per study.
-
-        Parameters
-        ----------
-        path : sequence of str and int
-            Keys that lead to the value.
-        entry : section
-            Keys of the file.
-
-        Returns
-        -------
-        Curves or None
-            None after adding issues.
-        """
+        """Read all curves of a file, once per study."""
         if self.kept is not None:
             return None
         if entry.file not in self._read and entry.file in self.given:
@@ -349,18 +231,7 @@ class Sources:
         return made
 
     def colorants(self, section: ColorantsSection) -> Colorants | None:
-        """Read the catalog of colorants.
-
-        Parameters
-        ----------
-        section : ColorantsSection
-            Names of files and folders, or of a built-in catalog.
-
-        Returns
-        -------
-        Colorants or None
-            None after adding issues.
-        """
+        """Read the catalog of colorants."""
         path: KeyPath = ("colorants", "catalog")
         if self.kept is not None and self.kept.colorants:
             kept = self.kept.colorants
@@ -395,19 +266,7 @@ class Sources:
     def chief_rays(self, path: KeyPath, file: str, corner_mm: float | None) -> ChiefRays | None:
         """Read the chief ray angles of a lens.
 
-        Parameters
-        ----------
-        path : sequence of str and int
-            Keys that lead to the value.
-        file : str
-            Name of the file.
-        corner_mm : float or None
-            Image height of the corner in mm.
-
-        Returns
-        -------
-        ChiefRays or None
-            None after adding issues.
+        `corner_mm`: image height of the corner in mm.
         """
         return self._content(path, file, lambda place: read_chief_rays(place, corner_mm))
 
@@ -428,17 +287,7 @@ class Sources:
     def file(self, path: KeyPath, file: str) -> Path | None:
         """Return the path of a file that the study names.
 
-        Parameters
-        ----------
-        path : sequence of str and int
-            Keys that lead to the value.
-        file : str
-            Name in the study.
-
-        Returns
-        -------
-        Path or None
-            None after adding an issue.
+        None after adding an issue.
         """
         place = next((where / file for where in self.folders if is_file(where / file) or is_folder(where / file)), None)
         if place is None:

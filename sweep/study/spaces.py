@@ -34,15 +34,7 @@ _FAMILIES: Offered = "sweep.families"
 
 
 def check_cfas(section: StudySection, sources: Sources) -> None:
-    """Check that filters belong to CFAs of the study.
-
-    Parameters
-    ----------
-    section : StudySection
-        The keys of the study, checked against the schema.
-    sources : Sources
-        Files, curves and the issues so far.
-    """
+    """Check that filters belong to CFAs of the study."""
     for kind, entries in (("designs", section.designs), ("sweeps", section.sweeps), ("boxes", section.boxes)):
         for name, entry in entries.items():
             if entry.cfa not in section.cfas:

@@ -25,20 +25,7 @@ _MOST_PAIRS = 200_000
 
 
 def tasks_of(section: TasksSection, sources: Sources) -> StudyTasks | None:
-    """Construct the tasks of a study.
-
-    Parameters
-    ----------
-    section : TasksSection
-        Keys of the tasks.
-    sources : Sources
-        Files, curves and the issues so far.
-
-    Returns
-    -------
-    StudyTasks or None
-        None after adding issues.
-    """
+    """Construct the tasks of a study."""
     before = len(sources.issues)
     user_tasks = section.own.values()
     named = [entry for task in user_tasks for spectra in task.classes.values() for entry in spectra]
@@ -164,21 +151,7 @@ def _read(path: KeyPath, entry: TaskFile, sources: Sources) -> dict[str, PerWave
 def check_tasks_in_scenes(
     tasks: StudyTasks, section: StudySection, sensor: SensorCurves, spaces: Sequence[Space], sources: Sources
 ) -> None:
-    """Add issues for a task whose filter depends on the angle, or whose patches saturate a pixel.
-
-    Parameters
-    ----------
-    tasks : StudyTasks
-        Tasks of the study.
-    section : StudySection
-        The keys of the study, checked against the schema.
-    sensor : SensorCurves
-        Sensor of the study.
-    spaces : sequence of Space
-        Design spaces.
-    sources : Sources
-        Files, curves and the issues so far.
-    """
+    """Add issues for a task whose filter depends on the angle, or whose patches saturate a pixel."""
     filters = [space.filter.technology for space in spaces if space.filter is not None]
     if any(t is not None and t.interference is not None for t in (*filters, *sensor.technologies.values())):
         sources.add(

@@ -40,19 +40,7 @@ _SAME = 1e-9
 def is_from_outside(name: str, group: Offered, known: Iterable[str]) -> bool:
     """Return True if a name refers to code of a file or an installed package.
 
-    Parameters
-    ----------
-    name : str
-        Name of a class or function.
-    group : Offered
-        Entry point group.
-    known : iterable of str
-        Built-in names, which take precedence.
-
-    Returns
-    -------
-    bool
-        False for built-in and unknown names.
+    False for built-in and unknown names.
     """
     return is_in_file(name) or (name not in known and name in offers(group))
 
@@ -60,19 +48,7 @@ def is_from_outside(name: str, group: Offered, known: Iterable[str]) -> bool:
 def allowed(sources: Sources, path: KeyPath, name: str) -> bool:
     """Return True if code may run; add an issue otherwise.
 
-    Parameters
-    ----------
-    sources : Sources
-        Files, curves and the issues so far.
-    path : sequence of str and int
-        Keys that lead to the value.
-    name : str
-        Name of the class or function.
-
-    Returns
-    -------
-    bool
-        True if `--allow-code` or `allow_code` was given.
+    True if `--allow-code` or `allow_code` was given.
     """
     if not sources.allow_code:
         whose = "a Python file" if is_in_file(name) else "a plugin of an installed package"
@@ -84,24 +60,7 @@ def allowed(sources: Sources, path: KeyPath, name: str) -> bool:
 def code_of(sources: Sources, name: str, group: Offered) -> UserCode:
     """Read code of a file or an installed package, and record its digest.
 
-    Parameters
-    ----------
-    sources : Sources
-        Files, curves and the issues so far.
-    name : str
-        Name of the class or function.
-    group : Offered
-        Entry point group.
-
-    Returns
-    -------
-    UserCode
-        The code, not run yet.
-
-    Raises
-    ------
-    SweepError
-        If it does not exist.
+    Raises SweepError if it does not exist.
     """
     if not is_in_file(name):
         offer = installed(group, name)
@@ -132,28 +91,7 @@ def offered_curves(sources: Sources, at: KeyPath, section: _Curves, group: Offer
     take
     precedence.
 
-    Parameters
-    ----------
-    sources : Sources
-        Files, curves and the issues so far.
-    at : sequence of str and int
-        Keys that lead to the section.
-    section : section
-        Sensor or lights.
-    group : Offered
-        Entry point group.
-    known : iterable of str
-        Built-in names.
-
-    Returns
-    -------
-    section
-        Unchanged if it names no package.
-
-    Raises
-    ------
-    StudyError
-        If the package cannot be used.
+    Returns unchanged if it names no package. Raises StudyError if the package cannot be used.
     """
     name = section.builtin
     if name is None or not is_from_outside(name, group, known):
@@ -185,22 +123,7 @@ def offered_curves(sources: Sources, at: KeyPath, section: _Curves, group: Offer
 def user_metrics(section: StudySection, sources: Sources) -> tuple[UserMetric, ...]:
     """Load the user's metrics.
 
-    Parameters
-    ----------
-    section : StudySection
-        The keys of the study, checked against the schema.
-    sources : Sources
-        Files, curves and the issues so far.
-
-    Returns
-    -------
-    tuple of UserMetric
-        The metrics.
-
-    Raises
-    ------
-    StudyError
-        If one cannot be loaded.
+    Raises StudyError if one cannot be loaded.
     """
 
     def make(code: UserCode) -> UserMetric:
@@ -222,22 +145,7 @@ def user_metrics(section: StudySection, sources: Sources) -> tuple[UserMetric, .
 def user_effects(section: StudySection, sources: Sources) -> tuple[UserEffect, ...]:
     """Load the user's effects.
 
-    Parameters
-    ----------
-    section : StudySection
-        The keys of the study, checked against the schema.
-    sources : Sources
-        Files, curves and the issues so far.
-
-    Returns
-    -------
-    tuple of UserEffect
-        The effects.
-
-    Raises
-    ------
-    StudyError
-        If one cannot be loaded.
+    Raises StudyError if one cannot be loaded.
     """
     return _read_user_code("effects", section.effects, "sweep.effects", UserEffect, sources)
 
@@ -266,17 +174,7 @@ def _read_user_code(
 def try_effects(study: Study, sources: Sources) -> None:
     """Apply the user's effects in every scenario.
 
-    Parameters
-    ----------
-    study : Study
-        The study.
-    sources : Sources
-        Files, curves and the issues so far.
-
-    Raises
-    ------
-    StudyError
-        If one fails.
+    Raises StudyError if one fails.
     """
     for name in study.scenarios if study.user_effects else ():
         try:
@@ -289,24 +187,7 @@ def try_effects(study: Study, sources: Sources) -> None:
 def check_names(
     user_metrics: Sequence[UserMetric], requested: RequestedQuantities, spaces: Sequence[Space], sources: Sources
 ) -> bool:
-    """Return True if every column has a single meaning; add an issue otherwise.
-
-    Parameters
-    ----------
-    user_metrics : sequence of UserMetric
-        Metrics of the user.
-    requested : RequestedQuantities
-        Quantities of the study.
-    spaces : sequence of Space
-        Design spaces.
-    sources : Sources
-        Files, curves and the issues so far.
-
-    Returns
-    -------
-    bool
-        True if no name clashes.
-    """
+    """Return True if every column has a single meaning; add an issue otherwise."""
     if not user_metrics:
         return True
     widest = replace(
@@ -326,17 +207,7 @@ def check_names(
 def try_metrics(study: Study, sources: Sources) -> None:
     """Compute the user's metrics of every CFA, for a light that fills the field.
 
-    Parameters
-    ----------
-    study : Study
-        The study.
-    sources : Sources
-        Files, curves and the issues so far.
-
-    Raises
-    ------
-    StudyError
-        If one fails.
+    Raises StudyError if one fails.
     """
     setups = (
         {space.cfa: study.setup(space, next(iter(study.scenarios))) for space in study.spaces}

@@ -29,98 +29,32 @@ _KEYS = {TEST: 0, TRAIN: 2, CHECK: 3}
 
 
 class Batch(NamedTuple):
-    """Images, ndarray of shape (n, rows, columns) or (n, rows, columns, n_channels), and a row of labels for each."""
+    """Images or (n, rows, columns, n_channels), and a row of labels for each."""
 
     images: NDArray[Any]
     labels: pd.DataFrame
 
 
 def image_id(design_id: int, seed: int, order: str, split: str, number: int) -> str:
-    """Return the name of an image in manifests and predictions.
-
-    Parameters
-    ----------
-    design_id, seed : int
-        Row of the design, and number of the seed.
-    order, split : str
-        Order of the lenses, and split of the images.
-    number : int
-        Number of the image in its split.
-
-    Returns
-    -------
-    str
-        Name.
-    """
+    """Return the name of an image in manifests and predictions."""
     return f"{design_id}-{seed}-{order}-{split}-{number}"
 
 
 def scenes_of(vision: Vision, lamps: dict[str, Lamps], order: str, split: str, seed: tuple[int, int]) -> Scenes:
-    """Return the scenes of a split.
-
-    Parameters
-    ----------
-    vision : Vision
-        Benchmark.
-    lamps : dict of str to Lamps
-        Lamps of each split.
-    order : str
-        Order of the lenses.
-    split : str
-        One of `lamps.SPLITS`.
-    seed : tuple of int
-        Seed of the study, and number of this seed.
-
-    Returns
-    -------
-    Scenes
-        Scenes.
-    """
+    """Return the scenes of a split."""
     count = {TEST: vision.test_images, TRAIN: vision.train_images, CHECK: vision.check_images}[split]
     return draw_scenes(vision, lamps[split], order, count, (*scene_key(seed, order), _KEYS[split]))
 
 
 def scene_key(seed: tuple[int, int], order: str) -> tuple[int, ...]:
-    """Return the start of the seed of scenes.
-
-    Parameters
-    ----------
-    seed : tuple of int
-        Seed of the study, and number of this seed.
-    order : str
-        Order of the lenses.
-
-    Returns
-    -------
-    tuple of int
-        Seed.
-    """
+    """Return the start of the seed of scenes."""
     return (*seed, 10 + ORDERS.index(order))
 
 
 def batches(
     camera: HeadCamera, scenes: Scenes, key: Mapping[str, Any], order: str, split: str, form: Form
 ) -> Iterator[Batch]:
-    """Yield the images of scenes in blocks of `TOGETHER`.
-
-    Parameters
-    ----------
-    camera : HeadCamera
-        Design.
-    scenes : Scenes
-        Scenes of the split.
-    key : mapping
-        `design_id`, `name`, `cfa` and `seed`, for the labels.
-    order, split : str
-        Order of the lenses, and split of the images.
-    form : {'raw', 'demosaicked', 'isp'}
-        Form of the images.
-
-    Yields
-    ------
-    Batch
-        Images with labels.
-    """
+    """Yield the images of scenes in blocks of `TOGETHER`."""
     for start in range(0, len(scenes), TOGETHER):
         block = scenes.subset(slice(start, start + TOGETHER))
         numbers = np.arange(start, start + len(block))
@@ -133,28 +67,7 @@ def batches(
 def images_of_split(
     camera: HeadCamera, lamps: dict[str, Lamps], key: Mapping[str, Any], seed: int, split: str, form: Form
 ) -> Iterator[Batch]:
-    """Yield the images of a split: of the test with lenses in the street's order, then in any; of others in any.
-
-    Parameters
-    ----------
-    camera : HeadCamera
-        Design.
-    lamps : dict of str to Lamps
-        Lamps of each split.
-    key : mapping
-        `design_id`, `name`, `cfa` and `seed`.
-    seed : int
-        Seed of the study.
-    split : str
-        One of `lamps.SPLITS`.
-    form : {'raw', 'demosaicked', 'isp'}
-        Form of the images.
-
-    Yields
-    ------
-    Batch
-        Images with labels.
-    """
+    """Yield the images of a split: of the test with lenses in the street's order, then in any; of others in any."""
     for order in ORDERS if split == TEST else (SHUFFLED,):
         scenes = scenes_of(camera.vision, lamps, order, split, (seed, key["seed"]))
         yield from batches(camera, scenes, key, order, split, form)
@@ -190,44 +103,12 @@ def _labels(camera: HeadCamera, scenes: Scenes) -> dict[str, Any]:
 
 
 def formed(camera: HeadCamera, scenes: Scenes, form: Form) -> NDArray[Any]:
-    """Return images of scenes in a form.
-
-    Parameters
-    ----------
-    camera : HeadCamera
-        Design.
-    scenes : Scenes
-        Scenes.
-    form : {'raw', 'demosaicked', 'isp'}
-        Form of the images.
-
-    Returns
-    -------
-    ndarray of shape (n, rows, columns) or (n, rows, columns, n_channels)
-        Images.
-    """
+    """Return images of scenes in a form."""
     return in_form(camera, camera.images(scenes), scenes.level, form)
 
 
 def in_form(camera: HeadCamera, numbers: Numbers, levels: Int[IndexArray, " values"], form: Form) -> NDArray[Any]:
-    """Return drawn images in a form.
-
-    Parameters
-    ----------
-    camera : HeadCamera
-        Design.
-    numbers : ndarray of shape (n, rows, columns)
-        Readings.
-    levels : ndarray of int, shape (n,)
-        Index of the light level of each.
-    form : {'raw', 'demosaicked', 'isp'}
-        Form of the images.
-
-    Returns
-    -------
-    ndarray of shape (n, rows, columns) or (n, rows, columns, n_channels)
-        Images.
-    """
+    """Return drawn images in a form."""
     values_dn, pixel = camera.table.values_dn, camera.pixel
     dn = values_dn[numbers]
     if form == "raw":

@@ -22,16 +22,7 @@ def draw_numbers(
 ) -> None:
     """Compute the digital number up to which a share `uniform` of all lies.
 
-    Parameters
-    ----------
-    node, share : ndarray of shape (n,)
-        Result of `PixelTable.at`.
-    below : ndarray
-        As in `PixelTable`.
-    uniform : ndarray of shape (n,)
-        Random numbers, 0 to 1.
-    out : ndarray of shape (n,)
-        Digital numbers.
+    `uniform`: random numbers, 0 to 1.
     """
     last = below.shape[1] - 1
     for i in range(node.size):
@@ -62,22 +53,7 @@ def cases_on_table(
 ) -> None:
     """Compute `PixelTable.at` of the expected electrons of all cases.
 
-    Parameters
-    ----------
-    unlit, phantoms, lamps : ndarray
-        As in `HeadElectrons`, the first for one background.
-    cases : ndarray of int, shape (n_cases, 5)
-        Type of the lit lens or -1, signal, order, phantom, place.
-    candelas : ndarray of shape (n_cases,)
-        Luminous intensity, cd.
-    orders : ndarray of int
-        Signal type of each lens in each order.
-    nodes_e, node_of_root : ndarray
-        As in `PixelTable`.
-    step : float
-        Its `ROOT_STEP`.
-    node, share : ndarray of shape (n_cases, n_pixels)
-        Results.
+    `cases`: type of the lit lens or -1, signal, order, phantom, place; `candelas`: luminous intensity, cd.
     """
     last = node_of_root.size - 1
     for case in range(len(cases)):
@@ -106,16 +82,8 @@ def log_likelihoods(
 ) -> None:
     """Write the log-likelihood of each case given each image into `out`, from tabulated probabilities.
 
-    Parameters
-    ----------
-    numbers : ndarray of shape (n_images, n_pixels)
-        Digital numbers.
-    node, share : ndarray of shape (n_cases, n_pixels)
-        Result of `PixelTable.at`, pixels with most information first.
-    table : ndarray
-        `PixelTable.shares`, none above 0.
-    out : ndarray of shape (n_images, n_cases)
-        Results; -inf for cases that are impossible beside the best.
+    `node`, `share`: result of `PixelTable.at`, pixels with most information first; `table`: `PixelTable.shares`, none
+    above 0.
     """
     n_pixels = numbers.shape[1]
     for image in range(numbers.shape[0]):

@@ -17,18 +17,7 @@ _LEAST_RADIUS_PX = 2.0
 
 
 def match_radius_px(diameter_px: Float[Array, " detections"]) -> Float[Array, " detections"]:
-    """Return how far a detection may be from the center of a lit lens: its diameter, and at least 2 pixels.
-
-    Parameters
-    ----------
-    diameter_px : ndarray
-        Diameters of lenses.
-
-    Returns
-    -------
-    ndarray
-        Radii, pixels.
-    """
+    """Return how far a detection may be from the center of a lit lens: its diameter, and at least 2 pixels."""
     return np.asarray(np.maximum(diameter_px, _LEAST_RADIUS_PX), dtype=float)
 
 
@@ -39,19 +28,8 @@ def average_precision(
 
     As of PASCAL VOC since 2010 (Everingham et al., IJCV 2015), over all recalls.
 
-    Parameters
-    ----------
-    right : ndarray of bool, shape (n,)
-        True for detections of a target that no detection of a higher score has found.
-    score : ndarray of shape (n,)
-        Scores.
-    n_targets : int
-        Targets.
-
-    Returns
-    -------
-    float
-        0 to 1; NaN without targets.
+    `right`: True for detections of a target that no detection of a higher score has found. Returns 0 to 1. NaN without
+    targets.
     """
     if not n_targets:
         return float("nan")
@@ -67,20 +45,6 @@ def precisions(labels: pd.DataFrame, detections: pd.DataFrame, lenses: Sequence[
 
     A detection is right within `match_radius_px` of a lit lens of its state that no detection of a higher score has
     found; everything else, brake lamps and heads that are off among it, is wrong.
-
-    Parameters
-    ----------
-    labels : pandas.DataFrame
-        Labels of the images of one design and seed.
-    detections : pandas.DataFrame
-        Columns `image_id`, `x_px`, `y_px`, `state`, `score`.
-    lenses : sequence of str
-        Signal types.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns `level`, `state`, `lit` (number of lit lenses), `average_precision`.
     """
     names = ["state", "head_x_px", "lit_y_px", "lens_diameter_px"]
     targets = labels[["image_id", "level", *names]].explode(names, ignore_index=True)
@@ -98,18 +62,8 @@ def precisions(labels: pd.DataFrame, detections: pd.DataFrame, lenses: Sequence[
 def precision_scores(table: pd.DataFrame, reference: str) -> pd.DataFrame:
     """Return average precisions, mean over signal types, with 95 % intervals over the seeds.
 
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        Results of `precisions` with the `name` of the design and the `seed`.
-    reference : str
-        Design from which differences are taken.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row per light level (first all of them) and design: `name`, `level`, `average_precision`, and `apart`, the
-        paired difference from the reference; both with `_low` and `_high`.
+    Returns a row per light level (first all of them) and design: `name`, `level`, `average_precision`, and `apart`, the
+    paired difference from the reference.
     """
     by_level = {
         str(level): part.pivot_table("average_precision", "name", "seed", sort=False)

@@ -31,17 +31,7 @@ _RIDGE = 1e-4
 
 
 class Detector:
-    """Detector of lit lenses of one design.
-
-    Parameters
-    ----------
-    mosaic : Mosaic
-        Tile.
-    pixel : Pixel
-        Pedestal, gain and noise.
-    lenses : sequence of str
-        Signal types.
-    """
+    """Detector of lit lenses of one design."""
 
     def __init__(self, mosaic: Mosaic, pixel: Pixel, lenses: Sequence[str]) -> None:
         self.mosaic = mosaic
@@ -72,13 +62,7 @@ class Detector:
         return number, np.stack([x, y], axis=1), np.column_stack([shares, np.log(total)])
 
     def learn(self, batches: Iterable[Batch]) -> None:
-        """Learn the colors of the places of training images.
-
-        Parameters
-        ----------
-        batches : iterable of Batch
-            Raw images of streets, with labels.
-        """
+        """Learn the colors of the places of training images."""
         features, classes = [], []
         for images, labels in batches:
             number, at_px, colors = self._places(images)
@@ -107,15 +91,7 @@ class Detector:
     def detect(self, batches: Iterable[Batch]) -> pd.DataFrame:
         """Return detections: `image_id`, `x_px`, `y_px`, `state`, `score` (0 to 1).
 
-        Parameters
-        ----------
-        batches : iterable of Batch
-            Raw images of streets, with names.
-
-        Returns
-        -------
-        pandas.DataFrame
-            A row per place whose most probable class is a signal type.
+        Returns a row per place whose most probable class is a signal type.
         """
         parts = []
         for images, labels in batches:

@@ -34,17 +34,7 @@ _PERIOD_PX = 160
 
 @dataclass(frozen=True)
 class HeadMaps:
-    """Light of each part relative to a uniform field of its radiance.
-
-    Parameters
-    ----------
-    knots_nm : ndarray of shape (n_knots,)
-        Wavelengths, nm.
-    lenses : ndarray of shape (n_places, n_lenses, side, side, n_knots)
-        Light of each lens; the side has `MARGIN` at both ends.
-    housing, backplate : ndarray of shape (n_places, side, side, n_knots)
-        Light of both, including the parts before them.
-    """
+    """Light of each part relative to a uniform field of its radiance."""
 
     knots_nm: PerKnot
     lenses: Float[Array, "places lenses side side knots"]
@@ -53,53 +43,18 @@ class HeadMaps:
 
 
 def heights(vision: Vision) -> Float[Array, " lenses"]:
-    """Return the positions of the lenses' centers below the head's center.
-
-    Parameters
-    ----------
-    vision : Vision
-        Benchmark.
-
-    Returns
-    -------
-    ndarray of shape (n_lenses,)
-        Diameters.
-    """
+    """Return the positions of the lenses' centers below the head's center."""
     n = len(vision.lenses)
     return np.asarray(SPACING * (np.arange(n) - (n - 1) / 2), dtype=float)
 
 
 def housing_diameters(vision: Vision) -> tuple[float, float]:
-    """Return the width and height of the housing.
-
-    Parameters
-    ----------
-    vision : Vision
-        Benchmark.
-
-    Returns
-    -------
-    tuple of float
-        Diameters.
-    """
+    """Return the width and height of the housing."""
     return _HOUSING[0], _HOUSING[1] + SPACING * (len(vision.lenses) - 1)
 
 
 def head_places_px(vision: Vision, mosaic: Mosaic) -> Float[Array, "places 2"]:
-    """Return the positions of the head's center from the image's first pixel.
-
-    Parameters
-    ----------
-    vision : Vision
-        Benchmark.
-    mosaic : Mosaic
-        Tile.
-
-    Returns
-    -------
-    ndarray of shape (n_places, 2)
-        (column, row), pixels.
-    """
+    """Return the positions of the head's center from the image's first pixel."""
     rows, columns = mosaic.indices.shape
     n = vision.places_per_pixel
     middle = [(vision.crop_px // 2 // size) * size - size / 2 for size in (columns, rows)]
@@ -111,20 +66,7 @@ _maps: Cache[tuple[object, ...], HeadMaps] = Cache(12)
 
 
 def head_maps(setup: Setup, vision: Vision) -> HeadMaps:
-    """Return the maps of the setup's target, which do not depend on filters; recent ones are cached.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-    vision : Vision
-        Benchmark.
-
-    Returns
-    -------
-    HeadMaps
-        Maps.
-    """
+    """Return the maps of the setup's target, which do not depend on filters; recent ones are cached."""
     target, pixel = setup.scene.target, setup.camera.pixel
     assert target is not None
     optics = vision.optics
@@ -145,19 +87,7 @@ def head_maps(setup: Setup, vision: Vision) -> HeadMaps:
 def lamp_maps(setup: Setup, vision: Vision) -> tuple[PerKnot, Float[Array, "places side side knots"]]:
     """Return the light of a disc as wide as a lens in the head's middle, relative to a uniform field of its radiance.
 
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-    vision : Vision
-        Benchmark.
-
-    Returns
-    -------
-    knots_nm : ndarray of shape (n_knots,)
-        Wavelengths, nm.
-    discs : ndarray of shape (n_places, side, side, n_knots)
-        Light at each position.
+    Returns `knots_nm`: wavelengths, nm.
     """
     knots_nm = psf.psf_knots_nm(setup.camera.grid.nodes_nm, _PSF_STEP_NM)
     return knots_nm, _disc(setup, vision, head_places_px(vision, setup.camera.mosaic), knots_nm)
@@ -178,7 +108,7 @@ def _made(setup: Setup, vision: Vision, target: Target) -> HeadMaps:
 def _apart(
     vision: Vision, centers: Float[Array, "places 2"]
 ) -> tuple[Float[Array, "places columns"], Float[Array, "places columns"]]:
-    """Return columns and rows of the pixels (with margin) from each center, ndarray of shape (n_places, side) each."""
+    """Return columns and rows of the pixels (with margin) from each center."""
     at = np.arange(-MARGIN, vision.crop_px + MARGIN)
     return at - centers[:, :1], at - centers[:, 1:]
 
@@ -186,7 +116,7 @@ def _apart(
 def _disc(
     setup: Setup, vision: Vision, centers: Float[Array, "places 2"], knots_nm: PerKnot
 ) -> Float[Array, "places side side knots"]:
-    """Return a lens by `disc_image`, ndarray of shape (n_places, side, side, n_knots)."""
+    """Return a lens by `disc_image`."""
     target, pixel = setup.scene.target, setup.camera.pixel
     assert target is not None
     dx, dy = _apart(vision, centers)
@@ -206,7 +136,7 @@ def _disc(
 def _rectangle(
     setup: Setup, vision: Vision, centers: Float[Array, "places 2"], size_px: tuple[float, float], knots_nm: PerKnot
 ) -> Float[Array, "places side side knots"]:
-    """Return a rectangle through the same lens onto the same pixels, ndarray of shape (n_places, side, side, n_knots).
+    """Return a rectangle through the same lens onto the same pixels.
 
     The spectrum of rectangle and pixel times the transfer function, which ends at 1 / (lambda N): a cosine series of a
     period that leaves its neighbors far away.

@@ -25,28 +25,11 @@ from .scenes import Scenes, orders_of_lenses, uniforms
 from .section import LightLevel, Vision
 
 Numbers = NDArray[np.int16]
-"""Digital numbers of images, ndarray[n_images, crop_px, crop_px]."""
+"""Digital numbers of images."""
 
 
 def setup_at(setup: Setup, vision: Vision, distance_m: float, level: LightLevel) -> Setup:
-    """Return the setup's camera before a head at a distance, with lamps of 1 cd.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-    vision : Vision
-        Benchmark.
-    distance_m : float
-        Distance, m.
-    level : LightLevel
-        Light and exposure.
-
-    Returns
-    -------
-    Setup
-        Setup.
-    """
+    """Return the setup's camera before a head at a distance, with lamps of 1 cd."""
     scenario = Scene(
         target=vision.target(distance_m),
         optics=vision.optics,
@@ -61,16 +44,7 @@ def setup_at(setup: Setup, vision: Vision, distance_m: float, level: LightLevel)
 class HeadElectrons:
     """Expected electrons of the parts of a head at one distance and level.
 
-    Parameters
-    ----------
-    unlit : ndarray of shape (n_places, n_backgrounds, n_pixels)
-        All lenses off.
-    phantoms : ndarray of shape (n_places, n_lenses, n_lenses, n_pixels)
-        Added by sun on a lens, by position and type.
-    lamps : ndarray of shape (n_places, n_lenses, n_signals, n_pixels)
-        Added per candela and second, by position.
-    time_s : float
-        Exposure time, s.
+    `lamps`: added per candela and second, by position.
     """
 
     unlit: Float[Array, "places backgrounds pixels"]
@@ -88,17 +62,7 @@ class HeadElectrons:
     ) -> Float[Array, "images pixels"]:
         """Return electrons of some heads.
 
-        Parameters
-        ----------
-        place, background, order, phantom_on : ndarray of int, shape (n,)
-            Choices of each head.
-        lit : tuple of ndarray of shape (n,)
-            Type of the lit lens (-1: none), its signal, its intensity, cd.
-
-        Returns
-        -------
-        ndarray of shape (n, n_pixels)
-            Expected electrons.
+        `lit`: type of the lit lens (-1: none), its signal, its intensity, cd. Returns expected electrons.
         """
         electrons = self.unlit[place, background]
         sunny = np.flatnonzero(phantom_on)
@@ -110,17 +74,7 @@ class HeadElectrons:
 
 
 class HeadCamera:
-    """One design before signal heads, at every distance and level of a benchmark.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-    curves : ndarray of shape (n_modified, n_wavelengths)
-        QE of the modified channels.
-    vision : Vision
-        Benchmark.
-    """
+    """One design before signal heads, at every distance and level of a benchmark."""
 
     def __init__(self, setup: Setup, curves: ChannelCurves, vision: Vision) -> None:
         qe = setup.camera.qe.copy()
@@ -141,18 +95,7 @@ class HeadCamera:
         self._heads: dict[tuple[int, int], HeadElectrons] = {}
 
     def electrons(self, distance: int, level: int) -> HeadElectrons:
-        """Return expected electrons of the parts of a head at a distance and a light level, by their indices.
-
-        Parameters
-        ----------
-        distance, level : int
-            Indices.
-
-        Returns
-        -------
-        HeadElectrons
-            Electrons.
-        """
+        """Return expected electrons of the parts of a head at a distance and a light level, by their indices."""
         if (distance, level) not in self._heads:
             self._heads[distance, level] = self._made(distance, level)
         return self._heads[distance, level]
@@ -184,23 +127,12 @@ class HeadCamera:
         return np.asarray(ambient * (radiance * irradiance_factor(self.vision.optics)), dtype=float)
 
     def _around(self, level: LightLevel) -> Float[Array, "backgrounds pixels"]:
-        """Return the photons that arrive from each background, ndarray of shape (n_backgrounds, n_wavelengths)."""
+        """Return the photons that arrive from each background."""
         grid, white = self.setup.camera.grid, self._of_white(level)
         return np.stack([white * reflectance(grid, background) for background in self.vision.backgrounds])
 
     def background(self, level: int) -> Float[Array, "backgrounds pixels"]:
-        """Return expected electrons of images of each background without a head.
-
-        Parameters
-        ----------
-        level : int
-            Index of the light level.
-
-        Returns
-        -------
-        ndarray of shape (n_backgrounds, n_pixels)
-            Electrons.
-        """
+        """Return expected electrons of images of each background without a head."""
         settings = self.levels[level]
         knots = head_maps(self._setups[0][level], self.vision).knots_nm
         uniform = np.ones((1, *self._channel.shape, knots.size))
@@ -208,20 +140,7 @@ class HeadCamera:
         return np.asarray((electrons + self.pixel.dark_e_per_s) * settings.exposure_s, dtype=float)
 
     def lamps(self, distance: int, spectra: Float[Array, "lamps wavelengths"]) -> Float[Array, "places lamps pixels"]:
-        """Return electrons of other lamps, as wide as a lens, for one candela and second at each position.
-
-        Parameters
-        ----------
-        distance : int
-            Index of the distance.
-        spectra : ndarray of shape (n_lamps, n_wavelengths)
-            Photons of the lamps, of any unit.
-
-        Returns
-        -------
-        ndarray of shape (n_places, n_lamps, n_pixels)
-            Electrons.
-        """
+        """Return electrons of other lamps, as wide as a lens, for one candela and second at each position."""
         setup = self._setups[distance][0]
         knots, discs = lamp_maps(setup, self.vision)
         per_cd = self._per_candela(setup) / luminance_per_photon_radiance(setup.camera.grid, spectra)
@@ -248,7 +167,7 @@ class HeadCamera:
     def _of_lenses(
         self, maps: HeadMaps, spectra: Float[Array, "spectra wavelengths"]
     ) -> Float[Array, "wavelengths _ spectra _"]:
-        """Return spectra on each lens, ndarray of shape (n_places, n_lenses, n_spectra, n_pixels)."""
+        """Return spectra on each lens."""
         places, positions = maps.lenses.shape[:2]
         lens_electrons = self._electrons(maps.knots_nm, maps.lenses.reshape(-1, *maps.lenses.shape[2:]), spectra)
         return np.maximum(lens_electrons.reshape(places, positions, *lens_electrons.shape[1:]), 0.0)
@@ -278,28 +197,11 @@ class HeadCamera:
         return electrons[:, :, inner, inner].reshape(*electrons.shape[:2], -1)
 
     def n_places(self) -> int:
-        """Return the number of positions of the head on the mosaic.
-
-        Returns
-        -------
-        int
-            Number.
-        """
+        """Return the number of positions of the head on the mosaic."""
         return int(self.setup.camera.mosaic.indices.size * self.vision.places_per_pixel**2)
 
     def expected(self, scenes: Scenes) -> Float[Array, "images pixels"]:
-        """Return expected electrons of scenes.
-
-        Parameters
-        ----------
-        scenes : Scenes
-            Scenes.
-
-        Returns
-        -------
-        ndarray of shape (n, n_pixels)
-            Electrons.
-        """
+        """Return expected electrons of scenes."""
         n_pixels = self.vision.crop_px**2
         electrons = np.empty((len(scenes), n_pixels))
         candelas = np.array(self.vision.intensities_cd)
@@ -316,36 +218,12 @@ class HeadCamera:
         return electrons
 
     def images(self, scenes: Scenes) -> Numbers:
-        """Return images of scenes, each with its own photons.
-
-        Parameters
-        ----------
-        scenes : Scenes
-            Scenes.
-
-        Returns
-        -------
-        ndarray of shape (n, n_pixels)
-            Digital numbers.
-        """
+        """Return images of scenes, each with its own photons."""
         numbers = self.drawn(self.expected(scenes), scenes.key)
         return numbers.reshape(len(scenes), self.vision.crop_px, self.vision.crop_px)
 
     def drawn(self, electrons: Float[Array, "images pixels"], keys: ImageNumbers) -> Numbers:
-        """Return digital numbers with the photons of each image's key.
-
-        Parameters
-        ----------
-        electrons : ndarray of shape (n, n_pixels)
-            Expected electrons.
-        keys : ndarray of int, shape (n,)
-            Keys.
-
-        Returns
-        -------
-        ndarray of shape (n, n_pixels)
-            Digital numbers.
-        """
+        """Return digital numbers with the photons of each image's key."""
         node, share = self.table.at(electrons.ravel())
         numbers = np.empty(electrons.size, dtype=np.int16)
         draw_numbers(node, share, self.table.below, uniforms(keys, electrons.shape[1]).ravel(), numbers)

@@ -8,13 +8,7 @@ from ..base.errors import SweepError, ValidationIssue
 
 
 def require_network() -> None:
-    """Raise SweepError if JAX and Optax are not installed.
-
-    Raises
-    ------
-    SweepError
-        If they are not.
-    """
+    """Raise SweepError if JAX and Optax are not installed."""
     if any(find_spec(name) is None for name in ("jax", "optax")):
         allowed = "pip install 'cfa-sweep[vision]', or `network: false`"
         raise SweepError(

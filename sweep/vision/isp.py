@@ -26,15 +26,7 @@ class Isp(NamedTuple):
     def developed(self, share: Float[Array, "... channels"]) -> NDArray[np.uint8]:
         """Return pictures of demosaicked images: channels are balanced and cut at white, so that what clips is white.
 
-        Parameters
-        ----------
-        share : ndarray of shape (..., n_channels)
-            Channels above the black level, as share of full scale.
-
-        Returns
-        -------
-        ndarray of uint8, shape (..., 3)
-            sRGB.
+        `share`: channels above the black level, as share of full scale.
         """
         balanced = np.minimum(share / self.white, 1.0)
         return np.asarray(np.rint(255 * srgb_gamma(np.clip(balanced @ self.matrix.T, 0.0, 1.0))), dtype=np.uint8)
@@ -45,20 +37,6 @@ def isp_of(grid: WavelengthGrid, qe: Float[Array, "channels wavelengths"], light
 
     The target of a patch is its linear sRGB under D65. White is the light on a surface of reflectance 1; its brightest
     channel is taken as full scale.
-
-    Parameters
-    ----------
-    grid : WavelengthGrid
-        Wavelengths, nm.
-    qe : ndarray of shape (n_channels, n_wavelengths)
-        QE of the channels.
-    light : str
-        Ambient light.
-
-    Returns
-    -------
-    Isp
-        ISP.
     """
     chart = chart_reflectances(grid)
     response = chart * ambient_light(grid, light) @ qe.T

@@ -21,43 +21,18 @@ SPLITS = (TRAIN, CHECK, TEST)
 class Lamps:
     """Signals of each lens's type that a part of the images shows.
 
-    Parameters
-    ----------
-    of_lens : tuple of ndarray of int
-        Signals, one array per lens.
+    `of_lens`: signals, one array per lens.
     """
 
     of_lens: tuple[Int[IndexArray, " _lamps"], ...]
 
     def digests(self, lights: Lights) -> set[str]:
-        """Return the digests of the spectra.
-
-        Parameters
-        ----------
-        lights : Lights
-            Signals.
-
-        Returns
-        -------
-        set of str
-            Digests.
-        """
+        """Return the digests of the spectra."""
         return {spectrum_digest(lights.photons[i]) for lamps in self.of_lens for i in lamps}
 
 
 def spectrum_digest(spectrum: PerWavelength) -> str:
-    """Return the SHA-256 of a spectrum.
-
-    Parameters
-    ----------
-    spectrum : ndarray of shape (n_wavelengths,)
-        Spectrum.
-
-    Returns
-    -------
-    str
-        Digest.
-    """
+    """Return the SHA-256 of a spectrum."""
     return hashlib.sha256(np.ascontiguousarray(spectrum, dtype="<f8").tobytes()).hexdigest()
 
 
@@ -66,24 +41,7 @@ def split_lamps(lights: Lights, vision: Vision, seed: tuple[int, int]) -> dict[s
 
     Signals with equal spectra are one lamp.
 
-    Parameters
-    ----------
-    lights : Lights
-        Signals.
-    vision : Vision
-        Benchmark.
-    seed : tuple of int
-        Seed of the study, and number of this seed.
-
-    Returns
-    -------
-    dict of str to Lamps
-        Parts.
-
-    Raises
-    ------
-    SweepError
-        If a lamp of the test has the spectrum of another part's.
+    Raises SweepError if a lamp of the test has the spectrum of another part's.
     """
     rng = np.random.default_rng((*seed, 1))
     parts: dict[str, list[IndexArray]] = {part: [] for part in SPLITS}

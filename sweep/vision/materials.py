@@ -40,20 +40,7 @@ _LENS_WIDTH_NM = 6.0
 
 @cache
 def ambient_light(grid: WavelengthGrid, name: Illuminant) -> PerWavelength:
-    """Return the photons of an illuminant, normalized to an integral of 1.
-
-    Parameters
-    ----------
-    grid : WavelengthGrid
-        Wavelengths, nm.
-    name : str
-        Illuminant.
-
-    Returns
-    -------
-    ndarray of shape (n_wavelengths,)
-        Photons per nm.
-    """
+    """Return the photons of an illuminant, normalized to an integral of 1."""
     from colour import SDS_ILLUMINANTS  # noqa: PLC0415  (more than a second to import)
 
     held = SDS_ILLUMINANTS[_ILLUMINANTS[name]]
@@ -63,20 +50,7 @@ def ambient_light(grid: WavelengthGrid, name: Illuminant) -> PerWavelength:
 
 @cache
 def reflectance(grid: WavelengthGrid, name: Material) -> PerWavelength:
-    """Return the reflectance of a surface; constant beyond its range, 0 for those of a group.
-
-    Parameters
-    ----------
-    grid : WavelengthGrid
-        Wavelengths, nm.
-    name : str
-        Material.
-
-    Returns
-    -------
-    ndarray of shape (n_wavelengths,)
-        0 to 1.
-    """
+    """Return the reflectance of a surface; constant beyond its range, 0 for those of a group, 0 to 1."""
     if name not in _PATCHES:
         return np.asarray(spectra_of_group(grid, name).mean(axis=0), dtype=float)
     from colour import SDS_COLOURCHECKERS  # noqa: PLC0415  (more than a second to import)
@@ -87,18 +61,7 @@ def reflectance(grid: WavelengthGrid, name: Material) -> PerWavelength:
 
 @cache
 def chart_reflectances(grid: WavelengthGrid) -> Float[Array, "24 wavelengths"]:
-    """Return the reflectances of the 24 patches of the ColorChecker; constant beyond their range.
-
-    Parameters
-    ----------
-    grid : WavelengthGrid
-        Wavelengths, nm.
-
-    Returns
-    -------
-    ndarray of shape (24, n_wavelengths)
-        0 to 1.
-    """
+    """Return the reflectances of the 24 patches of the ColorChecker; constant beyond their range, 0 to 1."""
     from colour import SDS_COLOURCHECKERS  # noqa: PLC0415  (more than a second to import)
 
     held = SDS_COLOURCHECKERS["ColorChecker N Ohta"].values()
@@ -110,18 +73,6 @@ def phantom(grid: WavelengthGrid, kind: str) -> PerWavelength:
 
     The lens is modeled, not measured: a band with logistic edges, passed twice. A lens of another signal type than
     red, orange, yellow and green is clear.
-
-    Parameters
-    ----------
-    grid : WavelengthGrid
-        Wavelengths, nm.
-    kind : str
-        Signal type of the lens.
-
-    Returns
-    -------
-    ndarray of shape (n_wavelengths,)
-        Photons per nm.
     """
     nodes = grid.nodes_nm
     passed = np.ones(nodes.size)

@@ -41,7 +41,7 @@ _OPTIMIZER = optax.chain(optax.scale_by_adam(), optax.add_decayed_weights(_DECAY
 """AdamW, whose rate is passed to each step."""
 _Weights = dict[str, Any]
 Inputs = tuple[NDArray[np.float32], NDArray[np.float32]]
-"""Planes, ndarray of shape (n, rows, columns, planes), and what is known, (n, n_known)."""
+"""Planes, and what is known, (n, n_known)."""
 
 
 def _start(key: Any, inputs: Inputs, n_outputs: int) -> _Weights:
@@ -107,34 +107,13 @@ _outputs_compiled: Callable[..., Any] = jax.jit(_outputs)
 
 @dataclass(frozen=True)
 class Network:
-    """Trained network.
-
-    Parameters
-    ----------
-    weights : dict
-        Weights.
-    n_states : int
-        Number of states, which are the first outputs.
-    """
+    """Trained network."""
 
     weights: _Weights
     n_states: int
 
     def logits(self, planes: NDArray[np.float32], known: NDArray[np.float32]) -> Float[Array, "images states"]:
-        """Return the logarithm of the probability of each state, but for a constant of each image.
-
-        Parameters
-        ----------
-        planes : ndarray of shape (n, rows, columns, planes)
-            Images.
-        known : ndarray of shape (n, n_known)
-            What is known of them.
-
-        Returns
-        -------
-        ndarray of shape (n, n_states)
-            Logits.
-        """
+        """Return the logarithm of the probability of each state, but for a constant of each image."""
         starts = range(0, len(planes), _AT_ONCE)
         parts = [
             _outputs_compiled(self.weights, planes[at : at + _AT_ONCE], known[at : at + _AT_ONCE]) for at in starts
@@ -149,26 +128,7 @@ def train(
     epochs: int,
     seed: tuple[int, ...],
 ) -> Network:
-    """Train a network by AdamW, with a rate that falls along a cosine.
-
-    Parameters
-    ----------
-    inputs : tuple of ndarray
-        Planes and what is known of the training images.
-    targets : ndarray of int, shape (n, n_targets)
-        State of each image, then what is learned beside it.
-    sizes : tuple of int
-        Number of values of each target.
-    epochs : int
-        Passes over the images.
-    seed : tuple of int
-        Seed.
-
-    Returns
-    -------
-    Network
-        Trained network.
-    """
+    """Train a network by AdamW, with a rate that falls along a cosine."""
     rng = np.random.default_rng(seed)
     planes, known = inputs
     weights = _start(jax.random.key(int(rng.integers(2**31))), inputs, sum(sizes))

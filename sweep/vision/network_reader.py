@@ -39,9 +39,9 @@ Float32 = NDArray[np.float32]
 class _Examples:
     """Inputs and labels of images.
 
-    `planes`: ndarray of shape (n, rows, columns, planes), in units of the noise; `mirrored` the same of their mirror
+    `planes`:, in units of the noise; `mirrored` the same of their mirror
     images (empty if the tile has none); `condition`: index of distance, level and background; `fixed`: 1 for lenses in
-    the street's order; `targets`: ndarray of int, shape (n, 4), state, lit position,
+    the street's order; `targets`:, state, lit position,
     order and sun on the lenses.
     """
 
@@ -62,17 +62,7 @@ class _Examples:
 
 
 class NetworkReader:
-    """Network that reads the images of one design.
-
-    Parameters
-    ----------
-    vision : Vision
-        Benchmark.
-    mosaic : Mosaic
-        Tile.
-    pixel : Pixel
-        Pedestal, gain and noise, by which the inputs are normalized.
-    """
+    """Network that reads the images of one design."""
 
     def __init__(self, vision: Vision, mosaic: Mosaic, pixel: Pixel) -> None:
         self.vision = vision
@@ -102,17 +92,8 @@ class NetworkReader:
     def planes(self, images: NDArray[np.generic], *, mirrored: bool = False) -> Float32:
         """Return the middle of images in units of their noise, as planes.
 
-        Parameters
-        ----------
-        images : ndarray of shape (n, rows, columns)
-            Raw images, DN.
-        mirrored : bool
-            True for mirror images.
-
-        Returns
-        -------
-        ndarray of float32, shape (n, rows, columns, planes)
-            A plane for each pixel of the tile, or each channel at every pixel, as the study asks.
+        `images`: raw images, DN; `mirrored`: True for mirror images. Returns a plane for each pixel of the tile, or
+        each channel at every pixel, as the study asks.
         """
         columns = self._mirror if mirrored else self._columns
         scaled = in_noise(images[:, self._rows[:, None], columns], self.pixel)
@@ -141,17 +122,7 @@ class NetworkReader:
         return np.stack([state, lit, order, labels["phantom"].to_numpy(dtype=np.intp)], axis=1)
 
     def learn(self, training: Iterable[Batch], check: Iterable[Batch], seed: tuple[int, ...]) -> None:
-        """Train the network, and its confidence on other lamps.
-
-        Parameters
-        ----------
-        training : iterable of Batch
-            Raw images of the training split, with labels.
-        check : iterable of Batch
-            Of the check split.
-        seed : tuple of int
-            Seed.
-        """
+        """Train the network, and its confidence on other lamps."""
         examples, checked = self._examples(training), self._examples(check)
         # Those that stand in the street's order by chance teach that order, too, beside any.
         by_chance = examples.subset(examples.targets[:, 2] == 0)
@@ -169,18 +140,7 @@ class NetworkReader:
         return _Fitted(train((planes, known), targets, sizes, self.vision.epochs, seed), inputs, 1.0)
 
     def read(self, images: Iterable[Batch]) -> Float[Array, "images states"]:
-        """Return the probability of each state.
-
-        Parameters
-        ----------
-        images : iterable of Batch
-            Raw images; of the labels those are taken that the reader is given.
-
-        Returns
-        -------
-        ndarray of shape (n, n_states)
-            Probabilities.
-        """
+        """Return the probability of each state."""
         assert self._fitted is not None
         return self._fitted.probabilities(self._examples(images))
 
@@ -244,7 +204,7 @@ class _Fitted(NamedTuple):
         return self.network.logits(self.inputs.of(examples.planes, examples), self.inputs.known(examples))
 
     def probabilities(self, examples: _Examples) -> Float[Array, "examples states"]:
-        """Return the probability of each state, ndarray of shape (n, n_states)."""
+        """Return the probability of each state."""
         from scipy.special import softmax  # noqa: PLC0415  (slow to import)
 
         return np.asarray(softmax(self._logits(examples) / self.temperature, axis=1), dtype=float)

@@ -26,12 +26,8 @@ from .scenes import PHANTOM_SHARE, SHUFFLED, Scenes, orders_of_lenses, states_of
 class _Cases:
     """All states of a head, one by one.
 
-    Parameters
-    ----------
-    table : ndarray of int, shape (n_cases, 5)
-        Type of the lit lens or -1, signal, order, phantom, place.
-    candelas, share : ndarray of shape (n_cases,)
-        Intensity, cd, and probability within the state.
+    `table`: type of the lit lens or -1, signal, order, phantom, place; `candelas`, `share`: intensity, cd, and
+    probability within the state.
     """
 
     table: Int[IndexArray, "cases 5"]
@@ -58,26 +54,7 @@ def _cases(camera: HeadCamera, lamps: Lamps, order: str, sunny: bool) -> _Cases:
 def posteriors(
     camera: HeadCamera, scenes: Scenes, images: Numbers, lamps: Lamps, order: str
 ) -> Float[Array, "images states"]:
-    """Return the probability of each state given each image; all states are equally frequent.
-
-    Parameters
-    ----------
-    camera : HeadCamera
-        Design.
-    scenes : Scenes
-        Scenes of the images.
-    images : ndarray
-        Digital numbers.
-    lamps : Lamps
-        Lamps of the scenes.
-    order : str
-        Order of the lenses.
-
-    Returns
-    -------
-    ndarray of shape (n_images, n_states)
-        Probabilities.
-    """
+    """Return the probability of each state given each image; all states are equally frequent."""
     probabilities = np.empty((len(scenes), len(states_of(camera.vision))))
     groups = np.stack([scenes.distance, scenes.level, scenes.background], axis=1)
     for distance, level in np.unique(groups[:, :2], axis=0):
@@ -92,7 +69,7 @@ def posteriors(
 def _of_states(
     camera: HeadCamera, images: Numbers, heads: HeadElectrons, background: int, cases: _Cases
 ) -> Float[Array, "cases 4"]:
-    """Return the probability of each state before a background, ndarray of shape (n_images, n_states)."""
+    """Return the probability of each state before a background."""
     n_cases, unlit = len(cases.table), heads.unlit[:, background]
     telling = np.argsort(-_telling(heads, unlit), kind="stable")
     dark, sun, lamp = (np.ascontiguousarray(part[..., telling]) for part in (unlit, heads.phantoms, heads.lamps))

@@ -31,18 +31,9 @@ class PixelTable:
     A reading is a digital number, the code of a companded HDR pixel, or a bin of an eighth of the noise of a merged
     value.
 
-    Parameters
-    ----------
-    nodes_e : ndarray of shape (n_nodes,)
-        Expected electrons of a pixel of full sensitivity.
-    node_of_root : ndarray of int, shape (n_roots,)
-        The last node that is not above each multiple of `ROOT_STEP`, squared; at most the last but one.
-    shares : ndarray of shape (n_readings, n_nodes)
-        Log of the probability of each reading, less its largest over all nodes.
-    below : ndarray of shape (n_nodes, n_readings)
-        Cumulative probability.
-    values_dn : ndarray of shape (n_readings,)
-        Value of each reading, DN; of a merged one those of the first capture.
+    `nodes_e`: expected electrons of a pixel of full sensitivity; `node_of_root`: the last node that is not above each
+    multiple of `ROOT_STEP`, squared; at most the last but one; `values_dn`: value of each reading, DN; of a merged one
+    those of the first capture.
     """
 
     nodes_e: Float[Array, " nodes"]
@@ -54,15 +45,7 @@ class PixelTable:
     def at(self, electrons: Float[Array, " ..."]) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
         """Return the node below each expected number of electrons, and the share of the next one.
 
-        Parameters
-        ----------
-        electrons : ndarray
-            Expected electrons of a pixel of full sensitivity.
-
-        Returns
-        -------
-        node, share : ndarray of the same shape
-            Node and share.
+        `electrons`: expected electrons of a pixel of full sensitivity.
         """
         root = np.minimum(np.sqrt(electrons) / ROOT_STEP, self.node_of_root.size - 1).astype(np.intp)
         node = self.node_of_root[root]
@@ -75,15 +58,7 @@ class PixelTable:
 def pixel_table(pixel: Pixel) -> PixelTable:
     """Return the table of a pixel with its noise; cached.
 
-    Parameters
-    ----------
-    pixel : Pixel
-        Full well, gain, noise and ADC; captures of an HDR pixel have its QE and crosstalk.
-
-    Returns
-    -------
-    PixelTable
-        Table.
+    `pixel`: full well, gain, noise and ADC; captures of an HDR pixel have its QE and crosstalk.
     """
     from ..camera.noise.compiled import merged_shares  # noqa: PLC0415  (compiled: kept off the start-up path)
 

@@ -19,17 +19,7 @@ def in_noise(raw: NDArray[np.generic], pixel: Pixel) -> Float[Array, "images row
     With e electrons above the pedestal, (1/p) ln(1 + 2 p (sqrt(s^2 + e + p^2 e^2) + p e)) has a slope of 1 over the
     noise, of shot noise, PRNU p and the rest s.
 
-    Parameters
-    ----------
-    raw : ndarray
-        Values, DN.
-    pixel : Pixel
-        Pedestal, gain and noise.
-
-    Returns
-    -------
-    ndarray
-        Values in units of the noise.
+    `raw`: values, DN.
     """
     gain, prnu = pixel.dn_per_e, max(pixel.prnu, _LEAST_PRNU)
     rest = pixel.read_noise_e**2 + 1 / (12 * gain**2) + 3 / 8  # 3/8: Anscombe's, of few photons
@@ -41,20 +31,7 @@ def in_noise(raw: NDArray[np.generic], pixel: Pixel) -> Float[Array, "images row
 def tile_planes(
     images: Float[Array, "images rows columns"], mosaic: Mosaic
 ) -> Float[Array, "images _rows _columns positions"]:
-    """Return each position of the tile as a plane.
-
-    Parameters
-    ----------
-    images : ndarray of shape (n, rows, columns)
-        Raw images.
-    mosaic : Mosaic
-        Tile.
-
-    Returns
-    -------
-    ndarray of shape (n, rows / tile, columns / tile, positions)
-        Planes.
-    """
+    """Return each position of the tile as a plane."""
     rows, columns = mosaic.indices.shape
     n, high, wide = images.shape
     parts = images.reshape(n, high // rows, rows, wide // columns, columns)
@@ -67,18 +44,6 @@ def demosaicked(
     """Return every channel at every pixel, for a tile of any size.
 
     Normalized convolution with a tent as wide as the tile, as in `camera.sampling.center_weights`.
-
-    Parameters
-    ----------
-    images : ndarray of shape (..., rows, columns)
-        Raw images.
-    mosaic : Mosaic
-        Tile.
-
-    Returns
-    -------
-    ndarray of shape (..., rows, columns, n_channels)
-        Demosaicked images.
     """
     tile = mosaic.indices
     high, wide = images.shape[-2:]

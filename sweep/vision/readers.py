@@ -33,7 +33,7 @@ OBSERVER = "observer"
 
 @dataclass(frozen=True)
 class Answers:
-    """Probability of each state from readers of the same images, ndarray of shape (n, n_states) each, by reader."""
+    """Probability of each state from readers of the same images, by reader."""
 
     scenes: Scenes
     probabilities: dict[str, Float[Array, "images states"]]
@@ -56,24 +56,7 @@ class SeedReading:
 
 
 def read_images(setup: Setup, curves: ChannelCurves, vision: Vision, seed: tuple[int, int]) -> SeedReading:
-    """Read the images of one design and one seed.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-    curves : ndarray of shape (n_modified, n_wavelengths)
-        QE of the modified channels.
-    vision : Vision
-        Benchmark.
-    seed : tuple of int
-        Seed of the study, and number of this seed.
-
-    Returns
-    -------
-    SeedReading
-        Answers.
-    """
+    """Read the images of one design and one seed."""
     camera = HeadCamera(setup, curves, vision)
     lamps = split_lamps(setup.lights, vision, seed)
     reader = _network(camera, lamps, seed) if vision.network else None
@@ -119,22 +102,6 @@ def observer_error(setup: Setup, curves: ChannelCurves, vision: Vision, seed: tu
     """Return the expected error of the ideal observer on one seed's test images, with the lenses in any order.
 
     The mean of one less the probability of the most probable state, with less scatter than a count.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-    curves : ndarray of shape (n_modified, n_wavelengths)
-        QE of the modified channels.
-    vision : Vision
-        Benchmark.
-    seed : tuple of int
-        Seed of the study, and number of this seed.
-
-    Returns
-    -------
-    float
-        Error probability.
     """
     camera, order = HeadCamera(setup, curves, vision), ORDERS[-1]
     lamps = split_lamps(setup.lights, vision, seed)

@@ -26,40 +26,18 @@ NETWORK = "network"
 
 @cache
 def orders_of_lenses(n_lenses: int) -> Int[IndexArray, "orders lenses"]:
-    """Return the signal type of the lens at each position from the top; the street's order is first.
-
-    Parameters
-    ----------
-    n_lenses : int
-        Number of lenses.
-
-    Returns
-    -------
-    ndarray of int, shape (n_orders, n_lenses)
-        Orders.
-    """
+    """Return the signal type of the lens at each position from the top; the street's order is first."""
     return np.array(list(permutations(range(n_lenses))), dtype=np.intp)
 
 
 def states_of(vision: Vision) -> tuple[str, ...]:
-    """Return the possible answers of a reader: off, or the type of the lit lens.
-
-    Parameters
-    ----------
-    vision : Vision
-        Benchmark.
-
-    Returns
-    -------
-    tuple of str
-        States.
-    """
+    """Return the possible answers of a reader: off, or the type of the lit lens."""
     return (OFF, *vision.lenses)
 
 
 @dataclass(frozen=True)
 class Scenes:
-    """Scenes one by one, ndarray[n] each.
+    """Scenes one by one.
 
     `state`: index into `states_of`; `lamp`: index of the lit signal; `intensity`, `background`, `distance`, `level`:
     index into the study's lists; `order`: into `orders_of_lenses`; `phantom`: 1 with sun on the lenses; `place`: where
@@ -81,42 +59,12 @@ class Scenes:
         return len(self.state)
 
     def subset(self, which: Int[IndexArray, " which"] | NDArray[np.bool_] | slice) -> Scenes:
-        """Return some of the scenes.
-
-        Parameters
-        ----------
-        which : ndarray or slice
-            Selection.
-
-        Returns
-        -------
-        Scenes
-            Scenes.
-        """
+        """Return some of the scenes."""
         return Scenes(**{field.name: getattr(self, field.name)[which] for field in fields(self)})
 
 
 def draw_scenes(vision: Vision, lamps: Lamps, order: str, count: int, key: tuple[int, ...]) -> Scenes:
-    """Draw scenes, evenly over distances, levels and states, the rest at random; equal for all CFAs.
-
-    Parameters
-    ----------
-    vision : Vision
-        Benchmark.
-    lamps : Lamps
-        Lamps.
-    order : str
-        Order of the lenses.
-    count : int
-        Number of scenes.
-    key : tuple of int
-        Seed.
-
-    Returns
-    -------
-    Scenes
-        Scenes.
-    """
+    """Draw scenes, evenly over distances, levels and states, the rest at random; equal for all CFAs."""
     rng = np.random.default_rng(key)
     levels, at, n_orders = list(vision.levels.values()), np.arange(count), len(orders_of_lenses(len(vision.lenses)))
     n_distances, n_levels = len(vision.distances_m), len(levels)
@@ -145,17 +93,5 @@ def uniforms(keys: ImageNumbers, n_pixels: int) -> Float[Array, "images pixels"]
     """Return a random number from 0 to 1 for each pixel of each scene, equal for all CFAs.
 
     Each scene has its own counter-based generator (Philox), so that earlier draws do not matter.
-
-    Parameters
-    ----------
-    keys : ndarray of int, shape (n,)
-        Key of each scene.
-    n_pixels : int
-        Pixels.
-
-    Returns
-    -------
-    ndarray of shape (n, n_pixels)
-        Numbers.
     """
     return np.stack([np.random.Generator(np.random.Philox(key=int(key))).random(n_pixels) for key in keys])

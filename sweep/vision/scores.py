@@ -25,32 +25,13 @@ class Interval:
         return self.low > 0 or self.high < 0
 
     def columns(self, name: str) -> dict[str, float]:
-        """Return value and ends as columns of a table.
-
-        Parameters
-        ----------
-        name : str
-            Name of the quantity.
-
-        Returns
-        -------
-        dict of str to float
-            `name`, and with `_low` and `_high`.
-        """
+        """Return value and ends as columns of a table."""
         return {name: self.value, f"{name}_low": self.low, f"{name}_high": self.high}
 
     def within(self, least: float, most: float) -> Interval:
         """Return the interval cut at the ends of a quantity.
 
-        Parameters
-        ----------
-        least, most : float
-            Ends.
-
-        Returns
-        -------
-        Interval
-            Interval; NaN stays NaN.
+        NaN stays NaN.
         """
         low, high = (float(np.clip(end, least, most)) for end in (self.low, self.high))
         return Interval(self.value, low, high)
@@ -61,17 +42,7 @@ def interval_of_seeds(value: float, by_seed: Float[Array, " seeds"]) -> Interval
 
     Seeds are independent: each has scenes, and networks, of its own.
 
-    Parameters
-    ----------
-    value : float
-        Value over all seeds.
-    by_seed : ndarray of shape (n_seeds,)
-        Value in each seed; those that are not finite are left out.
-
-    Returns
-    -------
-    Interval
-        Interval; NaN from fewer than two seeds.
+    `by_seed`: value in each seed; those that are not finite are left out. NaN from fewer than two seeds.
     """
     from scipy.special import stdtrit  # noqa: PLC0415  (slow to import)
 
@@ -83,40 +54,14 @@ def interval_of_seeds(value: float, by_seed: Float[Array, " seeds"]) -> Interval
 
 
 def mean_of(values: PerValue | Bool[BoolArray, " values"], seeds: Int[IndexArray, " values"]) -> Interval:
-    """Return the mean of one value per scene.
-
-    Parameters
-    ----------
-    values : ndarray of shape (n,)
-        Values.
-    seeds : ndarray of int, shape (n,)
-        Seed of each scene; all have equally many.
-
-    Returns
-    -------
-    Interval
-        Mean.
-    """
+    """Return the mean of one value per scene."""
     numbers = np.asarray(values, dtype=float)
     by_seed = np.array([numbers[seeds == seed].mean() for seed in np.unique(seeds)])
     return interval_of_seeds(float(numbers.mean()), by_seed)
 
 
 def confusion_matrix(truth: ImageNumbers, answered: ImageNumbers, n_states: int) -> Int[IndexArray, "states states"]:
-    """Return the number of answers by true state (row) and answer (column).
-
-    Parameters
-    ----------
-    truth, answered : ndarray of int, shape (n,)
-        True states and answers.
-    n_states : int
-        Number of states.
-
-    Returns
-    -------
-    ndarray of int, shape (n_states, n_states)
-        Counts.
-    """
+    """Return the number of answers by true state (row) and answer (column)."""
     counts = np.zeros((n_states, n_states), dtype=np.intp)
     np.add.at(counts, (truth, answered), 1)
     return counts
@@ -125,15 +70,7 @@ def confusion_matrix(truth: ImageNumbers, answered: ImageNumbers, n_states: int)
 def macro_f1(matrix: Int[IndexArray, "states states"]) -> float:
     """Return the mean over the states of the harmonic mean of precision and recall; 0 for a state that is never right.
 
-    Parameters
-    ----------
-    matrix : ndarray of int, shape (n_states, n_states)
-        Confusion matrix.
-
-    Returns
-    -------
-    float
-        0 to 1.
+    Returns 0 to 1.
     """
     right = np.diag(matrix).astype(float)
     total = matrix.sum(axis=0) + matrix.sum(axis=1)
@@ -145,21 +82,7 @@ def costs(
 ) -> tuple[Float[Array, " images"], Bool[BoolArray, " images"]]:
     """Return the cost of each answer; a reader answers "unknown" if that is expected to cost less than 1 for an error.
 
-    Parameters
-    ----------
-    wrong : ndarray of bool, shape (n,)
-        True if the most probable state is not the true one.
-    probability : ndarray of shape (n,)
-        Probability of that state, by the reader.
-    unknown_cost : float
-        Cost of "unknown".
-
-    Returns
-    -------
-    cost : ndarray of shape (n,)
-        Costs.
-    unknown : ndarray of bool, shape (n,)
-        True for "unknown".
+    `wrong`: True if the most probable state is not the true one. Returns `unknown`: True for "unknown".
     """
     unknown = np.asarray(1 - probability > unknown_cost, dtype=bool)
     return np.where(unknown, unknown_cost, wrong.astype(float)), unknown

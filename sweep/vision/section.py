@@ -126,18 +126,7 @@ class Vision(Section):
         return self
 
     def target(self, distance_m: float) -> Target:
-        """Return a lens of the head at a distance as the target of a scene.
-
-        Parameters
-        ----------
-        distance_m : float
-            Distance, m.
-
-        Returns
-        -------
-        Target
-            Target.
-        """
+        """Return a lens of the head at a distance as the target of a scene."""
         return Target(distance_m=distance_m, fov_deg=self.fov_deg, diameter_m=self.diameter_m)
 
 

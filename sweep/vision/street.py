@@ -34,7 +34,7 @@ _STREET_LIGHTS: tuple[Illuminant, ...] = ("LED street light", "sodium street lig
 
 @dataclass(frozen=True)
 class StreetScenes:
-    """Streets, ndarray[n] each or [n, n_lamps], heads first.
+    """Streets or [n, n_lamps], heads first.
 
     `level`, `background`, `distance`: index into the study's lists; `phantom`: 1 with sun on the lenses; `cell`: cell
     of the grid; `place`, `aside`, `below`: position in it, as shares; `state`: index into `states_of`; `lamp`: which of
@@ -59,40 +59,12 @@ class StreetScenes:
         return len(self.level)
 
     def subset(self, which: slice) -> StreetScenes:
-        """Return some of the streets.
-
-        Parameters
-        ----------
-        which : slice
-            Selection.
-
-        Returns
-        -------
-        StreetScenes
-            Streets.
-        """
+        """Return some of the streets."""
         return StreetScenes(**{field.name: getattr(self, field.name)[which] for field in fields(self)})
 
 
 def draw_streets(vision: Vision, street: Street, split: str, seed: tuple[int, int]) -> StreetScenes:
-    """Draw streets, evenly over the light levels, the rest at random; equal for all CFAs.
-
-    Parameters
-    ----------
-    vision : Vision
-        Benchmark.
-    street : Street
-        Its streets.
-    split : {'train', 'test'}
-        Split.
-    seed : tuple of int
-        Seed of the study, and number of this seed.
-
-    Returns
-    -------
-    StreetScenes
-        Streets.
-    """
+    """Draw streets, evenly over the light levels, the rest at random; equal for all CFAs."""
     rng = np.random.default_rng((*seed, _KEY_OF_STREET, (TRAIN, TEST).index(split)))
     n = street.train_images if split == TRAIN else street.test_images
     levels = list(vision.levels.values())
@@ -129,70 +101,28 @@ def draw_streets(vision: Vision, street: Street, split: str, seed: tuple[int, in
 
 
 def kinds_of(street: Street) -> Int[IndexArray, " lamps"]:
-    """Return the kind of each head and lamp: 0 for heads, 1 for brake lamps, 2 for street lamps.
-
-    Parameters
-    ----------
-    street : Street
-        Streets.
-
-    Returns
-    -------
-    ndarray of int, shape (n_lamps,)
-        Kinds.
-    """
+    """Return the kind of each head and lamp: 0 for heads, 1 for brake lamps, 2 for street lamps."""
     return np.repeat([_HEAD, _BRAKE, _STREET_LAMP], [street.heads, street.brake_lamps, street.street_lamps])
 
 
 def cell_shape(vision: Vision, tile: tuple[int, ...]) -> tuple[int, int]:
     """Return the size of a cell: of the image of a head, and how far it may stand aside.
 
-    Parameters
-    ----------
-    vision : Vision
-        Benchmark.
-    tile : tuple of int
-        Rows and columns of the tile.
-
-    Returns
-    -------
-    tuple of int
-        Rows and columns, pixels.
+    Returns rows and columns, pixels.
     """
     rows, columns = (vision.crop_px + _JITTER_PX // size * size for size in tile)
     return rows, columns
 
 
 def street_shape(vision: Vision, tile: tuple[int, ...]) -> tuple[int, int]:
-    """Return the size of an image of a street.
-
-    Parameters
-    ----------
-    vision : Vision
-        Benchmark with streets.
-    tile : tuple of int
-        Rows and columns of the tile.
-
-    Returns
-    -------
-    tuple of int
-        Rows and columns, pixels.
-    """
+    """Return the size of an image of a street, pixels."""
     assert vision.street is not None
     rows, columns = cell_shape(vision, tile)
     return vision.street.rows * rows, vision.street.columns * columns
 
 
 class StreetCamera:
-    """One design before streets.
-
-    Parameters
-    ----------
-    camera : HeadCamera
-        The design before single heads.
-    street : Street
-        Streets.
-    """
+    """One design before streets."""
 
     def __init__(self, camera: HeadCamera, street: Street) -> None:
         self.camera = camera
@@ -207,20 +137,7 @@ class StreetCamera:
         self._backgrounds = cache(camera.background)
 
     def expected(self, scenes: StreetScenes, lamps: Lamps) -> Float[Array, "images rows columns"]:
-        """Return expected electrons.
-
-        Parameters
-        ----------
-        scenes : StreetScenes
-            Streets.
-        lamps : Lamps
-            Lamps of the heads.
-
-        Returns
-        -------
-        ndarray of shape (n, rows, columns)
-            Electrons.
-        """
+        """Return expected electrons."""
         camera, side, kinds = self.camera, self.camera.vision.crop_px, kinds_of(self.street)
         corners = corners_px(camera.vision, self._tile, scenes)
         images = np.empty((len(scenes), *self.shape))
@@ -268,26 +185,7 @@ class StreetCamera:
     def batches(
         self, scenes: StreetScenes, lamps: Lamps, key: Mapping[str, Any], split: str, form: Form
     ) -> Iterator[Batch]:
-        """Yield images with labels, some at once.
-
-        Parameters
-        ----------
-        scenes : StreetScenes
-            Streets of a split.
-        lamps : Lamps
-            Lamps of the split.
-        key : mapping
-            `design_id`, `name`, `cfa` and `seed`.
-        split : {'train', 'test'}
-            Split.
-        form : {'raw', 'demosaicked', 'isp'}
-            Form of the images.
-
-        Yields
-        ------
-        Batch
-            Images with labels, see `street_labels`.
-        """
+        """Yield images with labels, some at once."""
         labels = street_labels(self.camera.vision, self.camera.setup.camera.mosaic, scenes, key, split)
         for start in range(0, len(scenes), _AT_ONCE):
             block = scenes.subset(slice(start, start + _AT_ONCE))
@@ -297,22 +195,7 @@ class StreetCamera:
 
 
 def corners_px(vision: Vision, tile: tuple[int, ...], scenes: StreetScenes) -> Int[IndexArray, "images lamps 2"]:
-    """Return the first row and column of each head's or lamp's image.
-
-    Parameters
-    ----------
-    vision : Vision
-        Benchmark with streets.
-    tile : tuple of int
-        Rows and columns of the tile.
-    scenes : StreetScenes
-        Streets.
-
-    Returns
-    -------
-    ndarray of int, shape (n, n_lamps, 2)
-        Pixels.
-    """
+    """Return the first row and column of each head's or lamp's image."""
     assert vision.street is not None
     at = np.stack(np.divmod(scenes.cell, vision.street.columns), axis=2)
     steps = [share * (_JITTER_PX // size + 1) for share, size in zip((scenes.below, scenes.aside), tile, strict=True)]
@@ -325,23 +208,7 @@ def street_labels(
 ) -> pd.DataFrame:
     """Return the labels of streets.
 
-    Parameters
-    ----------
-    vision : Vision
-        Benchmark with streets.
-    mosaic : Mosaic
-        Tile of the design.
-    scenes : StreetScenes
-        Streets of a split.
-    key : mapping
-        `design_id`, `name`, `cfa` and `seed`.
-    split : {'train', 'test'}
-        Split.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row per image, lists with an entry for each head.
+    Returns a row per image, lists with an entry for each head.
     """
     assert vision.street is not None
     heads, places = slice(0, vision.street.heads), head_places_px(vision, mosaic)

@@ -23,16 +23,7 @@ a capture is used."""
 def rounded_gaussian(mean: FloatArray, sigma: float, top: float, out: FloatArray) -> None:
     """Compute mean and variance of round(clip(x, 0, top)) for Gaussian x, by the probability of passing each step.
 
-    Parameters
-    ----------
-    mean : ndarray of shape (n,)
-        Means.
-    sigma : float
-        Standard deviation, above 0.
-    top : float
-        Upper end, an integer.
-    out : ndarray of shape (2, n)
-        Mean and variance.
+    `sigma`: standard deviation, above 0.
     """
     scale = 1 / (sigma * math.sqrt(2))
     for i in range(mean.size):
@@ -57,21 +48,7 @@ def rounded_gaussian(mean: FloatArray, sigma: float, top: float, out: FloatArray
 def poisson_shares(electrons: float, start: int, rare: float, shares: FloatArray) -> tuple[int, int]:
     """Compute the probability of each count, relative to the most frequent one.
 
-    Parameters
-    ----------
-    electrons : float
-        Expected number.
-    start : int
-        First count.
-    rare : float
-        Counts below this relative probability are left out.
-    shares : ndarray of shape (n_counts,)
-        Filled between the two returned indices; its last count takes all higher ones.
-
-    Returns
-    -------
-    begin, end : int
-        Range of indices that is filled.
+    `rare`: counts below this relative probability are left out.
     """
     last, mode = shares.size - 1, int(electrons)
     low = high = min(mode - start, last)
@@ -122,18 +99,8 @@ def poisson_moments(
 ) -> None:
     """Compute means of several quantities of a Poisson number of electrons, and the variance of the last one.
 
-    Parameters
-    ----------
-    electrons : ndarray of shape (n,)
-        Expected numbers.
-    start : int
-        First count.
-    values : ndarray of shape (n_quantities, n_counts)
-        Quantities at each count; constant beyond the last count.
-    variance : ndarray of shape (n_counts,) or (0,)
-        Variance of the last quantity at each count, if requested.
-    out : ndarray of shape (n_quantities + 1, n)
-        Means, and the variance.
+    `values`: quantities at each count; constant beyond the last count; `variance`: variance of the last quantity at
+    each count, if requested.
     """
     quantities, counts = values.shape
     shares = np.empty(counts)
@@ -162,20 +129,9 @@ def means_over_gains(
 ) -> None:
     """Compute means over Gaussian gains of the pixels by the trapezoidal rule, and the variance of the last mean.
 
-    Parameters
-    ----------
-    electrons : ndarray of shape (n,)
-        Expected numbers.
-    prnu : float
-        Relative standard deviation of the gains.
-    drawn : float
-        Standard deviations beyond which gains are left out.
-    per_deviation : float
-        Steps per standard deviation, more where there are more electrons.
-    roots, table : ndarray of shape (n_nodes,) and (4, n_nodes - 1, 3)
-        Nodes and coefficients of a cubic spline over the root of the electrons: two means and the variance.
-    out : ndarray of shape (3, n)
-        Two means and the variance.
+    `drawn`: standard deviations beyond which gains are left out; `per_deviation`: steps per standard deviation, more
+    where there are more electrons; `roots`, `table`: nodes and coefficients of a cubic spline over the root of the
+    electrons: two means and the variance.
     """
     for i in range(electrons.size):
         half = math.ceil(drawn * per_deviation * math.sqrt(1 + prnu * prnu * electrons[i]))
@@ -207,24 +163,7 @@ def means_over_gains(
 
 
 def poisson_means(electrons: FloatArray, start: int, values: FloatArray, variance: FloatArray = _NONE) -> FloatArray:
-    """Return the result of `poisson_moments` in a new array.
-
-    Parameters
-    ----------
-    electrons : ndarray of shape (n,)
-        Expected numbers.
-    start : int
-        First count.
-    values : ndarray of shape (n_quantities, n_counts)
-        Quantities at each count.
-    variance : ndarray of shape (n_counts,), optional
-        Variance of the last quantity at each count.
-
-    Returns
-    -------
-    ndarray of shape (n_quantities + 1, n)
-        Means, and the variance.
-    """
+    """Return the result of `poisson_moments` in a new array."""
     out = np.empty((len(values) + 1, electrons.size))
     poisson_moments(np.ascontiguousarray(electrons), start, values, variance, out)
     return out
@@ -242,20 +181,7 @@ def cubic_of_electrons(
 ) -> None:
     """Evaluate a table at expected electrons (see `table.MomentTable`); constant beyond `last_e`.
 
-    Parameters
-    ----------
-    electrons : ndarray of shape (n,)
-        Expected electrons.
-    last_e : float
-        Last electrons of the table.
-    nodes, coefficients : ndarray
-        Cubics of the table.
-    piece : ndarray of int
-        Piece at each multiple of `step`.
-    step : float
-        Step in the root of the electrons.
-    out : ndarray of shape (n,)
-        Values.
+    `step`: step in the root of the electrons.
     """
     for i in range(electrons.size):
         held = electrons[i]
@@ -274,17 +200,7 @@ def cubic_of_electrons(
 def occurring(shares: FloatArray, rare: float) -> tuple[int, int]:
     """Return the range of shares without the rare ones at both ends.
 
-    Parameters
-    ----------
-    shares : ndarray of shape (n,)
-        Probabilities.
-    rare : float
-        Probability below which one is left out.
-
-    Returns
-    -------
-    low, high : int
-        First index, and the one after the last.
+    `rare`: probability below which one is left out.
     """
     low, high = 0, shares.size
     while low + 1 < high and shares[low] < rare:
@@ -305,24 +221,7 @@ def merged_shares(
     shares: FloatArray,
     n_bins: int,
 ) -> tuple[int, FloatArray]:
-    """Return the distribution of the merged value of an HDR pixel.
-
-    Parameters
-    ----------
-    electrons : ndarray of shape (n_exposures,)
-        Expected electrons.
-    prnu : float
-        PRNU, common to all exposures.
-    exposure, passed, starts, columns, shares, n_bins
-        As in `Readings`.
-
-    Returns
-    -------
-    first : int
-        First bin that occurs.
-    shares : ndarray
-        Probability of each bin from there on.
-    """
+    """Return the distribution of the merged value of an HDR pixel."""
     n_captures, n_exposures, n_counts = passed.shape
     total, brightest = np.zeros(n_bins), electrons.max()
     half = int(_MOST_GAIN * math.sqrt(1 + prnu * prnu * brightest)) + 1 if prnu > 0 else 0

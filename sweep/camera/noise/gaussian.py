@@ -18,33 +18,14 @@ _EULER_DN = 4.0
 
 
 def density(z: SameShape) -> SameShape:
-    """Return the density of the standard normal distribution.
-
-    Parameters
-    ----------
-    z : ndarray
-        Arguments.
-
-    Returns
-    -------
-    ndarray of the same shape
-        Density.
-    """
+    """Return the density of the standard normal distribution."""
     return np.asarray(np.exp(-0.5 * z**2) / math.sqrt(2 * math.pi), dtype=float)
 
 
 def share_below(z: Float[Array, " *batch"] | float) -> Float[Array, " ..."]:
     """Return the standard normal distribution function.
 
-    Parameters
-    ----------
-    z : ndarray
-        Arguments.
-
-    Returns
-    -------
-    ndarray of the same shape
-        Probability below z.
+    Returns probability below z.
     """
     from scipy.special import ndtr  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
@@ -52,38 +33,12 @@ def share_below(z: Float[Array, " *batch"] | float) -> Float[Array, " ..."]:
 
 
 def ramp(z: SameShape) -> SameShape:
-    """Return the mean of max(0, z + Z) for a standard normal Z.
-
-    Parameters
-    ----------
-    z : ndarray
-        Arguments.
-
-    Returns
-    -------
-    ndarray of the same shape
-        Means.
-    """
+    """Return the mean of max(0, z + Z) for a standard normal Z."""
     return np.asarray(z * share_below(z) + density(z), dtype=float)
 
 
 def clipped_gaussian(mean: PerValue, sigma: float, low: float, high: float) -> tuple[PerValue, PerValue]:
-    """Return mean and variance of a clipped Gaussian.
-
-    Parameters
-    ----------
-    mean : ndarray
-        Means before clipping.
-    sigma : float
-        Standard deviation before clipping.
-    low, high : float
-        Ends.
-
-    Returns
-    -------
-    mean, variance : ndarray of the same shape
-        Moments after clipping.
-    """
+    """Return mean and variance of a clipped Gaussian."""
     if sigma == 0:
         return np.clip(mean, low, high), np.zeros_like(mean)
     z_low, z_high = (np.clip((end - mean) / sigma, -TAILS, TAILS) for end in (low, high))
@@ -97,24 +52,12 @@ def clipped_gaussian(mean: PerValue, sigma: float, low: float, high: float) -> t
 
 
 def clipped_and_rounded(mean: PerValue, sigma: float, top: float) -> tuple[PerValue, PerValue]:
-    """Return mean and variance of round(clip(x, 0, top)) for Gaussian x.
+    """Return mean and variance of round(clip(x, 0, top)) for Gaussian x, DN and DN^2.
 
     The sum over the steps of the probability of passing each, or, where the noise spans many steps, the Euler-
     Maclaurin series of the midpoint rule for that sum (four terms: less than 1e-10 DN is left from 4 DN of noise on).
 
-    Parameters
-    ----------
-    mean : ndarray of shape (n,)
-        Means before clipping, DN.
-    sigma : float
-        Standard deviation, DN.
-    top : float
-        Full scale, an integer, DN.
-
-    Returns
-    -------
-    mean, variance : ndarray of shape (n,)
-        Moments, DN and DN^2.
+    `mean`: means before clipping, DN; `sigma`: standard deviation, DN; `top`: full scale, an integer, DN.
     """
     if sigma == 0:
         return np.clip(np.floor(mean + 0.5), 0.0, top), np.zeros_like(mean)
@@ -167,20 +110,7 @@ def _by_steps(rest: PerValue, sigma: PerValue) -> tuple[PerValue, PerValue]:
 
 
 def rounding(mean_dn: PerValue, sigma_dn: PerValue) -> tuple[PerValue, PerValue]:
-    """Return mean of round(x) - x and variance of round(x) for Gaussian x far from both ends of the ADC.
-
-    Parameters
-    ----------
-    mean_dn : ndarray of shape (n,)
-        Means, DN.
-    sigma_dn : ndarray of shape (n,)
-        Standard deviations, DN.
-
-    Returns
-    -------
-    shift_dn, variance_dn2 : ndarray of shape (n,)
-        Mean shift, DN, and variance, DN^2.
-    """
+    """Return mean of round(x) - x, DN, and variance of round(x), DN^2, for Gaussian x far from both ends of the ADC."""
     rest = mean_dn - np.floor(mean_dn + 0.5)
     shift, variance = np.zeros_like(rest), sigma_dn**2 + 1 / 12
     little = sigma_dn < _SERIES_DN

@@ -36,20 +36,7 @@ _FAR_ROOT = 16.0
 
 
 def linear_moments(electrons: PerValue, pixel: Pixel) -> Float[Array, "3 values"]:
-    """Return the moments of a linear readout whose Gaussian noise dithers the steps.
-
-    Parameters
-    ----------
-    electrons : ndarray of shape (n,)
-        Expected electrons.
-    pixel : Pixel
-        Gain, noise and pedestal.
-
-    Returns
-    -------
-    ndarray of shape (3, n)
-        See `moments`.
-    """
+    """Return the moments of a linear readout whose Gaussian noise dithers the steps."""
     mean = pixel.dn_per_e * electrons + pixel.offset_dn
     sigma = pixel.dn_per_e * np.sqrt(electrons + (pixel.prnu * electrons) ** 2 + pixel.read_noise_e**2)
     shift, variance = gaussian.rounding(mean, sigma)
@@ -57,20 +44,7 @@ def linear_moments(electrons: PerValue, pixel: Pixel) -> Float[Array, "3 values"
 
 
 def of_count(electrons: PerValue, pixel: Pixel) -> Float[Array, "3 values"]:
-    """Return the moments for a given number of electrons, without photon noise.
-
-    Parameters
-    ----------
-    electrons : ndarray of shape (n,)
-        Numbers of electrons.
-    pixel : Pixel
-        Full well, gain, noise and ADC.
-
-    Returns
-    -------
-    ndarray of shape (3, n)
-        See `moments`.
-    """
+    """Return the moments for a given number of electrons, without photon noise."""
     top, sigma = float(pixel.full_scale_dn), pixel.dn_per_e * pixel.read_noise_e
     mean = pixel.dn_per_e * np.minimum(electrons, pixel.well_e) + pixel.offset_dn
     return np.stack(
@@ -82,16 +56,7 @@ def of_count(electrons: PerValue, pixel: Pixel) -> Float[Array, "3 values"]:
 class LinearRange:
     """Electrons at which a pixel's readout stops to be linear.
 
-    Parameters
-    ----------
-    low_e : float
-        Below, the dark end of the ADC has an effect.
-    high_e : float
-        Above, the full well or the bright end has an effect.
-    full_e : float
-        Above, the readout is constant.
-    last_e : float
-        Expected number whose counts exceed `full_e` almost surely.
+    `low_e`: below, the dark end of the ADC has an effect; `full_e`: above, the readout is constant.
     """
 
     low_e: float
@@ -101,18 +66,7 @@ class LinearRange:
 
     @classmethod
     def of(cls, pixel: Pixel) -> LinearRange:
-        """Return the ends of a pixel.
-
-        Parameters
-        ----------
-        pixel : Pixel
-            Full well, gain, noise and ADC.
-
-        Returns
-        -------
-        LinearRange
-            Its ends.
-        """
+        """Return the ends of a pixel."""
         reach_e = _REACH * pixel.read_noise_e
         adc_e = (pixel.full_scale_dn - pixel.offset_dn) / pixel.dn_per_e
         full_e = min(pixel.well_e, adc_e + reach_e)
@@ -136,36 +90,12 @@ def _felt(electrons: PerValue, pixel: Pixel) -> Bool[BoolArray, " values"]:
 
 
 def without_prnu(pixel: Pixel) -> Pixel:
-    """Return the pixel with equal gains.
-
-    Parameters
-    ----------
-    pixel : Pixel
-        Pixel.
-
-    Returns
-    -------
-    Pixel
-        The pixel without PRNU.
-    """
+    """Return the pixel with equal gains."""
     return pixel.model_copy(update={"prnu": 0.0})
 
 
 def counted(electrons: PerValue, pixel: Pixel) -> Float[Array, "3 values"]:
-    """Return the moments of pixels without PRNU.
-
-    Parameters
-    ----------
-    electrons : ndarray of shape (n,)
-        Expected electrons, ascending.
-    pixel : Pixel
-        Full well, gain, noise and ADC.
-
-    Returns
-    -------
-    ndarray of shape (3, n)
-        See `moments`.
-    """
+    """Return the moments of pixels without PRNU."""
     from .compiled import poisson_means  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     result = linear_moments(electrons, pixel)
@@ -177,17 +107,7 @@ def counted(electrons: PerValue, pixel: Pixel) -> Float[Array, "3 values"]:
 def runs(electrons: PerValue, pixel: Pixel) -> Iterator[tuple[slice, int, Float[Array, "3 _values"]]]:
     """Yield runs of expected electrons whose counts are summed.
 
-    Parameters
-    ----------
-    electrons : ndarray of shape (n,)
-        Expected electrons, ascending.
-    pixel : Pixel
-        Full well, gain, noise and ADC.
-
-    Yields
-    ------
-    run, first, moments : slice, int, ndarray
-        Range of electrons, their first count, and `of_count` from it on.
+    Returns range of electrons, their first count, and `of_count` from it on.
     """
     felt = _felt(electrons, pixel)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], felt, [False]])))
@@ -197,20 +117,7 @@ def runs(electrons: PerValue, pixel: Pixel) -> Iterator[tuple[slice, int, Float[
 
 
 def counts_of(electrons: PerValue, pixel: Pixel) -> tuple[int, int]:
-    """Return the first and last count of expected numbers of electrons; the full well holds no more.
-
-    Parameters
-    ----------
-    electrons : ndarray of shape (n,)
-        Expected electrons, ascending.
-    pixel : Pixel
-        Full well, gain, noise and ADC.
-
-    Returns
-    -------
-    first, last : int
-        Counts.
-    """
+    """Return the first and last count of expected numbers of electrons; the full well holds no more."""
     low, high = electrons[0], electrons[-1]
     first = max(0, math.floor(low - (_REACH + 1) * math.sqrt(low)))
     full = math.ceil(LinearRange.of(pixel).full_e)
@@ -221,15 +128,7 @@ def counts_of(electrons: PerValue, pixel: Pixel) -> tuple[int, int]:
 def table_nodes(pixel: Pixel) -> Float[Array, " nodes"]:
     """Return the roots of the electrons at which a table without PRNU is computed.
 
-    Parameters
-    ----------
-    pixel : Pixel
-        Full well, gain, noise and ADC.
-
-    Returns
-    -------
-    ndarray of shape (n_nodes,)
-        Roots, ascending from 0.
+    Returns roots, ascending from 0.
     """
     ends = LinearRange.of(pixel)
     last = math.sqrt(_least_exceeding(ends.full_e))
@@ -247,18 +146,7 @@ def table_nodes(pixel: Pixel) -> Float[Array, " nodes"]:
 
 @lru_cache(maxsize=8)
 def table_without_prnu(pixel: Pixel) -> CubicSpline:
-    """Return `counted` as a spline over the root of the electrons.
-
-    Parameters
-    ----------
-    pixel : Pixel
-        Full well, gain, noise and ADC.
-
-    Returns
-    -------
-    scipy.interpolate.CubicSpline
-        Moments.
-    """
+    """Return `counted` as a spline over the root of the electrons."""
     from scipy.interpolate import CubicSpline  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
     roots = table_nodes(pixel)
@@ -270,18 +158,6 @@ def with_prnu(electrons: PerValue, pixel: Pixel) -> Float[Array, "3 values"]:
 
     The integrand is a Gaussian times a function that is smooth over a deviation 2 / (prnu root of the electrons), so
     that the rule converges exponentially; its step leaves less than 1e-13.
-
-    Parameters
-    ----------
-    electrons : ndarray of shape (n,)
-        Expected electrons, ascending.
-    pixel : Pixel
-        Full well, gain, noise and ADC.
-
-    Returns
-    -------
-    ndarray of shape (3, n)
-        See `moments`.
     """
     from .compiled import means_over_gains  # noqa: PLC0415  (compiled: kept off the start-up path)
 
@@ -299,18 +175,8 @@ def with_prnu(electrons: PerValue, pixel: Pixel) -> Float[Array, "3 values"]:
 
 
 def moments(electrons: PerValue, pixel: Pixel) -> Float[Array, "3 values"]:
-    """Return the moments of the digital number, by exact sums.
+    """Return the moments of the digital number, by exact sums, DN, and variance after rounding, DN^2.
 
-    Parameters
-    ----------
-    electrons : ndarray of shape (n,)
-        Expected electrons, ascending.
-    pixel : Pixel
-        Full well, gain, noise and ADC.
-
-    Returns
-    -------
-    ndarray of shape (3, n)
-        Mean before rounding and after, DN, and variance after rounding, DN^2.
+    Returns mean before rounding and after, DN, and variance after rounding, DN^2.
     """
     return with_prnu(electrons, pixel) if pixel.prnu else counted(electrons, pixel)

@@ -36,17 +36,7 @@ Subset = tuple[int, ...]
 def threshold_dn(pixel: Pixel, threshold: float) -> int:
     """Return the least digital number from which on a capture is not used.
 
-    Parameters
-    ----------
-    pixel : Pixel
-        Capture, as a pixel that is read once.
-    threshold : float
-        Share of saturation.
-
-    Returns
-    -------
-    int
-        Digital number, DN.
+    `pixel`: capture, as a pixel that is read once.
     """
     saturated_dn = min(pixel.saturation_e * pixel.dn_per_e + pixel.offset_dn, pixel.full_scale_dn)
     return max(1, math.ceil(pixel.offset_dn + threshold * (saturated_dn - pixel.offset_dn)))
@@ -56,14 +46,7 @@ def threshold_dn(pixel: Pixel, threshold: float) -> int:
 class SubsetMoments:
     """Moments of the captures of an exposure if exactly some of them are usable.
 
-    Parameters
-    ----------
-    share : ndarray
-        Probability.
-    mean_e : ndarray of shape (n_captures, ...)
-        Conditional means, electrons; 0 for captures that are not usable.
-    covariance_e2 : ndarray of shape (n_captures, n_captures, ...)
-        Conditional covariances, electrons squared.
+    `mean_e`: conditional means, electrons; 0 for captures that are not usable.
     """
 
     share: SameShape
@@ -75,16 +58,8 @@ class SubsetMoments:
 class SubsetTable:
     """Moments over the root of the expected electrons.
 
-    Parameters
-    ----------
-    subsets : tuple of tuple of int
-        Usable captures.
-    splines : tuple of CubicSpline
-        Share, means less the expected electrons, and covariances, by subset.
-    last_e : float
-        Expected electrons from which on all is constant.
-    n_captures : int
-        Captures of the exposure.
+    `splines`: share, means less the expected electrons, and covariances, by subset; `last_e`: expected electrons from
+    which on all is constant.
     """
 
     subsets: tuple[Subset, ...]
@@ -93,18 +68,7 @@ class SubsetTable:
     n_captures: int
 
     def at(self, electrons: PerCapture) -> dict[Subset, SubsetMoments]:
-        """Look up expected electrons.
-
-        Parameters
-        ----------
-        electrons : ndarray
-            Expected electrons.
-
-        Returns
-        -------
-        dict of tuple of int to SubsetMoments
-            Moments by subset.
-        """
+        """Look up expected electrons."""
         held = np.minimum(electrons, self.last_e)
         roots, n = np.sqrt(held), self.n_captures
         moments = {}
@@ -126,19 +90,7 @@ def _pairs(subset: Subset) -> list[tuple[int, int]]:
 def share_beyond(counts: PerValue, pixel: Pixel, limit_dn: int) -> PerValue:
     """Return the probability that a capture reads its limit or more, for given numbers of electrons.
 
-    Parameters
-    ----------
-    counts : ndarray of shape (n,)
-        Numbers of electrons.
-    pixel : Pixel
-        Capture, as a pixel that is read once.
-    limit_dn : int
-        Digital number.
-
-    Returns
-    -------
-    ndarray of shape (n,)
-        Probability.
+    `pixel`: capture, as a pixel that is read once.
     """
     over = pixel.dn_per_e * np.minimum(counts, pixel.well_e) + pixel.offset_dn - (limit_dn - 0.5)
     sigma = pixel.dn_per_e * pixel.read_noise_e
@@ -148,19 +100,8 @@ def share_beyond(counts: PerValue, pixel: Pixel, limit_dn: int) -> PerValue:
 def usable_of_count(counts: PerValue, pixel: Pixel, limit_dn: int | None) -> tuple[PerValue, PerValue, PerValue]:
     """Return the chance that a capture is usable, and its partial moments, for given numbers of electrons.
 
-    Parameters
-    ----------
-    counts : ndarray of shape (n,)
-        Numbers of electrons.
-    pixel : Pixel
-        Capture, as a pixel that is read once.
-    limit_dn : int or None
-        Digital number from which on it is not usable; None if it always is.
-
-    Returns
-    -------
-    share, first_e, second_e2 : ndarray of shape (n,)
-        Probability; mean and mean square of what it reads, electrons, where it is usable, and 0 where not.
+    `pixel`: capture, as a pixel that is read once; `limit_dn`: digital number from which on it is not usable; None if
+    it always is. Mean and mean square of what it reads, electrons, where it is usable, and 0 where not.
     """
     gain, top = pixel.dn_per_e, float(pixel.full_scale_dn if limit_dn is None else limit_dn)
     sigma = gain * pixel.read_noise_e
@@ -181,17 +122,8 @@ def usable_of_count(counts: PerValue, pixel: Pixel, limit_dn: int | None) -> tup
 def subset_table(captures: tuple[Pixel, ...], limits_dn: tuple[int | None, ...]) -> SubsetTable:
     """Compute the table of an exposure without PRNU.
 
-    Parameters
-    ----------
-    captures : tuple of Pixel
-        Captures, as pixels that are read once.
-    limits_dn : tuple of int or None
-        Digital number from which on each is not usable; None if it always is.
-
-    Returns
-    -------
-    SubsetTable
-        Table.
+    `captures`: captures, as pixels that are read once; `limits_dn`: digital number from which on each is not usable;
+    None if it always is.
     """
     from scipy.interpolate import CubicSpline  # noqa: PLC0415  (slow to import: kept off the start-up path)
 

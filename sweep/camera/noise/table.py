@@ -22,7 +22,7 @@ _LEAST_PRNU = 1e-9
 class MomentTable(NamedTuple):
     """Cubics over the root of the expected electrons: several values at once.
 
-    `nodes`, ndarray of shape (n + 1,), are at least `step` apart; `coefficients`, (n_values, n, 4), are of the pieces
+    `nodes`, are at least `step` apart; `coefficients`, (n_values, n, 4), are of the pieces
     between them; `piece` is that at each multiple of `step` from 0 up. From `last_e` electrons on values are constant.
     """
 
@@ -51,56 +51,17 @@ class MomentTable(NamedTuple):
 
 
 def mean_unrounded(electrons: SameShape, pixel: Pixel) -> SameShape:
-    """Return the mean before rounding.
-
-    Parameters
-    ----------
-    electrons : ndarray
-        Expected electrons.
-    pixel : Pixel
-        Full well, gain, noise and ADC.
-
-    Returns
-    -------
-    ndarray of the same shape
-        Mean, DN.
-    """
+    """Return the mean before rounding, DN."""
     return tables(pixel).look_up(electrons, moments.UNROUNDED)
 
 
 def mean_rounded(electrons: SameShape, pixel: Pixel) -> SameShape:
-    """Return the mean of the digital number.
-
-    Parameters
-    ----------
-    electrons : ndarray
-        Expected electrons.
-    pixel : Pixel
-        Full well, gain, noise and ADC.
-
-    Returns
-    -------
-    ndarray of the same shape
-        Mean, DN.
-    """
+    """Return the mean of the digital number, DN."""
     return tables(pixel).look_up(electrons, moments.ROUNDED)
 
 
 def variance(electrons: SameShape, pixel: Pixel) -> SameShape:
-    """Return the variance of the digital number.
-
-    Parameters
-    ----------
-    electrons : ndarray
-        Expected electrons.
-    pixel : Pixel
-        Full well, gain, noise and ADC.
-
-    Returns
-    -------
-    ndarray of the same shape
-        Variance, DN^2.
-    """
+    """Return the variance of the digital number, DN^2."""
     return np.maximum(tables(pixel).look_up(electrons, moments.VARIANCE), 0.0)
 
 
@@ -108,15 +69,7 @@ def variance(electrons: SameShape, pixel: Pixel) -> SameShape:
 def unclipped_e(pixel: Pixel) -> tuple[float, float]:
     """Return the range of electrons in which neither end shifts the mean by more than 1e-5 of the noise.
 
-    Parameters
-    ----------
-    pixel : Pixel
-        Full well, gain, noise and ADC.
-
-    Returns
-    -------
-    low_e, high_e : float
-        Range, electrons; (1, 0) if it is empty.
+    (1, 0) if it is empty.
     """
     electrons = tables(pixel).nodes ** 2
     sigma = pixel.dn_per_e * np.sqrt(electrons + (pixel.prnu * electrons) ** 2 + pixel.read_noise_e**2)
@@ -131,16 +84,6 @@ def tables(pixel: Pixel) -> MomentTable:
 
     With PRNU the noise grows faster than the root of the electrons. Nodes are then equidistant in asinh(PRNU root) /
     PRNU, twice the standard deviation.
-
-    Parameters
-    ----------
-    pixel : Pixel
-        Full well, gain, noise and ADC.
-
-    Returns
-    -------
-    MomentTable
-        The table.
     """
     from scipy.interpolate import CubicSpline  # noqa: PLC0415  (slow to import: kept off the start-up path)
 

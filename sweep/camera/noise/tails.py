@@ -21,46 +21,12 @@ _EXPONENTS = np.geomspace(1e-7, 4.0, 256)
 
 
 def share_above(level_e: float, electrons: float, pixel: Pixel, read_noise_e: float) -> float:
-    """Return an upper bound on the share of readouts above a level.
-
-    Parameters
-    ----------
-    level_e : float
-        Level, electrons.
-    electrons : float
-        Expected electrons.
-    pixel : Pixel
-        PRNU.
-    read_noise_e : float
-        Read noise, electrons.
-
-    Returns
-    -------
-    float
-        0 to 1.
-    """
+    """Return an upper bound on the share of readouts above a level, 0 to 1."""
     return min(1.0, float(np.exp(_exponents(level_e, electrons, pixel, read_noise_e)).min()))
 
 
 def mean_above(level_e: float, electrons: float, pixel: Pixel, read_noise_e: float) -> float:
-    """Return an upper bound on the mean of max(0, Y - level); x is at most exp(t x - 1) / t.
-
-    Parameters
-    ----------
-    level_e : float
-        Level, electrons.
-    electrons : float
-        Expected electrons.
-    pixel : Pixel
-        PRNU.
-    read_noise_e : float
-        Read noise, electrons.
-
-    Returns
-    -------
-    float
-        Electrons.
-    """
+    """Return an upper bound on the mean of max(0, Y - level); x is at most exp(t x - 1) / t."""
     return float((np.exp(_exponents(level_e, electrons, pixel, read_noise_e) - 1) / _EXPONENTS).min())
 
 

@@ -49,26 +49,7 @@ class Dual(Banded):
     ) -> Dual:
         """Make the family over curves of a study.
 
-        Parameters
-        ----------
-        wavelength_nm : ndarray of shape (n_wavelengths,)
-            Wavelengths, nm.
-        base : ndarray of shape (n_wavelengths,)
-            QE of the replaced curve.
-        target : ndarray of shape (n_wavelengths,) or None
-            QE that the filter takes inside its band.
-        options : Section
-            Options of the family.
-
-        Returns
-        -------
-        Dual
-            The family.
-
-        Raises
-        ------
-        SweepError
-            If the ceiling is nowhere above the base.
+        Raises SweepError if the ceiling is nowhere above the base.
         """
         assert target is not None
         assert not options.model_fields_set

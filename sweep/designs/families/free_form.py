@@ -102,26 +102,7 @@ class FreeForm:
     ) -> FreeForm:
         """Make the family over curves of a study.
 
-        Parameters
-        ----------
-        wavelength_nm : ndarray of shape (n_wavelengths,)
-            Wavelengths, nm.
-        base : ndarray of shape (n_wavelengths,)
-            QE of the replaced curve.
-        target : ndarray of shape (n_wavelengths,) or None
-            QE that the filter takes inside its band.
-        options : Section
-            Options of the family.
-
-        Returns
-        -------
-        FreeForm
-            The family.
-
-        Raises
-        ------
-        SweepError
-            If nodes lie outside the wavelengths.
+        Raises SweepError if nodes lie outside the wavelengths.
         """
         assert target is None
         assert isinstance(options, FreeForm.Options)
@@ -168,18 +149,7 @@ class FreeForm:
         return {}
 
     def perturbed(self, off: ProductionError) -> FreeForm:
-        """Return the family with its transmission moved.
-
-        Parameters
-        ----------
-        off : ProductionError
-            Production error.
-
-        Returns
-        -------
-        FreeForm
-            The family as production makes it.
-        """
+        """Return the family with its transmission moved."""
         return FreeForm(*self._made_of, self.nodes_nm, off)
 
     @property

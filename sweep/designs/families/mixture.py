@@ -42,15 +42,7 @@ _BANDS: tuple[Parameter, ...] = (
 
 
 class Absorbing(ABC):
-    """Filter that is the base times 10 to the minus absorbance; methods as in `Family`.
-
-    Parameters
-    ----------
-    wavelength_nm : ndarray of shape (n_wavelengths,)
-        Wavelengths, nm.
-    base : ndarray of shape (n_wavelengths,)
-        QE of the replaced curve.
-    """
+    """Filter that is the base times 10 to the minus absorbance; methods as in `Family`."""
 
     n_modified: ClassVar[int] = 1
     needs_target: ClassVar[bool] = False
@@ -64,32 +56,13 @@ class Absorbing(ABC):
 
     @abstractmethod
     def absorbance(self, x: DesignParameters) -> Float[Array, "designs wavelengths"]:
-        """Return the absorbance.
-
-        Parameters
-        ----------
-        x : ndarray of shape (n_designs, n_parameters)
-            Parameters.
-
-        Returns
-        -------
-        ndarray of shape (n_designs, n_wavelengths)
-            Absorbance, decadic.
-        """
+        """Return the absorbance."""
 
     @abstractmethod
     def absorbance_gradient(self, x: PerParameter) -> Float[Array, "parameters wavelengths"]:
         """Return the derivative of `absorbance` at one design.
 
-        Parameters
-        ----------
-        x : ndarray of shape (n_parameters,)
-            Parameters of one design.
-
-        Returns
-        -------
-        ndarray of shape (n_parameters, n_wavelengths)
-            Absorbance per unit of parameter.
+        Returns absorbance per unit of parameter.
         """
 
     def curves(self, x: DesignParameters) -> DesignCurves:
@@ -116,18 +89,7 @@ class Absorbing(ABC):
 
     @abstractmethod
     def absorbance_range(self, low: PerParameter, high: PerParameter) -> tuple[PerWavelength, PerWavelength]:
-        """Return bounds on the absorbance in a box.
-
-        Parameters
-        ----------
-        low, high : ndarray of shape (n_parameters,)
-            Ends of the box of parameters.
-
-        Returns
-        -------
-        least, most : ndarray of shape (n_wavelengths,)
-            Absorbance, decadic.
-        """
+        """Return bounds on the absorbance in a box."""
 
     @property
     def dimensions(self) -> Mapping[str, ParameterWeights]:
@@ -160,25 +122,7 @@ class Absorbing(ABC):
 
 
 class AbsorptionBands(Absorbing):
-    """Modeled absorption bands, and an absorbance at all wavelengths; methods as in `Family`.
-
-    Notes
-    -----
-    = base times 10^-(baseline + sum of absorbance exp(-4 ln 2 u^2)), with u = (peak / l - 1) peak / fwhm for Gaussians
-    in wavenumber, which bands of dyes are nearer to (Siano and Metzler, J. Chem. Phys. 51, 1856, 1969; the width is in
-    nm at the peak), and u = (peak - l) / fwhm for Gaussians in wavelength.
-
-    Parameters
-    ----------
-    wavelength_nm : ndarray of shape (n_wavelengths,)
-        Wavelengths, nm.
-    base : ndarray of shape (n_wavelengths,)
-        QE of the replaced curve.
-    bands : int
-        Number of bands.
-    gaussian_in : str
-        `wavenumber` or `wavelength`.
-    """
+    """Modeled absorption bands, and an absorbance at all wavelengths; methods as in `Family`."""
 
     kind = "absorption_bands"
 
@@ -216,7 +160,7 @@ class AbsorptionBands(Absorbing):
     def _offsets(
         self, peaks_nm: Float[Array, " bands"], fwhm_nm: Float[Array, " bands"]
     ) -> Float[Array, "bands wavelengths"]:
-        """Return the distances from the peaks in widths; ndarray of shape (..., n_wavelengths)."""
+        """Return the distances from the peaks in widths;."""
         peak_nm, wave_nm = peaks_nm[..., None], self._nominal_nm
         away_nm = peak_nm - wave_nm if self._in_wavelength else (peak_nm / wave_nm - 1) * peak_nm
         return np.asarray(away_nm / fwhm_nm[..., None])
@@ -270,24 +214,7 @@ class AbsorptionBands(Absorbing):
 class Mixture(Absorbing):
     """Colorants of a catalog in one film; methods as in `Family`.
 
-    Notes
-    -----
-    = base times 10^-(thickness / 0.8 um * sum of absorbance_i a_i), with a_i the spectrum of a colorant with a peak of
-    1: `absorbance_i` is that of the colorant alone at its peak, in a film of 0.8 um. `colorant_i` is its number in the
-    catalog, from 1 on.
-
-    Parameters
-    ----------
-    wavelength_nm : ndarray of shape (n_wavelengths,)
-        Wavelengths, nm.
-    base : ndarray of shape (n_wavelengths,)
-        QE of the replaced curve.
-    spectra : ndarray of shape (n_colorants, n_wavelengths)
-        Absorbances with a peak of 1.
-    at_most : int
-        Number of colorants in one film.
-    numbers : ndarray of int, shape (n_colorants,), optional
-        Ascending numbers of the spectra; left out, from 1 on.
+    `spectra`: absorbances with a peak of 1; `numbers`: ascending numbers of the spectra; left out, from 1 on.
     """
 
     kind = "mixture"
@@ -348,7 +275,7 @@ class Mixture(Absorbing):
         return made
 
     def _chosen(self, x: Float[Array, "*batch parameters"]) -> Float[Array, "*batch _slots wavelengths"]:
-        """Return the spectra of each slot, ndarray of shape (..., at_most, n_wavelengths)."""
+        """Return the spectra of each slot."""
         return self._spectra[np.searchsorted(self._numbers, np.rint(x[..., : 2 * self._slots : 2]).astype(np.intp))]
 
     def absorbance(self, x: DesignParameters) -> Float[Array, "designs wavelengths"]:

@@ -57,24 +57,7 @@ class MultiStopband(Banded):
     def of_study(
         cls, wavelength_nm: PerWavelength, base: PerWavelength, target: PerWavelength | None, options: Section
     ) -> MultiStopband:
-        """Make the family over curves of a study.
-
-        Parameters
-        ----------
-        wavelength_nm : ndarray of shape (n_wavelengths,)
-            Wavelengths, nm.
-        base : ndarray of shape (n_wavelengths,)
-            QE of the replaced curve.
-        target : ndarray of shape (n_wavelengths,) or None
-            QE that the filter takes inside its band.
-        options : Section
-            Options of the family.
-
-        Returns
-        -------
-        MultiStopband
-            The family.
-        """
+        """Make the family over curves of a study."""
         assert target is not None
         assert isinstance(options, MultiStopband.Options)
         return MultiStopband(wavelength_nm, base, target, options.bands)
@@ -127,24 +110,7 @@ class Stopband(MultiStopband):
     def of_study(
         cls, wavelength_nm: PerWavelength, base: PerWavelength, target: PerWavelength | None, options: Section
     ) -> Stopband:
-        """Make the family over curves of a study.
-
-        Parameters
-        ----------
-        wavelength_nm : ndarray of shape (n_wavelengths,)
-            Wavelengths, nm.
-        base : ndarray of shape (n_wavelengths,)
-            QE of the replaced curve.
-        target : ndarray of shape (n_wavelengths,) or None
-            QE that the filter takes inside its band.
-        options : Section
-            Options of the family.
-
-        Returns
-        -------
-        Stopband
-            The family.
-        """
+        """Make the family over curves of a study."""
         assert target is not None
         assert not options.model_fields_set
         return Stopband(wavelength_nm, base, target)

@@ -98,22 +98,7 @@ def _quantity(metric: str, name: str, types: tuple[str, ...]) -> Quantity:
 
 
 def state_errors(imager: ForwardModel, curves: DesignCurves, states: Sequence[str]) -> PerDesign:
-    """Return the error of the worst pair of states alone.
-
-    Parameters
-    ----------
-    imager : ForwardModel
-        Model of the scene.
-    curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
-        QE of the modified channels.
-    states : sequence of str
-        Signal types.
-
-    Returns
-    -------
-    ndarray of shape (n_designs,)
-        Error probability.
-    """
+    """Return the error of the worst pair of states alone."""
     members = {name: imager.setup.members[name] for name in states}
     exact = _exact(imager, curves, members)
     if exact is not None:

@@ -79,17 +79,7 @@ def detection(
     If the darker readout is above 0, the contrast of two Gaussians is within its ends if bright - r dark is above 0
     for the lower ratio r and below it for the higher one. Darker readouts below 0 count against it.
 
-    Parameters
-    ----------
-    mean, variance : ndarray of shape (n_designs, n_signals, n_channels)
-        Mean without pedestal, DN, and variance, DN^2.
-    first, second : ndarray of int
-        Signals of each type.
-
-    Returns
-    -------
-    ndarray of shape (n_designs,)
-        Probability.
+    `mean`, `variance`: mean without pedestal, DN, and variance, DN^2.
     """
     least = np.ones(len(mean))
     for signal in first:

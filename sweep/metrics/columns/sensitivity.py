@@ -20,15 +20,7 @@ SENSITIVITY, CFA_SENSITIVITY = "sensitivity", "cfa_sensitivity"
 def reference_of(brightest: str) -> str:
     """Return the name of the sensor whose CFA sensitivity is 1.
 
-    Parameters
-    ----------
-    brightest : str
-        Brightest curve, if the study has no clear pixel.
-
-    Returns
-    -------
-    str
-        Text.
+    `brightest`: brightest curve, if the study has no clear pixel.
     """
     alone = f"a sensor of {brightest} pixels alone, its brightest curve"
     return alone if brightest else "a sensor without color filters"
@@ -83,20 +75,7 @@ class Sensitivity(DesignMetric):
 
 
 def sensitivities_gradient(setup: Setup, curves_gradient: CurvesGradient) -> Columns:
-    """Return exact derivatives of `sensitivity` and `cfa_sensitivity`.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-    curves_gradient : ndarray of shape (n_parameters, n_modified, n_wavelengths)
-        Derivative of the QE.
-
-    Returns
-    -------
-    dict of str to ndarray of shape (n_parameters,)
-        Derivatives.
-    """
+    """Return exact derivatives of `sensitivity` and `cfa_sensitivity`."""
     total = curves_gradient.sum(axis=-1)
     counts = setup.camera.mosaic.counts
     return {
@@ -108,17 +87,7 @@ def sensitivities_gradient(setup: Setup, curves_gradient: CurvesGradient) -> Col
 def cfa_sensitivity_at(setup: Setup, sensitivity: float) -> float | None:
     """Return the CFA sensitivity for a sensitivity of the only modified channel.
 
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-    sensitivity : float
-        Sensitivity of the modified channel.
-
-    Returns
-    -------
-    float or None
-        None if several channels are modified.
+    None if several channels are modified.
     """
     if len(setup.camera.modified) != 1:
         return None
@@ -127,18 +96,7 @@ def cfa_sensitivity_at(setup: Setup, sensitivity: float) -> float | None:
 
 
 def light_of(design: SmoothDesign) -> Columns:
-    """Return both sensitivities of one design.
-
-    Parameters
-    ----------
-    design : SmoothDesign
-        Design.
-
-    Returns
-    -------
-    dict of str to ndarray of shape (1,)
-        Sensitivities.
-    """
+    """Return both sensitivities of one design."""
     block = CurveBlock(design.curves[None])
     return design.cached("light", lambda: Sensitivity().of_designs(design.setup, block))
 

@@ -24,18 +24,7 @@ class Least(Rule):
         return np.asarray(-np.log10(np.maximum(terms.max(axis=0), _SMALLEST)), dtype=float)
 
     def gradient(self, terms: PerTerm) -> PerTerm:
-        """Return the derivative of the largest term, the first of several.
-
-        Parameters
-        ----------
-        terms : ndarray of shape (n_terms,)
-            Weight times quantity.
-
-        Returns
-        -------
-        ndarray of shape (n_terms,)
-            Derivatives.
-        """
+        """Return the derivative of the largest term, the first of several."""
         worst = np.argmax(terms)
         slope = np.zeros(len(terms))
         slope[worst] = -1 / (np.log(10) * max(terms[worst], _SMALLEST))
@@ -55,18 +44,7 @@ class Minimum(Rule):
         return np.asarray(terms.min(axis=0), dtype=float)
 
     def gradient(self, terms: PerTerm) -> PerTerm:
-        """Return 1 for the smallest term, the first of several.
-
-        Parameters
-        ----------
-        terms : ndarray of shape (n_terms,)
-            Weight times quantity.
-
-        Returns
-        -------
-        ndarray of shape (n_terms,)
-            Derivatives.
-        """
+        """Return 1 for the smallest term, the first of several."""
         return np.asarray(np.arange(len(terms)) == np.argmin(terms), dtype=float)
 
     def words(self, terms: Sequence[str]) -> str:

@@ -25,12 +25,7 @@ _LEAST = 1e-12
 class ChannelNoise:
     """Photon and read noise of four pixels of a CFA: variances of the channels' means, electrons^2.
 
-    Parameters
-    ----------
-    shares : ndarray of shape (n_channels,)
-        Share of the tile's pixels.
-    read_noise_e : float
-        Read noise, electrons.
+    `shares`: share of the tile's pixels.
     """
 
     shares: Float[Array, " channels"]
@@ -39,88 +34,39 @@ class ChannelNoise:
     def of(self, electrons: Smooth) -> Smooth:
         """Return the variances of the channels.
 
-        Parameters
-        ----------
-        electrons : ndarray of shape (..., n_channels)
-            Expected electrons.
-
-        Returns
-        -------
-        ndarray of the same shape
-            Variance, electrons^2.
+        Returns variance, electrons^2.
         """
         return self.photons(electrons) + self.read
 
     def photons(self, electrons: Smooth) -> Smooth:
         """Return the part of photon noise.
 
-        Parameters
-        ----------
-        electrons : ndarray of shape (..., n_channels)
-            Expected electrons.
-
-        Returns
-        -------
-        ndarray of the same shape
-            Variance, electrons^2.
+        Returns variance, electrons^2.
         """
         return np.asarray(electrons / (PIXELS * self.shares))
 
     @property
     def read(self) -> Float[Array, " patches"]:
-        """Part of read noise, ndarray of shape (n_channels,)."""
+        """Part of read noise."""
         return np.asarray(self.read_noise_e**2 / (PIXELS * self.shares), dtype=float)
 
 
 @dataclass(frozen=True)
 class PatchCamera:
-    """Designs before patches that fill the field, on axis, in clear air.
-
-    Parameters
-    ----------
-    setup : Setup
-        Camera and tasks.
-    modified : ndarray of shape (n, n_modified, n_wavelengths)
-        QE of the modified channels, complex with a derivative.
-    """
+    """Designs before patches that fill the field, on axis, in clear air."""
 
     setup: Setup
     modified: Smooth
 
     @classmethod
     def along(cls, setup: Setup, curves: ChannelCurves, by_u: Float[Array, "free modified wavelengths"]) -> PatchCamera:
-        """Return one design once per free parameter, with its derivative by that parameter.
-
-        Parameters
-        ----------
-        setup : Setup
-            Scene and camera.
-        curves : ndarray of shape (n_modified, n_wavelengths)
-            QE.
-        by_u : ndarray of shape (n_free, n_modified, n_wavelengths)
-            Derivatives.
-
-        Returns
-        -------
-        PatchCamera
-            Designs.
-        """
+        """Return one design once per free parameter, with its derivative by that parameter."""
         return cls(setup, curves + 1j * COMPLEX_STEP * by_u)
 
     def electrons(self, photons: Float[Array, "... wavelengths"], exposure_s: float) -> Smooth:
         """Return expected electrons of a pixel of each channel.
 
-        Parameters
-        ----------
-        photons : ndarray of shape (..., n_wavelengths)
-            Radiance, photons/s/sr/m2/nm.
-        exposure_s : float
-            Exposure time, s.
-
-        Returns
-        -------
-        ndarray of shape (n, ..., n_channels)
-            Electrons.
+        `photons`: radiance, photons/s/sr/m2/nm.
         """
         setup = self.setup
         factor = irradiance_factor(setup.scene.optics) * setup.camera.area_step_m2_nm * exposure_s
@@ -134,31 +80,14 @@ class PatchCamera:
 
     @property
     def qe(self) -> Smooth:
-        """Return the QE of all channels.
-
-        Returns
-        -------
-        ndarray of shape (n, n_channels, n_wavelengths)
-            QE.
-        """
+        """Return the QE of all channels."""
         qe = np.empty((len(self.modified), *self.setup.camera.qe.shape), dtype=self.modified.dtype)
         qe[:] = self.setup.camera.qe
         qe[:, list(self.setup.camera.modified)] = self.modified
         return qe
 
     def noise(self, read_noise_e: float) -> ChannelNoise:
-        """Return the noise of four pixels of the CFA.
-
-        Parameters
-        ----------
-        read_noise_e : float
-            Read noise, electrons.
-
-        Returns
-        -------
-        ChannelNoise
-            Noise.
-        """
+        """Return the noise of four pixels of the CFA."""
         counts = self.setup.camera.mosaic.counts
         return ChannelNoise(np.asarray(counts / counts.sum(), dtype=float), read_noise_e)
 
@@ -175,23 +104,7 @@ def color_matrix(
     It minimizes the expected sum over the patches of weight times |M (n + noise) - XYZ / white|^2. A weight is the
     squared change of a patch's CIE lightness with its luminance.
 
-    Parameters
-    ----------
-    electrons : ndarray of shape (n, n_patches, n_channels)
-        Expected electrons of each patch.
-    xyz : ndarray of shape (n_patches, 3)
-        Tristimulus values.
-    white : ndarray of shape (3,)
-        Tristimulus values of the white.
-    noise : ChannelNoise
-        Noise.
-    regularization : float
-        Factor of the noise: 1 is the noise-optimal matrix.
-
-    Returns
-    -------
-    ndarray of shape (n, n_channels, 3)
-        Matrix.
+    `electrons`: expected electrons of each patch; `regularization`: factor of the noise: 1 is the noise-optimal matrix.
     """
     weights = (116 / 3 * np.maximum(xyz[:, 1], _LEAST) ** (-2 / 3)) ** 2
     left = np.einsum("npc,p,npd->ncd", electrons, weights, electrons)
@@ -204,44 +117,18 @@ def color_matrix(
 def luminance_noise(matrix: Smooth, gray: Smooth, noise: ChannelNoise) -> Smooth:
     """Return the luminance SNR of gray after the matrix.
 
-    Parameters
-    ----------
-    matrix : ndarray of shape (n, n_channels, 3)
-        Color matrix.
-    gray : ndarray of shape (n, n_channels)
-        Expected electrons of gray.
-    noise : ChannelNoise
-        Noise.
-
-    Returns
-    -------
-    ndarray of shape (n,)
-        Ratio.
+    `gray`: expected electrons of gray.
     """
     row = matrix[:, :, 1]
     return np.asarray((row * gray).sum(axis=1) / (row**2 * noise.of(gray)).sum(axis=1) ** 0.5)
 
 
 def least_illuminance(matrix: Smooth, gray: Smooth, noise: ChannelNoise, ratio: float) -> Smooth:
-    """Return the illuminance at which the luminance SNR reaches a ratio.
+    """Return the illuminance at which the luminance SNR reaches a ratio, lx.
 
     With the luminance a E and its variance b E + c, the root of ratio^2 (b E + c) = (a E)^2.
 
-    Parameters
-    ----------
-    matrix : ndarray of shape (n, n_channels, 3)
-        Color matrix.
-    gray : ndarray of shape (n, n_channels)
-        Electrons of gray per lx.
-    noise : ChannelNoise
-        Noise.
-    ratio : float
-        SNR.
-
-    Returns
-    -------
-    ndarray of shape (n,)
-        Illuminance, lx.
+    `gray`: electrons of gray per lx.
     """
     row = matrix[:, :, 1]
     a = (row * gray).sum(axis=1)
@@ -255,17 +142,7 @@ def vora(responses: Smooth, matching: Float[Array, "3 wavelengths"]) -> Smooth:
 
     trace(P_V P_M) / 3 of the projections onto both spaces (Vora and Trussell, 1993).
 
-    Parameters
-    ----------
-    responses : ndarray of shape (n, n_channels, n_wavelengths)
-        Responses per radiant power.
-    matching : ndarray of shape (3, n_wavelengths)
-        Color-matching functions.
-
-    Returns
-    -------
-    ndarray of shape (n,)
-        0 to 1.
+    `responses`: responses per radiant power. Returns 0 to 1.
     """
     basis = np.linalg.qr(matching.T)[0]
     scaled = responses / np.sqrt((responses.real**2).sum(axis=-1, keepdims=True) + _LEAST)
@@ -280,19 +157,7 @@ def metamerism_index(electrons: Smooth, xyz: Float[Array, "patches 3"], white: F
     The matrix has the least mean, found by Gauss-Newton steps weighted by the inverse distances. 100 is a camera with
     the eye's color space; noise is left out.
 
-    Parameters
-    ----------
-    electrons : ndarray of shape (n, n_patches, n_channels)
-        Expected electrons of each patch.
-    xyz : ndarray of shape (n_patches, 3)
-        Tristimulus values.
-    white : ndarray of shape (3,)
-        Tristimulus values of the white.
-
-    Returns
-    -------
-    ndarray of shape (n,)
-        Index.
+    `electrons`: expected electrons of each patch.
     """
     target = lab(xyz / white, np.ones(3))
     scale = electrons.real.mean(axis=(1, 2), keepdims=True)

@@ -21,18 +21,7 @@ _25_7 = 25.0**7
 
 
 def lab(xyz: Smooth, white: Smooth) -> Smooth:
-    """Return CIELAB (CIE 15), linear below the range of the cube root, also below 0.
-
-    Parameters
-    ----------
-    xyz, white : ndarray of shape (..., 3)
-        Tristimulus values, and those of the white.
-
-    Returns
-    -------
-    ndarray of shape (..., 3)
-        CIELAB.
-    """
+    """Return CIELAB (CIE 15), linear below the range of the cube root, also below 0."""
     ratio = xyz / white
     bright = ratio.real > _EPSILON
     f = np.where(bright, np.where(bright, ratio, 1.0) ** (1 / 3), (_KAPPA * ratio + 16) / 116)
@@ -41,18 +30,7 @@ def lab(xyz: Smooth, white: Smooth) -> Smooth:
 
 
 def lab_slope(ratio: Smooth) -> Smooth:
-    """Return the derivative of CIELAB by XYZ relative to white.
-
-    Parameters
-    ----------
-    ratio : ndarray of shape (..., 3)
-        XYZ relative to white.
-
-    Returns
-    -------
-    ndarray of shape (..., 3, 3)
-        Derivative of each of L, a, b by each of X, Y, Z.
-    """
+    """Return the derivative of CIELAB by XYZ relative to white."""
     bright = ratio.real > _EPSILON
     slope = np.where(bright, np.where(bright, ratio, 1.0) ** (-2 / 3) / 3, _KAPPA / 116)
     mixed = np.array([[0.0, 116.0, 0.0], [500.0, -500.0, 0.0], [0.0, 200.0, -200.0]])
@@ -60,34 +38,12 @@ def lab_slope(ratio: Smooth) -> Smooth:
 
 
 def delta_e(one: Smooth, other: Smooth) -> Smooth:
-    """Return the Euclidean distance in CIELAB (1976).
-
-    Parameters
-    ----------
-    one, other : ndarray of shape (..., 3)
-        CIELAB.
-
-    Returns
-    -------
-    ndarray of shape (...)
-        Color difference.
-    """
+    """Return the Euclidean distance in CIELAB (1976)."""
     return root(((one - other) ** 2).sum(axis=-1))
 
 
 def delta_e_2000(one: Smooth, other: Smooth) -> Smooth:
-    """Return CIEDE2000 (CIE 142, after Sharma, Wu and Dalal, 2005).
-
-    Parameters
-    ----------
-    one, other : ndarray of shape (..., 3)
-        CIELAB.
-
-    Returns
-    -------
-    ndarray of shape (...)
-        Color difference.
-    """
+    """Return CIEDE2000 (CIE 142, after Sharma, Wu and Dalal, 2005)."""
     (l_1, a_1, b_1), (l_2, a_2, b_2) = (np.moveaxis(colors, -1, 0) for colors in np.broadcast_arrays(one, other))
     chroma = (root(a_1**2 + b_1**2) + root(a_2**2 + b_2**2)) / 2
     g = (1 - root(chroma**7 / (chroma**7 + _25_7))) / 2
@@ -115,18 +71,7 @@ def delta_e_2000(one: Smooth, other: Smooth) -> Smooth:
 
 
 def root(square: Smooth) -> Smooth:
-    """Return the square root, with value and slope 0 at 0, so that no NaN arises.
-
-    Parameters
-    ----------
-    square : ndarray
-        Squares.
-
-    Returns
-    -------
-    ndarray of the same shape
-        Roots.
-    """
+    """Return the square root, with value and slope 0 at 0, so that no NaN arises."""
     some = square.real > 0
     return np.where(some, np.where(some, square, 1.0) ** 0.5, 0.0)
 

@@ -54,20 +54,7 @@ class TaskEvaluation:
         }
 
     def rows(self, what: str, case: LightName) -> Smooth:
-        """Return the rows of a figure.
-
-        Parameters
-        ----------
-        what : str
-            Key of the figure.
-        case : LightName
-            Light.
-
-        Returns
-        -------
-        ndarray of shape (n, n_rows)
-            Rows.
-        """
+        """Return the rows of a figure."""
         return self._rows[what](case)
 
     def _once(self, key: str, case: LightName, make: Callable[[], Smooth]) -> Smooth:
@@ -103,7 +90,7 @@ class TaskEvaluation:
         return self._once("patches", case, lambda: self._patch_camera.electrons(photons, self._conditions.exposure_s))
 
     def _gray(self, case: LightName) -> Smooth:
-        """Return electrons of 18 % gray per lx, ndarray of shape (n, n_channels)."""
+        """Return electrons of 18 % gray per lx."""
         return self._patch_camera.electrons(self._chart.gray[self._at(case)], self._conditions.exposure_s)
 
     def _matrix(self, case: LightName) -> Smooth:
@@ -136,18 +123,7 @@ class TaskEvaluation:
 
 
 def pair_errors(z: Smooth) -> Smooth:
-    """Return the probability that Gaussian noise goes beyond a plane, with its derivative.
-
-    Parameters
-    ----------
-    z : ndarray
-        Distance to the plane in standard deviations.
-
-    Returns
-    -------
-    ndarray of the same shape
-        Probability.
-    """
+    """Return the probability that Gaussian noise goes beyond a plane, with its derivative."""
     error = share_below(-z.real)
     if not np.iscomplexobj(z):
         return np.asarray(error)
@@ -155,30 +131,13 @@ def pair_errors(z: Smooth) -> Smooth:
 
 
 def color_errors(electrons: Smooth, matrix: Smooth, chart: Chart, case: int) -> Smooth:
-    """Return CIEDE2000 of each patch of a chart after a color matrix.
-
-    Parameters
-    ----------
-    electrons : ndarray of shape (n, n_patches, n_channels)
-        Expected electrons.
-    matrix : ndarray of shape (n, n_channels, 3)
-        Color matrix.
-    chart : Chart
-        Patches and lights.
-    case : int
-        Index of the light.
-
-    Returns
-    -------
-    ndarray of shape (n, n_patches)
-        Color differences.
-    """
+    """Return CIEDE2000 of each patch of a chart after a color matrix."""
     target = lab(chart.xyz[case], chart.white[case])
     return delta_e_2000(lab(electrons @ matrix, np.ones(3)), target)
 
 
 def _percentile(values: Smooth, share: float) -> Smooth:
-    """Return the percentile over the last axis, linear between neighbors in order, ndarray of shape (n, 1)."""
+    """Return the percentile over the last axis, linear between neighbors in order."""
     ordered = np.take_along_axis(values, np.argsort(values.real, axis=1, kind="stable"), axis=1)
     at, rest = divmod(share * (values.shape[1] - 1), 1.0)
     low, high = ordered[:, int(at)], ordered[:, min(int(at) + 1, values.shape[1] - 1)]
@@ -186,20 +145,7 @@ def _percentile(values: Smooth, share: float) -> Smooth:
 
 
 def task_columns(setup: Setup, block: Block) -> Columns:
-    """Return every figure of a setup's tasks.
-
-    Parameters
-    ----------
-    setup : Setup
-        Scene and camera.
-    block : Block
-        Designs.
-
-    Returns
-    -------
-    dict of str to ndarray of shape (n_designs,)
-        Column name -> values.
-    """
+    """Return every figure of a setup's tasks."""
     tasks = setup.tasks
     assert tasks is not None
     curves = block.curves()
@@ -223,21 +169,7 @@ def error_against_noise(
 ) -> tuple[PerDesign, PerDesign]:
     """Return color error against noise of one design under one light, for each of `REGULARIZATIONS`.
 
-    Parameters
-    ----------
-    patch_camera : PatchCamera
-        Designs before patches.
-    chart : Chart
-        Patches and lights.
-    case : int
-        Index of the light.
-    conditions : Conditions
-        Exposure, read noise and illuminance.
-
-    Returns
-    -------
-    delta_e, snr : ndarray of shape (n,)
-        Mean CIEDE2000 of the chart, and luminance SNR of 18 % gray.
+    Returns mean CIEDE2000 of the chart, and luminance SNR of 18 % gray.
     """
     noise = patch_camera.noise(conditions.read_noise_e)
     patches = patch_camera.electrons(chart.photons[case] * conditions.illuminance_lx, conditions.exposure_s)
@@ -260,25 +192,7 @@ def rendered_areas(
 ) -> tuple[Float[Array, "areas 3"], Float[Array, "areas 3 3"]]:
     """Return the areas of a picture through the noise-optimal matrix, with the noise of four pixels.
 
-    Parameters
-    ----------
-    patch_camera : PatchCamera
-        Designs before patches.
-    chart : Chart
-        Patches and lights.
-    case : int
-        Index of the light.
-    photons : ndarray of shape (n_areas, n_wavelengths)
-        Radiance of each area.
-    conditions : Conditions
-        Exposure, read noise and illuminance.
-
-    Returns
-    -------
-    xyz : ndarray of shape (n_areas, 3)
-        XYZ relative to white.
-    covariance : ndarray of shape (n_areas, 3, 3)
-        Covariances.
+    Returns `xyz`: XYZ relative to white.
     """
     noise = patch_camera.noise(conditions.read_noise_e)
     patches = patch_camera.electrons(chart.photons[case] * conditions.illuminance_lx, conditions.exposure_s)

@@ -18,24 +18,7 @@ LUX, SNR_AT_1_LX = "lux", "snr_at_1_lx"
 class Figure:
     """Figure of a task.
 
-    Parameters
-    ----------
-    what : str
-        Key.
-    words, meaning : str
-        Name in texts, and meaning.
-    direction : {'more', 'less'}
-        Direction of improvement.
-    unit : str
-        Unit.
-    digits : int
-        Digits after the point.
-    each : bool
-        It has a value for each of the task's lights.
-    first : bool
-        A scorecard shows it.
-    signed : bool
-        It may be negative.
+    `each`: it has a value for each of the task's lights.
     """
 
     what: str
@@ -132,18 +115,7 @@ FIGURES: dict[TaskMetric, tuple[Figure, ...]] = {
 
 
 def figures_of(task: TaskColumns) -> Iterator[tuple[str, Figure, LightName]]:
-    """Yield all figures of a task.
-
-    Parameters
-    ----------
-    task : TaskColumns
-        Task.
-
-    Yields
-    ------
-    column, figure, case : str, Figure, LightName
-        Column name, figure and light.
-    """
+    """Yield all figures of a task."""
     for figure in FIGURES[task.metric]:
         for case in task.lights if figure.each else ("",):
             yield task.column(figure.what, case), figure, case

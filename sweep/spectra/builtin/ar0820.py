@@ -23,18 +23,6 @@ def monotone(nodes_nm: ArrayLike, values: ArrayLike, wavelength_nm: PerWavelengt
     """Return the monotone cubic through nodes: Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5, 300 (1984).
 
     That of `scipy.interpolate.PchipInterpolator`, whose import takes longer than reading the file.
-
-    Parameters
-    ----------
-    nodes_nm, values : array-like of shape (n,)
-        Three nodes or more.
-    wavelength_nm : ndarray of shape (n_wavelengths,)
-        Wavelengths, nm.
-
-    Returns
-    -------
-    ndarray of shape (n_wavelengths,)
-        Values.
     """
     x, y = np.asarray(nodes_nm, dtype=float), np.asarray(values, dtype=float)
     step = np.diff(x)
@@ -62,38 +50,12 @@ def _end_slope(step: float, next_step: float, rise: float, next_rise: float) -> 
 
 
 def clear_qe(wavelength_nm: PerWavelength, clear: ClearPixel) -> PerWavelength:
-    """Return the QE of the clear pixel.
-
-    Parameters
-    ----------
-    wavelength_nm : ndarray of shape (n_wavelengths,)
-        Wavelengths, nm.
-    clear : ClearPixel
-        Parameters.
-
-    Returns
-    -------
-    ndarray of shape (n_wavelengths,)
-        Values.
-    """
+    """Return the QE of the clear pixel."""
     return monotone(clear.wavelength_nm, clear.qe, wavelength_nm)
 
 
 def transmission(wavelength_nm: PerWavelength, parameters: FilterParameters) -> PerWavelength:
-    """Return the transmission of a color filter, between its leak and its peak.
-
-    Parameters
-    ----------
-    wavelength_nm : ndarray of shape (n_wavelengths,)
-        Wavelengths, nm.
-    parameters : FilterParameters
-        Parameters.
-
-    Returns
-    -------
-    ndarray of shape (n_wavelengths,)
-        Values.
-    """
+    """Return the transmission of a color filter, between its leak and its peak."""
     opened = np.ones_like(wavelength_nm)
     for edge in parameters.edges:
         sign = 1 if edge.passes == "above" else -1
@@ -109,37 +71,14 @@ def _logistic(offset_widths: PerWavelength) -> PerWavelength:
 
 
 def ir_cut_transmission(wavelength_nm: PerWavelength, parameters: SurrogateParameters) -> PerWavelength:
-    """Return the transmission of the IR cut.
-
-    Parameters
-    ----------
-    wavelength_nm : ndarray of shape (n_wavelengths,)
-        Wavelengths, nm.
-    parameters : SurrogateParameters
-        Parameters of the model.
-
-    Returns
-    -------
-    ndarray of shape (n_wavelengths,)
-        Values.
-    """
+    """Return the transmission of the IR cut."""
     return _logistic((parameters.ir_cut.center_nm - wavelength_nm) / parameters.ir_cut.width_nm)
 
 
 def ar0820(grid: WavelengthGrid, parameters: SurrogateParameters) -> Curves:
     """Return the surrogate sensor: C and every filter of the parameter file.
 
-    Parameters
-    ----------
-    grid : WavelengthGrid
-        Wavelengths inside 400 to 700 nm.
-    parameters : SurrogateParameters
-        Parameters.
-
-    Returns
-    -------
-    Curves
-        QE.
+    `grid`: wavelengths inside 400 to 700 nm.
     """
     wave = grid.nodes_nm
     clear = clear_qe(wave, parameters.clear_pixel) * ir_cut_transmission(wave, parameters)

@@ -13,17 +13,7 @@ def led_photons(wavelength_nm: PerWavelength, peak_nm: float, blue_nm: float, re
     (a + b) / (a exp(-u/a) + b exp(u/b)), u = l - peak, a blue, b red: an asymmetric hyperbolic secant, which decays as
     exp(u/a) toward the blue and exp(-u/b) toward the red, as the band-edge emission of LEDs does.
 
-    Parameters
-    ----------
-    wavelength_nm : ndarray of shape (n_wavelengths,)
-        Wavelengths, nm.
-    peak_nm, blue_nm, red_nm : float
-        Peak, and decay lengths, nm.
-
-    Returns
-    -------
-    ndarray of shape (n_wavelengths,)
-        Values.
+    `peak_nm`, `blue_nm`, `red_nm`: peak, and decay lengths, nm.
     """
     u = wavelength_nm - peak_nm
     # exp(-|u|/scale) never overflows; the two sides are the same formula divided by its larger exponential.

@@ -19,16 +19,7 @@ _ISETCAM = "ISETCam, https://github.com/ISET/isetcam"
 class MeasuredFile:
     """File of curves.
 
-    Parameters
-    ----------
-    file : str
-        Name.
-    columns : mapping of str to str
-        Curve -> column of the file.
-    scale : float
-        Factor that brings them to the scale of the other files.
-    times : str
-        Column that multiplies all others; empty if none does.
+    `times`: column that multiplies all others; empty if none does.
     """
 
     file: str
@@ -44,17 +35,7 @@ class MeasuredFile:
 
 @dataclass(frozen=True)
 class MeasuredSet:
-    """Sensor or set of lights with its origin.
-
-    Parameters
-    ----------
-    what : str
-        What was measured, for a list.
-    source, license : str
-        Origin and license.
-    files : tuple of MeasuredFile
-        Files.
-    """
+    """Sensor or set of lights with its origin."""
 
     what: str
     source: str
@@ -75,20 +56,7 @@ class MeasuredSet:
     def curves(self, grid: WavelengthGrid) -> dict[str, PerWavelength]:
         """Return the curves on a grid.
 
-        Parameters
-        ----------
-        grid : WavelengthGrid
-            Wavelengths inside `range_nm`.
-
-        Returns
-        -------
-        dict of str to ndarray of shape (n_wavelengths,)
-            Curves.
-
-        Raises
-        ------
-        DataError
-            If the grid goes beyond.
+        Raises DataError if the grid goes beyond.
         """
         return {
             name: file.raw.on(grid, column) * file.scale * (file.raw.on(grid, file.times) if file.times else 1.0)
@@ -97,18 +65,7 @@ class MeasuredSet:
         }
 
     def photons(self, grid: WavelengthGrid) -> dict[str, PerWavelength]:
-        """Return photons of spectra of radiant power.
-
-        Parameters
-        ----------
-        grid : WavelengthGrid
-            Wavelengths inside `range_nm`.
-
-        Returns
-        -------
-        dict of str to ndarray of shape (n_wavelengths,)
-            Photons, in any scale.
-        """
+        """Return photons of spectra of radiant power."""
         return {name: photons_from_energy(grid.nodes_nm, energy) for name, energy in self.curves(grid).items()}
 
     @property
@@ -162,17 +119,7 @@ LUXEON = MeasuredSet(
 def ir_cut(name: str, grid: WavelengthGrid) -> PerWavelength | None:
     """Return the transmission of a sensor's IR cut.
 
-    Parameters
-    ----------
-    name : str
-        Sensor.
-    grid : WavelengthGrid
-        Wavelengths, nm.
-
-    Returns
-    -------
-    ndarray of shape (n_wavelengths,) or None
-        Transmission; None if it has none.
+    None if it has none.
     """
     file = SENSORS[name].files[0]
     return file.raw.on(grid, file.times) if file.times else None

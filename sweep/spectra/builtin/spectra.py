@@ -21,7 +21,7 @@ _FILE = "spectra.parquet"
 
 @dataclass(frozen=True)
 class Spectrum:
-    """Spectrum as published: `value` at `wavelength_nm`, ndarray of shape (n,) each; emissions in relative power."""
+    """Spectrum as published: `value` at `wavelength_nm`; emissions in relative power."""
 
     name: str
     kind: SpectrumKind
@@ -66,29 +66,12 @@ def _read() -> tuple[dict[str, dict[str, str]], dict[str, dict[str, tuple[Spectr
 
 
 def shipped_groups() -> dict[str, tuple[Spectrum, ...]]:
-    """Return the spectra of every group, over all sets.
-
-    Returns
-    -------
-    dict of str to tuple of Spectrum
-        Spectra by group.
-    """
+    """Return the spectra of every group, over all sets."""
     return {group: members for parts in _read()[1].values() for group, members in parts.items()}
 
 
 def numbers_digest(spectra: tuple[Spectrum, ...]) -> str:
-    """Return the SHA-256 of names and numbers (32-bit floats, wavelengths first).
-
-    Parameters
-    ----------
-    spectra : tuple of Spectrum
-        Spectra.
-
-    Returns
-    -------
-    str
-        Hexadecimal digest.
-    """
+    """Return the SHA-256 of names and numbers (32-bit floats, wavelengths first)."""
     content = hashlib.sha256()
     for spectrum in spectra:
         wave, value = spectrum.wavelength_nm.astype(np.float32), spectrum.value.astype(np.float32)
@@ -97,13 +80,7 @@ def numbers_digest(spectra: tuple[Spectrum, ...]) -> str:
 
 
 def cards() -> list[Card]:
-    """Return the card of each set of the file, with range and digest of its numbers.
-
-    Returns
-    -------
-    list of Card
-        Cards.
-    """
+    """Return the card of each set of the file, with range and digest of its numbers."""
     about, parts = _read()
     made = []
     for name, groups_of_set in parts.items():
@@ -119,18 +96,7 @@ def cards() -> list[Card]:
 
 
 def spectrum_of(group: str, name: str) -> Spectrum:
-    """Return a spectrum of a group.
-
-    Parameters
-    ----------
-    group, name : str
-        Group and name.
-
-    Returns
-    -------
-    Spectrum
-        Spectrum.
-    """
+    """Return a spectrum of a group."""
     return next(spectrum for spectrum in shipped_groups()[group] if spectrum.name == name)
 
 
@@ -138,18 +104,6 @@ def gridded(grid: WavelengthGrid, spectrum: Spectrum) -> PerWavelength:
     """Return a reflectance, or a relative photon spectrum, on the grid.
 
     On a grid that is coarser than its samples it is the mean over each bin, so that narrow lines keep their photons.
-
-    Parameters
-    ----------
-    grid : WavelengthGrid
-        Wavelengths, nm.
-    spectrum : Spectrum
-        Spectrum.
-
-    Returns
-    -------
-    ndarray of shape (n_wavelengths,)
-        Values.
     """
     finest = float(np.diff(spectrum.wavelength_nm).min())
     method: Resampling = "mean" if grid.step_nm > finest else "linear"

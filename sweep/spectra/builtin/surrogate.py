@@ -81,34 +81,12 @@ class SurrogateParameters(Section):
 
 @cache
 def surrogate_parameters(name: str = "surrogate") -> SurrogateParameters:
-    """Read a parameter file of the package.
-
-    Parameters
-    ----------
-    name : str
-        `surrogate` or `prior`.
-
-    Returns
-    -------
-    SurrogateParameters
-        Parameters.
-    """
+    """Read a parameter file of the package."""
     return SurrogateParameters.model_validate(parameter_tree(name))
 
 
 def parameter_tree(name: str) -> dict[str, Any]:
-    """Return a parameter file as mappings and lists.
-
-    Parameters
-    ----------
-    name : str
-        `surrogate` or `prior`.
-
-    Returns
-    -------
-    dict
-        Content.
-    """
+    """Return a parameter file as mappings and lists."""
     text = files(__package__).joinpath(f"{name}.yaml").read_text(encoding="utf-8")
     tree: dict[str, Any] = YAML(typ="safe").load(text)
     return tree

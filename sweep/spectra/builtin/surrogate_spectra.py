@@ -32,18 +32,7 @@ class LedShape:
     red_nm: float
 
     def on(self, grid: WavelengthGrid) -> PerWavelength:
-        """Return relative photons.
-
-        Parameters
-        ----------
-        grid : WavelengthGrid
-            Wavelengths, nm.
-
-        Returns
-        -------
-        ndarray of shape (n_wavelengths,)
-            Values.
-        """
+        """Return relative photons."""
         return led_photons(grid.nodes_nm, self.peak_nm, self.blue_nm, self.red_nm)
 
 
@@ -61,18 +50,7 @@ class EdgeShape:
     lit: bool = False
 
     def on(self, grid: WavelengthGrid) -> PerWavelength:
-        """Return the reflectance, or the lens's relative photons.
-
-        Parameters
-        ----------
-        grid : WavelengthGrid
-            Wavelengths, nm.
-
-        Returns
-        -------
-        ndarray of shape (n_wavelengths,)
-            Values.
-        """
+        """Return the reflectance, or the lens's relative photons."""
         edge = 1 / (1 + np.exp(-(grid.nodes_nm - self.middle_nm) * _RISE / self.width_nm))
         return _behind(grid, self.low + (self.high - self.low) * edge, lit=self.lit)
 
@@ -88,18 +66,7 @@ class BandShape:
     lit: bool = False
 
     def on(self, grid: WavelengthGrid) -> PerWavelength:
-        """Return the reflectance, or the lens's relative photons.
-
-        Parameters
-        ----------
-        grid : WavelengthGrid
-            Wavelengths, nm.
-
-        Returns
-        -------
-        ndarray of shape (n_wavelengths,)
-            Values.
-        """
+        """Return the reflectance, or the lens's relative photons."""
         shape = np.exp(-4 * np.log(2) * ((grid.nodes_nm - self.middle_nm) / self.width_nm) ** 2)
         return _behind(grid, self.low + (self.high - self.low) * shape, lit=self.lit)
 
@@ -137,18 +104,7 @@ SURROGATES: Mapping[str, tuple[StandIn, ...]] = {
 
 
 def region(group: str) -> ColorRegion:
-    """Return the color region of a group by its regulation.
-
-    Parameters
-    ----------
-    group : str
-        Group.
-
-    Returns
-    -------
-    ColorRegion
-        Region.
-    """
+    """Return the color region of a group by its regulation."""
     first, _, second = group.partition(" ")
     if second == "sheeting":
         return SHEETING_REGIONS[first]
@@ -158,27 +114,13 @@ def region(group: str) -> ColorRegion:
 def is_sheeting(group: str) -> bool:
     """Return whether a group has surfaces.
 
-    Parameters
-    ----------
-    group : str
-        Group.
-
-    Returns
-    -------
-    bool
-        False for lamps.
+    False for lamps.
     """
     return group.endswith("sheeting")
 
 
 def surrogate_cards() -> list[Card]:
-    """Return the cards of lamps and sheeting, with digests of the stated numbers.
-
-    Returns
-    -------
-    list of Card
-        Cards.
-    """
+    """Return the cards of lamps and sheeting, with digests of the stated numbers."""
     cards = []
     for name, kind, source in (
         (

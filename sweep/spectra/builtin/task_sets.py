@@ -38,13 +38,7 @@ def illuminant(grid: WavelengthGrid, name: str) -> PerWavelength:
 
 
 def task_groups() -> dict[str, int]:
-    """Return the groups that a task may name as a class.
-
-    Returns
-    -------
-    dict of str to int
-        Number of spectra by group.
-    """
+    """Return the groups that a task may name as a class."""
     shipped = {name: len(members) for name, members in spectra.shipped_groups().items()}
     return shipped | {name: len(shapes) for name, shapes in surrogate_spectra.SURROGATES.items()}
 
@@ -52,15 +46,7 @@ def task_groups() -> dict[str, int]:
 def is_surface(spectra_of_group: str) -> bool:
     """Return whether a group has surfaces.
 
-    Parameters
-    ----------
-    spectra_of_group : str
-        Group.
-
-    Returns
-    -------
-    bool
-        False for lamps.
+    False for lamps.
     """
     if spectra_of_group in surrogate_spectra.SURROGATES:
         return surrogate_spectra.is_sheeting(spectra_of_group)
@@ -70,19 +56,7 @@ def is_surface(spectra_of_group: str) -> bool:
 def spectra_of_group(grid: WavelengthGrid, name: str, most: int | None = None) -> Float[Array, "spectra wavelengths"]:
     """Return the spectra of a named group on a grid, one per row.
 
-    Parameters
-    ----------
-    grid : WavelengthGrid
-        Wavelengths, nm.
-    name : str
-        Group.
-    most : int, optional
-        Number at most, evenly spaced.
-
-    Returns
-    -------
-    ndarray of shape (n, n_wavelengths)
-        Spectra.
+    `most`: number at most, evenly spaced.
     """
     if name in surrogate_spectra.SURROGATES:
         return np.stack([shape.on(grid) for shape in surrogate_spectra.SURROGATES[name]])
@@ -93,22 +67,7 @@ def spectra_of_group(grid: WavelengthGrid, name: str, most: int | None = None) -
 
 
 def chart(grid: WavelengthGrid, reflectances: Float[Array, "patches wavelengths"], lights: Sequence[str]) -> Chart:
-    """Return patches under lights of 1 lx.
-
-    Parameters
-    ----------
-    grid : WavelengthGrid
-        Wavelengths, nm.
-    reflectances : ndarray of shape (n_patches, n_wavelengths)
-        Reflectances.
-    lights : sequence of str
-        Illuminants.
-
-    Returns
-    -------
-    Chart
-        Chart.
-    """
+    """Return patches under lights of 1 lx."""
     matching = color_matching(grid)
     photons, gray, xyz, white = [], [], [], []
     for name in lights:
@@ -126,24 +85,7 @@ def chart(grid: WavelengthGrid, reflectances: Float[Array, "patches wavelengths"
 def separation_task(
     grid: WavelengthGrid, name: str, classes: Mapping[str, Float[Array, "_ wavelengths"]], lights: Sequence[str] = ()
 ) -> GriddedTask:
-    """Return a task of classes of spectra.
-
-    Parameters
-    ----------
-    grid : WavelengthGrid
-        Wavelengths, nm.
-    name : str
-        Task.
-    classes : mapping of str to ndarray of shape (n, n_wavelengths)
-        Lamps, or reflectances under `lights`.
-    lights : sequence of str
-        Illuminants.
-
-    Returns
-    -------
-    GriddedTask
-        Task.
-    """
+    """Return a task of classes of spectra."""
     stacked = np.concatenate(list(classes.values()))
     lit = [stacked * illuminant(grid, light) for light in lights] or [stacked]
     types = tuple(kind for kind, spectra_of_class in classes.items() for _ in spectra_of_class)
@@ -152,20 +94,7 @@ def separation_task(
 
 
 def shipped(grid: WavelengthGrid, name: str) -> GriddedTask:
-    """Return a task of the package.
-
-    Parameters
-    ----------
-    grid : WavelengthGrid
-        Wavelengths, nm.
-    name : str
-        Task.
-
-    Returns
-    -------
-    GriddedTask
-        Task.
-    """
+    """Return a task of the package."""
 
     def groups(*names: str) -> dict[str, Float[Array, "_ wavelengths"]]:
         return {name: spectra_of_group(grid, name, _MOST) for name in names}
@@ -222,19 +151,9 @@ _NIGHT_LAMPS = {
 
 
 def night_scene(grid: WavelengthGrid) -> dict[str, PerWavelength]:
-    """Return the photon radiance of the areas of a street at night.
+    """Return the photon radiance of the areas of a street at night, photons/s/sr/m2/nm.
 
     Surfaces under white LEDs, and lamps with as much of X, Y or Z as white paper there, so that none is overexposed.
-
-    Parameters
-    ----------
-    grid : WavelengthGrid
-        Wavelengths, nm.
-
-    Returns
-    -------
-    dict of str to ndarray of shape (n_wavelengths,)
-        Radiance, photons/s/sr/m2/nm.
     """
     light = equal_photons(grid, illuminant(grid, NIGHT_LIGHT)[None])[0]
     white = light * (NIGHT_LX / np.pi / luminance_per_photon_radiance(grid, light[None])[0])

@@ -18,15 +18,7 @@ _TYPES = {
 def lights(grid: WavelengthGrid) -> Lights:
     """Return the LEDs.
 
-    Parameters
-    ----------
-    grid : WavelengthGrid
-        Wavelengths inside 400 to 700 nm.
-
-    Returns
-    -------
-    Lights
-        Signals.
+    `grid`: wavelengths inside 400 to 700 nm.
     """
     signals = [(name, _TYPES[name], photons) for name, photons in LUXEON.photons(grid).items()]
     return make_lights(grid, "luxeon", signals, f"built-in luxeon, measured: {LUXEON.source}")

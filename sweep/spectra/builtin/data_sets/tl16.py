@@ -19,20 +19,7 @@ SIGNAL_TYPES = ("green", "yellow", "orange", "red")
 
 
 def tl16(grid: WavelengthGrid, parameters: SurrogateParameters) -> Lights:
-    """Return the 51 signals; the lamps of a region spread evenly over peak +- spread of each color.
-
-    Parameters
-    ----------
-    grid : WavelengthGrid
-        Wavelengths, nm.
-    parameters : SurrogateParameters
-        Parameters.
-
-    Returns
-    -------
-    Lights
-        Signals.
-    """
+    """Return the 51 signals; the lamps of a region spread evenly over peak +- spread of each color."""
     wave = grid.nodes_nm
     signals = []
     for color in SIGNAL_TYPES:
@@ -47,16 +34,5 @@ def tl16(grid: WavelengthGrid, parameters: SurrogateParameters) -> Lights:
 
 
 def lights(grid: WavelengthGrid) -> Lights:
-    """Return the signals of `tl16` with the package's parameters.
-
-    Parameters
-    ----------
-    grid : WavelengthGrid
-        Wavelengths, nm.
-
-    Returns
-    -------
-    Lights
-        Signals.
-    """
+    """Return the signals of `tl16` with the package's parameters."""
     return tl16(grid, surrogate_parameters())
