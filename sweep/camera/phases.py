@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.types import Array, DesignNumbers, Float, IndexArray, Int, PerValue
+from ..base.types import Array, Float, IndexArray, Int, PerValue
 from .mosaic import Mosaic
 from .scene import Target
 from .setup import Setup
@@ -47,7 +47,7 @@ class Phases:
         """Hashable key of each phase."""
         return [tuple(row) for row in np.concatenate([self.center_px, self.nearest_px], axis=1).tolist()]
 
-    def subset(self, which: slice | DesignNumbers) -> Phases:
+    def subset(self, which: slice | Int[IndexArray, " subset"]) -> Phases:
         """Return some of the phases."""
         return Phases(self.center_px[which], self.nearest_px[which])
 

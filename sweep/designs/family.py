@@ -11,9 +11,10 @@ from ..base.types import (
     ChannelCurves,
     CurvesGradient,
     DesignCurves,
-    DesignNumbers,
     DesignParameters,
     Float,
+    IndexArray,
+    Int,
     ParameterWeights,
     PerParameter,
     PerWavelength,
@@ -264,7 +265,7 @@ class ChoosingFamily(Protocol):
     def slots(self) -> tuple[tuple[int, int], ...]:
         """Indices of a number and its amount."""
 
-    def only(self, numbers: DesignNumbers) -> Family:
+    def only(self, numbers: Int[IndexArray, " colorants"]) -> Family:
         """Return the family with some members of the catalog, under their numbers.
 
         Parameters

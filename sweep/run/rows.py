@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from ..base.types import DesignNumbers
+from ..base.types import IndexArray, Int
 from ..camera.plan import Plan
 from ..camera.setup import Setup
 from ..designs.block import by_edges
@@ -159,6 +159,6 @@ def _word(text: str, n: int) -> pa.Array:
     return _words([text], np.zeros(n, dtype=np.intp))
 
 
-def _words(texts: list[str], numbers: DesignNumbers) -> pa.Array:
+def _words(texts: list[str], numbers: Int[IndexArray, " rows"]) -> pa.Array:
     """Return dictionary-encoded words from their indices in a list."""
     return pa.DictionaryArray.from_arrays(pa.array(numbers, pa.int32()), pa.array(texts, pa.string()))

@@ -16,9 +16,10 @@ from ...base.types import (
     ChannelCurves,
     CurvesGradient,
     DesignCurves,
-    DesignNumbers,
     DesignParameters,
     Float,
+    IndexArray,
+    Int,
     ParameterWeights,
     PerParameter,
     PerWavelength,
@@ -231,7 +232,7 @@ class Mixture(Absorbing):
         base: PerWavelength,
         spectra: Float[Array, "spectra wavelengths"],
         at_most: int,
-        numbers: DesignNumbers | None = None,
+        numbers: Int[IndexArray, " colorants"] | None = None,
     ) -> None:
         super().__init__(wavelength_nm, base)
         self._spectra, self._slots = spectra, at_most
@@ -255,7 +256,7 @@ class Mixture(Absorbing):
         """Indices of number and absorbance of each colorant; see `ChoosingFamily`."""
         return tuple((at, at + 1) for at in range(0, 2 * self._slots, 2))
 
-    def only(self, numbers: DesignNumbers) -> Self:
+    def only(self, numbers: Int[IndexArray, " colorants"]) -> Self:
         """Return the family with some colorants of the catalog, under their numbers; see `ChoosingFamily`."""
         made = copy(self)
         made._spectra, made._numbers = self._spectra[np.searchsorted(self._numbers, numbers)], numbers
