@@ -88,9 +88,9 @@ def channel_of(column: str) -> str | None:
         The channel; None if the name states none, and for N, the modified channel.
     """
     column = name_of(column)
-    whole = column[1:] if column[:1] in tuple(HINTS) and column[1:] in (*_ORDER, NEW) else column
-    if whole in (*_ORDER, NEW):
-        return None if whole == NEW else whole
+    name = column[1:] if column[:1] in tuple(HINTS) and column[1:] in (*_ORDER, NEW) else column
+    if name in (*_ORDER, NEW):
+        return None if name == NEW else name
     tokens = _TOKEN.findall(folded(_HUMP.sub(" ", column)))
     for known in (_WORDS, _LETTERS):
         stated = {known[token] for token in tokens if token in known}
@@ -207,13 +207,13 @@ def sensor_file(paths: Path | Sequence[Path], quantity: Quantity | None = None) 
     for path in places:
         read = clean_curves(path)
         known = [name for name in read.values if not _no_channel(name)]
-        made = used_as(read, known, "sensor", quantity)
-        notes += [f"{path.name}: {note}" for note in made.notes[len(read.notes) :]]
+        used = used_as(read, known, "sensor", quantity)
+        notes += [f"{path.name}: {note}" for note in used.notes[len(read.notes) :]]
         for name in known:
             own = name if len(places) == 1 else f"{path.stem} {name}" if len(known) > 1 else path.stem
             own = own if own not in curves else f"{path.stem} {name}"
-            curves[own] = Curve(own, *made.samples(name))
-            owner[own] = (path, name, made)
+            curves[own] = Curve(own, *used.samples(name))
+            owner[own] = (path, name, used)
         left = {name: _no_channel(name) for name in read.values if name not in known}
         curves |= {name: Curve(name, np.empty(0), np.empty(0)) for name in left}
     channels = channels_of(curves)
@@ -252,8 +252,8 @@ def _entries(channels: Channels, owner: Mapping[str, tuple[Path, str, Curves]]) 
     """Yield the keys of each file, and of each quantity in it."""
     groups: dict[tuple[Path, str, float], dict[str, str]] = {}
     for channel, own in channels.columns.items():
-        path, column, made = owner[own]
-        unit = made.units[column]
+        path, column, curves = owner[own]
+        unit = curves.units[column]
         assert unit.quantity is not None
         groups.setdefault((path, unit.quantity, unit.factor or 1.0), {})[channel] = column
     for (path, quantity, factor), columns in groups.items():

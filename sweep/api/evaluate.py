@@ -78,7 +78,7 @@ class EvaluateOptions:
     def stated(self, *uses: Use) -> Quantity | None:
         """Return the unit that is stated for a use."""
         stated = [self.quantity] if isinstance(self.quantity, str) else list(self.quantity or ())
-        return next((one for one in stated if any(one in FITTING[use] for use in uses)), None)
+        return next((quantity for quantity in stated if any(quantity in FITTING[use] for use in uses)), None)
 
     @property
     def of_lights(self) -> LightUnit | None:
@@ -176,14 +176,14 @@ def filter_of_file(path: Path, options: EvaluateOptions) -> FilterUnderTest:
     column = _find_column(path, curves, options.column, channel)
     use, stated = _use_of(curves, column, options)
     factor = options.relative_to or (qe.clear if options.transmission else base if use == "filter" else None)
-    made = used_as(curves, [column], use, stated)
-    unit = made.units[column]
+    used = used_as(curves, [column], use, stated)
+    unit = used.units[column]
     assert unit.quantity is not None
     entry: dict[str, Any] = {"file": str(path.absolute()), "columns": {USER_CURVE + channel: column}}
     entry |= {"quantity": unit.quantity, "scale": unit.factor or 1.0}
     entry |= {} if factor is None else {"relative_to": factor}
     times = "" if factor is None else f", times {factor}"
-    note = f"{path}: {made.notes[-1]}{times}; it is {channel} of {name}, in place of {base}"
+    note = f"{path}: {used.notes[-1]}{times}; it is {channel} of {name}, in place of {base}"
     with_filter = CurveSource({**sensor.keys, "files": [*sensor.keys["files"], entry]}, sensor.curves)
     spectra, types = _lights_and_types(options.lights or "tl16", options.of_lights)
     curve_names = _curve_names(qe, with_base(mosaic, {channel: base}).name, mosaic)

@@ -392,10 +392,10 @@ class FinishedRun:
     @property
     def curves(self) -> pd.DataFrame:
         """QE curves of the run over nm; columns are ("sensor", curve) and (design_id, channel)."""
-        kept = self.output.curves
-        columns: dict[tuple[Any, str], np.ndarray] = {("sensor", name): curve for name, curve in kept.sensor.items()}
-        columns |= {(i, channel): curve for i, filters in kept.designs.items() for channel, curve in filters.items()}
-        table = wavelength_table(kept.wavelength_nm, columns)
+        stored = self.output.curves
+        columns: dict[tuple[Any, str], np.ndarray] = {("sensor", name): curve for name, curve in stored.sensor.items()}
+        columns |= {(i, channel): curve for i, filters in stored.designs.items() for channel, curve in filters.items()}
+        table = wavelength_table(stored.wavelength_nm, columns)
         table.columns.names = ["design", "curve"]
         return table
 

@@ -120,7 +120,7 @@ def user_filter_setup(study: Study, cfa: str, scenario: str, bases: Mapping[str,
     filters = [s.filter for s in study.spaces if s.filter is not None and s.cfa == cfa]
     stated = {repr(f.technology): f.technology for f in filters if bases.keys() & set(f.channels)}
     if len(stated) > 1:
-        several = ", ".join("none" if made is None else made.description for made in stated.values())
+        several = ", ".join("none" if technology is None else technology.description for technology in stated.values())
         raise DataError(
             ValidationIssue(f"several technologies are stated for {' and '.join(bases)} of {cfa}", value=several)
         )
@@ -149,18 +149,20 @@ def find_cfa(study: Study, channels: Sequence[str]) -> str:
     """
     candidates = [name for name, mosaic in study.mosaics.items() if set(channels) <= set(mosaic.channels)]
     modified = {s.cfa for s in study.spaces if s.filter is not None and set(s.filter.channels) == set(channels)}
-    wanted = " and ".join(channels)
+    channel_names = " and ".join(channels)
     if not candidates:
         known = list(dict.fromkeys(channel for mosaic in study.mosaics.values() for channel in mosaic.channels))
         near = nearest(channels[0], known)
         raise DataError(
             ValidationIssue(
-                f"no CFA of the study has a channel {wanted}", None, None, None, None, ", ".join(known), near
+                f"no CFA of the study has a channel {channel_names}", None, None, None, None, ", ".join(known), near
             )
         )
     chosen = [name for name in candidates if name in modified] or candidates
     if len(chosen) > 1:
-        raise DataError(ValidationIssue(f"several CFAs have a channel {wanted}", key="cfa", allowed=", ".join(chosen)))
+        raise DataError(
+            ValidationIssue(f"several CFAs have a channel {channel_names}", key="cfa", allowed=", ".join(chosen))
+        )
     return chosen[0]
 
 
@@ -206,8 +208,10 @@ def evaluate_curves(study: Study, setup: Setup, curves: DesignCurves) -> Columns
             from ..metrics.drawn import LampsAndCameras  # noqa: PLC0415
 
             draws = LampsAndCameras(population_model(setup), study.tolerance, study.section.seed)
-            kept = draws.columns(lambda _, subset: curves[subset], len(curves), class_pairs(setup.lights.classes))
-            values |= {YIELD + name: column for name, column in kept.items()}
+            yield_columns = draws.columns(
+                lambda _, subset: curves[subset], len(curves), class_pairs(setup.lights.classes)
+            )
+            values |= {YIELD + name: column for name, column in yield_columns.items()}
     values |= family_quantities(None, np.empty((len(curves), 0)))
     values |= image_quantities(setup, curves, study.section.vision, study.section.seed)
     unknown = np.full(len(curves), np.nan)

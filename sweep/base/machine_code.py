@@ -50,11 +50,11 @@ def njit(**options: Any) -> Callable[[_F], _F]:
 
     Raises SweepError where others may write that folder.
     """
-    kept = options.pop("cache", False)
+    is_cached = options.pop("cache", False)
 
     def decorated(function: _F) -> _F:
         kernel: Any = numba.njit(**options)(function)
-        if kept:
+        if is_cached:
             with suppress(RuntimeError):  # numba's, where the folder cannot be written
                 kernel._cache = _Cache(function)
         return cast(_F, kernel)

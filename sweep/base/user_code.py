@@ -125,8 +125,8 @@ def _of_file(name: str, source: str) -> Any:
         raise SweepError(ValidationIssue(f"the code cannot be run: {_error_text(error)}", file)) from None
     member = getattr(module, name_inside, None)
     if not callable(member):
-        made = [key for key, value in vars(module).items() if getattr(value, "__module__", None) == module.__name__]
-        known = ", ".join(made) or "a class or function"
+        defined = [key for key, value in vars(module).items() if getattr(value, "__module__", None) == module.__name__]
+        known = ", ".join(defined) or "a class or function"
         raise SweepError(
             ValidationIssue("no such class or function in the file", file, value=name_inside, allowed=known)
         )

@@ -267,7 +267,7 @@ def _matrix(
     """Return the matrix from a curve on a base transmission to the curve in the cone; cached."""
     key = wavelength_nm.tobytes() + base_transmission.tobytes() + repr((index, cone, n_rays)).encode()
 
-    def made() -> csr_matrix:
+    def compute() -> csr_matrix:
         from scipy.sparse import csr_matrix, diags_array  # noqa: PLC0415  (slow to import: only where filters move)
 
         known = known_at(base_transmission)
@@ -278,7 +278,7 @@ def _matrix(
         inverse[known] = 1 / base_transmission[known]
         return csr_matrix(diags_array(base_transmission) @ mean @ diags_array(inverse))
 
-    return _MATRICES.get(hashlib.sha256(key).digest(), made)
+    return _MATRICES.get(hashlib.sha256(key).digest(), compute)
 
 
 def _means(wavelength_nm: PerWavelength, knots_nm: PerKnot, index: float, cone: Cone, n_rays: int | None) -> _Entries:
@@ -297,8 +297,8 @@ def _over_rays(wavelength_nm: PerWavelength, knots_nm: PerKnot, m: PerValue, wei
     at = np.clip(wavelength_nm[:, None] * m, knots_nm[0], knots_nm[-1])
     first = np.clip(np.searchsorted(knots_nm, at, side="right") - 1, 0, max(knots_nm.size - 2, 0))
     last = np.minimum(first + 1, knots_nm.size - 1)
-    apart = knots_nm[last] - knots_nm[first]
-    share = np.divide(at - knots_nm[first], apart, out=np.zeros_like(at), where=apart > 0)
+    step_nm = knots_nm[last] - knots_nm[first]
+    share = np.divide(at - knots_nm[first], step_nm, out=np.zeros_like(at), where=step_nm > 0)
     rows = np.broadcast_to(np.arange(wavelength_nm.size)[:, None], at.shape)
     shares = np.concatenate([(weights * (1 - share)).ravel(), (weights * share).ravel()])
     return np.tile(rows.ravel(), 2), np.concatenate([first.ravel(), last.ravel()]), shares
@@ -313,17 +313,17 @@ def _over_cone(wavelength_nm: PerWavelength, knots_nm: PerKnot, stretches: Stret
     knots = knots_nm[columns]
     m, which = np.unique(knots / wavelength_nm[:, None], return_inverse=True)
     share, summed = (values[which].reshape(columns.shape) for values in stretches.below(m))
-    whole = stretches.below(np.array([stretches.most]))[0][0]
-    there, moved, apart = np.diff(share), np.diff(summed), np.diff(knots)
+    total = stretches.below(np.array([stretches.most]))[0][0]
+    there, moved, steps = np.diff(share), np.diff(summed), np.diff(knots)
     second = np.divide(
-        wavelength_nm[:, None] * moved - knots[:, :-1] * there, apart, out=np.zeros_like(there), where=apart > 0
+        wavelength_nm[:, None] * moved - knots[:, :-1] * there, steps, out=np.zeros_like(there), where=steps > 0
     )
     second = np.clip(second, 0.0, there)
     shares = np.zeros(columns.shape)
     shares[:, 0] += share[:, 0]
     shares[:, :-1] += there - second
     shares[:, 1:] += second
-    shares[:, -1] += np.maximum(whole - share[:, -1], 0.0)
+    shares[:, -1] += np.maximum(total - share[:, -1], 0.0)
     shares /= shares.sum(axis=1, keepdims=True)
     rows = np.broadcast_to(np.arange(wavelength_nm.size)[:, None], columns.shape)
     return rows.ravel(), columns.ravel(), shares.ravel()

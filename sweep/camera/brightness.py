@@ -62,7 +62,7 @@ class LampReadings:
     def proportional(self) -> bool:
         """True if all exposures have their fixed share of the electrons: no pulse, crosstalk or QE tells them apart."""
         full = [self.lit_e / self.light[:, None], self.dark_e / self.light]
-        return all(same_electrons(of_exposure, one[0]) for one in full for of_exposure in one[1:])
+        return all(same_electrons(of_exposure, knees[0]) for knees in full for of_exposure in knees[1:])
 
     def alike(self, other: LampReadings, scale: float) -> bool:
         """Return whether these are the lamps of another case with a scale of their light."""
@@ -212,8 +212,8 @@ class LampReadings:
             parts += [np.concatenate(around, axis=1).reshape(len(lit_e), -1)]
             parts.append(_geometric(first, last, _RATIO ** (1 / steps)))
         else:
-            some = np.linspace(0, at_knees.shape[1] - 1, min(at_knees.shape[1], _MOST_KNEES)).round().astype(int)
-            parts += [np.sort(at_knees, axis=1)[:, some], _geometric(first, last, _RATIO ** (1 / steps))]
+            sampled = np.linspace(0, at_knees.shape[1] - 1, min(at_knees.shape[1], _MOST_KNEES)).round().astype(int)
+            parts += [np.sort(at_knees, axis=1)[:, sampled], _geometric(first, last, _RATIO ** (1 / steps))]
             parts.append(_geometric(0.9 * at_knees.min(axis=1, keepdims=True), last, _RATIO_OF_MANY ** (1 / steps)))
         return np.sort(np.clip(np.concatenate(parts, axis=1), least, most), axis=1)
 

@@ -28,7 +28,10 @@ def _area(x: float, y: float, radius: float) -> float:
 
 @njit(cache=True, nogil=True)
 def covered_share(x: float, y: float, half: float, radius: float) -> float:
-    """Return the exact share of a square that lies in a disc around the origin, 0 to 1."""
+    """Return the exact share of a square that lies in a disc around the origin, 0 to 1.
+
+    All lengths are in one unit.
+    """
     x, y, squared = abs(x), abs(y), radius * radius
     if (x + half) * (x + half) + (y + half) * (y + half) <= squared:
         return 1.0
@@ -76,15 +79,15 @@ def gather(light: FloatArray, shares: FloatArray, place: IndexArray, through: In
         for case in range(out.shape[1]):
             for unit in range(out.shape[3]):
                 pixel_light[:] = 0.0
-                some = False
+                lit = False
                 for part in range(shares.size):
                     channel = through[part, unit]
                     if channel >= 0:
-                        some = True
+                        lit = True
                         share, part_light = shares[part], light[design, channel, place[part, case, unit]]
                         for s in range(n_signals):
                             pixel_light[s] += share * part_light[s]
-                if some:
+                if lit:
                     for s in range(n_signals):
                         out[design, case, s, unit] += pixel_light[s]
 
@@ -110,12 +113,12 @@ def whole_numbers(
 
     `dn_per_e`, `offset_dn`, `full_scale_dn`: gain, pedestal and full scale, DN; `out`: digital numbers, DN.
     """
-    whole = math.floor(offset_dn)
-    rest = offset_dn - whole
+    whole_dn = math.floor(offset_dn)
+    rest = offset_dn - whole_dn
     for i in range(electrons.size):
         held = electrons[i]
         held = top_e if held > top_e else held
-        steps = np.floor((held * dn_per_e + rest) + 0.5) + whole
+        steps = np.floor((held * dn_per_e + rest) + 0.5) + whole_dn
         steps = 0.0 if steps < 0.0 else steps
         out[i] = full_scale_dn if steps > full_scale_dn else steps
 
@@ -153,9 +156,9 @@ def _add_four(shares: FloatArray, coefficients: FloatArray, result: FloatArray) 
                 result[value] += shares[node] * coefficients[node, value]
         return
     a, b, c, d = shares[0], shares[1], shares[2], shares[3]
-    one, two, three, four = coefficients[0], coefficients[1], coefficients[2], coefficients[3]
+    first, second, third, fourth = coefficients[0], coefficients[1], coefficients[2], coefficients[3]
     for value in range(result.size):
-        result[value] += (a * one[value] + b * two[value]) + (c * three[value] + d * four[value])
+        result[value] += (a * first[value] + b * second[value]) + (c * third[value] + d * fourth[value])
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})

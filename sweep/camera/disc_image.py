@@ -64,7 +64,7 @@ class PixelLight:
 
 
 def different(
-    window: Window, wanted: Bool[BoolArray, "cases rows columns"]
+    window: Window, requested: Bool[BoolArray, "cases rows columns"]
 ) -> tuple[Float[Array, "places 2"], Int[IndexArray, " wanted"]]:
     """Return the distinct pixel positions around the light's center; mirrored ones are equal in a round image.
 
@@ -74,7 +74,7 @@ def different(
     x, y = window.dx[:, 0, :], window.dy[:, :, 0]
     along = np.round(np.abs(np.concatenate([x.ravel(), y.ravel()])), 12)
     distances, which = np.unique(along, return_inverse=True)
-    case, row, column = np.nonzero(wanted)
+    case, row, column = np.nonzero(requested)
     of_x, of_y = which[: x.size].reshape(x.shape)[case, column], which[x.size :].reshape(y.shape)[case, row]
     pairs, place = np.unique(np.minimum(of_x, of_y) * distances.size + np.maximum(of_x, of_y), return_inverse=True)
     return distances[np.stack(np.divmod(pairs, distances.size), axis=1)], place
@@ -82,7 +82,7 @@ def different(
 
 def light_on_pixels(
     window: Window,
-    wanted: Bool[BoolArray, "cases rows columns"],
+    requested: Bool[BoolArray, "cases rows columns"],
     half_px: float,
     radius_px: float,
     profile: DiscProfile | None,
@@ -93,14 +93,14 @@ def light_on_pixels(
     `radius_px`: radius of the disc, pixels; a blurred one's is its profile's; `profile`: the blurred image; None for a
     sharp one. Returns means over the pixels, relative to a uniform field.
     """
-    places_px, inverse = different(window, wanted)
-    place = np.full(wanted.shape, len(places_px))
-    place[wanted] = inverse
+    places_px, inverse = different(window, requested)
+    place = np.full(requested.shape, len(places_px))
+    place[requested] = inverse
     if profile is None:
         values, shares = covered(places_px[:, 0], places_px[:, 1], half_px, radius_px)[:, None], None
     else:
         places_um, half_um, shares = places_px * pitch_um, half_px * pitch_um, profile.shares
-        if len(wanted) < _LATTICE:
+        if len(requested) < _LATTICE:
             values = profile.pixel_means(places_um, half_um)
         else:
             key = profile, half_um, places_um.tobytes()

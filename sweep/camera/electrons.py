@@ -55,9 +55,9 @@ class Changing:
     def whole_of(self, part: slice) -> DesignCases:
         """Return all channels of some designs."""
         values = self.values[part] if "values" in self.__dict__ else self.make(part)
-        whole = np.repeat(self.fixed[None], len(values), axis=0)
-        whole[..., self.channel] = values
-        return whole
+        all_channels = np.repeat(self.fixed[None], len(values), axis=0)
+        all_channels[..., self.channel] = values
+        return all_channels
 
 
 def _expose(
@@ -259,19 +259,23 @@ class Electrons:
             which = exposure_times(setup, white, self.light.fixed_white) == time_s
         if not which.any() or not np.isfinite(time_s[0]) or self.light.scales(time_s).shape[1] > 1:
             return None
-        some = block if which.all() else block.subset(np.flatnonzero(which))
+        selected = block if which.all() else block.subset(np.flatnonzero(which))
         unit = int(self._touched[0])
-        uniform = np.zeros((len(some), len(self.position)))
+        uniform = np.zeros((len(selected), len(self.position)))
         if self.background.any():
-            uniform = some.product(np.ascontiguousarray(self.background[:, 0].T), everywhere)[:, self.position]
+            uniform = selected.product(np.ascontiguousarray(self.background[:, 0].T), everywhere)[:, self.position]
             uniform *= self._modified_uniform[:, unit, 0]
         uniform = self._fixed_uniform[:, unit] + uniform + setup.camera.pixel.dark_e_per_s
         rest = self.fixed + (self._fixed_uniform + setup.camera.pixel.dark_e_per_s)[:, None]
-        fixed, kept = np.ascontiguousarray(self.fixed[:, :, unit]), self._kept
+        fixed, modified_rates = np.ascontiguousarray(self.fixed[:, :, unit]), self._kept
 
         def make(part: slice) -> Float[Array, "_designs cases channels"]:
-            few = some.subset(part)
-            values = few.product(kept, everywhere).reshape(len(few), len(fixed), -1).astype(float, copy=False)
+            part_block = selected.subset(part)
+            values = (
+                part_block.product(modified_rates, everywhere)
+                .reshape(len(part_block), len(fixed), -1)
+                .astype(float, copy=False)
+            )
             _expose(values, fixed, uniform[part], float(time_s[0]))
             return values
 

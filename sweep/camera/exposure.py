@@ -71,8 +71,8 @@ def largest_sensitivity_not_brightest(setup: Setup) -> float:
     Infinite for dark base curves.
     """
     camera, rates = setup.camera, setup.camera.qe.sum(axis=1)
-    kept, modified = (rates[list(some)].max(initial=0.0) for some in (camera.fixed, camera.modified))
-    return float(kept / modified) if modified > 0 else np.inf
+    fixed_rate, modified = (rates[list(channels)].max(initial=0.0) for channels in (camera.fixed, camera.modified))
+    return float(fixed_rate / modified) if modified > 0 else np.inf
 
 
 def relative_slope(
@@ -83,9 +83,9 @@ def relative_slope(
     `white`: electrons/s of the white patch per unit of QE.
     """
     # By the same products: a filter that leaves its base as it is, beside a pixel of that curve, sets nothing.
-    rates, kept = curves @ white, setup.camera.qe[list(setup.camera.fixed)] @ white
+    rates, fixed_rates = curves @ white, setup.camera.qe[list(setup.camera.fixed)] @ white
     of_white = isinstance(setup.scene.exposure, WhitePatchExposure)
-    if not of_white or not rates.size or not rates.max() > kept.max(initial=0.0):
+    if not of_white or not rates.size or not rates.max() > fixed_rates.max(initial=0.0):
         return np.zeros(len(curves_gradient))
     top = int(np.argmax(rates))
     return np.asarray(-(curves_gradient[:, top] @ white) / rates[top], dtype=float)

@@ -176,10 +176,10 @@ class ForwardModel:
         if len(curves) != 1 or self._in_parts:
             return read(curves)
         requested = curves.tobytes()
-        kept = self._latest.get(how)
-        if kept is None or kept[0] != requested:
-            kept = self._latest[how] = requested, read(curves)
-        result: _Result = kept[1]
+        cached = self._latest.get(how)
+        if cached is None or cached[0] != requested:
+            cached = self._latest[how] = requested, read(curves)
+        result: _Result = cached[1]
         return result
 
     def read_with_noise(self, curves: DesignCurves) -> NoisyReadout:
@@ -193,7 +193,7 @@ class ForwardModel:
         if self._in_parts:
             readouts = [part.read_with_noise(curves) for part in self._parts()]
             joined = {
-                name: np.concatenate([getattr(one, name) for one in readouts], axis=1)
+                name: np.concatenate([getattr(readout, name) for readout in readouts], axis=1)
                 for name in ("mean", "variance", "gaussian", "reach_dn")
             }
             return replace(readouts[0], **joined)
@@ -261,7 +261,7 @@ class ForwardModel:
     @cached_property
     def _of_exposures(self) -> list[tuple[Float[Array, " channels"], ForwardModel]]:
         """QE factors of the channels, and model of the electrons, of each exposure of an HDR pixel."""
-        camera, made = self.setup.camera, []
+        camera, models = self.setup.camera, []
         for exposure in camera.pixel.exposures:
             capture = exposure.capture
             factors = np.array([capture.qe_factor.get(channel, 1.0) for channel in camera.mosaic.channels])
@@ -272,8 +272,8 @@ class ForwardModel:
                 model = type(self)(self.setup.with_camera(**changes), self.phases, once=self._once)
             else:
                 model = self
-            made.append((factors, model))
-        return made
+            models.append((factors, model))
+        return models
 
     def pixel_electrons(self, curves: DesignCurves) -> Float[Array, "*captures designs cases signals pixels"]:
         """Return expected electrons of the pixels that are read.
@@ -319,7 +319,7 @@ _known: Cache[tuple[type[ForwardModel], int], tuple[Setup, ForwardModel]] = Cach
 def forward_model(setup: Setup, kind: type[ForwardModel] = ForwardModel) -> ForwardModel:
     """Return the forward model of a setup; recent models are cached."""
 
-    def made() -> tuple[Setup, ForwardModel]:
+    def build() -> tuple[Setup, ForwardModel]:
         return setup, _models.get((kind, hashlib.sha256(pickle.dumps(setup)).digest()), lambda: kind(setup))
 
-    return _known.get((kind, id(setup)), made)[1]
+    return _known.get((kind, id(setup)), build)[1]

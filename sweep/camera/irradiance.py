@@ -40,10 +40,11 @@ def with_veiling_glare(irradiance: Irradiance, share: float, mean: PerWavelength
     """Spread a share of the mean light of the field evenly over the field (integral of veiling glare, ISO 9358).
 
     `irradiance`: irradiance of a lens without glare; `share`: share, 0 to 1, that each pixel loses of its own light.
+    `mean` leaves out the light of a signal, which is small in the field.
     """
-    kept = 1 - share
-    background = kept * irradiance.background + share * mean
-    return replace(irradiance, signals=kept * irradiance.signals, background=background)
+    unscattered = 1 - share
+    background = unscattered * irradiance.background + share * mean
+    return replace(irradiance, signals=unscattered * irradiance.signals, background=background)
 
 
 def signal_irradiance(setup: Setup) -> Float[Array, "signals wavelengths"]:

@@ -57,8 +57,8 @@ class LinearModel(ForwardModel):
 
         Returns `response`: response, DN; `gradient`: DN per unit of parameter.
         """
-        whole, slope = self._with_slope(curves, curves_gradient)
-        response = self.readout.folded(unquantized(whole, self.readout.pixel))
+        electrons, slope = self._with_slope(curves, curves_gradient)
+        response = self.readout.folded(unquantized(electrons, self.readout.pixel))
         return response, self.readout.folded(slope * self.setup.camera.pixel.dn_per_e)
 
     def lamps_with_gradient(
@@ -68,9 +68,9 @@ class LinearModel(ForwardModel):
 
         Returns `response`: response, DN; `gradient`: DN per unit of parameter.
         """
-        whole, slope = self._with_slope(curves, curves_gradient, lamps_only=True)
+        electrons, slope = self._with_slope(curves, curves_gradient, lamps_only=True)
         dn_per_e = self.readout.pixel.dn_per_e
-        return self.readout.folded(whole * dn_per_e), self.readout.folded(slope * dn_per_e)
+        return self.readout.folded(electrons * dn_per_e), self.readout.folded(slope * dn_per_e)
 
     def variance(self, curves: DesignCurves) -> DesignCases:
         """Return the variance of the noise, DN^2."""
@@ -86,8 +86,8 @@ class LinearModel(ForwardModel):
         Returns DN^2 per unit of parameter.
         """
         pixel = self.readout.pixel
-        whole, slope = self.by_pixel._with_slope(curves, curves_gradient)
-        per_e = pixel.dn_per_e**2 * (1 + 2 * pixel.prnu**2 * whole)
+        electrons, slope = self.by_pixel._with_slope(curves, curves_gradient)
+        per_e = pixel.dn_per_e**2 * (1 + 2 * pixel.prnu**2 * electrons)
         return self.by_pixel.readout.spread(per_e * slope)
 
     def merged_with_gradient(
@@ -107,12 +107,12 @@ class LinearModel(ForwardModel):
         """
         assert self.hdr is not None
         by_pixel = self.by_pixel
-        whole, slope = by_pixel._with_slope(curves, curves_gradient)
+        electrons, slope = by_pixel._with_slope(curves, curves_gradient)
         light = capture_light(self.setup.with_camera(pixel=self.hdr), by_pixel.electrons.response)
-        moments = np.empty((4, *whole.shape))
+        moments = np.empty((4, *electrons.shape))
         for of_exposures, which in groups_of(light):
             curve = pixel_curve(self.hdr, of_exposures, noisy=True)
-            moments[..., which] = *curve.moments(whole[..., which]), *curve.slopes(whole[..., which])
+            moments[..., which] = *curve.moments(electrons[..., which]), *curve.slopes(electrons[..., which])
         mean, variance, mean_per_e, variance_per_e = moments
         variance_per_e = np.where(variance > STEPS_DN2, variance_per_e, 0.0)
         variance = np.maximum(variance, STEPS_DN2)
@@ -139,14 +139,14 @@ class LinearModel(ForwardModel):
         """
         by_pixel = self.by_pixel
         pixel = by_pixel.readout.pixel if self.hdr is None else self.hdr
-        whole, slope = by_pixel._with_slope(curves, curves_gradient)
+        electrons, slope = by_pixel._with_slope(curves, curves_gradient)
         lit, lit_by_u = by_pixel._with_slope(curves, curves_gradient, lamps_only=True)
         readout = Readout(by_pixel.setup.with_camera(pixel=pixel), by_pixel.electrons.response)
-        light = readout.capture_light if pixel.captures else np.ones((1, whole.shape[-1]))
-        dark, dark_by_u = whole[:, 0] - lit[:, 0], slope[:, :, 0] - lit_by_u[:, :, 0]
-        moments, noisy = len(whole) // readout.n_cases, self.setup.scene.noise is not None
+        light = readout.capture_light if pixel.captures else np.ones((1, electrons.shape[-1]))
+        dark, dark_by_u = electrons[:, 0] - lit[:, 0], slope[:, :, 0] - lit_by_u[:, :, 0]
+        moments, noisy = len(electrons) // readout.n_cases, self.setup.scene.noise is not None
         result = []
-        for case in range(len(whole)):
+        for case in range(len(electrons)):
             here = readout.at(case // moments)
             lamps = LampReadings(lit[case] * light[:, None], dark[case] * light, light, here, noisy)
             result.append(LampSlopes(lamps, lit_by_u[:, case], dark_by_u[:, case]))
@@ -188,18 +188,18 @@ class LinearModel(ForwardModel):
     ) -> tuple[Float[Array, "cases signals channels"], Float[Array, "parameters cases signals channels"]]:
         """Return expected electrons and their derivative."""
         electrons, n = self.electrons, len(curves_gradient)
-        one = curves[None]
-        exposure_s = self.light.exposure_s(one)
+        design = curves[None]
+        exposure_s = self.light.exposure_s(design)
         scales = self.light.scales(exposure_s)
-        whole = electrons.expected(one, scales, exposure_s)[0]
+        expected = electrons.expected(design, scales, exposure_s)[0]
         if lamps_only:
-            whole = whole - np.repeat(electrons.unlit(one)[0], scales.shape[1], axis=0)[:, None] * exposure_s
+            expected = expected - np.repeat(electrons.unlit(design)[0], scales.shape[1], axis=0)[:, None] * exposure_s
         light = (electrons.rates(curves_gradient) - electrons.fixed)[:, :, None] * scales[0][None, None, :, None, None]
         uniform = electrons.through_filters(electrons.of_background(curves_gradient))
         uniform = np.zeros_like(uniform) if lamps_only else uniform
-        slope = (light + uniform[:, :, None, None, :]).reshape(n, *whole.shape) * exposure_s
+        slope = (light + uniform[:, :, None, None, :]).reshape(n, *expected.shape) * exposure_s
         relative = relative_slope(self.setup, self.light.white, curves, curves_gradient)
-        return whole, np.asarray(slope + relative[:, None, None, None] * whole, dtype=float)
+        return expected, np.asarray(slope + relative[:, None, None, None] * expected, dtype=float)
 
     def per_qe(
         self, modified: int, curves: ChannelCurves, *, lamps_only: bool = False
@@ -260,16 +260,16 @@ def linear_model(setup: Setup) -> LinearModel:
 
     `setup`: camera, lights, scene and accuracy; at most 9 field positions and 2 moments of a pulse are used.
     """
-    few = setup.accuracy.model_copy(
+    coarse = setup.accuracy.model_copy(
         update={"field_positions": min(setup.accuracy.field_positions, _FIELD_POSITIONS), "pwm_moments": 2}
     )
     hdr = setup.camera.pixel if setup.camera.pixel.captures else None
     setup = setup if hdr is None else setup.with_camera(pixel=hdr.read_once)
-    without_readout = replace(setup, left_out=setup.left_out | READOUT, accuracy=few)
+    without_readout = replace(setup, left_out=setup.left_out | READOUT, accuracy=coarse)
 
-    def made() -> LinearModel:
+    def build() -> LinearModel:
         model = LinearModel(without_readout)
         model.hdr = hdr
         return model
 
-    return _models.get(hashlib.sha256(pickle.dumps((without_readout, hdr))).digest(), made)
+    return _models.get(hashlib.sha256(pickle.dumps((without_readout, hdr))).digest(), build)

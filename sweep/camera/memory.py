@@ -48,9 +48,9 @@ def memory_problem(setup: Setup) -> tuple[str, str, str] | None:
     if setup.scene.target is None:
         return None
     channels = f"{len(setup.camera.mosaic.channels)} channels and {setup.camera.grid.size} wavelengths"
-    if (one := bytes_per_phase(setup, by_pixel=True)) > MOST_BYTES:
+    if (needed_bytes := bytes_per_phase(setup, by_pixel=True)) > MOST_BYTES:
         problem = f"{pixels_per_phase(setup):,} pixels around the light, of {channels}, take too much memory"
-        return problem, f"{one / 2**30:.1f} GiB", f"at most {MOST_BYTES / 2**30:g} GiB"
+        return problem, f"{needed_bytes / 2**30:.1f} GiB", f"at most {MOST_BYTES / 2**30:g} GiB"
     phases = n_phases(setup)
     if phases > MOST_PHASES:
         problem = f"any sampling phase on a tile of {setup.camera.mosaic.indices.size:,} pixels: too many phases"

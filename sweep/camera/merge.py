@@ -135,7 +135,7 @@ def _merged(electrons: PerCapture, light: PerCapture, pixel: Pixel) -> Merged:
     parts = []
     for usable in itertools.product(*moments):
         conditional = [of[subset] for of, subset in zip(moments, usable, strict=True)]
-        share = np.prod([one.share for one in conditional], axis=0)
+        share = np.prod([subset_moments.share for subset_moments in conditional], axis=0)
         if not any(usable) or not share.any():
             continue
         parts.append((share, *_combined(conditional, weights_of(usable, electrons, light, pixel), light)))
@@ -173,16 +173,18 @@ def shape_of_noise(
     for at, exposure in enumerate(pixel.exposures):
         expected = electrons[at]
         for number in exposure.numbers:
-            one, limit_dn = pixel.read_as[number], limits_dn(pixel)[number]
-            noise_e = np.sqrt(expected + (one.prnu * expected) ** 2 + one.read_noise_e**2)
-            limit_e = np.inf if limit_dn is None else (limit_dn - one.offset_dn) / one.dn_per_e
+            capture, limit_dn = pixel.read_as[number], limits_dn(pixel)[number]
+            noise_e = np.sqrt(expected + (capture.prnu * expected) ** 2 + capture.read_noise_e**2)
+            limit_e = np.inf if limit_dn is None else (limit_dn - capture.offset_dn) / capture.dn_per_e
             used = expected - 9 * noise_e - 27 < limit_e
-            low_e, high_e = unclipped_e(one)
-            dithered = one.dn_per_e * one.read_noise_e >= DITHERED_DN
+            low_e, high_e = unclipped_e(capture)
+            dithered = capture.dn_per_e * capture.read_noise_e >= DITHERED_DN
             fine = (expected >= low_e) & (expected <= high_e)
-            fine &= dithered | (one.dn_per_e * noise_e >= MANY_STEPS**0.5)
+            fine &= dithered | (capture.dn_per_e * noise_e >= MANY_STEPS**0.5)
             gaussian &= fine | ~used
-            reach_e = 9 * (np.sqrt(expected) + one.prnu * expected + one.read_noise_e) + 27 + 1 / one.dn_per_e
+            reach_e = (
+                9 * (np.sqrt(expected) + capture.prnu * expected + capture.read_noise_e) + 27 + 1 / capture.dn_per_e
+            )
             # Its mean, if it is used, is within its reach of the expected number, and so is the mean of all.
             reach_dn = np.maximum(reach_dn, np.where(used, 2 * reach_e * pixel.dn_per_e / light[at], 0.0))
     return gaussian, reach_dn
@@ -222,9 +224,9 @@ def without_noise(
     Returns merged values, DN of the first capture.
     """
     read = []
-    for at, one in zip(exposure_of(pixel), pixel.read_as, strict=True):
-        held = np.minimum(electrons[at], one.saturation_e)
-        read.append(rounded(held * one.dn_per_e, one) if rounds else unquantized(held, one))
+    for at, capture in zip(exposure_of(pixel), pixel.read_as, strict=True):
+        held = np.minimum(electrons[at], capture.saturation_e)
+        read.append(rounded(held * capture.dn_per_e, capture) if rounds else unquantized(held, capture))
     values = merged_readings(read, electrons, light, pixel)
     return coded(values, pixel) if rounds else values
 
@@ -239,9 +241,9 @@ def draws(
     gain = 1 + pixel.prnu * rng.standard_normal(electrons.shape[1:])
     held = rng.poisson(np.clip(electrons * gain, 0.0, MOST_POISSON_E))
     read = []
-    for at, one in zip(exposure_of(pixel), pixel.read_as, strict=True):
-        noisy_e = np.minimum(held[at], one.well_e) + one.read_noise_e * rng.standard_normal(gain.shape)
-        read.append(rounded(noisy_e * one.dn_per_e, one))
+    for at, capture in zip(exposure_of(pixel), pixel.read_as, strict=True):
+        noisy_e = np.minimum(held[at], capture.well_e) + capture.read_noise_e * rng.standard_normal(gain.shape)
+        read.append(rounded(noisy_e * capture.dn_per_e, capture))
     return coded(merged_readings(read, electrons, light, pixel), pixel)
 
 

@@ -19,7 +19,7 @@ class Mosaic:
     """Color filter array.
 
     Each channel is kept once, in the order of its first pixel, so that ``len(channels)`` is the paper's m_p (RGGB 3,
-    RCCC 2, RCCB 3, RYYCy 3, RYNCy 4).
+    RCCC 2, RCCB 3, RYYCy 3, RYNCy 4). `tile[row][column]` indexes `channels`; the tile repeats over the sensor.
     """
 
     name: str

@@ -55,7 +55,7 @@ class Phases:
 def lattice_px(mosaic: Mosaic, steps_per_px: int) -> Float[Array, "phases 2"]:
     """Return the centers of a square lattice over the tile.
 
-    `steps_per_px`: steps along each side of a pixel.
+    `steps_per_px`: steps along each side of a pixel. Centers are (column, row), pixels.
     """
     rows, columns = mosaic.indices.shape
     x, y = np.meshgrid(np.arange(columns * steps_per_px) / steps_per_px, np.arange(rows * steps_per_px) / steps_per_px)
@@ -176,8 +176,8 @@ def refined_minima(
         centers, at_start = places[starts], np.take_along_axis(so_far, starts, axis=1)  # [n_values, n_starts, ...]
         apart_px = np.abs(np.mod(places[None, None] - centers[:, :, None] + period / 2, period) - period / 2)
         known_around = (apart_px <= 2 * step * (1 + 1e-9)).all(axis=3)
-        off = np.abs(so_far[:, None] - at_start[..., None])
-        moving = np.max(off, axis=2, where=known_around, initial=0.0) > flat_dn
+        change = np.abs(so_far[:, None] - at_start[..., None])
+        moving = np.max(change, axis=2, where=known_around, initial=0.0) > flat_dn
         while moving.any():
             around = np.unique((centers[moving][:, None] + step * _NEIGHBORS).reshape(-1, 2), axis=0)
             read = read_at(target, around)
@@ -204,8 +204,8 @@ def _apart(
     """Return the indices of the smallest values that are more than a step apart, shape (n_values, n_starts)."""
     starts, left = [values.argmin(axis=1)], values.copy()
     while len(starts) < n_starts:
-        off = np.mod(centers_px - centers_px[starts[-1]][:, None], period_px)
-        left[np.minimum(off, period_px - off).max(axis=2) <= step_px * (1 + 1e-9)] = np.inf
+        distance = np.mod(centers_px - centers_px[starts[-1]][:, None], period_px)
+        left[np.minimum(distance, period_px - distance).max(axis=2) <= step_px * (1 + 1e-9)] = np.inf
         starts.append(np.where(np.isfinite(left).any(axis=1), left.argmin(axis=1), starts[0]))
     return np.stack(starts, axis=1)
 

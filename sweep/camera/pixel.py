@@ -165,7 +165,7 @@ class Pixel(Section):
     def saturation_e(self) -> float:
         """Electrons at saturation: the full well, or the end of the range of the ADC; of an HDR pixel, of all."""
         if self.captures:
-            return max(one.saturation_e / of.light for one, of in zip(self.read_as, self.captures, strict=True))
+            return max(capture.saturation_e / of.light for capture, of in zip(self.read_as, self.captures, strict=True))
         return min(self.well_e, (self.full_scale_dn - self.offset_dn) / self.dn_per_e)
 
 

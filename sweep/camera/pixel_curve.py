@@ -44,8 +44,9 @@ class PixelCurve:
         if not pixel.captures:
             return np.array([pixel.saturation_e])
         ends = [
-            (one.saturation_e if limit is None else (limit - one.offset_dn) / one.dn_per_e) / self.light[exposure]
-            for exposure, one, limit in zip(
+            (capture.saturation_e if limit is None else (limit - capture.offset_dn) / capture.dn_per_e)
+            / self.light[exposure]
+            for exposure, capture, limit in zip(
                 merge.exposure_of(pixel), pixel.read_as, merge.limits_dn(pixel), strict=True
             )
         ]
@@ -59,7 +60,7 @@ class PixelCurve:
         pixel = self.pixel
         shares = [self.light[at] for at in merge.exposure_of(pixel)] if pixel.captures else [1.0]
         counts = self.knees_e * shares
-        read_e = np.array([one.read_noise_e for one in pixel.read_as or (pixel,)])
+        read_e = np.array([capture.read_noise_e for capture in pixel.read_as or (pixel,)])
         return np.asarray(np.sqrt(counts + read_e**2) / np.maximum(counts, 1e-9) + pixel.prnu, dtype=float)
 
     def mean(self, electrons: SameShape) -> SameShape:
@@ -118,8 +119,10 @@ def _merged(pixel: Pixel, light: tuple[float, ...]) -> table.MomentTable:
 @lru_cache(maxsize=16)
 def _read_once(pixel: Pixel) -> table.MomentTable:
     """Take mean and variance of the digital number from the table of a pixel that is read once."""
-    whole = table.tables(pixel)
-    return whole._replace(coefficients=np.ascontiguousarray(whole.coefficients[[moments.ROUNDED, moments.VARIANCE]]))
+    moment_table = table.tables(pixel)
+    return moment_table._replace(
+        coefficients=np.ascontiguousarray(moment_table.coefficients[[moments.ROUNDED, moments.VARIANCE]])
+    )
 
 
 @lru_cache(maxsize=64)
@@ -128,10 +131,10 @@ def pixel_curve(pixel: Pixel, light: tuple[float, ...], *, noisy: bool) -> Pixel
     return PixelCurve(pixel, light, noisy)
 
 
-def same_electrons(one: SameShape, other: SameShape) -> bool:
+def same_electrons(first: SameShape, second: SameShape) -> bool:
     """Return whether electrons are the same but for rounding."""
-    apart = np.abs(one - other)
-    return bool((apart <= _EQUAL * np.abs(other) + _NONE).all())
+    difference = np.abs(first - second)
+    return bool((difference <= _EQUAL * np.abs(second) + _NONE).all())
 
 
 def groups_of(light: Float[Array, "captures pixels"]) -> list[tuple[tuple[float, ...], Int[IndexArray, " _pixels"]]]:

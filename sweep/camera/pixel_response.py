@@ -143,23 +143,23 @@ def pixel_response(setup: Setup, phases: Phases | None, *, by_pixel: bool) -> Pi
     if setup.scene.field is not None:
         return _joined([pixel_response(position, phases, by_pixel=by_pixel) for position in over_field(setup)])
     if phases is None:
-        made = _uniform(setup, by_pixel=by_pixel)
-        return replace(made, source=made.light * path_factor(setup, wavelength_nm))
+        response = _uniform(setup, by_pixel=by_pixel)
+        return replace(response, source=response.light * path_factor(setup, wavelength_nm))
     knots = psf.psf_knots_nm(wavelength_nm, setup.accuracy.psf_step_nm)
     if by_pixel:
-        made = _pixels(setup, knots, phases, by_pixel=True)
+        response = _pixels(setup, knots, phases, by_pixel=True)
     else:
         step = max(1, _HELD // (pixels_per_phase(setup) * max(len(setup.camera.mosaic.channels) ** 2, knots.size)))
         blocks = [phases.subset(slice(at, at + step)) for at in range(0, len(phases), step)]
-        made = _joined([_pixels(setup, knots, block, by_pixel=False) for block in blocks])
-    same = knots.size == wavelength_nm.size or _one_light(made.source)
+        response = _joined([_pixels(setup, knots, block, by_pixel=False) for block in blocks])
+    same = knots.size == wavelength_nm.size or _one_light(response.source)
     between = None if same else linear_basis(wavelength_nm, knots)
     factor = path_factor(setup, wavelength_nm)
-    if isinstance(made.source, SplitLight):
-        shares = made.source.shares
+    if isinstance(response.source, SplitLight):
+        shares = response.source.shares
         shares = shares if shares is None or between is None else shares @ between
-        return replace(made, source=replace(made.source, shares=shares, factor=factor))
-    return replace(made, source=(made.light if between is None else made.light @ between) * factor)
+        return replace(response, source=replace(response.source, shares=shares, factor=factor))
+    return replace(response, source=(response.light if between is None else response.light @ between) * factor)
 
 
 def _one_light(source: Float[Array, "cases pixels channels wavelengths"] | SplitLight) -> bool:
@@ -180,11 +180,11 @@ class ChannelResponses:
         with self._one_at_a_time:
             new = [at for at, key in enumerate(keys) if key not in self._known]
             if new:
-                made = pixel_response(setup, phases.subset(np.array(new)), by_pixel=False)
-                if (len(self._known) + len(new)) * made.light[0].nbytes > _KEPT_BYTES:
+                response = pixel_response(setup, phases.subset(np.array(new)), by_pixel=False)
+                if (len(self._known) + len(new)) * response.light[0].nbytes > _KEPT_BYTES:
                     self._known.clear()
-                    return made if len(new) == len(keys) else pixel_response(setup, phases, by_pixel=False)
-                parts = zip(made.light, made.uniform, strict=True)
+                    return response if len(new) == len(keys) else pixel_response(setup, phases, by_pixel=False)
+                parts = zip(response.light, response.uniform, strict=True)
                 self._known.update(zip((keys[at] for at in new), parts, strict=True))
             light, uniform = (np.stack(part) for part in zip(*(self._known[key] for key in keys), strict=True))
         weights = np.repeat(np.eye(uniform.shape[2])[None], len(keys), axis=0)
@@ -258,19 +258,19 @@ def _pixels(setup: Setup, wavelength_nm: PerWavelength, phases: Phases, *, by_pi
     target, pixel, n = setup.scene.target, setup.camera.pixel, len(setup.camera.mosaic.channels)
     assert target is not None
     radius, half = sampling.radii_px(setup, target)[0], pixel.fill_factor**0.5 / 2
-    window, of_channel, apart = _weights(setup, phases)
+    window, of_channel, readout_weights = _weights(setup, phases)
     share = sampling.crosstalk_share(setup)
-    spread = sampling.with_crosstalk(apart, share) if share else apart
-    wanted = np.asarray((spread > 0).any(axis=3))
+    spread = sampling.with_crosstalk(readout_weights, share) if share else readout_weights
+    has_weight = np.asarray((spread > 0).any(axis=3))
     profile = _profile(setup, wavelength_nm)
-    light = disc_image.light_on_pixels(window, wanted, half, radius, profile, pixel.pitch_um)
+    light = disc_image.light_on_pixels(window, has_weight, half, radius, profile, pixel.pitch_um)
     if by_pixel:
-        return _apart(light, of_channel, apart, share)
+        return _apart(light, of_channel, readout_weights, share)
     # Weights of the pixels of each channel in each channel's readout: [cases, rows, columns, channels x channels].
     taken = spread[..., :, None] * of_channel[..., None, :]
-    shape = (len(apart), n, n)
+    shape = (len(readout_weights), n, n)
     folded = light.folded(taken.reshape(*taken.shape[:3], n * n)).reshape(*shape, -1)
-    weights = np.repeat(np.eye(n)[None], len(apart), axis=0)
+    weights = np.repeat(np.eye(n)[None], len(readout_weights), axis=0)
     return PixelResponse(folded, taken.sum(axis=(1, 2)), weights, weights, by_channel=True)
 
 
@@ -296,18 +296,18 @@ def _weights(
 def _apart(
     light: disc_image.PixelLight,
     of_channel: Float[Array, "_channels _rows _columns"],
-    apart: Float[Array, "_channels _cases _rows _columns"],
+    readout_weights: Float[Array, "_channels _cases _rows _columns"],
     share: float,
 ) -> PixelResponse:
     """Return the response of single pixels that have a weight in any readout."""
-    used = (apart > 0).any(axis=(0, 3))
+    used = (readout_weights > 0).any(axis=(0, 3))
     rows, columns = np.nonzero(used)
     taken = [((1 - share), rows, columns)]
     if share:  # see `with_crosstalk`; a pixel at the border has no weight
         steps = ((-1, 0), (1, 0), (0, -1), (0, 1))
         taken += [(share / 4, rows + down, columns + right) for down, right in steps]
     n = of_channel.shape[2]
-    uniform = np.zeros((len(apart), rows.size, n))
+    uniform = np.zeros((len(readout_weights), rows.size, n))
     pixels, channel = np.arange(rows.size), of_channel.argmax(axis=2)
     for part, row, column in taken:
         uniform[:, pixels, channel[row, column]] += part
@@ -315,5 +315,5 @@ def _apart(
     place = np.stack([light.place[:, row, column] for _, row, column in taken])
     through = np.stack([channel[row, column] for _, row, column in taken])
     split = SplitLight(light.values, light.shares, np.ones(1), parts, place, through, n)
-    readout = apart[:, used]
+    readout = readout_weights[:, used]
     return PixelResponse(split, uniform, readout, readout**2, by_channel=False)

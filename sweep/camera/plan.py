@@ -88,9 +88,9 @@ def plan_scene(
                 budget_dn -= bound_dn or 0.0
                 computed -= {name}
             choices[name] = Choice(name, not leave_out, bound_dn, _reason(bound_dn, leave_out, needed))
-    made = [choice for choice in choices.values() if choice is not None]
-    made += [Choice(effect.name, True, None, _OWN) for effect in boxes[0].setup.user_effects]
-    return Plan(scenario, tolerance_dn, accuracy, tuple(made))
+    chosen = [choice for choice in choices.values() if choice is not None]
+    chosen += [Choice(effect.name, True, None, _OWN) for effect in boxes[0].setup.user_effects]
+    return Plan(scenario, tolerance_dn, accuracy, tuple(chosen))
 
 
 def _inactive(effect: Effect, boxes: Sequence[Box]) -> Choice | None:

@@ -202,8 +202,8 @@ class DiscProfile:
         samples = _hankel_sums(table_um[-1] * np.sqrt((1 + nodes) / 2), frequency, spectrum)
         # The rest of any sample beyond the first columns is at most the size of the next entry on the diagonal.
         basis, triangle, _ = qr(samples.T, mode="economic", pivoting=True)
-        kept = max(1, int((np.abs(np.diag(triangle)) > _RESIDUAL).sum()))
-        self.shares = np.ascontiguousarray(basis[:, :kept].T)
+        n_functions = max(1, int((np.abs(np.diag(triangle)) > _RESIDUAL).sum()))
+        self.shares = np.ascontiguousarray(basis[:, :n_functions].T)
 
         coefficients = dct(samples @ self.shares.T, axis=0) / nodes.size
         coefficients[0] /= 2
@@ -252,7 +252,8 @@ def profile(
 def psf_knots_nm(wavelength_nm: PerWavelength, step_nm: float) -> PerKnot:
     """Return the wavelengths at which images are computed; between them they are interpolated linearly.
 
-    `step_nm`: distance of the wavelengths, nm; 0 asks for all of the grid.
+    `step_nm`: distance of the wavelengths, nm; 0 asks for all of the grid. Returns every `step_nm` from the first
+    wavelength on, and the last one.
     """
     if wavelength_nm.size < 3 or wavelength_nm[1] - wavelength_nm[0] >= step_nm:
         return wavelength_nm

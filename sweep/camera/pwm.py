@@ -16,9 +16,12 @@ def extremes(drive: PwmDrive, exposure_s: PerDesign) -> tuple[PerDesign, PerDesi
     for n duty and, in the rest, for max(0, r - (1 - duty)) to min(r, duty).
     """
     periods = exposure_s * drive.frequency_hz
-    whole = np.floor(periods)
-    rest = periods - whole
-    on = [whole * drive.duty + part for part in (np.maximum(0, rest - (1 - drive.duty)), np.minimum(rest, drive.duty))]
+    whole_periods = np.floor(periods)
+    rest = periods - whole_periods
+    on = [
+        whole_periods * drive.duty + part
+        for part in (np.maximum(0, rest - (1 - drive.duty)), np.minimum(rest, drive.duty))
+    ]
     least, most = (np.asarray(time / (periods * drive.duty), dtype=float) for time in on)
     return least, most
 
@@ -47,8 +50,8 @@ def _candidates(drive: PwmDrive, shortest_s: float, longest_s: float, rest: floa
 
 def on_time(drive: PwmDrive, periods: Float[Array, " *batch"] | float) -> Float[Array, " ..."]:
     """Return how long the light has been on since it was switched on, at the start of a period."""
-    whole = np.floor(periods)
-    return np.asarray(whole * drive.duty + np.minimum(periods - whole, drive.duty), dtype=float)
+    whole_periods = np.floor(periods)
+    return np.asarray(whole_periods * drive.duty + np.minimum(periods - whole_periods, drive.duty), dtype=float)
 
 
 def light_in(

@@ -47,8 +47,8 @@ class Bins:
     def of(cls, pixel: Pixel, light: Float[Array, " captures"]) -> Bins:
         """Return the bins of a pixel."""
         read = [(*each, a) for *each, a in zip(pixel.read_as, limits_dn(pixel), light, strict=True)]
-        ends = [(limit - one.offset_dn) / (one.dn_per_e * a) for one, limit, a in read if limit is not None]
-        dark = np.array([max(one.read_noise_e**2, 1.0) / a for one, _, a in read])
+        ends = [(limit - capture.offset_dn) / (capture.dn_per_e * a) for capture, limit, a in read if limit is not None]
+        dark = np.array([max(capture.read_noise_e**2, 1.0) / a for capture, _, a in read])
         knees_dn, codes = pixel.knees
         knees = np.stack([(knees_dn - pixel.offset_dn) / pixel.dn_per_e, codes])
         return cls(np.maximum.accumulate([0.0, *ends]), light, dark, knees)
@@ -118,7 +118,8 @@ def n_roots(pixel: Pixel, light: Float[Array, " captures"]) -> int:
 class Readings:
     """Distribution of the readings of each number of electrons, for all captures of an HDR pixel.
 
-    `bins`: bins of a pixel of full sensitivity.
+    `bins`: bins of a pixel of full sensitivity. `columns`, `shares`: bins from `first` on, and probabilities that the
+    capture is the first usable one of its exposure and reads it.
     """
 
     bins: Bins
@@ -138,7 +139,10 @@ def countable(pixel: Pixel) -> bool:
     """
     well_e = max(capture.well_e for capture in pixel.read_as)
     sums = 2 * _REACH * math.sqrt(well_e) * (1 + 2 * _REACH * math.sqrt(1 + pixel.prnu**2 * well_e) * bool(pixel.prnu))
-    reach_dn = [min(2 * _REACH * one.dn_per_e * one.read_noise_e + 3, one.full_scale_dn) for one in pixel.read_as]
+    reach_dn = [
+        min(2 * _REACH * readout.dn_per_e * readout.read_noise_e + 3, readout.full_scale_dn)
+        for readout in pixel.read_as
+    ]
     return pixel.merge == "saturated" and well_e * max(reach_dn) <= _MOST_READ and sums <= _MOST_SUMS
 
 

@@ -96,7 +96,7 @@ def capture_light(setup: Setup, response: PixelResponse) -> Float[Array, "captur
     channels = setup.camera.mosaic.channels
     of_element = [channels[at] for at in response.readout.max(axis=0).argmax(axis=1)]
     captures = [exposure.capture for exposure in setup.camera.pixel.exposures]
-    light = [[one.light * one.qe_factor.get(channel, 1.0) for channel in of_element] for one in captures]
+    light = [[capture.light * capture.qe_factor.get(channel, 1.0) for channel in of_element] for capture in captures]
     return np.array(light, dtype=float).reshape(len(captures), len(of_element))
 
 
@@ -113,10 +113,10 @@ class Readout:
 
     def at(self, place: int) -> Readout:
         """Return the readout of one sampling phase or field position alone."""
-        one = copy(self)
-        one.n_cases = 1
-        one.weights, one.spread_weights = self.weights[place][None], self.spread_weights[place][None]
-        return one
+        single = copy(self)
+        single.n_cases = 1
+        single.weights, single.spread_weights = self.weights[place][None], self.spread_weights[place][None]
+        return single
 
     def transfer(self, electrons: Float[Array, "... pixels"]) -> Float[Array, "... pixels"]:
         """Convert expected electrons to digital numbers; under noise, to their means, DN.

@@ -26,9 +26,9 @@ def rounded(dn: SameShape, pixel: Pixel) -> SameShape:
     `dn`: without pedestal, DN. The whole part of the pedestal is added after rounding, so that values with and without
     a whole pedestal differ by exactly that.
     """
-    whole = math.floor(pixel.offset_dn)
-    steps = np.asarray(dn + (pixel.offset_dn - whole), dtype=float)
+    whole_dn = math.floor(pixel.offset_dn)
+    steps = np.asarray(dn + (pixel.offset_dn - whole_dn), dtype=float)
     steps += 0.5
     np.floor(steps, out=steps)
-    steps += whole
+    steps += whole_dn
     return np.clip(steps, 0.0, pixel.full_scale_dn, out=steps)

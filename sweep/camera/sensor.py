@@ -29,7 +29,8 @@ class SensorCurves:
 
     `qe`: QE by curve name, electrons per photon, or on one common relative scale; `clear`: curve that the CFA
     sensitivity is relative to: the clear pixel, or the brightest curve; `surrogate`: True for modeled curves;
-    `has_clear`: True if `clear` is a pixel without a filter.
+    `has_clear`: True if `clear` is a pixel without a filter. `variants`: for a CFA, channels that use a curve with
+    another name.
     """
 
     name: str
@@ -71,7 +72,10 @@ class SensorCurves:
     def mosaic_qe(
         self, mosaic: Mosaic, replaced: Mapping[str, str] | None = None
     ) -> Float[Array, "channels wavelengths"]:
-        """Return the curves of a mosaic's channels."""
+        """Return the curves of a mosaic's channels.
+
+        `replaced`: curve of channels that the sensor does not have (a modified channel and its base).
+        """
         return np.stack([self.curve(name) for name in self.mosaic_curves(mosaic, replaced)])
 
     def mosaic_curves(self, mosaic: Mosaic, replaced: Mapping[str, str] | None = None) -> list[str]:
@@ -126,7 +130,7 @@ def ar0820_sensor(grid: WavelengthGrid, parameters: SurrogateParameters) -> Sens
 def measured_sensor(name: str, grid: WavelengthGrid) -> SensorCurves:
     """Make a measured sensor that the package ships.
 
-    Raises DataError if the grid goes beyond the curves.
+    Raises DataError if the grid goes beyond the curves. RCCC and RCCB have a red of their own where it was measured.
     """
     measured = SENSORS[name]
     curves = measured.curves(grid)

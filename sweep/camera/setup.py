@@ -19,7 +19,10 @@ READOUT = frozenset({"noise", "quantization", "saturation"})
 
 @dataclass(frozen=True)
 class Setup:
-    """Camera, lights and scene that a batch of designs shares."""
+    """Camera, lights and scene that a batch of designs shares.
+
+    `left_out`: effects that are not computed (see `effects`).
+    """
 
     camera: Camera
     lights: Lights

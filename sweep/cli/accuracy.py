@@ -62,26 +62,26 @@ def measure_accuracy(
     other, with nothing but imports and machine code there before.
     """
     jobs = [(scenario, preset) for scenario in study.scenarios for preset in dict.fromkeys((*presets, "reference"))]
-    space, made = max(study.spaces, key=lambda space: space.size), dict[tuple[str, str], Measured]()
+    space, measured = max(study.spaces, key=lambda space: space.size), dict[tuple[str, str], Measured]()
     numbers = spread(space.size)[:_MOST_DESIGNS]
     for done, (scenario, preset) in enumerate(jobs):
         progress("measurements", done, len(jobs))
         setup = replace(study.setup(space, scenario).with_all_effects, accuracy=PRESETS[preset])
-        made[scenario, preset] = _in_new_process(setup, space, numbers)
+        measured[scenario, preset] = _in_new_process(setup, space, numbers)
     progress("measurements", len(jobs), len(jobs))
-    table = pd.DataFrame(_rows(made, numbers.size))
+    table = pd.DataFrame(_rows(measured, numbers.size))
     write_table(pa.Table.from_pandas(table, preserve_index=False), output / "accuracy.parquet")
     for kind, content in pictures_of(lambda: draw_accuracy(table, study.name), ("png", "svg")).items():
         write_bytes(content, output / f"accuracy.{kind}")
     return [*aligned(_in_words(table)), f"Files: {output}/: accuracy.parquet, accuracy.png, accuracy.svg."]
 
 
-def _rows(made: dict[tuple[str, str], Measured], n_designs: int) -> Iterator[dict[str, Any]]:
-    for (scenario, preset), measured in made.items():
+def _rows(of_all: dict[tuple[str, str], Measured], n_designs: int) -> Iterator[dict[str, Any]]:
+    for (scenario, preset), measured in of_all.items():
         yield {
             "scenario": scenario,
             "preset": preset,
-            "error_dn": float(np.abs(measured.csds - made[scenario, "reference"].csds).max(initial=0.0)),
+            "error_dn": float(np.abs(measured.csds - of_all[scenario, "reference"].csds).max(initial=0.0)),
             "first_s": measured.first_s,
             "following_s": measured.following_s,
             "designs": n_designs,
@@ -131,13 +131,13 @@ def _measure(setup: Setup, space: Space, numbers: DesignNumbers) -> Measured:
 
 def _warm_up(setup: Setup, space: Space) -> None:
     """Load what a measurement imports and its machine code: a chart, and the scene itself behind another lens."""
-    one = replace(space, axes=tuple(axis[:1] for axis in space.axes), gridded=True, rows=None)
+    single = replace(space, axes=tuple(axis[:1] for axis in space.axes), gridded=True, rows=None)
     optics = setup.scene.optics.model_copy(update={"f_number": 1.1 * setup.scene.optics.f_number})
     elsewhere = setup.scene.model_copy(update={"optics": optics})
     chart = elsewhere.model_copy(update={"target": None, "field": None})
     for scene, n_designs in ((chart, 512), (elsewhere, 2)):
         model = ForwardModel(replace(setup, scene=scene, accuracy=_WARM))
-        _evaluated(model, one, np.zeros(n_designs, dtype=np.intp))
+        _evaluated(model, single, np.zeros(n_designs, dtype=np.intp))
 
 
 def _evaluated(model: ForwardModel, space: Space, numbers: DesignNumbers) -> Columns:

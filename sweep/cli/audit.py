@@ -75,8 +75,8 @@ def sampled(table: pd.DataFrame) -> pd.DataFrame:
     """
     digests = [hashlib.sha256(str(i).encode()).digest()[:4] for i in table["design_id"]]
     hashed = np.array([int.from_bytes(digest, "big") / 2**32 for digest in digests], dtype=float)
-    wanted = table["pareto"] | (table["kind"] != "sweep") | (hashed < _SHARE)
-    return table[wanted & (table["status"] == "ok")]
+    is_sampled = table["pareto"] | (table["kind"] != "sweep") | (hashed < _SHARE)
+    return table[is_sampled & (table["status"] == "ok")]
 
 
 def audit_rows(study: Study, tables: Iterable[pd.DataFrame], progress: Progress = lambda *_: None) -> Audit:

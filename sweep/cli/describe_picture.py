@@ -88,12 +88,12 @@ def _thinned(curve: Curve) -> tuple[PerValue, PerValue]:
     group = -(-2 * curve.values.size // _MOST_POINTS)
     if group <= 2:
         return curve.wavelength_nm, curve.values
-    whole = curve.values.size // group * group
-    groups = curve.values[:whole].reshape(-1, group)
+    in_groups = curve.values.size // group * group
+    groups = curve.values[:in_groups].reshape(-1, group)
     ends = np.stack([groups.argmin(axis=1), groups.argmax(axis=1)], axis=1)
     at = np.sort(ends, axis=1) + group * np.arange(len(groups))[:, None]
-    kept = np.unique([*at.ravel(), *range(whole, curve.values.size)])
-    return curve.wavelength_nm[kept], curve.values[kept]
+    shown = np.unique([*at.ravel(), *range(in_groups, curve.values.size)])
+    return curve.wavelength_nm[shown], curve.values[shown]
 
 
 def _draw_diagram(axes: Axes, colors: Mapping[str, LightColor | None], paints: Mapping[str, Paint]) -> None:

@@ -47,7 +47,7 @@ def export_images(
         manifest = write_images(designs, vision, study.section.seed, fingerprint, files, parallel, progress)
     names = ", ".join(str(row["name"]) for row, *_ in designs)
     splits = manifest["split"].value_counts().to_pylist()
-    counts = ", ".join(f"{one['counts']:,} to {one['values']}" for one in splits)
+    counts = ", ".join(f"{part['counts']:,} to {part['values']}" for part in splits)
     street = f"{STREET_MANIFEST} (streets), " if vision.street else ""
     boxes = ", coco-*.json" if files.coco else ""
     return [

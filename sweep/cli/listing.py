@@ -80,7 +80,7 @@ def _listed(path: Path, outputs: Path, data: Path | None) -> StudyListing:
         else:
             facts = several_facts(dict(zip(several.members, studies, strict=True)))
             stated, (folder, _) = several.name, output_folder(outputs / folder_name(several.name), facts)
-            runs = [run_in(folder / folder_name(one.name)) for one in studies]
+            runs = [run_in(folder / folder_name(study.name)) for study in studies]
             finished = sum(run is not None and run.finished for run in runs)
             state = f"{finished} of {len(runs)} runs finished" if finished < len(runs) else f"finished, {finished} runs"
     except SweepError as error:
@@ -90,7 +90,7 @@ def _listed(path: Path, outputs: Path, data: Path | None) -> StudyListing:
     question = " ".join(studies[0].section.question.split())
     if len(question) > _QUESTION_LETTERS:
         question = question[: _QUESTION_LETTERS - 3].rstrip() + "..."
-    return StudyListing(" ".join(name.split()), sum(one.n_designs for one in studies), state, question)
+    return StudyListing(" ".join(name.split()), sum(study.n_designs for study in studies), state, question)
 
 
 def _state(study: Study, outputs: Path) -> str:

@@ -43,7 +43,7 @@ def new_study(
     sources = Sources()
     sources = replace(sources, path_in_study=lambda file: _path_in_study(file, folder))
     if qe:
-        stated = next((one for one in FITTING["sensor"] if one in quantities), None)
+        stated = next((quantity for quantity in FITTING["sensor"] if quantity in quantities), None)
         sources = replace(sources, sensor=sensor_file(qe, stated))
     if lights:
         start_nm, stop_nm = (400, 700) if sources.sensor is None else sources.sensor.range_nm

@@ -22,7 +22,8 @@ _LEAST_SHARE, _LEAST_S = 0.01, 60.0
 def print_result(lines: Iterable[str], facts: Mapping[str, Any], *, as_json: bool = False, quiet: bool = False) -> None:
     """Print the result of a command.
 
-    `facts`: JSON object; NaN and infinity become null.
+    `facts`: JSON object; NaN and infinity become null. With `as_json` one JSON object goes to stdout; everything else
+    goes to stderr.
     """
     print_lines(lines, as_json=as_json, quiet=quiet)
     if as_json:

@@ -60,7 +60,8 @@ def run_one(
     """Run a study, or continue it, draw its report and print the result.
 
     `changes`: dotted key -> value instead of the file's; `began_s`: time at which the user began to wait, by the
-    monotonic clock, s. Raises SweepError for a backend that is unknown, and as `run_study` does.
+    monotonic clock, s. Raises SweepError for a backend that is unknown, and as `run_study` does. Returns the same as
+    plain values, for `--json`. The summary of a `member`, one of several sensors or light sets, is not printed.
     """
 
     def note(text: str) -> None:
@@ -137,7 +138,8 @@ def run_sensors(
 ) -> dict[str, Any]:
     """Run a study for each of its sensors and light sets, and compare them.
 
-    Raises SweepError as `run_one`, for the first member that cannot be run, after all others.
+    Raises SweepError as `run_one`, for the first member that cannot be run, after all others. `run` runs a `member`
+    into the folder `output`, `load` loads its study.
     """
     began_s, quiet = time.monotonic(), options.quiet
     studies = {member: load(member=member) for member in several.members}  # mistakes before any work
@@ -145,35 +147,35 @@ def run_sensors(
     folder, other = runner.output_folder(options.output / folder_name(several.name) / options.changed, known)
     if other is not None and not quiet:
         typer.echo(f"Note: {other}.", err=True)
-    made, failed = dict[SensorAndLights, dict[str, Any]](), list[SweepError]()
+    facts_of, failed = dict[SensorAndLights, dict[str, Any]](), list[SweepError]()
     with runner.stopped_by_signals(), nullcontext() if options.dry_run else locked(folder):
         inventory = Inventory(folder) if options.dry_run else begin(folder, known)
         for member in several.members:
             if not quiet:
                 typer.echo(f"-- {member.name} --", err=True)
             try:
-                made[member] = run(member=member, output=folder)
+                facts_of[member] = run(member=member, output=folder)
             except InterruptedRunError:
                 raise
             except SweepError as error:  # the others are run all the same
                 failed.append(error)
-        if not (made or options.dry_run):
+        if not (facts_of or options.dry_run):
             discard(inventory)
         elif not options.dry_run:
-            computed = any(facts["computed"] for facts in made.values())
-            lines = _join(inventory, studies, made, options, computed=computed, began_s=began_s)
+            computed = any(facts["computed"] for facts in facts_of.values())
+            lines = _join(inventory, studies, facts_of, options, computed=computed, began_s=began_s)
             print_lines(lines if not quiet else lines[-1:], as_json=options.as_json, quiet=quiet and options.as_json)
-    if options.opens and made and not options.dry_run:
+    if options.opens and facts_of and not options.dry_run:
         webbrowser.open((folder / REPORT).absolute().as_uri())
     if failed:
         raise failed[0]
-    return {"folder": str(folder), "runs": [*made.values()]}
+    return {"folder": str(folder), "runs": [*facts_of.values()]}
 
 
 def _join(
     inventory: Inventory,
     studies: Mapping[SensorAndLights, Study],
-    made: Mapping[SensorAndLights, Mapping[str, Any]],
+    facts_of: Mapping[SensorAndLights, Mapping[str, Any]],
     options: SensorsOptions,
     *,
     computed: bool,
@@ -185,7 +187,7 @@ def _join(
 
     if inventory.list_damaged:
         inventory.remove(inventory.unlisted())
-    runs = [SensorRun(member, Path(one["folder"])) for member, one in made.items()]
+    runs = [SensorRun(member, Path(run_facts["folder"])) for member, run_facts in facts_of.items()]
     wrong = inventory.wrong([PROVENANCE, RESULTS, *({ALL_SENSORS} & inventory.files.keys())])
     if computed or wrong:
         inventory.remove([PROVENANCE])
@@ -194,8 +196,8 @@ def _join(
             inventory.remove([ALL_SENSORS])
             parts = Parts(inventory.folder)
             with ProgressDisplay(quiet=options.quiet) as display, workers(options.jobs or os.cpu_count() or 1) as pool:
-                kept = CachedCalls(pool, parts, f"{inventory.fingerprint} all sensors")
-                table = all_sensors_table([*studies.items()], kept, display.update)
+                cached_calls = CachedCalls(pool, parts, f"{inventory.fingerprint} all sensors")
+                table = all_sensors_table([*studies.items()], cached_calls, display.update)
             if table is not None:
                 inventory.write_table(ALL_SENSORS, table)
             parts.remove()
@@ -203,8 +205,8 @@ def _join(
             "fingerprint": inventory.fingerprint,
             "runs": inventory.facts["runs"],
             "command": sys.argv,
-            "designs": sum(one["designs"] for one in made.values()),
-            "failed": sum(one["failed"] for one in made.values()),
+            "designs": sum(run_facts["designs"] for run_facts in facts_of.values()),
+            "failed": sum(run_facts["failed"] for run_facts in facts_of.values()),
             "duration_s": round(time.monotonic() - began_s, 3),
         }
         inventory.write({PROVENANCE: json_of(facts).encode("utf-8")})

@@ -82,10 +82,11 @@ def _status_of_several(inventory: Inventory, *, verify: bool, running: bool) -> 
         states[member.name] = str(status.facts["state"])
         lines.append(f"{member.name}: {status.lines[0]}")
     count = sum(state == "finished" for state in states.values())
-    whole = count == len(states) and PROVENANCE in inventory.files
-    state = "running" if running else "finished" if whole else "interrupted"
+    is_complete = count == len(states) and PROVENANCE in inventory.files
+    state = "running" if running else "finished" if is_complete else "interrupted"
     lines.append(
-        f"{state}: {count} of {len(states)} runs finished{'' if whole or running else '; the same command continues'}."
+        f"{state}: {count} of {len(states)} runs finished"
+        f"{'' if is_complete or running else '; the same command continues'}."
     )
     if PROVENANCE in inventory.files:
         lines.append(f"Files: {folder}/: {RESULTS}, {REPORT}.")

@@ -94,9 +94,9 @@ class Bands:
             most += np.outer(depths, left_high - right_low).max(axis=0)
         return least, most
 
-    def perturbed(self, off: ProductionError) -> Bands:
+    def perturbed(self, production_error: ProductionError) -> Bands:
         """Return the bands as production makes them."""
-        return Bands(off.nominal_nm(self._wave), self._count)
+        return Bands(production_error.nominal_nm(self._wave), self._count)
 
     @property
     def dimensions(self) -> dict[str, ParameterWeights]:
@@ -177,11 +177,11 @@ class Banded:
         """See `Bands.dimensions`."""
         return self._bands.dimensions
 
-    def perturbed(self, off: ProductionError) -> Self:
+    def perturbed(self, production_error: ProductionError) -> Self:
         """Return the family with shifted bands between the same curves; see `Family.perturbed`."""
-        made = copy(self)
-        made._bands = self._bands.perturbed(off)
-        return made
+        family = copy(self)
+        family._bands = self._bands.perturbed(production_error)
+        return family
 
     def start(self, points: Float[Array, "starts start_dimensions"]) -> Float[Array, "starts parameters"]:
         """Return the points: a search starts anywhere in the box."""

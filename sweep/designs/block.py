@@ -147,25 +147,27 @@ class Tables:
         """Return the shapes of the grid's edges at one depth; cached."""
         from .compiled import edge_shapes, outside, ranges_of  # noqa: PLC0415  (compiled: kept off the start-up path)
 
-        def made() -> KnownShapes:
+        def compute() -> KnownShapes:
             ratio, (left, right) = _inverse(base_qe), self.spans
             of_left = edge_shapes(self.base, self.change, deep * self.left, left, *ratio)
             of_right = edge_shapes(self.base, self.change, deep * (1.0 - self.right), right, *ratio)
             between = ranges_of(self.base + self.change * deep, *ratio)
             return KnownShapes(*ratio, *outside(self.base, *ratio), *between, of_left, of_right)
 
-        return self._shapes.get((deep, base_qe.tobytes()), made)
+        return self._shapes.get((deep, base_qe.tobytes()), compute)
 
     def product(self, weights: Float[Array, "_modified k"], nodes: Int[IndexArray, " nodes"]) -> EdgeSums:
         """Return weighted sums of the base and of the change times each edge; cached."""
 
-        def made() -> EdgeSums:
+        def compute() -> EdgeSums:
             changed = self.change[nodes, None] * weights
             return EdgeSums(self.base[nodes] @ weights, self.left[:, nodes] @ changed, self.right[:, nodes] @ changed)
 
         # Many weights are recognized by identity: they live as long as their products, and are never modified.
         data = weights.__array_interface__["data"][0] if weights.size > _FEW_WEIGHTS else weights.tobytes()
-        return self._products.get((data, weights.shape, weights.strides, nodes.tobytes()), lambda: (weights, made()))[1]
+        return self._products.get(
+            (data, weights.shape, weights.strides, nodes.tobytes()), lambda: (weights, compute())
+        )[1]
 
 
 @dataclass(frozen=True)
@@ -287,7 +289,7 @@ def _tables_of(space: Space) -> Tables | None:
     family, base, change = family_and_curves
     key = hashlib.sha256(pickle.dumps((space.axes, base, change, family.edges(np.array([[600.0, 10.0]]))))).digest()
 
-    def made() -> Tables:
+    def compute() -> Tables:
         pairs = [
             np.stack([a.ravel() for a in np.meshgrid(space.axes[at], space.axes[at + 1], indexing="ij")], axis=1)
             for at in (_LEFT, _RIGHT)
@@ -295,4 +297,4 @@ def _tables_of(space: Space) -> Tables | None:
         left_edges, right_edges = (family.edges(pair) for pair in pairs)
         return Tables(base, change, left_edges, right_edges)
 
-    return _tables.get(key, made)
+    return _tables.get(key, compute)

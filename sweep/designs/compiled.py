@@ -27,9 +27,9 @@ def through_edges(
 ) -> None:
     """Compute base + depth (left - right) of each design."""
     for d in range(depth.size):
-        one, other, deep = at_left[d], at_right[d], depth[d]
+        left_edge, right_edge, deep = at_left[d], at_right[d], depth[d]
         for s in range(base.size):
-            out[d, s] = base[s] + deep * (left[one, s] - right[other, s])
+            out[d, s] = base[s] + deep * (left[left_edge, s] - right[right_edge, s])
 
 
 @njit(cache=True, nogil=True, fastmath=_NUMBERS)
@@ -170,19 +170,24 @@ def shapes_of_edges(
     """
     curve, n = np.empty(base.size), base.size
     for d in range(depth.size):
-        one, other = at_left[d], at_right[d]
-        risen, falls = left_spans[one, 1], right_spans[other, 0]
-        if depth[d] == deep and 0 < left_spans[one, 0] < risen < falls < right_spans[other, 1] < n:
-            begin, end = left_spans[one, 0], right_spans[other, 1]
+        left_edge, right_edge = at_left[d], at_right[d]
+        risen, falls = left_spans[left_edge, 1], right_spans[right_edge, 0]
+        if depth[d] == deep and 0 < left_spans[left_edge, 0] < risen < falls < right_spans[right_edge, 1] < n:
+            begin, end = left_spans[left_edge, 0], right_spans[right_edge, 1]
             step, low = _inner_shape(steps, lows, risen, falls)
-            step = larger(larger(step, of_left[one, 0]), of_right[other, 0])
-            low = smaller(smaller(low, of_left[one, 1]), of_right[other, 1])
+            step = larger(larger(step, of_left[left_edge, 0]), of_right[right_edge, 0])
+            low = smaller(smaller(low, of_left[left_edge, 1]), of_right[right_edge, 1])
         else:
-            begin = min(left_spans[one, 0], right_spans[other, 0])
-            end = max(left_spans[one, 1], right_spans[other, 1])
+            begin = min(left_spans[left_edge, 0], right_spans[right_edge, 0])
+            end = max(left_spans[left_edge, 1], right_spans[right_edge, 1])
             between = slice(max(begin - 1, 0), min(end + 1, base.size))  # with the steps to both sides
             _between_edges(
-                base[between], change[between], depth[d], left[one, between], right[other, between], curve[between]
+                base[between],
+                change[between],
+                depth[d],
+                left[left_edge, between],
+                right[right_edge, between],
+                curve[between],
             )
             step, low = _shape(curve[between], inverse[between], dark[between])
         steepest[d] = larger(step, larger(before[begin, 0], after[end, 0]))

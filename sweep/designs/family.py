@@ -165,7 +165,7 @@ class Family(Protocol):
     def dimensions(self) -> Mapping[str, ParameterWeights]:
         """Lengths in production by name: rows r; a length is min(r @ x), nm."""
 
-    def perturbed(self, off: ProductionError) -> Self:
+    def perturbed(self, production_error: ProductionError) -> Self:
         """Return the family as production makes it.
 
         Parameters

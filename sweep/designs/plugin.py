@@ -48,10 +48,10 @@ class PluginFamily:
         self.kind = code.name
         self._given = code, wavelength_nm, base, target
         self._base = base
-        made = code.called(code.loaded, wavelength_nm, base, target)
-        self._own = made
-        self.below_base = getattr(made, "below_base", False) is True
-        self.parameters = _parameters(code.name, getattr(made, "parameters", None))
+        own_family = code.called(code.loaded, wavelength_nm, base, target)
+        self._own = own_family
+        self.below_base = getattr(own_family, "below_base", False) is True
+        self.parameters = _parameters(code.name, getattr(own_family, "parameters", None))
 
     def __reduce__(self) -> tuple[type[PluginFamily], tuple[Any, ...]]:
         return PluginFamily, self._given
@@ -126,9 +126,9 @@ class PluginFamily:
         """None, since the edges are unknown."""
         return {}
 
-    def perturbed(self, off: ProductionError) -> PluginFamily:
+    def perturbed(self, production_error: ProductionError) -> PluginFamily:
         """Return the same family; a study with production tolerances refuses it."""
-        if any(off):
+        if any(production_error):
             raise SweepError(ValidationIssue(f"{self.kind} has no edges that production could shift"))
         return self
 

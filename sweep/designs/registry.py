@@ -77,7 +77,9 @@ def build_family(
     needed = {name for name, field in known_options.items() if field.is_required()}
     for name in FamilyOptions.model_fields:
         if (name in given and name not in known_options) or (name in needed and name not in given):
-            owners = " or ".join(owner for owner, made in FAMILIES.items() if name in made.Options.model_fields)
+            owners = " or ".join(
+                owner for owner, family_class in FAMILIES.items() if name in family_class.Options.model_fields
+            )
             problem = f"`{name}` goes with {owners}, and {owners} with `{name}`"
             raise SweepError(ValidationIssue(problem, value=given.get(name)))
     if kind == Mixture.kind and colorants is None:

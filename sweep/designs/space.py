@@ -38,7 +38,7 @@ class Space:
     """Set of designs on one CFA: a full-factorial grid, `rows`, or a box that is searched but not swept.
 
     `filter`: left out for a plain CFA, which has no axes and one design; `gridded`: False for a box that is searched
-    but not swept.
+    but not swept. `axes`: values of each parameter; in a grid the last one runs fastest.
     """
 
     kind: Kind
@@ -69,9 +69,9 @@ class Space:
         rest = numbers
         digits = []
         for axis in reversed(self.axes):  # mixed radix: NumPy's own unravel_index stops at 64 axes
-            whole = rest // len(axis)  # several times as fast as divmod
-            digits.append(rest - whole * len(axis))
-            rest = whole
+            quotient = rest // len(axis)  # several times as fast as divmod
+            digits.append(rest - quotient * len(axis))
+            rest = quotient
         return digits[::-1]
 
     def points(self, start: int, stop: int) -> Float[Array, "_designs parameters"]:
@@ -90,12 +90,14 @@ class Space:
         columns = [np.asarray(axis, dtype=float)[digit] for axis, digit in digits]
         return np.stack(columns, axis=1) if columns else np.empty((len(numbers), 0))
 
-    def curves(self, points: DesignParameters, n_wavelengths: int, off: ProductionError = AS_DESIGNED) -> DesignCurves:
+    def curves(
+        self, points: DesignParameters, n_wavelengths: int, production_error: ProductionError = AS_DESIGNED
+    ) -> DesignCurves:
         """Return the QE of the modified channels; a plain CFA has none."""
         if self.filter is None:
             return np.empty((len(points), 0, n_wavelengths))
         family = self.filter.family
-        return (family.perturbed(off) if any(off) else family).curves(points)
+        return (family.perturbed(production_error) if any(production_error) else family).curves(points)
 
     def violation(self, points: DesignParameters) -> PerDesign:
         """Return the largest violation of the family's own conditions.

@@ -53,7 +53,11 @@ def sobol_points(dimensions: int, count: int, seed: int) -> Float[Array, "count 
 
 @dataclass(frozen=True)
 class SampledDesigns:
-    """Designs between the smallest and largest value of every axis, by SciPy's `qmc`."""
+    """Designs between the smallest and largest value of every axis, by SciPy's `qmc`.
+
+    `method`: `sobol`, the first points of a scrambled Sobol sequence, so that fewer designs are the first of more; or
+    `lhs`, a Latin hypercube.
+    """
 
     method: Method
     size: int

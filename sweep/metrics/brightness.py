@@ -128,8 +128,8 @@ class BrightnessCurves:
                 return np.asarray((-(mean - there) * by_mean).sum(axis=1))
             total = np.maximum((variance + spread) / 2, self._least_dn2)
             moving = by_spread * (total > self._least_dn2)
-            apart = mean - there
-            return np.asarray((-apart * by_mean / total - apart**2 * moving / (4 * total**2)).sum(axis=1))
+            difference = mean - there
+            return np.asarray((-difference * by_mean / total - difference**2 * moving / (4 * total**2)).sum(axis=1))
 
         (low, high), (darkest, brightest) = found.bracket.T, (self._nodes[found.curve, end] for end in (0, -1))
         low, high = np.maximum(2 * low - high, darkest), np.minimum(2 * high - low, brightest)

@@ -71,8 +71,10 @@ def chromatic_separation(
     `response`: readout less that without lamps, DN.
     """
     smallest = np.empty(len(response))
-    for block, one, other in pair_blocks(response.shape, first, second):
-        smallest[block] = squared_distance(response[block][:, one], response[block][:, other]).min(axis=1)
+    for block, first_of_pair, second_of_pair in pair_blocks(response.shape, first, second):
+        smallest[block] = squared_distance(response[block][:, first_of_pair], response[block][:, second_of_pair]).min(
+            axis=1
+        )
     return np.sqrt(smallest)
 
 
@@ -127,19 +129,19 @@ def _nearest_rows(
     refined = curves.refined(near.subset(active), noise=noise)
     factor = np.full(near.factor.size, curves.darkest)
     factor[active] = curves.polished(refined, noise=noise)
-    one = lamps.moments(near.reading, np.ones(near.reading.size))
-    other = lamps.moments(near.curve, factor)
+    of_reading = lamps.moments(near.reading, np.ones(near.reading.size))
+    of_curve = lamps.moments(near.curve, factor)
 
-    (mean, variance, by_mean, by_variance), (mean_2, variance_2, by_mean_2, by_variance_2) = one, other
-    apart, spread = mean - mean_2, variance + variance_2
+    (mean, variance, by_mean, by_variance), (mean_2, variance_2, by_mean_2, by_variance_2) = of_reading, of_curve
+    difference, spread = mean - mean_2, variance + variance_2
     by_spread = np.where(spread > 2 * STEPS_DN2, by_variance + by_variance_2, 0.0)
     spread = np.maximum(spread, 2 * STEPS_DN2)
-    apart_along = apart + 1j * COMPLEX_STEP * (by_mean - by_mean_2)
+    difference_along = difference + 1j * COMPLEX_STEP * (by_mean - by_mean_2)
     spread_along = spread + 1j * COMPLEX_STEP * by_spread
     if not noise:
         spread, spread_along = np.array(2.0), np.array(2.0)
-    along = (2 * apart_along**2 / spread_along).sum(axis=-1)
-    return Rows((2 * apart**2 / spread).sum(axis=-1), along.imag.T / COMPLEX_STEP)
+    along = (2 * difference_along**2 / spread_along).sum(axis=-1)
+    return Rows((2 * difference**2 / spread).sum(axis=-1), along.imag.T / COMPLEX_STEP)
 
 
 def _closed_rows(design: SmoothDesign, pairs: Sequence[Pair]) -> Rows:
@@ -150,10 +152,10 @@ def _closed_rows(design: SmoothDesign, pairs: Sequence[Pair]) -> Rows:
         parts = []
         for a, b in pairs:
             shape = (*response.shape[:-2], len(members[a]), len(members[b]), response.shape[-1])
-            one = np.broadcast_to(response[..., members[a], None, :], shape)
-            other = np.broadcast_to(response[..., None, members[b], :], shape)
-            area = parallelogram(one, other)
-            for vector in (one, other):
+            first_signals = np.broadcast_to(response[..., members[a], None, :], shape)
+            second_signals = np.broadcast_to(response[..., None, members[b], :], shape)
+            area = parallelogram(first_signals, second_signals)
+            for vector in (first_signals, second_signals):
                 squared = (vector**2).sum(axis=-1)
                 ratio = np.divide(area, squared, out=np.zeros_like(area), where=squared.real != 0)
                 parts.append(ratio.reshape(*ratio.shape[:-3], -1))
@@ -172,12 +174,12 @@ def smooth_chromatic(setup: Setup, curves: DesignCurves, pair: Pair) -> PerDesig
         return np.array(
             [
                 chromatic_distance(
-                    [BrightnessCurves(case.lamps, limits) for case in model.lamps_over_brightness(one, none)],
+                    [BrightnessCurves(case.lamps, limits) for case in model.lamps_over_brightness(design, none)],
                     first,
                     second,
                     noise=False,
                 )
-                for one in curves
+                for design in curves
             ]
         )
     response = model.smooth(curves) - model.unlit(curves, model.light.exposure_s(curves))[:, :, None]

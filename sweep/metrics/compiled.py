@@ -38,9 +38,9 @@ def _counts(electrons: float, prnu: float, most: int) -> tuple[int, FloatArray]:
         z = _TAIL * i / half
         begin, end = poisson_shares(max(electrons * (1 + prnu * z), 0.0), start, RARE, poisson)
         weight = math.exp(-z * z / 2) / poisson[begin:end].sum()
-        some, here = shares[begin:end], poisson[begin:end]
+        counted, here = shares[begin:end], poisson[begin:end]
         for k in range(here.size):
-            some[k] += weight * here[k]
+            counted[k] += weight * here[k]
     return start, shares / shares.sum()
 
 
@@ -119,14 +119,14 @@ def pixel_numbers(
 
 
 @njit(cache=True, nogil=True)
-def _sum_of(one: FloatArray, other: FloatArray) -> FloatArray:
+def _sum_of(first: FloatArray, second: FloatArray) -> FloatArray:
     """Return the distribution of the sum of two numbers."""
-    total = np.zeros(one.size + other.size - 1)
-    for i in range(one.size):
-        if one[i] > RARE:
-            share, some = one[i], total[i:]
-            for j in range(other.size):
-                some[j] += share * other[j]
+    total = np.zeros(first.size + second.size - 1)
+    for i in range(first.size):
+        if first[i] > RARE:
+            share, shifted = first[i], total[i:]
+            for j in range(second.size):
+                shifted[j] += share * second[j]
     return total
 
 
@@ -196,10 +196,10 @@ def overlaps(firsts: IndexArray, starts: IndexArray, roots: FloatArray, rows: In
     for a in range(rows.shape[1]):
         for b in range(a):
             for c in range(rows.shape[0]):
-                one, other = rows[c, a], rows[c, b]
-                if one == other:
+                first_row, second_row = rows[c, a], rows[c, b]
+                if first_row == second_row:
                     continue
-                i, j, n = _common(firsts, starts, one, other)
+                i, j, n = _common(firsts, starts, first_row, second_row)
                 total = 0.0
                 for k in range(n):
                     total += roots[i + k] * roots[j + k]
@@ -211,19 +211,32 @@ def overlaps(firsts: IndexArray, starts: IndexArray, roots: FloatArray, rows: In
 
 
 @njit(cache=True, nogil=True)
-def _common(firsts: IndexArray, starts: IndexArray, one: int, other: int) -> tuple[int, int, int]:
+def _common(firsts: IndexArray, starts: IndexArray, first_row: int, second_row: int) -> tuple[int, int, int]:
     """Return where the bins that two rows share begin in each, and their number."""
-    low = max(firsts[one], firsts[other])
-    high = min(firsts[one] + starts[one + 1] - starts[one], firsts[other] + starts[other + 1] - starts[other])
-    return starts[one] + low - firsts[one], starts[other] + low - firsts[other], max(high - low, 0)
+    low = max(firsts[first_row], firsts[second_row])
+    high = min(
+        firsts[first_row] + starts[first_row + 1] - starts[first_row],
+        firsts[second_row] + starts[second_row + 1] - starts[second_row],
+    )
+    return (
+        starts[first_row] + low - firsts[first_row],
+        starts[second_row] + low - firsts[second_row],
+        max(high - low, 0),
+    )
 
 
 @njit(cache=True, nogil=True)
 def _ratios(
-    firsts: IndexArray, starts: IndexArray, roots: FloatArray, logs: FloatArray, one: int, other: int, step: float
+    firsts: IndexArray,
+    starts: IndexArray,
+    roots: FloatArray,
+    logs: FloatArray,
+    first_row: int,
+    second_row: int,
+    step: float,
 ) -> tuple[int, FloatArray]:
     """Return the overlap of one channel by the logarithm of the likelihood ratio, in steps."""
-    i, j, n = _common(firsts, starts, one, other)
+    i, j, n = _common(firsts, starts, first_row, second_row)
     most = int(_MOST_NATS / step)
     histogram = np.zeros(2 * most + 1)
     begin, end = 2 * most, 0
@@ -239,13 +252,13 @@ def _ratios(
 
 
 @njit(cache=True, nogil=True)
-def _sum_of_few(one: FloatArray, other: FloatArray) -> FloatArray:
+def _sum_of_few(dense: FloatArray, sparse: FloatArray) -> FloatArray:
     """Return the distribution of the sum of two numbers, few of which occur in a long range."""
-    total, occurring = np.zeros(one.size + other.size - 1), np.flatnonzero(other)
-    for i in range(one.size):
-        if one[i] > RARE:
+    total, occurring = np.zeros(dense.size + sparse.size - 1), np.flatnonzero(sparse)
+    for i in range(dense.size):
+        if dense[i] > RARE:
             for j in occurring:
-                total[i + j] += one[i] * other[j]
+                total[i + j] += dense[i] * sparse[j]
     return total
 
 
@@ -266,31 +279,31 @@ def _least_error(
     Each is off by at most half a step, so that the error is exact within exp(n_channels step / 4).
     """
     # Two halves of the channels, so that their sum over both need not be written out.
-    first, one, other = 0, np.ones(1), np.ones(1)
+    first, left_shares, right_shares = 0, np.ones(1), np.ones(1)
     for c in range(rows.shape[0]):
         if rows[c, a] != rows[c, b]:
             ratio_first, ratios = _ratios(firsts, starts, roots, logs, rows[c, a], rows[c, b], step)
             first += ratio_first
-            if one.size <= other.size:
-                one = _sum_of_few(one, ratios)
+            if left_shares.size <= right_shares.size:
+                left_shares = _sum_of_few(left_shares, ratios)
             else:
-                other = _sum_of_few(other, ratios)
-    return 0.5 * _mean_decay(one, other, first, step / 2)
+                right_shares = _sum_of_few(right_shares, ratios)
+    return 0.5 * _mean_decay(left_shares, right_shares, first, step / 2)
 
 
 @njit(cache=True, nogil=True)
-def _mean_decay(one: FloatArray, other: FloatArray, first: int, rate: float) -> float:
+def _mean_decay(left_shares: FloatArray, right_shares: FloatArray, first: int, rate: float) -> float:
     """Return the sum of one[i] other[j] exp(-rate |first + i + j|)."""
-    n, decay = other.size, math.exp(-rate)
+    n, decay = right_shares.size, math.exp(-rate)
     before, after = np.zeros(n + 1), np.zeros(n + 1)  # of other[m] exp(-rate |j - m|), for m < j and m >= j
     for m in range(n):
-        before[m + 1] = (before[m] + other[m]) * decay
-        after[n - 1 - m] = other[n - 1 - m] + after[n - m] * decay
+        before[m + 1] = (before[m] + right_shares[m]) * decay
+        after[n - 1 - m] = right_shares[n - 1 - m] + after[n - m] * decay
     total = 0.0
-    for i in range(one.size):
-        if one[i] > 0:
+    for i in range(left_shares.size):
+        if left_shares[i] > 0:
             turn = min(max(-(first + i), 0), n)
-            total += one[i] * (before[turn] + after[turn]) * math.exp(-rate * abs(first + i + turn))
+            total += left_shares[i] * (before[turn] + after[turn]) * math.exp(-rate * abs(first + i + turn))
     return total
 
 

@@ -50,9 +50,9 @@ def nearest_on_curves(  # noqa: PLR0912  (one pass over pairs, blocks, segments 
     n_blocks = (n_nodes - 2) // _BLOCK + 1
     low, high = np.empty((n_curves, n_blocks, n_channels)), np.empty((n_curves, n_blocks, n_channels))
     noise = np.empty((n_curves, n_blocks, n_channels))
-    wanted = np.zeros(n_curves, np.bool_)
-    wanted[second] = True
-    for curve in np.flatnonzero(wanted):
+    is_second = np.zeros(n_curves, np.bool_)
+    is_second[second] = True
+    for curve in np.flatnonzero(is_second):
         for block in range(n_blocks):
             begin, end = block * _BLOCK, min(block * _BLOCK + _BLOCK, n_nodes - 1)
             for c in range(n_channels):
@@ -68,8 +68,8 @@ def nearest_on_curves(  # noqa: PLR0912  (one pass over pairs, blocks, segments 
         for block in range(n_blocks):
             bound = 0.0
             for c in range(n_channels):
-                off = max(low[curve, block, c] - point[c], point[c] - high[curve, block, c], 0.0)
-                bound += off * off * _weight(spread[c], noise[curve, block, c], least)
+                outside = max(low[curve, block, c] - point[c], point[c] - high[curve, block, c], 0.0)
+                bound += outside * outside * _weight(spread[c], noise[curve, block, c], least)
             if bound >= min(best, margin * nearest):
                 continue
             for node in range(block * _BLOCK, min(block * _BLOCK + _BLOCK, n_nodes - 1)):
@@ -85,10 +85,12 @@ def nearest_on_curves(  # noqa: PLR0912  (one pass over pairs, blocks, segments 
                     slope = bend = 0.0
                     for c in range(n_channels):
                         step = curve_mean[curve, node + 1, c] - curve_mean[curve, node, c]
-                        apart = point[c] - curve_mean[curve, node, c] - inside * step
+                        difference = point[c] - curve_mean[curve, node, c] - inside * step
                         grows = curve_variance[curve, node + 1, c] - curve_variance[curve, node, c]
                         weight = _weight(spread[c], curve_variance[curve, node, c] + inside * grows, least)
-                        slope -= 2.0 * apart * step * weight + 0.5 * apart * apart * grows * weight * weight
+                        slope -= (
+                            2.0 * difference * step * weight + 0.5 * difference * difference * grows * weight * weight
+                        )
                         bend += 2.0 * step * step * weight
                     inside = min(max(inside - slope / bend, 0.0), 1.0) if bend > 0.0 else inside
                 for place in (inside, 0.0, 1.0) if least > 0.0 and 0.0 < inside < 1.0 else (inside, inside, inside):

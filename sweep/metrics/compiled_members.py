@@ -112,7 +112,8 @@ def nearest_members(
     `response`: response to each spectrum, DN; consecutive rows of a light are one step apart; `cells`: whole steps of
     both lights below each triangle (see `ShiftRegion`); `shares`: corners of each triangle above these steps, 0 to 1;
     `out_squared`: output: squared distances, DN^2; infinite where a part has no triangle or all of its triangles were
-    skipped.
+    skipped. With `smallest_only` triangles are skipped that cannot hold the smallest of all distances; other results
+    may then be too large.
     """
     corners, weights = np.empty((3, response.shape[1])), np.empty(3)
     step_lengths = np.empty(response.shape[0] - 1)

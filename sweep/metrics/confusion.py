@@ -121,7 +121,7 @@ def errors(
     electrons = electrons[..., used, :]
     n_designs, n_signals = electrons.shape[-3:-1]
     unknown = np.asarray(np.isnan(electrons).reshape(-1, *electrons.shape[-3:]).any(axis=(0, 2, 3)))
-    most_e = max(one.well_e for one in pixel.read_as or (pixel,))
+    most_e = max(first_signals.well_e for first_signals in pixel.read_as or (pixel,))
     electrons = np.where(unknown[:, None, None], 0.0, np.minimum(electrons, 100 * most_e + 1e5))
     pairs = class_pairs(list(members))
     pair_errors = {pair: np.empty(n_designs) for pair in pairs}
@@ -142,13 +142,13 @@ def errors(
             overlap = kernels.overlaps(*parts, rows)
             sums = np.zeros(n_signals)
             for pair in pairs:
-                one, other = members[pair[0]], members[pair[1]]
-                overlaps_of_pair = overlap[np.ix_(one, other)]
-                for signals, axis in ((one, 1), (other, 0)):
+                first_signals, second_signals = members[pair[0]], members[pair[1]]
+                overlaps_of_pair = overlap[np.ix_(first_signals, second_signals)]
+                for signals, axis in ((first_signals, 1), (second_signals, 0)):
                     sums[signals] += overlaps_of_pair.sum(axis=axis)
                 worst = max(overlaps_of_pair.sum(axis=1).max(), overlaps_of_pair.sum(axis=0).max())
                 bounds[pair][start + d] = min(worst + FLOOR, 1.0)
-                error = kernels.largest_error(overlap, one, other, *parts, logs, rows, step)
+                error = kernels.largest_error(overlap, first_signals, second_signals, *parts, logs, rows, step)
                 pair_errors[pair][start + d] = min(error + FLOOR, 0.5)
             state[start + d] = min(sums.max() + FLOOR, 1.0)
     for values in (*pair_errors.values(), *bounds.values(), state):

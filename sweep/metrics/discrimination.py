@@ -96,11 +96,11 @@ def pairwise_error(
         total = ours + theirs
         z = _ratio(gaussian_difference, np.sqrt(total))
         shares = [np.divide(v, total, out=np.full_like(total, 0.5), where=total > 0) for v in (ours, theirs)]
-        whole = _length(z)
-        some = ~np.isinf(whole)
-        z = np.where(some[..., None], z, 0.0)
+        length = _length(z)
+        is_finite = ~np.isinf(length)
+        z = np.where(is_finite[..., None], z, 0.0)
         spread = _length(z * np.sqrt(shares[0])) + _length(z * np.sqrt(shares[1]))
-        error = share_below(-np.where(some, whole * _ratio(whole, spread), np.inf))
+        error = share_below(-np.where(is_finite, length * _ratio(length, spread), np.inf))
         if shape is not None:
             error = np.maximum(error, _LEFT_OUT)
             error = np.minimum(error, shape.bound(block, pair, difference, total))
@@ -157,21 +157,21 @@ class NoiseShape:
         """
         bound = np.full(difference.shape[:2], np.inf)
         # Each design for itself: what stands beside it in a block changes nothing.
-        some = ~self.gaussian[block].all(axis=(1, 2))
-        if not some.any():
+        is_bounded = ~self.gaussian[block].all(axis=(1, 2))
+        if not is_bounded.any():
             return bound
-        difference = difference[some]
-        reach = self.reach_dn[block][some]
+        difference = difference[is_bounded]
+        reach = self.reach_dn[block][is_bounded]
         reach = np.maximum(reach[:, pair[0]], reach[:, pair[1]])
-        total = np.maximum(total[some], _LEAST_VARIANCE)
+        total = np.maximum(total[is_bounded], _LEAST_VARIANCE)
         normal = difference / np.maximum(total, reach**2 / 50)  # a plane that suits terms as rare as Bennett allows
-        apart = (normal * difference).sum(axis=-1)
-        least = np.zeros(apart.shape)
+        separation = (normal * difference).sum(axis=-1)
+        least = np.zeros(separation.shape)
         for s in np.geomspace(1e-3, 10, 25):
             x = s * normal * reach
             with np.errstate(over="ignore"):
-                least = np.minimum(least, (total / reach**2 * (np.expm1(x) - x)).sum(axis=-1) - s * apart)
-        bound[some] = np.minimum(np.exp(least / 2) + _LEFT_OUT, 0.5)
+                least = np.minimum(least, (total / reach**2 * (np.expm1(x) - x)).sum(axis=-1) - s * separation)
+        bound[is_bounded] = np.minimum(np.exp(least / 2) + _LEFT_OUT, 0.5)
         return bound
 
 
@@ -255,6 +255,12 @@ def _pairs(
     ]
 ]:
     """Yield blocks of designs: slice, both signals of every pair, their difference and both variances."""
-    for block, one, other in pair_blocks(mean.shape, first, second):
-        ours, theirs = variance[block][:, one], variance[block][:, other]
-        yield block, (one, other), np.abs(mean[block][:, one] - mean[block][:, other]), ours, theirs
+    for block, first_of_pair, second_of_pair in pair_blocks(mean.shape, first, second):
+        ours, theirs = variance[block][:, first_of_pair], variance[block][:, second_of_pair]
+        yield (
+            block,
+            (first_of_pair, second_of_pair),
+            np.abs(mean[block][:, first_of_pair] - mean[block][:, second_of_pair]),
+            ours,
+            theirs,
+        )

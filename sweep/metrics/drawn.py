@@ -40,7 +40,7 @@ class Draws:
     `below`: spectrum below the shift of both lights; `place`: field position, 0 to 1.
     """
 
-    offs: tuple[ProductionError, ...]
+    production_errors: tuple[ProductionError, ...]
     starts: Int[IndexArray, " starts"]
     below: Int[IndexArray, "draws 2"]
     share: Float[Array, "draws 2"]
@@ -52,21 +52,21 @@ class Draws:
         return int(self.place.size)
 
     def distances(
-        self, off: int, response: Float[Array, "cases spectra channels"], out: Float[Array, " draws"]
+        self, error_index: int, response: Float[Array, "cases spectra channels"], out: Float[Array, " draws"]
     ) -> None:
         """Compute the distances of the draws with one production error.
 
         `response`: response of that filter to every spectrum, DN; `out`: distances, DN; changed in place.
         """
-        draws = slice(int(self.starts[off]), int(self.starts[off + 1]))
+        draws = slice(int(self.starts[error_index]), int(self.starts[error_index + 1]))
         out[draws] = np.sqrt((self.differences(draws, response) ** 2).sum(axis=-1))
 
     def differences(
-        self, some: slice | Int[IndexArray, " some"], response: Float[Array, "*batch cases spectra channels"]
+        self, subset: slice | Int[IndexArray, " some"], response: Float[Array, "*batch cases spectra channels"]
     ) -> Float[Array, "*batch some channels"]:
         """Return first minus second light of some draws."""
-        n_cases, below, share = response.shape[-3], self.below[some], self.share[some]
-        case = np.minimum((self.place[some] * n_cases).astype(np.intp), n_cases - 1)
+        n_cases, below, share = response.shape[-3], self.below[subset], self.share[subset]
+        case = np.minimum((self.place[subset] * n_cases).astype(np.intp), n_cases - 1)
         low, high = (response[..., case[:, None], below + step, :] for step in (0, 1))
         lights = low + share[..., None] * (high - low)
         return np.asarray(lights[..., 0, :] - lights[..., 1, :], dtype=float)
@@ -94,22 +94,24 @@ def draws_of(members: Members, pair: Pair, tolerance: Tolerance, seed: Sequence[
         steps.append(members.steps_of(nm))
     first, shifts = np.stack(rows, axis=1), np.stack(steps, axis=1)
     below = np.minimum(np.floor(shifts).astype(np.intp), members.n_steps - 2)
-    offs, which = _offs(tolerance, [edge[:, 0], film[:, 0], broader[:, 0]])
+    production_errors, which = _production_errors(tolerance, [edge[:, 0], film[:, 0], broader[:, 0]])
     order = np.argsort(which, kind="stable")
-    starts = np.searchsorted(which[order], np.arange(len(offs) + 1))
-    return Draws(offs, starts, (first + below)[order], (shifts - below)[order], place[order, 0])
+    starts = np.searchsorted(which[order], np.arange(len(production_errors) + 1))
+    return Draws(production_errors, starts, (first + below)[order], (shifts - below)[order], place[order, 0])
 
 
-def _offs(
+def _production_errors(
     tolerance: Tolerance, drawn: Sequence[Float[Array, " draws"]]
 ) -> tuple[tuple[ProductionError, ...], Int[IndexArray, " draws"]]:
     """Return production errors, and which of them each draw has, from numbers in 0..1 of edge, film and width."""
     kinds = [tolerance.edge_shift_nm > 0, tolerance.thickness > 0, tolerance.broadening > 0]
     counts = [_PARTS[sum(kinds)] if kind else 1 for kind in kinds]
     edges, films, widths = ([(number + 0.5) / count for number in range(count)] for count in counts)
-    offs = tuple(tolerance.at(2 * edge - 1, 2 * film - 1, width) for edge, film, width in product(edges, films, widths))
+    production_errors = tuple(
+        tolerance.at(2 * edge - 1, 2 * film - 1, width) for edge, film, width in product(edges, films, widths)
+    )
     parts = [np.minimum((u * count).astype(np.intp), count - 1) for u, count in zip(drawn, counts, strict=True)]
-    return offs, np.ravel_multi_index(parts, counts)
+    return production_errors, np.ravel_multi_index(parts, counts)
 
 
 def rank_below(draws: int, share: float) -> int:
@@ -137,27 +139,27 @@ class LampsAndCameras:
         return self._draws[pair]
 
     def kept(
-        self, curves: Float[Array, "offs modified wavelengths"], pairs: Sequence[Pair]
+        self, curves: Float[Array, "production_errors modified wavelengths"], pairs: Sequence[Pair]
     ) -> dict[Pair, tuple[float, Int[IndexArray, " _kept"]]]:
         """Return the distance that the wanted share has, for one design, DN, and the draws whose mean it is.
 
         NaN where a response is NaN.
         """
-        imager = self.population_model.imager
+        model = self.population_model.linear
         distances_of = {pair: np.empty(self.draws(pair).size) for pair in pairs}
         step = max(
             1,
             _HELD
             // (
-                imager.n_cases
+                model.n_cases
                 * self.population_model.setup.lights.photons.shape[0]
                 * len(self.population_model.setup.camera.qe)
             ),
         )
         for start in range(0, len(curves), step):
-            for off, response in enumerate(imager.smooth(curves[start : start + step]), start):
+            for error_index, response in enumerate(model.smooth(curves[start : start + step]), start):
                 for pair, distances in distances_of.items():
-                    self.draws(pair).distances(off, response, distances)
+                    self.draws(pair).distances(error_index, response, distances)
         return {pair: self._of_share(distances) for pair, distances in distances_of.items()}
 
     def _of_share(self, distances: Float[Array, " draws"]) -> tuple[float, Int[IndexArray, " _kept"]]:
@@ -169,17 +171,19 @@ class LampsAndCameras:
 
     def columns(
         self,
-        made: Callable[[ProductionError, slice], Float[Array, "_draws modified wavelengths"]],
+        curves_of: Callable[[ProductionError, slice], Float[Array, "_draws modified wavelengths"]],
         n_designs: int,
         pairs: Sequence[Pair],
     ) -> dict[str, PerDesign]:
         """Return the distance that the wanted share has, for several designs, DN, by the name of the CSD."""
-        offs, setup = self.draws(pairs[0]).offs, self.population_model.setup
-        step = max(1, _HELD // (len(offs) * max(1, len(setup.camera.modified)) * setup.camera.grid.size))
+        production_errors, setup = self.draws(pairs[0]).production_errors, self.population_model.setup
+        step = max(1, _HELD // (len(production_errors) * max(1, len(setup.camera.modified)) * setup.camera.grid.size))
         columns: dict[str, list[float]] = {csd_name(pair): [] for pair in pairs}
         for start in range(0, n_designs, step):
             batch = slice(start, min(start + step, n_designs))
-            for curves in np.stack([made(off, batch) for off in offs], axis=1):
+            for curves in np.stack(
+                [curves_of(production_error, batch) for production_error in production_errors], axis=1
+            ):
                 for pair, (value, _) in self.kept(curves, pairs).items():
                     columns[csd_name(pair)].append(value)
         return {name: np.array(values) for name, values in columns.items()}

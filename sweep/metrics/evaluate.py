@@ -99,7 +99,7 @@ def _by_phase(model: ForwardModel, cases: Columns, n_places: int) -> Float[Array
     return np.moveaxis(distances.reshape(len(names), n_places, -1, distances.shape[-1]).min(axis=2), -1, 0)
 
 
-def _csds(model: ForwardModel, curves: Float[Array, "offs modified wavelengths"]) -> Float[Array, "designs pairs"]:
+def _csds(model: ForwardModel, curves: Float[Array, "1 modified wavelengths"]) -> Float[Array, "phases pairs"]:
     """Return CSDs of one design at each phase, the smallest over the moments."""
     response = model.read(curves)[0]
     cases = {csd_name(pair): dn[:, None] for pair, dn in separations(response[0], model.setup.members).items()}
@@ -118,7 +118,7 @@ def _nonlinear_over_pulse(setup: Setup) -> bool:
 
 
 def _over_pulse(
-    model: ForwardModel, curves: Float[Array, "offs modified wavelengths"], pairs: Sequence[int], phases: Phases | None
+    model: ForwardModel, curves: Float[Array, "1 modified wavelengths"], pairs: Sequence[int], phases: Phases | None
 ) -> PerDesign:
     """Return the smallest CSDs of some pairs of one design at one phase over field positions and moments of a pulse."""
 
@@ -207,17 +207,17 @@ def _refine_heights(model: ForwardModel, block: Block, cases: Columns, columns: 
 
 
 def _whole_readout(
-    model: ForwardModel, user_metrics: Sequence[UserMetric], n: int, whole: _Part, unlit: _Part
+    model: ForwardModel, user_metrics: Sequence[UserMetric], n: int, read: _Part, unlit: _Part
 ) -> Columns:
     """Return columns of n designs by user metrics and those of `OTHERS`.
 
-    `whole`, `unlit`: the readout of a part of the designs, and the response without lamps.
+    `read`, `unlit`: the readout of a part of the designs, and the response without lamps.
     """
     if not (user_metrics or OTHERS):
         return {}
     setup = model.setup
     # A CFA of which an own metric says nothing says so of one design, and no more are read for it.
-    first = user_quantities(user_metrics, setup, whole(slice(0, 1))) if user_metrics else {}
+    first = user_quantities(user_metrics, setup, read(slice(0, 1))) if user_metrics else {}
     columns = {name: np.full(n, values[0]) for name, values in first.items()}
     present = [metric for metric in user_metrics if np.isfinite(first[metric.name][0])]
     if present or OTHERS:
@@ -225,7 +225,7 @@ def _whole_readout(
         step, parts = max(1, _READ_AT_ONCE // values_per_design), []
         for start in range(0, n, step):
             part = slice(start, start + step)
-            response = whole(part)
+            response = read(part)
             others = over_cases(model, by_case(setup, response, OTHERS, unlit(part))) if OTHERS else {}
             parts.append(others | user_quantities(present, setup, response))
         columns |= {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
@@ -256,16 +256,16 @@ def by_case(
     return {name: np.concatenate([part[name] for part in parts]).reshape(n_cases, n_designs) for name in parts[0]}
 
 
-def over_cases(imager: ForwardModel, cases: Columns) -> Columns:
+def over_cases(model: ForwardModel, cases: Columns) -> Columns:
     """Return the worst of all cases, and for CSDs the largest over the phases of the smallest over the moments."""
-    quantities = quantities_of(RequestedQuantities(imager.setup.lights.classes, any_place=True))
+    quantities = quantities_of(RequestedQuantities(model.setup.lights.classes, any_place=True))
     best = {quantity.of: name for name, quantity in quantities.items() if quantity.extreme == "best place"}
     columns: Columns = {}
     for name, values in cases.items():
         if len(values) == 1:
             columns |= {column: values[0].copy() for column in (name, best.get(name)) if column is not None}
             continue
-        moments = quantities[name].worse(np.swapaxes(values.reshape(imager.n_cases, -1, values.shape[1]), 0, 1))
+        moments = quantities[name].worse(np.swapaxes(values.reshape(model.n_cases, -1, values.shape[1]), 0, 1))
         columns[name] = quantities[name].worse(moments)
         if name in best:
             columns[best[name]] = moments.max(axis=0)
@@ -316,22 +316,22 @@ def _over_brightness(setup: Setup, block: Block, columns: Columns, states: Seque
 
     Those of noise, and others where a column is missing: no closed form holds there.
     """
-    walked, made = np.zeros(len(columns[EXPOSURE]), dtype=bool), Columns()
+    walked, refined = np.zeros(len(columns[EXPOSURE]), dtype=bool), Columns()
     for name in {pair_name(CHROMATIC_CSD, pair) for pair in class_pairs(setup.lights.classes)} & columns.keys():
         walked |= np.isnan(columns[name])
-        made[name] = columns[name].copy()
+        refined[name] = columns[name].copy()
     if not (walked.any() or states):
         return {}
     for pair in class_pairs(list(states)):
-        made |= {pair_name(of, pair): np.full(len(walked), np.nan) for of in (CHROMATIC_DPRIME, CHROMATIC_ERROR)}
+        refined |= {pair_name(of, pair): np.full(len(walked), np.nan) for of in (CHROMATIC_DPRIME, CHROMATIC_ERROR)}
     for design in range(len(walked)):
-        wanted = [metric for metric in _LAMPS if (states if metric.of_states else walked[design])]
+        requested = [metric for metric in _LAMPS if (states if metric.of_states else walked[design])]
         curves = block.subset(slice(design, design + 1)).curves()
-        if not (wanted and np.isfinite(curves).all() and np.isfinite(columns[EXPOSURE][design])):
+        if not (requested and np.isfinite(curves).all() and np.isfinite(columns[EXPOSURE][design])):
             continue
-        for name, value in of_lamps(setup, curves, states, wanted).items():
-            made[name][design] = value
-    return made | (with_equal_brightness(columns | made, states) if states else {})
+        for name, value in of_lamps(setup, curves, states, requested).items():
+            refined[name][design] = value
+    return refined | (with_equal_brightness(columns | refined, states) if states else {})
 
 
 def of_lamps(
@@ -346,22 +346,22 @@ def evaluate_some(
     model: ForwardModel, curves: DesignCurves, quantities: Sequence[Quantity], states: Sequence[str]
 ) -> dict[str, float]:
     """Return quantities of one design, by no more than their own metrics where these need none of the other columns."""
-    wanted = {quantity.metric for quantity in quantities}
-    if wanted == {CHROMATIC_DPRIME}:
+    requested = {quantity.metric for quantity in quantities}
+    if requested == {CHROMATIC_DPRIME}:
         found = of_lamps(model.setup, curves, states, [metric for metric in _LAMPS if metric.of_states])
     else:
-        pulses = [metric for metric in METRICS if isinstance(metric, PulseMetric) and wanted <= {*metric.names}]
+        pulses = [metric for metric in METRICS if isinstance(metric, PulseMetric) and requested <= {*metric.names}]
         columns = pulses[0].of_pulses(model, curves) if pulses else evaluate(model, curves, states)
         found = {name: float(values[0]) for name, values in columns.items()}
     return {quantity.name: found[quantity.name] for quantity in quantities}
 
 
 def _merged(
-    which: Bool[BoolArray, " designs"], some: Float[Array, " ..."], others: Float[Array, " ..."]
+    which: Bool[BoolArray, " designs"], selected: Float[Array, " ..."], others: Float[Array, " ..."]
 ) -> Float[Array, " ..."]:
     """Merge values of designs, the last axis, from two groups."""
-    merged = np.empty((*some.shape[:-1], which.size))
-    merged[..., which], merged[..., ~which] = some, others
+    merged = np.empty((*selected.shape[:-1], which.size))
+    merged[..., which], merged[..., ~which] = selected, others
     return merged
 
 
@@ -384,17 +384,17 @@ def _read(
     model: ForwardModel, block: Block, extra: _Extra, states: Sequence[str] = (), *, probabilities: bool = False
 ) -> tuple[Columns, Columns]:
     """Return CSDs in each case, and the columns, of any designs; with `states`, those of noise, too."""
-    curves, members, apart = block.curves(), model.setup.members, Columns()
+    curves, members, by_design = block.curves(), model.setup.members, Columns()
     if states:
         read = model.read_with_noise(curves)
         response, exposure_s = read.mean, read.exposure_s
         confused = {name: members[name] for name in states}
         noisy = [m for m in METRICS if isinstance(m, NoiseMetric) and (probabilities or not m.extra)]
-        apart = _joined([metric.of_noise(model, curves, read, confused) for metric in noisy])
+        by_design = _joined([metric.of_noise(model, curves, read, confused) for metric in noisy])
     else:
         response, exposure_s = model.read(curves)
-    apart |= extra(len(curves), response.__getitem__, lambda part: model.unlit(curves[part], exposure_s[part]))
+    by_design |= extra(len(curves), response.__getitem__, lambda part: model.unlit(curves[part], exposure_s[part]))
     if model.setup.scene.drive is not None and model.setup.camera.pixel.captures:
-        apart |= _joined([metric.of_pulses(model, curves) for metric in METRICS if isinstance(metric, PulseMetric)])
+        by_design |= _joined([metric.of_pulses(model, curves) for metric in METRICS if isinstance(metric, PulseMetric)])
     cases = by_case(model.setup, response, _CSD)
-    return cases, over_cases(model, cases) | apart | {EXPOSURE: exposure_s}
+    return cases, over_cases(model, cases) | by_design | {EXPOSURE: exposure_s}

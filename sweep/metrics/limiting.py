@@ -24,7 +24,10 @@ def limited_by_name(pair: Pair) -> str:
 
 
 def limiting_lights(setup: Setup, response: DesignCases) -> LimitingLights:
-    """Return the two lights that limit each CSD."""
+    """Return the two lights that limit each CSD.
+
+    The light of the first type stands first; over the lattice where all phases count.
+    """
     from .nearest import nearest_pairs  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     members = [setup.members[name] for name in setup.lights.classes]
@@ -40,19 +43,20 @@ def _named(setup: Setup, lights: Int[IndexArray, "rows 2"]) -> NDArray[np.object
     """Return the names of two lights each; empty for -1."""
     distinct, which = np.unique(lights, axis=0, return_inverse=True)
     names = [
-        None if one < 0 else BETWEEN.join((setup.lights.names[one], setup.lights.names[two])) for one, two in distinct
+        None if first < 0 else BETWEEN.join((setup.lights.names[first], setup.lights.names[second]))
+        for first, second in distinct
     ]
     return np.array(names, dtype=object)[which.reshape(-1)]
 
 
-def limiting_lights_of(imager: ForwardModel, block: Block) -> LimitingLights:
+def limiting_lights_of(model: ForwardModel, block: Block) -> LimitingLights:
     """Return the limiting lights of a batch of designs."""
-    changing = imager.read_changing(block)
+    changing = model.read_changing(block)
     if changing is None:
-        return limiting_lights(imager.setup, imager.read(block.curves())[0])
-    whole = changing.whole
-    response = np.empty((len(block), *whole.shape[1:]))
-    response[changing.which] = whole
+        return limiting_lights(model.setup, model.read(block.curves())[0])
+    all_channels = changing.whole
+    response = np.empty((len(block), *all_channels.shape[1:]))
+    response[changing.which] = all_channels
     if not changing.which.all():
-        response[~changing.which] = imager.read(block.subset(np.flatnonzero(~changing.which)).curves())[0]
-    return limiting_lights(imager.setup, response)
+        response[~changing.which] = model.read(block.subset(np.flatnonzero(~changing.which)).curves())[0]
+    return limiting_lights(model.setup, response)

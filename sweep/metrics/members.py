@@ -60,7 +60,7 @@ class PopulationModel:
         self._tables: dict[Pair, tuple[NDArray[Any], ...]] = {}
 
     @cached_property
-    def imager(self) -> LinearModel:
+    def linear(self) -> LinearModel:
         """Linear model of every spectrum of the members."""
         return linear_model(self.setup)
 
@@ -71,9 +71,9 @@ class PopulationModel:
         """
         pairs = pairs or class_pairs(self.setup.lights.classes)
         smallest = {pair: np.full(len(curves), np.nan) for pair in pairs}
-        step = max(1, _HELD // (self.imager.n_cases * self.setup.lights.photons.shape[0] * len(self.setup.camera.qe)))
+        step = max(1, _HELD // (self.linear.n_cases * self.setup.lights.photons.shape[0] * len(self.setup.camera.qe)))
         for start in range(0, len(curves), step):
-            for index, response in enumerate(self.imager.smooth(curves[start : start + step]), start):
+            for index, response in enumerate(self.linear.smooth(curves[start : start + step]), start):
                 if np.isfinite(response).all():
                     for pair in pairs:
                         least = min(float(self.nearest(case, pair, alone=True).squared.min()) for case in response)

@@ -89,7 +89,7 @@ class NoiseMetric(Metric):
 
     @abstractmethod
     def of_noise(
-        self, imager: ForwardModel, curves: DesignCurves, read: NoisyReadout, members: Mapping[str, MemberNumbers]
+        self, model: ForwardModel, curves: DesignCurves, read: NoisyReadout, members: Mapping[str, MemberNumbers]
     ) -> Columns:
         """Compute the columns, the worst over all phases and moments.
 

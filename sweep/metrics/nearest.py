@@ -22,7 +22,8 @@ _LANES, _AT_ONCE = 64, 16
 def nearest_squared(response: FloatArray, bounds: IndexArray, out: FloatArray) -> None:
     """Compute the smallest squared distance of each pair of classes.
 
-    `response`: C-ordered and finite, one class after the other; missing channels are 0.
+    `response`: C-ordered and finite, one class after the other; missing channels are 0. `out` is in the order of
+    `spectra.lights.class_pairs`.
     """
     for d in range(response.shape[0]):
         values = response[d]
@@ -47,7 +48,7 @@ def nearest_chromatic_squared(response: FloatArray, bounds: IndexArray, out: Flo
     """Compute the smallest squared chromatic distance of each pair of classes (see `chromatic.squared_distance`).
 
     `response`: less the response without lamps, C-ordered and finite, one class after the other; missing channels are
-    0.
+    0. `out` is in the order of `spectra.lights.class_pairs`.
     """
     for d in range(response.shape[0]):
         values = response[d]
@@ -90,8 +91,8 @@ def nearest_pairs(response: FloatArray, order: IndexArray, bounds: IndexArray, o
                         for j in order[bounds[b] : bounds[b + 1]]:
                             total = 0.0
                             for c in range(response.shape[3]):
-                                apart = response[d, case, i, c] - response[d, case, j, c]
-                                total += apart * apart
+                                difference = response[d, case, i, c] - response[d, case, j, c]
+                                total += difference * difference
                             if total < best:
                                 best = total
                                 out[d, pair, 0], out[d, pair, 1] = i, j
@@ -118,8 +119,8 @@ def nearest_along_squared(
                 if fixed[start] >= best.max():
                     break
                 for k in range(start, min(start + _AT_ONCE, starts[pair + 1])):
-                    apart, one, other = fixed[k], block[first[k]], block[second[k]]
+                    fixed_square, first_values, second_values = fixed[k], block[first[k]], block[second[k]]
                     for d in range(best.size):
-                        x = one[d] - other[d]
-                        best[d] = smaller(best[d], apart + x * x)
+                        x = first_values[d] - second_values[d]
+                        best[d] = smaller(best[d], fixed_square + x * x)
             out[pair, begin : begin + _LANES] = best

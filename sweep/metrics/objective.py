@@ -88,7 +88,7 @@ def columns_of(requested: RequestedQuantities, objective: Objective) -> Mapping[
     """Return the quantities of a study's result table."""
     if objective.column != COMBINED:
         return quantities_of(requested)
-    whole = Quantity(COMBINED, COMBINED, f"the study's objective: {objective}", direction="more")
+    combined = Quantity(COMBINED, COMBINED, f"the study's objective: {objective}", direction="more")
     if objective.rule.direction == "less":
-        whole = replace(whole, unit=LOG10, label=str(objective), digits=3, infinite=True)
-    return {**quantities_of(requested), COMBINED: whole}
+        combined = replace(combined, unit=LOG10, label=str(objective), digits=3, infinite=True)
+    return {**quantities_of(requested), COMBINED: combined}

@@ -29,7 +29,7 @@ def non_dominated(
     """Return the rows that no other eligible row dominates.
 
     `eligible`: rows that may be in the set; other rows, and rows with NaN, dominate nothing. True for non-dominated
-    rows.
+    rows. Equal rows are all kept.
     """
     import moocore  # noqa: PLC0415  (pulls in pandas: kept off the start-up path)
 

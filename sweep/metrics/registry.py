@@ -18,7 +18,10 @@ METRICS = tuple(sorted(instances_in(columns, Metric), key=lambda metric: metric.
 
 
 def listed(requested: RequestedQuantities) -> list[Quantity]:
-    """Return the columns of a study in order, worst cases and yields last."""
+    """Return the columns of a study in order, worst cases and yields last.
+
+    Names of pairs may coincide.
+    """
     quantities = [quantity for metric in METRICS for quantity in metric.quantities(requested)]
     worst = [worst_case for quantity in quantities if (worst_case := _worst(quantity, requested)) is not None]
     drawn = [quantity for quantity in quantities if requested.wanted_yield and quantity.yield_rows is not None]

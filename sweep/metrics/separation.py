@@ -59,9 +59,9 @@ def separation(
     odd = np.flatnonzero(
         (distances < _SMALLEST) | (distances > 1 / _SMALLEST)
     )  # squares that a float does not hold well
-    for some, one, other in pair_blocks((len(odd), *response.shape[1:]), first, second):
-        apart = response[odd[some]][:, one] - response[odd[some]][:, other]
-        distances[odd[some]] = np.hypot.reduce(apart, axis=2, initial=0.0).min(axis=1)
+    for designs, first_of_pair, second_of_pair in pair_blocks((len(odd), *response.shape[1:]), first, second):
+        differences = response[odd[designs]][:, first_of_pair] - response[odd[designs]][:, second_of_pair]
+        distances[odd[designs]] = np.hypot.reduce(differences, axis=2, initial=0.0).min(axis=1)
     return distances
 
 
@@ -69,10 +69,10 @@ def pair_blocks(
     shape: tuple[int, ...], first: Int[IndexArray, " first"], second: Int[IndexArray, " second"]
 ) -> Iterator[tuple[slice, Int[IndexArray, " _pairs"], Int[IndexArray, " _pairs"]]]:
     """Yield blocks of designs that are small enough for all pairs at once."""
-    one, other = np.repeat(first, len(second)), np.tile(second, len(first))
-    step = max(1, _BLOCK_PAIRS // max(1, one.size * shape[2]))
+    first_of_pair, second_of_pair = np.repeat(first, len(second)), np.tile(second, len(first))
+    step = max(1, _BLOCK_PAIRS // max(1, first_of_pair.size * shape[2]))
     for start in range(0, shape[0], step):
-        yield slice(start, min(start + step, shape[0])), one, other
+        yield slice(start, min(start + step, shape[0])), first_of_pair, second_of_pair
 
 
 def separations(response: DesignSignals, members: Mapping[str, MemberNumbers]) -> dict[Pair, PerDesign]:
@@ -85,7 +85,7 @@ def separations(response: DesignSignals, members: Mapping[str, MemberNumbers]) -
 
     squared = np.empty((n_designs, len(pairs)))
     nearest_squared(*packed, squared)
-    return _distances(squared.T, np.zeros(n_designs, dtype=bool), members, lambda some: response[some])
+    return _distances(squared.T, np.zeros(n_designs, dtype=bool), members, lambda designs: response[designs])
 
 
 def packed_response(
@@ -117,23 +117,23 @@ def separations_along(
     """
     others = np.delete(fixed, channel, axis=1)
     odd = np.asarray(~np.isfinite(values).all(axis=1) | (not np.isfinite(others).all()))
-    apart, first, second, starts = _pairs_apart(others, members)
+    fixed_squares, first, second, starts = _pairs_apart(others, members)
     if len(values) < _MANY:
         with np.errstate(invalid="ignore", over="ignore"):
-            squares = apart + (values[:, first] - values[:, second]) ** 2
+            squares = fixed_squares + (values[:, first] - values[:, second]) ** 2
         squared = np.minimum.reduceat(squares, starts[:-1], axis=1).T
     else:
         from .nearest import nearest_along_squared  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         squared = np.empty((len(starts) - 1, len(values)))
-        nearest_along_squared(np.ascontiguousarray(values), apart, first, second, starts, squared)
+        nearest_along_squared(np.ascontiguousarray(values), fixed_squares, first, second, starts, squared)
 
-    def whole(some: Bool[BoolArray, " values"]) -> DesignSignals:
-        response = np.repeat(fixed[None], int(some.sum()), axis=0)
-        response[..., channel] = values[some]
+    def all_channels(designs: Bool[BoolArray, " values"]) -> DesignSignals:
+        response = np.repeat(fixed[None], int(designs.sum()), axis=0)
+        response[..., channel] = values[designs]
         return response
 
-    return _distances(squared, odd, members, whole)
+    return _distances(squared, odd, members, all_channels)
 
 
 def _distances(
@@ -159,20 +159,20 @@ _apart: Cache[bytes, _Apart] = Cache(16)
 def _pairs_apart(others: Float[Array, "signals channels"], members: Mapping[str, MemberNumbers]) -> _Apart:
     """Return the pairs of signals as `nearest_along_squared` takes them, from DN of the shared channels."""
 
-    def made() -> _Apart:
+    def compute() -> _Apart:
         nearest = []
         for a, b in class_pairs(list(members)):
             first, second = np.repeat(members[a], len(members[b])), np.tile(members[b], len(members[a]))
             with np.errstate(invalid="ignore", over="ignore"):
-                apart = ((others[first] - others[second]) ** 2).sum(axis=1)
-            rank = np.argsort(apart, kind="stable")
-            nearest.append((apart[rank], first[rank], second[rank]))
-        starts = np.cumsum([0, *(len(apart) for apart, _, _ in nearest)])
-        apart, first, second = (np.concatenate(parts) for parts in zip(*nearest, strict=True))
-        return apart, first, second, starts
+                fixed_squares = ((others[first] - others[second]) ** 2).sum(axis=1)
+            rank = np.argsort(fixed_squares, kind="stable")
+            nearest.append((fixed_squares[rank], first[rank], second[rank]))
+        starts = np.cumsum([0, *(len(fixed_squares) for fixed_squares, _, _ in nearest)])
+        fixed_squares, first, second = (np.concatenate(parts) for parts in zip(*nearest, strict=True))
+        return fixed_squares, first, second, starts
 
     key_parts = [np.array([len(others), *map(len, members.values())]), *members.values(), np.ascontiguousarray(others)]
-    return _apart.get(hashlib.sha256(b"".join(part.tobytes() for part in key_parts)).digest(), made)
+    return _apart.get(hashlib.sha256(b"".join(part.tobytes() for part in key_parts)).digest(), compute)
 
 
 def cfa_sensitivity(

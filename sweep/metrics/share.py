@@ -12,9 +12,9 @@ _ROUNDING = 1e-12
 """Shares that are nearer to none or to all are these, but for the rounding of floats."""
 
 
-def share_interval(kept: int, n: int) -> tuple[float, float]:
+def share_interval(successes: int, n: int) -> tuple[float, float]:
     """Return the 95 % interval of a share (Wilson, J. Am. Stat. Assoc. 22, 209, 1927)."""
-    share, z = kept / n, _Z**2 / n
+    share, z = successes / n, _Z**2 / n
     middle, half = share + z / 2, _Z * math.sqrt(share * (1 - share) / n + z / (4 * n))
     return max(0.0, (middle - half) / (1 + z)), min(1.0, (middle + half) / (1 + z))
 
@@ -23,5 +23,9 @@ def format_share(share: float, digits: int = 1) -> str:
     """Format a share in percent, with more digits where rounding would give 0 or 100 %."""
     if min(abs(share), abs(1 - share)) < _ROUNDING:
         return f"{share:.0%}"
-    enough = (few for few in range(digits, _MOST_DIGITS) if float(f"{share:.{few}%}"[:-1]) not in (0, 100))
+    enough = (
+        shown_digits
+        for shown_digits in range(digits, _MOST_DIGITS)
+        if float(f"{share:.{shown_digits}%}"[:-1]) not in (0, 100)
+    )
     return f"{share:.{next(enough, _MOST_DIGITS)}%}"

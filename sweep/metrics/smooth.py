@@ -85,7 +85,7 @@ class SmoothDesign:
 
     def __init__(
         self,
-        imager: LinearModel,
+        model: LinearModel,
         family: Family,
         x: PerParameter,
         free: Int[IndexArray, " free"],
@@ -96,12 +96,12 @@ class SmoothDesign:
     ) -> None:
         """Compute curves and derivatives."""
         self.images = images
-        self.setup: Setup = imager.setup
+        self.setup: Setup = model.setup
         self._members, self._drawn = members, drawn
         self.family, self.x = family, x
         self.curves = family.curves(x[None])[0]
         self.by_u = family.gradient(x)[free] * span[:, None, None]
-        self._imager, self._free, self._span = imager, free, span
+        self._model, self._free, self._span = model, free, span
         self._made: dict[str, Any] = {}
 
     def cached(self, key: str, make: Callable[[], Made]) -> Made:
@@ -113,7 +113,7 @@ class SmoothDesign:
 
     @cached_property
     def _response(self) -> tuple[Float[Array, "cases signals channels"], Float[Array, "free cases signals channels"]]:
-        return self._imager.smooth_with_gradient(self.curves, self.by_u)
+        return self._model.smooth_with_gradient(self.curves, self.by_u)
 
     @property
     def response(self) -> Float[Array, "cases signals channels"]:
@@ -128,7 +128,7 @@ class SmoothDesign:
     @cached_property
     def lamps(self) -> tuple[Float[Array, "cases signals channels"], Float[Array, "free cases signals channels"]]:
         """Response to the lamps alone and its derivative, DN, in the shapes of `response` and `response_by_u`."""
-        return self._imager.lamps_with_gradient(self.curves, self.by_u)
+        return self._model.lamps_with_gradient(self.curves, self.by_u)
 
     @cached_property
     def noisy(
@@ -143,21 +143,26 @@ class SmoothDesign:
 
         The mean is `response`; of an HDR pixel it is that of the merged value, which saturates.
         """
-        if self._imager.hdr is not None:
-            return self._imager.merged_with_gradient(self.curves, self.by_u)
-        variance = np.asarray(self._imager.variance(self.curves[None])[0], dtype=float)
-        return self.response, variance, self.response_by_u, self._imager.variance_gradient(self.curves, self.by_u)
+        if self._model.hdr is not None:
+            return self._model.merged_with_gradient(self.curves, self.by_u)
+        variance = np.asarray(self._model.variance(self.curves[None])[0], dtype=float)
+        return (
+            self.response,
+            variance,
+            self.response_by_u,
+            self._model.variance_gradient(self.curves, self.by_u),
+        )
 
     @property
     def linear_over_brightness(self) -> bool:
         """True if chromatic distances have their closed form."""
-        return self._imager.linear_over_brightness
+        return self._model.linear_over_brightness
 
     @cached_property
     def over_brightness(self) -> list[tuple[LampSlopes, BrightnessCurves]]:
         """Readings and brightness curves of the lamps in each case."""
         limits = self.setup.scene.brightness
-        cases = self._imager.lamps_over_brightness(self.curves, self.by_u)
+        cases = self._model.lamps_over_brightness(self.curves, self.by_u)
         return [(lamps, BrightnessCurves(lamps.lamps, limits, least_dn2=STEPS_DN2)) for lamps in cases]
 
     def linear(self, matrix: Float[Array, "terms parameters"]) -> Rows:
@@ -166,11 +171,11 @@ class SmoothDesign:
 
     def squared_distances(self, pair: Pair) -> Rows:
         """Return squared distances of all pairs of signals of two types in every case, DN^2, with derivatives."""
-        first, second = (self._imager.members[name] for name in pair)
+        first, second = (self._model.members[name] for name in pair)
         response, by_u = self._response
-        apart = (response[:, first, None] - response[:, None, second]).reshape(-1, response.shape[-1])
-        apart_by_u = (by_u[:, :, first, None] - by_u[:, :, None, second]).reshape(len(by_u), *apart.shape)
-        return Rows((apart**2).sum(axis=1), 2 * (apart_by_u * apart).sum(axis=2).T)
+        differences = (response[:, first, None] - response[:, None, second]).reshape(-1, response.shape[-1])
+        differences_by_u = (by_u[:, :, first, None] - by_u[:, :, None, second]).reshape(len(by_u), *differences.shape)
+        return Rows((differences**2).sum(axis=1), 2 * (differences_by_u * differences).sum(axis=2).T)
 
     def squared_distances_of_members(self, pair: Pair) -> Rows:
         """Return squared distances of the nearest members of each two lights, by case and part of their shifts, DN^2.
@@ -184,29 +189,32 @@ class SmoothDesign:
             known = bool(np.isfinite(response[case]).all())
             base = response[case] if known else np.zeros_like(response[case])
             near = self._members.nearest(base, pair, parts=self._members.parts)
-            apart = near.of(response[case], 0) - near.of(response[case], 1)
+            differences = near.of(response[case], 0) - near.of(response[case], 1)
             slope = near.of(by_u[:, case], 0) - near.of(by_u[:, case], 1)
-            some = np.isfinite(near.squared)
-            values.append(near.squared[some] if known else np.full(int(some.sum()), np.nan))
-            slopes.append(2 * (slope * apart).sum(axis=-1)[:, some])
+            is_finite = np.isfinite(near.squared)
+            values.append(near.squared[is_finite] if known else np.full(int(is_finite.sum()), np.nan))
+            slopes.append(2 * (slope * differences).sum(axis=-1)[:, is_finite])
         return Rows(np.concatenate(values), np.concatenate(slopes, axis=1).T)
 
     def distance_of_a_share(self, pair: Pair) -> Rows:
         """Return the distance that the wanted share of random lamps and cameras has, DN, as one row."""
         assert self._drawn is not None
-        draws, imager = self._drawn.draws(pair), self._drawn.population_model.imager
-        made = [self.family.perturbed(off) if any(off) else self.family for off in draws.offs]
-        curves = np.stack([family.curves(self.x[None])[0] for family in made])
+        draws, model = self._drawn.draws(pair), self._drawn.population_model.linear
+        families = [
+            self.family.perturbed(error_index) if any(error_index) else self.family
+            for error_index in draws.production_errors
+        ]
+        curves = np.stack([family.curves(self.x[None])[0] for family in families])
         value, chosen = self._drawn.kept(curves, [pair])[pair]
         slope = np.zeros(self._free.size)
         if np.isfinite(value):
             which = np.searchsorted(draws.starts, chosen, side="right") - 1
-            for off in np.unique(which):
-                some, design_curves = chosen[which == off], curves[off]
-                apart = draws.differences(some, imager.smooth(design_curves[None])[0])
-                by_u = made[off].gradient(self.x)[self._free] * self._span[:, None, None]
-                slopes = (draws.differences(some, imager.gradient(design_curves, by_u)) * apart).sum(axis=-1)
-                length = np.linalg.norm(apart, axis=-1)
+            for error_index in np.unique(which):
+                subset, design_curves = chosen[which == error_index], curves[error_index]
+                differences = draws.differences(subset, model.smooth(design_curves[None])[0])
+                by_u = families[error_index].gradient(self.x)[self._free] * self._span[:, None, None]
+                slopes = (draws.differences(subset, model.gradient(design_curves, by_u)) * differences).sum(axis=-1)
+                length = np.linalg.norm(differences, axis=-1)
                 slope += np.divide(slopes, length, out=np.zeros_like(slopes), where=length > 0).sum(axis=1)
         return Rows(np.array([value]), slope[None] / chosen.size)
 
@@ -215,8 +223,8 @@ class SmoothDesign:
         self,
     ) -> tuple[Float[Array, "cases signals channels"], Float[Array, "free cases signals channels"]]:
         assert self._members is not None
-        imager = self._members.imager
-        return imager.smooth_with_gradient(self.curves, self.by_u)
+        model = self._members.linear
+        return model.smooth_with_gradient(self.curves, self.by_u)
 
 
 def smooth_response(setup: Setup, curves: DesignCurves) -> DesignCases:

@@ -110,13 +110,13 @@ def _between(design: SmoothDesign, pair: Pair, of: _OfPairs) -> Rows:
 
 def _of_signals(design: SmoothDesign, pair: Pair, of: _OfPairs) -> Rows:
     members = design.setup.members
-    one, other = (members[name] for name in pair)
+    first_signals, second_signals = (members[name] for name in pair)
 
     def of_both(values: Smooth) -> tuple[Smooth, Smooth]:
         """Combine the values of the first with those of the second signals, all pairs along one axis."""
-        shape = (*values.shape[:-2], len(one), len(other), values.shape[-1])
-        first = np.broadcast_to(values[..., one, None, :], shape)
-        second = np.broadcast_to(values[..., None, other, :], shape)
+        shape = (*values.shape[:-2], len(first_signals), len(second_signals), values.shape[-1])
+        first = np.broadcast_to(values[..., first_signals, None, :], shape)
+        second = np.broadcast_to(values[..., None, second_signals, :], shape)
         flat = (*values.shape[:-3], -1, values.shape[-1])
         return first.reshape(flat), second.reshape(flat)
 
@@ -132,8 +132,8 @@ def _of_signals(design: SmoothDesign, pair: Pair, of: _OfPairs) -> Rows:
 
 def smooth_detectability(setup: Setup, curves: DesignCurves, pair: Pair) -> PerDesign:
     """Return d' of the smooth response, the smallest over the cases."""
-    imager = linear_model(setup)
-    mean, variance = imager.smooth(curves), imager.variance(curves)
+    model = linear_model(setup)
+    mean, variance = model.smooth(curves), model.variance(curves)
     members = setup.members[pair[0]], setup.members[pair[1]]
     over = [detectability(mean[:, case], variance[:, case], *members) for case in range(mean.shape[1])]
     return np.asarray(np.min(over, axis=0), dtype=float)

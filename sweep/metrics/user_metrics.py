@@ -115,9 +115,9 @@ class UserMetric:
 
         None if the CFA has none. Raises SweepError if the code raises, or returns something else.
         """
-        made, n = self._made, len(readings.dn)
+        metric, n = self._made, len(readings.dn)
         with np.errstate(all="ignore"):
-            result = self.code.called(self.code.called(getattr, made, "of", made), readings)
+            result = self.code.called(self.code.called(getattr, metric, "of", metric), readings)
         if result is None:
             return None
         values = self.code.called(np.asarray, result)
@@ -139,10 +139,10 @@ class UserMetric:
         NaN if the CFA has none.
         """
         by_case = [self.parts(Readings.of_setup(setup, response[:, case])) for case in range(response.shape[1])]
-        some = [values for values in by_case if values is not None]
-        if len(some) < len(by_case):
+        defined = [values for values in by_case if values is not None]
+        if len(defined) < len(by_case):
             return np.full(len(response), np.nan)
-        joined = np.concatenate(some, axis=1)
+        joined = np.concatenate(defined, axis=1)
         return np.asarray(joined.min(axis=1) if self.direction == "more" else joined.max(axis=1), dtype=float)
 
 

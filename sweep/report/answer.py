@@ -41,7 +41,10 @@ _BY_NOISE = (D_PRIME, CNR)
 
 
 def answer_parts(output: Output) -> tuple[list[str], list[str]]:
-    """Return the answer to the study's question, which stands above the first plot, and what else was found."""
+    """Return the answer to the study's question, which stands above the first plot, and what else was found.
+
+    The answer is that of images; else leaders over scenarios that differ in one number, tasks, or the best design.
+    """
     answer, further = _of_designs(output)
     further = [*uncertain_lines(output), *further]
     if output.study.vision is None:

@@ -99,7 +99,12 @@ def compare_runs(folders: Sequence[Path], to: Path | None) -> Comparison:
         lines += _section(f"Fronts in {name}, {OF_FRONTS}", fronts[name], "none")
     if len(fronts) > _MOST_SCENARIOS:
         lines.append(f"({len(fronts) - _MOST_SCENARIOS} more scenes in {PAGE}.)")
-    lines += ["", *answer, *(f"Note: {note}" for note in notes), *(doubt for one in outputs for doubt in one.doubts)]
+    lines += [
+        "",
+        *answer,
+        *(f"Note: {note}" for note in notes),
+        *(doubt for run_output in outputs for doubt in run_output.doubts),
+    ]
     lines.append(f"Files: {target}/: {', '.join([PAGE, TABLE, *(f'{PICTURE}.{kind}' for kind in drawn)])}.")
     of_all = [table.assign(scene=name) for name, table in fronts.items()]
     tables = {"best": best, "plain": plain}

@@ -82,8 +82,8 @@ def _meaning(output: Output) -> tuple[str, ...]:
     for axis in output.trade_off:
         combined = axis.name == COMBINED
         text = str(output.objective) if combined else axis.words
-        off = axis.extreme == WORST_CASE or (combined and shifted)
-        dependent = f" ({', '.join(over)})" if off else ""
+        is_worst_case = axis.extreme == WORST_CASE or (combined and shifted)
+        dependent = f" ({', '.join(over)})" if is_worst_case else ""
         words.append(f"{text}{dependent}" + (f" in {dn_scale_label(output)}" if axis.unit == DN or combined else ""))
     return tuple(words)
 

@@ -52,8 +52,8 @@ def robustness_lines(output: Output, best: Row | None) -> Iterator[str]:
             name = "the search's answer" if row["kind"] == SEARCHED else row["name"]
             shares.append(f"{name} {share} ({low} to {high})")
     if shares:
-        wanted = output.trade_off[0].formatted(output.study.population.wanted_dn or 0.0)
-        yield f"Share of random lamps and cameras with {wanted} or more (95 % interval): {', '.join(shares)}."
+        wanted_dn = output.trade_off[0].formatted(output.study.population.wanted_dn or 0.0)
+        yield f"Share of random lamps and cameras with {wanted_dn} or more (95 % interval): {', '.join(shares)}."
 
 
 def cost_of_worst_case(output: Output, best: Row | None) -> Iterator[str]:
@@ -151,10 +151,12 @@ def lamp_lines(output: Output) -> Iterator[str]:
     if not maps or regions is None:
         return
     for norm, designs in maps.items():
-        chosen = [one for one in designs if best is not None and one.row["design_id"] == best["design_id"]]
-        shown = chosen[0] if chosen else max(designs, key=lambda one: one.share)
-        plain = [one for one in designs if one.row["kind"] == REFERENCE and one is not shown]
-        beside = max(plain, key=lambda one: one.share, default=None)
+        chosen = [
+            lamp_map for lamp_map in designs if best is not None and lamp_map.row["design_id"] == best["design_id"]
+        ]
+        shown = chosen[0] if chosen else max(designs, key=lambda lamp_map: lamp_map.share)
+        plain = [lamp_map for lamp_map in designs if lamp_map.row["kind"] == REFERENCE and lamp_map is not shown]
+        beside = max(plain, key=lambda lamp_map: lamp_map.share, default=None)
         rival = "" if beside is None else f", {full_name(beside.row)} {format_share(beside.share)}"
         yield (
             f"Of all {shown.pairs:,} pairs of a yellow and a red LED that {norm} allows, "
@@ -173,15 +175,15 @@ def lamp_table(output: Output) -> pd.DataFrame:
     rows = [
         {
             "norm": norm,
-            "design": label(one.row),
-            "pairs": f"{one.pairs:,}",
-            "separated": format_share(one.share),
-            "nearest yellow": one.led("yellow"),
-            "nearest red": one.led("red"),
-            "their distance": one.distance,
+            "design": label(lamp_map.row),
+            "pairs": f"{lamp_map.pairs:,}",
+            "separated": format_share(lamp_map.share),
+            "nearest yellow": lamp_map.led("yellow"),
+            "nearest red": lamp_map.led("red"),
+            "their distance": lamp_map.distance,
         }
         for norm, designs in lamp_maps(output).items()
-        for one in designs
+        for lamp_map in designs
     ]
     return pd.DataFrame(rows)
 
@@ -200,14 +202,18 @@ def lamp_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
 def _draw(maps: Sequence[LampMap], title: str, wanted_dn: float) -> Figure:
     """Draw one panel per design; a line at the wanted CSD, a cross at the nearest pair."""
     figure, panels = panel_grid(len(maps), _COLUMNS, (3.4, 2.6), (1.0, 0.6))
-    most = max(float(np.nanmax(one.least_dn)) for one in maps)
-    for axes, one in zip(panels, maps, strict=True):
-        red, yellow, dn = one.least_dn.columns, one.least_dn.index, one.least_dn.to_numpy()
+    most = max(float(np.nanmax(lamp_map.least_dn)) for lamp_map in maps)
+    for axes, lamp_map in zip(panels, maps, strict=True):
+        red, yellow, dn = lamp_map.least_dn.columns, lamp_map.least_dn.index, lamp_map.least_dn.to_numpy()
         drawn = axes.pcolormesh(red, yellow, dn, shading="nearest", cmap="viridis", vmin=0.0, vmax=most)
         if min(dn.shape) > 1 and np.nanmin(dn) < wanted_dn <= np.nanmax(dn):
             axes.contour(red, yellow, dn, levels=[wanted_dn], colors="white", linewidths=1.4)
-        axes.plot(one.nearest["red_nm"], one.nearest["yellow_nm"], "x", color="#d55e00", markersize=8, clip_on=False)
-        axes.set_title(f"{label(one.row)}: {format_share(one.share)}, nearest {one.distance}", fontsize=9)
+        axes.plot(
+            lamp_map.nearest["red_nm"], lamp_map.nearest["yellow_nm"], "x", color="#d55e00", markersize=8, clip_on=False
+        )
+        axes.set_title(
+            f"{label(lamp_map.row)}: {format_share(lamp_map.share)}, nearest {lamp_map.distance}", fontsize=9
+        )
     figure.supxlabel("peak of the red LED / nm", fontsize=9)
     figure.supylabel("peak of the yellow LED / nm", fontsize=9)
     bar = figure.colorbar(drawn, ax=panels, label=f"smallest CSD / {DN}")

@@ -49,8 +49,8 @@ def _leaders(output: Output, scenario: str) -> Leaders:
     separation = output.trade_off[0].name
     rows = output.table[(output.table["scenario"] == scenario) & (output.table["status"] == "ok")]
     best = output.best[output.best["scenario"] == scenario]
-    made = rows["kind"].isin([SWEPT, SEARCHED]).any()
-    chosen = _first(best) if made else _most(rows[rows["feasible"]], separation)
+    has_filters = rows["kind"].isin([SWEPT, SEARCHED]).any()
+    chosen = _first(best) if has_filters else _most(rows[rows["feasible"]], separation)
     plain = rows[rows["kind"] == REFERENCE]
     others: tuple[Row, ...] = ()
     if chosen is not None:

@@ -103,7 +103,7 @@ def worst_of_series(output: Output, best: Row) -> WorstOfSeries | None:
     least = {str(row["name"]): (float(row["value"]), float(row["at"])) for row in known.to_dict("records")}
     light = {str(row["name"]): float(row[CFA_SENSITIVITY]) for row in output.named_rows.to_dict("records")}
     plain = [name for name in output.kind(REFERENCE)["name"].unique() if least.get(name, (0.0, 0.0))[0] > 0]
-    rival, name, numbers = max(plain, key=lambda one: least[one][0], default=None), label(best), [*scenarios.values()]
+    rival, name, numbers = max(plain, key=lambda cfa: least[cfa][0], default=None), label(best), [*scenarios.values()]
     loses: tuple[float, ...] = ()
     if rival is not None:
         values = over_series(output.named_rows, scenarios, goal.name)

@@ -65,33 +65,33 @@ def make_report(output: Output, *, repair: bool = False, parallel: Parallel = in
         wrong = inventory.wrong({REPORT, *listed})
         if repair and not wrong:
             return
-        some = wrong if repair and REPORT not in wrong else None
-        contents = _contents(output, some, parallel)
-        inventory.write({n: made for n, made in contents.items() if not repair or n in wrong or n not in listed})
-        inventory.remove(n for n in listed if n not in contents and (some is None or n in some))
+        names = wrong if repair and REPORT not in wrong else None
+        contents = _contents(output, names, parallel)
+        inventory.write({n: content for n, content in contents.items() if not repair or n in wrong or n not in listed})
+        inventory.remove(n for n in listed if n not in contents and (names is None or n in names))
 
 
-def _contents(output: Output, some: Iterable[str] | None, parallel: Parallel) -> dict[str, bytes]:
+def _contents(output: Output, shown_names: Iterable[str] | None, parallel: Parallel) -> dict[str, bytes]:
     """Return the files of the report with their content: some of them, or all, since the page holds every picture."""
-    contents, wanted = dict[str, bytes](), []
+    contents, drawn = dict[str, bytes](), []
     images: dict[str, list[tuple[str, str]]] = {place: [] for place in _SHOWN}
     for name, caption, figure in (*_drawings(output), *_vision_drawings(output)):
         where = name if name.startswith(("cfas", "pareto")) else f"{FIGURES}/{name}"
-        if some is None or {f"{where}.png", f"{where}.svg"} & {*some}:
-            wanted.append((name, caption, where, figure))
-    pictures = parallel(delayed(pictures_of, figure, ("png", "svg")) for *_, figure in wanted)
+        if shown_names is None or {f"{where}.png", f"{where}.svg"} & {*shown_names}:
+            drawn.append((name, caption, where, figure))
+    pictures = parallel(delayed(pictures_of, figure, ("png", "svg")) for *_, figure in drawn)
     begun = [*islice(pictures, 1)]  # workers make the others while the page is written
     published = comparison_with_published(output)
-    parts = _parts(output, published) if some is None else {}
-    for (name, caption, where, _), made in zip(wanted, chain(begun, pictures), strict=True):
-        contents |= {f"{where}.{kind}": content for kind, content in made.items()}
+    parts = _parts(output, published) if shown_names is None else {}
+    for (name, caption, where, _), by_kind in zip(drawn, chain(begun, pictures), strict=True):
+        contents |= {f"{where}.{kind}": content for kind, content in by_kind.items()}
         for place, names in _SHOWN.items():
             if name.startswith(names):
-                images[place].append((caption, inlined(made["png"])))
+                images[place].append((caption, inlined(by_kind["png"])))
     if len(published):
         contents[PUBLISHED_CSV] = csv_of(published).encode("utf-8")
         contents[PUBLISHED_PARQUET] = encoded(pa.Table.from_pandas(published, preserve_index=False))
-    if some is None:
+    if shown_names is None:
         contents[REPORT] = page("report.html.j2", **parts, **images).encode("utf-8")
     return contents
 

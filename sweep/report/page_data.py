@@ -82,10 +82,10 @@ def _packed(values: Any, kind: str) -> dict[str, str]:
 
 def _numbers(values: np.ndarray) -> dict[str, Any]:
     """Return numbers, or if there are few, these and their indices."""
-    few, codes = np.unique(values, return_inverse=True)
-    if len(few) > 256:
+    distinct, codes = np.unique(values, return_inverse=True)
+    if len(distinct) > 256:
         return {"values": _packed(values, "f4")}
-    return {"values": _packed(few, "f4"), "codes": _packed(codes, "u1")}
+    return {"values": _packed(distinct, "f4"), "codes": _packed(codes, "u1")}
 
 
 def _words(values: pd.Series) -> dict[str, Any]:
@@ -112,9 +112,9 @@ def _names(output: Output, row: Mapping[Any, Any]) -> dict[str, str]:
 def _columns(output: Output, rows: pd.DataFrame) -> dict[str, dict[str, Any]]:
     """Return label, digits and values of every column with information on designs."""
     axes = [axis.name for axis in output.trade_off]
-    wanted = (*axes, *output.parameters, *output.distances, *output.light, *output.further, "violation")
+    names = (*axes, *output.parameters, *output.distances, *output.light, *output.further, "violation")
     columns = {}
-    for name in dict.fromkeys(wanted):
+    for name in dict.fromkeys(names):
         values = rows[name].to_numpy(dtype=float)
         if np.isfinite(values).any() or name in axes:
             quantity, digits = output.columns.get(name), _OF_PARAMETERS if name in output.parameters else _OF_OTHERS
@@ -185,7 +185,8 @@ def _curves(output: Output) -> dict[str, Any]:
         "sensor": {name: _packed(qe, "f4") for name, qe in curves.sensor.items()},
         "limits": {cfa: _packed(qe, "f4") for cfa, qe in curves.limits.items()},
         "designs": {
-            str(at): {channel: _packed(qe, "f4") for channel, qe in made.items()} for at, made in curves.designs.items()
+            str(at): {channel: _packed(qe, "f4") for channel, qe in filters.items()}
+            for at, filters in curves.designs.items()
         },
         "shades": {kind: _packed(shade, "f4") for kind, shade in content.light_shades(output).items()},
         "plain": {cfa: content.channel_curves(output, cfa) for cfa in output.study.cfas},
@@ -195,15 +196,15 @@ def _curves(output: Output) -> dict[str, Any]:
 
 def _clouds(output: Output, rows: pd.DataFrame) -> dict[str, Any]:
     """Return digital numbers of the signals of kept designs, channel by channel."""
-    kept: dict[str, Any] = {"designs": {}, "channels": {}, "types": [], "names": []}
+    clouds: dict[str, Any] = {"designs": {}, "channels": {}, "types": [], "names": []}
     cfas = dict(zip(rows["design_id"], rows["cfa"].astype(str), strict=True))
     for design in output.points["design_id"].unique():
         if design in cfas:
             channels, signals, dn = signals_of(output, design)
-            kept["types"], kept["names"] = [kind for kind, _ in signals], [name for _, name in signals]
-            kept["channels"][cfas[design]] = channels
-            kept["designs"][str(design)] = _packed(dn, "f4")
-    return kept
+            clouds["types"], clouds["names"] = [kind for kind, _ in signals], [name for _, name in signals]
+            clouds["channels"][cfas[design]] = channels
+            clouds["designs"][str(design)] = _packed(dn, "f4")
+    return clouds
 
 
 def _finite(values: np.ndarray) -> list[float | None]:

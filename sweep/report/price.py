@@ -47,8 +47,8 @@ def _row(column: Column, plain: float, best: float) -> tuple[str, str, str, str,
     better = best > plain if column.direction == "more" else best < plain
     effect = "same" if abs(best / plain - 1) < _SAME else "gain" if better else "loss"
     unit = f" {column.unit}" if column.unit and column.unit != "1" else ""
-    one, other = (f"{value:.{_digits(value)}f}{unit}" for value in (plain, best))
-    return column.words, one, other, f"{best / plain:.2f}", effect
+    plain_text, best_text = (f"{value:.{_digits(value)}f}{unit}" for value in (plain, best))
+    return column.words, plain_text, best_text, f"{best / plain:.2f}", effect
 
 
 def _digits(value: float) -> int:

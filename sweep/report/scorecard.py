@@ -57,8 +57,8 @@ class ScoreRow:
         """Factors by which designs are better than the first; NaN where they are undefined."""
         of = self.values[0]
         ratio = np.full(self.values.shape, np.nan)
-        some = (self.values > 0) & (of > 0) & bool(self.best)
-        np.divide(self.values, of, out=ratio, where=some)
+        is_positive = (self.values > 0) & (of > 0) & bool(self.best)
+        np.divide(self.values, of, out=ratio, where=is_positive)
         return ratio if self.column.direction == "more" else 1 / ratio
 
 

@@ -72,8 +72,8 @@ def _score_streets(output: Output, predictions: Sequence[Path], to: Path) -> lis
     vision = output.study.vision
     assert vision is not None
     labels = labels_of_test(output)
-    made = {path.stem: read_detections(path, labels, vision.lenses) for path in predictions}
-    parts = [street_scores(name, detections, labels, vision.lenses) for name, detections in made.items()]
+    detections_of = {path.stem: read_detections(path, labels, vision.lenses) for path in predictions}
+    parts = [street_scores(name, detections, labels, vision.lenses) for name, detections in detections_of.items()]
     scores = pd.concat(parts, ignore_index=True)
     with atomic(to / STREETS) as hidden:
         scores.to_parquet(hidden, index=False)
@@ -86,12 +86,12 @@ def summary_table(scores: pd.DataFrame) -> pd.DataFrame:
     Returns a row per reader and design: error, and difference from the first design and from the ideal observer,
     percent.
     """
-    whole = whole_scores(scores)
-    first = str(whole["name"].iloc[0])
+    totals = whole_scores(scores)
+    first = str(totals["name"].iloc[0])
     columns = {"error": "errs on / %", "apart": f"less that of {first}", "above_observer": "less the ideal observer's"}
-    table = whole[["reader", "name"]].rename(columns={"name": "design"})
+    table = totals[["reader", "name"]].rename(columns={"name": "design"})
     for column, title in columns.items():
-        ends = [whole[name].mul(100).map("{:.1f}".format) for name in (column, f"{column}_low", f"{column}_high")]
+        ends = [totals[name].mul(100).map("{:.1f}".format) for name in (column, f"{column}_low", f"{column}_high")]
         table[title] = ends[0] + " (" + ends[1] + " to " + ends[2] + ")"
     table.loc[table["design"] == first, columns["apart"]] = "-"
     return table

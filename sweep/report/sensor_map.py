@@ -64,17 +64,19 @@ def sensor_figures(output: Output) -> Iterator[SensorFigure]:
     name = separation.of or separation.name
     if output.places is None or separation.pair is None or name not in output.places:
         return
-    for scenario, few in output.named_rows.groupby("scenario", sort=False, observed=True):
-        places = output.places[output.places["design_id"].isin(few["design_id"])]
+    for scenario, scenario_rows in output.named_rows.groupby("scenario", sort=False, observed=True):
+        places = output.places[output.places["design_id"].isin(scenario_rows["design_id"])]
         plain: list[SensorMap] = []
         others: list[SensorMap] = []
-        for row in few.to_dict("records"):
+        for row in scenario_rows.to_dict("records"):
             rows = places[places["design_id"] == row["design_id"]]
             called = BEST_FOUND if row["kind"] == SEARCHED else str(row["name"])
-            made = SensorMap(called, rows["height"].to_numpy(), rows[name].to_numpy())
-            if made.dn.size and np.isfinite(made.dn).all():
-                (plain if row["kind"] == REFERENCE else others).append(made)
-        level = max(((one.name, float(one.dn.min())) for one in plain), key=lambda one: one[1], default=None)
+            sensor_map = SensorMap(called, rows["height"].to_numpy(), rows[name].to_numpy())
+            if sensor_map.dn.size and np.isfinite(sensor_map.dn).all():
+                (plain if row["kind"] == REFERENCE else others).append(sensor_map)
+        level = max(
+            ((cfa_map.name, float(cfa_map.dn.min())) for cfa_map in plain), key=lambda cfa_map: cfa_map[1], default=None
+        )
         shown = others or plain
         if shown:
             corner, left_out = float(places["cra_deg"].iloc[-1]), max(0, len(shown) - _MOST)
@@ -102,14 +104,14 @@ def _draw(figure: SensorFigure) -> Figure:
     drawn, panels = panel_grid(len(figure.maps), columns, (panel_in, 0.3 + 0.87 * panel_in * _HIGH / _WIDE), (0, 0.6))
     y, x = (np.linspace(-half, half, n) for half, n in zip((_HIGH, _WIDE), _PIXELS, strict=True))
     radius = np.hypot(x[None], y[:, None]) / np.hypot(_WIDE, _HIGH)
-    top = max(float(one.dn.max()) for one in figure.maps)
-    for axes, one in zip(panels, figure.maps, strict=True):
-        values = np.interp(radius, one.heights, one.dn)
+    top = max(float(sensor_map.dn.max()) for sensor_map in figure.maps)
+    for axes, sensor_map in zip(panels, figure.maps, strict=True):
+        values = np.interp(radius, sensor_map.heights, sensor_map.dn)
         extent = (-_WIDE, _WIDE, -_HIGH, _HIGH)
         image = axes.imshow(values, cmap="cividis", vmin=0.0, vmax=top, extent=extent, interpolation="nearest")
-        if figure.level is not None and one.dn.min() < figure.level[1] < one.dn.max():
+        if figure.level is not None and sensor_map.dn.min() < figure.level[1] < sensor_map.dn.max():
             axes.contour(x, y, values, levels=[figure.level[1]], colors="white", linewidths=1.4)
-        axes.set_title(f"{one.name}: {one.worst}", fontsize=9)
+        axes.set_title(f"{sensor_map.name}: {sensor_map.worst}", fontsize=9)
         axes.set(xticks=[], yticks=[])
     drawn.colorbar(image, ax=panels, shrink=0.85, label=f"{figure.words} / DN")
     drawn.suptitle(f"{figure.words} from the middle of the sensor to its corner, scene {figure.scenario}", fontsize=10)

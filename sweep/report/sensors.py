@@ -107,12 +107,14 @@ def report_sensors(inventory: Inventory, runs: Sequence[SensorRun]) -> list[str]
 def _figures(member: SensorAndLights, output: Output) -> Iterator[dict[str, Any]]:
     """Yield a row per plain CFA, named design and answer, in the first scenario."""
     separation = output.trade_off[0].name
-    few = output.named_rows[(output.named_rows["scenario"] == output.scenario) & (output.named_rows["status"] == "ok")]
-    plain = few[few["kind"] == REFERENCE]
+    scenario_rows = output.named_rows[
+        (output.named_rows["scenario"] == output.scenario) & (output.named_rows["status"] == "ok")
+    ]
+    plain = scenario_rows[scenario_rows["kind"] == REFERENCE]
     known = plain[plain["name"] == REFERENCE_CFA]
-    reference = (known if len(known) else plain if len(plain) else few).iloc[0]
+    reference = (known if len(known) else plain if len(plain) else scenario_rows).iloc[0]
     drawn = _uncertain(output, separation)
-    for row in few.to_dict("records"):
+    for row in scenario_rows.to_dict("records"):
         yield {
             "sensor": member.sensor,
             "lights": member.lights,
@@ -184,9 +186,9 @@ def _together(table: pd.DataFrame, goal: Column) -> Iterator[str]:
         for designed_on in dict.fromkeys(of_space["designed_on"]):
             filters = of_space[of_space["designed_on"] == designed_on]
             shown = filters if designed_on == ALL else filters[filters["judged"]]
-            kept, broken = shown["objective"] / shown["own_best"], float(shown["violation"].max())
+            shares, broken = shown["objective"] / shown["own_best"], float(shown["violation"].max())
             what = f"one {space} filter for {designed_on}" if designed_on == ALL else f"one for {designed_on}"
-            text = f"{what} keeps {kept.min():.0%} to {kept.max():.0%}"
+            text = f"{what} keeps {shares.min():.0%} to {shares.max():.0%}"
             text += " on that one" * (designed_on != ALL)
             parts.append(text + (f" and breaks a constraint by {broken:.2g} of its bound" if broken else ""))
         yield f"Of the best {goal.words} of each sensor and lights: {'; '.join(parts)}."

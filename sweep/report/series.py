@@ -42,7 +42,10 @@ _LABELS = {
 
 @dataclass(frozen=True)
 class Line:
-    """Line of a design."""
+    """Line of a design.
+
+    `passes`: numbers at which it passes the level of the figure, and its value there.
+    """
 
     y: Num[Array, " levels"]
     upper: Num[Array, " levels"] | None
@@ -189,7 +192,7 @@ def lead_sentence(series: SeriesFigure) -> str:
 def vanishing_line(series: SeriesFigure) -> list[str]:
     """Return between which numbers separations fall below 1 DN.
 
-    Returns sentence, if a design does.
+    Empty if no design does.
     """
     ranges = _below(series)
     if not ranges:

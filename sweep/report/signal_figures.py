@@ -59,14 +59,16 @@ def nearest_lights(output: Output, row: Mapping[Any, Any]) -> Nearest | None:
     separation = output.trade_off[0]
     if separation.pair is None or separation.role != "separation":
         return None
-    one, other = separation.pair
+    first_type, second_type = separation.pair
     text = row.get(limited_by_name(separation.pair))
-    ones, others = ([name for kind, name in output.curves.lights if kind == wanted] for wanted in separation.pair)
-    named = {f"{a}{BETWEEN}{b}": (a, b) for a in ones for b in others}
+    first_names, second_names = (
+        [name for kind, name in output.curves.lights if kind == signal_type] for signal_type in separation.pair
+    )
+    named = {f"{a}{BETWEEN}{b}": (a, b) for a in first_names for b in second_names}
     if text not in named:
         return None
     a, b = named[str(text)]
-    return (one, a), (other, b), separation.formatted(row[separation.of or separation.name])
+    return (first_type, a), (second_type, b), separation.formatted(row[separation.of or separation.name])
 
 
 def draw_clouds(designs: Sequence[Cloud], title: str, top_dn: float) -> Figure:

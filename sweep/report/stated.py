@@ -29,13 +29,13 @@ def _camera(output: Output) -> str:
     pixel, scenes = output.study.pixel, list(output.study.scenarios.values())
     lens = _span((scene.optics.f_number for scene in scenes), "f/{}".format)
     readings = f"{len(pixel.captures)} captures of {pixel.bits} bits" if pixel.captures else f"{pixel.bits} bits"
-    if pixel.captures and len({one.bits for one in pixel.read_as}) > 1:
+    if pixel.captures and len({capture.bits for capture in pixel.read_as}) > 1:
         readings = f"{len(pixel.captures)} captures"
     full = f"full scale {pixel.full_scale_dn:,} DN"
     if pixel.captures:
         top_dn = pixel.saturation_e * pixel.dn_per_e + pixel.offset_dn
         full = f"{pixel.full_scale_dn:,} DN the first, {top_dn:,.0f} DN merged"
-    wells = max(one.well_e for one in pixel.read_as or (pixel,))
+    wells = max(capture.well_e for capture in pixel.read_as or (pixel,))
     return f"{lens}, pixel of {pixel.pitch_um:g} um and {wells:,.0f} e, {readings} ({full})"
 
 
@@ -106,9 +106,9 @@ def saturation_lines(output: Output) -> Iterator[str]:
             )
             yield f"Warning: in {base}, signals fill pixels: {of_designs}."
     others = rows[~rows["scenario"].isin(told) & (rows[_FULL] > 0)]
-    for scenario, some in others.groupby("scenario", sort=False):
+    for scenario, of_scenario in others.groupby("scenario", sort=False):
         counts = ", ".join(
-            f"{row['name']} {int(row[_FULL])} of {total}" for row in some.to_dict("records")[:_MOST_NAMED]
+            f"{row['name']} {int(row[_FULL])} of {total}" for row in of_scenario.to_dict("records")[:_MOST_NAMED]
         )
-        more = f" and {len(some) - _MOST_NAMED} more" if len(some) > _MOST_NAMED else ""
+        more = f" and {len(of_scenario) - _MOST_NAMED} more" if len(of_scenario) > _MOST_NAMED else ""
         yield f"Warning: in {scene_in_words(str(scenario))}, signals fill pixels: {counts}{more}."

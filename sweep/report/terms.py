@@ -158,7 +158,7 @@ def assumptions_line(output: Output) -> str:
     Empty if neither applies.
     """
     notes = []
-    modeled = [one.name for one in (output.provenance.sensor, output.provenance.lights) if one.surrogate]
+    modeled = [origin.name for origin in (output.provenance.sensor, output.provenance.lights) if origin.surrogate]
     if len(modeled) == 2:
         notes.append("Built-in curves are surrogates, modeled from stated parameters, not measured.")
     elif modeled:

@@ -105,10 +105,10 @@ def pareto_figure(output: Output, scenario: str, cfa: str) -> TradeOff:
     bound = output.constraints.get(sensitivity.name)
     least = None if bound is None else bound.min
     traced, limit = _trade_offs(output, scenario, cfa)
-    whole = output.columns[sensitivity.of] if sensitivity.extreme else sensitivity
+    nominal = output.columns[sensitivity.of] if sensitivity.extreme else sensitivity
     return TradeOff(
         title=f"{output.study.study}, {cfa}: what separation costs in sensitivity",
-        x_label=sensitivity.words.removesuffix(whole.words) + whole.meaning,
+        x_label=sensitivity.words.removesuffix(nominal.words) + nominal.meaning,
         y_label=separation.axis,
         groups=groups,
         traced=traced,
@@ -209,8 +209,8 @@ def draw_trade_off(figure: TradeOff) -> Figure:
         if points.x.size:
             text = f"{_LABELS[group]} ({figure.counts[group]:,})" if group in figure.counts else _LABELS[group]
             # Spread evenly and not in step with a grid.
-            kept = even(points.x.size, _DRAWN_POINTS) if points.x.size > _DRAWN_POINTS else slice(None)
-            axes.scatter(points.x[kept], points.y[kept], label=text, rasterized=True, **_STYLES[group])
+            shown = even(points.x.size, _DRAWN_POINTS) if points.x.size > _DRAWN_POINTS else slice(None)
+            axes.scatter(points.x[shown], points.y[shown], label=text, rasterized=True, **_STYLES[group])
     traced, limit = figure.traced, figure.limit
     if traced is not None:
         axes.plot(traced.x, traced.y, "+", color="black", markersize=7, label=_TRACED_NAME, zorder=4)

@@ -62,13 +62,13 @@ def modifications(output: Output) -> list[Modification]:
 def drawn_rows(output: Output) -> pd.DataFrame:
     """Return the rows that figures show as points: CFAs, named designs, answers, and an even sample of swept ones."""
     table = output.table[output.table["status"] == "ok"]
-    kept = (table["kind"] != SWEPT) | (table["feasible"] & table["pareto"])
-    kept |= table["design_id"].isin(output.points["design_id"])
-    sample = table["design_id"].isin(output.swept_points) & ~kept
+    is_drawn = (table["kind"] != SWEPT) | (table["feasible"] & table["pareto"])
+    is_drawn |= table["design_id"].isin(output.points["design_id"])
+    sample = table["design_id"].isin(output.swept_points) & ~is_drawn
     for feasible in (True, False):
         group = np.flatnonzero(sample & (table["feasible"] == feasible))
-        kept.iloc[group[even(group.size, _MOST_POINTS)]] = True
-    return table[kept].reset_index(drop=True)
+        is_drawn.iloc[group[even(group.size, _MOST_POINTS)]] = True
+    return table[is_drawn].reset_index(drop=True)
 
 
 def filters_figure(output: Output, cfa: str) -> CurvesFigure:
@@ -77,8 +77,8 @@ def filters_figure(output: Output, cfa: str) -> CurvesFigure:
     ends = end_curves(output, cfa)
     curves = {name: values for name, values in output.curves.sensor.items() if name in ends}
     for row in rows.to_dict("records"):
-        made = output.curves.drawn[row["design_id"]]
-        curves |= {label(row) + (f", {channel}" if len(made) > 1 else ""): qe for channel, qe in made.items()}
+        filters = output.curves.drawn[row["design_id"]]
+        curves |= {label(row) + (f", {channel}" if len(filters) > 1 else ""): qe for channel, qe in filters.items()}
     if cfa in output.curves.limits:
         curves[BOUND_FILTER_NAME] = output.curves.limits[cfa]
     return CurvesFigure(

@@ -175,8 +175,8 @@ def _street_table(table: pd.DataFrame, reference: str) -> pd.DataFrame:
         name, level = score["name"], "all levels" if score["level"] == ALL else score["level"]
         rows.setdefault(name, {"design": name})[level] = _of_columns(score, "average_precision")
     for score in scores[scores["level"] == ALL].to_dict("records"):
-        apart = "-" if score["name"] == reference else _of_columns(score, "apart")
-        rows[score["name"]][f"less that of {reference}"] = apart
+        difference = "-" if score["name"] == reference else _of_columns(score, "apart")
+        rows[score["name"]][f"less that of {reference}"] = difference
     return pd.DataFrame([*rows.values()])
 
 

@@ -87,7 +87,10 @@ class KeptCurves:
             pa.array(ids, pa.int64()).take(at),
             pa.array(channels, pa.string()).take(at),
         )
-        return pa.table([pa.array(column).cast(one.type) for one, column in zip(SCHEMA, columns, strict=True)], SCHEMA)
+        return pa.table(
+            [pa.array(column).cast(schema_field.type) for schema_field, column in zip(SCHEMA, columns, strict=True)],
+            SCHEMA,
+        )
 
     @classmethod
     def of_table(cls, table: pa.Table) -> KeptCurves:
@@ -100,15 +103,15 @@ class KeptCurves:
         size = len(np.unique(wavelength_nm))
         if not size or len(table) % size or (wavelength_nm.reshape(-1, size) != wavelength_nm[:size]).any():
             raise ValueError("the curves are not all on one wavelength grid")
-        kept = cls(wavelength_nm[:size])
+        curves = cls(wavelength_nm[:size])
         starts = table.take(pa.array(np.arange(0, len(table), size))).to_pylist()
         for row, curve in zip(starts, table["value"].to_numpy().reshape(-1, size), strict=True):
             kind, name, owner = row["kind"], row["curve"], row["signal_type"]
             if kind in (_DESIGN, _ON_FRONT):
-                designs = kept.drawn if kind == _DESIGN else kept.on_front
+                designs = curves.drawn if kind == _DESIGN else curves.on_front
                 designs.setdefault(row["design_id"], {})[row["channel"]] = curve
             elif kind in (_LIGHT, _TASK):
-                (kept.lights if kind == _LIGHT else kept.tasks)[owner, name] = curve
+                (curves.lights if kind == _LIGHT else curves.tasks)[owner, name] = curve
             else:
-                {_QE: kept.sensor, _COLORANT: kept.colorants}.get(kind, kept.limits)[name] = curve
-        return kept
+                {_QE: curves.sensor, _COLORANT: curves.colorants}.get(kind, curves.limits)[name] = curve
+        return curves

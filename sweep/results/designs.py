@@ -65,10 +65,10 @@ def rows_of_series(
     study: Study, table: pd.DataFrame
 ) -> Iterator[tuple[str, str, dict[str, float], Mapping[Any, Any], Float[Array, "1 modified wavelengths"], Space]]:
     """Yield each design that was computed in all scenarios of a series."""
-    few = named_rows(table)
+    shown = named_rows(table)
     for (series, key), scenarios in series_of(study.scenarios).items():
         by_name: dict[str, dict[str, Mapping[Any, Any]]] = {}
-        for row in few:
+        for row in shown:
             if row["scenario"] in scenarios:
                 by_name.setdefault(row["name"], {})[row["scenario"]] = row
         for of_scene in by_name.values():
@@ -126,29 +126,35 @@ def study_of(output: Output, data: Path | None, *, allow_code: bool = False) -> 
         whose = ", ".join(in_files or [name.removeprefix(CODE_OF) for name in code])
         problem = f"it was made with the code of {whose}"
         raise OutputError(ValidationIssue(problem, str(output.folder), allowed=f"{where}--allow-code, if you trust it"))
-    kept = output.curves
+    stored = output.curves
     if data is None and digests.keys() - code:
-        return load_study(path, kept=KeptSources(kept.sensor, kept.lights, kept.tasks, kept.colorants), allow_code=code)
+        return load_study(
+            path, stored=KeptSources(stored.sensor, stored.lights, stored.tasks, stored.colorants), allow_code=code
+        )
     study = load_study(path, data, allow_code=code)
     lights = zip(study.lights.types, study.lights.names, study.lights.photons, strict=True)
-    check_kept(output, kept.sensor, study.sensor.qe)
-    check_kept(output, kept.lights, {(kind, name): values for kind, name, values in lights})
-    made = study.colorants
-    check_kept(output, kept.colorants, {} if made is None else dict(zip(made.names, made.absorbance, strict=True)))
-    check_kept(output, kept.tasks, {} if study.tasks is None else study.tasks.from_files)
+    check_kept(output, stored.sensor, study.sensor.qe)
+    check_kept(output, stored.lights, {(kind, name): values for kind, name, values in lights})
+    colorants = study.colorants
+    check_kept(
+        output,
+        stored.colorants,
+        {} if colorants is None else dict(zip(colorants.names, colorants.absorbance, strict=True)),
+    )
+    check_kept(output, stored.tasks, {} if study.tasks is None else study.tasks.from_files)
     return study
 
 
-def check_kept(output: Output, kept: Mapping[_Key, PerWavelength], made: Mapping[_Key, PerWavelength]) -> None:
+def check_kept(output: Output, stored: Mapping[_Key, PerWavelength], computed: Mapping[_Key, PerWavelength]) -> None:
     """Compare curves with those that the run kept.
 
     Raises OutputError if they differ.
     """
 
-    def same(one: SameShape, other: SameShape) -> bool:
-        return one.shape == other.shape and bool(np.abs(one - other).max(initial=0.0) <= _SAME)
+    def same(first: SameShape, second: SameShape) -> bool:
+        return first.shape == second.shape and bool(np.abs(first - second).max(initial=0.0) <= _SAME)
 
-    different = [str(name) for name, values in made.items() if name in kept and not same(kept[name], values)]
+    different = [str(name) for name, values in computed.items() if name in stored and not same(stored[name], values)]
     if different:
         shown = ", ".join(different[:_MOST_SHOWN]) + (" and more" if len(different) > _MOST_SHOWN else "")
         problem = f"computed again, these differ from the run: {shown}"

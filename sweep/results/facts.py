@@ -58,7 +58,7 @@ class PlanFacts(_Facts):
     @property
     def computed(self) -> list[str]:
         """Effects that were computed."""
-        return [one.effect for one in self.effects if one.computed]
+        return [choice.effect for choice in self.effects if choice.computed]
 
 
 class CheckFacts(_Facts):

@@ -16,7 +16,10 @@ CHUNK = 4096
 
 
 def identity(study: Study) -> dict[str, Any]:
-    """Return everything that a run depends on."""
+    """Return everything that a run depends on.
+
+    Checked study, digests of its curves, and version of the model.
+    """
     curves, lights = hashlib.sha256(), hashlib.sha256()
     for name, curve in sorted(study.sensor.qe.items()):
         curves.update(name.encode() + curve.tobytes())

@@ -43,7 +43,8 @@ class Inventory:
     """The files of a run's folder, empty where there is no run.
 
     `files`: name (`figures/chart.png`) -> SHA-256 of the file; `damaged`: `run.json` is there, but not as the run wrote
-    it; `facts` then has the fingerprint of the provenance, if any.
+    it; `facts` then has the fingerprint of the provenance, if any. `facts` is `run.json`: `fingerprint` and `identity`
+    of the study, and its number of designs.
     """
 
     def __init__(self, folder: Path) -> None:

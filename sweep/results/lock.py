@@ -93,7 +93,7 @@ def in_use(output: Path) -> bool:
 def _clear(output: Path) -> None:
     """Remove half-written files of killed commands and workers, but not through links."""
     inner = (output / PARTS, output / FIGURES)
-    for folder in (output, *(one for one in inner if is_real_folder(one))):
+    for folder in (output, *(inner_folder for inner_folder in inner if is_real_folder(inner_folder))):
         for path in folder.iterdir():
             if re.fullmatch(LEFT_OVER, path.name) and not is_real_folder(path):
                 path.unlink(missing_ok=True)

@@ -93,8 +93,8 @@ class Output:
         """Return a value that several parts of a report share, computed at its first use."""
         if key not in self._made:
             self._made[key] = make()
-        made: _Made = self._made[key]
-        return made
+        stored: _Made = self._made[key]
+        return stored
 
     @property
     def doubts(self) -> list[str]:
@@ -212,7 +212,7 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
     inventory = Inventory(folder)
     inventory.require_run()
     if inventory.runs:
-        names = ", ".join(folder_name(one.name) for one in inventory.runs)
+        names = ", ".join(folder_name(run.name) for run in inventory.runs)
         raise OutputError(ValidationIssue("holds the runs of several sensors", str(folder), allowed=f"one of {names}"))
     unverified = inventory.unverified
     if PROVENANCE not in (*inventory.files, *unverified):
@@ -295,11 +295,11 @@ def _mapping(path: Path, parse: Callable[[str], Any]) -> dict[str, Any]:
     return content
 
 
-def _check_columns(path: Path, wanted: Sequence[str]) -> None:
+def _check_columns(path: Path, needed: Sequence[str]) -> None:
     """Raise OutputError for a table without the requested columns."""
     try:
         names = pq.read_schema(path).names
     except (OSError, pa.ArrowException) as error:
         raise OutputError(ValidationIssue(f"cannot be read: {error}", str(path))) from None
-    if missing := [name for name in dict.fromkeys(wanted) if name not in names]:
+    if missing := [name for name in dict.fromkeys(needed) if name not in names]:
         raise missing_parts_error(path, missing)

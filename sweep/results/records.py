@@ -57,7 +57,7 @@ def _made(kind: Any, data: Any) -> Any:
             raise ValueError(f"other fields: {list(data)}")
         return kind(**{name: _made(hints[name], inner) for name, inner in data.items()})  # type: ignore[operator]
     if origin in (Union, types.UnionType):
-        (inner,) = (one for one in kinds if one is not types.NoneType)
+        (inner,) = (converted for converted in kinds if converted is not types.NoneType)
         return None if data is None else _made(inner, data)
     if isinstance(kind, type) and issubclass(kind, AbstractArray):
         content = base64.b64decode(data["base64"], validate=True)
@@ -71,7 +71,7 @@ def _made(kind: Any, data: Any) -> Any:
             raise TypeError(f"no list: {str(data)[:40]!r}")
         alike = origin is not tuple or kinds[-1] is Ellipsis
         pairs = zip(kinds[:1] * len(data) if alike else kinds, data, strict=True)
-        return (list if origin is list else tuple)(_made(one, inner) for one, inner in pairs)
+        return (list if origin is list else tuple)(_made(converted, inner) for converted, inner in pairs)
     return _value(kind, data)
 
 

@@ -65,8 +65,8 @@ class Counts:
 
     def _designs(self, scenario: str | None, cfa: str | None, met: bool) -> Iterator[tuple[bool, int]]:
         for (kind, own_scenario, own_cfa, status, feasible, pareto), n in self.groups.items():
-            wanted = scenario in (None, own_scenario) and cfa in (None, own_cfa)
-            if kind != REFERENCE and status == "ok" and feasible == met and wanted:
+            is_there = scenario in (None, own_scenario) and cfa in (None, own_cfa)
+            if kind != REFERENCE and status == "ok" and feasible == met and is_there:
                 yield pareto, n
 
 
@@ -124,7 +124,7 @@ def thinned(
     except (OSError, pa.ArrowException) as error:
         raise OutputError(ValidationIssue(f"cannot be read: {error}", str(path))) from None
     step = max(1, -(-total // MOST_ROWS))
-    kept: list[pa.Table] = []
+    selected: list[pa.Table] = []
     counted: Counter[_Group] = Counter()
     for table in batches(path):
         names = [table[name].cast(pa.string()) for name in _COUNTED[:4]]
@@ -132,16 +132,16 @@ def thinned(
         for row in groups.aggregate([([], "count_all")]).to_pylist():
             counted[*(row[name] for name in _COUNTED)] += row["count_all"]
         ids, feasible = table["design_id"].to_numpy(), table["feasible"].to_numpy()
-        wanted = ~word_mask(table, "kind", SWEPT) | table["pareto"].to_numpy() | (ids % step == 0) | np.isin(ids, keep)
+        is_kept = ~word_mask(table, "kind", SWEPT) | table["pareto"].to_numpy() | (ids % step == 0) | np.isin(ids, keep)
         if step > 1:
-            wanted[leading_rows(table, separation)] = True
+            is_kept[leading_rows(table, separation)] = True
             for rows in row_groups(table).values():
                 among = np.zeros(table.num_rows, dtype=bool)
                 among[rows] = feasible[rows]
-                wanted[best_at(table, order, _BEST, among)] = True
-        kept.append(table.filter(pa.array(wanted)))
+                is_kept[best_at(table, order, _BEST, among)] = True
+        selected.append(table.filter(pa.array(is_kept)))
         pa.default_memory_pool().release_unused()
-    frame: pd.DataFrame = pa.concat_tables(kept).unify_dictionaries().to_pandas()
+    frame: pd.DataFrame = pa.concat_tables(selected).unify_dictionaries().to_pandas()
     frame = frame.sort_values("design_id", ignore_index=True)
     frame[per_exposure(separation)] = frame[separation] / (frame[EXPOSURE] * _MS)
     return frame, Counts(counted)
@@ -166,8 +166,8 @@ def best_at(
         first = np.nan_to_num(table[order[0]].to_numpy()[at], nan=-np.inf, posinf=np.inf, neginf=-np.inf)
         at = at[first >= np.partition(first, -most)[-most]]
     keys = [*((name, "descending") for name in dict.fromkeys(order)), ("design_id", "ascending")]
-    few = table.select([name for name, _ in keys]).take(at)
-    return np.asarray(at[pc.sort_indices(few, sort_keys=keys)[:most].to_numpy()])
+    sort_columns = table.select([name for name, _ in keys]).take(at)
+    return np.asarray(at[pc.sort_indices(sort_columns, sort_keys=keys)[:most].to_numpy()])
 
 
 def leading_rows(

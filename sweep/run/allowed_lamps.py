@@ -45,13 +45,13 @@ def regions_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
     assert regions is not None
     leds = all_leds(regions)
     allowed = {norm: (leds.allowed(norm, "yellow"), leds.allowed(norm, "red")) for norm in regions.norms}
-    few, calls = named_rows(rows), []
-    for row in few:
+    shown, calls = named_rows(rows), []
+    for row in shown:
         space, curves = row_curves(study, row)
         setup = study.setup(space, row["scenario"]).with_all_effects
         calls.append(delayed(_cells, setup, curves, allowed, regions.wanted_dn))
-    answers = zip(few, run_with_progress(parallel, calls, "color regions", progress), strict=True)
-    cells = [{"design_id": row["design_id"], **cell} for row, made in answers for cell in made]
+    answers = zip(shown, run_with_progress(parallel, calls, "color regions", progress), strict=True)
+    cells = [{"design_id": row["design_id"], **cell} for row, cells_of_design in answers for cell in cells_of_design]
     return pa.Table.from_pylist(cells, schema=_SCHEMA)
 
 

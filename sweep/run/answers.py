@@ -36,18 +36,18 @@ class CachedCalls:
             hashlib.sha256(f"{self.fingerprint} answer {self._round}, {at}".encode()).hexdigest()
             for at in range(len(waiting))
         ]
-        kept = {at: self._answer(key, call) for at, (key, call) in enumerate(zip(keys, waiting, strict=True))}
-        kept = {at: answer for at, answer in kept.items() if answer is not None}
-        missing = [at for at in range(len(waiting)) if at not in kept]
+        finished = {at: self._answer(key, call) for at, (key, call) in enumerate(zip(keys, waiting, strict=True))}
+        finished = {at: answer for at, answer in finished.items() if answer is not None}
+        missing = [at for at in range(len(waiting)) if at not in finished]
         fresh = self.pool.unordered(waiting[at] for at in missing)
         for at, key in enumerate(keys):
-            while at not in kept:
+            while at not in finished:
                 number, answer = next(fresh)
-                kept[missing[number]] = answer
+                finished[missing[number]] = answer
                 self.parts.save(keys[missing[number]], ANSWER, to_json(answer))
-            if isinstance(kept[at], Limit):
+            if isinstance(finished[at], Limit):
                 self._limits.append(key)
-            yield kept.pop(at)
+            yield finished.pop(at)
 
     def drop_limits(self) -> None:
         """Forget upper bounds that cannot be right, so that the same command computes them again."""

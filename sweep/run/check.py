@@ -64,10 +64,10 @@ def _compared(study: Study, space: Space, scenario: str, rows: Sequence[Row]) ->
         exact |= worst_cases(space, model, points, nominal, worst, study.tolerance)
     differences = []
     for name, values in exact.items():
-        kept = np.array([row[name] for row in rows], dtype=float)
+        stored = np.array([row[name] for row in rows], dtype=float)
         # A column that the scene does not have is missing in both; one that is missing in one of them is an issue.
-        both_missing = np.isnan(kept) & np.isnan(values)
-        differences.append(np.nan_to_num(np.where(both_missing, 0.0, np.abs(values - kept)), nan=np.inf))
+        both_missing = np.isnan(stored) & np.isnan(values)
+        differences.append(np.nan_to_num(np.where(both_missing, 0.0, np.abs(values - stored)), nan=np.inf))
     realized, names = np.stack(differences), list(exact)
     allowed = _allowed_dn(setup, study.plans[scenario].tolerance_dn if study.plans else study.section.tolerance_dn)
     return [

@@ -66,7 +66,7 @@ def error_against_noise_table(study: Study, highlights: pd.DataFrame) -> pa.Tabl
 def rendered_table(study: Study, highlights: pd.DataFrame) -> pa.Table:
     """Compute the areas of two pictures: the chart in daylight, and a night scene under white LEDs.
 
-    Returns one row per design, picture and area.
+    Returns one row per design, picture and area. Those of the eye itself have no design.
     """
     from ..metrics.tasks.evaluation import rendered_areas  # noqa: PLC0415
     from ..spectra.builtin.task_sets import NIGHT_LIGHT, NIGHT_LX, night_scene  # noqa: PLC0415  (few studies have tasks)

@@ -58,8 +58,8 @@ def crossings_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progre
             known = {name: errors[name].to_dict() for name in errors}
             calls.append(delayed(_of_design, ErrorsBetween(scenes, curves, study.states), known, recognition.error_max))
     answers = run_with_progress(parallel, calls, "where designs stop being usable", progress)
-    made = [key | at for key, found in zip(keys, answers, strict=True) for at in found]
-    return pa.Table.from_pylist(made, schema=_SCHEMA)
+    crossings = [key | at for key, found in zip(keys, answers, strict=True) for at in found]
+    return pa.Table.from_pylist(crossings, schema=_SCHEMA)
 
 
 class ErrorsBetween:
@@ -125,12 +125,14 @@ def crossings_of(
             continue
         grid = [low, *inner_numbers([low, high])[1:-1], high]
         grid = [number for number in grid if not math.isnan(decades(number))]
-        for one, other in pairwise(grid):
-            if (decades(one) <= 0) == (decades(other) <= 0):
+        for before, after in pairwise(grid):
+            if (decades(before) <= 0) == (decades(after) <= 0):
                 continue
-            ends = (math.log(one), math.log(other)) if by_ratio else (one, other)
-            tolerance = _CLOSE * (1.0 if by_ratio else abs(other - one))
-            number = at(brentq(lambda position, ends=(one, other): of_ends(at(position), ends), *ends, xtol=tolerance))
+            ends = (math.log(before), math.log(after)) if by_ratio else (before, after)
+            tolerance = _CLOSE * (1.0 if by_ratio else abs(after - before))
+            number = at(
+                brentq(lambda position, ends=(before, after): of_ends(at(position), ends), *ends, xtol=tolerance)
+            )
             error = allowed * 10 ** decades(number)
-            found.append({"at": number, "error": error, "rises": decades(other) > 0})
+            found.append({"at": number, "error": error, "rises": decades(after) > 0})
     return found

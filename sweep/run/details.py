@@ -119,7 +119,7 @@ def limited_by_table(
             calls.append(delayed(_limits, study.setup(space, scenarios[scene_index]), space, numbers))
             parts.append(ids[part].tolist())
     for part, lights in zip(parts, run_with_progress(parallel, calls, "limiting lights", progress), strict=True):
-        names |= {one: {pair: lights[pair][index] for pair in lights} for index, one in enumerate(part)}
+        names |= {design_id: {pair: lights[pair][index] for pair in lights} for index, design_id in enumerate(part)}
     shown = sorted(names)
     limits = {
         limited_by_name(pair): pa.array([names[at].get(pair) for at in shown], pa.string()) for pair in study.pairs

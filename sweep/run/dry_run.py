@@ -32,9 +32,9 @@ class RemainingWork:
 def remaining_work(study: Study, output: Path, n_jobs: int) -> RemainingWork:
     """Plan a study and read which parts are kept, without computing or writing."""
     held = run_in(output)
-    whole = held is not None and held.is_of(run_facts(study)) and not held.wrong([RESULTS], quick=True)
+    is_finished = held is not None and held.is_of(run_facts(study)) and not held.wrong([RESULTS], quick=True)
     study = study.with_plans()
-    if whole:
+    if is_finished:
         return RemainingWork(study, study.n_designs, 0, searches=False)
     sweep = Sweep(study, rules_of(study), Parts(output), Workers(n_jobs))
     rows = sum(sweep.jobs[index].size for index in sweep.todo)

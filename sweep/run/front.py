@@ -32,17 +32,17 @@ def report_rows(table: pa.Table, rules: Rules) -> pa.Table:
     Plain CFAs, named designs and answers are all kept. `pareto` marks the front of any part of a run's rows, so that
     the function may be applied again to concatenated results.
     """
-    few, on_front = word_mask(table, "kind", *NAMED_KINDS), table["pareto"].to_numpy()
+    is_named, on_front = word_mask(table, "kind", *NAMED_KINDS), table["pareto"].to_numpy()
     feasible = table["feasible"].to_numpy()
-    kept = [np.flatnonzero(few), leading_rows(table, rules.front[0], ~few)]
+    selected = [np.flatnonzero(is_named), leading_rows(table, rules.front[0], ~is_named)]
     for at in row_groups(table).values():
-        swept = at[~few[at]]
+        swept = at[~is_named[at]]
         marked = swept[on_front[swept]]
-        kept.append(marked[non_dominated(_values(table.take(marked), rules.front))])
+        selected.append(marked[non_dominated(_values(table.take(marked), rules.front))])
         eligible = np.zeros(table.num_rows, dtype=bool)
         eligible[swept] = feasible[swept]
-        kept.append(best_at(table, rules.order, BEST_PER_CFA, eligible))
-    return table.take(np.unique(np.concatenate(kept)).astype(np.int64)).combine_chunks()
+        selected.append(best_at(table, rules.order, BEST_PER_CFA, eligible))
+    return table.take(np.unique(np.concatenate(selected)).astype(np.int64)).combine_chunks()
 
 
 def _values(table: pa.Table, axes: tuple[str, str]) -> Float[Array, "rows objectives"]:
@@ -58,9 +58,9 @@ class RunRows:
         self._rows = pa.table({})
         self._front: dict[_Group, set[tuple[float, ...]]] = {}
 
-    def add(self, few: pa.Table) -> None:
+    def add(self, rows: pa.Table) -> None:
         """Add the result of `report_rows` for a part of the rows."""
-        self._waiting.append(few)
+        self._waiting.append(rows)
         if sum(table.num_rows for table in self._waiting) > _AT_ONCE:
             self._waiting = [report_rows(self._all(), self.rules)]
 
@@ -84,21 +84,21 @@ class RunRows:
         """Return a table of the run with `pareto` only where a row is on the front of the whole run."""
         front: BoolArray = np.zeros(table.num_rows, dtype=bool)
         local = np.flatnonzero(table["pareto"].to_numpy())
-        few = table.take(local)
-        groups = zip(few["cfa"].to_pylist(), few["scenario"].to_pylist(), strict=True)
-        values = map(tuple, _values(few, self.rules.front).tolist())
+        marked_rows = table.take(local)
+        groups = zip(marked_rows["cfa"].to_pylist(), marked_rows["scenario"].to_pylist(), strict=True)
+        values = map(tuple, _values(marked_rows, self.rules.front).tolist())
         front[local] = [pair in self._front[group] for pair, group in zip(values, groups, strict=True)]
         at = table.schema.get_field_index("pareto")
         return table.set_column(at, table.schema.field(at), pa.array(front))
 
     def frame(self) -> pd.DataFrame:
         """Return the rows to draw: all that are not swept, and the first scenario's best swept rows of each CFA."""
-        few, drawn = word_mask(self._rows, "kind", *NAMED_KINDS), self._drawn()
+        is_named, drawn = word_mask(self._rows, "kind", *NAMED_KINDS), self._drawn()
         best = [
             best_at(self._rows, self.rules.order, BEST_PER_CFA, drawn & word_mask(self._rows, "cfa", cfa))
             for cfa in self._cfas()
         ]
-        return self._frame([np.flatnonzero(few), *best])
+        return self._frame([np.flatnonzero(is_named), *best])
 
     def front_frame(self) -> pd.DataFrame:
         """Return swept rows: an even sample of the first scenario's feasible front, and those that lead a scenario."""

@@ -42,13 +42,13 @@ def handovers_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progre
             keys.append({"name": row["name"], "series": series, "key": key})
             calls.append(delayed(_handovers, first, scenes, curves, np.array([*scenarios.values()])))
     answers = run_with_progress(parallel, calls, "handovers of captures", progress)
-    made = [key | row for key, rows_of_design in zip(keys, answers, strict=True) for row in rows_of_design]
-    return pa.Table.from_pylist(made, schema=_SCHEMA)
+    table_rows = [key | row for key, rows_of_design in zip(keys, answers, strict=True) for row in rows_of_design]
+    return pa.Table.from_pylist(table_rows, schema=_SCHEMA)
 
 
 def _handovers(setup: Setup, scenes: Between, curves: DesignCurves, numbers: PerDesign) -> list[dict[str, Any]]:
     """Return rows of the table without their keys."""
-    pixel, known, made = setup.camera.pixel, dict[float, FloatArray](), []
+    pixel, known, handovers = setup.camera.pixel, dict[float, FloatArray](), []
 
     def electrons(number: float) -> Float[Array, "signals channels"]:
         """Return expected electrons, the mean over phases, field positions and moments, [n_signals, n_channels]."""
@@ -64,14 +64,14 @@ def _handovers(setup: Setup, scenes: Between, curves: DesignCurves, numbers: Per
             def typical_e(number: float, at: int = at, members: MemberNumbers = members) -> float:
                 return float(np.median(electrons(number)[members, at]))
 
-            for number, (capture, one, limit) in enumerate(
+            for number, (capture, readout, limit) in enumerate(
                 zip(pixel.captures, pixel.read_as, limits_dn(pixel), strict=True), 1
             ):
-                full_e = one.saturation_e if limit is None else (limit - one.offset_dn) / one.dn_per_e
+                full_e = readout.saturation_e if limit is None else (limit - readout.offset_dn) / readout.dn_per_e
                 share = full_e / (capture.light * capture.qe_factor.get(channel, 1.0))
                 row = {"channel": channel, "signal_type": kind, "capture": number}
-                made.append(row | {"at": _reached(numbers, typical_e, share)})
-    return made
+                handovers.append(row | {"at": _reached(numbers, typical_e, share)})
+    return handovers
 
 
 def _reached(numbers: PerDesign, value: Callable[[float], float], limit: float) -> float:

@@ -31,7 +31,8 @@ def left_out_table(study: Study, search: Search, best: Evaluation, parallel: Par
     Each search starts from the study's answer and a few other points. For a worst case the nominal quantity is
     searched, too. A light that is alone in its type cannot be left out.
 
-    `seen`: optimum without the light, `with_it`: the same design with all lights, `fall`: the difference.
+    `seen`: optimum without the light, `with_it`: the same design with all lights, `fall`: the difference. All are
+    before clipping and quantization.
     """
     problem, seed, lights = study.problem(search), study.section.seed, study.lights
     points = starting_points(problem, _LEFT_OUT_STARTS - 1, seed)
@@ -98,18 +99,20 @@ def _without(
 ) -> tuple[float, float, float] | None:
     """Return the objective of the optimum without a light: without it, with it, and their difference."""
     lights = problem.setup.lights
-    kept = [i for i in range(len(lights.names)) if i != light]
+    remaining = [i for i in range(len(lights.names)) if i != light]
     fewer_lights = replace(
         lights,
-        names=tuple(lights.names[i] for i in kept),
-        types=tuple(lights.types[i] for i in kept),
-        photons=lights.photons[kept],
+        names=tuple(lights.names[i] for i in remaining),
+        types=tuple(lights.types[i] for i in remaining),
+        photons=lights.photons[remaining],
     )
-    (setup, _), *others = ((replace(one, lights=fewer_lights), family) for one, family in problem.scenes)
+    (setup, _), *others = (
+        (replace(setup_of_scene, lights=fewer_lights), family) for setup_of_scene, family in problem.scenes
+    )
     fewer = replace(problem, setup=setup, others=tuple(others))
     log = [e for i, start in enumerate(starts) for e in search_from(fewer, i, start, algorithm, evaluations, seed).log]
     best = best_feasible(log)
     if best is None:
         return None
-    whole = smooth_objective(problem, best.x)
-    return best.objective, whole, best.objective - whole
+    with_light = smooth_objective(problem, best.x)
+    return best.objective, with_light, best.objective - with_light

@@ -43,7 +43,10 @@ def plan_facts(study: Study) -> dict[str, Any]:
 
 
 def provenance(study: Study, how: Mapping[str, Any]) -> dict[str, Any]:
-    """Return versions, digests, seed and machine."""
+    """Return versions, digests, seed and machine.
+
+    `how`: `command`, `duration_s`, `backend`, `scheduler` and `workers` of the run.
+    """
     vision = study.section.vision
     packages = (*_PACKAGES, "jax", "optax") if vision is not None and vision.network else _PACKAGES
     return {

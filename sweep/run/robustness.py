@@ -49,7 +49,7 @@ class Candidate:
     point: Float[Array, "1 parameters"]
     tolerance: Tolerance
 
-    def imager(self, scale: float) -> PopulationModel:
+    def population_model(self, scale: float) -> PopulationModel:
         """Return the scene with a scaled population of its lights."""
         population = self.setup.lights.population
         assert population is not None
@@ -57,15 +57,15 @@ class Candidate:
             replace(self.setup, lights=replace(self.setup.lights, population=population.scaled(scale)))
         )
 
-    def curves(self, off: ProductionError) -> Float[Array, "1 modified wavelengths"]:
+    def curves(self, production_error: ProductionError) -> Float[Array, "1 modified wavelengths"]:
         """Return the filters as production makes them."""
-        return np.asarray(self.space.curves(self.point, self.setup.camera.grid.size, off), dtype=float)
+        return np.asarray(self.space.curves(self.point, self.setup.camera.grid.size, production_error), dtype=float)
 
     def worst(self, pair: Pair, scale: float) -> tuple[float, ProductionError]:
         """Return the smallest CSD over a scaled population and scaled tolerances."""
-        imager, made = self.imager(scale), self.space.filter is not None
-        errors = self.tolerance.scaled(scale).places if made else (AS_DESIGNED,)
-        csds = imager.worst(np.concatenate([self.curves(off) for off in errors]), [pair])[csd_name(pair)]
+        model, has_filter = self.population_model(scale), self.space.filter is not None
+        errors = self.tolerance.scaled(scale).places if has_filter else (AS_DESIGNED,)
+        csds = model.worst(np.concatenate([self.curves(off) for off in errors]), [pair])[csd_name(pair)]
         at = int(csds.argmin())
         return float(csds[at]), errors[at]
 
@@ -81,15 +81,17 @@ def robustness_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progr
     """
     pair = study.pair_over_population
     assert pair is not None
-    few, calls = named_rows(rows), []
-    for row in few:
-        plain = [one for one in few if one["kind"] == REFERENCE and one["scenario"] == row["scenario"]]
-        best = max(plain, key=lambda one: one[f"worst_{csd_name(pair)}"], default=row)
+    shown, calls = named_rows(rows), []
+    for row in shown:
+        plain = [
+            cfa_row for cfa_row in shown if cfa_row["kind"] == REFERENCE and cfa_row["scenario"] == row["scenario"]
+        ]
+        best = max(plain, key=lambda cfa_row: cfa_row[f"worst_{csd_name(pair)}"], default=row)
         rival = None if best["design_id"] == row["design_id"] else _design(study, best)
         calls.append(delayed(_robustness, _design(study, row), rival, pair, study.section.seed))
-    answers = zip(few, run_with_progress(parallel, calls, "robustness", progress), strict=True)
-    made = [{"design_id": row["design_id"], **numbers, **lights} for row, (numbers, lights) in answers]
-    return pa.Table.from_pylist(made, schema=pa.schema(_FIELDS))
+    answers = zip(shown, run_with_progress(parallel, calls, "robustness", progress), strict=True)
+    table_rows = [{"design_id": row["design_id"], **numbers, **lights} for row, (numbers, lights) in answers]
+    return pa.Table.from_pylist(table_rows, schema=pa.schema(_FIELDS))
 
 
 def _design(study: Study, row: dict[Any, Any]) -> Candidate:
@@ -106,9 +108,9 @@ def _robustness(
     population = design.setup.lights.population
     assert population is not None
     if population.wanted_dn is not None:
-        kept = int((drawn_dn(design, pair, seed) >= population.wanted_dn).sum())
-        low, high = share_interval(kept, population.draws)
-        numbers |= {"yield": kept / population.draws, "yield_low": low, "yield_high": high}
+        successes = int((drawn_dn(design, pair, seed) >= population.wanted_dn).sum())
+        low, high = share_interval(successes, population.draws)
+        numbers |= {"yield": successes / population.draws, "yield_low": low, "yield_high": high}
     return numbers, lights
 
 
@@ -121,19 +123,19 @@ def _breaks(design: Candidate, rival: Candidate, pair: Pair) -> tuple[dict[str, 
     scale = _first(below)
     if scale is None:
         return {}, {}
-    least, off = design.worst(pair, scale)
-    imager = design.imager(scale)
-    response = imager.imager.smooth(design.curves(off))[0]
-    near = min((imager.nearest(case, pair) for case in response), key=lambda pairs: float(pairs.squared.min()))
+    least, production_error = design.worst(pair, scale)
+    model = design.population_model(scale)
+    response = model.linear.smooth(design.curves(production_error))[0]
+    near = min((model.nearest(case, pair) for case in response), key=lambda pairs: float(pairs.squared.min()))
     at = np.unravel_index(int(near.squared.argmin()), near.squared.shape)
-    lights, population = design.setup.lights, design.imager(scale).members.population
+    lights, population = design.setup.lights, design.population_model(scale).members.population
     names = dict[str, str]()
-    numbers: dict[str, float] = {"breaks_at": scale, "breaks_dn": least, "breaks_edge_nm": off.shift_nm}
-    numbers |= {"breaks_thickness": off.thickness, "breaks_broadening": off.broadening}
+    numbers: dict[str, float] = {"breaks_at": scale, "breaks_dn": least, "breaks_edge_nm": production_error.shift_nm}
+    numbers |= {"breaks_thickness": production_error.thickness, "breaks_broadening": production_error.broadening}
     warm = []
     for side, (name, starts) in enumerate((("first", near.first), ("second", near.second))):
-        signal = imager.members.signal(int(starts[at[side]]))
-        nm = imager.members.shift_nm(int(near.steps[at][side]), float(near.shares[at][side]))
+        signal = model.members.signal(int(starts[at[side]]))
+        nm = model.members.shift_nm(int(near.steps[at][side]), float(near.shares[at][side]))
         names[f"breaks_{name}"], numbers[f"breaks_{name}_nm"] = lights.names[signal], nm
         warm.append(population.temperature_of(lights.types[signal], lights.names[signal], nm))
     together = max(low for low, _ in warm), min(high for _, high in warm)
@@ -159,10 +161,10 @@ def _first(below: Callable[[float], bool]) -> float | None:
 
 def drawn_dn(design: Candidate, pair: Pair, seed: int) -> Float[Array, " draws"]:
     """Return the CSD of two random members per draw, before clipping and rounding; equal draws for all designs."""
-    imager = population_model(design.setup)
+    model = population_model(design.setup)
     tolerance = design.tolerance if design.space.filter is not None else NONE
-    draws = draws_of(imager.members, pair, tolerance, (seed, 1))
+    draws = draws_of(model.members, pair, tolerance, (seed, 1))
     dn = np.empty(draws.size)
-    for number, off in enumerate(draws.offs):
-        draws.distances(number, imager.imager.smooth(design.curves(off))[0], dn)
+    for number, production_error in enumerate(draws.production_errors):
+        draws.distances(number, model.linear.smooth(design.curves(production_error))[0], dn)
     return dn

@@ -126,8 +126,14 @@ def worst_cases(
 ) -> Columns:
     """Return worst cases over production errors, and of CSDs over the population of the lights."""
     setup = model.setup
-    errors = [off for off in tolerance.places if any(off)] if space.filter is not None else []
-    curves = [space.curves(points, setup.camera.grid.size, off) for off in (AS_DESIGNED, *errors)]
+    errors = (
+        [production_error for production_error in tolerance.places if any(production_error)]
+        if space.filter is not None
+        else []
+    )
+    curves = [
+        space.curves(points, setup.camera.grid.size, production_error) for production_error in (AS_DESIGNED, *errors)
+    ]
     cases = [nominal, *(evaluate(model, shifted, user_metrics=user_metrics) for shifted in curves[1:])]
     if setup.lights.population is not None:
         from ..metrics.members import population_model  # noqa: PLC0415  (only where lights have a population)
@@ -145,7 +151,11 @@ def _of_a_share(space: Space, setup: Setup, points: Float[Array, "points 2"], ru
     tolerance = rules.tolerance if space.filter is not None else NONE
     drawn = LampsAndCameras(population_model(setup), tolerance, rules.seed)
     pairs = [q.pair for q in rules.quantities.values() if q.extreme == OF_A_SHARE and q.pair is not None]
-    csds = drawn.columns(lambda off, some: space.curves(points[some], setup.camera.grid.size, off), len(points), pairs)
+    csds = drawn.columns(
+        lambda production_error, designs: space.curves(points[designs], setup.camera.grid.size, production_error),
+        len(points),
+        pairs,
+    )
     return {YIELD + name: values for name, values in csds.items()}
 
 

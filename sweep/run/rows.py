@@ -146,10 +146,14 @@ def _table(job: Job, rules: Rules, values: Mapping[str, Any]) -> pa.Table:
         known |= {"plan": _word(plan.key, n), "promised_dn": np.full(n, plan.error_bound_dn)}
 
     def column(field: pa.Field) -> pa.Array:
-        made = known.get(field.name)
-        if made is None:
+        values_of_field = known.get(field.name)
+        if values_of_field is None:
             return pa.nulls(n, field.type)
-        return made if isinstance(made, pa.Array) else pa.array(made, field.type, from_pandas=True)
+        return (
+            values_of_field
+            if isinstance(values_of_field, pa.Array)
+            else pa.array(values_of_field, field.type, from_pandas=True)
+        )
 
     return pa.Table.from_arrays([column(field) for field in rules.schema], schema=rules.schema)
 

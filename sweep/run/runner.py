@@ -112,7 +112,8 @@ def run_study(
 
     Raises OutputError: the folder is in use, holds another study or files of others, or cannot be written. Raises
     InfeasibleError: the search finds no feasible design; nothing is left behind. Raises FailedDesignError: a design
-    failed, with `fail_fast`. Raises InterruptedRunError: SIGINT or SIGTERM came; finished parts are kept.
+    failed, with `fail_fast`. Raises InterruptedRunError: SIGINT or SIGTERM came; finished parts are kept. Returns the
+    names of the files that were made; none when nothing was left to do.
     """
     started = time.monotonic()
     refuse_unreachable(study)
@@ -186,11 +187,11 @@ class _Run:
         """Answer of the search; None for a study without a search."""
         if self.study.search is None:
             return None
-        kept = self._kept("search")
+        cached_calls = self._kept("search")
         try:
-            return run_search(self.study, self.study.search, kept, self.progress)
+            return run_search(self.study, self.study.search, cached_calls, self.progress)
         except UpperBoundExceededError:
-            kept.drop_limits()
+            cached_calls.drop_limits()
             raise
 
     def _kept(self, what: str) -> CachedCalls:
@@ -217,8 +218,10 @@ class _Run:
             if answer.search.levels:
                 self._write(FRONT, front_table(self.study, answer))
             if self.study.leaves_one_out:
-                kept = self._kept("left out")
-                self._write(LEFT_OUT, left_out_table(self.study, answer.search, answer.best, kept, self.progress))
+                cached_calls = self._kept("left out")
+                self._write(
+                    LEFT_OUT, left_out_table(self.study, answer.search, answer.best, cached_calls, self.progress)
+                )
 
     def _write_row_tables(self, names: set[str]) -> None:
         rows, on_front = self.gathered.frame(), self.gathered.front_frame()

@@ -49,7 +49,10 @@ class Reader:
 
 
 def images_of_test(images: pd.DataFrame) -> pd.DataFrame:
-    """Return the images of a run that predictions are of, with their names."""
+    """Return the images of a run that predictions are of, with their names.
+
+    They are of lamps that no network has seen, with `image_id`.
+    """
     unseen = images[images["lamps"] == UNSEEN]
     keys = zip(unseen["design_id"], unseen["seed"], unseen["order"], unseen["image"], strict=True)
     return unseen.assign(**{_ID: [image_id(d, seed, order, TEST, at) for d, seed, order, at in keys]})
@@ -173,10 +176,10 @@ def scores_of(reader: Reader, images: pd.DataFrame, unknown_cost: float) -> pd.D
     table["cost"] = np.where(table["unknown"], unknown_cost, table["wrong"].astype(float))
     table["observer_wrong"] = table["observer"] != table["state"]
     rows = []
-    whole: list[tuple[Any, Any]] = [(ALL, ALL), *((d, ALL) for d in table["distance_m"].unique())]
-    whole += [*((ALL, level) for level in table["level"].unique())]
-    whole += [*product(table["distance_m"].unique(), table["level"].unique())]
-    for order, (distance, level) in product(table["order"].unique(), whole):
+    conditions: list[tuple[Any, Any]] = [(ALL, ALL), *((d, ALL) for d in table["distance_m"].unique())]
+    conditions += [*((ALL, level) for level in table["level"].unique())]
+    conditions += [*product(table["distance_m"].unique(), table["level"].unique())]
+    for order, (distance, level) in product(table["order"].unique(), conditions):
         answers = table[table["order"] == order]
         answers = answers if distance == ALL else answers[answers["distance_m"] == distance]
         answers = answers if level == ALL else answers[answers["level"] == level]
@@ -236,9 +239,9 @@ def in_any_order(scores: pd.DataFrame) -> pd.DataFrame:
 
 def score_lines(scores: pd.DataFrame) -> Iterator[str]:
     """Yield a line per reader and design, of all test images with lenses in any order."""
-    whole = whole_scores(scores)
-    first = str(whole["name"].iloc[0])
-    for row in whole.to_dict("records"):
+    totals = whole_scores(scores)
+    first = str(totals["name"].iloc[0])
+    for row in totals.to_dict("records"):
         text = f"{row['reader']}, {row['name']}: errs on {_percent(row, 'error')} of {row['images']:,} images"
         text += f", unknown {row['unknown']:.1%}" if row["unknown"] else ""
         if row["name"] != first:

@@ -86,9 +86,9 @@ def street_scores(reader: str, detections: pd.DataFrame, labels: pd.DataFrame, l
 
 def street_lines(scores: pd.DataFrame) -> Iterator[str]:
     """Yield a line per detector and design, over all light levels."""
-    whole = scores[scores["level"] == ALL]
-    first = whole["name"].iloc[0]
-    for row in whole.to_dict("records"):
+    totals = scores[scores["level"] == ALL]
+    first = totals["name"].iloc[0]
+    for row in totals.to_dict("records"):
         text = f"{row['reader']}, {row['name']}: average precision {row['average_precision']:.3f}"
         text += f" ({row['average_precision_low']:.3f} to {row['average_precision_high']:.3f})"
         if row["name"] != first:

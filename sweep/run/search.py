@@ -111,7 +111,7 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
         runs += more
     if series:
         alone = [problem.in_scenario(number) for number in range(len(search.scenarios))]
-        worst = int(np.argmin([smooth_objective(one, best.x) for one in alone]))
+        worst = int(np.argmin([smooth_objective(scene_problem, best.x) for scene_problem in alone]))
         no_limit = reason_without_bound(alone[worst])
         # No filter's worst value is above the bound of any one scenario.
         limit = next(iter(parallel([delayed(limit_of, alone[worst])]))) if no_limit is None else None
@@ -196,7 +196,10 @@ def _infeasible(study: Study, problem: Problem, starts: Float[Array, "starts fre
 
 
 def answer_rows(study: Study, answer: SearchAnswer, rules: Rules, parallel: Parallel) -> list[pa.Table]:
-    """Return the search's answer as the camera reads it out in each scenario, with its upper bound and gap."""
+    """Return the search's answer as the camera reads it out in each scenario, with its upper bound and gap.
+
+    Upper bound and gap stand in the scenario that they hold for.
+    """
     space = answer.search.space
     best = Space(
         "search", answer.search.name, space.cfa, space.filter, tuple((float(value),) for value in answer.best.x)
@@ -208,14 +211,14 @@ def answer_rows(study: Study, answer: SearchAnswer, rules: Rules, parallel: Para
     # Workers have loaded what this takes, and this process has not.
     rows = parallel([delayed(run_job, job, study.setup(best, job.scenario), rules) for job in jobs])
     proven = None if answer.limit is None else answer.limit.proven
-    made: list[pa.Table] = []
+    tables: list[pa.Table] = []
     for job, row in zip(jobs, rows, strict=True):
-        made.append(row)
+        tables.append(row)
         bound = {"limit": proven, "gap": answer.gap} if job.scenario == answer.scenario else {}
         for name, value in {"space": space.name, **bound}.items():
             index, kind = row.schema.get_field_index(name), row.schema.field(name)
-            made[-1] = made[-1].set_column(index, kind, pa.array([value]).cast(kind.type))
-    return made
+            tables[-1] = tables[-1].set_column(index, kind, pa.array([value]).cast(kind.type))
+    return tables
 
 
 def search_facts(study: Study, answer: SearchAnswer) -> dict[str, Any]:
@@ -260,12 +263,12 @@ def bounded_spaces(study: Study, search: Search) -> list[str]:
     assert searched is not None
     names = [f"search {search.space.name}"]
     for space in study.spaces:
-        made, same = space.filter, (search.space.cfa, searched.bases, searched.technology)
-        if made is None or (space.cfa, made.bases, made.technology) != same:
+        filter_of_space, same = space.filter, (search.space.cfa, searched.bases, searched.technology)
+        if filter_of_space is None or (space.cfa, filter_of_space.bases, filter_of_space.technology) != same:
             continue
         low, high = (np.array([end(axis) for axis in space.axes], dtype=float) for end in (min, max))
-        (base,) = (study.sensor.curve(name) for name in made.bases.values())
-        if (made.family.upper(low, high)[0] <= base * (1 + ROUNDING)).all():
+        (base,) = (study.sensor.curve(name) for name in filter_of_space.bases.values())
+        if (filter_of_space.family.upper(low, high)[0] <= base * (1 + ROUNDING)).all():
             names.append(f"{space.kind} {space.name}")
     return names
 
@@ -363,6 +366,6 @@ def front_table(study: Study, answer: SearchAnswer) -> pa.Table:
         rows.append(row)
         for sensitivity, proven in point.onward:
             if np.isfinite(proven):
-                whole = cfa_sensitivity_at(setup, sensitivity)
-                rows.append({"sensitivity_min": sensitivity, "cfa_sensitivity_min": whole, "limit": proven})
+                cfa_sensitivity = cfa_sensitivity_at(setup, sensitivity)
+                rows.append({"sensitivity_min": sensitivity, "cfa_sensitivity_min": cfa_sensitivity, "limit": proven})
     return pa.Table.from_pylist(rows, schema=front_schema(names))

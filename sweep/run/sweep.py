@@ -157,8 +157,8 @@ class Sweep:
         enough = len(scenes) >= _SCENES_PER_WORKER * self.pool.count
         batches: list[list[int]] = []
         for jobs in scenes:
-            few = sum(self.jobs[index].size for index in jobs) <= _FEW
-            batches += [jobs] if enough and few else [[index] for index in jobs]
+            is_small = sum(self.jobs[index].size for index in jobs) <= _FEW
+            batches += [jobs] if enough and is_small else [[index] for index in jobs]
         return batches
 
 

@@ -54,34 +54,34 @@ def uncertainty_table(study: Study, rows: pd.DataFrame, parallel: Parallel, prog
     """
     errors = study.section.uncertainty
     assert errors is not None
-    few, calls = named_rows(rows), []
-    for row in few:
+    shown, calls = named_rows(rows), []
+    for row in shown:
         space, curves = row_curves(study, row)
         setup = study.setup(space, row["scenario"]).with_all_effects
         names = _names(study, space)
         calls.append(delayed(_on_sensors, setup, curves[0], study.sensor, names, errors, study.section.seed))
     drawn_sensors = [*run_with_progress(parallel, calls, "random sensors", progress)]
-    plain = [row for row in few if row["kind"] == REFERENCE] or few
+    plain = [row for row in shown if row["kind"] == REFERENCE] or shown
     names = [row["name"] for row in plain]
     reference = REFERENCE_CFA if REFERENCE_CFA in names else names[0]
     of_reference = {
-        row["scenario"]: sensors for row, sensors in zip(few, drawn_sensors, strict=True) if row["name"] == reference
+        row["scenario"]: sensors for row, sensors in zip(shown, drawn_sensors, strict=True) if row["name"] == reference
     }
-    made = []
-    for row, (csds, light, least) in zip(few, drawn_sensors, strict=True):
+    table_rows = []
+    for row, (csds, light, least) in zip(shown, drawn_sensors, strict=True):
         beside = of_reference.get(row["scenario"])
         for pair in class_pairs(study.lights.classes):
             values = {"dn": csds[pair]}
             if beside is not None:
                 with np.errstate(divide="ignore", invalid="ignore"):
                     values |= {"ratio": csds[pair] / beside[0][pair], "light_ratio": light / beside[1]}
-            made.append(
+            table_rows.append(
                 {name: row[name] for name in _KEYS[:3]}
                 | {"quantity": csd_name(pair), "reference": reference, "at_least_dn": least.get(pair)}
                 | {key: value for of, drawn in values.items() for key, value in _quantiles(of, drawn).items()}
                 | (_spread(values["ratio"], values["light_ratio"]) if beside is not None else {})
             )
-    return pa.Table.from_pylist(made, schema=_SCHEMA)
+    return pa.Table.from_pylist(table_rows, schema=_SCHEMA)
 
 
 def _names(study: Study, space: Space) -> list[str]:
@@ -129,8 +129,8 @@ def _at_least(setup: Setup, designed: ChannelCurves, pair: Pair, errors: CurveEr
         d = per_qe[:, first][:, :, None] - per_qe[:, second][:, None]
         of_curve, spread = d @ curve, errors.noise * (np.abs(d) @ curve)
         middle, radius = middle + of_curve, radius + spread * (1 + errors.gain) + errors.gain * np.abs(of_curve)
-    apart = np.maximum(np.abs(middle) - radius, 0.0)
-    least = float(np.sqrt((apart**2).sum(axis=-1)).min())
+    distance = np.maximum(np.abs(middle) - radius, 0.0)
+    least = float(np.sqrt((distance**2).sum(axis=-1)).min())
     is_fixed = not isinstance(setup.scene.exposure, WhitePatchExposure)
     return least / (1.0 if is_fixed else (1 + errors.gain) * (1 + errors.noise))
 

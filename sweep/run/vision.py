@@ -103,11 +103,11 @@ def vision_designs(study: Study, rows: pd.DataFrame) -> list[tuple[dict[Any, Any
     for row in named_rows(rows):
         if row["scenario"] == first or row["kind"] == SEARCHED:
             by_name[row["name"]] = row
-    made = []
+    designs = []
     for row in by_name.values():
         space, curves = row_curves(study, row)
-        made.append((row, study.setup(space, row["scenario"]), np.asarray(curves[0], dtype=float)))
-    return made
+        designs.append((row, study.setup(space, row["scenario"]), np.asarray(curves[0], dtype=float)))
+    return designs
 
 
 def _image_rows(study: Study, vision: Vision, key: dict[str, Any], reading: SeedReading) -> Iterator[dict[str, Any]]:
@@ -155,7 +155,7 @@ def predictors(setup: Setup, curves: ChannelCurves, vision: Vision) -> list[tupl
     """
     middle_cd = sorted(vision.intensities_cd)[len(vision.intensities_cd) // 2]
     pairs = class_pairs(tuple(kind for kind in setup.lights.classes if kind in vision.lenses))
-    made = []
+    figures = []
     for distance_m, level in product(vision.distances_m, vision.levels.values()):
         there = setup_at(setup, vision, distance_m, level)
         there = replace(there, scene=there.scene.model_copy(update={"intensity_cd": middle_cd}))
@@ -163,5 +163,5 @@ def predictors(setup: Setup, curves: ChannelCurves, vision: Vision) -> list[tupl
         csd = min(float(columns[csd_name(pair)][0]) for pair in pairs)
         names = [pair_name(D_PRIME, order) for pair in pairs for order in (pair, pair[::-1])]
         dprime = min(float(columns[name][0]) for name in names if name in columns)
-        made.append((csd, dprime, float(columns[STATE_ERROR][0])))
-    return made
+        figures.append((csd, dprime, float(columns[STATE_ERROR][0])))
+    return figures

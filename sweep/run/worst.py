@@ -48,13 +48,13 @@ def worst_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: 
     for series, key, scenarios, row, curves, space in rows_of_series(study, rows):
         scenes = between(study, study.setup(space, next(iter(scenarios))), scenarios)
         known = rows[(rows["name"] == row["name"]) & rows["scenario"].isin(list(scenarios))]
-        quantities = [one for one in refined_quantities(study, key) if known[one.name].notna().any()]
+        quantities = [quantity for quantity in refined_quantities(study, key) if known[quantity.name].notna().any()]
         if scenes is not None and quantities:
             keys.append({"name": row["name"], "series": series, "key": key})
             calls.append(delayed(worst_over, scenes, curves, quantities, study.states, [*scenarios.values()]))
     answers = run_with_progress(parallel, calls, "worst values between scenarios", progress)
-    made = [key | row for key, found in zip(keys, answers, strict=True) for row in found]
-    return pa.Table.from_pylist(made, schema=_SCHEMA)
+    table_rows = [key | row for key, found in zip(keys, answers, strict=True) for row in found]
+    return pa.Table.from_pylist(table_rows, schema=_SCHEMA)
 
 
 def worst_over(

@@ -28,16 +28,16 @@ _MOST_HEIGHTS = 60
 class AnyHeight:
     """Problem at the known image heights."""
 
-    def __init__(self, whole: Problem) -> None:
-        field = whole.setup.scene.field
+    def __init__(self, problem: Problem) -> None:
+        field = problem.setup.scene.field
         assert field is not None
-        self._whole, self._field = whole, field
+        self._whole, self._field = problem, field
         self._heights = {*field.counted_heights, *field.knots[0]}
-        self._looked_at = field_heights(whole.setup)
+        self._looked_at = field_heights(problem.setup)
         self._models: dict[float, LinearModel] = {}
-        requested = {*whole.objective.weights, *whole.constraints} & whole.pairs.keys()
+        requested = {*problem.objective.weights, *problem.constraints} & problem.pairs.keys()
         self._pairs = {
-            name: whole.pairs[name] for name in sorted(requested) if whole.quantities[name].distance_kind == DN
+            name: problem.pairs[name] for name in sorted(requested) if problem.quantities[name].distance_kind == DN
         }
 
     @property

@@ -45,7 +45,7 @@ class Certificate:
 class LinearSolution:
     """Result of a linear program for a t and some sides, in the objective's unit.
 
-    `margin`: largest margin above t.
+    `margin`: largest margin above t. `beyond`: upper bound on filters with these sides; -inf: there is none.
     """
 
     beyond: float

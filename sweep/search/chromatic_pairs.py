@@ -36,8 +36,8 @@ class _Known(KnownPairs):
 
         `values` has shape (n_cases, n_signals, n).
         """
-        one, other = values[self.case, self.first], values[self.case, self.second]
-        return np.asarray(self.factors[:, :1] * one - self.factors[:, 1:] * other, dtype=float)
+        first_values, second_values = values[self.case, self.first], values[self.case, self.second]
+        return np.asarray(self.factors[:, :1] * first_values - self.factors[:, 1:] * second_values, dtype=float)
 
 
 class ChromaticPairs:
@@ -84,14 +84,16 @@ class ChromaticPairs:
     def _nearest(self, name: str, curve: PerWavelength) -> tuple[_Known, Float[Array, " known"]]:
         """Return every pair at its worst brightness, and their distances, DN."""
         first, second = (self._members[kind] for kind in self._types[name])
-        case, one, other = (at.ravel() for at in np.meshgrid(range(len(self._gain)), first, second, indexing="ij"))
+        case, first_signals, second_signals = (
+            at.ravel() for at in np.meshgrid(range(len(self._gain)), first, second, indexing="ij")
+        )
         response = np.concatenate([self._others, (self._gain @ curve)[:, :, None]], axis=2)
-        a, b = response[case, one], response[case, other]
+        a, b = response[case, first_signals], response[case, second_signals]
         squares, product = np.stack([(a * a).sum(axis=1), (b * b).sum(axis=1)]), (a * b).sum(axis=1)
         brighter = squares.argmax(axis=0)  # the brighter signal is dimmed
         larger = squares.max(axis=0)
         factors = np.ones((case.size, 2))
         ratio = np.divide(product, larger, out=np.zeros_like(product), where=larger > 0)
         factors[np.arange(case.size), brighter] = np.clip(ratio, 0.0, 1.0)
-        apart = factors[:, :1] * a - factors[:, 1:] * b
-        return _Known(case, one, other, factors), np.sqrt((apart**2).sum(axis=1))
+        differences = factors[:, :1] * a - factors[:, 1:] * b
+        return _Known(case, first_signals, second_signals, factors), np.sqrt((differences**2).sum(axis=1))

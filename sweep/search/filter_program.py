@@ -96,41 +96,41 @@ class FilterProgram:
             weight = self.problem.objective.weights.get(quantity.name)
             if quantity.linear is None or (bound.min is None and bound.max is None and weight is None):
                 continue
-            made = quantity.linear(self.problem.setup)
-            slack = FEASIBLE * bound.scale * made.scale
-            least = -np.inf if bound.min is None else bound.min * made.scale
+            linear = quantity.linear(self.problem.setup)
+            slack = FEASIBLE * bound.scale * linear.scale
+            least = -np.inf if bound.min is None else bound.min * linear.scale
             if least > -np.inf or weight is not None:
-                rate = 0.0 if weight is None else made.scale / weight
-                matrices.append(made.rows)
-                per_sensitivity = made.scale if quantity.name == SENSITIVITY and least > -np.inf else 0.0
-                coefficients = [least, slack, rate, made.constant, per_sensitivity]
-                columns.append(np.tile(coefficients, (made.rows.shape[0], 1)))
+                rate = 0.0 if weight is None else linear.scale / weight
+                matrices.append(linear.rows)
+                per_sensitivity = linear.scale if quantity.name == SENSITIVITY and least > -np.inf else 0.0
+                coefficients = [least, slack, rate, linear.constant, per_sensitivity]
+                columns.append(np.tile(coefficients, (linear.rows.shape[0], 1)))
             if bound.max is not None:
-                matrices.append(-made.rows)
-                most = [-bound.max * made.scale, slack, 0.0, -made.constant, 0.0]
-                columns.append(np.tile(most, (made.rows.shape[0], 1)))
+                matrices.append(-linear.rows)
+                most = [-bound.max * linear.scale, slack, 0.0, -linear.constant, 0.0]
+                columns.append(np.tile(most, (linear.rows.shape[0], 1)))
         *own_columns, per_sensitivities = np.concatenate(columns).T
         return _Rows(vstack(matrices).tocsr(), *own_columns), per_sensitivities
 
     def _distances(self) -> Iterator[tuple[str, Distances]]:
         """Yield the name and the pairs of each distance."""
         setup = self.problem.setup
-        imager, channel = linear_model(setup), setup.camera.modified[0]
+        model, channel = linear_model(setup), setup.camera.modified[0]
         # Exposure does not depend on N, so the response to a filter is linear, plus what does not depend on it.
-        gain = imager.per_qe(0, self.base[None])[:, :, channel]
-        fixed = np.delete(imager.smooth(self.base[None, None])[0], channel, axis=2)
-        noise = self._noise(imager) if self.noisy else None
+        gain = model.per_qe(0, self.base[None])[:, :, channel]
+        fixed = np.delete(model.smooth(self.base[None, None])[0], channel, axis=2)
+        noise = self._noise(model) if self.noisy else None
         for name, (a, b) in self.problem.pairs.items():
             if self.problem.quantities[name].distance_kind == "chromatic":  # their pairs are members of the program
                 continue
             first, second = setup.members[a], setup.members[b]
-            apart = gain[:, first, None] - gain[:, None, second]
+            differences = gain[:, first, None] - gain[:, None, second]
             squares = (fixed[:, first, None] - fixed[:, None, second]) ** 2
             if noise is not None and self.problem.quantities[name].distance_kind == "noise":
                 own_noise, others = ((variance[:, first, None] + variance[:, None, second]) / 2 for variance in noise)
-                apart, squares = apart / np.sqrt(own_noise)[..., None], squares / others
+                differences, squares = differences / np.sqrt(own_noise)[..., None], squares / others
             others_squared = squares.sum(axis=3).ravel()
-            rows = apart.reshape(-1, self.base.size)
+            rows = differences.reshape(-1, self.base.size)
             yield name, Distances(rows, others_squared, np.zeros((others_squared.size, 2)))
         if self._members is not None:
             for name in self._members.names:
@@ -138,12 +138,12 @@ class FilterProgram:
 
     def _set_pairs(self) -> None:
         problem = self.problem
-        apart, columns = [np.empty((0, self.base.size))], [np.empty((0, 6))]
+        differences, columns = [np.empty((0, self.base.size))], [np.empty((0, 6))]
         for name, distances in self._distances():
             bound, weight = problem.constraints.get(name), problem.objective.weights.get(name)
             if weight is None and (bound is None or bound.min is None):
                 continue
-            apart.append(distances.rows)
+            differences.append(distances.rows)
             least, slack = (0.0, 0.0) if bound is None else (bound.min or 0.0, FEASIBLE * bound.scale)
             coefficients = [least, slack, 0.0 if weight is None else 1 / weight]
             columns.append(
@@ -151,7 +151,7 @@ class FilterProgram:
                     [distances.added, distances.squared, np.tile(coefficients, (distances.squared.size, 1))]
                 )
             )
-        self.differences = np.concatenate(apart)
+        self.differences = np.concatenate(differences)
         *added, self._squared, self._least, self._slack, self._rate = np.concatenate(columns).T
         self.added = np.stack(added, axis=1)
         low, high = self._box
@@ -164,15 +164,15 @@ class FilterProgram:
         self.reach = np.where(most < (self._least - self._slack)[:, None], -np.inf, reach)
 
     def _noise(
-        self, imager: LinearModel
+        self, model: LinearModel
     ) -> tuple[Float[Array, "pairs channels"], Float[Array, "pairs channels _wavelengths"]]:
         """Return the least variance in the modified channel and the others' variances, DN^2, [n_cases, n_signals]."""
         row, least = np.zeros_like(self.base), 0.0
         bound = self.problem.constraints.get(SENSITIVITY)
         if bound is not None and bound.min is not None:
             row, least = 1 / self.base.sum() + row, bound.min - FEASIBLE * bound.scale
-        others = np.delete(imager.variance(self.base[None, None])[0], imager.setup.camera.modified[0], axis=2)
-        return least_variance(imager, self.base, self._box, row, least), others
+        others = np.delete(model.variance(self.base[None, None])[0], model.setup.camera.modified[0], axis=2)
+        return least_variance(model, self.base, self._box, row, least), others
 
     @property
     def noisy(self) -> bool:
@@ -187,10 +187,10 @@ class FilterProgram:
         linear = (self._rows.matrix @ curve + self._rows.constant)[rows] / self._rows.rate[rows]
         return float(min(self.top, far.min(initial=np.inf), linear.min(initial=np.inf)))
 
-    def _keep(self, wanted: Int[IndexArray, " rows"]) -> None:
-        self.differences, self.added, self.reach = self.differences[wanted], self.added[wanted], self.reach[wanted]
-        self._squared, self._least = self._squared[wanted], self._least[wanted]
-        self._slack, self._rate = self._slack[wanted], self._rate[wanted]
+    def _keep(self, subset: Int[IndexArray, " rows"]) -> None:
+        self.differences, self.added, self.reach = self.differences[subset], self.added[subset], self.reach[subset]
+        self._squared, self._least = self._squared[subset], self._least[subset]
+        self._slack, self._rate = self._slack[subset], self._rate[subset]
 
     def needed(self, t: float, margin: float = 0.0, *, relaxed: bool = False) -> Float[Array, " pairs"]:
         """Return the difference in the modified channel that each pair needs to reach t, DN.
@@ -207,8 +207,8 @@ class FilterProgram:
         """Find the filter with the largest margin above t, and a bound for all filters with these sides."""
         self.solved += 1
         pairs, signs = np.array(sides.pairs, dtype=np.intp), np.array(sides.signs)
-        some = self.needed(t)[pairs] > 0
-        pairs, signs = pairs[some], signs[some]
+        is_needed = self.needed(t)[pairs] > 0
+        pairs, signs = pairs[is_needed], signs[is_needed]
         rows = vstack([self._rows.matrix, csr_matrix(signs[:, None] * self.differences[pairs])]).tocsr()
         own_added = self._added(pairs, signs)
         floor = np.concatenate([self._rows.needed(t), self.needed(t)[pairs] - own_added])
@@ -221,7 +221,7 @@ class FilterProgram:
         if weights is None:
             return LinearSolution(np.inf)
         weights[weights < _LEAST_WEIGHT * weights.max(initial=0.0)] = 0.0
-        used = weights[-pairs.size :] > 0 if pairs.size else some[:0]
+        used = weights[-pairs.size :] > 0 if pairs.size else is_needed[:0]
         needs = Sides().joined(pairs[used], signs[used])
         certificate = self._certificate(weights, rows, pairs, own_added)
         beyond = self.beyond(certificate)
@@ -263,8 +263,8 @@ class FilterProgram:
         most += _SUM_ROUNDING * float(weights @ np.concatenate([self._sizes[0], self._sizes[1][pairs]]))
         n_fixed = len(weights) - pairs.size
         most += float(weights[n_fixed:] @ added)
-        used, apart = np.flatnonzero(weights[:n_fixed]), np.flatnonzero(weights[n_fixed:])
-        return Certificate(used, weights[used], pairs[apart], weights[n_fixed:][apart], most)
+        used, used_pairs = np.flatnonzero(weights[:n_fixed]), np.flatnonzero(weights[n_fixed:])
+        return Certificate(used, weights[used], pairs[used_pairs], weights[n_fixed:][used_pairs], most)
 
     def beyond(
         self, certificate: Certificate, sensitivity: float | None = None, at_least: float = 0.0, near: float = 0.0
@@ -272,16 +272,16 @@ class FilterProgram:
         """Return the bound of a certificate at another sensitivity.
 
         `sensitivity`: least sensitivity, instead of the problem's. Returns upper bound on filters with the
-        certificate's sides. Inf if the weights give none.
+        certificate's sides. Inf if the weights give none. The result may exceed the bound of the weights by `near`.
         """
         rows, per = self._rows, self._per_sensitivity
         if sensitivity is not None:
             rows = replace(rows, least=np.where(per > 0, per * sensitivity, rows.least))
 
         def excluded(t: float) -> bool:
-            floor, apart = rows.needed(t, relaxed=True), self.needed(t, relaxed=True)
+            floor, needed_of_pairs = rows.needed(t, relaxed=True), self.needed(t, relaxed=True)
             requested = certificate.row_weights @ floor[certificate.rows]
-            requested += certificate.pair_weights @ apart[certificate.pairs]
+            requested += certificate.pair_weights @ needed_of_pairs[certificate.pairs]
             return bool(requested > certificate.most)
 
         if excluded(at_least):

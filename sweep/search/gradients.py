@@ -105,16 +105,21 @@ class Model:
         self._span = (problem.high - problem.low)[problem.free]
         self._free = problem.free
         self._rule, self._weights = problem.objective.rule, problem.objective.weights
-        wanted = (*self._weights, *problem.constraints)
-        self._perturbed = {name: problem.perturbed(name) for name in wanted}
-        errors = dict.fromkeys((AS_DESIGNED, *(off for every in self._perturbed.values() for off in every)))
-        over = any(problem.over_population(name) for name in wanted)
-        of_a_share = any(problem.of_a_share(name) for name in wanted)
+        requested = (*self._weights, *problem.constraints)
+        self._perturbed = {name: problem.perturbed(name) for name in requested}
+        errors = dict.fromkeys(
+            (AS_DESIGNED, *(production_error for every in self._perturbed.values() for production_error in every))
+        )
+        over = any(problem.over_population(name) for name in requested)
+        of_a_share = any(problem.of_a_share(name) for name in requested)
         self._errors = tuple(errors)
         self._scenes = [
             (
                 linear_model(setup),
-                {off: family.perturbed(off) if any(off) else family for off in errors},
+                {
+                    production_error: family.perturbed(production_error) if any(production_error) else family
+                    for production_error in errors
+                },
                 _members_of(setup) if over else None,
                 _drawn_of(problem, setup) if of_a_share else None,
             )
@@ -162,14 +167,14 @@ class Model:
     def _simulate(self, u: PerFree) -> Point:
         problem, free = self._problem, self._free
         x = problem.from_unit(u)
-        made = {
-            off: [
-                SmoothDesign(imager, families[off], x, free, self._span, members, drawn, problem.vision)
-                for imager, families, members, drawn in self._scenes
+        simulated = {
+            production_error: [
+                SmoothDesign(model, families[production_error], x, free, self._span, members, drawn, problem.vision)
+                for model, families, members, drawn in self._scenes
             ]
-            for off in self._errors
+            for production_error in self._errors
         }
-        terms, objective = self._terms(made)
+        terms, objective = self._terms(simulated)
         violations = problem.family.violation(x[None])[0]
         conditions = [
             Rows(violations, problem.family.violation_gradient(x)[:, free] * self._span).scaled(1 / _CONDITION_NM)
@@ -177,33 +182,39 @@ class Model:
         worst = float(max(violations.max(initial=0.0), 0.0))
         quantities = {}
         for name, bound in problem.constraints.items():
-            rows = quantities[name] = self._rows(name, made)
+            rows = quantities[name] = self._rows(name, simulated)
             conditions += _conditions(self._quantities[name], bound, rows, self._back_off[name])
             worst = max(worst, float(bound.violation(np.array([self._quantities[name].value(rows)]))[0]))
-        light = light_of(made[AS_DESIGNED][0])
-        violations, whole = (float(light[name][0]) for name in (SENSITIVITY, CFA_SENSITIVITY))
-        evaluation = Evaluation(x, objective, violations, whole, worst)
+        light = light_of(simulated[AS_DESIGNED][0])
+        violations, cfa_sensitivity = (float(light[name][0]) for name in (SENSITIVITY, CFA_SENSITIVITY))
+        evaluation = Evaluation(x, objective, violations, cfa_sensitivity, worst)
         own_term = np.arange(len(terms)) * (not self._rule.smallest)  # what is smallest needs one bound
         term = np.repeat(own_term, [rows.values.size for rows in terms])
         return Point(evaluation, Rows.joined(terms), self._power, term, Rows.joined(conditions), quantities)
 
-    def _terms(self, made: Mapping[ProductionError, list[SmoothDesign]]) -> tuple[list[Rows], float]:
+    def _terms(self, simulated: Mapping[ProductionError, list[SmoothDesign]]) -> tuple[list[Rows], float]:
         """Return the rows of the objective's weighted quantities, and its value."""
         terms, columns = [], {}
         for name, weight in self._weights.items():
-            quantity, rows = self._quantities[name], self._rows(name, made)
+            quantity, rows = self._quantities[name], self._rows(name, simulated)
             columns[name] = np.array([quantity.value(rows)])
             terms.append(_term(quantity, rows, weight, self._rule, self._power))
         if self._rule.direction == "less":  # by the decades, which do not end where numbers do
             return terms, float(min(rows.values.min() for rows in terms))
         return terms, float(self._problem.objective.of(columns)[0])
 
-    def _rows(self, name: str, made: Mapping[ProductionError, list[SmoothDesign]]) -> Rows:
+    def _rows(self, name: str, simulated: Mapping[ProductionError, list[SmoothDesign]]) -> Rows:
         """Return the rows of a quantity, in every scenario."""
         smooth = self._quantities[name].smooth
         assert smooth is not None
         n_scenes = self._problem.n_scenes_of(name)
-        return Rows.joined([smooth(design) for off in self._perturbed[name] for design in made[off][:n_scenes]])
+        return Rows.joined(
+            [
+                smooth(design)
+                for production_error in self._perturbed[name]
+                for design in simulated[production_error][:n_scenes]
+            ]
+        )
 
 
 def _term(quantity: Quantity, rows: Rows, weight: float, rule: Rule, power: int) -> Rows:

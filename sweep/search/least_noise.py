@@ -22,16 +22,17 @@ _ROUNDING = 1e-12
 
 
 def least_variance(
-    imager: LinearModel, base: PerWavelength, box: tuple[PerWavelength, PerWavelength], row: PerWavelength, least: float
+    model: LinearModel, base: PerWavelength, box: tuple[PerWavelength, PerWavelength], row: PerWavelength, least: float
 ) -> Float[Array, "cases signals"]:
     """Return a lower bound on the variance in the modified channel, DN^2.
 
-    `row`: coefficients of the sensitivity, >= 0; `least`: least sensitivity: row @ N >= least.
+    `row`: coefficients of the sensitivity, >= 0; `least`: least sensitivity: row @ N >= least. `base`: curve at which
+    the variance is known; it grows with the light.
     """
-    pixel, channel = imager.readout.pixel, imager.setup.camera.modified[0]
-    per_qe = imager.spread_per_qe(0, base[None])
-    at_base = imager.spread_electrons(base[None, None])[0, :, :, channel]
-    share = imager.spread_shares()[:, None, channel]
+    pixel, channel = model.readout.pixel, model.setup.camera.modified[0]
+    per_qe = model.spread_per_qe(0, base[None])
+    at_base = model.spread_electrons(base[None, None])[0, :, :, channel]
+    share = model.spread_shares()[:, None, channel]
     constant = at_base - per_qe @ base
     electrons = np.maximum(_least_light(per_qe, box, row, least) + constant, 0.0)
     # The weighted sum of the pixels' squares is no less than the square of their weighted sum over that of the weights.

@@ -280,7 +280,7 @@ def _relaxed(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
     nominal = {name for name in requested if quantities[name].extreme == WORST_CASE} - stay
     plains = {name: quantities[name].of if name in nominal else name for name in requested}
     left_out: list[str] = []
-    kept: dict[str, Bound] = {}
+    relaxed_bounds: dict[str, Bound] = {}
     for name, bound in problem.constraints.items():
         plain = plains[name]
         better = "min" if quantities[name].direction == "less" else "max"
@@ -290,24 +290,24 @@ def _relaxed(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
             nominal -= {name} - problem.objective.weights.keys()
             continue
         left_out += [] if relaxed_bound == bound else [f"the {better} of {name}"]
-        ends = [b for b in (relaxed_bound, kept.get(plain)) if b is not None]
+        ends = [b for b in (relaxed_bound, relaxed_bounds.get(plain)) if b is not None]
         least, most = [b.min for b in ends if b.min is not None], [b.max for b in ends if b.max is not None]
-        kept[plain] = Bound.model_construct(min=max(least, default=None), max=min(most, default=None))
+        relaxed_bounds[plain] = Bound.model_construct(min=max(least, default=None), max=min(most, default=None))
     weights: dict[str, float] = {}
     for name, weight in problem.objective.weights.items():
         plain = plains[name]
         weights[plain] = min(weight, weights.get(plain, weight))
     if (stay or nominal) and problem.tolerance:
         left_out += _shifts_left_out([plains[name] for name in requested if name in nominal], problem)
-    return replace(problem, objective=Objective(minimum=weights), constraints=kept), tuple(left_out)
+    return replace(problem, objective=Objective(minimum=weights), constraints=relaxed_bounds), tuple(left_out)
 
 
 def _shifts_left_out(nominal: Sequence[str], problem: Problem) -> list[str]:
     """Return a note on production errors that the bound leaves out."""
     if len(perturbed_filters(problem)) == 1:
         return ["edge shifts"]
-    some = [] if all_ways(problem) else ["some edge shifts"]
-    return [*some, *(f"edge shifts of {name}" for name in dict.fromkeys(nominal))]
+    shifts = [] if all_ways(problem) else ["some edge shifts"]
+    return [*shifts, *(f"edge shifts of {name}" for name in dict.fromkeys(nominal))]
 
 
 def _top(problem: Problem) -> PerWavelength:
@@ -351,10 +351,10 @@ def _attained(problem: Problem, curve: PerWavelength, over: Mapping[str, float])
     curves = curve[None, None]
     columns = designed_quantities(problem.setup, curves) | {name: np.array([value]) for name, value in over.items()}
     for name in {*problem.objective.weights, *problem.constraints} & problem.pairs.keys():
-        apart = problem.quantities[name].distance_kind
-        if apart == "chromatic" and name in over:  # over the known brightnesses
+        distance_kind = problem.quantities[name].distance_kind
+        if distance_kind == "chromatic" and name in over:  # over the known brightnesses
             continue
-        of = _DISTANCES[apart]
+        of = _DISTANCES[distance_kind]
         columns[name] = np.minimum(of(problem.setup, curves, problem.pairs[name]), over.get(name, np.inf))
     for name, bound in problem.constraints.items():
         if not bound.violation(columns[name])[0] <= FEASIBLE:

@@ -27,10 +27,10 @@ _NEARER_DN = 0.01
 class KnownPairs:
     """Pairs of lights that the programs know; every field has one row per pair."""
 
-    def joined(self, others: Self, some: Bool[BoolArray, " values"]) -> Self:
+    def joined(self, others: Self, subset: Bool[BoolArray, " values"]) -> Self:
         """Return these and some other pairs."""
         columns = ((getattr(self, field.name), getattr(others, field.name)) for field in fields(self))
-        return type(self)(*(np.concatenate([known, new[some]]) for known, new in columns))
+        return type(self)(*(np.concatenate([known, new[subset]]) for known, new in columns))
 
 
 @dataclass(frozen=True)
@@ -63,11 +63,19 @@ class MemberPairs:
         if setup.lights.population is None:
             alone = Population.model_validate({"drift_nm_per_k": 0.0})
             setup = replace(setup, lights=replace(setup.lights, population=alone))
-        self._imager, self.names, self._ways = population_model(setup), tuple(names), perturbed_filters(problem)
+        self._population_model, self.names, self._ways = (
+            population_model(setup),
+            tuple(names),
+            perturbed_filters(problem),
+        )
         self._types = {name: pair for name in names if (pair := problem.quantities[name].pair) is not None}
-        imager, channel, base = self._imager.imager, problem.setup.camera.modified[0], problem.setup.camera.base_qe
-        self._gain = imager.per_qe(0, base)[:, :, channel]
-        self._others = np.delete(imager.smooth(base[None])[0], channel, axis=2)
+        model, channel, base = (
+            self._population_model.linear,
+            problem.setup.camera.modified[0],
+            problem.setup.camera.base_qe,
+        )
+        self._gain = model.per_qe(0, base)[:, :, channel]
+        self._others = np.delete(model.smooth(base[None])[0], channel, axis=2)
         self._made: dict[str, Distances] = {}
         self._known = {name: self._nearest(name, base[0], self._ways[:1])[0] for name in names}
 
@@ -77,8 +85,8 @@ class MemberPairs:
         if name not in self._made:
             rows, added = known.difference(self._gain), np.zeros((known.case.size, 2))
             for way in np.unique(known.way):
-                some = known.way == way
-                rows[some], added[some] = self._ways[way].rows(rows[some])
+                of_way = known.way == way
+                rows[of_way], added[of_way] = self._ways[way].rows(rows[of_way])
             self._made[name] = Distances(rows, (known.difference(self._others) ** 2).sum(axis=1), added)
         return self._made[name]
 
@@ -90,8 +98,8 @@ class MemberPairs:
         """Return the smallest distance of known members of the filter as produced, DN."""
         known = self._known[name]
         perturbed = np.stack([way.curve(curve) for way in self._ways])[known.way]
-        apart = (known.difference(self._gain) * perturbed).sum(axis=1)
-        return float(np.sqrt((apart**2 + (known.difference(self._others) ** 2).sum(axis=1)).min()))
+        differences = (known.difference(self._gain) * perturbed).sum(axis=1)
+        return float(np.sqrt((differences**2 + (known.difference(self._others) ** 2).sum(axis=1)).min()))
 
     def least(self, name: str, curve: PerWavelength) -> float:
         """Return the smallest distance of all members, DN."""
@@ -118,13 +126,15 @@ class MemberPairs:
         """Return the nearest members of each two lights and part of their shifts, and their squared distances."""
         parts = []
         for number, way in enumerate(ways or self._ways):
-            response = self._imager.imager.smooth(way.curve(curve)[None, None])[0]
+            response = self._population_model.linear.smooth(way.curve(curve)[None, None])[0]
             for case, values in enumerate(response):
-                near = self._imager.nearest(values, self._types[name], parts=self._imager.parts)
-                one, other, part = np.nonzero(np.isfinite(near.squared))
-                below = near.steps[one, other, part] + np.stack([near.first[one], near.second[other]], axis=1)
-                share = near.shares[one, other, part]
-                where = np.full(one.size, number), np.full(one.size, case)
-                parts.append((*where, below, share, near.squared[one, other, part]))
+                near = self._population_model.nearest(values, self._types[name], parts=self._population_model.parts)
+                first_signals, second_signals, part = np.nonzero(np.isfinite(near.squared))
+                below = near.steps[first_signals, second_signals, part] + np.stack(
+                    [near.first[first_signals], near.second[second_signals]], axis=1
+                )
+                share = near.shares[first_signals, second_signals, part]
+                where = np.full(first_signals.size, number), np.full(first_signals.size, case)
+                parts.append((*where, below, share, near.squared[first_signals, second_signals, part]))
         outs, cases, spectra, shares, squared = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
         return _Known(outs, cases, spectra, shares), squared

@@ -40,8 +40,8 @@ class Distances:
 
     def least(self, curve: PerWavelength) -> float:
         """Return a lower bound on the smallest distance of a filter, DN."""
-        apart = self.rows @ curve
-        most = np.maximum(apart + self.added[:, 0], self.added[:, 1] - apart)
+        differences = self.rows @ curve
+        most = np.maximum(differences + self.added[:, 0], self.added[:, 1] - differences)
         return float(np.sqrt(self.squared + most**2).min())
 
 
@@ -64,15 +64,15 @@ class PerturbedFilter:
         return np.where(self.known, self.scale * curve[self.source] + self.constant, self.high)
 
     def rows(
-        self, apart: Float[Array, "distances wavelengths"]
+        self, differences: Float[Array, "distances wavelengths"]
     ) -> tuple[Float[Array, "distances wavelengths"], Float[Array, "distances 2"]]:
         """Convert sums over the produced filter to sums over N."""
-        rows = np.zeros_like(apart)
+        rows = np.zeros_like(differences)
         known = np.flatnonzero(self.known)  # each has a source of its own
-        rows[:, self.source[known]] = apart[:, known] * self.scale[known]
-        other = apart * ~self.known
+        rows[:, self.source[known]] = differences[:, known] * self.scale[known]
+        other = differences * ~self.known
         ends = [np.maximum(sign * other, 0) @ self.high + np.minimum(sign * other, 0) @ self.low for sign in (1, -1)]
-        fixed = apart[:, known] @ self.constant[known]
+        fixed = differences[:, known] @ self.constant[known]
         return rows, np.stack([ends[0] + fixed, ends[1] - fixed], axis=1)
 
 
@@ -98,10 +98,14 @@ def _moves(problem: Problem) -> Iterator[PerturbedFilter]:
     family, step_nm = problem.family, problem.setup.camera.grid.step_nm
     if not isinstance(family, MovedFamily):
         return
-    for off in problem.tolerance.places:
-        steps = round(off.shift_nm / step_nm)
-        if any(off) and not (off.thickness or off.broadening) and abs(off.shift_nm / step_nm - steps) < _WHOLE:
-            perturbed: Family = family.perturbed(off)
+    for production_error in problem.tolerance.places:
+        steps = round(production_error.shift_nm / step_nm)
+        if (
+            any(production_error)
+            and not (production_error.thickness or production_error.broadening)
+            and abs(production_error.shift_nm / step_nm - steps) < _WHOLE
+        ):
+            perturbed: Family = family.perturbed(production_error)
             ends = (end(problem.low, problem.high)[0] for end in (perturbed.lower, perturbed.upper))
             yield _moved(problem.setup.camera.base_qe[0], *family.moved, steps, *ends)
 

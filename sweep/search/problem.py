@@ -24,7 +24,11 @@ from ..vision.section import SeededVision
 
 @dataclass(frozen=True)
 class Problem:
-    """Maximize an objective over a box under constraints."""
+    """Maximize an objective over a box under constraints.
+
+    `others`: further scenarios, or sensors with the same family on their own curves: a quantity counts with its worst
+    value over all.
+    """
 
     setup: Setup
     family: Family
@@ -47,8 +51,10 @@ class Problem:
             self.setup.lights.classes, self.states, edge_shift=True, tasks=tasks, user_metrics=self.user_metrics
         )
         population = self.setup.lights.population
-        wanted = 0.0 if population is None else population.wanted_yield or 0.0
-        requested = replace(requested, population=self.population, wanted_yield=wanted, vision=self.vision is not None)
+        wanted_yield = 0.0 if population is None else population.wanted_yield or 0.0
+        requested = replace(
+            requested, population=self.population, wanted_yield=wanted_yield, vision=self.vision is not None
+        )
         return quantities_of(requested)
 
     @property

@@ -146,9 +146,9 @@ class SideSearch:
                 self._closed = max(self._closed, beyond)
             elif not more:
                 left.append((beyond, part))
-            for one, reach in more:
+            for part_sides, reach in more:
                 region = SideRegion(min(part.cap, reach), part.certificates)
-                heappush(parts, (-min(beyond, reach), next(order), one, region))
+                heappush(parts, (-min(beyond, reach), next(order), part_sides, region))
         left += [(-beyond, part) for beyond, _, _, part in parts]
         far = sum(beyond > self._closing for beyond, _ in left)
         proven = max([self._closed, self._best, *(beyond for beyond, _ in left)])

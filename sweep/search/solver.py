@@ -154,13 +154,13 @@ def _direct(problem: Problem, model: Model, first: Point, u0: PerFree, algorithm
     """Set up: maximize the objective itself, subject to the worst of the conditions."""
     rule = problem.objective.rule
 
-    def whole(terms: PerTerm) -> float:
+    def objective_of(terms: PerTerm) -> float:
         return float(terms.min() if rule.smallest else rule.of(terms))
 
-    scale = whole(np.maximum(first.term_values, 1.0))
+    scale = objective_of(np.maximum(first.term_values, 1.0))
 
     def objective(u: PerFree, _: Float[Array, " ..."]) -> float:
-        return whole(model.at(u).term_values) / scale
+        return objective_of(model.at(u).term_values) / scale
 
     opt = nlopt.opt(DIRECT[algorithm], u0.size)
     opt.set_lower_bounds([0.0] * u0.size)

@@ -101,9 +101,9 @@ class Cleaner:
             total, number = (np.bincount(index[known], weights, unique.size) for weights in (values[known], None))
             mean = np.divide(total, number, out=np.full(unique.size, np.nan), where=number > 0)
             spread = np.maximum.reduceat(np.where(known, np.abs(values - mean[index]), 0.0), first)
-        apart = (counts > 1) & (spread > _ALIKE_SHARE / 2 * np.nanmax(np.abs(values), initial=0.0))
-        if 4 * np.count_nonzero(apart) > unique.size:
-            at = float(unique[np.argmax(apart)])
+        contradicting = (counts > 1) & (spread > _ALIKE_SHARE / 2 * np.nanmax(np.abs(values), initial=0.0))
+        if 4 * np.count_nonzero(contradicting) > unique.size:
+            at = float(unique[np.argmax(contradicting)])
             self._fault(name, "wavelengths occur twice, with other values", at, "one spectrum in a column")
         repeated = int(np.count_nonzero(counts > 1))
         self._note(

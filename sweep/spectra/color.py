@@ -23,7 +23,7 @@ class ColorRegion:
     def violation(self, xy: Float[Array, "colors 2"]) -> Float[Array, " colors"]:
         """Return the distance of points beyond the bounds.
 
-        Inside where <= 0.
+        Inside where <= 0. It is in x, y; inside where <= 0.
         """
         a, b, c = np.array(self.bounds).T
         return np.asarray((xy[:, :1] * a + xy[:, 1:] * b - c).max(axis=1), dtype=float)
@@ -84,7 +84,7 @@ def luminance_per_photon_radiance(
 def chromaticity(grid: WavelengthGrid, photons: Float[Array, "spectra wavelengths"]) -> Float[Array, "spectra 2"]:
     """Return CIE 1931 x, y of photon spectra.
 
-    `photons`: photon spectra, photons per nm. NaN for invisible spectra.
+    `photons`: photon spectra, photons per nm. NaN for invisible spectra. NaN for invisible spectra.
     """
     xyz = energy_from_photons(grid.nodes_nm, photons) @ color_matching(grid).T
     return np.asarray(xyz[:, :2] / xyz.sum(axis=1, keepdims=True), dtype=float)

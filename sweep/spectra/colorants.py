@@ -30,7 +30,8 @@ class Colorants:
     """Absorption spectra with a peak of 1, and what was not read.
 
     `absorbance`: absorbance relative to the peak of the whole spectrum, which may lie outside the wavelength grid;
-    `refused`: name and reason of each spectrum that was left out.
+    `refused`: name and reason of each spectrum that was left out. `peaks`: value of the file at the peak; l/(mol cm)
+    for molar extinction.
     """
 
     names: tuple[str, ...]

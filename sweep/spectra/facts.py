@@ -140,12 +140,14 @@ def notes(facts: Facts, *, as_qe: bool) -> list[str]:
     gap = float(np.diff(wave).max(initial=0.0))
     if gap > _COARSE_NM:
         lines.append(f"sparse samples: up to {gap:g} nm apart; between them the curves are taken as straight lines")
-    few = [c for c in facts.curves if c.peak > 0 and c.samples_in_peak < _FEWEST_IN_PEAK]
-    if few:
-        worst = min(few, key=lambda curve: curve.samples_in_peak)
+    coarse = [c for c in facts.curves if c.peak > 0 and c.samples_in_peak < _FEWEST_IN_PEAK]
+    if coarse:
+        worst = min(coarse, key=lambda curve: curve.samples_in_peak)
         samples = "1 sample" if worst.samples_in_peak == 1 else f"{worst.samples_in_peak} samples"
         finding = f"only {samples} of half its height or more around its peak at {worst.peak_nm:g} nm"
-        lines.append(f"{worst.name} has {finding}" + (f", and {len(few) - 1} more curves likewise" if few[1:] else ""))
+        lines.append(
+            f"{worst.name} has {finding}" + (f", and {len(coarse) - 1} more curves likewise" if coarse[1:] else "")
+        )
     dark = [curve.name for curve in facts.curves if not curve.peak > 0]
     if dark:
         lines.append(f"no value is above 0: {', '.join(dark)}")

@@ -112,19 +112,25 @@ def _to_corner(
             ValidationIssue("a lens needs two rows or more", table.file, table.rows[-1][0], None, heights.size)
         )
     steep = int(np.argmax(cra_deg > _STEEPEST_DEG))
-    whole = {"percent": 100.0, "relative": 1.0}.get(unit)
-    if whole is not None and corner_mm is not None:
+    full_height = {"percent": 100.0, "relative": 1.0}.get(unit)
+    if full_height is not None and corner_mm is not None:
         raise DataError(
             ValidationIssue(f"`corner_mm` needs heights in mm, not {unit}", table.file, table.rows[0][0], names[0])
         )
     corner = float(heights[-1]) if corner_mm is None else corner_mm
     check(heights[0] == 0, "image heights begin in the middle of the sensor", 0, 0, "0")
     check(cra_deg[steep] <= _STEEPEST_DEG, "too steep a chief ray", steep, 1, f"0 to {_STEEPEST_DEG:g} degrees")
-    check(whole is None or heights[-1] == whole, "the last row is not the corner", -1, 0, f"{whole or 0:g}")
+    check(
+        full_height is None or heights[-1] == full_height,
+        "the last row is not the corner",
+        -1,
+        0,
+        f"{full_height or 0:g}",
+    )
     check(corner <= heights[-1], "the table ends before the corner", -1, 0, f"{corner:g} mm")
     notes = list(table.notes)
     if unit == "mm" and corner_mm is None:
         notes.append(f"the last row, {corner:g} mm, was taken for the corner of the sensor")
     inside = heights < corner
-    kept = np.append(heights[inside] / corner, 1.0)
-    return ChiefRays(kept, np.append(cra_deg[inside], np.interp(corner, heights, cra_deg)), tuple(notes))
+    relative_heights = np.append(heights[inside] / corner, 1.0)
+    return ChiefRays(relative_heights, np.append(cra_deg[inside], np.interp(corner, heights, cra_deg)), tuple(notes))

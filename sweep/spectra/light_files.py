@@ -59,12 +59,14 @@ class LightsFile:
     @property
     def types(self) -> dict[str, list[str]]:
         """Columns of each signal type, in the order of a study."""
-        known = {kind: [name for one in self.entries for name in one.types.get(kind, ())] for kind in _SIGNAL_COLORS}
+        known = {
+            kind: [name for entry in self.entries for name in entry.types.get(kind, ())] for kind in _SIGNAL_COLORS
+        }
         return {kind: names for kind, names in known.items() if names}
 
     def keys(self, path_in_study: Callable[[Path], str]) -> dict[str, Any]:
         """Return the keys of a study for these lights."""
-        return {"name": self.name, "files": [one.keys(path_in_study(one.path)) for one in self.entries]}
+        return {"name": self.name, "files": [entry.keys(path_in_study(entry.path)) for entry in self.entries]}
 
 
 def clean_curves(path: Path) -> Curves:

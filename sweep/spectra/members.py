@@ -56,11 +56,11 @@ class Members:
         widths = self.population.width
         photons = [stretched(grid, spectrum, factor) for spectrum in lights.photons for factor in widths]
         steps = range(self._first, self._first + self.n_steps)
-        made = np.stack([moved(spectrum, step) for spectrum in photons for step in steps])
+        shifted = np.stack([moved(spectrum, step) for spectrum in photons for step in steps])
         n_spectra = len(widths) * self.n_steps
         names = tuple(name for name in lights.names for _ in range(n_spectra))
         types = tuple(kind for kind in lights.types for _ in range(n_spectra))
-        self.lights = replace(lights, names=names, types=types, photons=made, population=None)
+        self.lights = replace(lights, names=names, types=types, photons=shifted, population=None)
         self._regions: dict[tuple[float, ...], ShiftRegion] = {}
 
     @cached_property
@@ -85,7 +85,10 @@ class Members:
         return (self._first + cell + share) * self._step_nm
 
     def drift_and_independent(self, signal: int) -> tuple[float, tuple[float, float]]:
-        """Return drift and independent shifts of a signal, nm."""
+        """Return drift and independent shifts of a signal, nm.
+
+        Drift is in nm/K, the range of shifts by binning and ageing in nm.
+        """
         return _drift_and_independent(self._lights, self.population, signal)
 
     def regions(self, pair: Pair) -> tuple[list[ShiftRegion], Int[IndexArray, "first second"]]:
@@ -94,18 +97,18 @@ class Members:
         known: dict[int, int] = {}
         regions: list[ShiftRegion] = []
         indices = np.empty((first.size, second.size), dtype=np.intp)
-        for one, row in enumerate(first):
+        for row_index, signals in enumerate(first):
             for other, column in enumerate(second):
-                region = self.region(self.signal(int(row)), self.signal(int(column)))
+                region = self.region(self.signal(int(signals)), self.signal(int(column)))
                 if id(region) not in known:
                     known[id(region)] = len(regions)
                     regions.append(region)
-                indices[one, other] = known[id(region)]
+                indices[row_index, other] = known[id(region)]
         return regions, indices
 
-    def region(self, one: int, other: int) -> ShiftRegion:
+    def region(self, first: int, second: int) -> ShiftRegion:
         """Return the shifts of two signals that occur together."""
-        (a, own_a), (b, own_b) = self.drift_and_independent(one), self.drift_and_independent(other)
+        (a, own_a), (b, own_b) = self.drift_and_independent(first), self.drift_and_independent(second)
         key = (a, *own_a, b, *own_b)
         if key not in self._regions:
             corners = _corners(self.population, (a, b), (own_a, own_b))
@@ -159,8 +162,8 @@ def _corners(
     (a, b), (x, y) = drifts, independent
     warmings = [(warmer, warmer) for warmer in population.warmer_k]
     if population.temperatures == "independent":
-        warmings = [(one, other) for one in population.warmer_k for other in population.warmer_k]
-    return [(a * one + u, b * other + v) for one, other in warmings for u in x for v in y]
+        warmings = [(warmer_a, warmer_b) for warmer_a in population.warmer_k for warmer_b in population.warmer_k]
+    return [(a * warmer_a + u, b * warmer_b + v) for warmer_a, warmer_b in warmings for u in x for v in y]
 
 
 def _hull(points: list[_Point]) -> list[_Point]:
@@ -186,17 +189,17 @@ def _cross(o: _Point, p: _Point, q: _Point) -> float:
 
 def _clipped(polygon: list[_Point], axis: int, bound: float, sign: float) -> list[_Point]:
     """Return the part of a polygon with sign x (coordinate - bound) >= 0 (Sutherland and Hodgman)."""
-    kept: list[_Point] = []
+    clipped: list[_Point] = []
     for here, there in zip(polygon, polygon[1:] + polygon[:1], strict=True):
         u, v = sign * (here[axis] - bound), sign * (there[axis] - bound)
         if u >= 0:
-            kept.append(here)
+            clipped.append(here)
         if (u < 0 < v) or (v < 0 < u):
             share = u / (u - v)
             cut = [p + (q - p) * share for p, q in zip(here, there, strict=True)]
             cut[axis] = bound
-            kept.append((cut[0], cut[1]))
-    return list(dict.fromkeys(kept))
+            clipped.append((cut[0], cut[1]))
+    return list(dict.fromkeys(clipped))
 
 
 def _size(polygon: list[_Point]) -> tuple[float, float]:
@@ -230,6 +233,6 @@ def _region(points: list[_Point]) -> ShiftRegion:
 
 def _along(points: Float[Array, "points 2"]) -> Float[Array, " points"]:
     """Return where points lie along the direction in which they are spread most, 0 to 1."""
-    off = points - points.mean(axis=0)
-    at = off @ np.linalg.svd(off, full_matrices=False)[2][0]
+    centered = points - points.mean(axis=0)
+    at = centered @ np.linalg.svd(centered, full_matrices=False)[2][0]
     return np.asarray((at - at.min()) / max(float(np.ptp(at)), _TINY), dtype=float)

@@ -142,7 +142,7 @@ class Population(Section):
         drift, (low, high) = self.drift(kind, name), self.independent_nm(kind, name)
         ends = self.warmer_k
         if drift:
-            ends_k = sorted((shift_nm - off) / drift for off in (low, high))
+            ends_k = sorted((shift_nm - independent_nm) / drift for independent_nm in (low, high))
             ends = max(ends[0], ends_k[0]), min(ends[1], ends_k[1])
         return self.reference_c + ends[0], self.reference_c + ends[1]
 

@@ -99,12 +99,12 @@ def _table_of(sheet: Sheet) -> Table:
     for numbers in parsed:
         count = sum(number is not None and number == number for number in numbers)  # noqa: PLR0124  (NaN: missing)
         shares.append((count, count / max(count + sum(number is None for number in numbers), 1)))
-    whole = [at for at, (count, share) in enumerate(shares) if count > 1 and share == 1]
-    whole = whole or [at for at, (count, share) in enumerate(shares) if count > 1 and share >= 0.5]
+    numeric_rows = [at for at, (count, share) in enumerate(shares) if count > 1 and share == 1]
+    numeric_rows = numeric_rows or [at for at, (count, share) in enumerate(shares) if count > 1 and share >= 0.5]
     empty = ValidationIssue(
         "no rows of numbers", sheet.file, allowed="a header `wavelength_nm,...` and rows of numbers"
     )
-    if not whole:
+    if not numeric_rows:
         if sheet.rows and len(sheet.rows[0][1]) == 1 and wave_unit(sheet.rows[0][1][0]) is not None:
             raise DataError(
                 ValidationIssue(
@@ -116,7 +116,7 @@ def _table_of(sheet: Sheet) -> Table:
             )
         raise DataError(empty)
     blocks: list[list[int]] = [[]]
-    for at in range(whole[0], whole[-1] + 1):
+    for at in range(numeric_rows[0], numeric_rows[-1] + 1):
         if shares[at][0] == 0 and len(sheet.rows[at][1]) == 1:
             blocks.append([])
         else:
@@ -150,7 +150,7 @@ def _columns(table: Table) -> list[_Column]:
     names, at_x = heads.names, wave_columns(table, heads)
     pairs = len(at_x) > 1
     titled = heads.titles[-1][1] if heads.titles and pairs else []
-    whole, loose = table_units(table, heads.titles)
+    of_table, loose = table_units(table, heads.titles)
     others = [at for at in range(table.width) if at not in at_x]
     left_out = _left_out(table.sheet, names, table.series, others, at_x)
     columns: list[_Column] = []
@@ -162,7 +162,7 @@ def _columns(table: Table) -> list[_Column]:
         if heads.units[at] and not stated.words:
             stated = Unit(heads.units[at], unclear="has an unknown unit")
         above = [cells[at] for _, cells in heads.titles if not cells[0] and at < len(cells) and not titled]
-        for other in (stated, *map(unit_of, above), whole):
+        for other in (stated, *map(unit_of, above), of_table):
             unit = unit.over(other)
         unit = unit if unit.quantity or unit.unclear else unit.over(loose)
         columns.append(_Column(name or ("" if names else _made_name(table, len(columns), at_x)), unit, wave, at))
@@ -183,11 +183,11 @@ def _left_out(
         sheet.notes.append("a column that counts the rows was left out")
     texts = [at for at in others if all(value is None or np.isnan(value) for value in series[at])]
     spreads = [at for at in others if names and _SPREAD.search(folded(names[at]).replace("_", " "))]
-    for what, some in (("without numbers", texts), ("of deviations", spreads)):
-        if some and len(some) < len(others):
-            named = ", ".join(repr(names[at]) for at in some if names and names[at])
+    for what, columns in (("without numbers", texts), ("of deviations", spreads)):
+        if columns and len(columns) < len(others):
+            named = ", ".join(repr(names[at]) for at in columns if names and names[at])
             sheet.notes.append(f"columns {what} were left out{f': {named}' if named else ''}")
-            index += some
+            index += columns
     return index
 
 
@@ -236,7 +236,7 @@ def _numbered(columns: Sequence[_Column]) -> list[_Column]:
     for number, column in enumerate(columns, 1):
         name = (
             column.name
-            if column.name and column.name not in [one.name for one in known]
+            if column.name and column.name not in [earlier.name for earlier in known]
             else f"{column.name or 'curve'}_{number}"
         )
         known.append(column._replace(name=name))

@@ -120,15 +120,15 @@ def text_sheet(path: Path, allowed: str = "a header `wavelength_nm,...` and rows
         numbered = numbered[begin + 1 : end]
         break
     comments = [(n, line) for n, line in numbered if _COMMENT.match(line)]
-    kept = [(n, line) for n, line in numbered if line.strip() and not _COMMENT.match(line)]
+    content_lines = [(n, line) for n, line in numbered if line.strip() and not _COMMENT.match(line)]
     sheet.remarks = [_COMMENT.sub("", line, count=1).strip() for _, line in comments]
-    if not any(re.search(r"[^\s,;|]", line) for _, line in kept):
+    if not any(re.search(r"[^\s,;|]", line) for _, line in content_lines):
         raise DataError(ValidationIssue("the file is empty", file, allowed=allowed))
-    mark = _mark([line for _, line in kept])
+    mark = _mark([line for _, line in content_lines])
     if _MARKS[mark]:
         sheet.notes.append(f"columns are separated by {_MARKS[mark]}")
-    heads = [(n, _COMMENT.sub("", line, count=1).strip()) for n, line in comments if n < kept[-1][0]]
-    sheet.rows = _cells(file, kept, mark)
+    heads = [(n, _COMMENT.sub("", line, count=1).strip()) for n, line in comments if n < content_lines[-1][0]]
+    sheet.rows = _cells(file, content_lines, mark)
     sheet.rows = sorted([*_commented_heads(file, heads, mark, sheet.rows), *sheet.rows])
     _find_decimal(sheet)
     return sheet
@@ -142,8 +142,8 @@ def _commented_heads(file: str, comments: Sequence[tuple[int, str]], mark: str, 
     if not first or first != rows[0][0]:
         return []
     above = [(n, text) for n, text in comments if n < first and text][-1:]
-    made = _cells(file, above, mark) if above else []
-    return [row for row in made if len(row[1]) == len(rows[0][1]) > 1]
+    head_rows = _cells(file, above, mark) if above else []
+    return [row for row in head_rows if len(row[1]) == len(rows[0][1]) > 1]
 
 
 def _decoded(path: Path) -> tuple[str, list[str]]:
@@ -175,11 +175,11 @@ def _split(line: str, mark: str) -> list[str]:
 
 def _mark(lines: Sequence[str]) -> str:
     """Return the separator with which the largest shares of cells are numbers, summed over lines."""
-    some = [lines[int(at)] for at in np.unique(np.linspace(0, len(lines) - 1, _SAMPLED).astype(int))]
+    sampled = [lines[int(at)] for at in np.unique(np.linspace(0, len(lines) - 1, _SAMPLED).astype(int))]
 
     def numbers(mark: str) -> float:
         total = 0.0
-        for line in some:
+        for line in sampled:
             cells = [c for c in (line.split() if mark == " " else line.replace('"', "").split(mark)) if c.strip()]
             if len(cells) > 1:
                 plain = [cell.replace(",", ".", 1).strip().rstrip("%").rstrip() for cell in cells]
@@ -189,7 +189,7 @@ def _mark(lines: Sequence[str]) -> str:
     scores = {mark: numbers(mark) for mark in _MARKS}
     if max(scores.values()) > 0:
         return next(mark for mark in _MARKS if scores[mark] >= _NEARLY * max(scores.values()))
-    return max(("\t", ";", ",", "|"), key=lambda mark: sum(mark in line for line in some))
+    return max(("\t", ";", ",", "|"), key=lambda mark: sum(mark in line for line in sampled))
 
 
 def _cells(file: str, lines: Sequence[tuple[int, str]], mark: str) -> Rows:
@@ -206,12 +206,12 @@ def _cells(file: str, lines: Sequence[tuple[int, str]], mark: str) -> Rows:
 
 def _find_decimal(sheet: Sheet) -> None:
     """Find the decimal mark: a comma where numbers have some, and none has a point. DataError where it is unclear."""
-    some = [sheet.rows[int(at)] for at in np.unique(np.linspace(0, len(sheet.rows) - 1, _SAMPLED).astype(int))]
-    cells = [cell.rstrip("%").strip() for _, row in some for cell in row]
-    for column in zip_longest(*(row for _, row in some), fillvalue=""):
+    sampled = [sheet.rows[int(at)] for at in np.unique(np.linspace(0, len(sheet.rows) - 1, _SAMPLED).astype(int))]
+    cells = [cell.rstrip("%").strip() for _, row in sampled for cell in row]
+    for column in zip_longest(*(row for _, row in sampled), fillvalue=""):
         dotted = [cell for cell in column if _DOTTED.fullmatch(cell)]
-        whole = [cell for cell in column if cell.isdigit() and int(cell[:6]) >= 100]
-        if dotted and whole and len(dotted) == sum("." in cell for cell in column) and float(dotted[0]) < 100:
+        integers = [cell for cell in column if cell.isdigit() and int(cell[:6]) >= 100]
+        if dotted and integers and len(dotted) == sum("." in cell for cell in column) and float(dotted[0]) < 100:
             problem, allowed = "a point may be a decimal mark or part every three digits", "numbers without it"
             raise DataError(ValidationIssue(problem, sheet.file, value=dotted[0], allowed=allowed))
     commas = [cell for cell in cells if _COMMA.fullmatch(cell) or _THOUSANDS.fullmatch(cell)]

@@ -111,13 +111,13 @@ def outline(kind: str) -> Float[Array, "corners 2"]:
     polygon = spectral_locus()
     for a, b, c in REGIONS[kind].bounds:
         over = polygon @ np.array([a, b]) - c
-        kept: list[FloatArray] = []
+        corners: list[FloatArray] = []
         for here, there, u, v in zip(polygon, np.roll(polygon, -1, axis=0), over, np.roll(over, -1), strict=True):
             if u <= 0:
-                kept.append(here)
+                corners.append(here)
             if (u <= 0) != (v <= 0):
-                kept.append(here + (there - here) * (u / (u - v)))
-        polygon = np.array(kept)
+                corners.append(here + (there - here) * (u / (u - v)))
+        polygon = np.array(corners)
     return polygon
 
 

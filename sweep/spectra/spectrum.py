@@ -272,11 +272,11 @@ def integral_between(wavelength_nm: PerWavelength, values: PerWavelength, low_nm
 
 def _integral_to(wave: PerSample, data: PerSample, at: Float[Array, " at"]) -> Float[Array, " at"]:
     """Return the integral of the piecewise linear interpolant from the first sample to `at`."""
-    whole = np.concatenate([[0.0], np.cumsum(np.diff(wave) * (data[1:] + data[:-1]) / 2)])
+    cumulative = np.concatenate([[0.0], np.cumsum(np.diff(wave) * (data[1:] + data[:-1]) / 2)])
     index = np.clip(np.searchsorted(wave, at, side="right") - 1, 0, wave.size - 2)
     part = at - wave[index]
     slope = (data[index + 1] - data[index]) / (wave[index + 1] - wave[index])
-    return np.asarray(whole[index] + part * (data[index] + slope * part / 2), dtype=float)
+    return np.asarray(cumulative[index] + part * (data[index] + slope * part / 2), dtype=float)
 
 
 def photons_from_energy(
@@ -320,7 +320,7 @@ def equal_photons(
 def linear_basis(at: Float[Array, " at"], knots: PerKnot) -> Float[Array, "knots at"]:
     """Return the linear basis of interpolation between knots; constant beyond the ends.
 
-    `knots`: knots, ascending.
+    `knots`: knots, ascending. Any f of values at the knots is f @ weights at the points.
     """
     if knots.size == 1:
         return np.ones((1, at.size))

@@ -107,10 +107,10 @@ _TRAILING = re.compile(r"(?:(?:^|[\s_,:/])(od|m?a[/_ ]w(?:\^?-1)?|db|percent|pct
 def folded(text: str) -> str:
     """Return a text without accents, in lower case, with plain blanks, minus signs and apostrophes."""
     plain = unicodedata.normalize("NFKD", text[:_MOST_LETTERS].replace("\u2019", "'").replace("\x92", "'"))
-    kept = "".join(c for c in plain if not unicodedata.combining(c))
+    letters = "".join(c for c in plain if not unicodedata.combining(c))
     for foreign, own in (("\u00b5", "u"), ("\u03bc", "u"), ("\u2212", "-"), ("\u00df", "ss")):
-        kept = kept.replace(foreign, own)
-    return " ".join(kept.casefold().split())
+        letters = letters.replace(foreign, own)
+    return " ".join(letters.casefold().split())
 
 
 def symbol_unit(text: str) -> Unit | None:
@@ -140,8 +140,8 @@ def _parts(head: str) -> tuple[str, list[Unit]]:
 
     head = head[:_MOST_LETTERS]
     if re.search(r"[/\-]", head):
-        if (whole := symbol_unit(head)) and not whole.unclear:
-            return "", [whole]
+        if (unit_of_head := symbol_unit(head)) and not unit_of_head.unclear:
+            return "", [unit_of_head]
         before, _, after = head.rpartition(" / ")
         if before and (unit := symbol_unit(after)):
             return before.strip(), [unit]
@@ -172,7 +172,7 @@ def unit_of(head: str) -> Unit:
         stated = []
     if "decibel" in symbols and not re.search(r"return|reflect", bare):
         stated = [] if stated == ["transmission"] else stated
-    quantities = symbols | {one for one in stated if not symbols or one in _EXCLUSIVE}
+    quantities = symbols | {word for word in stated if not symbols or word in _EXCLUSIVE}
     factors = {unit.factor for unit in found if unit.factor is not None}
     percent = 0.01 in factors and quantities & {"density", "decibel", "responsivity", "relative_responsivity"}
     if len(quantities) > 1 or len(factors) > 1 or percent:
@@ -182,7 +182,7 @@ def unit_of(head: str) -> Unit:
     quantity = next(iter(quantities), None)
     if _UNCLEAR.search(bare) and (quantity is None or _OTHERWISE.search(bare)):
         return Unit(head, unclear="does not tell its quantity")
-    said = ", ".join([*(unit.words for unit in found), *(SAID[one].split(",")[0] for one in stated)])
+    said = ", ".join([*(unit.words for unit in found), *(SAID[word].split(",")[0] for word in stated)])
     return Unit(said, quantity, next(iter(factors), None), loss=bool(_LOSS.search(bare)))
 
 

@@ -114,14 +114,14 @@ def expanded(value: Any) -> Any:
         if count * _size(entry) > _MOST_KEYS:
             raise ValueError(f"{name}: more than {_MOST_KEYS:,} keys in all that `each` makes of it")
         for point in product(*axes):
-            made = deepcopy({key: inner for key, inner in entry.items() if key != "each"})
+            scenario = deepcopy({key: inner for key, inner in entry.items() if key != "each"})
             full = str(name)
             for key, number in zip(map(str, each), point, strict=True):
-                _set(made, key.split("."), number)
+                _set(scenario, key.split("."), number)
                 full += f" {key.rsplit('.', 1)[-1]}={number:.12g}"
             if full in scenarios:
                 raise ValueError(f"{name}: two scenarios are named {full!r}")
-            scenarios[full] = made
+            scenarios[full] = scenario
     if len(scenarios) > _MOST_SCENARIOS:
         raise ValueError(f"more than {_MOST_SCENARIOS} scenarios")
     return scenarios

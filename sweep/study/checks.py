@@ -237,7 +237,7 @@ def _check_merged(pixel: Pixel, sources: Sources) -> None:
     if not countable(pixel):
         problem = "`vision` counts electrons of the first usable capture"
         sources.add(("pixel", "merge"), problem, pixel.merge, "saturated, with smaller wells, PRNU or read noise")
-    readings = pixel.knees[1, -1] or NOISE_BINS * sum(2 * math.sqrt(one.well_e) for one in pixel.read_as)
+    readings = pixel.knees[1, -1] or NOISE_BINS * sum(2 * math.sqrt(readout.well_e) for readout in pixel.read_as)
     if readings > MOST_READINGS or n_roots(pixel, light_of(pixel)) > MOST_ROOTS:
         light = min(capture.light for capture in pixel.captures)
         problem = f"too many readings for `vision`: {readings:,.0f}, and light from 1 to {light:.3g}"

@@ -122,16 +122,16 @@ class Tree:
             if key in lines:
                 raise self._error(f"found duplicate key {key!r}", line, path)
             lines[key] = line
-            made = self._value(inner, (*path, key), depth + 1)
+            converted = self._value(inner, (*path, key), depth + 1)
             if key == "<<" and key_node.style is None:
-                sources = made if isinstance(made, list) else [made]
+                sources = converted if isinstance(converted, list) else [converted]
                 if not all(isinstance(source, dict) for source in sources):
                     raise self._error("`<<` merges mappings only", line, path)
                 merged += sources
             else:
-                value[key] = made
+                value[key] = converted
         for source in merged:
-            value |= {key: made for key, made in source.items() if key not in value}
+            value |= {key: converted for key, converted in source.items() if key not in value}
         self._lines[id(value)] = value, lines
         return value
 
@@ -283,9 +283,9 @@ class Document:
             if item["type"] == "extra_forbidden":
                 meant.add((*path[:-1], issue.nearest))
         # A misspelled key is one issue, not a second one because the right key is missing.
-        kept = [issue for (path, problem), issue in issues.items() if problem != "missing" or path not in meant]
+        shown = [issue for (path, problem), issue in issues.items() if problem != "missing" or path not in meant]
         more = len(items) - _MOST_LOOKED_AT
-        return by_line(kept) + ([ValidationIssue(f"and about {more:,} more errors", self.file)] if more > 0 else [])
+        return by_line(shown) + ([ValidationIssue(f"and about {more:,} more errors", self.file)] if more > 0 else [])
 
     def _path(self, loc: Sequence[Key]) -> KeyPath:
         """Return `loc` without the tags that pydantic adds for unions, and with a missing last key kept."""

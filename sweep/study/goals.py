@@ -140,10 +140,12 @@ def search_of(section: StudySection, spaces: Sequence[Space], sources: Sources) 
     elif chosen in boxes and not _free(boxes[chosen], requested.map or {}):
         sources.add(("search", "space"), "every parameter is fixed", chosen, "one free parameter or more")
     bases = {name: _NUMBERS.sub("", name) for name in scenarios}
-    wanted = requested.scenario or scenarios[0]
-    searched = [wanted] if wanted in bases else [name for name, base in bases.items() if base == wanted]
+    scenario_name = requested.scenario or scenarios[0]
+    searched = (
+        [scenario_name] if scenario_name in bases else [name for name, base in bases.items() if base == scenario_name]
+    )
     if not searched:
-        sources.unknown(("search", "scenario"), "scenario", wanted, dict.fromkeys([*bases, *bases.values()]))
+        sources.unknown(("search", "scenario"), "scenario", scenario_name, dict.fromkeys([*bases, *bases.values()]))
     if requested.algorithm not in ALGORITHMS:
         what = "algorithm (it must take inequality constraints)"
         sources.unknown(("search", "algorithm"), what, requested.algorithm, list(ALGORITHMS))
@@ -156,7 +158,7 @@ def search_of(section: StudySection, spaces: Sequence[Space], sources: Sources) 
         levels = Axis(min=requested.front.min, max=requested.front.max, count=requested.front.count).points()
     for scene in (section.scenarios[name] for name in searched):
         if scene.drive is not None and isinstance(scene.exposure, WhitePatchExposure):
-            sources.add(("search", "scenario"), "a search under a pulsed light needs a fixed exposure", wanted)
+            sources.add(("search", "scenario"), "a search under a pulsed light needs a fixed exposure", scenario_name)
             break
     space, others = boxes[chosen], {space.name for space in spaces if space.kind in ("reference", "design")}
     assert space.filter is not None
@@ -278,8 +280,8 @@ def _most(study: Study, space: Space, scenario: str) -> Iterator[tuple[str, floa
     if space.filter is None:
         return
     low, high = (np.array([end(axis) for axis in space.axes], dtype=float) for end in (min, max))
-    made = [space.filter.family.perturbed(off) for off in study.tolerance.places]
-    top = np.max([family.hull(low, high)[1] for family in made], axis=0)
+    perturbed = [space.filter.family.perturbed(off) for off in study.tolerance.places]
+    top = np.max([family.hull(low, high)[1] for family in perturbed], axis=0)
     counts, modified = setup.camera.mosaic.counts, list(setup.camera.modified)
     qe = setup.camera.qe.copy()
     qe[modified] = top

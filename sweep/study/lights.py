@@ -72,8 +72,8 @@ def _padded(make: Callable[[WavelengthGrid], Lights], grid: WavelengthGrid) -> L
     if inside.size < 2:
         raise DataError(ValidationIssue("no wavelengths of built-in lights", value=f"{low:g} to {high:g} nm"))
     first, last = int(inside[0]), int(inside[-1])
-    made = make(grid.model_copy(update={"start_nm": float(nodes[first]), "stop_nm": float(nodes[last])}))
-    return replace(made, photons=np.pad(made.photons, ((0, 0), (first, grid.size - 1 - last))))
+    inside_lights = make(grid.model_copy(update={"start_nm": float(nodes[first]), "stop_nm": float(nodes[last])}))
+    return replace(inside_lights, photons=np.pad(inside_lights.photons, ((0, 0), (first, grid.size - 1 - last))))
 
 
 def _built_in(section: LightsSection, sources: Sources, at: KeyPath) -> Lights | None:
@@ -112,8 +112,8 @@ def lights_of(section: LightsSection, sources: Sources, at: KeyPath = ("lights",
             for position, column in enumerate(columns):
                 found_path = (*files, index, "signals", signal_type, position)
                 label = f"{Path(entry.file).stem}:{column}"
-                if sources.kept is not None:
-                    photons = sources.kept_curve(found_path, sources.kept.lights, (signal_type, label))
+                if sources.stored is not None:
+                    photons = sources.stored_curve(found_path, sources.stored.lights, (signal_type, label))
                 else:
                     photons = sources.photons(found_path, curves, column, entry)
                 if photons is not None:

@@ -23,7 +23,7 @@ from .sources import KeptSources, Sources
 def load_study(
     path: Path,
     data: Path | None = None,
-    kept: KeptSources | None = None,
+    stored: KeptSources | None = None,
     changes: Mapping[str, str] = {},
     *,
     allow_code: bool | Mapping[str, str] = False,
@@ -31,14 +31,15 @@ def load_study(
 ) -> Study:
     """Read and check a study file.
 
-    `kept`: curves on that grid to take instead of those in files; `changes`: dotted key -> value to take instead, as a
-    study file would have it. Raises StudyError: with one issue per problem: file:line, key, value, allowed values,
-    nearest name.
+    `stored`: curves on that grid to take instead of those in files; `changes`: dotted key -> value to take instead, as
+    a study file would have it. Files are looked for in `data` first, then beside the study. With `allow_code` code
+    that the study names may run, or only code with these digests. Raises StudyError with one issue per problem:
+    file:line, key, value, allowed values, nearest name.
     """
     document = _changed(path, changes)
     members = members_of(document)
     if member is None and len(members) > 1:
-        names = ", ".join(one.name for one in members)
+        names = ", ".join(known_member.name for known_member in members)
         problem = f"a study of several sensors or lights ({names}): `sweep run` runs all"
         raise StudyError(ValidationIssue(problem, str(path), allowed=f"one of each here: {way_to_one(document)}"))
     chosen, notes = member or members[0], list[str]()
@@ -51,7 +52,7 @@ def load_study(
     if data is not None and not is_folder(data):
         raise StudyError(ValidationIssue("no such folder", None, None, "--data", str(data)))
     folders = [path.parent] if data is None else [data, path.parent]
-    sources = Sources(document, section.wavelengths, folders, kept, allow_code=allow_code)
+    sources = Sources(document, section.wavelengths, folders, stored, allow_code=allow_code)
     sources.warnings += notes
     return resolve(section, sources)
 
@@ -96,6 +97,9 @@ def _checked(document: Document) -> StudySection:
 
 
 def folder_name(study_name: str) -> str:
-    """Return a valid folder name for the results of a study."""
+    """Return a valid folder name for the results of a study.
+
+    Everything except letters, digits, `-`, `_` and `.` becomes `_`.
+    """
     name = re.sub(r"[^a-zA-Z0-9_.-]", "_", study_name)
     return name if name.strip(".") else "_"

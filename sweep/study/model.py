@@ -107,8 +107,8 @@ class Study:
     @property
     def requested(self) -> RequestedQuantities:
         """Quantities that the study asks for of its designs."""
-        made = requested_quantities(self.section, self.lights, self.tasks, self.user_metrics)
-        return replace(made, any_place=self.any_place, brightest=self.sensor.brightest)
+        quantities = requested_quantities(self.section, self.lights, self.tasks, self.user_metrics)
+        return replace(quantities, any_place=self.any_place, brightest=self.sensor.brightest)
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -208,7 +208,7 @@ class Study:
         low, high = setup.camera.qe.copy(), setup.camera.qe.copy()
         if space.filter is not None:
             ends = [np.array([end(axis) for axis in space.axes], dtype=float) for end in (min, max)]
-            families = [space.filter.family.perturbed(off) for off in self.tolerance.places]
+            families = [space.filter.family.perturbed(production_error) for production_error in self.tolerance.places]
             lows, highs = zip(*(family.hull(*ends) for family in families), strict=True)
             low[list(setup.camera.modified)] = np.min(lows, axis=0)
             high[list(setup.camera.modified)] = np.max(highs, axis=0)
@@ -282,7 +282,7 @@ def requested_quantities(
         wanted_yield=section.wanted_yield,
         tasks=() if tasks is None else tasks.columns,
         vision=section.vision is not None,
-        flicker=bool(section.pixel.captures) and any(one.drive is not None for one in section.scenarios.values()),
+        flicker=bool(section.pixel.captures) and any(scene.drive is not None for scene in section.scenarios.values()),
         user_metrics=user_metrics,
     )
 

@@ -54,7 +54,7 @@ def members_of(document: Document) -> list[SensorAndLights]:
     if len(sensors) * len(lights) > _MOST:
         allowed = f"at most {_MOST} sensors times lights"
         raise StudyError(document.issue(("sensors",), "too many", len(sensors) * len(lights), allowed))
-    return [SensorAndLights(one, other, (i, k)) for (one, i), (other, k) in product(sensors, lights)]
+    return [SensorAndLights(sensor, light_set, (i, k)) for (sensor, i), (light_set, k) in product(sensors, lights)]
 
 
 def _listed(document: Document, key: str, alone: Any) -> list[tuple[str, int]]:
@@ -144,7 +144,7 @@ def _buildable(section: StudySection, names: set[str]) -> dict[str, Any]:
 
     A name that no sensor has is a mistake, and stays for its error.
     """
-    others = {*_SURROGATE_CURVES, *(curve for one in SENSORS.values() for curve in one.names)} - names
+    others = {*_SURROGATE_CURVES, *(curve for measured in SENSORS.values() for curve in measured.names)} - names
     variants = own_red(names) if section.sensor.builtin is not None else {}
 
     def is_buildable(entry: Modification) -> bool:
@@ -166,10 +166,10 @@ def _buildable(section: StudySection, names: set[str]) -> dict[str, Any]:
         for key, entries in filters.items()
     }
     searched = {**filters["sweeps"], **filters["boxes"]}
-    wanted = None if section.search is None else section.search.space
-    if section.search is None or wanted is None or wanted in searched:
+    space_name = None if section.search is None else section.search.space
+    if section.search is None or space_name is None or space_name in searched:
         return {"cfas": cfas, **filters} | ({"search": None} if not searched else {})
-    named_anywhere = wanted in {**section.sweeps, **section.boxes}
-    instead = next(iter(searched), None) if named_anywhere else wanted
+    named_anywhere = space_name in {**section.sweeps, **section.boxes}
+    instead = next(iter(searched), None) if named_anywhere else space_name
     search = None if instead is None else section.search.model_copy(update={"space": instead})
     return {"cfas": cfas, **filters, "search": search}

@@ -34,9 +34,9 @@ def sensor_of(section: SensorSection, sources: Sources) -> SensorCurves | None:
     Raises StudyError: with every issue so far, if the study cannot be used.
     """
     section = offered_curves(sources, ("sensor",), section, "sweep.sensors", BUILT_IN_SENSORS)
-    made = _sensor(section, sources)
-    if made is None or section.ir_cut is None or sources.kept is not None:
-        return made
+    sensor = _sensor(section, sources)
+    if sensor is None or section.ir_cut is None or sources.stored is not None:
+        return sensor
     entry = CurveFile(file=section.ir_cut, columns={"ir_cut": "ir_cut"})
     curves = sources.curves(("sensor", "ir_cut"), entry)
     if curves is None:
@@ -49,8 +49,8 @@ def sensor_of(section: SensorSection, sources: Sources) -> SensorCurves | None:
     values = sources.column(("sensor", "ir_cut"), cut, column, entry)
     if values is None:
         return None
-    qe = {name: curve * values for name, curve in made.qe.items()}
-    return replace(made, qe=qe, source=f"{made.source}, behind {section.ir_cut}")
+    qe = {name: curve * values for name, curve in sensor.qe.items()}
+    return replace(sensor, qe=qe, source=f"{sensor.source}, behind {section.ir_cut}")
 
 
 def _sensor(section: SensorSection, sources: Sources) -> SensorCurves | None:
@@ -70,7 +70,7 @@ def _sensor(section: SensorSection, sources: Sources) -> SensorCurves | None:
     source = ", ".join(entry.file for entry in section.files)
     clear = section.clear or (None if built_in is None else built_in.clear)
     try:
-        made = make_sensor(section.name or section.builtin or "sensor", {**known, **added}, source, clear)
+        sensor = make_sensor(section.name or section.builtin or "sensor", {**known, **added}, source, clear)
     except DataError as error:
         for issue in error.issues:
             index = next((i for i, entry in enumerate(section.files) if issue.key in entry.columns), None)
@@ -79,12 +79,12 @@ def _sensor(section: SensorSection, sources: Sources) -> SensorCurves | None:
             sources.add(path, issue.problem, issue.value, issue.allowed, issue.nearest)
         return None
     if built_in is None:
-        return made
+        return sensor
     variants = {
         cfa: {channel: curve for channel, curve in channels.items() if channel not in added}
         for cfa, channels in built_in.variants.items()
     }
-    return replace(made, source=f"{built_in.source}, {source}", surrogate=built_in.surrogate, variants=variants)
+    return replace(sensor, source=f"{built_in.source}, {source}", surrogate=built_in.surrogate, variants=variants)
 
 
 def _curves_of_files(
@@ -93,19 +93,19 @@ def _curves_of_files(
     """Return the QE of every curve of the files, those that are relative to others last; `known`: built-in curves."""
     curves: dict[str, FloatArray] = {}
     files = sorted(enumerate(section.files), key=lambda item: item[1].relative_to is not None)
-    whole = dict(known)
+    all_known = dict(known)
     for index, entry in files:
         path: KeyPath = ("sensor", "files", index)
-        if entry.relative_to is not None and entry.relative_to not in whole:
-            sources.unknown((*path, "relative_to"), "curve", entry.relative_to, whole)
+        if entry.relative_to is not None and entry.relative_to not in all_known:
+            sources.unknown((*path, "relative_to"), "curve", entry.relative_to, all_known)
             continue
-        factor = entry.scale if entry.relative_to is None else entry.scale * whole[entry.relative_to]
+        factor = entry.scale if entry.relative_to is None else entry.scale * all_known[entry.relative_to]
         for name, values in _columns(sources, path, entry, factor).items():
             if name in curves:
                 sources.add((*path, "columns", name), "the curve is defined twice", name)
             curves[name] = values
             if entry.relative_to is None:
-                whole[name] = values
+                all_known[name] = values
     return curves
 
 
@@ -123,7 +123,7 @@ def _columns(
         entry.quantity or given,
         scaled="scale" in entry.model_fields_set or given is not None,
     )
-    if sources.kept is None and known is None:
+    if sources.stored is None and known is None:
         return {}
     if known is not None and entry.relative_to is None:
         present = [column for column in entry.columns.values() if column in known.values]
@@ -134,8 +134,8 @@ def _columns(
     scaled = {}
     for name, column in entry.columns.items():
         place = (*path, "columns", name)
-        if sources.kept is not None:
-            values = sources.kept_curve(place, sources.kept.sensor, name)
+        if sources.stored is not None:
+            values = sources.stored_curve(place, sources.stored.sensor, name)
         else:
             values = sources.column(place, known, column, entry)
             values = None if values is None else values * factor
@@ -164,8 +164,8 @@ def with_chief_rays(section: StudySection, sources: Sources) -> StudySection:
                 if rays is None
                 else SensorField(heights=tuple(rays.heights.tolist()), cra_deg=tuple(rays.cra_deg.tolist()))
             )
-        made = read[key].model_copy(update={"places": field.places or PLACES})
-        scenarios[name] = scenario.model_copy(update={"field": made})
+        sensor_field = read[key].model_copy(update={"places": field.places or PLACES})
+        scenarios[name] = scenario.model_copy(update={"field": sensor_field})
     return section.model_copy(update={"scenarios": scenarios})
 
 
@@ -192,19 +192,19 @@ def with_technologies(sensor: SensorCurves, section: StudySection, sources: Sour
 
 def check_filter(space: Space, path: KeyPath, sensor: SensorCurves, sources: Sources) -> None:
     """Check that the base of a filter is no interference filter and that no filter exceeds its base."""
-    made = space.filter
-    assert made is not None
-    for base in dict.fromkeys(made.bases.values()):
+    candidate = space.filter
+    assert candidate is not None
+    for base in dict.fromkeys(candidate.bases.values()):
         if _moves(sensor, base):
             problem = f"the base curve {base} is an interference filter itself"
             sources.add((*path, "base"), problem, base, "a base of pigment")
-    if made.technology is None or made.technology.interference is None:
+    if candidate.technology is None or candidate.technology.interference is None:
         return
     low, high = (np.array([end(axis) for axis in space.axes], dtype=float) for end in (min, max))
-    bases = np.stack([sensor.curve(base) for base in made.bases.values()])
-    if (made.family.upper(low, high) > bases * (1 + _ROUNDING)).any():
+    bases = np.stack([sensor.curve(base) for base in candidate.bases.values()])
+    if (candidate.family.upper(low, high) > bases * (1 + _ROUNDING)).any():
         problem = "an interference filter lets through a share of its base"
-        exceeded = f"filters that exceed {' and '.join(dict.fromkeys(made.bases.values()))}"
+        exceeded = f"filters that exceed {' and '.join(dict.fromkeys(candidate.bases.values()))}"
         sources.add((*path, "technology"), problem, exceeded, "a filter below it, or pigment")
 
 

@@ -56,14 +56,14 @@ class KeptSources:
 class Sources:
     """Reader of the files of one study, each once; collects issues, warnings and digests.
 
-    `kept`: the curves of a finished run; no file is read then. `given`: files that are not on a disk, by their names.
+    `stored`: the curves of a finished run; no file is read then. `given`: files that are not on a disk, by their names.
     `allow_code`: code that the study names may run, or only code with these digests.
     """
 
     document: Document
     grid: WavelengthGrid
     folders: Sequence[Path]
-    kept: KeptSources | None = None
+    stored: KeptSources | None = None
     given: Mapping[str, Curves] = field(default_factory=dict)
     allow_code: bool | Mapping[str, str] = False
     issues: list[ValidationIssue] = field(default_factory=list)
@@ -181,7 +181,7 @@ class Sources:
                 self.add(path, f"{entry.file}, column {column}: {issue.problem}", issue.value, issue.allowed)
             return None
 
-    def kept_curve(self, path: KeyPath, curves: Mapping[_Key, PerWavelength], name: _Key) -> PerWavelength | None:
+    def stored_curve(self, path: KeyPath, curves: Mapping[_Key, PerWavelength], name: _Key) -> PerWavelength | None:
         """Return a curve stored with a finished run.
 
         None after adding an issue.
@@ -192,7 +192,7 @@ class Sources:
 
     def curves(self, path: KeyPath, entry: _Entry) -> Curves | None:
         """Read all curves of a file, once per study."""
-        if self.kept is not None:
+        if self.stored is not None:
             return None
         if entry.file not in self._read and entry.file in self.given:
             curves = self._read[entry.file] = self.given[entry.file]
@@ -218,24 +218,24 @@ class Sources:
         curves = self.curves(path, entry)
         if curves is None:
             return None
-        wanted = curves.values if columns is None else columns
-        known = [column for column in dict.fromkeys(wanted) if column in curves.values]
+        names = curves.values if columns is None else columns
+        known = [column for column in dict.fromkeys(names) if column in curves.values]
         try:
-            made = used_as(curves, known, use, stated, scaled=scaled)
+            used = used_as(curves, known, use, stated, scaled=scaled)
         except DataError as error:
             for issue in error.issues:
                 self.add(path, f"{entry.file}, column {issue.key}: {issue.problem}", issue.value, issue.allowed)
             return None
         if entry.file not in self.given and stated is None:
-            self.warnings += [f"{entry.file}: {note}" for note in made.notes[len(curves.notes) :]]
-        return made
+            self.warnings += [f"{entry.file}: {note}" for note in used.notes[len(curves.notes) :]]
+        return used
 
     def colorants(self, section: ColorantsSection) -> Colorants | None:
         """Read the catalog of colorants."""
         path: KeyPath = ("colorants", "catalog")
-        if self.kept is not None and self.kept.colorants:
-            kept = self.kept.colorants
-            return Colorants(tuple(kept), np.stack(list(kept.values())), np.ones(len(kept)))
+        if self.stored is not None and self.stored.colorants:
+            stored = self.stored.colorants
+            return Colorants(tuple(stored), np.stack(list(stored.values())), np.ones(len(stored)))
         for name in BUILTIN_COLORANTS.keys() & set(section.catalog):
             if len(section.catalog) > 1:
                 self.add(path, f"the built-in catalog `{name}` goes with no other", section.catalog)

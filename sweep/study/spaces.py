@@ -176,8 +176,8 @@ class SpaceBuilder:
         if len(self.sources.issues) > before:
             return []
         target_name = "" if entry.to is None else str(entry.to)
-        made = Filter(family, dict.fromkeys(entry.channel, entry.base), target_name, entry.technology)
-        space = Space(kind, name, entry.cfa, made, tuple(ordered), kind != "search" and rows is None, rows)
+        candidate = Filter(family, dict.fromkeys(entry.channel, entry.base), target_name, entry.technology)
+        space = Space(kind, name, entry.cfa, candidate, tuple(ordered), kind != "search" and rows is None, rows)
         check_filter(space, path, self.sensor, self.sources)
         _check_formed(space, axes_path, self.sources)
         return [space]

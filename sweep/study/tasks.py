@@ -39,11 +39,14 @@ def tasks_of(section: TasksSection, sources: Sources) -> StudyTasks | None:
     if len(sources.issues) > before:
         return None
     from_files: dict[tuple[str, str], FloatArray] = {}
-    made = [_user_task(name, task, from_files, sources) for name, task in section.own.items()]
+    own_tasks = [_user_task(name, task, from_files, sources) for name, task in section.own.items()]
     if len(sources.issues) > before:
         return None
     conditions = Conditions(section.exposure_s, section.read_noise_e, section.illuminance_lx)
-    tasks = (*(shipped(sources.grid, name) for name in section.shipped), *(task for task in made if task is not None))
+    tasks = (
+        *(shipped(sources.grid, name) for name in section.shipped),
+        *(task for task in own_tasks if task is not None),
+    )
     return StudyTasks(conditions, tasks, from_files)
 
 
@@ -73,7 +76,7 @@ def _user_task(
             else:
                 files.add(entry.file)
                 owner = f"{name} {kind}"
-                read = _read(path, entry, sources) if sources.kept is None else _kept(owner, path, entry, sources)
+                read = _read(path, entry, sources) if sources.stored is None else _kept(owner, path, entry, sources)
                 from_files |= {(owner, f"{entry.file}:{column}"): values for column, values in read.items()}
                 spectra += list(read.values())
         classes[kind] = np.array(spectra).reshape(-1, sources.grid.size)
@@ -112,11 +115,11 @@ def _check_names(name: str, task: UserTask, path: KeyPath, sources: Sources) -> 
 
 def _kept(owner: str, path: KeyPath, entry: TaskFile, sources: Sources) -> dict[str, PerWavelength]:
     """Return the spectra of a file that a finished run kept."""
-    assert sources.kept is not None
+    assert sources.stored is not None
     start = f"{entry.file}:"
     spectra = {
         name.removeprefix(start): values
-        for (of, name), values in sources.kept.tasks.items()
+        for (of, name), values in sources.stored.tasks.items()
         if of == owner and name.startswith(start)
     }
     if not spectra or not set(entry.columns or ()) <= spectra.keys():

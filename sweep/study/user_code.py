@@ -105,7 +105,7 @@ def offered_curves(sources: Sources, at: KeyPath, section: _Curves, group: Offer
             raise SweepError(
                 ValidationIssue(f"{name} says nothing of curves", value=stated, allowed="a mapping with `files`")
             )
-        made: _Curves = type(section).model_validate(dict(stated))
+        curves: _Curves = type(section).model_validate(dict(stated))
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
@@ -117,7 +117,7 @@ def offered_curves(sources: Sources, at: KeyPath, section: _Curves, group: Offer
     package: Installed | None = installed(group, name)
     sources.folders = [*([] if package is None else package.folders), *sources.folders]
     added = {key: getattr(section, key) for key in section.model_fields_set - {"builtin", "files"}}
-    return made.model_copy(update={"name": made.name or name, "files": [*made.files, *section.files], **added})
+    return curves.model_copy(update={"name": curves.name or name, "files": [*curves.files, *section.files], **added})
 
 
 def user_metrics(section: StudySection, sources: Sources) -> tuple[UserMetric, ...]:
@@ -154,21 +154,21 @@ def _read_user_code(
     key: str, names: Sequence[str], group: Offered, make: Callable[[UserCode], _Made], sources: Sources
 ) -> tuple[_Made, ...]:
     is_list = isinstance(sources.document.data.get(key), list)
-    made, failed = [], set[str]()
+    loaded, failed = [], set[str]()
     for index, name in enumerate(names):
         path: KeyPath = (key, index) if is_list else (key,)
         if not is_from_outside(name, group, ()):
             sources.unknown(path, key.removesuffix("s"), name, offers(group) or ["FILE.py:NAME"])
         elif allowed(sources, path, name):
             try:
-                made.append(make(code_of(sources, name, group)))
+                loaded.append(make(code_of(sources, name, group)))
             except SweepError as error:
                 if str(error) not in failed:  # several names may be of one file
                     sources.add_error(path, error)
                 failed.add(str(error))
-    if len(made) < len(names):
+    if len(loaded) < len(names):
         raise sources.error
-    return tuple(made)
+    return tuple(loaded)
 
 
 def try_effects(study: Study, sources: Sources) -> None:
@@ -215,7 +215,7 @@ def try_metrics(study: Study, sources: Sources) -> None:
         else {}
     )
     searched = None if study.search is None else study.search.space.cfa
-    wanted = {*study.objective.weights, *study.constraints}
+    requested = {*study.objective.weights, *study.constraints}
     without_metric: dict[str, list[str]] = {metric.name: [] for metric in study.user_metrics}
     for metric in study.user_metrics:
         for cfa, setup in setups.items():
@@ -224,7 +224,7 @@ def try_metrics(study: Study, sources: Sources) -> None:
             except SweepError as error:
                 sources.add_error(("metrics",), error)
                 break  # it fails on the others, too
-        if searched in without_metric[metric.name] and {metric.name, WORST + metric.name} & wanted:
+        if searched in without_metric[metric.name] and {metric.name, WORST + metric.name} & requested:
             sources.add(("metrics",), f"{metric.code.name} gives None for {searched}, which is searched", metric.name)
     if sources.issues:
         raise sources.error

@@ -47,14 +47,20 @@ def scenes_of(vision: Vision, lamps: dict[str, Lamps], order: str, split: str, s
 
 
 def scene_key(seed: tuple[int, int], order: str) -> tuple[int, ...]:
-    """Return the start of the seed of scenes."""
+    """Return the start of the seed of scenes.
+
+    `seed`: that of the study, and the number of this one.
+    """
     return (*seed, 10 + ORDERS.index(order))
 
 
 def batches(
     camera: HeadCamera, scenes: Scenes, key: Mapping[str, Any], order: str, split: str, form: Form
 ) -> Iterator[Batch]:
-    """Yield the images of scenes in blocks of `TOGETHER`."""
+    """Yield the images of scenes in blocks of `TOGETHER`.
+
+    `key`: `design_id`, `name`, `cfa` and `seed`, for the labels.
+    """
     for start in range(0, len(scenes), TOGETHER):
         block = scenes.subset(slice(start, start + TOGETHER))
         numbers = np.arange(start, start + len(block))

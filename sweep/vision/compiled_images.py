@@ -26,11 +26,11 @@ def draw_numbers(
     """
     last = below.shape[1] - 1
     for i in range(node.size):
-        one, two, w, u = below[node[i]], below[node[i] + 1], share[i], uniform[i]
+        lower, upper, w, u = below[node[i]], below[node[i] + 1], share[i], uniform[i]
         low, high = 0, last
         while low < high:
             middle = (low + high) // 2
-            if one[middle] * (1 - w) + two[middle] * w >= u:
+            if lower[middle] * (1 - w) + upper[middle] * w >= u:
                 high = middle
             else:
                 low = middle + 1
@@ -83,7 +83,7 @@ def log_likelihoods(
     """Write the log-likelihood of each case given each image into `out`, from tabulated probabilities.
 
     `node`, `share`: result of `PixelTable.at`, pixels with most information first; `table`: `PixelTable.shares`, none
-    above 0.
+    above 0. -inf for cases that are impossible beside the best.
     """
     n_pixels = numbers.shape[1]
     for image in range(numbers.shape[0]):

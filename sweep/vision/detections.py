@@ -44,15 +44,16 @@ def precisions(labels: pd.DataFrame, detections: pd.DataFrame, lenses: Sequence[
     """Return the average precision of each signal type in the images of each light level.
 
     A detection is right within `match_radius_px` of a lit lens of its state that no detection of a higher score has
-    found; everything else, brake lamps and heads that are off among it, is wrong.
+    found; everything else, brake lamps and heads that are off among it, is wrong. Columns `level`, `state`, `lit`
+    (number of lit lenses), `average_precision`; of detections `image_id`, `x_px`, `y_px`, `state`, `score`.
     """
     names = ["state", "head_x_px", "lit_y_px", "lens_diameter_px"]
     targets = labels[["image_id", "level", *names]].explode(names, ignore_index=True)
-    made = detections.merge(labels[["image_id", "level"]], on="image_id").reset_index(drop=True)
+    located = detections.merge(labels[["image_id", "level"]], on="image_id").reset_index(drop=True)
     rows = []
     for level in labels["level"].unique():
         for state in lenses:
-            here, said = (part[(part["level"] == level) & (part["state"] == state)] for part in (targets, made))
+            here, said = (part[(part["level"] == level) & (part["state"] == state)] for part in (targets, located))
             said = said.sort_values("score", ascending=False, kind="stable")
             ap = average_precision(_right(here, said), said["score"].to_numpy(dtype=float), len(here))
             rows.append({"level": level, "state": state, "lit": len(here), "average_precision": ap})
@@ -73,8 +74,8 @@ def precision_scores(table: pd.DataFrame, reference: str) -> pd.DataFrame:
     for level, values in by_level.items():
         for name in values.index:
             row: dict[str, Any] = {"name": str(name), "level": level}
-            apart = values.loc[name] - values.loc[reference]
-            for column, of_seeds in (("average_precision", values.loc[name]), ("apart", apart)):
+            differences = values.loc[name] - values.loc[reference]
+            for column, of_seeds in (("average_precision", values.loc[name]), ("apart", differences)):
                 row |= interval_of_seeds(float(of_seeds.mean()), np.array(of_seeds, dtype=float)).columns(column)
             rows.append(row)
     return pd.DataFrame(rows)

@@ -51,9 +51,13 @@ def split_lamps(lights: Lights, vision: Vision, seed: tuple[int, int]) -> dict[s
             by_digest.setdefault(spectrum_digest(lights.photons[i]), []).append(int(i))
         groups = [by_digest[key] for key in by_digest]
         order = rng.permutation(len(groups))
-        few = max(1, len(groups) // 4)
-        for part, some in ((TEST, order[:few]), (CHECK, order[few : 2 * few]), (TRAIN, order[2 * few :])):
-            parts[part].append(np.array([i for at in some for i in groups[at]], dtype=np.intp))
+        n_quarter = max(1, len(groups) // 4)
+        for part, numbers in (
+            (TEST, order[:n_quarter]),
+            (CHECK, order[n_quarter : 2 * n_quarter]),
+            (TRAIN, order[2 * n_quarter :]),
+        ):
+            parts[part].append(np.array([i for at in numbers for i in groups[at]], dtype=np.intp))
     split = {part: Lamps(tuple(by_digest)) for part, by_digest in parts.items()}
     learned = split[TRAIN].digests(lights) | split[CHECK].digests(lights)
     if learned & split[TEST].digests(lights):

@@ -97,8 +97,8 @@ class NetworkReader:
         """
         columns = self._mirror if mirrored else self._columns
         scaled = in_noise(images[:, self._rows[:, None], columns], self.pixel)
-        whole = self.vision.input == "demosaicked"
-        planes = demosaicked(scaled, self.mosaic) if whole else tile_planes(scaled, self.mosaic)
+        is_demosaicked = self.vision.input == "demosaicked"
+        planes = demosaicked(scaled, self.mosaic) if is_demosaicked else tile_planes(scaled, self.mosaic)
         return planes.astype(np.float32)
 
     def _examples(self, batches: Iterable[Batch]) -> _Examples:

@@ -44,11 +44,11 @@ def _cases(camera: HeadCamera, lamps: Lamps, order: str, sunny: bool) -> _Cases:
     for kind, lamp_indices in enumerate(lamps.of_lens):
         share = 1 / (len(lamp_indices) * len(intensities))
         lit += [(kind, int(lamp), candelas, share) for lamp in lamp_indices for candelas in intensities]
-    whole = np.array(lit)
+    lit_cases = np.array(lit)
     first, second = np.repeat(np.arange(len(lit)), len(rest)), np.tile(np.arange(len(rest)), len(lit))
-    table = np.concatenate([whole[first, :2].astype(np.intp), rest[second]], axis=1)
-    weight = whole[first, 3] * sun_share[second] / (len(orders) * n_places)
-    return _Cases(np.ascontiguousarray(table), np.ascontiguousarray(whole[first, 2]), weight)
+    table = np.concatenate([lit_cases[first, :2].astype(np.intp), rest[second]], axis=1)
+    weight = lit_cases[first, 3] * sun_share[second] / (len(orders) * n_places)
+    return _Cases(np.ascontiguousarray(table), np.ascontiguousarray(lit_cases[first, 2]), weight)
 
 
 def posteriors(

@@ -70,8 +70,8 @@ def pixel_table(pixel: Pixel) -> PixelTable:
     parts = readings.exposure, readings.passed, readings.starts, readings.columns, readings.shares
     shares = np.zeros((nodes_e.size, readings.n_bins))
     for of_node, electrons in zip(shares, nodes_e, strict=True):
-        first, some = merged_shares(np.minimum(electrons * light, most_e), 0.0, *parts, readings.n_bins)
-        of_node[first : first + some.size] = some
+        first, of_readings = merged_shares(np.minimum(electrons * light, most_e), 0.0, *parts, readings.n_bins)
+        of_node[first : first + of_readings.size] = of_readings
     shares = _with_prnu(shares, nodes_e, pixel.prnu)
     logs = np.log(np.maximum(shares, _LEAST)).T
     logs -= logs.max(axis=1, keepdims=True)

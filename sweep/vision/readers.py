@@ -89,11 +89,11 @@ def _streets(
     learned, test = (draw_streets(vision, vision.street, split, seed) for split in (TRAIN, TEST))
     detector = Detector(design.mosaic, camera.pixel, vision.lenses)
     detector.learn(streets.batches(learned, lamps[TRAIN], key, TRAIN, "raw"))
-    made = detector.detect(streets.batches(test, lamps[TEST], key, TEST, "raw"))
+    detections = detector.detect(streets.batches(test, lamps[TEST], key, TEST, "raw"))
     first = test.subset(slice(0, len(camera.levels)))  # levels take turns
     pictures = next(streets.batches(first, lamps[TEST], key, TEST, "isp")).images
     labels, shape = street_labels(vision, design.mosaic, test, key, TEST), (-1, len(vision.lenses))
-    table = precisions(labels, made, vision.lenses)
+    table = precisions(labels, detections, vision.lenses)
     precision, lit = table["average_precision"].to_numpy(dtype=float), table["lit"].to_numpy(dtype=np.intp)
     return precision.reshape(shape), lit.reshape(shape), pictures
 

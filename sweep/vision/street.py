@@ -73,7 +73,7 @@ def draw_streets(vision: Vision, street: Street, split: str, seed: tuple[int, in
     shape = (n, kinds.size)
     state = np.where(kinds == _HEAD, rng.integers(1 + len(vision.lenses), size=shape), 0)
     lamp = rng.random(shape)
-    daylight = np.array([one.light == "daylight" for one in levels])[level]
+    daylight = np.array([light_level.light == "daylight" for light_level in levels])[level]
     of_signals = np.array(vision.intensities_cd)[rng.integers(len(vision.intensities_cd), size=shape)]
     u = rng.random(shape)
     of_brake, of_street = (low * (high / low) ** u for low, high in (_BRAKE_CD, _STREET_CD))
@@ -82,7 +82,7 @@ def draw_streets(vision: Vision, street: Street, split: str, seed: tuple[int, in
         [np.where(state > 0, of_signals, 0.0), of_brake],
         np.where(daylight[:, None], 0.0, of_street),
     )
-    sunny = np.array([one.phantom_cd > 0 for one in levels])[level]
+    sunny = np.array([light_level.phantom_cd > 0 for light_level in levels])[level]
     cells = np.stack([rng.permutation(street.columns * street.rows)[: kinds.size] for _ in range(n)])
     return StreetScenes(
         level=level,
@@ -179,8 +179,8 @@ class StreetCamera:
         if not share:
             return image
         means = image.reshape(self.shape[0] // rows, rows, self.shape[1] // columns, columns).mean(axis=(0, 2))
-        whole = np.tile(means, (self.shape[0] // rows, self.shape[1] // columns))
-        return np.asarray((1 - share) * image + share * whole, dtype=float)
+        tiled_means = np.tile(means, (self.shape[0] // rows, self.shape[1] // columns))
+        return np.asarray((1 - share) * image + share * tiled_means, dtype=float)
 
     def batches(
         self, scenes: StreetScenes, lamps: Lamps, key: Mapping[str, Any], split: str, form: Form

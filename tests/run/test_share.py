@@ -123,7 +123,7 @@ def test_many_designs_are_made_in_blocks_and_read_out_once_for_all_pairs_within_
     allowed = rounding_of_distance(terms_of(setup), setup.camera.pixel.full_scale_dn, len(setup.camera.mosaic.channels))
     for at in range(7):
         alone = np.concatenate(
-            [search.space.curves(points[at : at + 1], size, off) for off in drawn.draws(pairs[0]).offs]
+            [search.space.curves(points[at : at + 1], size, off) for off in drawn.draws(pairs[0]).production_errors]
         )
         for pair in pairs:
             own = drawn.kept(alone, [pair])[pair][0]

@@ -48,7 +48,8 @@ def rounded_gaussian(mean: FloatArray, sigma: float, top: float, out: FloatArray
 def poisson_shares(electrons: float, start: int, rare: float, shares: FloatArray) -> tuple[int, int]:
     """Compute the probability of each count, relative to the most frequent one.
 
-    `rare`: counts below this relative probability are left out.
+    `rare`: counts below this relative probability are left out. `shares` is filled between the two returned indices;
+    its last count takes all higher ones.
     """
     last, mode = shares.size - 1, int(electrons)
     low = high = min(mode - start, last)
@@ -88,8 +89,8 @@ def _sum_square(shares: FloatArray, values: FloatArray, about: float, variance: 
     """Sum of variances and of the squares of values less another one, by their shares."""
     total = 0.0
     for k in range(shares.size):
-        off = values[k] - about
-        total += shares[k] * (variance[k] + off * off)
+        deviation = values[k] - about
+        total += shares[k] * (variance[k] + deviation * deviation)
     return total
 
 
@@ -200,7 +201,7 @@ def cubic_of_electrons(
 def occurring(shares: FloatArray, rare: float) -> tuple[int, int]:
     """Return the range of shares without the rare ones at both ends.
 
-    `rare`: probability below which one is left out.
+    `rare`: probability below which one is left out. Returns the first index, and that after the last.
     """
     low, high = 0, shares.size
     while low + 1 < high and shares[low] < rare:

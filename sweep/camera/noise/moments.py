@@ -167,10 +167,10 @@ def with_prnu(electrons: PerValue, pixel: Pixel) -> Float[Array, "3 values"]:
     spread = 1 + DRAWN * pixel.prnu
     ends = LinearRange.of(pixel)
     felt = _felt(electrons * spread, even) | _felt(electrons * (2 - spread), even)
-    some = np.flatnonzero(felt & (electrons <= ends.last_e * 2))
-    averaged = np.empty((3, some.size))
-    means_over_gains(electrons[some], pixel.prnu, DRAWN, _PER_DEVIATION, table.x, table.c, averaged)
-    result[:, some] = averaged
+    in_table = np.flatnonzero(felt & (electrons <= ends.last_e * 2))
+    averaged = np.empty((3, in_table.size))
+    means_over_gains(electrons[in_table], pixel.prnu, DRAWN, _PER_DEVIATION, table.x, table.c, averaged)
+    result[:, in_table] = averaged
     return result
 
 

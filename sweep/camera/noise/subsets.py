@@ -75,10 +75,10 @@ class SubsetTable:
         for subset, spline in zip(self.subsets, self.splines, strict=True):
             rows = spline(roots)
             mean_e, covariance_e2 = np.zeros((n, *roots.shape)), np.zeros((n, n, *roots.shape))
-            for at, one in enumerate(subset, 1):
-                mean_e[one] = rows[at] + held
-            for at, (one, other) in enumerate(_pairs(subset), 1 + len(subset)):
-                covariance_e2[one, other] = covariance_e2[other, one] = rows[at]
+            for at, first in enumerate(subset, 1):
+                mean_e[first] = rows[at] + held
+            for at, (first, second) in enumerate(_pairs(subset), 1 + len(subset)):
+                covariance_e2[first, second] = covariance_e2[second, first] = rows[at]
             moments[subset] = SubsetMoments(np.clip(rows[0], 0.0, 1.0), mean_e, covariance_e2)
         return moments
 
@@ -101,7 +101,8 @@ def usable_of_count(counts: PerValue, pixel: Pixel, limit_dn: int | None) -> tup
     """Return the chance that a capture is usable, and its partial moments, for given numbers of electrons.
 
     `pixel`: capture, as a pixel that is read once; `limit_dn`: digital number from which on it is not usable; None if
-    it always is. Mean and mean square of what it reads, electrons, where it is usable, and 0 where not.
+    it always is. Returns
+    probability, mean and mean square of what it reads, electrons, where it is usable, and 0 where not.
     """
     gain, top = pixel.dn_per_e, float(pixel.full_scale_dn if limit_dn is None else limit_dn)
     sigma = gain * pixel.read_noise_e
@@ -166,8 +167,8 @@ def _moments(
             within = np.divide(summed[1:], share, out=np.zeros_like(summed[1:]), where=known)
             mean = within[:size]
             covariance = [
-                within[size + at] - mean[subset.index(one)] * mean[subset.index(other)]
-                for at, (one, other) in enumerate(_pairs(subset))
+                within[size + at] - mean[subset.index(capture_a)] * mean[subset.index(capture_b)]
+                for at, (capture_a, capture_b) in enumerate(_pairs(subset))
             ]
             less = np.where(known, mean + first - electrons, 0.0)
             result[subset] = np.concatenate([share[None], less, np.array(covariance).reshape(-1, electrons.size)])

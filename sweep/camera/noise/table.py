@@ -73,9 +73,9 @@ def unclipped_e(pixel: Pixel) -> tuple[float, float]:
     """
     electrons = tables(pixel).nodes ** 2
     sigma = pixel.dn_per_e * np.sqrt(electrons + (pixel.prnu * electrons) ** 2 + pixel.read_noise_e**2)
-    off = mean_unrounded(electrons, pixel) - pixel.dn_per_e * electrons - pixel.offset_dn
-    kept = electrons[np.abs(off) <= _CUT * sigma + 1e-9]
-    return (float(kept[0]), float(kept[-1])) if kept.size else (1.0, 0.0)
+    shift = mean_unrounded(electrons, pixel) - pixel.dn_per_e * electrons - pixel.offset_dn
+    unclipped = electrons[np.abs(shift) <= _CUT * sigma + 1e-9]
+    return (float(unclipped[0]), float(unclipped[-1])) if unclipped.size else (1.0, 0.0)
 
 
 @lru_cache(maxsize=8)
@@ -91,7 +91,7 @@ def tables(pixel: Pixel) -> MomentTable:
         prnu = max(pixel.prnu, _LEAST_PRNU)
         last = np.arcsinh(prnu * np.sqrt(moments.LinearRange.of(pixel).last_e)) / prnu
         nodes = np.sinh(prnu * np.arange(0, last + 2 * moments.STEP, moments.STEP)) / prnu
-        whole = CubicSpline(nodes, moments.moments(nodes**2, pixel), axis=1)
+        spline = CubicSpline(nodes, moments.moments(nodes**2, pixel), axis=1)
     else:
-        whole = moments.table_without_prnu(pixel)
-    return MomentTable.of(whole, moments.LinearRange.of(pixel).last_e, moments.STEP)
+        spline = moments.table_without_prnu(pixel)
+    return MomentTable.of(spline, moments.LinearRange.of(pixel).last_e, moments.STEP)

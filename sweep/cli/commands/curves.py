@@ -89,7 +89,7 @@ def evaluate_(
         column=column,
         sensor=sensor,
         lights=lights,
-        quantity=[quantity_of(one) for one in quantity or ()],
+        quantity=[quantity_of(word) for word in quantity or ()],
         transmission=transmission,
         relative_to=relative_to,
         data=data,

@@ -98,7 +98,7 @@ def export(
 
         assert images is not None
         with ProgressDisplay(quiet=quiet) as display:
-            splits = tuple(one.value for one in split or ImageSplit)
+            splits = tuple(name.value for name in split or ImageSplit)
             files = ImageFiles(images, form.value, png, splits, coco)
             lines = export_images(folder, files, data, jobs, display.update, allow_code=allow_code)
     for line in [] if quiet else lines:

@@ -85,13 +85,13 @@ class FreeForm:
         wavelength_nm: PerWavelength,
         base: PerWavelength,
         nodes_nm: Float[Array, " nodes"],
-        off: ProductionError = AS_DESIGNED,
+        production_error: ProductionError = AS_DESIGNED,
     ) -> None:
         if nodes_nm.size < 2:
             raise SweepError(ValidationIssue("a free-form filter needs two nodes or more", value=nodes_nm.tolist()))
         self.nodes_nm = nodes_nm
         self._made_of = wavelength_nm, base
-        nominal_nm = off.nominal_nm(wavelength_nm)
+        nominal_nm = production_error.nominal_nm(wavelength_nm)
         inside = (nominal_nm >= nodes_nm[0]) & (nominal_nm <= nodes_nm[-1])
         self._linear_basis = linear_basis(nominal_nm, nodes_nm) * (base * inside)
         self._fixed = np.where(inside, 0.0, base)
@@ -148,9 +148,9 @@ class FreeForm:
         """None, since it has no bands."""
         return {}
 
-    def perturbed(self, off: ProductionError) -> FreeForm:
+    def perturbed(self, production_error: ProductionError) -> FreeForm:
         """Return the family with its transmission moved."""
-        return FreeForm(*self._made_of, self.nodes_nm, off)
+        return FreeForm(*self._made_of, self.nodes_nm, production_error)
 
     @property
     def moved(self) -> tuple[PerWavelength, PerWavelength]:

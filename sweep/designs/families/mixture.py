@@ -57,7 +57,10 @@ class Absorbing(ABC):
 
     @abstractmethod
     def absorbance(self, x: DesignParameters) -> Float[Array, "designs wavelengths"]:
-        """Return the absorbance."""
+        """Return the absorbance.
+
+        It is decadic.
+        """
 
     @abstractmethod
     def absorbance_gradient(self, x: PerParameter) -> Float[Array, "parameters wavelengths"]:
@@ -97,12 +100,15 @@ class Absorbing(ABC):
         """None, since it has no edges."""
         return {}
 
-    def perturbed(self, off: ProductionError) -> Self:
+    def perturbed(self, production_error: ProductionError) -> Self:
         """Return the family with bands that are moved and broader, in films that are too thick, which moves nothing."""
-        made = copy(self)
-        made._nominal_nm, made._film = self._wavelength_nm - off.shift_nm, 1 + off.thickness
-        made._width = 1 + off.broadening
-        return made
+        family = copy(self)
+        family._nominal_nm, family._film = (
+            self._wavelength_nm - production_error.shift_nm,
+            1 + production_error.thickness,
+        )
+        family._width = 1 + production_error.broadening
+        return family
 
     @property
     def moved(self) -> tuple[PerWavelength, PerWavelength]:
@@ -258,22 +264,22 @@ class Mixture(Absorbing):
 
     def only(self, numbers: Int[IndexArray, " colorants"]) -> Self:
         """Return the family with some colorants of the catalog, under their numbers; see `ChoosingFamily`."""
-        made = copy(self)
-        made._spectra, made._numbers = self._spectra[np.searchsorted(self._numbers, numbers)], numbers
-        return made
+        family = copy(self)
+        family._spectra, family._numbers = self._spectra[np.searchsorted(self._numbers, numbers)], numbers
+        return family
 
-    def perturbed(self, off: ProductionError) -> Self:
+    def perturbed(self, production_error: ProductionError) -> Self:
         """Return the family with its spectra moved, and stretched about their peaks; see `Absorbing.perturbed`."""
-        made = super().perturbed(off)
-        wave_nm, nominal_nm, width = self._wavelength_nm, made._nominal_nm, made._width
+        family = super().perturbed(production_error)
+        wave_nm, nominal_nm, width = self._wavelength_nm, family._nominal_nm, family._width
         peaks_nm = wave_nm[self._spectra.argmax(axis=1)]
         stretched = [
             np.interp(peak_nm + (nominal_nm - peak_nm) / width, wave_nm, row) / width
             for peak_nm, row in zip(peaks_nm, self._spectra, strict=True)
         ]
-        made._spectra = np.stack(stretched)
-        made._most = np.interp(nominal_nm, wave_nm, self._most) if width == 1 else np.ones(wave_nm.size) / width
-        return made
+        family._spectra = np.stack(stretched)
+        family._most = np.interp(nominal_nm, wave_nm, self._most) if width == 1 else np.ones(wave_nm.size) / width
+        return family
 
     def _chosen(self, x: Float[Array, "*batch parameters"]) -> Float[Array, "*batch _slots wavelengths"]:
         """Return the spectra of each slot."""

@@ -54,11 +54,11 @@ class Confusion(NoiseMetric):
         )
 
     def of_noise(
-        self, imager: ForwardModel, curves: DesignCurves, read: NoisyReadout, members: Mapping[str, MemberNumbers]
+        self, model: ForwardModel, curves: DesignCurves, read: NoisyReadout, members: Mapping[str, MemberNumbers]
     ) -> Columns:
         """Compute exact sums over the digital numbers of a few pixels, else Gaussian errors or bounds."""
         mean, variance, _ = NoiseShape.of_cases(read)
-        error, bound, state_bound = _errors(imager, curves, read, members)
+        error, bound, state_bound = _errors(model, curves, read, members)
         columns: Columns = {}
         for pair in class_pairs(list(members)):
             pair_members = members[pair[0]], members[pair[1]]
@@ -97,26 +97,28 @@ def _quantity(metric: str, name: str, types: tuple[str, ...]) -> Quantity:
     )
 
 
-def state_errors(imager: ForwardModel, curves: DesignCurves, states: Sequence[str]) -> PerDesign:
+def state_errors(model: ForwardModel, curves: DesignCurves, states: Sequence[str]) -> PerDesign:
     """Return the error of the worst pair of states alone."""
-    members = {name: imager.setup.members[name] for name in states}
-    exact = _exact(imager, curves, members)
+    members = {name: model.setup.members[name] for name in states}
+    exact = _exact(model, curves, members)
     if exact is not None:
         return np.asarray(np.max([error for case in exact for error in case.error.values()], axis=0), dtype=float)
-    error = _gaussian(imager.read_with_noise(curves), members)
+    error = _gaussian(model.read_with_noise(curves), members)
     return np.asarray(np.max(list(error.values()), axis=0), dtype=float)
 
 
 def _exact(
-    imager: ForwardModel, curves: DesignCurves, members: Mapping[str, MemberNumbers]
+    model: ForwardModel, curves: DesignCurves, members: Mapping[str, MemberNumbers]
 ) -> list[confusion.Errors] | None:
     """Return errors and bounds in each case by exact sums; None if these are too many."""
-    few = imager.few_pixels
-    if few is None or not confusion.affordable(imager.readout.pixel, few):
+    pixels = model.few_pixels
+    if pixels is None or not confusion.affordable(model.readout.pixel, pixels):
         return None
-    electrons = imager.pixel_electrons(curves)
-    light = imager.capture_light
-    return [confusion.errors(case, few, imager.readout.pixel, members, light) for case in np.moveaxis(electrons, -3, 0)]
+    electrons = model.pixel_electrons(curves)
+    light = model.capture_light
+    return [
+        confusion.errors(case, pixels, model.readout.pixel, members, light) for case in np.moveaxis(electrons, -3, 0)
+    ]
 
 
 def _gaussian(read: NoisyReadout, members: Mapping[str, MemberNumbers]) -> _ByPair:
@@ -129,10 +131,10 @@ def _gaussian(read: NoisyReadout, members: Mapping[str, MemberNumbers]) -> _ByPa
 
 
 def _errors(
-    imager: ForwardModel, curves: DesignCurves, read: NoisyReadout, members: Mapping[str, MemberNumbers]
+    model: ForwardModel, curves: DesignCurves, read: NoisyReadout, members: Mapping[str, MemberNumbers]
 ) -> tuple[_ByPair, _ByPair, PerDesign]:
     """Return error and bound of each pair, and the bound of all states, the largest over the cases."""
-    exact, pairs = _exact(imager, curves, members), class_pairs(list(members))
+    exact, pairs = _exact(model, curves, members), class_pairs(list(members))
     if exact is not None:
         return (
             {pair: np.max([errors.error[pair] for errors in exact], axis=0) for pair in pairs},

@@ -69,8 +69,8 @@ class Flicker(PulseMetric):
         setup = model.setup
         steady = forward_model(replace(setup, scene=setup.scene.model_copy(update={"drive": None})))
         exposure_s, rows = model.light.exposure_s(curves), []
-        for one, time_s in zip(curves, exposure_s, strict=True):
-            of_places = [_of_lamps(lamps, setup, time_s) for lamps in steady.lamps(one[None])]
+        for design, time_s in zip(curves, exposure_s, strict=True):
+            of_places = [_of_lamps(lamps, setup, time_s) for lamps in steady.lamps(design[None])]
             rows.append(
                 {
                     MODULATION: max(place[MODULATION] for place in of_places),

@@ -56,14 +56,14 @@ class Probabilities(NoiseMetric):
         )
 
     def of_noise(
-        self, imager: ForwardModel, curves: DesignCurves, read: NoisyReadout, members: Mapping[str, MemberNumbers]
+        self, model: ForwardModel, curves: DesignCurves, read: NoisyReadout, members: Mapping[str, MemberNumbers]
     ) -> Columns:
         """Compute the columns from mean and variance of the digital numbers."""
         columns: Columns = {}
         mean, variance, _ = NoiseShape.of_cases(read)
         for pair in class_pairs(list(members)):
             pair_members = members[pair[0]], members[pair[1]]
-            detected = detection(mean - imager.readout.pixel.offset_dn, variance, *pair_members)
+            detected = detection(mean - model.readout.pixel.offset_dn, variance, *pair_members)
             columns[pair_name(CTA, pair)] = detected.reshape(read.mean.shape[:2]).min(axis=1)
         return columns
 
@@ -83,21 +83,25 @@ def detection(
     """
     least = np.ones(len(mean))
     for signal in first:
-        one, others = mean[:, signal, None], mean[:, second]
+        own, others = mean[:, signal, None], mean[:, second]
         variance_one, other = variance[:, signal, None], variance[:, second]
-        bright, dark = np.maximum(one, others), np.minimum(one, others)
-        bright_noise = np.where(one >= others, variance_one, other)
-        dark_noise = np.where(one >= others, other, variance_one)
-        apart = bright - dark
-        contrast = np.divide(apart, dark, out=np.full(apart.shape, _MOST), where=dark > 0)
+        bright, dark = np.maximum(own, others), np.minimum(own, others)
+        bright_noise = np.where(own >= others, variance_one, other)
+        dark_noise = np.where(own >= others, other, variance_one)
+        contrast_dn = bright - dark
+        contrast = np.divide(contrast_dn, dark, out=np.full(contrast_dn.shape, _MOST), where=dark > 0)
         ratios = [1 + contrast * (1 + side * _SHARE) for side in (1, -1)]
-        above, below = (_beyond(_SHARE * apart, bright_noise, dark_noise, ratio) for ratio in ratios)
+        above, below = (_beyond(_SHARE * contrast_dn, bright_noise, dark_noise, ratio) for ratio in ratios)
         inside = np.maximum(share_below(above) - share_below(-below), 0.0)
         least = np.minimum(least, inside.max(axis=2).min(axis=1))
     return least
 
 
-def _beyond(apart: SameShape, bright: Num[Array, "*batch"], dark: Num[Array, "*batch"], ratio: SameShape) -> SameShape:
+def _beyond(
+    contrast_dn: SameShape, bright: Num[Array, "*batch"], dark: Num[Array, "*batch"], ratio: SameShape
+) -> SameShape:
     """Return a distance over the noise of bright - ratio times dark; 0 for no distance, infinite without noise."""
     noise = np.sqrt(bright + np.where(dark > 0, ratio**2 * dark, 0.0))
-    return np.where(apart > 0, np.divide(apart, noise, out=np.full(apart.shape, np.inf), where=noise > 0), 0.0)
+    return np.where(
+        contrast_dn > 0, np.divide(contrast_dn, noise, out=np.full(contrast_dn.shape, np.inf), where=noise > 0), 0.0
+    )

@@ -45,7 +45,7 @@ class Sensitivity(DesignMetric):
             smooth=partial(_row, name=SENSITIVITY),
             linear=_modified_share,
         )
-        whole = Quantity(
+        of_cfa = Quantity(
             name=CFA_SENSITIVITY,
             metric=CFA_SENSITIVITY,
             meaning=f"sensitivity of the CFA: the light of the whole tile (1 = {reference_of(requested.brightest)})",
@@ -57,7 +57,7 @@ class Sensitivity(DesignMetric):
             smooth=partial(_row, name=CFA_SENSITIVITY),
             linear=_whole_share,
         )
-        return of_filter, whole
+        return of_filter, of_cfa
 
     def of_designs(self, setup: Setup, block: Block) -> Columns:
         """Compute the sensitivity of N relative to Y, NaN without a modified channel, and that of the CFA."""
@@ -91,8 +91,8 @@ def cfa_sensitivity_at(setup: Setup, sensitivity: float) -> float | None:
     """
     if len(setup.camera.modified) != 1:
         return None
-    whole = _whole_share(setup)
-    return float(whole.rows.toarray()[0] @ setup.camera.base_qe[0] * sensitivity + whole.constant)
+    share_rows = _whole_share(setup)
+    return float(share_rows.rows.toarray()[0] @ setup.camera.base_qe[0] * sensitivity + share_rows.constant)
 
 
 def light_of(design: SmoothDesign) -> Columns:
@@ -115,9 +115,9 @@ def _modified_share(setup: Setup) -> LinearRows:
 def _whole_share(setup: Setup) -> LinearRows:
     """Return the linear rows of the CFA sensitivity."""
     counts, modified = setup.camera.mosaic.counts, setup.camera.modified[0]
-    whole = counts.sum() * setup.camera.clear_qe.sum()
+    clear_light = counts.sum() * setup.camera.clear_qe.sum()
     others = float(np.delete(setup.camera.qe.sum(axis=1) * counts, modified).sum())
-    return _one_row(np.full(setup.camera.grid.size, counts[modified] / whole), others / whole)
+    return _one_row(np.full(setup.camera.grid.size, counts[modified] / clear_light), others / clear_light)
 
 
 def _one_row(weights: PerRow, constant: float = 0.0) -> LinearRows:

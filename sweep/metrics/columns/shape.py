@@ -64,9 +64,9 @@ def _slopes(design: SmoothDesign) -> Rows:
 def _ratios(design: SmoothDesign) -> Rows:
     """Return curve over base at every wavelength with a base above 0."""
     base = design.setup.camera.base_qe.ravel()
-    some = base > 0
+    has_base = base > 0
     by_u = design.by_u.reshape(len(design.by_u), -1).T
-    return Rows(design.curves.ravel()[some] / base[some], by_u[some] / base[some, None])
+    return Rows(design.curves.ravel()[has_base] / base[has_base], by_u[has_base] / base[has_base, None])
 
 
 def _steps(setup: Setup) -> LinearRows:

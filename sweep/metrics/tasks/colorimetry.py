@@ -37,14 +37,14 @@ def lab_slope(ratio: Smooth) -> Smooth:
     return np.asarray(mixed * slope[..., None, :])
 
 
-def delta_e(one: Smooth, other: Smooth) -> Smooth:
+def delta_e(first: Smooth, second: Smooth) -> Smooth:
     """Return the Euclidean distance in CIELAB (1976)."""
-    return root(((one - other) ** 2).sum(axis=-1))
+    return root(((first - second) ** 2).sum(axis=-1))
 
 
-def delta_e_2000(one: Smooth, other: Smooth) -> Smooth:
+def delta_e_2000(first: Smooth, second: Smooth) -> Smooth:
     """Return CIEDE2000 (CIE 142, after Sharma, Wu and Dalal, 2005)."""
-    (l_1, a_1, b_1), (l_2, a_2, b_2) = (np.moveaxis(colors, -1, 0) for colors in np.broadcast_arrays(one, other))
+    (l_1, a_1, b_1), (l_2, a_2, b_2) = (np.moveaxis(colors, -1, 0) for colors in np.broadcast_arrays(first, second))
     chroma = (root(a_1**2 + b_1**2) + root(a_2**2 + b_2**2)) / 2
     g = (1 - root(chroma**7 / (chroma**7 + _25_7))) / 2
     a_1, a_2 = a_1 * (1 + g), a_2 * (1 + g)
@@ -72,8 +72,8 @@ def delta_e_2000(one: Smooth, other: Smooth) -> Smooth:
 
 def root(square: Smooth) -> Smooth:
     """Return the square root, with value and slope 0 at 0, so that no NaN arises."""
-    some = square.real > 0
-    return np.where(some, np.where(some, square, 1.0) ** 0.5, 0.0)
+    is_positive = square.real > 0
+    return np.where(is_positive, np.where(is_positive, square, 1.0) ** 0.5, 0.0)
 
 
 def _angle(a: Smooth, b: Smooth) -> Smooth:

@@ -73,9 +73,9 @@ class TaskEvaluation:
 
     def _apart(self, case: LightName) -> tuple[Smooth, Smooth, Smooth]:
         """Return differences of the pairs of spectra of two classes, and both variances, [n, n_pairs, n_channels]."""
-        signals, (one, other) = self._signals(case), self._task.pairs
+        signals, (first, second) = self._signals(case), self._task.pairs
         variance = self._noise.of(signals)
-        return signals[:, one] - signals[:, other], variance[:, one], variance[:, other]
+        return signals[:, first] - signals[:, second], variance[:, first], variance[:, second]
 
     def _csd(self, case: LightName) -> Smooth:
         return root(((self._patch_camera.setup.camera.pixel.dn_per_e * self._apart(case)[0]) ** 2).sum(axis=-1))

@@ -82,17 +82,17 @@ def numbers_digest(spectra: tuple[Spectrum, ...]) -> str:
 def cards() -> list[Card]:
     """Return the card of each set of the file, with range and digest of its numbers."""
     about, parts = _read()
-    made = []
+    entries = []
     for name, groups_of_set in parts.items():
         spectra = tuple(spectrum for group in groups_of_set.values() for spectrum in group)
         sizes = {group: len(members) for group, members in groups_of_set.items()}
         first, last = min(s.wavelength_nm[0] for s in spectra), max(s.wavelength_nm[-1] for s in spectra)
         source, license_, credit = (about[name][key] for key in ("source", "license", "credit"))
         kind = spectra[0].kind
-        made.append(
+        entries.append(
             Card(name, source, license_, credit, kind, sizes, float(first), float(last), numbers_digest(spectra))
         )
-    return made
+    return entries
 
 
 def spectrum_of(group: str, name: str) -> Spectrum:
