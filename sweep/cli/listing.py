@@ -145,8 +145,8 @@ def _measured() -> list[tuple[str, str, MeasuredSet]]:
 def data_facts() -> dict[str, Any]:
     """Return the same as plain values."""
     measured = [
-        {"name": name, "kind": kind, "what": one.what, "license": one.license, "source": one.source}
-        | {"range_nm": one.range_nm, "curves": one.names, "sha256": one.digests}
-        for kind, name, one in _measured()
+        {"name": name, "kind": kind, "what": curves.what, "license": curves.license, "source": curves.source}
+        | {"range_nm": curves.range_nm, "curves": curves.names, "sha256": curves.digests}
+        for kind, name, curves in _measured()
     ]
     return {"sets": [asdict(card) for card in (*cards(), *surrogate_cards())], "measured": measured}

@@ -203,9 +203,11 @@ def _span(values: pd.Series[float]) -> str:
 def _notes(outputs: Sequence[tuple[SensorAndLights, Output]]) -> Iterator[str]:
     """Yield what was left out, and which curves are modeled."""
     warnings = [(member, warning) for member, output in outputs for warning in output.provenance.warnings]
-    yield from dict.fromkeys(f"Note: {one}." for member, one in warnings if one.startswith(f"{member.sensor}: "))
-    origins = [one for _, output in outputs for one in (output.provenance.sensor, output.provenance.lights)]
-    modeled = dict.fromkeys(one.name for one in origins if one.surrogate)
+    yield from dict.fromkeys(
+        f"Note: {warning}." for member, warning in warnings if warning.startswith(f"{member.sensor}: ")
+    )
+    origins = [origin for _, output in outputs for origin in (output.provenance.sensor, output.provenance.lights)]
+    modeled = dict.fromkeys(origin.name for origin in origins if origin.surrogate)
     if modeled:
         names = " and ".join(modeled)
         yield f"Note: the curves of {names} are surrogates, modeled from stated parameters, not measured."

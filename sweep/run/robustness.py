@@ -65,7 +65,7 @@ class Candidate:
         """Return the smallest CSD over a scaled population and scaled tolerances."""
         model, has_filter = self.population_model(scale), self.space.filter is not None
         errors = self.tolerance.scaled(scale).places if has_filter else (AS_DESIGNED,)
-        csds = model.worst(np.concatenate([self.curves(off) for off in errors]), [pair])[csd_name(pair)]
+        csds = model.worst(np.concatenate([self.curves(error) for error in errors]), [pair])[csd_name(pair)]
         at = int(csds.argmin())
         return float(csds[at]), errors[at]
 

@@ -280,7 +280,7 @@ def _most(study: Study, space: Space, scenario: str) -> Iterator[tuple[str, floa
     if space.filter is None:
         return
     low, high = (np.array([end(axis) for axis in space.axes], dtype=float) for end in (min, max))
-    perturbed = [space.filter.family.perturbed(off) for off in study.tolerance.places]
+    perturbed = [space.filter.family.perturbed(production_error) for production_error in study.tolerance.places]
     top = np.max([family.hull(low, high)[1] for family in perturbed], axis=0)
     counts, modified = setup.camera.mosaic.counts, list(setup.camera.modified)
     qe = setup.camera.qe.copy()
