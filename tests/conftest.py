@@ -15,13 +15,14 @@ from jaxtyping import install_import_hook
 from .shapes import checked
 
 ROOT = Path(__file__).parent.parent
-KERNELS = ("compiled", "nearest", "vectorized")
-"""How names of files begin whose functions Numba compiles: it cannot compile what is wrapped."""
+UNCHECKED = ("compiled", "nearest", "vectorized", "user_effects", "app", "__init__")
+"""How names of files begin that are left out: Numba compiles no function that is wrapped, effects of users are checked
+by the package itself, and typer hands over a context of another class."""
 install_import_hook(
     [
         ".".join(path.relative_to(ROOT).with_suffix("").parts)
         for path in (ROOT / "sweep").rglob("*.py")
-        if not path.name.startswith((*KERNELS, "__init__"))
+        if not path.name.startswith(UNCHECKED) and path.parent.name != "commands"
     ],
     f"{checked.__module__}.{checked.__name__}",
 )

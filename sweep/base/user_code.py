@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points
@@ -75,7 +74,7 @@ class UserCode:
         """The class, function or value itself, made once in a process; raises SweepError."""
         return _loaded(self)
 
-    def called(self, function: Callable[..., Any], *arguments: Any) -> Any:
+    def called(self, function: Any, *arguments: Any) -> Any:
         """Call a function of the user's code.
 
         Raises SweepError, one line, for any exception of the function.

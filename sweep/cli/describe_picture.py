@@ -154,4 +154,4 @@ def _name_points(axes: Axes, corner: Axes, points: Mapping[str, tuple[float, flo
 
 
 def _in_corner(x: float, y: float) -> bool:
-    return _CORNER_X[0] <= x <= _CORNER_X[1] and _CORNER_Y[0] <= y <= _CORNER_Y[1]
+    return bool(_CORNER_X[0] <= x <= _CORNER_X[1] and _CORNER_Y[0] <= y <= _CORNER_Y[1])

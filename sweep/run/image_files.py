@@ -17,6 +17,7 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
 from ..base.errors import OutputError, ValidationIssue
 from ..base.types import ChannelCurves, Parallel, Progress, delayed
@@ -195,7 +196,7 @@ def _write_block(batch: Batch, files: ImageFiles) -> pd.DataFrame:
     return labels.assign(file=name, index=np.arange(len(labels)))
 
 
-def _write_png(image: np.ndarray[Any, Any], path: Path) -> None:
+def _write_png(image: NDArray[np.uint8] | NDArray[np.uint16], path: Path) -> None:
     from PIL import Image  # noqa: PLC0415  (slow to import)
 
     with atomic(path) as hidden, hidden.open("wb") as file:

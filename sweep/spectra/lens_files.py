@@ -101,7 +101,7 @@ def _to_corner(
 ) -> ChiefRays:
     """Return the rays from the center of the sensor to its corner."""
 
-    def check(passes: bool, problem: str, row: int, column: int, allowed: str | None = None) -> None:
+    def check(passes: bool | np.bool, problem: str, row: int, column: int, allowed: str | None = None) -> None:
         if not passes:
             line, value = table.rows[1:][row][0], values[row, column].item()
             raise DataError(ValidationIssue(problem, table.file, line, names[column], value, allowed))

@@ -206,7 +206,7 @@ class Document:
             allowed = "`study: name` and further keys"
             raise StudyError(ValidationIssue("a study file is a mapping of keys", self.file, 1, allowed=allowed))
 
-    def change(self, key: str, text: str) -> None:
+    def change(self, key: str, text: Any) -> None:
         """Set a key, as the option `--set` does.
 
         Raises StudyError if the value cannot be set there.

@@ -24,7 +24,7 @@ def load_study(
     path: Path,
     data: Path | None = None,
     stored: KeptSources | None = None,
-    changes: Mapping[str, str] = {},
+    changes: Mapping[str, Any] = {},
     *,
     allow_code: bool | Mapping[str, str] = False,
     member: SensorAndLights | None = None,
@@ -57,7 +57,7 @@ def load_study(
     return resolve(section, sources)
 
 
-def sensor_studies_in(path: Path, changes: Mapping[str, str] = {}) -> SensorStudies | None:
+def sensor_studies_in(path: Path, changes: Mapping[str, Any] = {}) -> SensorStudies | None:
     """Return the sensors and light sets of a study file; None if it is a plain study.
 
     `changes`: dotted key -> value to take instead, as a study file would have it. Raises StudyError if the file is no
@@ -69,7 +69,7 @@ def sensor_studies_in(path: Path, changes: Mapping[str, str] = {}) -> SensorStud
     return SensorStudies(name, tuple(members)) if len(members) > 1 else None
 
 
-def _changed(path: Path, changes: Mapping[str, str]) -> Document:
+def _changed(path: Path, changes: Mapping[str, Any]) -> Document:
     document = Document(path)
     for key, text in changes.items():
         document.change(key, text)

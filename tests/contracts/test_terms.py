@@ -18,6 +18,7 @@ from sweep.metrics.quantity import Column
 from sweep.report.price import _row
 from sweep.results.parts import Parts
 from sweep.run.answers import CachedCalls
+from sweep.run.workers import Workers
 
 
 def test_a_code_of_companding_has_the_variance_of_a_uniform_step() -> None:
@@ -104,13 +105,14 @@ def answer_of(number: int) -> int:
     return number
 
 
-class Pool:
+class Pool(Workers):
     """Workers that count their calls."""
 
     def __init__(self) -> None:
+        super().__init__(1)
         self.calls = 0
 
-    def unordered(self, calls: Any) -> Iterator[tuple[int, int]]:
+    def unordered(self, calls: Any, _killed: Any = None) -> Iterator[tuple[int, int]]:
         for at, (function, arguments, _) in enumerate(calls):
             self.calls += 1
             yield at, function(*arguments)

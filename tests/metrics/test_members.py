@@ -144,7 +144,7 @@ def test_the_nearest_members_are_members_and_so_far_apart(name: str) -> None:
     """What it says the nearest two are, computed from their shifts."""
     lights = replace(STUDY.lights, population=population(name))
     seen = population_model(replace(PROBLEM.setup, lights=lights))
-    response = seen.imager.smooth(PROBLEM.family.curves(DESIGNS))[:, 0]
+    response = seen.linear.smooth(PROBLEM.family.curves(DESIGNS))[:, 0]
     widths = POPULATIONS[name].get("width", [1.0])
     for design in range(len(DESIGNS)):
         near = seen.nearest(response[design], ("yellow", "red"))

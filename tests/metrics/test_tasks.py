@@ -136,7 +136,7 @@ def test_an_error_is_that_of_draws() -> None:
     """Of the plane between two points, with a million Gaussian draws of each."""
     a, b = np.array([900.0, 500.0, 300.0]), np.array([905.0, 490.0, 306.0])
     noise = ChannelNoise(np.array([0.25, 0.5, 0.25]), 2.0)
-    told = float(pair_errors(margin(a - b, noise.of(a), noise.of(b))))
+    told = float(pair_errors(margin((a - b)[None], noise.of(a)[None], noise.of(b)[None]))[0])
     rng = np.random.default_rng(1)
     normal = (a - b) / (noise.of(a) + noise.of(b))
     spread = [np.sqrt(normal**2 @ noise.of(p)) for p in (a, b)]

@@ -73,7 +73,7 @@ def test_a_design_alone_is_the_one_of_its_block_within_rounding(name: str, separ
     parts = [np.array([at]) for at in range(0, space.size, 1 if setup.scene.target is None else 5)]
     parts += [np.arange(start, start + n) for n in (2, 3, 15, 16, 17, 31) for start in rng.integers(0, 40, 2)]
     for part in parts[::step]:
-        some = edges_of(space, part[0], part[-1] + 1) if separable else CurveBlock(curves[part])
+        some = edges_of(space, int(part[0]), int(part[-1]) + 1) if separable else CurveBlock(curves[part])
         assert some is not None
         assert_same(whole, part, evaluate(imager, some, states), setup, magnitude_dn)
 

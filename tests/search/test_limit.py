@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,6 +20,7 @@ from sweep.metrics.objective import Objective
 from sweep.metrics.smooth import smooth_response
 from sweep.report.summary import _limit_line
 from sweep.results.facts import SearchFacts
+from sweep.results.output import Output
 from sweep.search.gradients import Model
 from sweep.search.limit import _relaxed, limit_of, reason_without_bound
 from sweep.search.problem import Problem, SearchRun, starting_points
@@ -157,9 +157,17 @@ def test_no_limit_is_claimed_where_it_would_not_hold() -> None:
 
 def test_report_words_match_the_proof() -> None:
     """A finished proof, one that was cut short, and levels that were."""
-    output: Any = SimpleNamespace(
-        goal=PROBLEM.quantities["csd_yellow_red"], study=STUDY.section, scenarios=list(STUDY.scenarios)
-    )
+
+    class OfSearch(Output):
+        """What the line asks of a run."""
+
+        goal: Any = PROBLEM.quantities["csd_yellow_red"]
+        study: Any = STUDY.section
+        scenarios: Any = list(STUDY.scenarios)
+
+        def __init__(self) -> None: ...
+
+    output = OfSearch()
     done = SearchFacts(
         algorithm="SLSQP",
         scenario="chart",
