@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from ..base.types import Array, DesignCurves, Float, FloatArray, MemberNumbers, Parallel, PerDesign, Progress, delayed
+from ..base.types import Array, DesignCurves, Float, FloatArray, MemberNumbers, Parallel, Progress, delayed
 from ..camera.linear import linear_model
 from ..camera.merge import limits_dn
 from ..camera.setup import Setup
@@ -46,7 +46,9 @@ def handovers_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progre
     return pa.Table.from_pylist(table_rows, schema=_SCHEMA)
 
 
-def _handovers(setup: Setup, scenes: Between, curves: DesignCurves, numbers: PerDesign) -> list[dict[str, Any]]:
+def _handovers(
+    setup: Setup, scenes: Between, curves: DesignCurves, numbers: Float[Array, " numbers"]
+) -> list[dict[str, Any]]:
     """Return rows of the table without their keys."""
     pixel, known, handovers = setup.camera.pixel, dict[float, FloatArray](), []
 
@@ -74,7 +76,7 @@ def _handovers(setup: Setup, scenes: Between, curves: DesignCurves, numbers: Per
     return handovers
 
 
-def _reached(numbers: PerDesign, value: Callable[[float], float], limit: float) -> float:
+def _reached(numbers: Float[Array, " numbers"], value: Callable[[float], float], limit: float) -> float:
     """Return the first number at which ascending values reach a limit."""
     from scipy.optimize import brentq  # noqa: PLC0415  (few studies ask for it)
 

@@ -127,7 +127,7 @@ def test_a_file_variant_is_read_or_refused_with_advice(tmp_path: Path, name: str
     else:
         np.testing.assert_allclose(np.stack([*found.values.values()], axis=1), right, rtol=1e-5, atol=1e-12)
     made = commanded("new", "mine", "--qe", path, "--folder", tmp_path / "studies")
-    if said == "there is no header":
+    if name in ("Ocean spectrometer", "Thorlabs spectrometer", "numbers alone"):  # their curves have no names
         assert made[0] == 2
         assert (
             "no column names a channel (got 'curve_1, curve_2, curve_3'); allowed: columns named by channels" in made[2]
