@@ -122,7 +122,7 @@ def read_input(path: Path, most_bytes: int, refused: type[SweepError]) -> bytes:
 def not_utf8(content: bytes, error: UnicodeDecodeError) -> tuple[str, bool]:
     """Describe a text that is not UTF-8.
 
-    Returns problem with the position, and True if the text starts like UTF-16.
+    Returns the problem with its position, and whether the text starts like UTF-16.
     """
     wide = content[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
     return f"not UTF-8 text ({error.reason} at byte {error.start})", wide

@@ -33,8 +33,6 @@ from ..base.types import (
     IndexArray,
     Int,
     PerKnot,
-    PerParameter,
-    PerRow,
     PerValue,
     PerWavelength,
     SameShape,
@@ -113,7 +111,7 @@ def _arcs(cone: Cone) -> list[_Arc]:
             azimuth = np.arccos(np.clip(cosine, -1.0, 1.0)) / math.pi
             return np.asarray(2 * azimuth * np.sin(t) * np.cos(t) * width * math.pi * np.sin(math.pi * u) / area)
 
-        def place(x: PerParameter) -> PerParameter:
+        def place(x: SameShape) -> SameShape:
             t = np.arcsin(np.sqrt(np.clip(x, 0.0, 1.0)))
             return np.asarray(np.arccos(np.clip((middle - t) / width, -1.0, 1.0)) / math.pi)
 
@@ -219,7 +217,7 @@ class AngularResponse:
 
     def __init__(self, setup: Setup) -> None:
         self.matrices: dict[int, csr_matrix] = {}
-        """Matrix of each channel that moves, [n_wavelengths, n_wavelengths]: its curve as seen is matrix @ curve."""
+        """Matrix of each channel that moves: its curve as seen is matrix @ curve."""
         if setup.computes("angle"):
             cone, wave, rays = cone_of(setup.scene), setup.camera.grid.nodes_nm, setup.accuracy.rays
             self.matrices = {
@@ -292,7 +290,9 @@ def _means(wavelength_nm: PerWavelength, knots_nm: PerKnot, index: float, cone: 
     return _over_rays(wavelength_nm, knots_nm, stretch(sine_squared, index), weights)
 
 
-def _over_rays(wavelength_nm: PerWavelength, knots_nm: PerKnot, m: PerValue, weights: PerRow) -> _Entries:
+def _over_rays(
+    wavelength_nm: PerWavelength, knots_nm: PerKnot, m: Float[Array, " rays"], weights: Float[Array, " rays"]
+) -> _Entries:
     """Return the mean over single rays."""
     at = np.clip(wavelength_nm[:, None] * m, knots_nm[0], knots_nm[-1])
     first = np.clip(np.searchsorted(knots_nm, at, side="right") - 1, 0, max(knots_nm.size - 2, 0))

@@ -42,7 +42,7 @@ _MOST_RATIO = 1e9
 class LampReadings:
     """Electrons of the lamps of a design in one case, and how they are read.
 
-    `lit_e`, [n_exposures, n_signals, n_elements], and `dark_e`, [n_exposures, n_elements]: electrons of the lamps at
+    `lit_e` and `dark_e`: electrons of the lamps at
     the brightness of the scene, and without lamps. `light`: of the exposures on the elements, relative to a pixel of
     full sensitivity. `readout`: that of the case alone.
     """
@@ -82,7 +82,7 @@ class LampReadings:
 
     @property
     def full(self) -> Bool[BoolArray, " signals"]:
-        """True for lamps that fill a pixel of any channel, of an HDR pixel all its captures, [n_signals]."""
+        """True for lamps that fill a pixel of any channel, of an HDR pixel all its captures."""
         lit_e, dark_e = self.full_e
         full = np.zeros(self.n_signals, dtype=bool)
         for curve, at in self.pixel_curves():
@@ -97,7 +97,7 @@ class LampReadings:
     def means(
         self, signals: Int[IndexArray, " signals"], factors: Float[Array, "signals factors"]
     ) -> Float[Array, "signals factors channels"]:
-        """Return the mean of each channel, DN: [n, n_factors, n_channels], as of `moments`."""
+        """Return the mean of each channel, DN, as of `moments`."""
         if not self.proportional:
             return self.moments(signals, factors)[0]
         full_e, curves = self._full_e_at(signals, factors), self.pixel_curves()
@@ -109,9 +109,9 @@ class LampReadings:
     def moments(
         self, signals: Int[IndexArray, " signals"], factors: Float[Array, "signals factors"]
     ) -> tuple[Float[Array, "signals factors channels"], Float[Array, "signals factors channels"]]:
-        """Return mean, DN, and variance, DN^2, of each channel: [n, n_factors, n_channels].
+        """Return mean, DN, and variance, DN^2, of each channel.
 
-        `factors`: brightnesses of each of the `signals`, [n, n_factors].
+        `factors`: brightnesses of each of the `signals`.
         """
         if self.proportional:
             full_e, curves = self._full_e_at(signals, factors), self.pixel_curves()
@@ -134,7 +134,7 @@ class LampReadings:
     ) -> tuple[Float[Array, "values channels"], Float[Array, "values channels"]]:
         """Return derivatives of mean and variance of lamps, each at one brightness, by the electrons of each element.
 
-        Of a pixel of full sensitivity, [n, n_elements]; all exposures have their fixed share of the light.
+        Of a pixel of full sensitivity; all exposures have their fixed share of the light.
         """
         lit_e, dark_e = self.full_e
         full_e = lit_e[signals] * factors[:, None] + dark_e
@@ -151,16 +151,16 @@ class LampReadings:
         Float[Array, "values channels"],
         Float[Array, "values channels"],
     ]:
-        """Return mean and variance of lamps, each at one brightness, [n, n_channels], and their derivatives by it."""
+        """Return mean and variance of lamps, each at one brightness, and their derivatives by it."""
         mean, variance = (values[:, 0] for values in self.moments(signals, factors[:, None]))
         lit_e = self.full_e[0][signals]
         by_mean, by_variance = (slopes * lit_e for slopes in self.by_electrons(signals, factors))
         return mean, variance, by_mean @ self.readout.weights[0], by_variance @ self.readout.spread_weights[0]
 
     def means_of_exposures(self, factors: Float[Array, "signals factors"]) -> Float[Array, "factors _ 4"]:
-        """Return the means of all lamps, each exposure with its own share of their light, [n, n_signals, n_channels].
+        """Return the means of all lamps, each exposure with its own share of their light.
 
-        `factors`: light of each exposure relative to that of the scene, [n_exposures, n].
+        `factors`: light of each exposure relative to that of the scene.
         """
         every = np.arange(self.n_signals)
         if same_electrons(factors, np.broadcast_to(factors[:1], factors.shape)):
@@ -173,12 +173,12 @@ class LampReadings:
     def _full_e_at(
         self, signals: Int[IndexArray, " signals"], factors: Float[Array, "signals factors"]
     ) -> Float[Array, "signals factors pixels"]:
-        """Return electrons of a pixel of full sensitivity, [n, n_factors, n_elements]."""
+        """Return electrons of a pixel of full sensitivity."""
         lit_e, dark_e = self.full_e
         return np.asarray(lit_e[signals, None] * factors[..., None] + dark_e)
 
     def nodes(self, least: float, most: float, steps: int) -> Float[Array, "signals nodes"]:
-        """Return brightnesses between which curves are nearly straight: [n_signals, n_nodes], from dark to all full.
+        """Return brightnesses between which curves are nearly straight, from dark to all full.
 
         `least`, `most`: ends of the brightness, relative to that of the scene. `steps`: in the place of each step.
         """
@@ -236,16 +236,16 @@ def of_case(
 ) -> LampReadings:
     """Return the readings of a case from electrons with and without lamps.
 
-    `electrons`: [n_exposures, n_signals, n_elements], `dark` the same without lamps, [n_exposures, n_elements].
+    `dark` is `electrons` without lamps.
     """
     light = readout.capture_light if readout.pixel.captures else np.ones((1, dark.shape[1]))
     return LampReadings(electrons - dark[:, None], dark, light, readout, noisy)
 
 
 def room_dn(setup: Setup, response: DesignSignals, unlit: Float[Array, "designs channels"]) -> PerDesign:
-    """Return the chromatic distance up to which the closed form holds, DN, [n_designs]; negative: nowhere.
+    """Return the chromatic distance up to which the closed form holds, DN; negative: nowhere.
 
-    `response`: readout, DN, [n_designs, n_signals, n_channels]; `unlit`: without lamps, DN, [n_designs, n_channels].
+    `response`: readout, DN; `unlit`: without lamps, DN.
     It holds for no HDR pixel, and within no limits of the brightness. The closed form takes a lamp that is dimmer than
     it is. A brighter one has its fullest channel at least where its brightest pixel is full, so that it is no nearer to
     a reading than that channel lies above the reading.
@@ -267,7 +267,7 @@ def room_dn(setup: Setup, response: DesignSignals, unlit: Float[Array, "designs 
 class LampSlopes:
     """Readings of the lamps of a design in one case, with derivatives by its free parameters.
 
-    `lit_by_u`, [n_free, n_signals, n_elements], and `dark_by_u`, [n_free, n_elements]: those of the electrons of a
+    `lit_by_u` and `dark_by_u`: those of the electrons of a
     pixel of full sensitivity.
     """
 
@@ -283,7 +283,7 @@ class LampSlopes:
         Float[Array, "free values channels"],
         Float[Array, "free values channels"],
     ]:
-        """Return mean and variance of lamps, each at one brightness, [n, n_channels], and their derivatives."""
+        """Return mean and variance of lamps, each at one brightness, and their derivatives."""
         readout = self.lamps.readout
         mean, variance = (values[:, 0] for values in self.lamps.moments(signals, factors[:, None]))
         by_mean, by_variance = self.lamps.by_electrons(signals, factors)

@@ -65,7 +65,7 @@ class PixelLight:
 
 def different(
     window: Window, requested: Bool[BoolArray, "cases rows columns"]
-) -> tuple[Float[Array, "places 2"], Int[IndexArray, " wanted"]]:
+) -> tuple[Float[Array, "places 2"], Int[IndexArray, " requested"]]:
     """Return the distinct pixel positions around the light's center; mirrored ones are equal in a round image.
 
     Returns `places_px`: distances from the center along rows and columns, the shorter one first, pixels; `place`: place

@@ -138,7 +138,7 @@ class Electrons:
     def _products(
         self, light: Float[Array, "cases pixels _signals wavelengths"], qe: DesignCurves, of: Sequence[int]
     ) -> Float[Array, "designs cases spectra pixels"]:
-        """Sum light times QE times signals over channels and wavelengths, [n_designs, n_cases, n_signals, n_units]."""
+        """Sum light times QE times signals over channels and wavelengths."""
         parts = [self._products_at(at, light[self.position == at], qe, of) for at in range(len(self.light.angular))]
         return np.concatenate(parts, axis=1)
 
@@ -166,7 +166,7 @@ class Electrons:
         return np.asarray(np.moveaxis(products, 1, 2), dtype=float)
 
     def _table(self) -> Float[Array, "rows columns"]:
-        """Return signals times response, [channels x wavelengths, n_cases x n_signals x n_elements]."""
+        """Return signals times response."""
         cases, units, channels, size = self._modified.shape
         if not any(seen.matrices for seen in self.light.angular):
             table = np.empty((channels, size, cases, len(self.light.signals), units))

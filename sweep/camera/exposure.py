@@ -119,6 +119,6 @@ class SceneLight:
 
 
 def _different_moments(scales: Float[Array, "captures _designs _moments"]) -> Float[Array, "captures designs moments"]:
-    """Return scales, [n_exposures, n_designs, n_moments], without moments of the same light in all of them."""
+    """Return scales, without moments of the same light in all of them."""
     flat = np.round(scales.reshape(-1, scales.shape[-1]), 12)
     return scales[..., np.sort(np.unique(flat, axis=1, return_index=True)[1])]

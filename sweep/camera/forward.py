@@ -302,7 +302,7 @@ class ForwardModel:
 
     @property
     def capture_light(self) -> Float[Array, "captures pixels"] | None:
-        """Relative light of exposures on `pixel_electrons`, [n_exposures, n_pixels]; None for a pixel read once."""
+        """Relative light of exposures on `pixel_electrons`; None for a pixel read once."""
         return self.readout.of_pixels(self.readout.capture_light) if self.setup.camera.pixel.captures else None
 
     @property

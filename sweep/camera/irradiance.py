@@ -58,7 +58,7 @@ def background_irradiance(setup: Setup) -> PerWavelength:
 
 
 def _signals(setup: Setup) -> Float[Array, "signals wavelengths"]:
-    """Return the irradiance of each signal from its radiance or luminance, [n_signals, n_wavelengths]."""
+    """Return the irradiance of each signal from its radiance or luminance."""
     scene = setup.scene
     factor = irradiance_factor(scene.optics)
     luminance = scene.luminance_cd_m2

@@ -135,7 +135,7 @@ class LinearModel(ForwardModel):
     def lamps_over_brightness(self, curves: ChannelCurves, curves_gradient: CurvesGradient) -> list[LampSlopes]:
         """Return the readings of the lamps of one design over their brightness, one for each case, with derivatives.
 
-        `curves`: QE of the modified channels, [n_modified, n_wavelengths]; `curves_gradient`: its derivatives.
+        `curves`: QE of the modified channels; `curves_gradient`: its derivatives.
         """
         by_pixel = self.by_pixel
         pixel = by_pixel.readout.pixel if self.hdr is None else self.hdr

@@ -20,12 +20,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.types import Array, Bool, BoolArray, Float, FloatArray, PerCapture, PerDesign, SameShape
+from ..base.types import Array, Bool, BoolArray, Float, FloatArray, PerCapture, SameShape
 from .noise.moments import DRAWN, LinearRange
 from .noise.subsets import Subset, SubsetMoments, subset_table, threshold_dn
 from .noise.table import unclipped_e
 from .pixel import Pixel, unquantized
-from .rounding import DITHERED_DN, MANY_STEPS, MOST_POISSON_E, rounded
+from .rounding import DITHERED_DN, MANY_STEPS, rounded
 
 _PER_DEVIATION = 1.3
 _CERTAIN = 1 - 1e-12
@@ -36,7 +36,7 @@ _HELD = 200_000
 
 @dataclass(frozen=True)
 class Merged:
-    """Merged values, ndarray of one shape each.
+    """Merged values.
 
     `mean`, `variance`: mean, DN of the first capture, and variance, DN^2; `certain`: True where the same captures are
     used in all but 1e-12 of the readouts.
@@ -88,7 +88,7 @@ def merged(electrons: PerCapture, light: PerCapture, pixel: Pixel) -> Merged:
     return Merged(np.where(constant, np.round(mean, 6), mean), np.where(constant, 0.0, variance), result.certain)
 
 
-def _step_dn(dn: PerDesign, pixel: Pixel) -> PerDesign:
+def _step_dn(dn: SameShape, pixel: Pixel) -> SameShape:
     """Return the step of a code at merged values, DN."""
     knees_dn, codes = pixel.knees
     at = np.clip(np.searchsorted(knees_dn, dn, side="right") - 1, 0, codes.size - 2)
@@ -229,22 +229,6 @@ def without_noise(
         read.append(rounded(held * capture.dn_per_e, capture) if rounds else unquantized(held, capture))
     values = merged_readings(read, electrons, light, pixel)
     return coded(values, pixel) if rounds else values
-
-
-def draws(
-    electrons: Float[Array, " captures *batch"], light: PerCapture, pixel: Pixel, rng: np.random.Generator
-) -> SameShape:
-    """Draw one merged value of each pixel (Monte Carlo), DN of the first capture.
-
-    `electrons`: expected electrons of each of `Pixel.exposures`.
-    """
-    gain = 1 + pixel.prnu * rng.standard_normal(electrons.shape[1:])
-    held = rng.poisson(np.clip(electrons * gain, 0.0, MOST_POISSON_E))
-    read = []
-    for at, capture in zip(exposure_of(pixel), pixel.read_as, strict=True):
-        noisy_e = np.minimum(held[at], capture.well_e) + capture.read_noise_e * rng.standard_normal(gain.shape)
-        read.append(rounded(noisy_e * capture.dn_per_e, capture))
-    return coded(merged_readings(read, electrons, light, pixel), pixel)
 
 
 def merged_readings(

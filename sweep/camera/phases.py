@@ -201,7 +201,7 @@ def _apart(
     step_px: float,
     period_px: Int[IndexArray, " 2"],
 ) -> Int[IndexArray, "values phases_apart"]:
-    """Return the indices of the smallest values that are more than a step apart, shape (n_values, n_starts)."""
+    """Return the indices of the smallest values that are more than a step apart."""
     starts, left = [values.argmin(axis=1)], values.copy()
     while len(starts) < n_starts:
         distance = np.mod(centers_px - centers_px[starts[-1]][:, None], period_px)

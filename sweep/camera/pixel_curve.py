@@ -138,7 +138,7 @@ def same_electrons(first: SameShape, second: SameShape) -> bool:
 
 
 def groups_of(light: Float[Array, "captures pixels"]) -> list[tuple[tuple[float, ...], Int[IndexArray, " _pixels"]]]:
-    """Return the distinct columns of the light of exposures, [n_exposures, n_elements], and the elements of each."""
+    """Return the distinct columns of the light of exposures, and the elements of each."""
     columns, which = np.unique(light, axis=1, return_inverse=True)
     return [(tuple(column), np.flatnonzero(which.ravel() == at)) for at, column in enumerate(columns.T)]
 

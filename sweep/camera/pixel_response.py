@@ -51,7 +51,7 @@ class SplitLight:
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
-        """Shape (n_cases, n_elements, n_channels, n_wavelengths) of the array."""
+        """Cases, pixels, channels and wavelengths of the array."""
         return (*self.place.shape[1:], self.n_channels, self.factor.size)
 
     def whole(self) -> Float[Array, "cases pixels channels wavelengths"]:
@@ -66,7 +66,7 @@ class SplitLight:
     def _filtered_light(
         self, spectra: Float[Array, "designs channels signals wavelengths"]
     ) -> Float[Array, "designs channels _functions signals"]:
-        """Sum over the wavelengths at each place: [..., n, n_wavelengths] to [..., n_places, n]."""
+        """Sum over the wavelengths at each place."""
         light = spectra * self.factor
         by_function = light.sum(axis=-1, keepdims=True) if self.shares is None else light @ self.shares.T
         return np.asarray(self.values @ np.swapaxes(by_function, -1, -2), dtype=float)
@@ -114,10 +114,7 @@ class PixelResponse:
 
     @cached_property
     def light(self) -> Float[Array, "cases pixels signals wavelengths"]:
-        """Light on each element through each channel's filter, relative to a uniform field on axis in clear air.
-
-        .
-        """
+        """Light on each element through each channel's filter, relative to a uniform field on axis in clear air."""
         return self.source.whole() if isinstance(self.source, SplitLight) else self.source
 
     @property
@@ -277,10 +274,7 @@ def _pixels(setup: Setup, wavelength_nm: PerWavelength, phases: Phases, *, by_pi
 def _weights(
     setup: Setup, phases: Phases
 ) -> tuple[sampling.Window, Float[Array, "_cases _pixels _channels"], Float[Array, "_cases _rows _columns _channels"]]:
-    """Return pixels around the light, their channels and their weights.
-
-    Shapes (rows, columns, n_channels) and (n_cases, rows, columns, n_channels).
-    """
+    """Return pixels around the light, their channels and their weights."""
     target, mosaic, n = setup.scene.target, setup.camera.mosaic, len(setup.camera.mosaic.channels)
     assert target is not None
     window = sampling.window(mosaic, phases.center_px, sampling.reach_px(setup, target))

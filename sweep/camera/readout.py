@@ -17,30 +17,13 @@ from .noise import table
 from .pixel import Pixel, unquantized
 from .pixel_curve import groups_of, pixel_curve, same_electrons
 from .pixel_response import PixelResponse
-from .rounding import DITHERED_DN, MANY_STEPS, MOST_POISSON_E, rounded
+from .rounding import DITHERED_DN, MANY_STEPS, rounded
 from .setup import Setup
 
 _CERTAIN_DN2 = 1e-9
 _FEW = 16
 _MANY = 50_000
 """Values from which on a compiled pass saves more time than it takes to load."""
-
-
-def draws_dn(electrons: SameShape, pixel: Pixel, rng: np.random.Generator) -> SameShape:
-    """Draw one readout of each pixel (Monte Carlo), with its own gain error."""
-    # In place: to give memory to an array of millions of pixels takes as long as a sum over them.
-    expected = rng.standard_normal(electrons.shape)
-    expected *= pixel.prnu
-    expected += 1
-    expected *= electrons
-    held = rng.poisson(np.clip(expected, 0.0, MOST_POISSON_E, out=expected))
-    dn = rng.standard_normal(out=expected)
-    dn *= pixel.read_noise_e
-    dn += np.minimum(held, pixel.well_e)
-    dn *= pixel.dn_per_e
-    dn += pixel.offset_dn
-    dn += 0.5
-    return np.clip(np.floor(dn, out=dn), 0, pixel.full_scale_dn, out=dn)
 
 
 @dataclass(frozen=True)

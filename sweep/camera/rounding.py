@@ -9,8 +9,6 @@ import numpy as np
 from ..base.types import SameShape
 from .pixel import Pixel
 
-MOST_POISSON_E = 1e18
-"""NumPy's Poisson generator takes no larger mean."""
 DITHERED_DN = 0.7
 """Read noise, DN, from which on rounding shows in no error."""
 MANY_STEPS = 16.0

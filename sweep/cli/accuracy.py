@@ -18,7 +18,7 @@ import pyarrow as pa
 from threadpoolctl import threadpool_limits
 
 from ..base.errors import SweepError, ValidationIssue
-from ..base.types import Array, DesignNumbers, Float, PerDesign, Progress
+from ..base.types import Array, DesignNumbers, Float, Progress
 from ..camera.accuracy import PRESETS, Accuracy
 from ..camera.forward import ForwardModel
 from ..camera.setup import Setup
@@ -47,7 +47,7 @@ class Measured:
     where there is none.
     """
 
-    csds: PerDesign
+    csds: Float[Array, "csds designs"]
     first_s: float
     following_s: float
 

@@ -32,11 +32,10 @@ class PluginFamily:
     """Family by a class of user code: FILE.py:CLASS, or the name by which an installed package offers it.
 
     Methods as in `Family`. The class has `parameters`, a list of (name, low, high) or (name, low, high, default), is
-    constructed with (wavelength_nm, base, target), and has `curves(x)`: to
-    QE. It may have `violation(x)`, met
-    where <= 0, and `below_base = True`, which states that no curve of a well-formed design is above the base. Curves
-    are checked to be within 0 and 1, and below the base if that is stated. Gradients are central differences. A row of
-    `curves(x)` must not depend on the other rows.
+    constructed with (wavelength_nm, base, target), and has `curves(x)`: from [designs, parameters] to QE, [designs,
+    wavelengths]. It may have `violation(x)`, [designs, n], met where <= 0, and `below_base = True`, which states that
+    no curve of a well-formed design is above the base. Curves are checked to be within 0 and 1, and below the base if
+    that is stated. Gradients are central differences. A row of `curves(x)` must not depend on the other rows.
 
     Worker processes get the text of a file; an installed package must be installed there.
     """

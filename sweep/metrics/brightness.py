@@ -39,7 +39,7 @@ class Nearest:
     factor: Float[Array, " nearest"]
     squared: Float[Array, " nearest"]
     bracket: Float[Array, "nearest 2"]
-    """Brightnesses between which the nearest point lies, [n, 2]."""
+    """Brightnesses between which the nearest point lies."""
 
     def subset(self, which: Int[IndexArray, " values"] | Bool[BoolArray, " values"]) -> Nearest:
         """Return some of the points."""
@@ -75,7 +75,7 @@ class BrightnessCurves:
 
     @cached_property
     def _readings(self) -> tuple[Float[Array, "readings channels"], Float[Array, "readings channels"]]:
-        """Mean and variance of each lamp at each scale, [n_scales x n_signals, n_channels]."""
+        """Mean and variance of each lamp at each scale."""
         every = np.arange(self.lamps.n_signals)
         moments = self.lamps.moments(every, np.broadcast_to(self._scales, (every.size, self._scales.size)))
         mean, variance = (np.ascontiguousarray(np.swapaxes(values, 0, 1)) for values in moments)

@@ -16,7 +16,6 @@ from ..base.types import (
     DesignParameters,
     Float,
     FloatArray,
-    PerDesign,
 )
 from ..camera.electrons import Changing
 from ..camera.field import field_heights, refined_heights, setup_at
@@ -93,13 +92,13 @@ def _csd_names(setup: Setup) -> list[str]:
 
 
 def _by_phase(model: ForwardModel, cases: Columns, n_places: int) -> Float[Array, "designs pairs places"]:
-    """Return CSDs at each phase or field position, the smallest over the moments, [n_designs, n_pairs, n_places]."""
+    """Return CSDs at each phase or field position, the smallest over the moments."""
     names = _csd_names(model.setup)
     distances = np.stack([cases[name] for name in names])  # [n_pairs, n_cases x n_moments, n_designs]
     return np.moveaxis(distances.reshape(len(names), n_places, -1, distances.shape[-1]).min(axis=2), -1, 0)
 
 
-def _csds(model: ForwardModel, curves: Float[Array, "1 modified wavelengths"]) -> Float[Array, "phases pairs"]:
+def _csds(model: ForwardModel, curves: Float[Array, "1 modified wavelengths"]) -> Float[Array, "pairs phases"]:
     """Return CSDs of one design at each phase, the smallest over the moments."""
     response = model.read(curves)[0]
     cases = {csd_name(pair): dn[:, None] for pair, dn in separations(response[0], model.setup.members).items()}
@@ -119,7 +118,7 @@ def _nonlinear_over_pulse(setup: Setup) -> bool:
 
 def _over_pulse(
     model: ForwardModel, curves: Float[Array, "1 modified wavelengths"], pairs: Sequence[int], phases: Phases | None
-) -> PerDesign:
+) -> Float[Array, " pairs"]:
     """Return the smallest CSDs of some pairs of one design at one phase over field positions and moments of a pulse."""
 
     def distances(moments: Float[Array, " moments"]) -> list[Float[Array, " moments"]]:
@@ -194,7 +193,7 @@ def _refine_heights(model: ForwardModel, block: Block, cases: Columns, columns: 
     for design in np.flatnonzero(np.isfinite(at_heights).all(axis=(1, 2))):
         curves = block.subset(slice(design, design + 1)).curves()
 
-        def at_height(height: float, curves: DesignCurves = curves) -> PerDesign:
+        def at_height(height: float, curves: DesignCurves = curves) -> PerValue:
             csds = _csds(forward_model(setup_at(setup, height)), curves).min(axis=1)
             return np.concatenate([csds, -csds]) if best else csds
 

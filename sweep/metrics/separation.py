@@ -142,7 +142,7 @@ def _distances(
     members: Mapping[str, MemberNumbers],
     response: Callable[[Bool[BoolArray, "designs signals channels"]], DesignSignals],
 ) -> dict[Pair, PerDesign]:
-    """Return roots of; non-finite designs and extreme squares by `separation`."""
+    """Return the roots; non-finite designs and extreme squares by `separation`."""
     distances = dict(zip(class_pairs(list(members)), np.sqrt(squared), strict=True))
     for (a, b), distance in distances.items():
         recomputed = odd | ~((distance >= _SMALLEST) & (distance <= 1 / _SMALLEST))

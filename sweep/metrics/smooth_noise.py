@@ -104,7 +104,7 @@ def _summed(parts: list[Rows]) -> Rows:
 
 
 def _between(design: SmoothDesign, pair: Pair, of: _OfPairs) -> Rows:
-    """Return the rows of two types, [n_cases x n_first x n_second]."""
+    """Return the rows of two types."""
     return design.cached(f"{of.__name__} of {' and '.join(pair)}", lambda: _of_signals(design, pair, of))
 
 

@@ -49,7 +49,7 @@ class Readings:
 class UserMetric:
     """Metric of user code: a function of `Readings`, or a class with a method `of`, constructed without arguments.
 
-    It returns; or (n_designs, n), of which the worst counts, so that a search sees each
+    It returns a number for each design; or several, [designs, n], of which the worst counts, so that a search sees each
     of them; or None for a CFA that it does not apply to. A row must not depend on other rows. Optional attributes:
     `name`, `unit`, `label`, `digits` and `direction` (`more` or `less`).
     """

@@ -59,7 +59,7 @@ def robustness_lines(output: Output, best: Row | None) -> Iterator[str]:
 def cost_of_worst_case(output: Output, best: Row | None) -> Iterator[str]:
     """Yield the best design of a worst case beside the named design with the largest nominal separation.
 
-    Returns sentence, if the separation is a worst case over a population of lights.
+    It is a sentence, if the separation is a worst case over a population of lights.
     """
     if best is None or not over_population(output):
         return

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.types import PerDesign
+from ..base.types import Array, Float
 from ..results.output import Output
 from ..results.tables import REFERENCE, SEARCHED, SENSOR_MAP
 from .figures import Drawing, panel_grid
@@ -34,8 +34,8 @@ class SensorMap:
     """
 
     name: str
-    heights: PerDesign
-    dn: PerDesign
+    heights: Float[Array, " heights"]
+    dn: Float[Array, " heights"]
 
     @property
     def worst(self) -> str:

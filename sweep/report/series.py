@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.types import Array, Float, IndexArray, Int, Num, PerParameter
+from ..base.types import Array, Float, IndexArray, Int, Num
 from ..metrics.quantity import DN
 from ..results.output import Output
 from ..study.axes import series_of
@@ -72,7 +72,7 @@ class SeriesFigure:
     title: str
     key: str
     y_label: str
-    x: PerParameter
+    x: Float[Array, " numbers"]
     lines: Mapping[str, Line]
     band: str
     log_y: bool = False

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base.types import PerDesign
+from ..base.types import Array, Float
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..results.output import Output
 from ..results.tables import NAMED, REFERENCE, SEARCHED, SWEPT
@@ -60,8 +60,8 @@ class Points:
     `labels`: labels of single points (empty: none).
     """
 
-    x: PerDesign
-    y: PerDesign
+    x: Float[Array, " points"]
+    y: Float[Array, " points"]
     labels: tuple[str, ...] = ()
 
 

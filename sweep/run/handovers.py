@@ -53,7 +53,7 @@ def _handovers(
     pixel, known, handovers = setup.camera.pixel, dict[float, FloatArray](), []
 
     def electrons(number: float) -> Float[Array, "signals channels"]:
-        """Return expected electrons, the mean over phases, field positions and moments, [n_signals, n_channels]."""
+        """Return expected electrons, the mean over phases, field positions and moments."""
         if number not in known:
             model = linear_model(scenes.at(number))
             dn, once = model.smooth(curves)[0].mean(axis=0), model.setup.camera.pixel

@@ -32,10 +32,7 @@ class _Known(KnownPairs):
     factors: Float[Array, "known 2"]
 
     def difference(self, values: Float[Array, "cases spectra channels"]) -> Float[Array, "known channels"]:
-        """Return first minus second signal, each times its factor.
-
-        `values` has shape (n_cases, n_signals, n).
-        """
+        """Return first minus second signal, each times its factor."""
         first_values, second_values = values[self.case, self.first], values[self.case, self.second]
         return np.asarray(self.factors[:, :1] * first_values - self.factors[:, 1:] * second_values, dtype=float)
 

@@ -45,7 +45,7 @@ _SOLVED, _INFEASIBLE = 0, 2
 
 @dataclass(frozen=True)
 class _Rows:
-    """Rows a @ N >= h(t) = max(least, rate t) - constant, each.
+    """Rows a @ N >= h(t) = max(least, rate t) - constant.
 
     `slack` is the amount by which a feasible design may be below `least`; `rate` is 0 where t does not matter.
     """
@@ -166,7 +166,7 @@ class FilterProgram:
     def _noise(
         self, model: LinearModel
     ) -> tuple[Float[Array, "pairs channels"], Float[Array, "pairs channels _wavelengths"]]:
-        """Return the least variance in the modified channel and the others' variances, DN^2, [n_cases, n_signals]."""
+        """Return the least variance in the modified channel and the others' variances, DN^2."""
         row, least = np.zeros_like(self.base), 0.0
         bound = self.problem.constraints.get(SENSITIVITY)
         if bound is not None and bound.min is not None:

@@ -43,7 +43,7 @@ def least_variance(
 def _least_light(
     light: Float[Array, "_ _ wavelengths"], box: tuple[PerWavelength, PerWavelength], row: PerWavelength, least: float
 ) -> Float[Array, "rows columns"]:
-    """Return a lower bound on light @ N for light of shape (..., n_wavelengths)."""
+    """Return a lower bound on light @ N."""
     low, high = box
     used = row > 0
     ratio = np.divide(light, row, out=np.zeros_like(light), where=used)

@@ -79,7 +79,7 @@ class Problem:
     def in_scenario(self, number: int) -> Problem:
         """Return the problem of one scenario or sensor.
 
-        `number`: its number: 0 is `setup`. Returns problem without other scenarios.
+        `number`: its number: 0 is `setup`. The problem has no other scenarios.
         """
         setup, family = self.scenes[number]
         return replace(self, setup=setup, family=family, others=())

@@ -46,7 +46,7 @@ green: y <= 0.726 - 0.726 x, x <= 0.625 y - 0.041, y >= 0.400."""
 
 @cache
 def _observer(grid: WavelengthGrid) -> Float[Array, "4 wavelengths"]:
-    """Return the CIE 1931 observer's x, y and z, and V(lambda) of 1924, on the grid, [4, n_wavelengths].
+    """Return the CIE 1931 observer's x, y and z, and V(lambda) of 1924, on the grid.
 
     Tables of colour-science; 0 outside 360 to 830 nm, where they are not defined.
     """

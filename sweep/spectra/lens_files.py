@@ -53,7 +53,7 @@ def read_chief_rays(path: Path, corner_mm: float | None = None) -> ChiefRays:
 
 
 def _numbers(table: Sheet, names: list[str], column: int) -> Float[Array, "rows 2"]:
-    """Return heights and angles, [n_rows, 2]. Raises DataError for other cells, and for heights that do not rise."""
+    """Return heights and angles. Raises DataError for other cells, and for heights that do not rise."""
     values: list[list[float]] = []
     for line, row in table.rows[1:]:
         if len(row) != len(table.rows[0][1]):

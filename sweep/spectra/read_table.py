@@ -52,7 +52,7 @@ _MOST_UM = 1.65
 class Scan:
     """File of curves, read as far as possible.
 
-    `values`, [n_samples, n_curves]: NaN beyond the samples of a curve, and for what is none. `issues` in groups:
+    `values`: NaN beyond the samples of a curve, and for what is none. `issues` in groups:
     `read_curves` stops at the first.
     """
 
@@ -244,7 +244,7 @@ def _numbered(columns: Sequence[_Column]) -> list[_Column]:
 
 
 def _numbers(table: Table, columns: Sequence[_Column]) -> tuple[Float[Array, "rows width"], set[int], list[int]]:
-    """Return the numbers of a table, [n_rows, width], NaN for missing ones, and columns with faults, with % signs."""
+    """Return the numbers of a table, NaN for missing ones, and columns with faults, with % signs."""
     keys = {column.wave: WAVELENGTH for column in columns} | {column.at: column.name for column in columns}
     values, bad = np.full((len(table.body), table.width), np.nan), set[int]()
     percent = dict.fromkeys(keys, 0)

@@ -132,7 +132,7 @@ def dominant_ranges_nm() -> dict[str, tuple[float, float]]:
 
 
 def _distance(xy: Float[Array, " 2"], polygon: Float[Array, "corners 2"]) -> float:
-    """Return the distance from a point to a polygon's outline and."""
+    """Return the distance from a point to a polygon's outline."""
     along = np.roll(polygon, -1, axis=0) - polygon
     length = (along**2).sum(axis=1)
     share = np.divide(((xy - polygon) * along).sum(axis=1), length, out=np.zeros_like(length), where=length > 0)

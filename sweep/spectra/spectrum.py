@@ -213,7 +213,7 @@ def check_samples(wavelength_nm: ArrayLike, values: ArrayLike, *, signed: bool =
 def sample_issues(
     file: str, wave: PerSample, names: Sequence[str], data: Float[Array, "samples curves"], signed: Container[int] = ()
 ) -> list[list[ValidationIssue]]:
-    """Return the issues of the curves of a file, [n_samples, n_curves], by `check_samples`; `signed`: curves in dB."""
+    """Return the issues of the curves of a file, by `check_samples`; `signed`: curves in dB."""
     groups = []
     for index, name in enumerate(names):
         try:

@@ -88,7 +88,7 @@ class GriddedTask:
 
     @property
     def pairs(self) -> tuple[Int[IndexArray, " pairs"], Int[IndexArray, " pairs"]]:
-        """Indices (first, second) of all pairs of spectra of different classes, each of shape (n_pairs,)."""
+        """Indices (first, second) of all pairs of spectra of different classes."""
         types = np.asarray(self.types)
         first, second = np.triu_indices(len(types), 1)
         differ = types[first] != types[second]

@@ -29,7 +29,7 @@ _KEYS = {TEST: 0, TRAIN: 2, CHECK: 3}
 
 
 class Batch(NamedTuple):
-    """Images or (n, rows, columns, n_channels), and a row of labels for each."""
+    """Images, raw or with channels on the last axis, and a row of labels for each."""
 
     images: NDArray[Any]
     labels: pd.DataFrame

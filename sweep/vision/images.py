@@ -178,10 +178,7 @@ class HeadCamera:
         light: Float[Array, "cases pixels _signals wavelengths"],
         spectra: Float[Array, "spectra wavelengths"],
     ) -> Float[Array, "cases spectra _"]:
-        """Return electrons/s of images with spectra, through each pixel's filter, with crosstalk.
-
-        `light` has shape (n, side, side, n_knots), the result (n, n_spectra, n_pixels).
-        """
+        """Return electrons/s of images with spectra, through each pixel's filter, with crosstalk."""
         setup = self.setup
         on_knots = linear_basis(setup.camera.grid.nodes_nm, knots_nm)
         weight = np.einsum("cw,sw,kw->cks", self.qe, spectra, on_knots, optimize=True) * setup.camera.area_step_m2_nm

@@ -41,7 +41,7 @@ _OPTIMIZER = optax.chain(optax.scale_by_adam(), optax.add_decayed_weights(_DECAY
 """AdamW, whose rate is passed to each step."""
 _Weights = dict[str, Any]
 Inputs = tuple[NDArray[np.float32], NDArray[np.float32]]
-"""Planes, and what is known, (n, n_known)."""
+"""Planes, [n, rows, columns, planes], and what is known, [n, known]."""
 
 
 def _start(key: Any, inputs: Inputs, n_outputs: int) -> _Weights:

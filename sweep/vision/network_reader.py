@@ -39,9 +39,9 @@ Float32 = NDArray[np.float32]
 class _Examples:
     """Inputs and labels of images.
 
-    `planes`:, in units of the noise; `mirrored` the same of their mirror
+    `planes`: in units of the noise; `mirrored` the same of their mirror
     images (empty if the tile has none); `condition`: index of distance, level and background; `fixed`: 1 for lenses in
-    the street's order; `targets`:, state, lit position,
+    the street's order; `targets`: state, lit position,
     order and sun on the lenses.
     """
 

@@ -43,9 +43,8 @@ class Answers:
 class SeedReading:
     """Answers of one seed by order of the lenses, on lamps that the network has not seen, and on those it has.
 
-    `precision` is that of a detector in streets and `lit` the number of lit lenses,
-    [n_levels, n_lenses]; `streets` the first street of each light level, [n_levels, rows, columns, 3]. Without streets
-    they are empty.
+    `precision` is that of a detector in streets and `lit` the number of lit lenses, by level
+    and lens; `streets` the first street of each light level. Without streets they are empty.
     """
 
     unseen: dict[str, Answers]

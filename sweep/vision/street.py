@@ -34,7 +34,7 @@ _STREET_LIGHTS: tuple[Illuminant, ...] = ("LED street light", "sodium street lig
 
 @dataclass(frozen=True)
 class StreetScenes:
-    """Streets or [n, n_lamps], heads first.
+    """Streets; of several lamps, heads come first.
 
     `level`, `background`, `distance`: index into the study's lists; `phantom`: 1 with sun on the lenses; `cell`: cell
     of the grid; `place`, `aside`, `below`: position in it, as shares; `state`: index into `states_of`; `lamp`: which of

@@ -20,11 +20,11 @@ from sweep.camera.linear import linear_model
 from sweep.camera.noise import gaussian, moments
 from sweep.camera.phases import lattice_px, scene_phases
 from sweep.camera.pixel import Pixel
-from sweep.camera.readout import draws_dn
 from sweep.camera.scene import FixedExposure, PwmDrive, Scene, Target
 from sweep.spectra.color import luminance_per_photon_radiance
 from sweep.spectra.spectrum import LIGHT_M_S, PLANCK_J_S, WavelengthGrid, linear_basis
 
+from ..draws import draws_dn
 from ..hard.scenes import F2, FAR, NEAR, TILES, scene, target
 
 

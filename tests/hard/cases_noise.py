@@ -11,13 +11,13 @@ from sweep.camera.mosaic import Mosaic
 from sweep.camera.noise.gaussian import rounding
 from sweep.camera.noise.moments import moments
 from sweep.camera.pixel import Pixel
-from sweep.camera.readout import draws_dn
 from sweep.camera.scene import Scene
 from sweep.camera.setup import Setup
 from sweep.metrics.evaluate import evaluate
 from sweep.spectra.lights import Lights
 from sweep.spectra.spectrum import WavelengthGrid
 
+from ..draws import draws_dn
 from .registry import EPS, Result, hard_case, outcome, worst
 
 PLAIN = Pixel(read_noise_e=2.0, offset_dn=64.0)

@@ -14,7 +14,6 @@ from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
 import sweep
 from sweep.base.errors import StudyError
 from sweep.camera.forward import ForwardModel
-from sweep.camera.readout import draws_dn
 from sweep.metrics.columns.confusion import D_PRIME, ERROR, STATE_ERROR
 from sweep.metrics.evaluate import evaluate
 from sweep.report import make_report, read_output, summary_lines
@@ -22,6 +21,7 @@ from sweep.run import run_study
 from sweep.spectra.lights import Lights
 from sweep.study import load_study
 
+from ..draws import draws_dn
 from ..hard.scenes import DARK, F2, FAR, FIXED, DesignScene, scene
 
 NOISY = (

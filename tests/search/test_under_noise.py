@@ -14,7 +14,6 @@ from sweep.camera.accuracy import Accuracy
 from sweep.camera.forward import ForwardModel
 from sweep.camera.linear import linear_model
 from sweep.camera.pixel_curve import STEPS_DN2
-from sweep.camera.readout import draws_dn
 from sweep.designs.families.dual import Dual
 from sweep.designs.families.free_form import FreeForm
 from sweep.designs.families.mixture import AbsorptionBands, Mixture
@@ -34,6 +33,7 @@ from sweep.spectra.colorants import modeled_colorants
 from sweep.study import load_study
 
 from ..conftest import STUDIES
+from ..draws import draws_dn
 from ..hard.random_scenes import random_scene
 from ..hard.scenes import FAMILY, GRID, SENSOR
 from .problems import STATES, best_of, best_random, noisy_problem

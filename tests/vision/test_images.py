@@ -13,11 +13,10 @@ from scipy.spatial.distance import cdist
 
 from sweep.base.types import FloatArray
 from sweep.camera.forward import ForwardModel
-from sweep.camera.merge import draws, light_of, limits_dn
+from sweep.camera.merge import light_of, limits_dn
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.noise import table
 from sweep.camera.pixel import Pixel
-from sweep.camera.readout import draws_dn
 from sweep.camera.sampling import Window, center_weights
 from sweep.camera.setup import READOUT
 from sweep.spectra.builtin.spectra import shipped_groups
@@ -33,6 +32,7 @@ from sweep.vision.scenes import SHUFFLED, Scenes, draw_scenes
 from sweep.vision.section import Material, Vision
 
 from ..cases import thinned
+from ..draws import draws_dn, merged_draws
 from .heads import NO_FILTERS, head_setup, vision
 
 FOUR = ["red", "orange", "yellow", "green"]
@@ -181,7 +181,7 @@ def test_an_hdr_image_has_the_merged_value_s_noise(hdr: dict[str, Any]) -> None:
     variance = shares @ values_dn**2 - mean**2
     n = 200_000
     expected = np.repeat((electrons * light[:, None])[:, None], n, axis=1)
-    drawn = draws(expected, light.reshape(-1, 1, 1), pixel, np.random.default_rng(3))
+    drawn = merged_draws(expected, light.reshape(-1, 1, 1), pixel, np.random.default_rng(3))
     noise_dn = drawn.std(axis=0)
     noise_dn[-1] = 0.01 * mean[-1]  # saturated: that of the full well's photons, which the bins go by
     assert (np.abs(drawn.mean(axis=0) - mean) < (5 / np.sqrt(n) + 1 / 16) * noise_dn).all()

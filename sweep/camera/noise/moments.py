@@ -107,7 +107,7 @@ def counted(electrons: PerValue, pixel: Pixel) -> Float[Array, "3 values"]:
 def runs(electrons: PerValue, pixel: Pixel) -> Iterator[tuple[slice, int, Float[Array, "3 _values"]]]:
     """Yield runs of expected electrons whose counts are summed.
 
-    Returns range of electrons, their first count, and `of_count` from it on.
+    Each is a range of electrons, their first count, and `of_count` from it on.
     """
     felt = _felt(electrons, pixel)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], felt, [False]])))
@@ -175,7 +175,7 @@ def with_prnu(electrons: PerValue, pixel: Pixel) -> Float[Array, "3 values"]:
 
 
 def moments(electrons: PerValue, pixel: Pixel) -> Float[Array, "3 values"]:
-    """Return the moments of the digital number, by exact sums, DN, and variance after rounding, DN^2.
+    """Return the moments of the digital number, by exact sums.
 
     Returns mean before rounding and after, DN, and variance after rounding, DN^2.
     """

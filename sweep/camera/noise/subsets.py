@@ -101,8 +101,8 @@ def usable_of_count(counts: PerValue, pixel: Pixel, limit_dn: int | None) -> tup
     """Return the chance that a capture is usable, and its partial moments, for given numbers of electrons.
 
     `pixel`: capture, as a pixel that is read once; `limit_dn`: digital number from which on it is not usable; None if
-    it always is. Returns
-    probability, mean and mean square of what it reads, electrons, where it is usable, and 0 where not.
+    it always is. Returns probability, mean and mean square of what it reads, electrons, where it is usable, and 0 where
+    not.
     """
     gain, top = pixel.dn_per_e, float(pixel.full_scale_dn if limit_dn is None else limit_dn)
     sigma = gain * pixel.read_noise_e

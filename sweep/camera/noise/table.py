@@ -22,8 +22,8 @@ _LEAST_PRNU = 1e-9
 class MomentTable(NamedTuple):
     """Cubics over the root of the expected electrons: several values at once.
 
-    `nodes`, are at least `step` apart; `coefficients`, (n_values, n, 4), are of the pieces
-    between them; `piece` is that at each multiple of `step` from 0 up. From `last_e` electrons on values are constant.
+    `nodes` are at least `step` apart; `coefficients` are of the pieces between them; `piece` is that at each multiple
+    of `step` from 0 up. From `last_e` electrons on values are constant.
     """
 
     nodes: Float[Array, " nodes"]

@@ -167,7 +167,7 @@ class AbsorptionBands(Absorbing):
     def _offsets(
         self, peaks_nm: Float[Array, " bands"], fwhm_nm: Float[Array, " bands"]
     ) -> Float[Array, "bands wavelengths"]:
-        """Return the distances from the peaks in widths;."""
+        """Return the distances from the peaks in widths."""
         peak_nm, wave_nm = peaks_nm[..., None], self._nominal_nm
         away_nm = peak_nm - wave_nm if self._in_wavelength else (peak_nm / wave_nm - 1) * peak_nm
         return np.asarray(away_nm / fwhm_nm[..., None])

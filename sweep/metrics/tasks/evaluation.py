@@ -72,7 +72,7 @@ class TaskEvaluation:
         return self._once("signals", case, lambda: self._patch_camera.electrons(photons, self._conditions.exposure_s))
 
     def _apart(self, case: LightName) -> tuple[Smooth, Smooth, Smooth]:
-        """Return differences of the pairs of spectra of two classes, and both variances, [n, n_pairs, n_channels]."""
+        """Return differences of the pairs of spectra of two classes, and both variances."""
         signals, (first, second) = self._signals(case), self._task.pairs
         variance = self._noise.of(signals)
         return signals[:, first] - signals[:, second], variance[:, first], variance[:, second]
