@@ -16,6 +16,7 @@ from ..base.types import (
     DesignParameters,
     Float,
     FloatArray,
+    PerValue,
 )
 from ..camera.electrons import Changing
 from ..camera.field import field_heights, refined_heights, setup_at
