@@ -214,7 +214,8 @@ class LampReadings:
         else:
             sampled = np.linspace(0, at_knees.shape[1] - 1, min(at_knees.shape[1], _MOST_KNEES)).round().astype(int)
             parts += [np.sort(at_knees, axis=1)[:, sampled], _geometric(first, last, _RATIO ** (1 / steps))]
-            parts.append(_geometric(0.9 * at_knees.min(axis=1, keepdims=True), last, _RATIO_OF_MANY ** (1 / steps)))
+            first_full = np.maximum(0.9 * at_knees.min(axis=1, keepdims=True), first)
+            parts.append(_geometric(first_full, last, _RATIO_OF_MANY ** (1 / steps)))
         return np.sort(np.clip(np.concatenate(parts, axis=1), least, most), axis=1)
 
 
