@@ -77,8 +77,8 @@ def in_turn(calls: Iterable[Call]) -> Iterator[Any]:
 class Section(BaseModel):
     """Frozen section of a study; unknown keys, NaN, infinity and quoted numbers are refused.
 
-    The docstring below a field is its description. Validators are built at the first use, since most sections are in
-    no study.
+    The docstring below a field is its description, which `study.editors` reads. Validators are built at the first use,
+    since most sections are in no study.
     """
 
     model_config = ConfigDict(
@@ -87,7 +87,6 @@ class Section(BaseModel):
         allow_inf_nan=False,
         strict=True,
         defer_build=True,
-        use_attribute_docstrings=True,
     )
 
 

@@ -27,10 +27,7 @@ FAMILIES = _found()
 def _optional(kinds: dict[str, type[Family]]) -> dict[str, Any]:
     """Return the options of all families as optional fields."""
     every = {name: field for family in kinds.values() for name, field in family.Options.model_fields.items()}
-    return {
-        name: (field.rebuild_annotation() | None, Field(default=None, description=field.description))
-        for name, field in every.items()
-    }
+    return {name: (field.rebuild_annotation() | None, None) for name, field in every.items()}
 
 
 class FamilyOptions(create_model("_FamilyOptions", __base__=Section, **_optional(FAMILIES))):  # type: ignore[misc]

@@ -82,7 +82,7 @@ def compare_runs(folders: Sequence[Path], to: Path | None) -> Comparison:
         best=rows(shown),
         left_out=left_out,
         of_fronts=OF_FRONTS,
-        picture=inlined(drawn["png"]) if drawn else None,
+        picture=inlined(drawn["svg"]) if drawn else None,
         fronts=[(name, rows(table)) for name, table in fronts.items()],
         plain=rows(plain),
         same=same or "The runs share no plain CFA and no named design.",

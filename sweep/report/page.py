@@ -15,7 +15,7 @@ from ..metrics.objective import COMBINED
 from ..results.inventory import Inventory
 from ..results.lock import locked
 from ..results.output import Output
-from ..results.tables import FIGURES, NAMED, REFERENCE, REPORT, SEARCHED, VISION_FIGURES, csv_of, encoded, is_drawn
+from ..results.tables import FIGURES, REPORT, VISION_FIGURES, csv_of, encoded, is_drawn
 from . import signal_figures as signals
 from . import tables
 from . import values as content
@@ -43,6 +43,8 @@ from .trade_off import draw_trade_off, overview_figure, pareto_figure, traded_cf
 
 _MOST_SERIES = 3
 """Figures over scenarios that the page shows unfolded."""
+_RASTERED = ("cfas", "pareto")
+"""Pictures that are also PNG, for slides."""
 _SHOWN = {
     "images": ("tiles", "sensor", "signals", "chart"),
     "lamp_images": ("regions",),
@@ -77,17 +79,18 @@ def _contents(output: Output, shown_names: Iterable[str] | None, parallel: Paral
     images: dict[str, list[tuple[str, str]]] = {place: [] for place in _SHOWN}
     for name, caption, figure in (*_drawings(output), *_vision_drawings(output)):
         where = name if name.startswith(("cfas", "pareto")) else f"{FIGURES}/{name}"
-        if shown_names is None or {f"{where}.png", f"{where}.svg"} & {*shown_names}:
-            drawn.append((name, caption, where, figure))
-    pictures = parallel(delayed(pictures_of, figure, ("png", "svg")) for *_, figure in drawn)
+        kinds = ("png", "svg") if name in _RASTERED else ("svg",)
+        if shown_names is None or {f"{where}.{kind}" for kind in kinds} & {*shown_names}:
+            drawn.append((name, caption, where, figure, kinds))
+    pictures = parallel(delayed(pictures_of, figure, kinds) for *_, figure, kinds in drawn)
     begun = [*islice(pictures, 1)]  # workers make the others while the page is written
     published = comparison_with_published(output)
     parts = _parts(output, published) if shown_names is None else {}
-    for (name, caption, where, _), by_kind in zip(drawn, chain(begun, pictures), strict=True):
+    for (name, caption, where, *_), by_kind in zip(drawn, chain(begun, pictures), strict=True):
         contents |= {f"{where}.{kind}": content for kind, content in by_kind.items()}
         for place, names in _SHOWN.items():
             if name.startswith(names):
-                images[place].append((caption, inlined(by_kind["png"])))
+                images[place].append((caption, inlined(by_kind["svg"])))
     if len(published):
         contents[PUBLISHED_CSV] = csv_of(published).encode("utf-8")
         contents[PUBLISHED_PARQUET] = encoded(pa.Table.from_pandas(published, preserve_index=False))
@@ -162,21 +165,11 @@ def _objective(output: Output) -> str:
 
 def _drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
     """Yield all drawings, the slowest first, so that no core waits for it."""
-    for name, caption, kinds in (
-        ("clouds-cfas", "Signals in the channels of the plain CFAs", (REFERENCE,)),
-        ("clouds-designs", "Signals in the channels of the named and the found designs", (NAMED, SEARCHED)),
-    ):
-        designs = signals.clouds(output, *kinds)
-        if designs:
-            top_dn = max(1.0, 1.05 * float(output.points["dn"].max()))
-            yield name, caption, partial(signals.draw_clouds, designs, caption, top_dn)
     scenario = output.scenarios[0]
     yield "cfas", "All CFAs", partial(draw_trade_off, overview_figure(output, scenario))
     for number, cfa in enumerate(traded_cfas(output), 1):
         figure = partial(draw_trade_off, pareto_figure(output, scenario, cfa))
         yield ("pareto" if number == 1 else f"pareto-{number}"), f"Trade-off of {cfa}", figure
-    for number, cfa in enumerate(dict.fromkeys(m.cfa for m in content.modifications(output)), 1):
-        yield f"filters-{number}", f"Filters of {cfa}", partial(draw_curves, content.filters_figure(output, cfa))
     for number, series in enumerate(all_series(output), 1):
         yield f"series-{number}", series.title, partial(draw_series, series)
     yield from capture_drawings(output)

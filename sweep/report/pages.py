@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import io
 import math
 from importlib import resources
 from typing import Any
@@ -29,14 +28,9 @@ def script(name: str) -> Markup:
     return Markup(text.replace("</script", "<\\/script"))
 
 
-def inlined(png: bytes) -> str:
-    """Return a picture for the page, in 256 colors, a third of the size."""
-    from PIL import Image  # noqa: PLC0415  (only where a page is written)
-
-    buffer = io.BytesIO()
-    with Image.open(io.BytesIO(png)) as image:
-        image.convert("RGB").quantize(256).save(buffer, "png", optimize=True)
-    return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
+def inlined(svg: bytes) -> str:
+    """Return a picture for the page."""
+    return "data:image/svg+xml;base64," + base64.b64encode(svg).decode("ascii")
 
 
 def rows(table: pd.DataFrame) -> list[list[str]]:

@@ -58,7 +58,7 @@ def score_readers(output: Output, predictions: Sequence[Path], to: Path) -> list
     with atomic(to / TABLE) as hidden:
         scores.to_parquet(hidden, index=False)
     lines += [*score_lines(scores), *output.doubts]
-    picture = inlined(rendered(draw_scores(scores), "png"))
+    picture = inlined(rendered(draw_scores(scores), "svg"))
     shown = scores.drop(columns=["design_id"]).round(4)
     name, folder = output.study.study, output.folder.name
     summary = rows(summary_table(scores))

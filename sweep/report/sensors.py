@@ -93,7 +93,7 @@ def report_sensors(inventory: Inventory, runs: Sequence[SensorRun]) -> list[str]
         stated=stated,
         further=lines[len(answer) :],
         summary=rows(summary),
-        image=inlined(images["png"]),
+        image=inlined(images["svg"]),
         table=rows(_shown(figures)),
         together=rows(together) if len(together) else [],
         links=links,

@@ -1,20 +1,18 @@
-"""Figures of signals and pixels: point clouds in the channels of a CFA, the color chart, and CFA tiles."""
+"""Figures of signals and pixels: the color chart, and CFA tiles; which lights limit a design."""
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base.types import Array, Float, FloatArray
+from ..base.types import Array, Float
 from ..camera.mosaic import Mosaic
 from ..metrics.limiting import BETWEEN, limited_by_name
 from ..results.output import Output
 from ..spectra.color import display_colors
-from .figures import CURVE_COLORS, TYPE_COLORS, decorate, empty_figure
-from .leaders import label
+from .figures import CURVE_COLORS, empty_figure
 from .values import modifications
 
 if TYPE_CHECKING:
@@ -22,8 +20,6 @@ if TYPE_CHECKING:
 
 Nearest = tuple[tuple[str, str], tuple[str, str], str]
 """(type, name) of two lights, and their distance in words."""
-Cloud = tuple[str, list[str], list[tuple[str, str]], FloatArray, Nearest | None]
-"""Name, channels, (type, name) of the signals, DN and nearest lights of a design."""
 _CLEAR = "#eeeeee"
 _MOST_TILES, _WIDE = 24, 8
 
@@ -37,18 +33,6 @@ def signals_of(
     first = points.iloc[:: max(1, len(channels))]
     dn = points["dn"].to_numpy(dtype=float).reshape(-1, max(1, len(channels))).T
     return channels, list(zip(first["signal_type"], first["signal"], strict=True)), dn
-
-
-def clouds(output: Output, *kinds: str) -> list[Cloud]:
-    """Return signals of designs in the first scenario; a CFA of one channel has none."""
-    rows = output.kind(*kinds)
-    rows = rows[(rows["scenario"] == output.scenarios[0]) & (rows["status"] == "ok")]
-    designs = []
-    for row in rows.to_dict("records"):
-        channels, signals, dn = signals_of(output, row["design_id"])
-        if len(channels) > 1:
-            designs.append((label(row), channels, signals, dn, nearest_lights(output, row)))
-    return designs
 
 
 def nearest_lights(output: Output, row: Mapping[Any, Any]) -> Nearest | None:
@@ -69,34 +53,6 @@ def nearest_lights(output: Output, row: Mapping[Any, Any]) -> Nearest | None:
         return None
     a, b = named[str(text)]
     return (first_type, a), (second_type, b), separation.formatted(row[separation.of or separation.name])
-
-
-def draw_clouds(designs: Sequence[Cloud], title: str, top_dn: float) -> Figure:
-    """Draw a row of panels per design, its first channel against the others, with equal axes."""
-    most = max(len(channels) for _, channels, *_ in designs) - 1
-    figure = empty_figure(3.1 * most + 1.0, 2.9 * len(designs) + 0.6)
-    panels = figure.subplots(len(designs), most, squeeze=False)
-    for line, (name, channels, signals, dn, nearest) in zip(panels, designs, strict=True):
-        kinds = np.array([kind for kind, _ in signals])
-        for axes in line[len(channels) - 1 :]:
-            axes.set_axis_off()
-        for axes, channel, y in zip(line, channels[1:], dn[1:], strict=False):
-            decorate(axes)
-            for kind, marker in zip(dict.fromkeys(kinds), itertools.cycle("osD^vP")):
-                those = kinds == kind
-                color = TYPE_COLORS.get(str(kind))
-                axes.scatter(dn[0, those], y[those], s=13, marker=marker, color=color, label=kind, linewidths=0)
-            if nearest is not None:
-                at = [signals.index(light) for light in nearest[:2]]
-                axes.plot(dn[0, at], y[at], "-", color="black", linewidth=1.2, label=nearest[2])
-                middle = dn[0, at].mean(), y[at].mean()
-                axes.annotate(nearest[2], middle, (6, -10), textcoords="offset points", fontsize=7)
-            axes.set(xlim=(0, top_dn), ylim=(0, top_dn), aspect="equal")
-            axes.set(xlabel=f"{channels[0]} / DN", ylabel=f"{channel} / DN")
-            axes.set_title(f"{name}: {channels[0]}, {channel}", fontsize=9)
-    panels[0][0].legend(fontsize=7, frameon=False, loc="upper right")
-    figure.suptitle(title)
-    return figure
 
 
 def chart_patches(output: Output) -> dict[str, Float[Array, "_ 3"]]:

@@ -11,8 +11,7 @@ from ..results.output import Output
 from ..results.tables import SWEPT
 from ..results.thinning import even
 from ..study.schema import Modification
-from .figures import BOUND_FILTER_NAME, TYPE_COLORS, CurvesFigure
-from .leaders import label
+from .figures import TYPE_COLORS, CurvesFigure
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -69,27 +68,6 @@ def drawn_rows(output: Output) -> pd.DataFrame:
         group = np.flatnonzero(sample & (table["feasible"] == feasible))
         is_drawn.iloc[group[even(group.size, _MOST_POINTS)]] = True
     return table[is_drawn].reset_index(drop=True)
-
-
-def filters_figure(output: Output, cfa: str) -> CurvesFigure:
-    """Return the modified channels of named and best designs of a CFA, beside the curves that they lie between."""
-    rows = output.table[output.table["design_id"].isin(output.curves.drawn) & (output.table["cfa"] == cfa)]
-    ends = end_curves(output, cfa)
-    curves = {name: values for name, values in output.curves.sensor.items() if name in ends}
-    for row in rows.to_dict("records"):
-        filters = output.curves.drawn[row["design_id"]]
-        curves |= {label(row) + (f", {channel}" if len(filters) > 1 else ""): qe for channel, qe in filters.items()}
-    if cfa in output.curves.limits:
-        curves[BOUND_FILTER_NAME] = output.curves.limits[cfa]
-    return CurvesFigure(
-        f"{cfa}: modified channel",
-        "QE",
-        output.curves.wavelength_nm,
-        curves,
-        dashed=(*ends, BOUND_FILTER_NAME),
-        colors={BOUND_FILTER_NAME: "#000000"},
-        shades=light_shades(output),
-    )
 
 
 def end_curves(output: Output, cfa: str) -> list[str]:

@@ -22,7 +22,7 @@ from .tables import REFERENCE, SWEPT, batches, word_mask
 if TYPE_CHECKING:
     import pandas as pd
 
-MOST_ROWS = 150_000
+MOST_ROWS = 10_000
 """A table of up to this many rows is kept whole."""
 MOST_POINTS = 6_000
 """Swept designs off the front, of those that are feasible and of the others each, that a report draws as points."""

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from copy import deepcopy
+from itertools import pairwise
+from textwrap import dedent
 from typing import Any
 
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
+from ..base.types import Section
+from ..designs.registry import FAMILIES, FamilyOptions
 from .schema import StudySection
 
 SCHEMA_FILE = "study.schema.json"
@@ -20,12 +26,40 @@ _REF = "#/$defs/"
 Json = dict[str, Any]
 
 
-class _Untitled(GenerateJsonSchema):
-    """Generator that leaves out titles of keys, which only repeat the keys."""
+class _Described(GenerateJsonSchema):
+    """Generator with the docstrings below the keys, and without titles of keys, which only repeat these."""
+
+    def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
+        """Add the descriptions; pydantic would read all sources whenever the package is imported."""
+        described, section = super().model_schema(schema), schema["cls"]
+        options = [family.Options for family in FAMILIES.values()] if issubclass(section, FamilyOptions) else []
+        texts = _key_texts([*options, *reversed(section.__mro__)])
+        for name, field in section.model_fields.items():
+            if name in texts:
+                described["properties"][field.alias or name]["description"] = texts[name]
+        return described
 
     def field_title_should_be_set(self, schema: core_schema.CoreSchema | Any) -> bool:  # noqa: ARG002  (pydantic's)
         """Return False."""
         return False
+
+
+def _key_texts(owners: Iterable[type]) -> dict[str, str]:
+    """Return the docstrings below the keys of sections, by name."""
+    texts = {}
+    for owner in owners:
+        if not issubclass(owner, Section):
+            continue
+        try:
+            source = dedent(inspect.getsource(owner))
+        except OSError:  # pydantic's `create_model` made it
+            continue
+        (section,) = ast.parse(source).body
+        for key, text in pairwise(section.body):
+            match key, text:
+                case ast.AnnAssign(target=ast.Name(name)), ast.Expr(ast.Constant(str(words))):
+                    texts[name] = inspect.cleandoc(words)
+    return texts
 
 
 def study_schema() -> Json:
@@ -33,7 +67,7 @@ def study_schema() -> Json:
 
     It is wider than the loader in what only a whole file tells: names that refer to others, what goes together.
     """
-    schema = StudySection.model_json_schema(mode="validation", by_alias=True, schema_generator=_Untitled)
+    schema = StudySection.model_json_schema(mode="validation", by_alias=True, schema_generator=_Described)
     sections: JsonSchemaValue = schema["$defs"]
     for section in [schema, *sections.values()]:
         # A key that has no description of its own shows its section's, which speaks of it.

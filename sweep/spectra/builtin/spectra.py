@@ -54,7 +54,7 @@ def _read() -> tuple[dict[str, dict[str, str]], dict[str, dict[str, tuple[Spectr
     """Return the metadata of each set, and its spectra by group, in the file's order."""
     from pyarrow import parquet  # noqa: PLC0415  (few studies need it)
 
-    table = parquet.read_table(str(files(__package__).joinpath(_FILE)))
+    table = parquet.ParquetFile(str(files(__package__).joinpath(_FILE))).read()
     about = json.loads(table.schema.metadata[b"cards"])
     sets: dict[str, dict[str, list[Spectrum]]] = {}
     for row in table.to_pylist():
