@@ -244,22 +244,33 @@ def of_case(
 
 
 def room_dn(setup: Setup, response: DesignSignals, unlit: Float[Array, "designs channels"]) -> PerDesign:
-    """Return the chromatic distance up to which the closed form holds, DN; negative: nowhere.
+    """Return the chromatic distance up to which the closed form holds, DN; see `room_of`.
 
     `response`: readout, DN; `unlit`: without lamps, DN.
+    """
+    least_dn = (response - unlit[:, None]).max(axis=2).min(axis=1)
+    return room_of(setup, response.max(axis=(1, 2)), least_dn, unlit.min(axis=1), unlit.max(axis=1))
+
+
+def room_of(
+    setup: Setup, most_dn: PerDesign, least_dn: PerDesign, darkest_dn: PerDesign, brightest_dn: PerDesign
+) -> PerDesign:
+    """Return the chromatic distance up to which the closed form holds, DN; negative: nowhere.
+
+    `most_dn`: largest reading, DN; `least_dn`: that of the fullest channel of the darkest lamp alone, DN;
+    `darkest_dn`, `brightest_dn`: smallest and largest reading without lamps, DN.
     It holds for no HDR pixel, and within no limits of the brightness. The closed form takes a lamp that is dimmer than
     it is. A brighter one has its fullest channel at least where its brightest pixel is full, so that it is no nearer to
     a reading than that channel lies above the reading.
     """
     pixel, scene = setup.camera.pixel, setup.scene
     if pixel.captures or scene.brightness is not None:
-        return np.full(len(response), -np.inf)
+        return np.full(len(most_dn), -np.inf)
     full_e = pixel.saturation_e if scene.noise is None else unclipped_e(pixel)[1]
-    full_dn = unquantized(np.array(full_e), pixel) - unlit.max(axis=1)
-    above_dn = response.max(axis=(1, 2)) - unlit.min(axis=1)
+    full_dn = unquantized(np.array(full_e), pixel) - brightest_dn
+    above_dn = most_dn - darkest_dn
     if scene.target is not None or pixel.crosstalk:
         # The mean of a channel is below its brightest pixel, and that is at most what a light has that fills the field.
-        least_dn = (response - unlit[:, None]).max(axis=2).min(axis=1)
         full_dn = full_dn * least_dn / any_filter(setup).brightest_signal_dn
     return np.asarray(full_dn - above_dn, dtype=float)
 

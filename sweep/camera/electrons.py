@@ -237,6 +237,13 @@ class Electrons:
             total += self._modified_uniform[:, :, index] * rates[:, self.position, index, None]
         return total
 
+    @cached_property
+    def _along(self) -> Float[Array, "wavelengths products"]:
+        """Weights of the one modified channel: white, background at each position, and what is kept."""
+        assert self._kept is not None
+        white = self.light.white[:, None].astype(self._kept.dtype)
+        return np.concatenate([white, self.background[:, 0].T, self._kept], axis=1)
+
     def changing(self, block: Block) -> Changing | None:
         """Return electrons of designs that differ in one channel alone, if each element is a channel.
 
@@ -250,32 +257,25 @@ class Electrons:
             return None
         if not np.array_equal(touched, self._touched):
             return None
-        everywhere = np.arange(setup.camera.grid.size)
         time_s = exposure_times(setup, np.zeros((1, 1)), self.light.fixed_white)
-        white = block.product(self.light.white[:, None], everywhere)
+        products = block.product(self._along, np.arange(setup.camera.grid.size))
+        white, background, rates = np.split(products, [1, 1 + len(self.background)], axis=1)
         if white.max(initial=0.0) <= self.light.fixed_white:
             which = np.ones(len(block), dtype=bool)
         else:
             which = exposure_times(setup, white, self.light.fixed_white) == time_s
         if not which.any() or not np.isfinite(time_s[0]) or self.light.scales(time_s).shape[1] > 1:
             return None
-        selected = block if which.all() else block.subset(np.flatnonzero(which))
+        if not which.all():
+            background, rates = background[which], rates[which]
         unit = int(self._touched[0])
-        uniform = np.zeros((len(selected), len(self.position)))
-        if self.background.any():
-            uniform = selected.product(np.ascontiguousarray(self.background[:, 0].T), everywhere)[:, self.position]
-            uniform *= self._modified_uniform[:, unit, 0]
+        uniform = background[:, self.position] * self._modified_uniform[:, unit, 0]
         uniform = self._fixed_uniform[:, unit] + uniform + setup.camera.pixel.dark_e_per_s
         rest = self.fixed + (self._fixed_uniform + setup.camera.pixel.dark_e_per_s)[:, None]
-        fixed, modified_rates = np.ascontiguousarray(self.fixed[:, :, unit]), self._kept
+        fixed = np.ascontiguousarray(self.fixed[:, :, unit])
 
         def make(part: slice) -> Float[Array, "_designs cases channels"]:
-            part_block = selected.subset(part)
-            values = (
-                part_block.product(modified_rates, everywhere)
-                .reshape(len(part_block), len(fixed), -1)
-                .astype(float, copy=False)
-            )
+            values = rates[part].reshape(-1, *fixed.shape).astype(float)
             _expose(values, fixed, uniform[part], float(time_s[0]))
             return values
 

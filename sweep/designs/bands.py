@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 
 from ..base.types import Array, DesignParameters, Float, ParameterWeights, PerParameter, PerWavelength
-from .edge import SPAN_PER_WIDTH, edge, edge_gradient
+from .edge import SPAN_PER_WIDTH, edge, edge_gradient, per_span
 from .family import Parameter
 from .products import row_products
 from .tolerance import ProductionError
@@ -17,7 +17,7 @@ from .tolerance import ProductionError
 _HALF = SPAN_PER_WIDTH / 2
 _PER_BAND = 5
 _FEW = 64
-"""Edges of fewer designs are all computed."""
+"""From so many designs on, a compiled pass saves more time than it takes to load."""
 LEFT, LEFT_WIDTH, RIGHT, RIGHT_WIDTH, DEPTH = range(_PER_BAND)
 
 
@@ -49,7 +49,18 @@ class Bands:
 
     def shape(self, x: DesignParameters) -> Float[Array, "designs wavelengths"]:
         """Return the sum of the bands, 0 to 1 for well-formed designs."""
-        return np.asarray(sum(self._depth(x, band) * self._open(x, band) for band in range(self._count)), dtype=float)
+        bands = x.reshape(len(x), self._count, _PER_BAND)
+        if len(x) < _FEW:
+            edges = self.edges(bands[:, :, :DEPTH].reshape(-1, 2)).reshape(len(x), self._count, 2, -1)
+            each = bands[:, :, DEPTH, None] * (edges[:, :, 0] - edges[:, :, 1])
+            return np.asarray(sum(each.swapaxes(0, 1), start=np.zeros((len(x), self._wave.size))), dtype=float)
+        from .compiled import between_edges  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+        shape = np.zeros((len(x), self._wave.size))
+        centers_nm, widths_nm = (bands[:, :, at:DEPTH:2].reshape(len(x), -1) for at in (LEFT, LEFT_WIDTH))
+        between_edges(self._wave, centers_nm, per_span(widths_nm), np.ascontiguousarray(bands[:, :, DEPTH]), shape)
+        shape[~np.isfinite(x).all(axis=1)] = np.nan
+        return shape
 
     def gradient(self, x: PerParameter) -> Float[Array, "parameters wavelengths"]:
         """Return the derivative of `shape` at one design, per unit of parameter."""
@@ -126,22 +137,6 @@ class Bands:
     def edges(self, centers_and_widths: Float[Array, "bands 2"]) -> Float[Array, "bands wavelengths"]:
         """Return rising edges."""
         return edge(self._wave, centers_and_widths[:, :1], centers_and_widths[:, 1:])
-
-    def _open(self, x: DesignParameters, band: int) -> Float[Array, "designs gaps"]:
-        at = band * _PER_BAND
-        if len(x) < _FEW:
-            edges = self.edges(x[:, at : at + DEPTH].reshape(-1, 2)).reshape(len(x), 2, -1)
-            return np.asarray(edges[:, 0] - edges[:, 1], dtype=float)
-        left, right = (self._each_once(x[:, at + i : at + i + 2]) for i in (LEFT, RIGHT))
-        return np.asarray(left - right, dtype=float)
-
-    def _each_once(self, centers_and_widths: Float[Array, "bands 2"]) -> Float[Array, "bands wavelengths"]:
-        """Return `edges`; each distinct edge of a grid is computed once."""
-        unique, which = np.unique(centers_and_widths, axis=0, return_inverse=True)
-        return self.edges(unique)[which.ravel()]
-
-    def _depth(self, x: DesignParameters, band: int) -> Float[Array, "designs depths"]:
-        return x[:, band * _PER_BAND + DEPTH, None]
 
     def _condition_matrix(self) -> Float[Array, "conditions parameters"]:
         rows = []

@@ -33,6 +33,39 @@ def through_edges(
 
 
 @njit(cache=True, nogil=True, fastmath=_NUMBERS)
+def between_edges(
+    wavelength_nm: FloatArray, centers_nm: FloatArray, per_nm: FloatArray, depths: FloatArray, out: FloatArray
+) -> None:
+    """Add the bands of each design, depth times left less right edge (see `edge.edge`), for two edges a band.
+
+    `per_nm`: 1 / span of each edge; 0: a step.
+    """
+    for d in range(depths.shape[0]):
+        row = out[d]
+        for band in range(depths.shape[1]):
+            left_nm, right_nm = centers_nm[d, 2 * band], centers_nm[d, 2 * band + 1]
+            left_per, right_per, depth = per_nm[d, 2 * band], per_nm[d, 2 * band + 1], depths[d, band]
+            if left_per > 0.0 and right_per > 0.0:
+                for w in range(row.size):
+                    t = smaller(larger((wavelength_nm[w] - left_nm) * left_per + 0.5, 0.0), 1.0)
+                    u = smaller(larger((wavelength_nm[w] - right_nm) * right_per + 0.5, 0.0), 1.0)
+                    rise, fall = t * t * t * (t * (6 * t - 15) + 10), u * u * u * (u * (6 * u - 15) + 10)
+                    row[w] += depth * (rise - fall)
+            else:
+                for w in range(row.size):
+                    row[w] += depth * (
+                        _edge(wavelength_nm[w] - left_nm, left_per) - _edge(wavelength_nm[w] - right_nm, right_per)
+                    )
+
+
+@njit(cache=True, nogil=True)
+def _edge(offset_nm: float, per_nm: float) -> float:
+    t = np.sign(offset_nm) / 2 if per_nm == 0.0 else offset_nm * per_nm
+    t = min(max(t + 0.5, 0.0), 1.0)
+    return float(t * t * t * (t * (6 * t - 15) + 10))
+
+
+@njit(cache=True, nogil=True, fastmath=_NUMBERS)
 def _shape(curve: FloatArray, inverse: FloatArray, dark: FloatArray) -> tuple[float, float]:
     step, low = 0.0, np.inf
     for w in range(curve.size):

@@ -43,10 +43,14 @@ def edge_gradient(
     return by_center, by_width
 
 
+def per_span(width_nm: Float[Array, "*edges"]) -> Float[Array, "*edges"]:
+    """Return 1 / span of edges, 1/nm; 0 of a step."""
+    span = np.asarray(width_nm, dtype=float) * SPAN_PER_WIDTH
+    return np.divide(1.0, span, out=np.zeros_like(span), where=span > _WALL_NM)
+
+
 def _position(
     wavelength_nm: Float[Array, "*#points"], center_nm: Float[Array, "*#points"], width_nm: Float[Array, "*#points"]
 ) -> Float[Array, "*points"]:
-    offset = np.asarray(wavelength_nm, dtype=float) - center_nm
-    span = np.broadcast_to(np.asarray(width_nm, dtype=float) * SPAN_PER_WIDTH, offset.shape)
-    wall = np.sign(offset) / 2
-    return np.clip(np.divide(offset, span, out=wall, where=span > _WALL_NM) + 0.5, 0.0, 1.0)
+    offset, per_nm = np.asarray(wavelength_nm, dtype=float) - center_nm, per_span(width_nm)
+    return np.clip(np.where(per_nm == 0, np.sign(offset) / 2, offset * per_nm) + 0.5, 0.0, 1.0)

@@ -8,13 +8,15 @@ from ..base.types import Array, Float
 
 _FEW_TERMS = 8
 """Sums of so many products are taken one after the other, all rows at once."""
+_ROWS, _LANES = 64, 8
+"""Rows of each product, and what the number of its columns is a multiple of."""
 
 
 def row_products(rows: Float[Array, "rows k"], matrix: Float[Array, "k others"]) -> Float[Array, "rows others"]:
-    """Multiply each row by a matrix in a call of its own.
+    """Multiply each row by a matrix.
 
-    BLAS sums in an order that depends on shapes, strides and the place of a row among others. Here the sums of a row
-    are the same alone and in any block, on one machine.
+    BLAS sums in an order that depends on shapes, strides and the place of a row among others. In blocks of one shape,
+    filled up with zeros, the sums of a row are the same alone and in any block, on one machine.
     """
     if 0 < len(matrix) <= _FEW_TERMS:
         columns = np.ascontiguousarray(rows.T)
@@ -22,4 +24,13 @@ def row_products(rows: Float[Array, "rows k"], matrix: Float[Array, "k others"])
         for at in range(1, len(matrix)):
             products += matrix[at][:, None] * columns[at]
         return np.asarray(products.T)
-    return np.asarray(np.matmul(np.ascontiguousarray(rows)[:, None, :], matrix)[:, 0])
+    n, wanted = len(rows), matrix.shape[1]
+    padded = np.zeros((len(matrix), -(-wanted // _LANES) * _LANES), dtype=matrix.dtype)
+    padded[:, :wanted] = matrix
+    products = np.empty((n, wanted), dtype=np.result_type(rows, matrix))
+    for start in range(0, n, _ROWS):
+        block = np.ascontiguousarray(rows[start : start + _ROWS])
+        if len(block) < _ROWS:
+            block = np.concatenate([block, np.zeros((_ROWS - len(block), block.shape[1]), dtype=block.dtype)])
+        products[start : start + _ROWS] = (block @ padded)[: n - start, :wanted]
+    return products

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, cast
 
-from pydantic import Field, create_model
+from pydantic import create_model
 
 from ..base.errors import SweepError, ValidationIssue, nearest
 from ..base.modules import files_in

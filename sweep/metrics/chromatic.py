@@ -22,10 +22,12 @@ from ..camera.pixel_curve import STEPS_DN2
 from ..camera.setup import Setup
 from ..spectra.lights import Pair, class_pairs
 from .brightness import BrightnessCurves, chromatic_distance
-from .separation import packed_response, pair_blocks
+from .separation import MANY, MOST_CHANNELS, packed_response, pair_blocks, pair_order
 from .smooth import Rows, SmoothDesign
 from .tasks.colorimetry import COMPLEX_STEP, Smooth
 
+_ROUNDED = 1 - 1e-9
+"""More than rounding takes off a squared distance, so that which pairs are left out changes no bit of it."""
 _SEEN = 4.0
 """A search sees the nearest points of pairs whose squared distance is at most so many times the smallest, and others at
 the darkest point of the curve, which is no nearer."""
@@ -92,6 +94,43 @@ def chromatic_separations(response: DesignSignals, members: Mapping[str, MemberN
     squared = np.empty((len(response), len(pairs)))
     nearest_chromatic_squared(*packed, squared)
     return dict(zip(pairs, np.sqrt(squared.T), strict=True))
+
+
+def chromatic_along(
+    fixed: Float[Array, "signals channels"],
+    channel: int,
+    values: Float[Array, "designs signals"],
+    unlit: Float[Array, "designs channels"],
+    members: Mapping[str, MemberNumbers],
+    pairs: Sequence[Pair],
+) -> tuple[dict[Pair, PerDesign], PerDesign, PerDesign]:
+    """Compute the smallest chromatic distance of pairs for designs that differ in one channel alone, DN.
+
+    `fixed`: shared channels, DN, whose response without lamps is the same, too; `values`: values of that channel, DN;
+    `unlit`: without lamps, DN. Returns distances, largest reading, and that of the fullest channel of the darkest lamp
+    alone, DN.
+    """
+    if len(values) < MANY or fixed.shape[1] > MOST_CHANNELS or not np.isfinite(values).all():
+        response = np.repeat(fixed[None], len(values), axis=0)
+        response[..., channel] = values
+        lit = response - unlit[:, None]
+        distances = {(a, b): chromatic_separation(lit, members[a], members[b]) for a, b in pairs}
+        return distances, response.max(axis=(1, 2)), lit.max(axis=2).min(axis=1)
+    from .nearest import nearest_chromatic_along  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+    padded = np.zeros((len(fixed), MOST_CHANNELS - 1))
+    padded[:, : fixed.shape[1] - 1] = np.delete(fixed - unlit[0], channel, axis=1)
+    order, squared = pair_order(_least, padded, members, pairs), np.empty((len(pairs), len(values)))
+    of_pairs, (most_dn, least_dn) = (order.first, order.second, order.starts, order.least), np.empty((2, len(values)))
+    dark = np.ascontiguousarray(unlit[:, channel])
+    nearest_chromatic_along(np.ascontiguousarray(values), dark, padded, *of_pairs, squared, most_dn, least_dn)
+    most_dn = np.maximum(most_dn, np.delete(fixed, channel, axis=1).max(initial=-np.inf))
+    return dict(zip(pairs, np.sqrt(squared), strict=True)), most_dn, least_dn
+
+
+def _least(first: Float[Array, "pairs channels"], second: Float[Array, "pairs channels"]) -> Float[Array, " pairs"]:
+    """Return what no squared chromatic distance with one more channel is below, but for rounding."""
+    return squared_distance(first, second) * _ROUNDED
 
 
 def chromatic_rows(design: SmoothDesign, *, pairs: Sequence[Pair], noise: bool, decades: bool = False) -> Rows:

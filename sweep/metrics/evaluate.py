@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,7 +15,6 @@ from ..base.types import (
     DesignCurves,
     DesignParameters,
     Float,
-    FloatArray,
     PerValue,
 )
 from ..camera.electrons import Changing
@@ -26,13 +25,28 @@ from ..camera.pwm import phases_of
 from ..camera.setup import Setup
 from ..designs.block import Block, CurveBlock
 from ..designs.family import Family
-from ..spectra.lights import class_pairs, pair_name
+from ..spectra.lights import Pair, class_pairs, pair_name
 from ..vision.section import Vision
 from .brightness import curves_of
-from .columns.chromatic import CHROMATIC_CSD, CHROMATIC_DPRIME, CHROMATIC_ERROR, with_equal_brightness
+from .columns.chromatic import (
+    CHROMATIC_CSD,
+    CHROMATIC_DPRIME,
+    CHROMATIC_ERROR,
+    ChromaticSeparation,
+    with_equal_brightness,
+)
 from .columns.color_separation import ColorSeparation
 from .columns.exposure import EXPOSURE
-from .metric import DesignMetric, FamilyMetric, LampMetric, NoiseMetric, PulseMetric, ReadoutMetric, VisionMetric
+from .metric import (
+    DesignMetric,
+    FamilyMetric,
+    LampMetric,
+    Metric,
+    NoiseMetric,
+    PulseMetric,
+    ReadoutMetric,
+    VisionMetric,
+)
 from .quantity import BEST_PHASE, Columns, Quantity, RequestedQuantities
 from .registry import METRICS, quantities_of
 from .separation import csd_name, separations, separations_along
@@ -42,42 +56,57 @@ _FINER_MOMENTS, _PULSE_ROUNDS, _PULSE_STEPS = 8, 3, 9
 """Factor by which moments of a pulse are finer at one phase; rounds in which the worst is refined; moments of each."""
 _AT_ONCE = 1024
 """Designs that differ in one channel alone and are read at once, so that their readout stays in the cache."""
-OTHERS = [metric for metric in METRICS if isinstance(metric, ReadoutMetric) and not isinstance(metric, ColorSeparation)]
-"""Metrics that need the whole readout of every design."""
 _COMPARED_AT_ONCE = 1024
 """Readouts of a design in a case that are compared at once."""
 _READ_AT_ONCE = 2**19
 """Digital numbers that other metrics are given at once: 4 MiB, so that they stay in the cache."""
-_Part = Callable[[slice], FloatArray]
-_Extra = Callable[[int, _Part, _Part], Columns]
-"""Columns of n designs from the whole readout of parts of them, and from the response without lamps."""
-_CSD = [metric for metric in METRICS if isinstance(metric, ColorSeparation)]
+_CSD = next(metric for metric in METRICS if isinstance(metric, ColorSeparation))
+_CHROMATIC = next(metric for metric in METRICS if isinstance(metric, ChromaticSeparation))
+_ALONG = (_CSD, _CHROMATIC)
+"""Metrics of the readout that take the one channel in which designs differ."""
+_Unlit = Callable[[slice], Float[Array, "designs cases channels"]]
 _LAMPS = [metric for metric in METRICS if isinstance(metric, LampMetric)]
 
 
-def designed_quantities(setup: Setup, designs: DesignCurves | Block) -> Columns:
+@dataclass(frozen=True)
+class _Request:
+    """What a batch is evaluated for: chromatic pairs, metrics of readouts, of noise between states, and of users."""
+
+    pairs: tuple[Pair, ...]
+    readouts: Sequence[ReadoutMetric]
+    noisy: Sequence[NoiseMetric]
+    states: Sequence[str]
+    user_metrics: Sequence[UserMetric]
+    probabilities: bool
+
+
+def designed_quantities(setup: Setup, designs: DesignCurves | Block, metrics: Collection[Metric] = METRICS) -> Columns:
     """Return the quantities of designs without light."""
     block = _block(designs)
-    return _joined([metric.of_designs(setup, block) for metric in METRICS if isinstance(metric, DesignMetric)])
+    return _joined([metric.of_designs(setup, block) for metric in metrics if isinstance(metric, DesignMetric)])
 
 
-def family_quantities(family: Family | None, points: DesignParameters) -> Columns:
+def family_quantities(
+    family: Family | None, points: DesignParameters, metrics: Collection[Metric] = METRICS
+) -> Columns:
     """Return the quantities that the parameters of designs determine.
 
     `family`: family; None for plain CFAs.
     """
-    return _joined([metric.of_parameters(family, points) for metric in METRICS if isinstance(metric, FamilyMetric)])
+    return _joined([metric.of_parameters(family, points) for metric in metrics if isinstance(metric, FamilyMetric)])
 
 
-def image_quantities(setup: Setup, curves: DesignCurves, vision: Vision | None, seed: int) -> Columns:
+def image_quantities(
+    setup: Setup, curves: DesignCurves, vision: Vision | None, seed: int, metrics: Collection[Metric] = METRICS
+) -> Columns:
     """Return the quantities of images of signal heads.
 
     `vision`: benchmark; None if the study has none.
     """
     if vision is None:
         return {}
-    metrics = [metric for metric in METRICS if isinstance(metric, VisionMetric)]
-    return _joined([metric.of_images(setup, curves, vision, seed) for metric in metrics])
+    of_images = [metric for metric in metrics if isinstance(metric, VisionMetric)]
+    return _joined([metric.of_images(setup, curves, vision, seed) for metric in of_images])
 
 
 def _block(designs: DesignCurves | Block) -> Block:
@@ -207,27 +236,25 @@ def _refine_heights(model: ForwardModel, block: Block, cases: Columns, columns: 
 
 
 def _whole_readout(
-    model: ForwardModel, user_metrics: Sequence[UserMetric], n: int, read: _Part, unlit: _Part
+    model: ForwardModel, request: _Request, n: int, read: Callable[[slice], DesignCases], unlit: _Unlit
 ) -> Columns:
-    """Return columns of n designs by user metrics and those of `OTHERS`.
+    """Return columns of n designs by metrics of users, and by those of the readout that have no way along a channel.
 
     `read`, `unlit`: the readout of a part of the designs, and the response without lamps.
     """
-    if not (user_metrics or OTHERS):
-        return {}
-    setup = model.setup
+    setup, readouts, user_metrics = model.setup, request.readouts, request.user_metrics
     # A CFA of which an own metric says nothing says so of one design, and no more are read for it.
     first = user_quantities(user_metrics, setup, read(slice(0, 1))) if user_metrics else {}
     columns = {name: np.full(n, values[0]) for name, values in first.items()}
     present = [metric for metric in user_metrics if np.isfinite(first[metric.name][0])]
-    if present or OTHERS:
+    if present or readouts:
         values_per_design = model.n_cases * len(setup.lights.names) * len(setup.camera.mosaic.channels)
         step, parts = max(1, _READ_AT_ONCE // values_per_design), []
         for start in range(0, n, step):
             part = slice(start, start + step)
             response = read(part)
-            others = over_cases(model, by_case(setup, response, OTHERS, unlit(part))) if OTHERS else {}
-            parts.append(others | user_quantities(present, setup, response))
+            cases = by_case(setup, response, readouts, unlit(part)) if readouts else {}
+            parts.append(over_cases(model, cases) | user_quantities(present, setup, response))
         columns |= {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     return columns
 
@@ -279,67 +306,84 @@ def evaluate(
     *,
     probabilities: bool = False,
     user_metrics: Sequence[UserMetric] = (),
+    metrics: Collection[Metric] = METRICS,
+    chromatic: Sequence[Pair] | None = None,
 ) -> Columns:
     """Evaluate a batch of designs as the camera reads them out.
+
+    `metrics`: those whose columns are wanted, beside the CSDs; `chromatic`: the pairs whose chromatic CSD is wanted;
+    left out, all of them.
 
     CSDs are the smallest over sampling phases, field positions and moments of a pulse; ``best_phase_csd_<a>_<b>`` is
     the largest over the phases of the smallest over the moments. Where all phases or field positions count, CSDs are
     refined; other metrics are the worst over the lattice.
     """
-    block, extra, setup = _block(designs), partial(_whole_readout, model, user_metrics), model.setup
-    changing = None if states else model.read_changing(block)
+    block, setup = _block(designs), model.setup
+    pairs = class_pairs(setup.lights.classes) if chromatic is None else chromatic
+    noisy = [metric for metric in metrics if isinstance(metric, NoiseMetric) and states]
+    readouts = [metric for metric in metrics if isinstance(metric, ReadoutMetric) and metric not in _ALONG]
+    request = _Request(tuple(pairs), readouts, noisy, states, [*user_metrics], probabilities)
+    changing = None if noisy else model.read_changing(block)
     if changing is None:
-        cases, columns = _read(model, block, extra, states, probabilities=probabilities)
+        cases, columns = _read(model, block, request, metrics)
     elif changing.which.all():
-        cases, columns = _distances_along(model, changing, extra)
+        cases, columns = _along(model, changing, request)
     else:
-        parts = (
-            _distances_along(model, changing, extra),
-            _read(model, block.subset(np.flatnonzero(~changing.which)), extra),
-        )
+        rest = block.subset(np.flatnonzero(~changing.which))
+        parts = _along(model, changing, request), _read(model, rest, request, metrics)
         cases, columns = (
-            {name: _merged(changing.which, along[name], rest[name]) for name in along}
-            for along, rest in zip(*parts, strict=True)
+            {name: _merged(changing.which, along[name], others[name]) for name in along}
+            for along, others in zip(*parts, strict=True)
         )
-    columns |= _over_brightness(setup, block, columns, states)
+    columns |= _over_brightness(setup, block, columns, request, metrics)
     if setup.all_phases:
         _refine_phases(model, block, columns)
     elif _nonlinear_over_pulse(setup) and not setup.all_heights:
         _refine_moments(model, block, columns)
     if setup.all_heights:
         _refine_heights(model, block, cases, columns)
-    return columns | designed_quantities(setup, block)
+    return columns | designed_quantities(setup, block, metrics)
 
 
-def _over_brightness(setup: Setup, block: Block, columns: Columns, states: Sequence[str]) -> Columns:
+def _over_brightness(
+    setup: Setup, block: Block, columns: Columns, request: _Request, metrics: Collection[Metric]
+) -> Columns:
     """Return columns of lamps of unknown brightness by their brightness curves.
 
     Those of noise, and others where a column is missing: no closed form holds there.
     """
-    walked, refined = np.zeros(len(columns[EXPOSURE]), dtype=bool), Columns()
-    for name in {pair_name(CHROMATIC_CSD, pair) for pair in class_pairs(setup.lights.classes)} & columns.keys():
+    walked, refined, states = np.zeros(len(columns[EXPOSURE]), dtype=bool), Columns(), request.states
+    for name in map(_chromatic_name, request.pairs):
         walked |= np.isnan(columns[name])
         refined[name] = columns[name].copy()
-    if not (walked.any() or states):
+    of_states = [metric for metric in metrics if isinstance(metric, LampMetric) and metric.of_states and states]
+    if not (walked.any() or of_states):
         return {}
-    for pair in class_pairs(list(states)):
+    for pair in class_pairs(list(states if of_states else ())):
         refined |= {pair_name(of, pair): np.full(len(walked), np.nan) for of in (CHROMATIC_DPRIME, CHROMATIC_ERROR)}
     for design in range(len(walked)):
-        requested = [metric for metric in _LAMPS if (states if metric.of_states else walked[design])]
+        requested = [*of_states, *([_CHROMATIC] if walked[design] else [])]
         curves = block.subset(slice(design, design + 1)).curves()
         if not (requested and np.isfinite(curves).all() and np.isfinite(columns[EXPOSURE][design])):
             continue
-        for name, value in of_lamps(setup, curves, states, requested).items():
+        for name, value in of_lamps(setup, curves, states, requested, request.pairs).items():
             refined[name][design] = value
-    return refined | (with_equal_brightness(columns | refined, states) if states else {})
+    return refined | (with_equal_brightness(columns | refined, states) if of_states else {})
 
 
 def of_lamps(
-    setup: Setup, curves: DesignCurves, states: Sequence[str], metrics: Sequence[LampMetric]
+    setup: Setup,
+    curves: DesignCurves,
+    states: Sequence[str],
+    metrics: Sequence[LampMetric],
+    pairs: Sequence[Pair] = (),
 ) -> dict[str, float]:
-    """Return columns of lamps of unknown brightness of one design."""
+    """Return columns of lamps of unknown brightness of one design, of pairs of types and of states."""
     cases = curves_of(forward_model(setup.over_brightness).lamps(curves), setup)
-    return {k: v for metric in metrics for k, v in metric.of_lamps(cases, setup.members, states).items()}
+    columns: dict[str, float] = {}
+    for metric in metrics:
+        columns |= metric.of_lamps(cases, setup.members, class_pairs(list(states)) if metric.of_states else pairs)
+    return columns
 
 
 def evaluate_some(
@@ -365,36 +409,48 @@ def _merged(
     return merged
 
 
-def _distances_along(model: ForwardModel, changing: Changing, extra: _Extra) -> tuple[Columns, Columns]:
+def _along(model: ForwardModel, changing: Changing, request: _Request) -> tuple[Columns, Columns]:
     """Return CSDs in each case, and the columns, of designs that differ in one channel alone."""
-    n, names = int(changing.which.sum()), _csd_names(model.setup)
-    cases = {name: np.empty((len(changing.fixed), n)) for name in names}
+    n, csds = int(changing.which.sum()), _csd_names(model.setup)
+    cases = {name: np.empty((len(changing.fixed), n)) for name in (*csds, *map(_chromatic_name, request.pairs))}
     for start in range(0, n, _AT_ONCE):
         batch = slice(start, start + _AT_ONCE)
-        values = changing.make(batch)
+        values, unlit = changing.make(batch), changing.unlit(batch)
         for case, fixed in enumerate(changing.fixed):
-            along = separations_along(fixed, changing.channel, values[:, case], model.setup.members)
-            for pair, distance in along.items():
+            along = fixed, changing.channel, values[:, case]
+            for pair, distance in separations_along(*along, model.setup.members).items():
                 cases[csd_name(pair)][case, batch] = distance
-    columns = over_cases(model, cases) | extra(n, changing.whole_of, changing.unlit)
-    return cases, columns | {EXPOSURE: np.full(n, changing.exposure_s)}
+            for name, distance in _CHROMATIC.along(model.setup, *along, unlit[:, case], request.pairs).items():
+                cases[name][case, batch] = distance
+    columns = over_cases(model, cases) | _whole_readout(model, request, n, changing.whole_of, changing.unlit)
+    return {name: cases[name] for name in csds}, columns | {EXPOSURE: np.full(n, changing.exposure_s)}
 
 
-def _read(
-    model: ForwardModel, block: Block, extra: _Extra, states: Sequence[str] = (), *, probabilities: bool = False
-) -> tuple[Columns, Columns]:
-    """Return CSDs in each case, and the columns, of any designs; with `states`, those of noise, too."""
-    curves, members, by_design = block.curves(), model.setup.members, Columns()
-    if states:
+def _read(model: ForwardModel, block: Block, request: _Request, metrics: Collection[Metric]) -> tuple[Columns, Columns]:
+    """Return CSDs in each case, and the columns, of any designs; with `noisy` metrics, those of noise, too."""
+    curves, setup, by_design = block.curves(), model.setup, Columns()
+    if request.noisy:
         read = model.read_with_noise(curves)
         response, exposure_s = read.mean, read.exposure_s
-        confused = {name: members[name] for name in states}
-        noisy = [m for m in METRICS if isinstance(m, NoiseMetric) and (probabilities or not m.extra)]
+        confused = {name: setup.members[name] for name in request.states}
+        noisy = [metric for metric in request.noisy if request.probabilities or not metric.extra]
         by_design = _joined([metric.of_noise(model, curves, read, confused) for metric in noisy])
     else:
         response, exposure_s = model.read(curves)
-    by_design |= extra(len(curves), response.__getitem__, lambda part: model.unlit(curves[part], exposure_s[part]))
-    if model.setup.scene.drive is not None and model.setup.camera.pixel.captures:
-        by_design |= _joined([metric.of_pulses(model, curves) for metric in METRICS if isinstance(metric, PulseMetric)])
-    cases = by_case(model.setup, response, _CSD)
+
+    def unlit(part: slice) -> Float[Array, "designs cases channels"]:
+        return model.unlit(curves[part], exposure_s[part])
+
+    by_design |= _whole_readout(model, request, len(curves), response.__getitem__, unlit)
+    if setup.scene.drive is not None and setup.camera.pixel.captures:
+        pulsed = [metric for metric in metrics if isinstance(metric, PulseMetric)]
+        by_design |= _joined([metric.of_pulses(model, curves) for metric in pulsed])
+    cases = by_case(setup, response, [_CSD])
+    if request.pairs:
+        chromatic = by_case(setup, response, [_CHROMATIC], unlit(slice(None)))
+        by_design |= over_cases(model, {name: chromatic[name] for name in map(_chromatic_name, request.pairs)})
     return cases, over_cases(model, cases) | by_design | {EXPOSURE: exposure_s}
+
+
+def _chromatic_name(pair: Pair) -> str:
+    return pair_name(CHROMATIC_CSD, pair)

@@ -12,6 +12,7 @@ from ..camera.readout import NoisyReadout
 from ..camera.setup import Setup
 from ..designs.block import Block
 from ..designs.family import Family
+from ..spectra.lights import Pair
 from ..vision.section import Vision
 from .brightness import BrightnessCurves
 from .quantity import Columns, Quantity, RequestedQuantities
@@ -118,7 +119,7 @@ class LampMetric(Metric):
 
     @abstractmethod
     def of_lamps(
-        self, cases: Sequence[BrightnessCurves], members: Mapping[str, MemberNumbers], states: Sequence[str]
+        self, cases: Sequence[BrightnessCurves], members: Mapping[str, MemberNumbers], pairs: Sequence[Pair]
     ) -> dict[str, float]:
         """Compute the columns of one design, the worst over all phases and moments.
 
@@ -128,8 +129,8 @@ class LampMetric(Metric):
             Readings of the lamps over their brightness in each case.
         members : mapping of str to ndarray of int
             Signals of each type.
-        states : sequence of str
-            Signal types that noise may confuse.
+        pairs : sequence of tuple of str
+            Two signal types each.
 
         Returns
         -------

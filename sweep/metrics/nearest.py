@@ -124,3 +124,67 @@ def nearest_along_squared(
                         x = first_values[d] - second_values[d]
                         best[d] = smaller(best[d], fixed_square + x * x)
             out[pair, begin : begin + _LANES] = best
+
+
+@njit(cache=True, nogil=True, fastmath=_NUMBERS)
+def nearest_chromatic_along(
+    values: FloatArray,
+    dark: FloatArray,
+    others: FloatArray,
+    first: IndexArray,
+    second: IndexArray,
+    starts: IndexArray,
+    least: FloatArray,
+    out: FloatArray,
+    most_dn: FloatArray,
+    least_dn: FloatArray,
+) -> None:
+    """As `nearest_along_squared`, of the chromatic distance (see `chromatic.squared_distance`).
+
+    `dark`: the channel without lamps; `others`: the three shared channels less their response without lamps, missing
+    ones 0; `least`: what no squared distance of a pair is below. Ratios are compared without a division. `most_dn` and
+    `least_dn` become the largest value, and that of the fullest channel of the darkest signal less dark.
+    """
+    own = others[:, 0] ** 2 + others[:, 1] ** 2 + others[:, 2] ** 2
+    fullest = np.array([larger(larger(signal[0], signal[1]), signal[2]) for signal in others])
+    for begin in range(0, len(values), _LANES):
+        block = np.ascontiguousarray(values[begin : begin + _LANES].T)
+        n = block.shape[1]
+        length, largest, smallest, negative = np.empty_like(block), np.full(n, -np.inf), np.full(n, np.inf), 0.0
+        for signal in range(block.shape[0]):
+            for d in range(n):
+                largest[d] = larger(largest[d], block[signal, d])
+                lit = block[signal, d] - dark[begin + d]
+                smallest[d] = smaller(smallest[d], larger(lit, fullest[signal]))
+                negative = smaller(negative, lit)
+                block[signal, d] = lit
+                length[signal, d] = own[signal] + lit * lit
+        most_dn[begin : begin + n], least_dn[begin : begin + n] = largest, smallest
+        for pair in range(starts.size - 1):
+            top, under = np.full(n, np.inf), np.ones(n)
+            for start in range(starts[pair], starts[pair + 1], _AT_ONCE):
+                worst = 0.0
+                for d in range(n):
+                    worst = larger(worst, top[d] / under[d])
+                if least[start] >= worst:
+                    break
+                for k in range(start, min(start + _AT_ONCE, starts[pair + 1])):
+                    i, j = first[k], second[k]
+                    one, other, squared_1, squared_2 = block[i], block[j], length[i], length[j]
+                    f0, f1, f2 = others[i, 0], others[i, 1], others[i, 2]
+                    g0, g1, g2 = others[j, 0], others[j, 1], others[j, 2]
+                    a01, a02, a12 = f0 * g1 - f1 * g0, f0 * g2 - f2 * g0, f1 * g2 - f2 * g1
+                    area, dot = a01 * a01 + a02 * a02 + a12 * a12, f0 * g0 + f1 * g1 + f2 * g2
+                    usual = dot > 0.0 and negative >= 0.0  # angles below 90 degrees, lengths above 0
+                    for d in range(n):
+                        x, y = one[d], other[d]
+                        x0, x1, x2 = f0 * y - g0 * x, f1 * y - g1 * x, f2 * y - g2 * x
+                        squared, most = area + x0 * x0 + x1 * x1 + x2 * x2, larger(squared_1[d], squared_2[d])
+                        if not usual:
+                            squared = squared_1[d] * squared_2[d] if dot + x * y <= 0.0 else squared
+                            most = most if most > 0.0 else 1.0
+                        nearer = squared * under[d] < top[d] * most
+                        top[d] = squared if nearer else top[d]
+                        under[d] = most if nearer else under[d]
+            for d in range(n):
+                out[pair, begin + d] = top[d] / under[d]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,10 +27,10 @@ from ..spectra.lights import Pair, class_pairs, pair_name
 
 _BLOCK_PAIRS = 262_144
 """Pair distances held at once per channel: 2 MiB, so that a block stays in cache."""
-_MANY, _MOST_CHANNELS = 64, 4
+MANY, MOST_CHANNELS = 64, 4
 """From so many designs of so few channels on, the compiled pass saves more time than it takes to load."""
-_SMALLEST = 1e-140
-"""Distances below this, and above its inverse, are computed without squares."""
+_LARGEST = 1e140
+"""Larger distances are computed without squares, DN."""
 
 
 def csd_name(pair: Pair) -> str:
@@ -56,9 +57,7 @@ def separation(
                 values = block[:, :, channel]
                 total += (values[:, first, None] - values[:, None, second]) ** 2
         distances[start : start + step] = np.sqrt(total.min(axis=(1, 2)))
-    odd = np.flatnonzero(
-        (distances < _SMALLEST) | (distances > 1 / _SMALLEST)
-    )  # squares that a float does not hold well
+    odd = np.flatnonzero(distances > _LARGEST)
     for designs, first_of_pair, second_of_pair in pair_blocks((len(odd), *response.shape[1:]), first, second):
         differences = response[odd[designs]][:, first_of_pair] - response[odd[designs]][:, second_of_pair]
         distances[odd[designs]] = np.hypot.reduce(differences, axis=2, initial=0.0).min(axis=1)
@@ -97,10 +96,10 @@ def packed_response(
     both for few designs, more channels, or values that are not finite.
     """
     n_designs, _, n_channels = response.shape
-    if n_designs < _MANY or n_channels > _MOST_CHANNELS or not np.isfinite(response).all():
+    if n_designs < MANY or n_channels > MOST_CHANNELS or not np.isfinite(response).all():
         return None
     order = np.concatenate(list(members.values()))
-    packed = np.zeros((n_designs, _MOST_CHANNELS, order.size))
+    packed = np.zeros((n_designs, MOST_CHANNELS, order.size))
     packed[:, :n_channels] = np.moveaxis(response[:, order], 1, 2)
     return packed, np.cumsum([0, *map(len, members.values())])
 
@@ -115,18 +114,19 @@ def separations_along(
 
     `fixed`: shared channels, DN; `values`: values of that channel, DN.
     """
-    others = np.delete(fixed, channel, axis=1)
+    others, pairs = np.delete(fixed, channel, axis=1), class_pairs(list(members))
     odd = np.asarray(~np.isfinite(values).all(axis=1) | (not np.isfinite(others).all()))
-    fixed_squares, first, second, starts = _pairs_apart(others, members)
-    if len(values) < _MANY:
+    order = pair_order(_squared, others, members, pairs)
+    if len(values) < MANY:
         with np.errstate(invalid="ignore", over="ignore"):
-            squares = fixed_squares + (values[:, first] - values[:, second]) ** 2
-        squared = np.minimum.reduceat(squares, starts[:-1], axis=1).T
+            squares = order.least + (values[:, order.first] - values[:, order.second]) ** 2
+        squared = np.minimum.reduceat(squares, order.starts[:-1], axis=1).T
     else:
         from .nearest import nearest_along_squared  # noqa: PLC0415  (compiled: kept off the start-up path)
 
-        squared = np.empty((len(starts) - 1, len(values)))
-        nearest_along_squared(np.ascontiguousarray(values), fixed_squares, first, second, starts, squared)
+        squared = np.empty((len(pairs), len(values)))
+        of_pairs = order.least, order.first, order.second, order.starts
+        nearest_along_squared(np.ascontiguousarray(values), *of_pairs, squared)
 
     def all_channels(designs: Bool[BoolArray, " values"]) -> DesignSignals:
         response = np.repeat(fixed[None], int(designs.sum()), axis=0)
@@ -142,37 +142,60 @@ def _distances(
     members: Mapping[str, MemberNumbers],
     response: Callable[[Bool[BoolArray, "designs signals channels"]], DesignSignals],
 ) -> dict[Pair, PerDesign]:
-    """Return the roots; non-finite designs and extreme squares by `separation`."""
+    """Return the roots; non-finite designs and too large squares by `separation`."""
     distances = dict(zip(class_pairs(list(members)), np.sqrt(squared), strict=True))
     for (a, b), distance in distances.items():
-        recomputed = odd | ~((distance >= _SMALLEST) & (distance <= 1 / _SMALLEST))
+        recomputed = odd | ~(distance <= _LARGEST)
         if recomputed.any():
             distance[recomputed] = separation(response(recomputed), members[a], members[b])
     return distances
 
 
-_Apart = tuple[FloatArray, IndexArray, IndexArray, IndexArray]
-_apart: Cache[bytes, _Apart] = Cache(16)
+@dataclass(frozen=True)
+class PairOrder:
+    """Pairs of signals of two types each, type by type from `starts`, those that may be nearest first.
+
+    `least`: what no squared distance of a pair is below, ascending within each pair of types.
+    """
+
+    first: Int[IndexArray, " pairs"]
+    second: Int[IndexArray, " pairs"]
+    starts: Int[IndexArray, " types"]
+    least: Float[Array, " pairs"]
+
+
+_orders: Cache[bytes, PairOrder] = Cache(16)
 """The blocks of a run share their fixed channels."""
+_SquaredDistance = Callable[[FloatArray, FloatArray], FloatArray]
 
 
-def _pairs_apart(others: Float[Array, "signals channels"], members: Mapping[str, MemberNumbers]) -> _Apart:
-    """Return the pairs of signals as `nearest_along_squared` takes them, from DN of the shared channels."""
+def pair_order(
+    squared: _SquaredDistance,
+    others: Float[Array, "signals channels"],
+    members: Mapping[str, MemberNumbers],
+    pairs: Sequence[Pair],
+) -> PairOrder:
+    """Return the pairs of signals by their squared distance in the shared channels, DN^2."""
 
-    def compute() -> _Apart:
-        nearest = []
-        for a, b in class_pairs(list(members)):
+    def compute() -> PairOrder:
+        parts = []
+        for a, b in pairs:
             first, second = np.repeat(members[a], len(members[b])), np.tile(members[b], len(members[a]))
             with np.errstate(invalid="ignore", over="ignore"):
-                fixed_squares = ((others[first] - others[second]) ** 2).sum(axis=1)
-            rank = np.argsort(fixed_squares, kind="stable")
-            nearest.append((fixed_squares[rank], first[rank], second[rank]))
-        starts = np.cumsum([0, *(len(fixed_squares) for fixed_squares, _, _ in nearest)])
-        fixed_squares, first, second = (np.concatenate(parts) for parts in zip(*nearest, strict=True))
-        return fixed_squares, first, second, starts
+                least = squared(others[first], others[second])
+            rank = np.argsort(least, kind="stable")
+            parts.append((first[rank], second[rank], least[rank]))
+        starts = np.cumsum([0, *(len(first) for first, *_ in parts)])
+        first, second, least = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+        return PairOrder(first, second, starts, least)
 
-    key_parts = [np.array([len(others), *map(len, members.values())]), *members.values(), np.ascontiguousarray(others)]
-    return _apart.get(hashlib.sha256(b"".join(part.tobytes() for part in key_parts)).digest(), compute)
+    sizes = [len(of_type) for of_type in members.values()]
+    key = [repr((squared.__name__, pairs, sizes)).encode(), *map(bytes, members.values()), others.tobytes()]
+    return _orders.get(hashlib.sha256(b"".join(key)).digest(), compute)
+
+
+def _squared(first: Float[Array, "pairs channels"], second: Float[Array, "pairs channels"]) -> Float[Array, " pairs"]:
+    return np.asarray(((first - second) ** 2).sum(axis=1), dtype=float)
 
 
 def cfa_sensitivity(

@@ -54,8 +54,7 @@ def _key_texts(owners: Iterable[type]) -> dict[str, str]:
             source = dedent(inspect.getsource(owner))
         except OSError:  # pydantic's `create_model` made it
             continue
-        (section,) = ast.parse(source).body
-        for key, text in pairwise(section.body):
+        for key, text in pairwise(ast.parse(source).body[0].body):  # type: ignore[attr-defined]  # a class
             match key, text:
                 case ast.AnnAssign(target=ast.Name(name)), ast.Expr(ast.Constant(str(words))):
                     texts[name] = inspect.cleandoc(words)

@@ -18,7 +18,7 @@ from sweep.designs.block import CurveBlock, edges_of
 from sweep.designs.families.free_form import FreeForm
 from sweep.designs.families.stopband import MultiStopband, Stopband
 from sweep.designs.space import Filter, Space
-from sweep.metrics import separation
+from sweep.metrics import chromatic, separation
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.separation import class_pairs, separations, separations_along
 
@@ -74,7 +74,8 @@ def test_few_designs_are_the_same_within_rounding_without_compiled_code(
     found = []
     for many in (10**9, 0):
         monkeypatch.setattr(blocks, "_MANY", many)
-        monkeypatch.setattr(separation, "_MANY", many)
+        monkeypatch.setattr(separation, "MANY", many)
+        monkeypatch.setattr(chromatic, "MANY", many)
         monkeypatch.setattr(electrons, "_MANY", many)
         found.append([evaluate(ForwardModel(VIEWS[name]), block) for block in (curves, edges)])
     magnitude_dn = brightest_dn(VIEWS[name], edges.curves())

@@ -59,7 +59,6 @@ class Darkest(ReadoutMetric):
 def darkest(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """One more registered metric."""
     monkeypatch.setattr(registry, "METRICS", (*registry.METRICS, Darkest()))
-    monkeypatch.setattr(route, "OTHERS", [Darkest()])
     registry.quantities_of.cache_clear()
     yield
     registry.quantities_of.cache_clear()
@@ -94,8 +93,7 @@ def test_csds_are_those_without_other_metrics_and_these_are_of_the_whole_readout
     monkeypatch.setattr(route, "_READ_AT_ONCE", at_once)
     block = edges_of(SPACE, 3, 9 if name == "refined" else 69)
     assert block is not None
-    columns = evaluate(ForwardModel(SCENES[name]), block, user_metrics=[BRIGHTEST])
-    monkeypatch.setattr(route, "OTHERS", [])
+    columns = evaluate(ForwardModel(SCENES[name]), block, user_metrics=[BRIGHTEST], metrics=registry.METRICS)
     alone = evaluate(ForwardModel(SCENES[name]), block)
     assert {*columns} == {*alone, "darkest_dn", "brightest"}
     for column, values in alone.items():
@@ -112,7 +110,7 @@ def test_other_metrics_switch_no_fast_route_off(name: str, way: str, n: int, mon
     fast, slow = counted(monkeypatch, way), counted(monkeypatch, "_read")
     block = edges_of(SPACE, 0, n)
     assert block is not None
-    evaluate(ForwardModel(SCENES[name]), block, user_metrics=[BRIGHTEST])
+    evaluate(ForwardModel(SCENES[name]), block, user_metrics=[BRIGHTEST], metrics=registry.METRICS)
     assert (len(fast), len(slow)) == (1, 0)
 
 

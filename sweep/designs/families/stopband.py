@@ -64,7 +64,10 @@ class MultiStopband(Banded):
 
     def curves(self, x: DesignParameters) -> DesignCurves:
         """Return the QE of the modified channel."""
-        return (self._base + self._change * self._bands.shape(x))[:, None, :]
+        curves = self._bands.shape(x)
+        curves *= self._change
+        curves += self._base
+        return curves[:, None, :]
 
     def upper(self, low: PerParameter, high: PerParameter) -> ChannelCurves:
         """Return the base, or the target where it is higher and a band can reach."""

@@ -8,11 +8,11 @@ from functools import partial
 import numpy as np
 
 from ...base.types import Array, DesignSignals, Float, MemberNumbers
-from ...camera.brightness import room_dn
+from ...camera.brightness import room_dn, room_of
 from ...camera.setup import Setup
-from ...spectra.lights import class_pairs, pair_name
+from ...spectra.lights import Pair, class_pairs, pair_name
 from ..brightness import BrightnessCurves, chromatic_distance, error_of
-from ..chromatic import chromatic_rows, chromatic_separations
+from ..chromatic import chromatic_along, chromatic_rows, chromatic_separations
 from ..metric import LampMetric, ReadoutMetric
 from ..quantity import DN, Columns, Quantity, RequestedQuantities
 from .confusion import ERROR
@@ -59,13 +59,37 @@ class ChromaticSeparation(ReadoutMetric, LampMetric):
             for pair, distance in distances.items()
         }
 
+    def along(
+        self,
+        setup: Setup,
+        fixed: Float[Array, "signals channels"],
+        channel: int,
+        values: Float[Array, "designs signals"],
+        unlit: Float[Array, "designs channels"],
+        pairs: Sequence[Pair],
+    ) -> Columns:
+        """Compute columns as `of_readout`, for designs that differ in one channel alone.
+
+        `fixed`: shared channels, DN, whose response without lamps is the same too; `values`: those of that channel, DN.
+        """
+        if not pairs:
+            return {}
+        distances, most_dn, least_dn = chromatic_along(fixed, channel, values, unlit, setup.members, pairs)
+        dark_dn, others_dn = unlit[:, channel], np.delete(unlit[0], channel)
+        darkest_dn = np.minimum(dark_dn, others_dn.min(initial=np.inf))
+        room = room_of(setup, most_dn, least_dn, darkest_dn, np.maximum(dark_dn, others_dn.max(initial=-np.inf)))
+        return {
+            pair_name(CHROMATIC_CSD, pair): np.where(distance <= room, distance, np.nan)
+            for pair, distance in distances.items()
+        }
+
     def of_lamps(
-        self, cases: Sequence[BrightnessCurves], members: Mapping[str, MemberNumbers], states: Sequence[str]
+        self, cases: Sequence[BrightnessCurves], members: Mapping[str, MemberNumbers], pairs: Sequence[Pair]
     ) -> dict[str, float]:
         """Compute the columns from brightness curves."""
         return {
             pair_name(CHROMATIC_CSD, (a, b)): chromatic_distance(cases, members[a], members[b], noise=False)
-            for a, b in class_pairs(list(members))
+            for a, b in pairs
         }
 
 
@@ -115,11 +139,11 @@ class ChromaticConfusion(LampMetric):
         )
 
     def of_lamps(
-        self, cases: Sequence[BrightnessCurves], members: Mapping[str, MemberNumbers], states: Sequence[str]
+        self, cases: Sequence[BrightnessCurves], members: Mapping[str, MemberNumbers], pairs: Sequence[Pair]
     ) -> dict[str, float]:
         """Compute the columns from brightness curves; see `with_equal_brightness`."""
         columns = {}
-        for pair in class_pairs(list(states)):
+        for pair in pairs:
             dprime = chromatic_distance(cases, members[pair[0]], members[pair[1]], noise=True)
             columns[pair_name(CHROMATIC_DPRIME, pair)] = dprime
             columns[pair_name(CHROMATIC_ERROR, pair)] = float(error_of(np.array(dprime)))
