@@ -30,7 +30,7 @@ _BEYOND = 1.1
 """Brightness of the last node, relative to those around the last knee."""
 _BESIDE = 1e-9
 """Nodes beside a knee without noise, where the reading may jump, relative."""
-_FEW, _MOST_KNEES = 16, 300
+_FEW, _MOST_KNEES = 16, 32
 """Pixels around whose knees nodes are, and knees of many pixels that are nodes."""
 _SEEN = 1e-4
 """Weight of a pixel in a channel, relative to the largest, below which its knees are not waited for."""

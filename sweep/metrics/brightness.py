@@ -111,7 +111,7 @@ class BrightnessCurves:
 
     def refined(self, found: Nearest, *, noise: bool) -> Nearest:
         """Refine nearest points between finer nodes; curves that are straight between nodes need none."""
-        if self.lamps.straight and not noise:
+        if not found.curve.size or (self.lamps.straight and not noise):
             return found
         (low, high), rows = found.bracket.T, np.arange(found.curve.size)
         nodes = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, _FINER + 1)
