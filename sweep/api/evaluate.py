@@ -30,7 +30,7 @@ from .filter_evaluation import (
 )
 from .loading import CurveSource, lights, make_study, sensor_source
 
-_OF_A_RUN = ("run.json", "provenance.json")
+_OF_A_RUN = ("manifest.json", "provenance.json")
 
 
 @dataclass(frozen=True)

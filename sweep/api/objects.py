@@ -187,7 +187,8 @@ class LoadedStudy:
         for name in scenarios:
             for space in spaces:
                 points = space.points(0, space.size)
-                values, issues = quantities_at(space, 0, points, study.setup(space, name), rules)
+                numbers, setup = np.arange(space.size), study.setup(space, name)
+                values, issues = quantities_at(space, numbers, setup, rules, rules.wanted)
                 for text in issues.values():
                     raise SweepError(ValidationIssue(f"{space.name} in {name}: {text}"))
                 worst = total_violation(values, study.constraints, space.violation(points))
@@ -375,10 +376,12 @@ class FinishedRun:
     @cached_property
     def table(self) -> pd.DataFrame:
         """Result table with one row per design and scenario; units and meanings are in ``attrs``."""
-        from ..results.tables import RESULTS, read_table
+        import pyarrow as pa
+
+        from ..results.dataset import batches
 
         columns: Mapping[str, Column] = self.output.columns
-        return with_units(read_table(self.folder / RESULTS).to_pandas(), columns)
+        return with_units(pa.concat_tables(batches(self.folder)).unify_dictionaries().to_pandas(), columns)
 
     @property
     def best(self) -> pd.Series:

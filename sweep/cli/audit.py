@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,9 +14,10 @@ import pyarrow as pa
 from ..base.errors import ValidationIssue
 from ..base.types import Progress
 from ..report import read_output, study_of
-from ..results.inventory import Inventory
+from ..results.dataset import batches
 from ..results.lock import locked
-from ..results.tables import AUDIT, RESULTS, batches
+from ..results.manifest import Manifest
+from ..results.tables import AUDIT
 from ..run.check import compared_rows
 from ..study import Study
 
@@ -68,22 +69,25 @@ class Audit:
         ]
 
 
-def sampled(table: pd.DataFrame) -> pd.DataFrame:
+def sampled(table: pd.DataFrame, on_front: Collection[int]) -> pd.DataFrame:
     """Select the rows to audit.
 
-    Returns Pareto front, all rows that are not of a sweep, and 1 % of the others by the hash of their id.
+    `on_front`: ids of the front. Returns that, all rows that are not of a sweep, and 1 % of the others by the hash of
+    their id.
     """
     digests = [hashlib.sha256(str(i).encode()).digest()[:4] for i in table["design_id"]]
     hashed = np.array([int.from_bytes(digest, "big") / 2**32 for digest in digests], dtype=float)
-    is_sampled = table["pareto"] | (table["kind"] != "sweep") | (hashed < _SHARE)
+    is_sampled = table["design_id"].isin(on_front) | (table["kind"] != "sweep") | (hashed < _SHARE)
     return table[is_sampled & (table["status"] == "ok")]
 
 
-def audit_rows(study: Study, tables: Iterable[pd.DataFrame], progress: Progress = lambda *_: None) -> Audit:
+def audit_rows(
+    study: Study, tables: Iterable[pd.DataFrame], on_front: Collection[int], progress: Progress = lambda *_: None
+) -> Audit:
     """Compute the selected rows again at the reference settings."""
     samples, n_designs = [], 0
     for table in tables:
-        samples.append(sampled(table))
+        samples.append(sampled(table, on_front))
         n_designs += len(table)
     rows: list[dict[str, object]] = []
     total = sum(map(len, samples))
@@ -105,14 +109,15 @@ def audit_output(
     """
     output = read_output(folder, audited=False)
     study = study_of(output, data, allow_code=allow_code)
-    result = audit_rows(study, (table.to_pandas() for table in batches(folder / RESULTS)), progress)
+    front = set(output.front_ids)
+    result = audit_rows(study, (table.to_pandas() for table in batches(folder)), front, progress)
     with locked(folder):
-        Inventory(folder).write_table(AUDIT, pa.Table.from_pandas(result.rows, preserve_index=False))
+        Manifest(folder).write_table(AUDIT, pa.Table.from_pandas(result.rows, preserve_index=False))
     return result
 
 
 def audit_again(folder: Path, data: Path | None) -> None:
     """Repeat the audit of a run whose audited rows are missing or damaged."""
-    inventory = Inventory(folder)
-    if AUDIT in inventory.files and inventory.wrong([AUDIT]):
+    manifest = Manifest(folder)
+    if AUDIT in manifest.files and manifest.wrong([AUDIT]):
         audit_output(folder, data)

@@ -169,7 +169,6 @@ def _lines(output: Output, row: Row, bases: Mapping[str, str]) -> list[str]:
     lines.append(f"CSDs{where}: {distances}; {sensitivity}CFA sensitivity {row['cfa_sensitivity']:.4f}.")
     if not row["feasible"]:
         lines.append("Note: the design does not meet the study's constraints.")
-    lines += output.doubts
     if output.provenance.sensor.surrogate:
         lines.append("Note: the curves are surrogates, modeled from stated parameters, not measured.")
     return lines

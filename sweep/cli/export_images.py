@@ -8,7 +8,7 @@ from pathlib import Path
 from ..base.errors import SweepError, ValidationIssue
 from ..base.types import Progress
 from ..report import read_output, study_of
-from ..results.inventory import Inventory
+from ..results.manifest import Manifest
 from ..run.image_files import MANIFEST, STREET_MANIFEST, ImageFiles, write_images
 from ..run.vision import vision_designs
 from ..run.workers import workers
@@ -43,7 +43,7 @@ def export_images(
     study = study_of(output, data, allow_code=allow_code)
     designs = vision_designs(study, output.named_rows)
     with workers(jobs or os.cpu_count() or 1) as parallel:
-        fingerprint = Inventory(folder).fingerprint
+        fingerprint = Manifest(folder).fingerprint
         manifest = write_images(designs, vision, study.section.seed, fingerprint, files, parallel, progress)
     names = ", ".join(str(row["name"]) for row, *_ in designs)
     splits = manifest["split"].value_counts().to_pylist()
@@ -51,7 +51,6 @@ def export_images(
     street = f"{STREET_MANIFEST} (streets), " if vision.street else ""
     boxes = ", coco-*.json" if files.coco else ""
     return [
-        *output.doubts,
         f"{len(manifest):,} images of {names}: {counts}; the same scenes, lamps and photons for every design.",
         f"Files: {files.folder}/: {MANIFEST}, {street}images/{boxes}.",
     ]

@@ -45,7 +45,7 @@ def run_folders(incomplete: str) -> list[str]:
 
     Returns completions, down to one folder below.
     """
-    patterns = ("*/run.json", "*/provenance.json", "*/*/run.json", "*/*/provenance.json")
+    patterns = ("*/manifest.json", "*/*/manifest.json")
     return sorted({str(Path(path).parent) for path in _paths(incomplete, patterns)})
 
 

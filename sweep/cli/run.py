@@ -17,13 +17,15 @@ import typer
 from .. import run as runner
 from ..base.errors import ErrorBoundExceededError, InterruptedRunError, SweepError, ValidationIssue
 from ..base.types import in_turn
+from ..results.answers import Answers
+from ..results.atomic import write_bytes
+from ..results.dataset import encoded_part, part_name
 from ..results.folder import begin
 from ..results.identity import run_facts, several_facts
-from ..results.inventory import Inventory
 from ..results.lock import locked
-from ..results.parts import Parts
-from ..results.tables import ALL_SENSORS, PROVENANCE, REPORT, RESULTS, json_of
-from ..run.answers import CachedCalls
+from ..results.manifest import Manifest
+from ..results.tables import ALL_SENSORS, PROVENANCE, REPORT, json_of
+from ..run.kept import CachedCalls
 from ..run.runner import discard
 from ..run.workers import backend_here, workers
 from ..study import SensorAndLights, SensorStudies, Study, folder_name, load_study
@@ -81,21 +83,14 @@ def run_one(
         if other is not None:
             note(f"{other}.")
     if dry_run:
-        left = runner.remaining_work(study, folder, n_workers)
+        left = runner.remaining_work(study, folder)
         print_lines(runner.remaining_work_lines(left, folder), as_json=as_json, quiet=quiet)
         counts = {"designs": study.n_designs, "finished_designs": left.finished, "parts": left.chunks}
         return {"folder": str(folder), **counts, "searches": left.searches}
-    with runner.stopped_by_signals():
+    with runner.stopped_by_signals(), workers(n_workers, backend, scheduler) as pool:
         with ProgressDisplay(quiet=quiet) as display:
             computed = runner.run_study(
-                study,
-                folder,
-                n_workers,
-                display.update,
-                sys.argv,
-                backend=backend,
-                scheduler=scheduler,
-                options=options,
+                study, folder, n_workers, display.update, sys.argv, scheduler=scheduler, options=options, pool=pool
             )
         if not computed:
             note(f"{folder} holds this very study, finished; nothing was computed.")
@@ -104,9 +99,8 @@ def run_one(
         audit_again(folder, data)
         if quiet and member is None and not as_json:  # else it ends the summary
             typer.echo(folder)
-        with workers(n_workers if computed and backend == "loky" else 1) as parallel:
-            silent = quiet or member is not None
-            facts = finish(folder, began_s, repair=True, parallel=parallel, as_json=as_json, quiet=silent)
+        parallel, silent = pool if computed and backend != "dask" else in_turn, quiet or member is not None
+        facts = finish(folder, began_s, repair=True, parallel=parallel, as_json=as_json, quiet=silent)
     if opens and member is None and not webbrowser.open((folder / REPORT).absolute().as_uri()):
         note(f"no browser was found for {folder / REPORT}.")
     return {"computed": bool(computed), **facts}
@@ -149,7 +143,7 @@ def run_sensors(
         typer.echo(f"Note: {other}.", err=True)
     facts_of, failed = dict[SensorAndLights, dict[str, Any]](), list[SweepError]()
     with runner.stopped_by_signals(), nullcontext() if options.dry_run else locked(folder):
-        inventory = Inventory(folder) if options.dry_run else begin(folder, known)
+        manifest = Manifest(folder) if options.dry_run else begin(folder, known)
         for member in several.members:
             if not quiet:
                 typer.echo(f"-- {member.name} --", err=True)
@@ -160,10 +154,10 @@ def run_sensors(
             except SweepError as error:  # the others are run all the same
                 failed.append(error)
         if not (facts_of or options.dry_run):
-            discard(inventory)
+            discard(manifest)
         elif not options.dry_run:
             computed = any(facts["computed"] for facts in facts_of.values())
-            lines = _join(inventory, studies, facts_of, options, computed=computed, began_s=began_s)
+            lines = _join(manifest, studies, facts_of, options, computed=computed, began_s=began_s)
             print_lines(lines if not quiet else lines[-1:], as_json=options.as_json, quiet=quiet and options.as_json)
     if options.opens and facts_of and not options.dry_run:
         webbrowser.open((folder / REPORT).absolute().as_uri())
@@ -173,7 +167,7 @@ def run_sensors(
 
 
 def _join(
-    inventory: Inventory,
+    manifest: Manifest,
     studies: Mapping[SensorAndLights, Study],
     facts_of: Mapping[SensorAndLights, Mapping[str, Any]],
     options: SensorsOptions,
@@ -185,32 +179,33 @@ def _join(
     from ..report.sensors import SensorRun, report_sensors, rows_of_all  # noqa: PLC0415  (while workers compute)
     from ..run.all_sensors import all_sensors_table  # noqa: PLC0415  (few studies have several sensors)
 
-    if inventory.list_damaged:
-        inventory.remove(inventory.unlisted())
     runs = [SensorRun(member, Path(run_facts["folder"])) for member, run_facts in facts_of.items()]
-    wrong = inventory.wrong([PROVENANCE, RESULTS, *({ALL_SENSORS} & inventory.files.keys())])
+    wrong = manifest.wrong([PROVENANCE, *manifest.files.keys() - {REPORT}])
     if computed or wrong:
-        inventory.remove([PROVENANCE])
-        inventory.write_table(RESULTS, rows_of_all(runs))
+        manifest.remove([PROVENANCE, *manifest.rows()])
+        for at, table in enumerate(rows_of_all(runs)):
+            content = encoded_part(table, "")
+            write_bytes(content, manifest.path(part_name(at)))
+            manifest.add({part_name(at): hashlib.sha256(content).hexdigest()})
         if {PROVENANCE, ALL_SENSORS} & wrong.keys():
-            inventory.remove([ALL_SENSORS])
-            parts = Parts(inventory.folder)
+            manifest.remove([ALL_SENSORS])
+            answers = Answers(manifest.folder)
             with ProgressDisplay(quiet=options.quiet) as display, workers(options.jobs or os.cpu_count() or 1) as pool:
-                cached_calls = CachedCalls(pool, parts, f"{inventory.fingerprint} all sensors")
+                cached_calls = CachedCalls(pool, answers, f"{manifest.fingerprint} all sensors")
                 table = all_sensors_table([*studies.items()], cached_calls, display.update)
             if table is not None:
-                inventory.write_table(ALL_SENSORS, table)
-            parts.remove()
+                manifest.write_table(ALL_SENSORS, table)
+            answers.remove()
         facts = {
-            "fingerprint": inventory.fingerprint,
-            "runs": inventory.facts["runs"],
+            "fingerprint": manifest.fingerprint,
+            "runs": manifest.facts["runs"],
             "command": sys.argv,
             "designs": sum(run_facts["designs"] for run_facts in facts_of.values()),
             "failed": sum(run_facts["failed"] for run_facts in facts_of.values()),
             "duration_s": round(time.monotonic() - began_s, 3),
         }
-        inventory.write({PROVENANCE: json_of(facts).encode("utf-8")})
-    return report_sensors(inventory, runs)
+        manifest.write({PROVENANCE: json_of(facts).encode("utf-8")})
+    return report_sensors(manifest, runs)
 
 
 def finish(

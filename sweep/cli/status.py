@@ -10,11 +10,12 @@ from typing import Any
 from ..base.disk import read_facts
 from ..base.errors import OutputError
 from ..metrics.share import format_share
+from ..results.answers import Answers
+from ..results.dataset import rows_in
 from ..results.folder import run_in
-from ..results.inventory import Inventory, issues_of
 from ..results.lock import in_use
-from ..results.parts import ANSWER, PARTS, ROWS, Parts
-from ..results.tables import PROVENANCE, REPORT, RESULTS, RUN, rows_in
+from ..results.manifest import Manifest, issues_of
+from ..results.tables import PROVENANCE, REPORT, RESULTS
 from ..study import folder_name
 
 
@@ -31,16 +32,14 @@ def status_of(folder: Path, *, verify: bool = False) -> Status:
 
     Raises OutputError if there is no run, or files of a finished run are missing or damaged.
     """
-    inventory = Inventory(folder)
-    inventory.require_run()
+    manifest = Manifest(folder)
+    manifest.require_run()
     running = in_use(folder)
-    if inventory.runs:
-        return _status_of_several(inventory, verify=verify, running=running)
-    finished = PROVENANCE in inventory.files and not running
-    if finished or (verify and not running):
-        wrong = inventory.wrong(quick=not verify) | inventory.wrong([PROVENANCE, RUN] if finished else [RUN])
-        if wrong:
-            raise OutputError(issues_of(folder, wrong))
+    if manifest.runs:
+        return _status_of_several(manifest, verify=verify, running=running)
+    finished = PROVENANCE in manifest.files and not running
+    if (finished or (verify and not running)) and (wrong := manifest.wrong(quick=not verify)):
+        raise OutputError(issues_of(folder, wrong))
     if finished:
         facts = read_facts(folder / PROVENANCE)
         state = "finished"
@@ -48,31 +47,30 @@ def status_of(folder: Path, *, verify: bool = False) -> Status:
         lines = [f"finished: {_number(facts, 'designs'):,} designs{failed} in {_number(facts, 'duration_s'):.1f} s."]
         values = {key: facts.get(key) for key in ("designs", "failed", "duration_s")}
     else:
-        parts = Parts(folder)
-        rows, answers = parts.paths(ROWS), parts.paths(ANSWER)
-        done, total = sum(map(rows_in, rows)), _number(inventory.facts, "designs")
+        (done, parts), answers = rows_in(folder), len(Answers(folder))
+        total = _number(manifest.facts, "designs")
         state = "running" if running else "interrupted"
         share = f" ({format_share(done / total)})" if total else ""
         continues = "" if running else "; the same command continues"
-        lines = [f"{state}{continues}: {done:,} of {total:,} designs{share}, {len(rows):,} parts finished."]
+        lines = [f"{state}{continues}: {done:,} of {total:,} designs{share}, {parts:,} parts finished."]
         if answers:
-            lines.append(f"The search has {len(answers):,} answers.")
-        values = {"designs": total, "finished_designs": done, "parts": len(rows), "search_answers": len(answers)}
-    if (folder / RESULTS).is_file() and (finished or rows):
-        lines.append(f"Files: {folder}/: {RESULTS}, report.html.")
-    elif finished or rows:
-        lines.append(f"Finished parts: {folder / PARTS}/*.parquet, which pandas.read_parquet reads.")
+            lines.append(f"The search has {answers:,} answers.")
+        values = {"designs": total, "finished_designs": done, "parts": parts, "search_answers": answers}
+    if finished or parts:
+        lines.append(
+            f"Files: {folder}/: {RESULTS}, which pandas.read_parquet reads{', ' + REPORT if finished else ''}."
+        )
     if verify and not running:
-        lines.append(f"ok: its {len(inventory.files)} files are as the run wrote them.")
+        lines.append(f"ok: its {len(manifest.files)} files are as the run wrote them.")
     return Status(lines, {"folder": str(folder), "state": state, "verified": verify, **values})
 
 
-def _status_of_several(inventory: Inventory, *, verify: bool, running: bool) -> Status:
+def _status_of_several(manifest: Manifest, *, verify: bool, running: bool) -> Status:
     """Return the state of a study of several sensors or lights: a line for each of them."""
-    folder, lines, states = inventory.folder, [], {}
-    if not running and (wrong := inventory.wrong(quick=not verify)):
+    folder, lines, states = manifest.folder, [], {}
+    if not running and (wrong := manifest.wrong(quick=not verify)):
         raise OutputError(issues_of(folder, wrong))
-    for member in inventory.runs:
+    for member in manifest.runs:
         inner = folder / folder_name(member.name)
         if run_in(inner) is None:
             states[member.name] = "not run"
@@ -82,16 +80,16 @@ def _status_of_several(inventory: Inventory, *, verify: bool, running: bool) -> 
         states[member.name] = str(status.facts["state"])
         lines.append(f"{member.name}: {status.lines[0]}")
     count = sum(state == "finished" for state in states.values())
-    is_complete = count == len(states) and PROVENANCE in inventory.files
+    is_complete = count == len(states) and PROVENANCE in manifest.files
     state = "running" if running else "finished" if is_complete else "interrupted"
     lines.append(
         f"{state}: {count} of {len(states)} runs finished"
         f"{'' if is_complete or running else '; the same command continues'}."
     )
-    if PROVENANCE in inventory.files:
+    if PROVENANCE in manifest.files:
         lines.append(f"Files: {folder}/: {RESULTS}, {REPORT}.")
     if verify and not running:
-        lines.append(f"ok: its {len(inventory.files)} files are as the run wrote them.")
+        lines.append(f"ok: its {len(manifest.files)} files are as the run wrote them.")
     return Status(lines, {"folder": str(folder), "state": state, "verified": verify, "runs": states})
 
 

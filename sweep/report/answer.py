@@ -12,8 +12,8 @@ from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.limiting import limited_by_name
 from ..metrics.quantity import LOG10, OF_A_SHARE, WORST_CASE
 from ..results.output import Output
+from ..results.shown import per_exposure
 from ..results.tables import NAMED, REFERENCE, SEARCHED, SWEPT
-from ..results.thinning import per_exposure
 from ..study.axes import series_of
 from .lamps import cost_of_worst_case, lamp_lines, over_population, robustness_lines
 from .leaders import Leaders, Row, capital, full_name, label, leaders_of, of_reference, upper_bound_beside

@@ -103,7 +103,6 @@ def compare_runs(folders: Sequence[Path], to: Path | None) -> Comparison:
         "",
         *answer,
         *(f"Note: {note}" for note in notes),
-        *(doubt for run_output in outputs for doubt in run_output.doubts),
     ]
     lines.append(f"Files: {target}/: {', '.join([PAGE, TABLE, *(f'{PICTURE}.{kind}' for kind in drawn)])}.")
     of_all = [table.assign(scene=name) for name, table in fronts.items()]

@@ -12,8 +12,8 @@ import pyarrow as pa
 
 from ..base.types import Parallel, delayed, in_turn
 from ..metrics.objective import COMBINED
-from ..results.inventory import Inventory
 from ..results.lock import locked
+from ..results.manifest import Manifest
 from ..results.output import Output
 from ..results.tables import FIGURES, REPORT, VISION_FIGURES, csv_of, encoded, is_drawn
 from . import signal_figures as signals
@@ -62,15 +62,15 @@ def make_report(output: Output, *, repair: bool = False, parallel: Parallel = in
     Raises OutputError if a file of others has one of the names, or the disk refuses.
     """
     with locked(output.folder):
-        inventory = Inventory(output.folder)
-        listed = [name for name in inventory.files if is_drawn(name)]
-        wrong = inventory.wrong({REPORT, *listed})
+        manifest = Manifest(output.folder)
+        listed = [name for name in manifest.files if is_drawn(name)]
+        wrong = manifest.wrong({REPORT, *listed})
         if repair and not wrong:
             return
         names = wrong if repair and REPORT not in wrong else None
         contents = _contents(output, names, parallel)
-        inventory.write({n: content for n, content in contents.items() if not repair or n in wrong or n not in listed})
-        inventory.remove(n for n in listed if n not in contents and (names is None or n in names))
+        manifest.write({n: content for n, content in contents.items() if not repair or n in wrong or n not in listed})
+        manifest.remove(n for n in listed if n not in contents and (names is None or n in names))
 
 
 def _contents(output: Output, shown_names: Iterable[str] | None, parallel: Parallel) -> dict[str, bytes]:

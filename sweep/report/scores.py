@@ -57,7 +57,7 @@ def score_readers(output: Output, predictions: Sequence[Path], to: Path) -> list
     scores = pd.concat([scores_of(reader, images, vision.unknown_cost) for reader in readers], ignore_index=True)
     with atomic(to / TABLE) as hidden:
         scores.to_parquet(hidden, index=False)
-    lines += [*score_lines(scores), *output.doubts]
+    lines += score_lines(scores)
     picture = inlined(rendered(draw_scores(scores), "svg"))
     shown = scores.drop(columns=["design_id"]).round(4)
     name, folder = output.study.study, output.folder.name

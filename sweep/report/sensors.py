@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 import pyarrow as pa
+import pyarrow.parquet as pq
 
 from ..base.types import Array, Float
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.quantity import Column
-from ..results.inventory import Inventory
+from ..results.dataset import batches, part_paths
+from ..results.manifest import Manifest
 from ..results.output import Output, read_output
 from ..results.tables import ALL_SENSORS, REFERENCE, REPORT, RESULTS, SEARCHED, read_table
 from ..run.all_sensors import ALL
@@ -45,32 +47,33 @@ class SensorRun:
 
 def runs_in(folder: Path) -> list[SensorRun]:
     """Return the runs of a study of several sensors; none of the folder of another study."""
-    runs = [SensorRun(member, folder / folder_name(member.name)) for member in Inventory(folder).runs]
-    return [run for run in runs if Inventory(run.folder).finished]
+    runs = [SensorRun(member, folder / folder_name(member.name)) for member in Manifest(folder).runs]
+    return [run for run in runs if Manifest(run.folder).finished]
 
 
-def rows_of_all(runs: Sequence[SensorRun]) -> pa.Table:
-    """Return the rows of all runs with `sensor` and `lights` before them."""
-    tables = []
+def rows_of_all(runs: Sequence[SensorRun]) -> Iterator[pa.Table]:
+    """Yield the rows of all runs, a part at a time, with `sensor` and `lights` before them."""
+    schemas = [pq.read_schema(part_paths(run.folder)[0]) for run in runs]
+    own = [pa.field(name, pa.string()) for name in _KEYS]
+    together = pa.unify_schemas(
+        [pa.schema([*own, *(field.remove_metadata() for field in schema)]) for schema in schemas]
+    )
     for run in runs:
-        table = read_table(run.folder / RESULTS)
-        kinds = [f.type.value_type if pa.types.is_dictionary(f.type) else f.type for f in table.schema]
-        table = table.cast(pa.schema(zip(table.column_names, kinds, strict=True)))
-        for at, (key, value) in enumerate(zip(_KEYS, run.member[:2], strict=True)):
-            table = table.add_column(at, key, pa.array([value] * len(table)))
-        tables.append(table)
-    return pa.concat_tables(tables, promote_options="default")
+        for table in batches(run.folder):
+            whose = [pa.array([value] * len(table)) for value in run.member[:2]]
+            rows = pa.table([*whose, *table.columns], names=[*_KEYS, *table.column_names])
+            yield pa.concat_tables([together.empty_table(), rows], promote_options="default")
 
 
-def report_sensors(inventory: Inventory, runs: Sequence[SensorRun]) -> list[str]:
+def report_sensors(manifest: Manifest, runs: Sequence[SensorRun]) -> list[str]:
     """Write a picture and a page of a study of several sensors.
 
     The filters for several sensors are read from `all_sensors.parquet`, see `all_sensors_table`, if the folder has it.
 
     Raises OutputError for files that are damaged, or if the disk refuses.
     """
-    folder = inventory.folder
-    inventory.require({ALL_SENSORS} & inventory.files.keys())
+    folder = manifest.folder
+    manifest.require({ALL_SENSORS} & manifest.files.keys())
     outputs = [(run.member, read_output(run.folder)) for run in runs]
     figures = pd.DataFrame([row for member, output in outputs for row in _figures(member, output)])
     drawn = draw_sensors(figures, outputs[0][1].trade_off[0].words)
@@ -79,7 +82,7 @@ def report_sensors(inventory: Inventory, runs: Sequence[SensorRun]) -> list[str]
     n_found = figures.loc[figures["kind"] == SEARCHED, "cfa"].nunique()
     lines = [*_answer(summary, n_found, str(figures["reference"].iloc[0]), words)]
     answer, stated = lines[: max(n_found, 1)], f"{camera_and_scene(outputs[0][1])}."
-    known = ALL_SENSORS in inventory.files
+    known = ALL_SENSORS in manifest.files
     together = read_table(folder / ALL_SENSORS).to_pandas() if known else pd.DataFrame()
     if len(together):
         lines += _together(together, outputs[0][1].goal)
@@ -98,7 +101,7 @@ def report_sensors(inventory: Inventory, runs: Sequence[SensorRun]) -> list[str]
         together=rows(together) if len(together) else [],
         links=links,
     )
-    inventory.write({f"{PICTURE}.{kind}": image for kind, image in images.items()} | {REPORT: text.encode("utf-8")})
+    manifest.write({f"{PICTURE}.{kind}": image for kind, image in images.items()} | {REPORT: text.encode("utf-8")})
     lines.insert(len(answer), stated)
     files = f"Files: {RESULTS}, {REPORT}, {PICTURE}.png, and a folder for each run, in the folder"
     return [*lines, files, str(folder)]

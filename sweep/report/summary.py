@@ -55,7 +55,7 @@ def summary_lines(output: Output, took_s: float | None = None) -> list[str]:
         algorithms = " and ".join(filter(None, (facts.search.algorithm, facts.search.refinement)))
         lines.append(f"Search: {algorithms}, {starts}, {evaluations}: {reached}.")
         lines.append(_limit_line(output, facts.search))
-    lines += [*(f"Note: {warning}." for warning in facts.warnings), *output.doubts]
+    lines += [f"Note: {warning}." for warning in facts.warnings]
     ratio = output.study.lights.photon_ratio
     if ratio is not None:
         lines.append(

@@ -11,8 +11,8 @@ import numpy as np
 from ..base.types import Array, Float
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..results.output import Output
+from ..results.shown import even
 from ..results.tables import NAMED, REFERENCE, SEARCHED, SWEPT
-from ..results.thinning import even
 from .figures import COLORS, canvas, legend_beside
 from .leaders import bounds_figure, label
 from .terms import is_angle_dependent

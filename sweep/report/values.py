@@ -8,8 +8,8 @@ import numpy as np
 
 from ..results.facts import Origin
 from ..results.output import Output
+from ..results.shown import even
 from ..results.tables import SWEPT
-from ..results.thinning import even
 from ..study.schema import Modification
 from .figures import TYPE_COLORS, CurvesFigure
 
@@ -63,9 +63,9 @@ def drawn_rows(output: Output) -> pd.DataFrame:
     table = output.table[output.table["status"] == "ok"]
     is_drawn = (table["kind"] != SWEPT) | (table["feasible"] & table["pareto"])
     is_drawn |= table["design_id"].isin(output.points["design_id"])
-    sample = table["design_id"].isin(output.swept_points) & ~is_drawn
+    others = ~is_drawn
     for feasible in (True, False):
-        group = np.flatnonzero(sample & (table["feasible"] == feasible))
+        group = np.flatnonzero(others & (table["feasible"] == feasible))
         is_drawn.iloc[group[even(group.size, _MOST_POINTS)]] = True
     return table[is_drawn].reset_index(drop=True)
 

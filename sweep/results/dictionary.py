@@ -14,7 +14,7 @@ from ..metrics.registry import listed
 from ..spectra.tasks import TaskColumns, TaskMetric
 from . import tables as files
 from .curves import SCHEMA
-from .thinning import MOST_POINTS
+from .shown import MOST_POINTS
 
 _KEYS = {
     ("design_id",): "number of the row: a filter in a scenario",
@@ -104,11 +104,15 @@ def columns_table() -> list[str]:
 
 
 FILES = {
-    files.RESULTS: "a row per design and scenario; its columns are below",
+    f"{files.RESULTS}/": "a row per design and scenario, a dataset of parts, with the columns that a study asks "
+    "for, or all that are below (`columns: all`, or a study without sweeps)",
+    files.PARETO: "the Pareto front of each CFA and scenario, with all columns",
+    files.DESIGNS: "designs that the report shows: plain CFAs, named designs, answers of the search, the best of each "
+    "sweep, those that lead, and a sample of the front, with all columns; and up to "
+    f"{MOST_POINTS:,} other feasible and as many infeasible ones, evenly, with those of the dataset",
     files.LIMITED_BY: "the two lights that limit each CSD, of plain CFAs, named designs, answers of the search, and "
-    "of the swept designs that the report draws: the best of each CFA, those that lead, the feasible front, and up to "
-    f"{MOST_POINTS:,} other feasible and as many infeasible ones, evenly: `design_id`, `limited_by_<a>_<b>` (for "
-    "any sampling phase, at the worst one of the lattice that was computed)",
+    "of the swept designs that the report draws: `design_id`, `limited_by_<a>_<b>` (for any sampling phase, at the "
+    "worst one of the lattice that was computed)",
     files.ROBUSTNESS: "where the lights have a population, for each plain CFA, named design and answer of the search: "
     "`design_id`; how many times as large population and production tolerances must be for the worst CSD to fall below "
     "that of the best plain CFA (`breaks_at`; null: not up to 3 times), and the CSD, lights, shifts and temperatures "
@@ -174,10 +178,9 @@ FILES = {
     files.REPORT: "the report: one file that you can send, without the network",
     "cfas.png": "all CFAs: separation against the light of the whole CFA; also `.svg`",
     "pareto.png": "the trade-off in one modified pixel, where there is one; also `.svg`",
-    f"{files.FIGURES}/": "all other figures as PNG and SVG",
+    f"{files.FIGURES}/": "all other figures as SVG",
     "paper_comparison.csv": "published figures beside ours, where a study gives some; also `.parquet`",
-    files.RUN: "owner of the folder: the fingerprint of the study and its inputs",
-    files.SUMS: "the digests for `sha256sum -c SHA256SUMS`",
+    files.MANIFEST: "owner of the folder, the fingerprint of the study and its inputs, and the SHA-256 of each file",
 }
 """Every file of a run's folder, in the order in which one asks for them."""
 

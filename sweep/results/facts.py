@@ -150,6 +150,7 @@ class Provenance(_Facts):
     filters: int
     designs: int
     failed: int
+    counts: tuple[tuple[str, str, str, str, bool, int], ...]
     plans: dict[str, PlanFacts]
     check: CheckFacts | None = None
     trade_off: tuple[str, str]

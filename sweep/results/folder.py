@@ -9,16 +9,15 @@ from pathlib import Path
 from typing import Any
 
 from ..base.errors import OutputError, ValidationIssue
-from .inventory import Inventory
-from .tables import RUN
+from .manifest import Manifest
 
 _MOST_SHOWN = 3
 
 
-def run_in(folder: Path) -> Inventory | None:
+def run_in(folder: Path) -> Manifest | None:
     """Return the run in a folder; files of others under the names of a run's have an empty fingerprint."""
-    inventory = Inventory(folder)
-    return inventory if inventory.fingerprint or inventory.damaged or inventory.foreign_files() else None
+    manifest = Manifest(folder)
+    return manifest if manifest.fingerprint or manifest.damaged or manifest.foreign_files() else None
 
 
 def output_folder(base: Path, facts: Mapping[str, Any]) -> tuple[Path, str | None]:
@@ -38,29 +37,24 @@ def output_folder(base: Path, facts: Mapping[str, Any]) -> tuple[Path, str | Non
     raise AssertionError
 
 
-def begin(folder: Path, facts: Mapping[str, Any]) -> Inventory:
+def begin(folder: Path, facts: Mapping[str, Any]) -> Manifest:
     """Write into the folder which run it holds, and return its files.
 
     Raises OutputError if it holds another run, or files of others.
     """
-    inventory = Inventory(folder)
-    if inventory.is_of(facts):
-        if inventory.damaged or RUN not in inventory.files:
-            inventory.begin(facts)
-        return inventory
-    if inventory.damaged:
-        inventory.require_run()
-    if inventory.fingerprint:
-        problem = f"holds another study ({_changed(inventory, facts)})"
+    manifest = Manifest(folder)
+    if manifest.damaged:
+        manifest.require_run()
+    if manifest.fingerprint and not manifest.is_of(facts):
+        problem = f"holds another study ({_changed(manifest, facts)})"
         raise OutputError(ValidationIssue(problem, str(folder), allowed="another folder"))
-    inventory.begin(facts)
-    return inventory
+    if not manifest.fingerprint:
+        manifest.begin(facts)
+    return manifest
 
 
-def _changed(held: Inventory, facts: Mapping[str, Any]) -> str:
+def _changed(held: Manifest, facts: Mapping[str, Any]) -> str:
     """Return the first few keys that differ, with their values."""
-    if held.damaged:
-        return f"its {RUN} is damaged"
     if ("runs" in held.facts) != ("runs" in facts):
         return f"of {'several sensors' if 'runs' in held.facts else 'one sensor'}"
     before, after = (dict(_flat(x)) for x in (held.facts.get("identity"), json.loads(json.dumps(facts["identity"]))))

@@ -9,7 +9,7 @@ from typing import Any
 
 from ..study import SensorAndLights, Study
 
-MODEL_VERSION = "21"
+MODEL_VERSION = "22"
 """Raised whenever the same study would give other rows; part of every part's key."""
 CHUNK = 4096
 """Designs that are computed at once."""
@@ -43,13 +43,13 @@ def fingerprint(study: Study) -> str:
 
 
 def run_facts(study: Study) -> dict[str, Any]:
-    """Return the content of the `run.json` of a study's run."""
+    """Return the facts of the manifest of a study's run."""
     known = identity(study)
     return {"fingerprint": _digest(known), "identity": known, "designs": study.n_designs}
 
 
 def several_facts(studies: Mapping[SensorAndLights, Study]) -> dict[str, Any]:
-    """Return the content of the `run.json` of a study of several sensors or lights; `runs` names each pair of them."""
+    """Return the facts of the manifest of a study of several sensors or lights; `runs` names each pair of them."""
     known = {member.name: identity(study) for member, study in studies.items()}
     designs = sum(study.n_designs for study in studies.values())
     runs = [[member.sensor, member.lights] for member in studies]

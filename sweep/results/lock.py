@@ -14,9 +14,9 @@ from filelock import BaseFileLock, FileLock, SoftFileLock, Timeout
 
 from ..base.disk import is_real_folder, read_plain
 from ..base.errors import OutputError, ValidationIssue
+from .answers import ANSWERS
 from .atomic import LEFT_OVER
-from .parts import PARTS
-from .tables import FIGURES
+from .tables import FIGURES, RESULTS
 
 LOCK = ".lock"
 OWNER = ".lock-owner"
@@ -92,7 +92,7 @@ def in_use(output: Path) -> bool:
 
 def _clear(output: Path) -> None:
     """Remove half-written files of killed commands and workers, but not through links."""
-    inner = (output / PARTS, output / FIGURES)
+    inner = (output / RESULTS, output / ANSWERS, output / FIGURES)
     for folder in (output, *(inner_folder for inner_folder in inner if is_real_folder(inner_folder))):
         for path in folder.iterdir():
             if re.fullmatch(LEFT_OVER, path.name) and not is_real_folder(path):

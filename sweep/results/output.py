@@ -15,9 +15,9 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from ..base.errors import OutputError, ValidationIssue
-from ..base.types import DesignNumbers
 from ..camera.mosaic import Mosaic
 from ..metrics.bound import Bound
+from ..metrics.columns.exposure import EXPOSURE
 from ..metrics.objective import Objective
 from ..metrics.quantity import Column
 from ..study import StudySection, folder_name
@@ -26,15 +26,24 @@ from .curves import SCHEMA as CURVES_SCHEMA
 from .curves import KeptCurves
 from .facts import Provenance, checked_facts, missing_parts_error
 from .identity import MODEL_VERSION
-from .inventory import Inventory
-from .tables import NAMED, NAMED_KINDS, PROVENANCE, REFERENCE, RESOLVED, RESULTS, SEARCHED, SWEPT, read_table
-from .thinning import Counts, swept_points, thinned
+from .manifest import Manifest
+from .shown import MS, Counts, per_exposure, shown_rows
+from .tables import NAMED, NAMED_KINDS, PROVENANCE, REFERENCE, RESOLVED, SEARCHED, SWEPT, read_table
 
 if TYPE_CHECKING:
     import pandas as pd
 
 _Made = TypeVar("_Made")
-_ALWAYS = (RESULTS, files.CURVES, files.POINTS, files.LIMITED_BY, files.SATURATED, RESOLVED, PROVENANCE)
+_ALWAYS = (
+    files.DESIGNS,
+    files.PARETO,
+    files.CURVES,
+    files.POINTS,
+    files.LIMITED_BY,
+    files.SATURATED,
+    RESOLVED,
+    PROVENANCE,
+)
 """Files of every run; others are of some runs alone."""
 _ALWAYS_WRITTEN = ("study", "seed", "wavelengths", "scenarios", "objective")
 """Keys of every resolved study: it has its defaults, too, so that one that lacks them was cut."""
@@ -52,15 +61,14 @@ _COLUMNS: dict[str, Sequence[str]] = {
 
 @dataclass(frozen=True)
 class Output:
-    """Results of a run; of a long result table, `table` holds the rows that a report shows.
+    """Results of a run; `table` has the rows that a report shows.
 
-    `study`: the study that was run, and `resolved` its file. `swept_points`: ids of the swept designs that figures show
-    as points. `audited`: rows of `sweep audit`; `left_out`: a row per light that was left out of a search; `regions`:
+    `study`: the study that was run, and `resolved` its file. `audited`: rows of `sweep audit`; `left_out`: a row per
+    light that was left out of a search; `regions`:
     cells of the maps of color regions. `error_against_noise`: color error against noise, `rendered`: areas of pictures;
     `places`: separations over the sensor; `map`: the best objective over two parameters; `handovers`: where captures of
     an HDR pixel are full; `worst`: worst values over series; `saturated`: signals that fill a pixel; `uncertainty`:
-    quantiles over random sensors; `vision`: tables of the benchmark of vision by their files' names. `unverified`:
-    files that the damaged lists of the folder cannot vouch for.
+    quantiles over random sensors; `vision`: tables of the benchmark of vision by their files' names.
     """
 
     folder: Path
@@ -69,7 +77,6 @@ class Output:
     provenance: Provenance
     table: pd.DataFrame
     counts: Counts
-    swept_points: DesignNumbers
     curves: KeptCurves
     points: pd.DataFrame
     front: pd.DataFrame | None
@@ -86,7 +93,6 @@ class Output:
     saturated: pd.DataFrame
     uncertainty: pd.DataFrame | None
     vision: Mapping[str, pd.DataFrame]
-    unverified: Sequence[str]
     _made: dict[object, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def cached(self, key: object, make: Callable[[], _Made]) -> _Made:
@@ -97,12 +103,9 @@ class Output:
         return stored
 
     @property
-    def doubts(self) -> list[str]:
-        """A note on the files that damaged lists of the folder cannot vouch for; none of an intact run."""
-        if not self.unverified:
-            return []
-        names = ", ".join(self.unverified)
-        return [f"Note: not verified, since lists of {self.folder} are damaged: {names}; `sweep run` repairs it."]
+    def front_ids(self) -> list[int]:
+        """`design_id` of the rows on the Pareto front."""
+        return [int(number) for number in self.table.loc[self.table["pareto"], "design_id"]]
 
     @property
     def objective(self) -> Objective:
@@ -209,21 +212,19 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
 
     Raises OutputError: files, which it names, are missing or not as the run wrote them.
     """
-    inventory = Inventory(folder)
-    inventory.require_run()
-    if inventory.runs:
-        names = ", ".join(folder_name(run.name) for run in inventory.runs)
+    manifest = Manifest(folder)
+    manifest.require_run()
+    if manifest.runs:
+        names = ", ".join(folder_name(run.name) for run in manifest.runs)
         raise OutputError(ValidationIssue("holds the runs of several sensors", str(folder), allowed=f"one of {names}"))
-    unverified = inventory.unverified
-    if PROVENANCE not in (*inventory.files, *unverified):
+    if PROVENANCE not in manifest.files:
         raise OutputError(
             ValidationIssue("no finished run here", str(folder), allowed="a folder that `sweep run` finished")
         )
-    present = {*inventory.files, *unverified}
-    optional = present.intersection((*files.MADE_BY_RUN, files.AUDIT)).difference(_ALWAYS)
+    optional = (manifest.files.keys() & {*files.MADE_BY_RUN, files.AUDIT}).difference(_ALWAYS)
     if not audited:
         optional.discard(files.AUDIT)
-    inventory.require([*_ALWAYS, *sorted(optional)])
+    manifest.require([*_ALWAYS, *sorted(optional)])
     facts = _mapping(folder / PROVENANCE, json.loads)
     if facts.get("model_version", MODEL_VERSION) != MODEL_VERSION:
         problem, allowed = (
@@ -237,14 +238,14 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
     study = checked_facts(folder / RESOLVED, StudySection, resolved)
     provenance = checked_facts(folder / PROVENANCE, Provenance, facts)
     quantities = (column.name for column in provenance.quantities)
-    _check_columns(folder / RESULTS, [*files.ROW_COLUMNS, *provenance.parameters, *quantities])
+    _check_columns(folder / files.DESIGNS, [*files.ROW_COLUMNS, *provenance.parameters, *quantities])
     for name, columns in _COLUMNS.items():
         if name in optional or name in _ALWAYS:
             _check_columns(folder / name, columns)
-    objective = study.objective.column
-    points = swept_points(folder / RESULTS)
-    order = [objective, *provenance.trade_off]
-    table, counts = thinned(folder / RESULTS, order, provenance.trade_off[0], points)
+    pareto = read_table(folder / files.PARETO)
+    table = shown_rows(read_table(folder / files.DESIGNS), pareto).to_pandas()
+    separation = provenance.trade_off[0]
+    table[per_exposure(separation)] = table[separation] / (table[EXPOSURE] * MS)
     more = {
         name: read_table(folder / name).to_pandas()
         for name in (files.POINTS, files.LIMITED_BY, files.SATURATED, *optional)
@@ -262,8 +263,7 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         resolved=resolved,
         provenance=provenance,
         table=table,
-        counts=counts,
-        swept_points=points,
+        counts=Counts.of(provenance.counts, pareto.to_pandas()),
         curves=curves,
         points=more[files.POINTS],
         front=more.get(files.FRONT),
@@ -280,7 +280,6 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         saturated=more[files.SATURATED],
         uncertainty=more.get(files.UNCERTAINTY),
         vision={name: more[name] for name in files.VISION_TABLES if name in more},
-        unverified=unverified,
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,8 +20,8 @@ from .atomic import atomic, write_text
 if TYPE_CHECKING:
     import pandas as pd
 
-SCHEMA_VERSION = "2"
-RESULTS = "results.parquet"
+SCHEMA_VERSION = "3"
+RESULTS, DESIGNS, PARETO = "results.parquet", "designs.parquet", "pareto.parquet"
 SEARCH_LOG = "search.parquet"
 FRONT = "front.parquet"
 CURVES = "curves.parquet"
@@ -46,22 +46,23 @@ light level and state of detections in streets, and per picture of a street."""
 AUDIT, ALL_SENSORS = "audit.parquet", "all_sensors.parquet"
 PROVENANCE = "provenance.json"
 RESOLVED = "study.resolved.yaml"
-RUN, SUMS = "run.json", "SHA256SUMS"
+MANIFEST = "manifest.json"
 REPORT, FIGURES, VISION_FIGURES = "report.html", "figures", "vision-"
 MADE_BY_RUN = frozenset(
     (
-        *(RESULTS, SEARCH_LOG, FRONT, CURVES, POINTS, CROSSINGS, LIMITED_BY, ROBUSTNESS, REGIONS_MAP),
+        *(DESIGNS, PARETO, SEARCH_LOG, FRONT, CURVES, POINTS, CROSSINGS, LIMITED_BY, ROBUSTNESS, REGIONS_MAP),
         *(SENSOR_MAP, TRADED, RENDERED, LEFT_OUT, COMBINATIONS, MAP, HANDOVERS, WORST, SATURATED),
         UNCERTAINTY,
         *(*VISION_TABLES, ALL_SENSORS, PROVENANCE, RESOLVED),
     )
 )
-"""Files that a run itself writes beside its lists; the report draws from them, `sweep audit` adds a table."""
+"""Files that a run itself writes beside its rows; the report draws from them, `sweep audit` adds a table."""
 _DRAWN = re.compile(
-    r"report\.html|sensors\.(png|svg)|cfas\.(png|svg)|pareto(-\d+)?\.(png|svg)|paper_comparison\.(csv|parquet)"
-    r"|figures/((filters|series|places)-\d+|tiles|sensor|signals|chart|scorecard|(color-noise|rendered)-\d+"
-    r"|regions-\d+|map|captures-\d+|clouds-(cfas|designs)|vision-(errors|ranks|street))\.(png|svg)"
+    r"report\.html|(sensors|cfas|pareto)\.(png|svg)|pareto-\d+\.svg|paper_comparison\.(csv|parquet)"
+    r"|figures/((series|places)-\d+|tiles|sensor|signals|chart|scorecard|(color-noise|rendered)-\d+"
+    r"|regions-\d+|map|captures-\d+|vision-(errors|ranks|street))\.svg"
 )
+_OF_ROWS = re.compile(rf"{re.escape(RESULTS)}(/part-\d{{8}}\.parquet)?")
 _PARAMETERS = "cfa_sweep_parameters"
 _ROWS_AT_ONCE = 65_536
 """That PyArrow encodes; columns of one word take less time so than with its own 1,024."""
@@ -72,21 +73,22 @@ _KEYS = (
     *(pa.field(name, _TEXT) for name in ("kind", "name", "space", "cfa", "family", "scenario")),
 )
 _VERDICTS = (
-    *(pa.field(name, pa.float64()) for name in ("violation", "limit", "gap")),
-    *(pa.field(name, pa.bool_()) for name in ("feasible", "pareto")),
+    pa.field("violation", pa.float64()),
+    pa.field("feasible", pa.bool_()),
     pa.field("plan", _TEXT),
     pa.field("promised_dn", pa.float64()),
     pa.field("status", _TEXT),
 )
+OF_SEARCH = ("limit", "gap")
+"""Columns of the answers of a search."""
+ON_FRONT = "pareto"
+"""Column of the rows that a report shows."""
 ROW_COLUMNS = tuple(one.name for one in (*_KEYS, *_VERDICTS))
 """Columns of every result table; parameters and quantities stand between the keys and the verdicts."""
 REFERENCE, NAMED, SWEPT, SEARCHED = "reference", "design", "sweep", "search"
 """Kinds of rows: a plain CFA, a named design, one that was swept, the search's answer."""
 NAMED_KINDS = (REFERENCE, NAMED, SEARCHED)
 """Kinds of which there are few rows."""
-ROW_GROUP = 131_072
-"""Rows that are read and written at once."""
-_LEAST_GROUP = ROW_GROUP // 4
 
 
 def is_drawn(name: str) -> bool:
@@ -95,14 +97,21 @@ def is_drawn(name: str) -> bool:
 
 
 def is_of_run(name: str) -> bool:
-    """Return whether a name is one that commands give to files of a run, beside its two lists."""
-    return name in MADE_BY_RUN or name == AUDIT or is_drawn(name)
+    """Return whether a name is one that commands give to files of a run, beside its manifest."""
+    return name in MADE_BY_RUN or name == AUDIT or is_drawn(name) or _OF_ROWS.fullmatch(name) is not None
 
 
-def result_schema(parameters: Sequence[str], quantities: Sequence[str]) -> pa.Schema:
-    """Return the columns of the result table."""
-    number = pa.float64()
-    fields = list(_KEYS) + [pa.field(name, number) for name in (*parameters, *quantities)] + list(_VERDICTS)
+def result_schema(
+    parameters: Sequence[str], quantities: Sequence[str], *, searched: bool, marked: bool = False
+) -> pa.Schema:
+    """Return the columns of rows.
+
+    `searched`: with those of the answers of a search; `marked`: with `pareto`.
+    """
+    numbers = (*parameters, *quantities, *(OF_SEARCH if searched else ()))
+    fields = list(_KEYS) + [pa.field(name, pa.float64()) for name in numbers] + list(_VERDICTS)
+    if marked:
+        fields.append(pa.field(ON_FRONT, pa.bool_()))
     return pa.schema(fields, metadata={"cfa_sweep_schema": SCHEMA_VERSION, _PARAMETERS: json.dumps(list(parameters))})
 
 
@@ -132,27 +141,8 @@ def front_schema(parameters: Sequence[str]) -> pa.Schema:
 
 def write_table(table: pa.Table, path: Path) -> None:
     """Write one Parquet file atomically, with a checksum of each page."""
-    write_tables([table], table.schema, path)
-
-
-def write_tables(tables: Iterable[pa.Table], schema: pa.Schema, path: Path) -> None:
-    """Write tables of one schema to one Parquet file as they come.
-
-    A row group has at most `ROW_GROUP` rows; short tables are joined. One row group and one table are in memory.
-    """
-    waiting: list[pa.Table] = []
-    with atomic(path) as hidden, pq.ParquetWriter(hidden, schema, **_how(schema)) as writer:
-
-        def put() -> None:
-            if waiting:
-                writer.write_table(pa.concat_tables(waiting).unify_dictionaries().cast(schema), ROW_GROUP)
-                waiting.clear()
-
-        for table in tables:
-            waiting.append(table.replace_schema_metadata(schema.metadata))
-            if sum(table.num_rows for table in waiting) >= _LEAST_GROUP:
-                put()
-        put()
+    with atomic(path) as hidden:
+        pq.write_table(table, hidden, **_how(table.schema))
 
 
 def write_csv(table: pd.DataFrame, path: Path) -> None:
@@ -177,22 +167,6 @@ def encoded(table: pa.Table) -> bytes:
     return bytes(sink.getvalue().to_pybytes())
 
 
-def decoded(content: bytes, schema: pa.Schema, rows: int) -> pa.Table | None:
-    """Return the table of a Parquet file's bytes.
-
-    Size and schema are checked before rows are read, so that no more memory is taken than they need.
-
-    None if there is no such table.
-    """
-    try:
-        file = pq.ParquetFile(pa.BufferReader(content), page_checksum_verification=True)
-        if file.metadata.num_rows != rows or not file.schema_arrow.equals(schema):
-            return None
-        return file.read().replace_schema_metadata(schema.metadata)
-    except (OSError, pa.ArrowException):
-        return None
-
-
 def _how(schema: pa.Schema) -> dict[str, Any]:
     """Return the settings of the Parquet writer: pages carry checksums (CRC-32), which readers verify.
 
@@ -203,31 +177,6 @@ def _how(schema: pa.Schema) -> dict[str, Any]:
         how["use_dictionary"] = [field.name for field in schema if pa.types.is_dictionary(field.type)]
         how["column_encoding"] = dict.fromkeys(("design_id", "filter_id"), "DELTA_BINARY_PACKED")
     return how
-
-
-def batches(path: Path, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
-    """Yield a Parquet file one row group at a time.
-
-    `columns`: columns; left out, all of them. Raises OutputError if the file is missing or damaged.
-    """
-    try:
-        # Buffered ahead, a whole file would be in memory.
-        file = pq.ParquetFile(path, pre_buffer=False, page_checksum_verification=True)
-        for batch in file.iter_batches(ROW_GROUP, columns=columns):
-            yield pa.Table.from_batches([batch])
-    except (OSError, pa.ArrowException) as error:
-        raise OutputError(ValidationIssue(f"cannot be read: {error}", str(path))) from None
-
-
-def rows_in(path: Path) -> int:
-    """Return the number of rows of a Parquet file.
-
-    0 if the file is missing or damaged.
-    """
-    try:
-        return int(pq.read_metadata(path).num_rows)
-    except (OSError, pa.ArrowException):
-        return 0
 
 
 def word_mask(table: pa.Table, column: str, *words: str) -> Bool[BoolArray, " rows"]:

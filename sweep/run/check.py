@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 
 from ..base.types import delayed
@@ -20,6 +21,7 @@ from ..designs.space import Space
 from ..metrics.columns.chromatic import CHROMATIC_CSD
 from ..metrics.evaluate import evaluate
 from ..metrics.quantity import WORST_CASE
+from ..results.dataset import part_paths
 from ..results.designs import row_space
 from ..results.facts import CheckFacts
 from ..results.tables import word_mask
@@ -30,7 +32,7 @@ from .workers import Workers
 _AT_ONCE = 64
 """Designs that are computed again in one block."""
 _MOST_ROWS, _ENOUGH_ROWS = 200, 5000
-"""Rows of a check at the end of a run, at most; row groups are read until they have so many to choose from."""
+"""Rows of a check at the end of a run, at most; parts are read until they have so many to choose from."""
 
 Row = Mapping[str, Any]
 
@@ -58,6 +60,7 @@ def _compared(study: Study, space: Space, scenario: str, rows: Sequence[Row]) ->
     csds = [quantity for quantity in study.quantities.values() if quantity.has_error_bound]
     if not (setup.all_phases or setup.all_heights or setup.scene.drive is not None):  # elsewhere of a lattice alone
         csds += [quantity for quantity in study.quantities.values() if quantity.metric == CHROMATIC_CSD]
+    csds = [quantity for quantity in csds if quantity.name in rows[0]]
     worst = [quantity for quantity in csds if quantity.extreme == WORST_CASE]
     exact = {quantity.name: nominal[quantity.name] for quantity in csds if quantity not in worst}
     if worst:
@@ -88,12 +91,12 @@ def _allowed_dn(setup: Setup, tolerance_dn: float) -> float:
     return tolerance_dn + (math.sqrt(len(setup.camera.mosaic.channels)) if steps and sampled else 0.0)
 
 
-def check_run(study: Study, results: Path, seconds: float, pool: Workers) -> tuple[CheckFacts | None, list[str]]:
+def check_run(study: Study, folder: Path, seconds: float, pool: Workers) -> tuple[CheckFacts | None, list[str]]:
     """Compare a seeded sample of a run's rows with the reference within a time, at least one row.
 
     `seconds`: time, s; each worker takes a part of it. Returns `check`: None if no row could be compared.
     """
-    sample = _sampled(study, results)
+    sample = _sampled(study, folder)
     parts = [sample[at :: pool.count] for at in range(pool.count)]
     rows: list[dict[str, Any]] = []
     warnings: list[str] = []
@@ -124,13 +127,15 @@ def _checked(study: Study, rows: Sequence[Row], seconds: float) -> tuple[list[di
     return result, warnings
 
 
-def _sampled(study: Study, results: Path) -> list[Row]:
+def _sampled(study: Study, folder: Path) -> list[Row]:
     """Return rows in a random order by the study's seed, without those that failed."""
     rng = np.random.default_rng([study.section.seed, 5])
-    with pq.ParquetFile(results) as table:
-        groups = rng.permutation(table.num_row_groups)
-        sizes = np.cumsum([table.metadata.row_group(int(group)).num_rows for group in groups])
-        part = table.read_row_groups(sorted(groups[: 1 + int(np.searchsorted(sizes, _ENOUGH_ROWS))].tolist()))
+    paths, tables = part_paths(folder), list[pa.Table]()
+    for at in rng.permutation(len(paths)):
+        tables.append(pq.read_table(paths[at]))
+        if sum(table.num_rows for table in tables) >= _ENOUGH_ROWS:
+            break
+    part = pa.concat_tables(tables).unify_dictionaries()
     part = part.filter(word_mask(part, "status", "ok"))
     chosen = rng.choice(part.num_rows, size=min(part.num_rows, _MOST_ROWS), replace=False)
     rows = part.take(chosen).to_pylist()

@@ -6,17 +6,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..results.dataset import part_name
 from ..results.folder import run_in
 from ..results.identity import run_facts
-from ..results.parts import Parts
-from ..results.tables import REFERENCE, RESULTS
+from ..results.tables import REFERENCE
 from ..search.solver import refinement_of
 from ..search.trade_off import most_searches
 from ..study import Study
 from .held_out import most_evaluations_left_out
-from .rows import rules_of
-from .sweep import Sweep
-from .workers import Workers
+from .rows import parts_of
 
 
 @dataclass(frozen=True)
@@ -29,16 +27,14 @@ class RemainingWork:
     searches: bool
 
 
-def remaining_work(study: Study, output: Path, n_jobs: int) -> RemainingWork:
+def remaining_work(study: Study, output: Path) -> RemainingWork:
     """Plan a study and read which parts are kept, without computing or writing."""
-    held = run_in(output)
-    is_finished = held is not None and held.is_of(run_facts(study)) and not held.wrong([RESULTS], quick=True)
-    study = study.with_plans()
-    if is_finished:
-        return RemainingWork(study, study.n_designs, 0, searches=False)
-    sweep = Sweep(study, rules_of(study), Parts(output), Workers(n_jobs))
-    rows = sum(sweep.jobs[index].size for index in sweep.todo)
-    return RemainingWork(study, study.n_designs - rows, len(sweep.todo), searches=study.search is not None)
+    held, parts = run_in(output), parts_of(study)
+    is_finished = held is not None and held.is_of(run_facts(study)) and held.finished
+    todo = [part for part in parts if not is_finished and not (output / part_name(part.number)).is_file()]
+    rows = sum(part.size for part in todo)
+    searches = study.search is not None and not is_finished
+    return RemainingWork(study.with_plans(), study.n_designs - rows, len(todo), searches=searches)
 
 
 def remaining_work_lines(todo: RemainingWork, output: Path) -> Iterator[str]:

@@ -9,31 +9,39 @@ from functools import cached_property
 import numpy as np
 import pyarrow as pa
 
-from ..base.types import Array, DesignParameters, Float
+from ..base.types import Array, DesignNumbers, DesignParameters, Float
 from ..camera.forward import ForwardModel, forward_model
 from ..camera.plan import Plan
 from ..camera.setup import Setup
-from ..designs.block import CurveBlock, edges_of
+from ..designs.block import CurveBlock, edges_of_some
 from ..designs.space import Space
 from ..designs.tolerance import AS_DESIGNED, NONE, Tolerance
 from ..metrics.bound import Bound
+from ..metrics.columns.chromatic import CHROMATIC_CSD
 from ..metrics.evaluate import evaluate, family_quantities, image_quantities
+from ..metrics.metric import Metric
 from ..metrics.objective import COMBINED, Objective, columns_of
 from ..metrics.quantity import OF_A_SHARE, WORST_CASE, YIELD, Columns, Quantity, RequestedQuantities
+from ..metrics.registry import METRICS
 from ..metrics.user_metrics import UserMetric
 from ..results.identity import CHUNK
+from ..results.tables import ON_FRONT
+from ..spectra.lights import Pair
 from ..vision.section import Vision
 
 _MOST_LETTERS = 200
-_CHUNKS_BY_EDGES = 4
-"""Chunks in a block of designs that are computed from their edges alone: these take little memory."""
 
 
 @dataclass(frozen=True)
 class Rules:
-    """Rules by which designs become rows."""
+    """Rules by which designs become rows.
+
+    `schema`: of the rows of a run; `shown`: of those that its report shows; `swept`: quantities in `schema`.
+    """
 
     schema: pa.Schema
+    shown: pa.Schema
+    swept: frozenset[str]
     requested: RequestedQuantities
     objective: Objective
     constraints: Mapping[str, Bound]
@@ -43,24 +51,48 @@ class Rules:
     vision: Vision | None
     seed: int
 
-    @property
-    def order(self) -> tuple[str, ...]:
-        """Quantities by which designs are ranked, the first one first, all maximized."""
-        return (self.objective.column, *self.front)
-
     @cached_property
     def quantities(self) -> Mapping[str, Quantity]:
         """Quantities by column name."""
         return columns_of(self.requested, self.objective)
 
-    @property
-    def worst(self) -> list[Quantity]:
-        """Worst cases among the quantities."""
-        return [quantity for quantity in self.quantities.values() if quantity.extreme == WORST_CASE]
+    @cached_property
+    def wanted(self) -> Wanted:
+        """All of them."""
+        return Wanted.of(self.quantities, self.requested, self.shown)
+
+    @cached_property
+    def wanted_of_swept(self) -> Wanted:
+        """Those of the rows of a run."""
+        schema = self.schema.append(self.shown.field(ON_FRONT))
+        return Wanted.of({name: q for name, q in self.quantities.items() if name in self.swept}, self.requested, schema)
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Quantities that designs are evaluated for, the metrics that compute them, and their rows with `pareto`."""
+
+    schema: pa.Schema
+    quantities: Mapping[str, Quantity]
+    metrics: tuple[Metric, ...]
+    chromatic: tuple[Pair, ...]
+    user_metrics: tuple[UserMetric, ...]
+
+    @classmethod
+    def of(cls, quantities: Mapping[str, Quantity], requested: RequestedQuantities, schema: pa.Schema) -> Wanted:
+        """Return the metrics of some quantities."""
+        metrics = [m for m in METRICS if quantities.keys() & {q.name for q in m.quantities(requested)}]
+        pairs = [q.pair for q in quantities.values() if q.metric == CHROMATIC_CSD and q.pair and not q.extreme]
+        user_metrics = [metric for metric in requested.user_metrics if metric.name in quantities]
+        return cls(schema, quantities, tuple(metrics), tuple(pairs), tuple(user_metrics))
+
+    def of_extreme(self, extreme: str) -> list[Quantity]:
+        """Return the worst cases, or the yields, among the quantities."""
+        return [quantity for quantity in self.quantities.values() if quantity.extreme == extreme]
 
 
 def quantities_at(
-    space: Space, start: int, points: DesignParameters, setup: Setup, rules: Rules
+    space: Space, numbers: DesignNumbers, setup: Setup, rules: Rules, wanted: Wanted
 ) -> tuple[Columns, dict[int, str]]:
     """Compute the quantities of designs of a space.
 
@@ -71,18 +103,16 @@ def quantities_at(
 
     def computed(begin: int, end: int) -> list[Columns]:
         try:
-            return [_columns(space, start + begin, setup, points[begin:end], rules)]
+            return [_columns(space, numbers[begin:end], setup, rules, wanted)]
         except Exception as error:  # one design must not take the others with it
             if end - begin > 1:
                 middle = (begin + end) // 2
                 return computed(begin, middle) + computed(middle, end)
             issues[begin] = f"error: {text_of(error)}"
-            return [dict.fromkeys(rules.quantities, np.array([np.nan]))]
+            return [dict.fromkeys(wanted.quantities, np.array([np.nan]))]
 
-    from_curves = rules.vision is not None or rules.requested.states or rules.requested.wanted_yield or rules.worst
-    size = CHUNK * (1 if from_curves else _CHUNKS_BY_EDGES)
-    parts = [part for begin in range(0, len(points), size) for part in computed(begin, min(begin + size, len(points)))]
-    names = rules.quantities.keys() & set.intersection(*map(set, parts))
+    parts = [part for at in range(0, len(numbers), CHUNK) for part in computed(at, min(at + CHUNK, len(numbers)))]
+    names = wanted.quantities.keys() & set.intersection(*map(set, parts))
     columns = {name: np.concatenate([part[name] for part in parts]) for name in names}
     return columns, _not_finite(columns, setup, rules) | issues
 
@@ -92,25 +122,29 @@ def text_of(error: Exception) -> str:
     return " ".join(f"{type(error).__name__}: {error}".split())[:_MOST_LETTERS]
 
 
-def _columns(
-    space: Space, start: int, setup: Setup, points: Float[Array, "points parameters"], rules: Rules
-) -> Columns:
+def _columns(space: Space, numbers: DesignNumbers, setup: Setup, rules: Rules, wanted: Wanted) -> Columns:
     """Return the quantities of a block of designs."""
-    size, requested = setup.camera.grid.size, rules.requested
+    size, requested, points = setup.camera.grid.size, rules.requested, space.points_of(numbers)
     model = forward_model(setup)
-    edges = edges_of(space, start, start + len(points))
+    edges = edges_of_some(space, numbers)
     designs = CurveBlock(space.curves(points, size)) if edges is None else edges
     columns = evaluate(
-        model, designs, requested.states, probabilities=requested.probabilities, user_metrics=requested.user_metrics
+        model,
+        designs,
+        requested.states,
+        probabilities=requested.probabilities,
+        user_metrics=wanted.user_metrics,
+        metrics=wanted.metrics,
+        chromatic=wanted.chromatic,
     )
-    columns |= family_quantities(None if space.filter is None else space.filter.family, points)
+    columns |= family_quantities(None if space.filter is None else space.filter.family, points, wanted.metrics)
     if rules.vision is not None:
-        columns |= image_quantities(setup, space.curves(points, size), rules.vision, rules.seed)
-    if rules.worst:
-        columns |= worst_cases(space, model, points, columns, rules.worst, rules.tolerance, requested.user_metrics)
-    if requested.wanted_yield:
-        columns |= _of_a_share(space, setup, points, rules)
-    if rules.objective.column == COMBINED:
+        columns |= image_quantities(setup, space.curves(points, size), rules.vision, rules.seed, wanted.metrics)
+    if worst := wanted.of_extreme(WORST_CASE):
+        columns |= worst_cases(space, model, points, columns, worst, rules.tolerance, wanted.user_metrics)
+    if yields := wanted.of_extreme(OF_A_SHARE):
+        columns |= _of_a_share(space, setup, points, rules, yields)
+    if COMBINED in wanted.quantities:
         columns[COMBINED] = rules.objective.of(columns)
     return columns
 
@@ -134,7 +168,9 @@ def worst_cases(
     curves = [
         space.curves(points, setup.camera.grid.size, production_error) for production_error in (AS_DESIGNED, *errors)
     ]
-    cases = [nominal, *(evaluate(model, shifted, user_metrics=user_metrics) for shifted in curves[1:])]
+    chromatic = [quantity.pair for quantity in worst if quantity.metric == CHROMATIC_CSD and quantity.pair is not None]
+    shifted_cases = [evaluate(model, shifted, user_metrics=user_metrics, chromatic=chromatic) for shifted in curves[1:]]
+    cases = [nominal, *shifted_cases]
     if setup.lights.population is not None:
         from ..metrics.members import population_model  # noqa: PLC0415  (only where lights have a population)
 
@@ -143,14 +179,16 @@ def worst_cases(
     return {quantity.name: quantity.worse([case[quantity.of] for case in cases]) for quantity in worst}
 
 
-def _of_a_share(space: Space, setup: Setup, points: Float[Array, "points 2"], rules: Rules) -> Columns:
+def _of_a_share(
+    space: Space, setup: Setup, points: Float[Array, "points 2"], rules: Rules, yields: Sequence[Quantity]
+) -> Columns:
     """Return the CSD that the wanted share of random lamps and cameras has."""
     from ..metrics.drawn import LampsAndCameras  # noqa: PLC0415  (only where a share of lamps and cameras counts)
     from ..metrics.members import population_model  # noqa: PLC0415
 
     tolerance = rules.tolerance if space.filter is not None else NONE
     drawn = LampsAndCameras(population_model(setup), tolerance, rules.seed)
-    pairs = [q.pair for q in rules.quantities.values() if q.extreme == OF_A_SHARE and q.pair is not None]
+    pairs = [quantity.pair for quantity in yields if quantity.pair is not None]
     csds = drawn.columns(
         lambda production_error, designs: space.curves(points[designs], setup.camera.grid.size, production_error),
         len(points),

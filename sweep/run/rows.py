@@ -1,4 +1,4 @@
-"""Jobs (chunks of designs) and their rows."""
+"""Jobs (chunks of designs), the parts that they make, and rows."""
 
 from __future__ import annotations
 
@@ -11,29 +11,32 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from ..base.types import IndexArray, Int
-from ..camera.plan import Plan
+from ..base.types import Bool, BoolArray, DesignNumbers, IndexArray, Int, PerDesign
 from ..camera.setup import Setup
 from ..designs.block import by_edges
 from ..designs.space import Space
 from ..metrics.bound import FEASIBLE, total_violation
 from ..metrics.pareto import non_dominated
+from ..metrics.quantity import Columns
 from ..results.dictionary import described
 from ..results.identity import CHUNK
-from ..results.tables import SWEPT, result_schema
+from ..results.shown import Selection
+from ..results.tables import ON_FRONT, SWEPT, result_schema, word_mask
 from ..study import Study
-from .routes import Rules, quantities_at
+from .routes import Rules, Wanted, quantities_at
 
 _MOST_CHUNKS, _LEAST_JOBS = 16, 64
 _DRAWN_DESIGNS = 32
 """Designs of a job where each is evaluated with many random lamps and cameras."""
+_ENOUGH_SCENES, _FEW = 4, 64
+"""From so many scenes on, jobs of a scene that have few designs together share its pixel response, in one part."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """Consecutive designs of one space in one scenario."""
+    """Consecutive designs of one space, by its number, in one scenario."""
 
-    space: Space
+    space: int
     scenario: str
     start: int
     stop: int
@@ -46,40 +49,71 @@ class Job:
         return self.stop - self.start
 
 
-def jobs_of(study: Study) -> Iterator[Job]:
-    """Yield all jobs in the order of their rows."""
+@dataclass(frozen=True)
+class Part:
+    """Jobs whose rows are one file; none for the answers of a search."""
+
+    number: int
+    jobs: tuple[Job, ...]
+
+    @property
+    def size(self) -> int:
+        """Number of rows."""
+        return sum(job.size for job in self.jobs)
+
+    def key(self, study: Study, fingerprint: str) -> str:
+        """Return the SHA-256 of everything that the rows depend on."""
+        plans = [study.plans[job.scenario].key for job in self.jobs[:1] if study.plans]
+        jobs = [[job.scenario, job.space, job.start, job.stop] for job in self.jobs]
+        return hashlib.sha256(json.dumps([fingerprint, *plans, jobs]).encode()).hexdigest()
+
+
+def parts_of(study: Study) -> list[Part]:
+    """Return all parts in the order of their rows."""
+    groups: list[list[Job]] = []
     first_id = 0
-    for scenario in study.scenarios:
-        first_filter = 0
-        for space in study.spaces:
-            size = _job_size(study, space)
-            for start in range(0, space.size, size):
-                stop = min(start + size, space.size)
-                yield Job(space, scenario, start, stop, first_id + start, first_filter + start)
-            first_id += space.size
-            first_filter += space.size
+    for name, scene in study.scenarios.items():
+        small: list[Job] = []
+        light = scene.target is None and not study.states and study.section.vision is None
+        together = light or len(study.scenarios) >= _ENOUGH_SCENES
+        for job in _jobs_of(study, name, first_id):
+            if together and sum(other.size for other in (*small, job)) <= _FEW:
+                small.append(job)
+                groups += [small] if len(small) == 1 else []
+            else:
+                small = []
+                groups.append([job])
+        first_id += study.n_filters
+    return [Part(number, tuple(jobs)) for number, jobs in enumerate(groups)]
+
+
+def _jobs_of(study: Study, scenario: str, first_id: int) -> Iterator[Job]:
+    first_filter = 0
+    for number, space in enumerate(study.spaces):
+        size = _job_size(study, space)
+        for start in range(0, space.size, size):
+            stop, first = min(start + size, space.size), first_filter + start
+            yield Job(number, scenario, start, stop, first_id + first, first)
+        first_filter += space.size
 
 
 def _job_size(study: Study, space: Space) -> int:
     """Return the number of designs of a job, independent of the workers; several chunks for fast designs."""
     if study.requested.wanted_yield:
         return _DRAWN_DESIGNS
-    if study.states or not by_edges(space):
+    if not by_edges(space) or any(quantity.states for quantity in study.swept_quantities.values()):
         return CHUNK
     return CHUNK * min(max(1, space.size // (CHUNK * _LEAST_JOBS)), _MOST_CHUNKS)
 
 
-def job_key(job: Job, fingerprint: str, plan: Plan | None) -> str:
-    """Return the SHA-256 of everything that a job's rows depend on."""
-    parts = [fingerprint, "" if plan is None else plan.key, job.scenario, job.space.kind, job.space.name]
-    return hashlib.sha256(json.dumps([*parts, job.start, job.stop]).encode()).hexdigest()
-
-
 def rules_of(study: Study) -> Rules:
     """Return the rules of a study."""
-    section = study.section
+    section, quantities, swept = study.section, study.quantities, study.swept_quantities
+    of_rows = {"searched": study.search is not None}
     return Rules(
-        schema=described(result_schema(study.parameters, list(study.quantities)), study.quantities),
+        schema=described(result_schema(study.parameters, list(swept), **of_rows), quantities),
+        shown=described(result_schema(study.parameters, list(quantities), marked=True, **of_rows), quantities),
+        swept=frozenset(swept),
         requested=study.requested,
         objective=study.objective,
         constraints=study.constraints,
@@ -91,52 +125,103 @@ def rules_of(study: Study) -> Rules:
     )
 
 
-def run_job(job: Job, setup: Setup, rules: Rules) -> pa.Table:
+def selection_of(study: Study) -> Selection:
+    """Return what a study's report shows of its rows."""
+    swept = sum(space.size for space in study.spaces if space.kind == SWEPT) * len(study.scenarios)
+    return Selection((study.objective.column, *study.trade_off), study.trade_off, swept)
+
+
+def run_job(job: Job, study: Study, rules: Rules) -> pa.Table:
     """Evaluate a job; a design that fails becomes a row with its status.
 
-    `pareto` marks the non-dominated designs of this job alone, among those that meet every constraint but those on the
-    front's axes; `front.RunRows` finds those of the whole table.
-
-    `setup`: scene and camera of the job's scenario and space. Returns a row per design, of `rules.schema`.
+    Returns a row per design, with `pareto` as of `rows_of`.
     """
-    points = job.space.points(job.start, job.stop)
-    columns, issues = quantities_at(job.space, job.start, points, setup, rules)
-    ok = np.ones(job.size, dtype=bool)
+    at = Rows.of(job, study)
+    return rows_of(at, study.setup(at.space, job.scenario), rules, rules.wanted_of_swept)
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Rows of designs of one space in one scenario."""
+
+    space: Space
+    scenario: str
+    numbers: DesignNumbers
+    ids: DesignNumbers
+    filters: DesignNumbers
+
+    @classmethod
+    def of(cls, job: Job, study: Study) -> Rows:
+        """Return the rows of a job."""
+        numbers = np.arange(job.start, job.stop)
+        ids, filters = (numbers + (first - job.start) for first in (job.first_id, job.first_filter))
+        return cls(study.spaces[job.space], job.scenario, numbers, ids, filters)
+
+    @property
+    def misshape(self) -> PerDesign:
+        """By how much filters are not well-formed."""
+        return self.space.violation(self.space.points_of(self.numbers))
+
+
+def marked(table: pa.Table, part: Part, study: Study, rules: Rules) -> pa.Table:
+    """Return the rows of a part as `rows_of` does, from those of its file."""
+    marks, start = [], 0
+    for job in part.jobs:
+        rows = table.slice(start, job.size)
+        columns = {name: rows[name].to_numpy() for name in (*rules.constraints, *rules.front)}
+        marks.append(_non_dominated(Rows.of(job, study), columns, word_mask(rows, "status", "ok"), rules))
+        start += job.size
+    return table.append_column(rules.shown.field(ON_FRONT), pa.array(np.concatenate(marks)))
+
+
+def _non_dominated(at: Rows, columns: Columns, ok: Bool[BoolArray, " rows"], rules: Rules) -> Bool[BoolArray, " rows"]:
+    eligible = ok & (total_violation(columns, rules.constraints, at.misshape, leave_out=rules.front) <= FEASIBLE)
+    return non_dominated(np.stack([columns[name] for name in rules.front], axis=1), eligible)
+
+
+def rows_of(at: Rows, setup: Setup, rules: Rules, wanted: Wanted) -> pa.Table:
+    """Evaluate designs.
+
+    `pareto` marks the non-dominated ones of these alone, among those that meet every constraint but those on the
+    front's axes.
+    """
+    columns, issues = quantities_at(at.space, at.numbers, setup, rules, wanted)
+    n = len(at.numbers)
+    ok = np.ones(n, dtype=bool)
     ok[list(issues)] = False
-    misshape = job.space.violation(points)
-    violation = total_violation(columns, rules.constraints, misshape)
-    eligible = ok & (total_violation(columns, rules.constraints, misshape, leave_out=rules.front) <= FEASIBLE)
+    violation = total_violation(columns, rules.constraints, at.misshape)
     texts = dict.fromkeys(["ok"] if ok.any() else []) | dict.fromkeys(issues.values())
-    numbers = {text: at for at, text in enumerate(texts)}
-    status = np.zeros(job.size, dtype=np.intp)
+    numbers = {text: number for number, text in enumerate(texts)}
+    status = np.zeros(n, dtype=np.intp)
     status[list(issues)] = [numbers[text] for text in issues.values()]
     verdicts = {
         "violation": np.where(ok, violation, np.nan),
         "feasible": ok & (violation <= FEASIBLE),
-        "pareto": non_dominated(np.stack([columns[name] for name in rules.front], axis=1), eligible),
+        ON_FRONT: _non_dominated(at, columns, ok, rules),
         "status": _words(list(numbers), status),
     }
-    return _table(job, rules, columns | verdicts)
+    return _table(at, rules, wanted.schema, columns | verdicts)
 
 
-def failed_rows(job: Job, rules: Rules, status: str) -> pa.Table:
+def failed_rows(job: Job, study: Study, rules: Rules, status: str) -> pa.Table:
     """Return the rows of a job that could not be computed."""
     no = np.zeros(job.size, dtype=bool)
-    return _table(job, rules, {"feasible": no, "pareto": no, "status": _word(status, job.size)})
+    verdicts = {"feasible": no, ON_FRONT: no, "status": _word(status, job.size)}
+    return _table(Rows.of(job, study), rules, rules.wanted_of_swept.schema, verdicts)
 
 
-def _table(job: Job, rules: Rules, values: Mapping[str, Any]) -> pa.Table:
-    """Return the rows of a job: keys, parameters, plan and values; a missing column, and NaN, is null."""
-    n, space, plan = job.size, job.space, rules.plans.get(job.scenario)
-    points = space.points(job.start, job.stop)
+def _table(at: Rows, rules: Rules, schema: pa.Schema, values: Mapping[str, Any]) -> pa.Table:
+    """Return rows: keys, parameters, plan and values; a missing column, and NaN, is null."""
+    n, space, plan = len(at.numbers), at.space, rules.plans.get(at.scenario)
+    points = space.points_of(at.numbers)
     known: dict[str, Any] = {
-        "design_id": np.arange(job.first_id, job.first_id + n),
-        "filter_id": np.arange(job.first_filter, job.first_filter + n),
+        "design_id": at.ids,
+        "filter_id": at.filters,
         "kind": _word(space.kind, n),
         "space": _word(space.name, n),
         "cfa": _word(space.cfa, n),
         "family": _word("none" if space.filter is None else space.filter.family.kind, n),
-        "scenario": _word(job.scenario, n),
+        "scenario": _word(at.scenario, n),
         **{name: points[:, i] for i, name in enumerate(space.parameters)},
         **values,
     }
@@ -155,7 +240,7 @@ def _table(job: Job, rules: Rules, values: Mapping[str, Any]) -> pa.Table:
             else pa.array(values_of_field, field.type, from_pandas=True)
         )
 
-    return pa.Table.from_arrays([column(field) for field in rules.schema], schema=rules.schema)
+    return pa.Table.from_arrays([column(field) for field in schema], schema=schema)
 
 
 def _word(text: str, n: int) -> pa.Array:

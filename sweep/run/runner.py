@@ -3,59 +3,61 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
 
 from ..base.disk import read_facts
 from ..base.errors import InfeasibleError, StudyError, UpperBoundExceededError
-from ..base.types import Progress
+from ..base.types import IndexArray, Int, Progress
+from ..results.answers import Answers
+from ..results.dataset import part_name
 from ..results.dictionary import described
 from ..results.facts import Provenance, missing_keys
 from ..results.folder import begin
 from ..results.identity import run_facts
-from ..results.inventory import Inventory
 from ..results.lock import LOCK, locked
-from ..results.parts import Parts
+from ..results.manifest import Manifest
+from ..results.shown import Gathered, Selection, drawn_rows, front_rows, joined, shown_rows
 from ..results.tables import (
     COMBINATIONS,
+    DESIGNS,
     FRONT,
     LEFT_OUT,
     MAP,
+    ON_FRONT,
+    PARETO,
     PROVENANCE,
-    REPORT,
     RESOLVED,
-    RESULTS,
     SEARCH_LOG,
+    SEARCHED,
+    SWEPT,
     VISION_STREET,
     VISION_STREETS,
     VISION_TABLES,
-    batches,
     json_of,
-    write_tables,
+    read_table,
+    word_mask,
 )
-from ..results.thinning import swept_points
 from ..search.combinations import numbers_of
 from ..search.limit import Limit
 from ..search.problem import CONVERGED
 from ..study import Study
 from ..study.goals import refuse_unreachable
 from ..vision.installed import require_network
-from .answers import CachedCalls
 from .check import check_run
 from .derived import DerivedInput, row_tables
 from .details import design_details
-from .front import RunRows, report_rows
 from .held_out import left_out_table
+from .kept import CachedCalls
 from .provenance import plan_facts, provenance, resolved_yaml
-from .rows import rules_of
+from .rows import parts_of
 from .search import (
     SearchAnswer,
     answer_rows,
@@ -67,9 +69,12 @@ from .search import (
     search_facts,
     search_log,
 )
-from .sweep import RunOptions, Sweep
+from .sweep import Planned, RunOptions, Sweep
 from .uncertainty import UNCLIPPED
 from .workers import Workers, stopped_by_signals, workers
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _CHECK_S, _CHECK_SHARE = 1.0, 0.1
 """Time of the check at the end of a run: seconds, or a share of the run, whichever is longer."""
@@ -84,9 +89,10 @@ def files_of(study: Study) -> set[str]:
 
 def _whole(study: Study) -> set[str]:
     """Return the files for which the whole run is made again."""
-    names = {RESULTS, PROVENANCE}
+    parts = parts_of(study)
+    names = {DESIGNS, PARETO, PROVENANCE, *(part_name(part.number) for part in parts)}
     if study.search is not None:
-        names |= {SEARCH_LOG} | ({FRONT} if study.search.levels else set())
+        names |= {SEARCH_LOG, part_name(len(parts))} | ({FRONT} if study.search.levels else set())
         names |= {LEFT_OUT} if study.leaves_one_out else set()
         names |= {MAP} if study.search.map else set()
         names |= {COMBINATIONS} if len(numbers_of(study.problem(study.search))) > 1 else set()
@@ -103,12 +109,13 @@ def run_study(
     backend: str = "loky",
     scheduler: str | None = None,
     options: RunOptions = RunOptions(),  # noqa: B008  (a frozen value)
+    pool: Workers | None = None,
 ) -> tuple[str, ...]:
     """Run a study into a folder, or continue a stopped run; a finished one is only repaired.
 
-    A table of the report that is missing or damaged is made again from the rows. Where the rows, the search's tables
-    or
-    provenance are, the whole run is.
+    A table of the report that is missing or damaged is made again from the rows that it shows. Where rows, the
+    search's tables or provenance are, all of it is, but for parts that are whole. `pool`: workers; left out, they are
+    started.
 
     Raises OutputError: the folder is in use, holds another study or files of others, or cannot be written. Raises
     InfeasibleError: the search finds no feasible design; nothing is left behind. Raises FailedDesignError: a design
@@ -120,22 +127,20 @@ def run_study(
     if study.section.vision is not None and study.section.vision.network:
         require_network()
     with stopped_by_signals(), locked(output):
-        inventory = begin(output, run_facts(study))
-        if inventory.list_damaged:  # nothing is known of what it lacks, nor whether the report was whole
-            inventory.remove([*inventory.unlisted(), REPORT])
-        wrong = set(inventory.wrong(sorted(files_of(study))))
-        facts = read_facts(inventory.path(PROVENANCE))
+        manifest = begin(output, run_facts(study))
+        wrong = set(manifest.wrong(files_of(study)))
+        facts = read_facts(manifest.path(PROVENANCE))
         if missing_keys(Provenance, facts) or (options.retry_failed and facts["failed"]):
             wrong.add(PROVENANCE)
         if not wrong:
             return ()
-        with workers(n_jobs, backend, scheduler) as pool:
-            how = {"command": list(command), "workers": pool.count, "backend": backend, "scheduler": scheduler}
-            run = _Run(study.with_plans(), inventory, pool, progress, options, started, how)
+        with nullcontext(pool) if pool is not None else workers(n_jobs, backend, scheduler) as own:
+            how = {"command": list(command), "workers": own.count, "backend": own.backend, "scheduler": scheduler}
+            run = _Run(study.with_plans(), manifest, own, progress, options, started, how)
             try:
                 return run.make(wrong)
             except (StudyError, InfeasibleError):
-                discard(inventory)
+                discard(manifest)
                 raise
 
 
@@ -147,7 +152,7 @@ class _Run:
     """
 
     study: Study
-    inventory: Inventory
+    manifest: Manifest
     pool: Workers
     progress: Progress
     options: RunOptions
@@ -155,31 +160,28 @@ class _Run:
     how: dict[str, Any]
 
     def __post_init__(self) -> None:
-        self.rules, self.parts = rules_of(self.study), Parts(self.inventory.folder)
-        self.sweep = Sweep(self.study, self.rules, self.parts, self.pool)
-        self.gathered = RunRows(self.rules, next(iter(self.study.scenarios)))
+        self.planned, self.answers = Planned.of(self.study), Answers(self.manifest.folder)
+        self.rules, self.selection = self.planned.rules, self.planned.selection
+        self.sweep = Sweep(self.planned, self.manifest.folder, self.pool)
+        self.gathered = Gathered(self.selection, self.rules.wanted_of_swept.schema)
 
     def make(self, wrong: set[str]) -> tuple[str, ...]:
         """Make files and those that depend on them; provenance comes last, and marks a finished run."""
         study = self.study
         if wrong & _whole(study):
             wrong = files_of(study)
-            self.inventory.remove([PROVENANCE])
-            self.inventory.discard_derived()
+            self.manifest.remove([PROVENANCE])
+            self.manifest.discard_derived()
             self._search_and_sweep()
-        else:
-            for table in batches(self.inventory.path(RESULTS)):
-                self.gathered.add(report_rows(table, self.rules))
-            self.gathered.finish()
         if wrong & row_tables(study).keys():
             self._write_row_tables(wrong)
         if wrong.intersection(VISION_TABLES):
             self._write_vision()
-        self.inventory.write({RESOLVED: resolved_yaml(study).encode("utf-8")})
+        self.manifest.write({RESOLVED: resolved_yaml(study).encode("utf-8")})
         if PROVENANCE in wrong:
             facts = self._provenance().model_dump(mode="json")
-            self.inventory.write({PROVENANCE: json_of(facts).encode("utf-8")})
-        self.parts.remove()
+            self.manifest.write({PROVENANCE: json_of(facts).encode("utf-8")})
+        self.answers.remove()
         return tuple(sorted(wrong))
 
     @cached_property
@@ -195,20 +197,30 @@ class _Run:
             raise
 
     def _kept(self, what: str) -> CachedCalls:
-        """Return calls whose answers are part files."""
-        return CachedCalls(self.pool, self.parts, f"{self.sweep.fingerprint} {what}")
+        """Return calls whose answers are kept."""
+        return CachedCalls(self.pool, self.answers, f"{self.planned.fingerprint} {what}")
 
     def _search_and_sweep(self) -> None:
         """Search, sweep, and write the tables of both; an infeasible search ends the run before the sweep."""
-        answer, sweep, gathered = self.answer, self.sweep, self.gathered
-        sweep.run(gathered, self.progress, self.options)
-        answered = [] if answer is None else answer_rows(self.study, answer, self.rules, self.pool)
-        for row in answered:
-            gathered.add(row)
-        gathered.finish()
-        marked = map(gathered.marked, chain(sweep.tables(), answered))
-        write_tables(marked, self.rules.schema, self.inventory.path(RESULTS))
-        self.inventory.list_file(RESULTS)
+        answer, sweep, shown = self.answer, self.sweep, self.rules.shown
+        sweep.run(self.gathered, self.progress, self.options)
+        answered = shown.empty_table()
+        if answer is not None:
+            answered = pa.concat_tables(answer_rows(self.study, answer, self.rules, self.pool)).unify_dictionaries()
+            sweep.write_answers(answered, self.gathered)
+        rows, sample = self.gathered.finish()
+        of_parts = rows.filter(pa.array(~word_mask(rows, "kind", SEARCHED)))
+        whole = pa.concat_tables([sweep.with_all_columns(of_parts), answered]).unify_dictionaries()
+        at = shown.get_field_index(ON_FRONT)
+        whole = whole.sort_by("design_id").set_column(at, shown.field(at), rows[ON_FRONT])
+        first = next(iter(self.study.scenarios))
+        drawn = [select(whole, self.selection, first) for select in (drawn_rows, front_rows)]
+        others = sample.filter(pa.array(~np.isin(sample["design_id"].to_numpy(), whole["design_id"].to_numpy())))
+        designs = [whole.take(np.unique(np.concatenate(drawn))), others]
+        self._write(DESIGNS, joined(designs, shown))
+        self._write(PARETO, whole.filter(whole[ON_FRONT]))
+        self.manifest.add(sweep.digests)
+        self.manifest.remove([name for name in self.manifest.rows() if name not in sweep.digests])
         if answer is not None:
             self._write(SEARCH_LOG, search_log(answer))
             if answer.search.map:
@@ -223,10 +235,21 @@ class _Run:
                     LEFT_OUT, left_out_table(self.study, answer.search, answer.best, cached_calls, self.progress)
                 )
 
+    @cached_property
+    def shown(self) -> pa.Table:
+        """Rows that the report shows, from their files."""
+        return shown_rows(*(read_table(self.manifest.path(name)) for name in (DESIGNS, PARETO)))
+
+    def _frame(self, select: Callable[[pa.Table, Selection, str], Int[IndexArray, " rows"]]) -> pd.DataFrame:
+        at = select(self.shown, self.selection, next(iter(self.study.scenarios)))
+        frame: pd.DataFrame = self.shown.take(at).to_pandas()
+        return frame
+
     def _write_row_tables(self, names: set[str]) -> None:
-        rows, on_front = self.gathered.frame(), self.gathered.front_frame()
+        rows, on_front = self._frame(drawn_rows), self._frame(front_rows)
         details = design_details(self.study, names, rows, on_front, self.pool, self.progress)
-        points = swept_points(self.inventory.path(RESULTS))
+        swept = word_mask(self.shown, "kind", SWEPT) & word_mask(self.shown, "status", "ok")
+        points = self.shown["design_id"].to_numpy()[swept]
         shown = DerivedInput(
             self.study, rows, on_front, details, points, self._limit, self.pool, self._kept, self.progress
         )
@@ -237,7 +260,7 @@ class _Run:
     def _write_vision(self) -> None:
         from .vision import vision_tables  # noqa: PLC0415  (only where a study asks for images)
 
-        tables = vision_tables(self.study, self.gathered.frame(), self._kept("vision"), self.progress)
+        tables = vision_tables(self.study, self._frame(drawn_rows), self._kept("vision"), self.progress)
         for name, table in tables.items():
             self._write(name, table)
 
@@ -248,7 +271,7 @@ class _Run:
             filters = np.where(ids >= self.study.n_designs, self.study.n_filters, ids % max(1, self.study.n_filters))
             at = table.column_names.index("design_id") + 1
             table = table.add_column(at, "filter_id", pa.array(filters, pa.int64(), from_pandas=True))
-        self.inventory.write_table(name, table.cast(described(table.schema, self.study.quantities)))
+        self.manifest.write_table(name, table.cast(described(table.schema, self.study.quantities)))
 
     def _limit(self) -> Limit | None:
         """Return the upper bound of a search in one scenario, computed alone if the search need not be repeated."""
@@ -264,6 +287,7 @@ class _Run:
             "filters": study.n_filters + (answer is not None),
             "designs": study.n_designs + (0 if answer is None else len(answer.search.scenarios)),
             "failed": sweep.failed,
+            "counts": [[*group, n] for group, n in sorted(self.gathered.counts.items())],
             "plans": plan_facts(study),
             "trade_off": study.trade_off,
             "parameters": study.parameters,
@@ -282,15 +306,15 @@ class _Run:
                 warnings.append("pixels may saturate: the search sees them before clipping, its row after")
         duration_s = round(time.monotonic() - self.started, 3)
         seconds = max(_CHECK_S, _CHECK_SHARE * duration_s)
-        facts["check"], unchecked = check_run(study, self.inventory.path(RESULTS), seconds, self.pool)
+        facts["check"], unchecked = check_run(study, self.manifest.folder, seconds, self.pool)
         how = self.how | {"duration_s": duration_s}
         return Provenance(**provenance(study, how), **facts, warnings=(*warnings, *unchecked))
 
 
-def discard(inventory: Inventory) -> None:
+def discard(manifest: Manifest) -> None:
     """Remove everything of a run without a result; files of others stay."""
-    Parts(inventory.folder).remove()
-    inventory.discard()
+    Answers(manifest.folder).remove()
+    manifest.discard()
     with suppress(OSError):
-        (inventory.folder / LOCK).unlink()
-        inventory.folder.rmdir()
+        (manifest.folder / LOCK).unlink()
+        manifest.folder.rmdir()

@@ -28,7 +28,7 @@ from ..study import Search, Study
 from ..study.axes import series_of
 from .between import Between, between, minima_between, or_nan
 from .routes import Rules
-from .rows import Job, run_job
+from .rows import Rows, rows_of
 
 _CM_PER_UM = 1e-4
 _CELLS_AT_ONCE = 16
@@ -204,12 +204,13 @@ def answer_rows(study: Study, answer: SearchAnswer, rules: Rules, parallel: Para
     best = Space(
         "search", answer.search.name, space.cfa, space.filter, tuple((float(value),) for value in answer.best.x)
     )
+    ids, first = study.n_designs + np.arange(len(answer.search.scenarios)), np.zeros(1, dtype=np.intp)
     jobs = [
-        Job(best, scenario, 0, 1, study.n_designs + number, study.n_filters)
-        for number, scenario in enumerate(answer.search.scenarios)
+        Rows(best, scenario, first, ids[at : at + 1], first + study.n_filters)
+        for at, scenario in enumerate(answer.search.scenarios)
     ]
     # Workers have loaded what this takes, and this process has not.
-    rows = parallel([delayed(run_job, job, study.setup(best, job.scenario), rules) for job in jobs])
+    rows = parallel([delayed(rows_of, job, study.setup(best, job.scenario), rules, rules.wanted) for job in jobs])
     proven = None if answer.limit is None else answer.limit.proven
     tables: list[pa.Table] = []
     for job, row in zip(jobs, rows, strict=True):

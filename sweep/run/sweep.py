@@ -1,44 +1,55 @@
-"""Sweep of a study: jobs on the workers, each kept as a part file as soon as it is finished."""
+"""Sweep of a study: parts on the workers, each a file of the results as soon as it is finished."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import hashlib
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import groupby
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 
+from ..base.disk import digest_of
 from ..base.errors import FailedDesignError, ValidationIssue
-from ..base.types import Call, Progress, delayed
-from ..camera.setup import Setup
+from ..base.types import Call, DesignNumbers, Progress, delayed
+from ..results.atomic import write_bytes
+from ..results.dataset import encoded_part, part_name, read_part, refuse_others
 from ..results.identity import fingerprint
-from ..results.parts import ROWS, Parts, write_part
-from ..results.tables import decoded, encoded, word_mask
+from ..results.shown import Gathered, Selection, ShownRows, joined
+from ..results.tables import word_mask
 from ..study import Study
-from .front import RunRows, report_rows
 from .routes import Rules
-from .rows import Job, failed_rows, job_key, jobs_of, run_job
-from .workers import WorkerKilledError, Workers, raise_if_stopped
+from .rows import Job, Part, Rows, failed_rows, marked, parts_of, rows_of, rules_of, run_job, selection_of
+from .workers import Held, WorkerKilledError, Workers, raise_if_stopped
 
-_SCENES_PER_WORKER, _FEW = 2, 64
-"""Least number of scenes for each worker, and largest number of designs, where one worker computes a whole scene."""
 KILLED = "error: its worker died twice"
-_KeyedJob = tuple[Job, str, Setup]
-"""A job, its key and its setup."""
+_MOST_AT_ONCE = 256
+"""Rows of which all columns are computed in one call."""
 
 
 @dataclass(frozen=True)
-class FinishedJob:
-    """Finished job.
+class Planned:
+    """Study with the rules of its rows, what its report shows, and its fingerprint."""
 
-    `part`: name of its part file, or its content if the worker could not write it.
-    """
+    study: Study
+    rules: Rules
+    selection: Selection
+    fingerprint: str
 
-    part: str | bytes
-    named_rows: pa.Table
+    @classmethod
+    def of(cls, study: Study) -> Planned:
+        """Return a planned study with its rules."""
+        return cls(study, rules_of(study), selection_of(study), fingerprint(study))
+
+
+@dataclass(frozen=True)
+class FinishedPart:
+    """Finished part: digest of its file, its content if the worker could not write it, and what it shows."""
+
+    digest: str
+    content: bytes | None
+    shown: ShownRows
     failed: int
 
 
@@ -52,151 +63,160 @@ class RunOptions:
 
 @dataclass
 class Sweep:
-    """All jobs of a study, finished and remaining."""
+    """All parts of a study, finished and remaining, in the folder of a run.
 
-    study: Study
-    rules: Rules
-    parts: Parts
+    `digests`: of the files that are finished.
+    """
+
+    planned: Planned
+    folder: Path
     pool: Workers
+    digests: dict[str, str] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
     failed: int = 0
 
-    @cached_property
-    def fingerprint(self) -> str:
-        """Fingerprint of the study, part of all keys."""
-        return fingerprint(self.study)
+    def __post_init__(self) -> None:
+        refuse_others(self.folder)
+        self.held = self.pool.hold(self.planned)
 
     @cached_property
-    def jobs(self) -> list[Job]:
-        """All jobs in the order of their rows."""
-        return list(jobs_of(self.study))
-
-    @cached_property
-    def keys(self) -> list[str]:
-        """Key of each job."""
-        return [job_key(job, self.fingerprint, self.study.plans.get(job.scenario)) for job in self.jobs]
+    def parts(self) -> list[Part]:
+        """All parts in the order of their rows."""
+        return parts_of(self.planned.study)
 
     @property
-    def todo(self) -> list[int]:
-        """Jobs without a part."""
-        return [index for index, key in enumerate(self.keys) if key not in self.parts]
+    def todo(self) -> list[Part]:
+        """Parts without a file."""
+        return [part for part in self.parts if not (self.folder / part_name(part.number)).is_file()]
 
-    @cached_property
-    def _setups(self) -> dict[tuple[int, str], Setup]:
-        spaces, scenarios = self.study.spaces, self.study.scenarios
-        return {(id(space), name): self.study.setup(space, name) for name in scenarios for space in spaces}
-
-    def _setup(self, job: Job) -> Setup:
-        return self._setups[id(job.space), job.scenario]
-
-    def run(self, gathered: RunRows, progress: Progress, options: RunOptions) -> None:
-        """Compute the remaining jobs.
+    def run(self, gathered: Gathered, progress: Progress, options: RunOptions) -> None:
+        """Compute the parts that are not there or not whole.
 
         Raises FailedDesignError if a design failed, with `fail_fast`; its part is kept.
         """
-        done = 0
-        for index, key in enumerate(self.keys):
-            if key in self.parts and (table := self._kept(index)) is not None:
-                failed = _failed(table)
-                if options.retry_failed and failed:
-                    self.parts.forget(key)
-                    continue
-                self.failed += failed
-                gathered.add(report_rows(table, self.rules))
-                done += table.num_rows
-        progress("designs", done, self.study.n_designs)
-        batches = self._batches(self.todo)
-        folder = None if self.pool.backend == "dask" else self.parts.folder  # a cluster may have other disks
-        keyed = ([(self.jobs[i], self.keys[i], self._setup(self.jobs[i])) for i in batch] for batch in batches)
-        calls = [delayed(_compute, jobs, self.rules, folder) for jobs in keyed]
-        for at, results in self.pool.unordered(calls, _quarantined):
-            for index, finished in zip(batches[at], results, strict=True):
-                if isinstance(finished.part, str):
-                    self.parts.add(finished.part)
-                else:
-                    self.parts.save(self.keys[index], ROWS, finished.part)
-                self.failed += finished.failed
-                gathered.add(finished.named_rows)
-                done += self.jobs[index].size
-                if finished.failed and options.fail_fast:
-                    raise _first_failure(self.table(index))
-            progress("designs", done, self.study.n_designs)
+        total = self.planned.study.n_designs
+        done, todo = 0, []
+        for part in self.parts:
+            finished = self._kept(part, options)
+            if finished is None:
+                todo.append(part)
+            else:
+                self._take(part, finished, gathered)
+                done += part.size
+        progress("designs", done, total)
+        todo.sort(key=self._light_px, reverse=True)  # the largest lights take longest
+        folder = None if self.pool.backend == "dask" else self.folder  # a cluster may have other disks
+        calls = [delayed(_compute, self.held, part, folder) for part in todo]
+        for at, finished in self.pool.unordered(calls, _quarantined):
+            if finished.content is not None:
+                write_bytes(finished.content, self.folder / part_name(todo[at].number))
+            self._take(todo[at], replace(finished, content=None), gathered)
+            done += todo[at].size
+            if finished.failed and options.fail_fast:
+                raise _first_failure(finished.shown.rows)
+            progress("designs", done, total)
 
-    def tables(self) -> Iterator[pa.Table]:
-        """Yield the rows of all jobs in order."""
-        for index in range(len(self.jobs)):
-            yield self.table(index)
+    def _light_px(self, part: Part) -> float:
+        target = self.planned.study.scenarios[part.jobs[0].scenario].target
+        return 0.0 if target is None else target.object_resolution_px
 
-    def table(self, index: int) -> pa.Table:
-        """Return the rows of a finished job; a damaged part is computed again."""
-        job, table = self.jobs[index], self._kept(index)
-        return run_job(job, self._setup(job), self.rules) if table is None else table
+    def _take(self, part: Part, finished: FinishedPart, gathered: Gathered) -> None:
+        self.digests[part_name(part.number)] = finished.digest
+        self.failed += finished.failed
+        gathered.add(finished.shown)
 
-    def _kept(self, index: int) -> pa.Table | None:
-        """Return the rows of a part; None, and a warning, if it is damaged."""
-        content = self.parts.read(self.keys[index])
-        table = None if content is None else decoded(content, self.rules.schema, self.jobs[index].size)
+    def _kept(self, part: Part, options: RunOptions) -> FinishedPart | None:
+        """Return a part of an earlier run; None if it is not there, or not as that run wrote it."""
+        path = self.folder / part_name(part.number)
+        if not path.is_file():
+            return None
+        key, rules = part.key(self.planned.study, self.planned.fingerprint), self.planned.rules
+        table = read_part(path, key, rules.schema, part.size)
         if table is None:
-            self.warnings.append(f"part {index} was damaged on the disk and is computed again")
-            self.parts.forget(self.keys[index])
-        return table
+            self.warnings.append(f"part {part.number} was damaged on the disk and is computed again")
+            return None
+        if options.retry_failed and _failed(table):
+            return None
+        shown = self.planned.selection.of_part(marked(table, part, self.planned.study, rules))
+        return FinishedPart(digest_of(path), None, shown, _failed(table))
 
-    def _batches(self, todo: list[int]) -> list[list[int]]:
-        """Return jobs by the call that computes them.
+    def write_answers(self, rows: pa.Table, gathered: Gathered) -> None:
+        """Write the answers of a search, after all designs."""
+        part, planned = Part(len(self.parts), ()), self.planned
+        finished = _written(planned, part, self.folder, rows.select(planned.rules.wanted_of_swept.schema.names))
+        self._take(part, finished, gathered)
 
-        Jobs of few designs of one scene share its pixel response in one worker, if there are enough scenes. Scenes
-        with the largest lights, which take longest, come first.
-        """
-
-        def light_px(scenario: str) -> float:
-            target = self.study.scenarios[scenario].target
-            return 0.0 if target is None else target.object_resolution_px
-
-        scenes = [list(jobs) for _, jobs in groupby(todo, lambda index: self.jobs[index].scenario)]
-        scenes.sort(key=lambda jobs: -light_px(self.jobs[jobs[0]].scenario))
-        enough = len(scenes) >= _SCENES_PER_WORKER * self.pool.count
-        batches: list[list[int]] = []
-        for jobs in scenes:
-            is_small = sum(self.jobs[index].size for index in jobs) <= _FEW
-            batches += [jobs] if enough and is_small else [[index] for index in jobs]
-        return batches
-
-
-def _compute(jobs: Sequence[_KeyedJob], rules: Rules, folder: Path | None) -> list[FinishedJob]:
-    """Compute jobs, and write their parts if a folder is given."""
-    return [_finished(key, folder, rules, run_job(job, setup, rules)) for job, key, setup in jobs]
+    def with_all_columns(self, rows: pa.Table) -> pa.Table:
+        """Return rows of the parts with all columns of what a report shows; rows that failed stay as they are."""
+        shown = self.planned.rules.shown
+        if rows.schema.names == shown.names:
+            return rows
+        ok = word_mask(rows, "status", "ok")
+        ids, jobs, calls = rows["design_id"].to_numpy()[ok], [job for part in self.parts for job in part.jobs], []
+        of_job = np.searchsorted([job.first_id for job in jobs], ids, side="right") - 1
+        for at in np.unique(of_job):
+            own = ids[of_job == at]
+            starts = range(0, own.size, _MOST_AT_ONCE)
+            calls += [delayed(_whole, self.held, jobs[at], own[start : start + _MOST_AT_ONCE]) for start in starts]
+        tables = [*self.pool(calls), rows.filter(pa.array(~ok))]
+        return joined(tables, shown)
 
 
-def _finished(key: str, folder: Path | None, rules: Rules, table: pa.Table) -> FinishedJob:
+def _compute(held: Held, part: Part, folder: Path | None) -> FinishedPart:
+    """Compute a part, and write it if a folder is given."""
+    planned = held.value
+    tables = [run_job(job, planned.study, planned.rules) for job in part.jobs]
+    return _written(planned, part, folder, pa.concat_tables(tables).unify_dictionaries())
+
+
+def _written(planned: Planned, part: Part, folder: Path | None, table: pa.Table) -> FinishedPart:
     raise_if_stopped()
-    content = encoded(table)
-    part = content if folder is None else write_part(folder, key, ROWS, content)
-    return FinishedJob(part, report_rows(table, rules), _failed(table))
+    schema = planned.rules.schema
+    rows = table.select(schema.names).replace_schema_metadata(schema.metadata)
+    content = encoded_part(rows, part.key(planned.study, planned.fingerprint))
+    if folder is not None:
+        write_bytes(content, folder / part_name(part.number))
+    digest = hashlib.sha256(content).hexdigest()
+    shown = planned.selection.of_part(table)
+    return FinishedPart(digest, content if folder is None else None, shown, _failed(table))
+
+
+def _whole(held: Held, job: Job, ids: DesignNumbers) -> pa.Table:
+    """Compute all columns of some designs of a job."""
+    study, rules = held.value.study, held.value.rules
+    numbers = ids - job.first_id + job.start
+    at = Rows(study.spaces[job.space], job.scenario, numbers, ids, ids - job.first_id + job.first_filter)
+    return rows_of(at, study.setup(at.space, job.scenario), rules, rules.wanted)
 
 
 def _failed(table: pa.Table) -> int:
     return int(np.count_nonzero(~word_mask(table, "status", "ok")))
 
 
-def _quarantined(call: Call) -> list[FinishedJob]:
-    """Compute jobs whose worker died twice one by one; one that kills again by halves, down to the design."""
-    jobs, rules, folder = call[1]
-    return [_finished(key, folder, rules, _alone(job, setup, rules)) for job, key, setup in jobs]
+def _quarantined(call: Call) -> FinishedPart:
+    """Compute a part whose worker died twice job by job; one that kills again by halves, down to the design."""
+    held, part, folder = call[1]
+    tables = [_alone(job, held) for job in part.jobs]
+    return _written(held.value, part, folder, pa.concat_tables(tables).unify_dictionaries())
 
 
-def _alone(job: Job, setup: Setup, rules: Rules) -> pa.Table:
+def _alone(job: Job, held: Held) -> pa.Table:
     """Return the rows of a job, computed with no other; by halves if its worker dies, down to a row with its status."""
     try:
-        table: pa.Table = Workers(2).alone((run_job, (job, setup, rules), {}))
+        table: pa.Table = Workers(2).alone((_rows_of_job, (job, held), {}))
         return table
     except WorkerKilledError:
         if job.size == 1:
-            return failed_rows(job, rules, KILLED)
+            return failed_rows(job, held.value.study, held.value.rules, KILLED)
     first = job.size // 2
     middle = job.start + first
     second = replace(job, start=middle, first_id=job.first_id + first, first_filter=job.first_filter + first)
-    halves = [_alone(half, setup, rules) for half in (replace(job, stop=middle), second)]
+    halves = [_alone(half, held) for half in (replace(job, stop=middle), second)]
     return pa.concat_tables(halves).unify_dictionaries()
+
+
+def _rows_of_job(job: Job, held: Held) -> pa.Table:
+    return run_job(job, held.value.study, held.value.rules)
 
 
 def _first_failure(table: pa.Table) -> FailedDesignError:

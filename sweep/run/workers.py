@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import pickle
 import re
 import shutil
 import signal
@@ -14,6 +15,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -41,14 +43,40 @@ class WorkerKilledError(SweepError):
 
 
 @dataclass(frozen=True)
+class Held:
+    """Value that many calls share; `path`: file in which worker processes find it, None where calls carry it."""
+
+    value: Any
+    path: Path | None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (Held, (self.value, None)) if self.path is None else (_held, (self.path,))
+
+
+@lru_cache(maxsize=2)
+def _held(path: Path) -> Held:
+    return Held(pickle.loads(path.read_bytes()), path)
+
+
+@dataclass(frozen=True)
 class Workers:
     """Workers of a backend, each with one thread for its libraries.
 
-    `n_jobs`: workers on this machine, at most one for each core; those of a cluster are used as they are.
+    `n_jobs`: workers on this machine, at most one for each core; those of a cluster are used as they are. `folder`: a
+    temporary one for what worker processes of this machine share.
     """
 
     n_jobs: int
     backend: str = "loky"
+    folder: Path | None = None
+
+    def hold(self, value: Any) -> Held:
+        """Return a value that calls may name: worker processes on this machine read it once each."""
+        if self.folder is None:
+            return Held(value, None)
+        path = self.folder / f"{id(value)}.pickle"
+        path.write_bytes(pickle.dumps(value))
+        return Held(value, path)
 
     @property
     def count(self) -> int:
@@ -125,6 +153,7 @@ def workers(n_jobs: int, backend: str = "loky", scheduler: str | None = None) ->
     Raises SweepError if Dask is not installed, or its scheduler does not answer.
     """
     settings: dict[str, Any] = {}
+    folder: Path | None = None
     backend = backend_here(backend)
     _remove_what_the_dead_left()
     # These filters stay: joblib may warn of cancelled calls after a stop has left the block.
@@ -135,10 +164,11 @@ def workers(n_jobs: int, backend: str = "loky", scheduler: str | None = None) ->
             stack.enter_context(_client(scheduler))
         elif backend == "loky":
             _start_quiet_tracker()
+            folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="sweep-")))
             settings = {"inner_max_num_threads": 1, "initializer": _begin_worker, "initargs": (os.getpid(),)}
         stack.enter_context(threadpool_limits(limits=1))  # with one worker, and with threads, this process computes
         stack.enter_context(joblib.parallel_config(backend, **settings))
-        yield Workers(n_jobs, backend)
+        yield Workers(n_jobs, backend, folder)
 
 
 def backend_here(backend: str) -> str:

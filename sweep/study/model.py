@@ -21,6 +21,8 @@ from ..designs.space import Space
 from ..designs.technology import Technology
 from ..designs.tolerance import Tolerance
 from ..metrics.bound import Bound
+from ..metrics.columns.chromatic import CHROMATIC_CSD
+from ..metrics.columns.exposure import EXPOSURE
 from ..metrics.columns.tasks import PREFIX
 from ..metrics.objective import Objective, columns_of
 from ..metrics.quantity import Quantity, RequestedQuantities
@@ -28,7 +30,7 @@ from ..metrics.separation import csd_name
 from ..metrics.user_metrics import UserMetric
 from ..search.problem import Problem
 from ..spectra.colorants import Colorants
-from ..spectra.lights import Lights, Pair, class_pairs
+from ..spectra.lights import Lights, Pair, class_pairs, pair_name
 from ..spectra.spectrum import WavelengthGrid
 from ..spectra.tasks import StudyTasks
 from ..vision.section import SeededVision
@@ -103,6 +105,25 @@ class Study:
     def quantities(self) -> Mapping[str, Quantity]:
         """Quantities of the result table: those of a design, worst cases, a combined objective."""
         return columns_of(self.requested, self.objective)
+
+    @property
+    def swept_quantities(self) -> Mapping[str, Quantity]:
+        """Quantities of the rows of swept designs: those that the study asks for, or all."""
+        quantities = self.quantities
+        if self.section.columns == "all" or not any(space.kind == "sweep" for space in self.spaces):
+            return quantities
+        pair = quantities[self.trade_off[0]].pair
+        asked = {*self.constraints, *self.objective.weights, self.objective.column, *self.trade_off, EXPOSURE}
+        asked |= {quantities[name].of for name in asked}
+        if self.has_swept_tasks:
+            asked |= {name for name, quantity in quantities.items() if quantity.metric.startswith(PREFIX)}
+        return {
+            name: quantity
+            for name, quantity in quantities.items()
+            if name in asked
+            or (quantity.role and quantity.extreme in ("", "best place"))
+            or name == (pair and pair_name(CHROMATIC_CSD, pair))
+        }
 
     @property
     def requested(self) -> RequestedQuantities:

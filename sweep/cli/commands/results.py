@@ -129,12 +129,12 @@ def score(
 def report(context: typer.Context, folder: RunFolder) -> None:
     """Draw figures and report of a finished run again."""
     from ...report.sensors import report_sensors, runs_in
-    from ...results.inventory import Inventory
     from ...results.lock import locked
+    from ...results.manifest import Manifest
     from ..run import finish
 
     began_s = context.find_root().obj
-    if not Inventory(folder).runs:
+    if not Manifest(folder).runs:
         finish(folder, began_s)
         return
     with locked(folder):
@@ -143,7 +143,7 @@ def report(context: typer.Context, folder: RunFolder) -> None:
             raise OutputError(ValidationIssue("no finished run here", str(folder), allowed="`sweep run` of its study"))
         for run in runs:
             finish(run.folder, began_s, quiet=True)
-        for line in report_sensors(Inventory(folder), runs):
+        for line in report_sensors(Manifest(folder), runs):
             typer.echo(line)
 
 

@@ -135,7 +135,7 @@ def run(
     With --set they go to OUTPUT/<study>/KEY=VALUE.
 
     The same command continues an interrupted run, and replaces missing or damaged files.
-    Other files in the folder are kept; SHA256SUMS lists those of the run.
+    Other files in the folder are kept; manifest.json lists those of the run.
     If one study cannot be run, the others are.
     """
     from ...run import RunOptions

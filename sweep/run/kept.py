@@ -1,4 +1,4 @@
-"""Answers of a search that survive a kill: each is a part file (JSON) as soon as it is finished."""
+"""Answers of a search that survive a kill: each is a file as soon as it is finished."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, get_type_hints
 
 from ..base.types import Call
-from ..results.parts import ANSWER, Parts
+from ..results.answers import Answers
 from ..results.records import from_json, to_json
 from ..search.limit import Limit
 from .workers import Workers
@@ -23,7 +23,7 @@ class CachedCalls:
     """
 
     pool: Workers
-    parts: Parts
+    answers: Answers
     fingerprint: str
     _round: int = 0
     _limits: list[str] = field(default_factory=list)
@@ -44,7 +44,7 @@ class CachedCalls:
             while at not in finished:
                 number, answer = next(fresh)
                 finished[missing[number]] = answer
-                self.parts.save(keys[missing[number]], ANSWER, to_json(answer))
+                self.answers.save(keys[missing[number]], to_json(answer))
             if isinstance(finished[at], Limit):
                 self._limits.append(key)
             yield finished.pop(at)
@@ -52,11 +52,11 @@ class CachedCalls:
     def drop_limits(self) -> None:
         """Forget upper bounds that cannot be right, so that the same command computes them again."""
         while self._limits:
-            self.parts.forget(self._limits.pop())
+            self.answers.forget(self._limits.pop())
 
     def _answer(self, key: str, call: Call) -> Any:
         """Return the answer of an earlier, interrupted run, or None."""
-        content = self.parts.read(key)
+        content = self.answers.read(key)
         with suppress(ValueError):
             return None if content is None else from_json(get_type_hints(call[0])["return"], content)
         return None

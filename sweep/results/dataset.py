@@ -1,0 +1,88 @@
+"""Rows of a run: a Parquet dataset of parts, each written once, by the worker that computed it where that is possible.
+
+A part holds the key of what its rows depend on, and a checksum of each page: one that is missing, damaged or of other
+work is computed again.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from ..base.disk import is_real_folder, read_plain
+from ..base.errors import OutputError, ValidationIssue
+from .tables import RESULTS, encoded
+
+_PART = re.compile(r"part-(\d{8})\.parquet")
+_KEY = b"cfa_sweep_part"
+_MOST_BYTES = 2**31
+
+
+def part_name(number: int) -> str:
+    """Return the name of a part in the folder of a run."""
+    return f"{RESULTS}/part-{number:08}.parquet"
+
+
+def encoded_part(table: pa.Table, key: str) -> bytes:
+    """Return the file of a part."""
+    return encoded(table.replace_schema_metadata({**(table.schema.metadata or {}), _KEY: key.encode()}))
+
+
+def read_part(path: Path, key: str, schema: pa.Schema, rows: int) -> pa.Table | None:
+    """Return the rows of a part; None if it is not there, damaged, or of other work.
+
+    Size and schema are checked before rows are read, so that no more memory is taken than they need.
+    """
+    try:
+        file = pq.ParquetFile(pa.BufferReader(read_plain(path, _MOST_BYTES)), page_checksum_verification=True)
+        own = (file.schema_arrow.metadata or {}).get(_KEY) == key.encode()
+        if not own or file.metadata.num_rows != rows or not file.schema_arrow.equals(schema):
+            return None
+        return file.read().replace_schema_metadata(schema.metadata)
+    except (OSError, pa.ArrowException):
+        return None
+
+
+def part_paths(folder: Path) -> list[Path]:
+    """Return the parts in the folder of a run, in the order of their rows."""
+    inner = folder / RESULTS
+    names = sorted(path.name for path in inner.iterdir()) if is_real_folder(inner) else []
+    return [inner / name for name in names if _PART.fullmatch(name)]
+
+
+def refuse_others(folder: Path) -> None:
+    """Raise OutputError if something else has the name of the dataset."""
+    if os.path.lexists(folder / RESULTS) and not is_real_folder(folder / RESULTS):
+        raise OutputError(ValidationIssue("file not created by sweep; move it", str(folder / RESULTS)))
+
+
+def batches(folder: Path, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
+    """Yield the rows of a run, a part at a time.
+
+    `columns`: columns; left out, all of them. Raises OutputError if a part is damaged, or none is there.
+    """
+    paths = part_paths(folder)
+    if not paths:
+        raise OutputError(ValidationIssue("no rows here", str(folder / RESULTS)))
+    for path in paths:
+        try:
+            yield pq.ParquetFile(path, page_checksum_verification=True).read(columns)
+        except (OSError, pa.ArrowException) as error:
+            raise OutputError(ValidationIssue(f"cannot be read: {error}", str(path))) from None
+
+
+def rows_in(folder: Path) -> tuple[int, int]:
+    """Return the number of rows and parts of a run, without those that cannot be read."""
+    rows, parts = 0, 0
+    for path in part_paths(folder):
+        try:
+            rows += pq.read_metadata(path).num_rows
+            parts += 1
+        except (OSError, pa.ArrowException):
+            continue
+    return rows, parts
