@@ -187,7 +187,7 @@ class Electrons:
         if self._kept is None:
             part = self._products(self._modified, curves, self.setup.camera.modified)
         else:
-            qe = curves.reshape(len(curves), -1).astype(self._kept.dtype)
+            qe = curves.reshape(len(curves), -1)
             part = row_products(qe, self._kept).reshape(len(curves), *self.fixed.shape[:2], self._touched.size)
         rates[..., self._touched] += part
         return rates
@@ -241,7 +241,7 @@ class Electrons:
     def _along(self) -> Float[Array, "wavelengths products"]:
         """Weights of the one modified channel: white, background at each position, and what is kept."""
         assert self._kept is not None
-        white = self.light.white[:, None].astype(self._kept.dtype)
+        white = self.light.white[:, None]
         return np.concatenate([white, self.background[:, 0].T, self._kept], axis=1)
 
     def changing(self, block: Block) -> Changing | None:
@@ -275,7 +275,7 @@ class Electrons:
         fixed = np.ascontiguousarray(self.fixed[:, :, unit])
 
         def make(part: slice) -> Float[Array, "_designs cases channels"]:
-            values = rates[part].reshape(-1, *fixed.shape).astype(float)
+            values = rates[part].reshape(-1, *fixed.shape).copy()
             _expose(values, fixed, uniform[part], float(time_s[0]))
             return values
 

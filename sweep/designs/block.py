@@ -80,10 +80,10 @@ class CurveBlock:
     def product(
         self, weights: Float[Array, "_modified k"], nodes: Int[IndexArray, " nodes"]
     ) -> Float[Array, "designs k"]:
-        """Sum QE times weights, in the precision of the weights."""
+        """Sum QE times weights."""
         seen = self.qe if nodes.size == self.qe.shape[2] else self.qe[:, :, nodes]
         flat = seen.reshape(len(self.qe), -1)
-        return row_products(flat.astype(weights.dtype, copy=False), weights)
+        return row_products(flat, weights)
 
     def subset(self, which: Int[IndexArray, " which"] | slice) -> CurveBlock:
         """Return some of the designs."""

@@ -8,8 +8,8 @@ from ..base.types import Array, Float
 
 _FEW_TERMS = 8
 """Sums of so many products are taken one after the other, all rows at once."""
-_ROWS, _LANES = 64, 8
-"""Rows of each product, and what the number of its columns is a multiple of."""
+_ROWS, _LANES, _LARGE = 64, 8, 200_000
+"""Rows of each product, what the number of its columns is a multiple of, and numbers of a matrix for single rows."""
 
 
 def row_products(rows: Float[Array, "rows k"], matrix: Float[Array, "k others"]) -> Float[Array, "rows others"]:
@@ -24,13 +24,15 @@ def row_products(rows: Float[Array, "rows k"], matrix: Float[Array, "k others"])
         for at in range(1, len(matrix)):
             products += matrix[at][:, None] * columns[at]
         return np.asarray(products.T)
+    if matrix.size > _LARGE:  # few rows are multiplied by so many columns
+        return np.asarray(np.matmul(np.ascontiguousarray(rows)[:, None, :], matrix)[:, 0])
     n, wanted = len(rows), matrix.shape[1]
-    padded = np.zeros((len(matrix), -(-wanted // _LANES) * _LANES), dtype=matrix.dtype)
+    padded = np.zeros((len(matrix), -(-wanted // _LANES) * _LANES))
     padded[:, :wanted] = matrix
-    products = np.empty((n, wanted), dtype=np.result_type(rows, matrix))
+    products = np.empty((n, wanted))
     for start in range(0, n, _ROWS):
         block = np.ascontiguousarray(rows[start : start + _ROWS])
         if len(block) < _ROWS:
-            block = np.concatenate([block, np.zeros((_ROWS - len(block), block.shape[1]), dtype=block.dtype)])
+            block = np.concatenate([block, np.zeros((_ROWS - len(block), block.shape[1]))])
         products[start : start + _ROWS] = (block @ padded)[: n - start, :wanted]
     return products

@@ -6,6 +6,8 @@ nearest. They release the GIL. Sums keep their order, so results equal those of 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ..base.machine_code import njit
@@ -73,6 +75,36 @@ def nearest_chromatic_squared(response: FloatArray, bounds: IndexArray, out: Flo
                     best = smaller(best, nearest)
                 out[d, pair] = best
                 pair += 1
+
+
+@njit(cache=True, nogil=True)
+def nearest_scaled(response: FloatArray, first: IndexArray, second: IndexArray, out: FloatArray) -> None:
+    """Compute the smallest distance of two types whose squares a float does not hold; NaN if any difference is.
+
+    Differences are scaled by a power of two, which is exact.
+    """
+    for d in range(response.shape[0]):
+        best = np.inf
+        for i in first:
+            for j in second:
+                largest = 0.0
+                for c in range(response.shape[2]):
+                    difference = abs(response[d, i, c] - response[d, j, c])
+                    largest = largest if difference <= largest else difference
+                    best = difference if np.isnan(difference) else best
+                if largest < best:
+                    best = min(best, _scaled_length(response[d, i], response[d, j], largest))
+        out[d] = best
+
+
+@njit(cache=True, nogil=True)
+def _scaled_length(one: FloatArray, other: FloatArray, largest: float) -> float:
+    if largest == 0.0 or np.isinf(largest):
+        return largest
+    exponent, total = math.frexp(largest)[1], 0.0
+    for c in range(one.size):
+        total += math.ldexp(one[c] - other[c], -exponent) ** 2
+    return math.ldexp(math.sqrt(total), exponent)
 
 
 @njit(cache=True, nogil=True)

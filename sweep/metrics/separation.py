@@ -30,7 +30,7 @@ _BLOCK_PAIRS = 262_144
 MANY, MOST_CHANNELS = 64, 4
 """From so many designs of so few channels on, the compiled pass saves more time than it takes to load."""
 _LARGEST = 1e140
-"""Larger distances are computed without squares, DN."""
+"""Larger distances, and those below its inverse, are scaled before they are squared, DN."""
 
 
 def csd_name(pair: Pair) -> str:
@@ -57,10 +57,13 @@ def separation(
                 values = block[:, :, channel]
                 total += (values[:, first, None] - values[:, None, second]) ** 2
         distances[start : start + step] = np.sqrt(total.min(axis=(1, 2)))
-    odd = np.flatnonzero(distances > _LARGEST)
-    for designs, first_of_pair, second_of_pair in pair_blocks((len(odd), *response.shape[1:]), first, second):
-        differences = response[odd[designs]][:, first_of_pair] - response[odd[designs]][:, second_of_pair]
-        distances[odd[designs]] = np.hypot.reduce(differences, axis=2, initial=0.0).min(axis=1)
+    odd = np.flatnonzero(~((distances >= 1 / _LARGEST) & (distances <= _LARGEST)))
+    if odd.size:
+        from .nearest import nearest_scaled  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+        scaled = np.empty(odd.size)
+        nearest_scaled(response[odd], first, second, scaled)
+        distances[odd] = scaled
     return distances
 
 
@@ -145,7 +148,7 @@ def _distances(
     """Return the roots; non-finite designs and too large squares by `separation`."""
     distances = dict(zip(class_pairs(list(members)), np.sqrt(squared), strict=True))
     for (a, b), distance in distances.items():
-        recomputed = odd | ~(distance <= _LARGEST)
+        recomputed = odd | ~((distance >= 1 / _LARGEST) & (distance <= _LARGEST))
         if recomputed.any():
             distance[recomputed] = separation(response(recomputed), members[a], members[b])
     return distances

@@ -117,17 +117,15 @@ def test_two_modified_channels_within_rounding(scenario: dict[str, Any]) -> None
         assert_same(whole, slice(at, at + 1), evaluate(imager, curves[at : at + 1]), setup, magnitude_dn)
 
 
-@pytest.mark.parametrize("dtype", [np.float64, np.float32])
 @pytest.mark.parametrize(("k", "m"), thinned([(7, 3), (1, 1), (61, 51), (301, 1), (301, 51), (301, 2000), (602, 102)]))
-def test_products_of_rows(k: int, m: int, dtype: type) -> None:
+def test_products_of_rows(k: int, m: int) -> None:
     """Every row is multiplied by the same call, so that its bits are those that it has alone."""
     rng = np.random.default_rng(k + m)
-    rows, matrix = (rng.random(shape).astype(dtype) for shape in ((150, k), (k, m)))
+    rows, matrix = rng.random((150, k)), rng.random((k, m))
     whole = row_products(rows, matrix)
-    assert whole.dtype == dtype
     # An error of at most k roundings of a sum of positive numbers.
     exact = rows.astype(np.longdouble) @ matrix.astype(np.longdouble)
-    assert (np.abs(whole - exact) <= k * np.finfo(dtype).eps * exact).all()
+    assert (np.abs(whole - exact) <= k * np.finfo(float).eps * exact).all()
     np.testing.assert_array_equal(row_products(np.asfortranarray(rows), matrix), whole)
     for at in range(len(rows)):
         np.testing.assert_array_equal(row_products(rows[at : at + 1], matrix)[0], whole[at])
