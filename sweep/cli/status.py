@@ -56,10 +56,10 @@ def status_of(folder: Path, *, verify: bool = False) -> Status:
         if answers:
             lines.append(f"The search has {answers:,} answers.")
         values = {"designs": total, "finished_designs": done, "parts": parts, "search_answers": answers}
-    if finished or parts:
-        lines.append(
-            f"Files: {folder}/: {RESULTS}, which pandas.read_parquet reads{', ' + REPORT if finished else ''}."
-        )
+    if finished:
+        lines.append(f"Files: {folder}/: {RESULTS}, {REPORT}.")
+    elif parts:
+        lines.append(f"Finished parts: {folder / RESULTS}, which pandas.read_parquet reads.")
     if verify and not running:
         lines.append(f"ok: its {len(manifest.files)} files are as the run wrote them.")
     return Status(lines, {"folder": str(folder), "state": state, "verified": verify, **values})

@@ -27,6 +27,10 @@ MS = 1e3
 """Milliseconds per second."""
 _AT_ONCE = 50_000
 """Rows that are held before they are reduced."""
+_TIMES, _LEAST_SAMPLE = 8, 50
+"""Rows of a part that are taken into a sample, at most, of its share, and beside it."""
+_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
+"""2^64 over the golden ratio."""
 _COUNTED = ("kind", "scenario", "cfa", "status", "feasible")
 _Group = tuple[str, str, str, str, bool]
 
@@ -103,6 +107,16 @@ def even(size: int, most: int) -> Int[IndexArray, " numbers"]:
     return np.unique((golden * size).astype(np.intp))
 
 
+def sampled(swept: pa.Table, most: int) -> pa.Table:
+    """Return an even sample of swept rows, of those that are feasible and of the others each, the same in any parts."""
+    feasible, chosen = swept["feasible"].to_numpy(), []
+    order = swept["design_id"].to_numpy().astype(np.uint64) * _GOLDEN  # spread evenly, modulo 2^64
+    for group in (feasible, ~feasible):
+        at = np.flatnonzero(group)
+        chosen.append(at if at.size <= most else at[np.argpartition(order[at], most)[:most]])
+    return swept.take(np.sort(np.concatenate(chosen)))
+
+
 @dataclass(frozen=True)
 class Selection:
     """What is shown: columns that rank designs, the first one first, and the two of the front, all maximized."""
@@ -113,13 +127,9 @@ class Selection:
 
     def of_part(self, table: pa.Table) -> ShownRows:
         """Select the rows of a part that the whole run may show."""
-        swept = word_mask(table, "kind", SWEPT) & word_mask(table, "status", "ok")
-        feasible, samples = table["feasible"].to_numpy(), []
-        for group in (swept & feasible, swept & ~feasible):
-            at = np.flatnonzero(group)
-            most = -(-MOST_POINTS * int(np.count_nonzero(swept)) // max(1, self.n_swept))
-            samples.append(at[even(at.size, most)])
-        return ShownRows(self.reduced(table), table.take(np.sort(np.concatenate(samples))), counted(table))
+        swept = table.filter(pa.array(word_mask(table, "kind", SWEPT) & word_mask(table, "status", "ok")))
+        most = _LEAST_SAMPLE + _TIMES * MOST_POINTS * swept.num_rows // max(1, self.n_swept)
+        return ShownRows(self.reduced(table), sampled(swept, min(most, MOST_POINTS)), counted(table))
 
     def reduced(self, table: pa.Table) -> pa.Table:
         """Select front, best and leading rows of each CFA and scenario; what is no sweep is kept.
@@ -174,6 +184,8 @@ class Gathered:
         self._waiting.append(part.rows)
         self._samples.append(part.sample)
         self.counts += part.counts
+        if sum(table.num_rows for table in self._samples) > _AT_ONCE:
+            self._samples = [sampled(joined(self._samples, self.schema), MOST_POINTS)]
         if sum(table.num_rows for table in self._waiting) > _AT_ONCE:
             self._waiting = [self.selection.reduced(joined(self._waiting, self.schema))]
 
@@ -182,7 +194,7 @@ class Gathered:
         rows = self.selection.reduced(joined(self._waiting, self.schema))
         at = rows.schema.get_field_index("pareto")
         marked = rows.set_column(at, rows.schema.field(at), pa.array(self.selection.on_front(rows)))
-        return marked, joined(self._samples, self.schema)
+        return marked, sampled(joined(self._samples, self.schema), MOST_POINTS)
 
 
 def shown_rows(designs: pa.Table, pareto: pa.Table) -> pa.Table:

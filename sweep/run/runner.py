@@ -162,7 +162,7 @@ class _Run:
     def __post_init__(self) -> None:
         self.planned, self.answers = Planned.of(self.study), Answers(self.manifest.folder)
         self.rules, self.selection = self.planned.rules, self.planned.selection
-        self.sweep = Sweep(self.planned, self.manifest.folder, self.pool)
+        self.sweep = Sweep(self.planned, self.manifest.folder.absolute(), self.pool)
         self.gathered = Gathered(self.selection, self.rules.wanted_of_swept.schema)
 
     def make(self, wrong: set[str]) -> tuple[str, ...]:
@@ -211,12 +211,13 @@ class _Run:
         rows, sample = self.gathered.finish()
         of_parts = rows.filter(pa.array(~word_mask(rows, "kind", SEARCHED)))
         whole = pa.concat_tables([sweep.with_all_columns(of_parts), answered]).unify_dictionaries()
-        at = shown.get_field_index(ON_FRONT)
-        whole = whole.sort_by("design_id").set_column(at, shown.field(at), rows[ON_FRONT])
+        mark = shown.get_field_index(ON_FRONT)
+        whole = whole.sort_by("design_id").set_column(mark, shown.field(mark), rows[ON_FRONT])
         first = next(iter(self.study.scenarios))
         drawn = [select(whole, self.selection, first) for select in (drawn_rows, front_rows)]
-        others = sample.filter(pa.array(~np.isin(sample["design_id"].to_numpy(), whole["design_id"].to_numpy())))
-        designs = [whole.take(np.unique(np.concatenate(drawn))), others]
+        sampled, ids = sample["design_id"].to_numpy(), whole["design_id"].to_numpy()
+        at = np.unique(np.concatenate([*drawn, np.flatnonzero(np.isin(ids, sampled))]))
+        designs = [whole.take(at), sample.filter(pa.array(~np.isin(sampled, ids)))]
         self._write(DESIGNS, joined(designs, shown))
         self._write(PARETO, whole.filter(whole[ON_FRONT]))
         self.manifest.add(sweep.digests)

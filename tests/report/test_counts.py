@@ -129,7 +129,7 @@ def test_pandas_alone_reads_units_and_meanings(scenes: Output) -> None:
     table = pd.read_parquet(scenes.folder / "results.parquet")
     assert table.attrs["units"]["csd_yellow_red"] == "DN"
     assert table.attrs["meanings"]["csd_yellow_red"] == scenes.columns["csd_yellow_red"].meaning
-    field = pq.read_schema(scenes.folder / "results.parquet").field("exposure_s")
+    field = pq.read_schema(scenes.folder / "results.parquet" / "part-00000000.parquet").field("exposure_s")
     assert field.metadata[b"unit"] == b"s"
     assert field.metadata[b"meaning"]
     assert {*table.columns} - {*table.attrs["meanings"]} == {*scenes.parameters}

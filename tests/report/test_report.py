@@ -20,7 +20,7 @@ from sweep.report.scenes import scene_groups
 from sweep.report.series import scene_in_words
 from sweep.results.facts import CheckFacts
 from sweep.results.identity import CHUNK
-from sweep.run.rows import Job, jobs_of, rules_of, run_job
+from sweep.run.rows import Job, parts_of, rules_of, run_job
 from sweep.study import Study, load_study
 
 from ..build import large, ran, study_file
@@ -78,9 +78,9 @@ def test_every_scene_is_listed_once_with_its_largest_bound(finished: FinishedFol
 
 def test_a_job_of_several_chunks_has_their_rows(tmp_path: Path) -> None:
     study: Study = load_study(large(tmp_path, 20))
-    whole = next(job for job in jobs_of(study) if job.space.kind == "sweep")
+    whole = parts_of(study)[-1].jobs[0]
     assert whole.stop - whole.start > CHUNK
-    setup, rules = study.setup(whole.space, whole.scenario), rules_of(study)
+    rules = rules_of(study)
     parts = [
         Job(
             whole.space,
@@ -92,14 +92,14 @@ def test_a_job_of_several_chunks_has_their_rows(tmp_path: Path) -> None:
         )
         for start in range(0, whole.stop, CHUNK)
     ]
-    together = run_job(whole, setup, rules).to_pandas()
-    each = pd.concat([run_job(part, setup, rules).to_pandas() for part in parts], ignore_index=True)
+    together = run_job(whole, study, rules).to_pandas()
+    each = pd.concat([run_job(part, study, rules).to_pandas() for part in parts], ignore_index=True)
     pd.testing.assert_frame_equal(together.drop(columns="pareto"), each.drop(columns="pareto"), check_categorical=False)
 
 
 def test_a_small_study_has_one_chunk_per_job(tmp_path: Path) -> None:
     study = load_study(study_file(tmp_path))
-    assert all(job.stop - job.start <= CHUNK for job in jobs_of(study))
+    assert all(part.size <= CHUNK for part in parts_of(study))
 
 
 def test_a_dollar_in_a_name_is_no_formula() -> None:

@@ -30,7 +30,7 @@ scenarios:
   lens: {{optics: {{f_number: 1.6}}, off_axis_deg: 20, field: {{cra_deg: [0, 16, 20], places: any}}}}
   named: {{optics: {{f_number: 1.6, cra_deg: 16}}, off_axis_deg: 10.314104815618196}}
 """
-OF_MAPS = ("sensor_map.parquet", "figures/places-1.png")
+OF_MAPS = ("sensor_map.parquet", "figures/places-1.svg")
 
 
 def run_of(text: str, folder: Path) -> Path:
