@@ -22,7 +22,7 @@ from .setup import Setup
 
 _LEAST_E = 0.05
 """Electrons of the brightest pixel at the dimmest node beside dark."""
-_RATIO, _RATIO_OF_MANY = 1.25, 1.06
+_RATIO, _RATIO_OF_MANY = 1.25, 1.12
 """Ratio of neighboring nodes, and from where the first of many pixels is full."""
 _AROUND_KNEE = 6
 """Standard deviations of the noise on either side of a knee, of which each half has a node."""
@@ -100,6 +100,8 @@ class LampReadings:
         """Return the mean of each channel, DN, as of `moments`."""
         if not self.proportional:
             return self.moments(signals, factors)[0]
+        if self.noisy:
+            return self._of_table(signals, factors, spread=False)[0]
         full_e, curves = self._full_e_at(signals, factors), self.pixel_curves()
         mean = curves[0][0].mean(full_e)
         for curve, at in curves[1:]:
@@ -113,21 +115,32 @@ class LampReadings:
 
         `factors`: brightnesses of each of the `signals`.
         """
+        if self.proportional and self.noisy:
+            return self._of_table(signals, factors, spread=True)
         if self.proportional:
-            full_e, curves = self._full_e_at(signals, factors), self.pixel_curves()
-            mean, variance = curves[0][0].moments(full_e)
-            for curve, at in curves[1:]:
-                mean[..., at], variance[..., at] = curve.moments(full_e[..., at])
+            mean = self.means(signals, factors)
+            return mean, np.zeros(mean.shape)
+        electrons = self.lit_e[:, signals, None] * factors[..., None] + self.dark_e[:, None, None]
+        pixel, light = self.readout.pixel, self.light[:, None, None]
+        if self.noisy:
+            values = merged(electrons, light, pixel)
+            mean, variance = values.mean, values.variance
         else:
-            electrons = self.lit_e[:, signals, None] * factors[..., None] + self.dark_e[:, None, None]
-            pixel, light = self.readout.pixel, self.light[:, None, None]
-            if self.noisy:
-                values = merged(electrons, light, pixel)
-                mean, variance = values.mean, values.variance
-            else:
-                mean = without_noise(electrons, light, pixel, rounds=False)
-                variance = np.zeros(mean.shape)
+            mean = without_noise(electrons, light, pixel, rounds=False)
+            variance = np.zeros(mean.shape)
         return mean @ self.readout.weights[0], variance @ self.readout.spread_weights[0]
+
+    def _of_table(
+        self, signals: Int[IndexArray, " signals"], factors: Float[Array, "signals factors"], *, spread: bool
+    ) -> tuple[Float[Array, "signals factors channels"], Float[Array, "signals factors channels"]]:
+        """Return mean and variance from the tables of noisy pixels; the variance is empty if not asked for."""
+        (lit_e, dark_e), weights = self.full_e, (self.readout.weights[0], self.readout.spread_weights[0])
+        shape = (*factors.shape, weights[0].shape[1])
+        mean, variance = np.zeros(shape), np.zeros(shape if spread else (0, *shape[1:]))
+        for curve, at in self.pixel_curves():
+            of_pixels = weights[0][at], weights[1][at]
+            curve.table.add_moments(lit_e[signals][:, at], dark_e[at], factors, of_pixels, mean, variance)
+        return mean, variance
 
     def by_electrons(
         self, signals: Int[IndexArray, " values"], factors: PerValue

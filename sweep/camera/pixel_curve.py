@@ -65,11 +65,11 @@ class PixelCurve:
 
     def mean(self, electrons: SameShape) -> SameShape:
         """Return the mean, DN."""
-        return self._table.look_up(electrons, 0) if self.noisy else self._noiseless(electrons)
+        return self.table.look_up(electrons, 0) if self.noisy else self._noiseless(electrons)
 
     def moments(self, electrons: SameShape) -> tuple[SameShape, SameShape]:
         """Return mean, DN, and variance, DN^2."""
-        spread = self._table.look_up(electrons, 1) if self.noisy else np.zeros(electrons.shape)
+        spread = self.table.look_up(electrons, 1) if self.noisy else np.zeros(electrons.shape)
         return self.mean(electrons), np.maximum(spread, 0.0)
 
     def slopes(self, electrons: SameShape) -> tuple[SameShape, SameShape]:
@@ -78,7 +78,7 @@ class PixelCurve:
             linear = unquantized(electrons, self.pixel.read_once)
             inside = np.abs(self._noiseless(electrons) - linear) <= 1e-9 * np.maximum(linear, 1.0)
             return np.asarray(self.pixel.dn_per_e * inside, dtype=float), np.zeros(electrons.shape)
-        last = np.sqrt(self._table.last_e)
+        last = np.sqrt(self.table.last_e)
         root = np.clip(np.sqrt(np.maximum(electrons, 0.0)), _LEAST_ROOT, last)
         by_mean, by_variance = np.where(root < last, np.moveaxis(self._by_root(root), -1, 0) / (2 * root), 0.0)
         return by_mean, by_variance
@@ -91,7 +91,8 @@ class PixelCurve:
         return merge.without_noise(electrons * light, light, pixel, rounds=False)
 
     @property
-    def _table(self) -> table.MomentTable:
+    def table(self) -> table.MomentTable:
+        """Mean and variance of a noisy pixel over its electrons."""
         return _merged(self.pixel, self.light) if self.pixel.captures else _read_once(self.pixel)
 
     @cached_property
@@ -99,8 +100,8 @@ class PixelCurve:
         """Derivatives of both moments by the root of the electrons, on the last axis."""
         from scipy.interpolate import PPoly  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
-        pieces = self._table.coefficients.T
-        return PPoly(pieces, self._table.nodes).derivative()
+        pieces = self.table.coefficients.T
+        return PPoly(pieces, self.table.nodes).derivative()
 
 
 @lru_cache(maxsize=16)

@@ -86,8 +86,8 @@ class BrightnessCurves:
         return self.lamps.means(np.arange(self.lamps.n_signals), self._nodes)
 
     @cached_property
-    def _variances(self) -> Float[Array, "signals factors channels"]:
-        return self.lamps.moments(np.arange(self.lamps.n_signals), self._nodes)[1]
+    def _moments(self) -> tuple[Float[Array, "signals factors channels"], Float[Array, "signals factors channels"]]:
+        return self.lamps.moments(np.arange(self.lamps.n_signals), self._nodes)
 
     def nearest(
         self,
@@ -106,7 +106,7 @@ class BrightnessCurves:
         reading = np.concatenate([np.repeat(first, second.size), np.repeat(second, first.size)])
         curve = np.tile([*np.tile(second, first.size), *np.tile(first, second.size)], self._scales.size)
         reading = (reading + self.lamps.n_signals * np.arange(self._scales.size)[:, None]).ravel()
-        curves = self._means, self._variances if noise else self._means
+        curves = self._moments if noise else (self._means, self._means)
         return self._on(curves, self._nodes, reading, curve, curve, noise=noise, margin=margin, nearest=nearest)
 
     def refined(self, found: Nearest, *, noise: bool) -> Nearest:

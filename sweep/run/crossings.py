@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 _LEAST = 1e-300
 _CLOSE = 1e-3
 """Tolerance of the number: relative, or of the interval."""
+_STEPS = 3
+"""Numbers between two neighboring scenarios at which an error that may come back is computed."""
 _NEAR = 2.5
 """Between two scenarios whose d' are both so many times the allowed one, or less, errors are not looked for."""
 _SCHEMA = pa.schema(
@@ -123,7 +125,7 @@ def crossings_of(
         passes = (known[low] <= allowed) != (known[high] <= allowed)
         if not passes and (dprimes[:2].min() > _NEAR * dprimes[2] or dprimes[:2].max() * _NEAR < dprimes[2]):
             continue
-        grid = [low, *inner_numbers([low, high])[1:-1], high]
+        grid = [low, *inner_numbers([low, high], _STEPS)[1:-1], high]
         grid = [number for number in grid if not math.isnan(decades(number))]
         for before, after in pairwise(grid):
             if (decades(before) <= 0) == (decades(after) <= 0):
