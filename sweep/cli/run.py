@@ -47,7 +47,7 @@ def run_one(
     data: Path | None,
     output: Path,
     jobs: int | None,
-    backend: str,
+    backend: str | None,
     scheduler: str | None,
     dry_run: bool,
     options: runner.RunOptions,
@@ -70,13 +70,13 @@ def run_one(
         if not quiet:
             typer.echo(f"Note: {text}", err=True)
 
-    if backend not in runner.BACKENDS:
+    if backend not in (None, *runner.BACKENDS):
         allowed = ", ".join(runner.BACKENDS)
         raise SweepError(ValidationIssue("unknown backend", key="--backend", value=backend, allowed=allowed))
-    if (usable := backend_here(backend)) != backend:
-        note("no shared memory for processes here (/dev/shm): threads compute the same rows.")
-        backend = usable
     study = load_study(path, data, changes=changes, allow_code=allow_code, member=member)
+    wanted = backend or runner.usual_backend(study)
+    if (backend := backend_here(wanted)) != wanted:
+        note("no shared memory for processes here (/dev/shm): threads compute the same rows.")
     folder, n_workers = output / folder_name(study.name), jobs or os.cpu_count() or 1
     if member is None:
         folder, other = runner.output_folder(folder / changed_name(changes), run_facts(study))
@@ -99,7 +99,7 @@ def run_one(
         audit_again(folder, data)
         if quiet and member is None and not as_json:  # else it ends the summary
             typer.echo(folder)
-        parallel, silent = pool if computed and backend != "dask" else in_turn, quiet or member is not None
+        parallel, silent = pool if computed and backend == "loky" else in_turn, quiet or member is not None
         facts = finish(folder, began_s, repair=True, parallel=parallel, as_json=as_json, quiet=silent)
     if opens and member is None and not webbrowser.open((folder / REPORT).absolute().as_uri()):
         note(f"no browser was found for {folder / REPORT}.")

@@ -10,7 +10,7 @@ from ..base.modules import lazy_import
 if TYPE_CHECKING:
     from ..results.folder import output_folder
     from .dry_run import remaining_work, remaining_work_lines
-    from .runner import run_study
+    from .runner import run_study, usual_backend
     from .sweep import RunOptions
     from .workers import BACKENDS, stopped_by_signals
 
@@ -22,6 +22,7 @@ __all__ = [
     "remaining_work_lines",
     "run_study",
     "stopped_by_signals",
+    "usual_backend",
 ]
 __getattr__ = lazy_import(
     globals(),
@@ -30,6 +31,7 @@ __getattr__ = lazy_import(
         "RunOptions": ".sweep",
         "output_folder": "..results.folder",
         "run_study": ".runner",
+        "usual_backend": ".runner",
         "stopped_by_signals": ".workers",
         "remaining_work": ".dry_run",
         "remaining_work_lines": ".dry_run",

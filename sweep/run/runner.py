@@ -76,6 +76,8 @@ from .workers import Workers, stopped_by_signals, workers
 if TYPE_CHECKING:
     import pandas as pd
 
+_FEW = 64
+"""Designs that threads compute."""
 _CHECK_S, _CHECK_SHARE = 1.0, 0.1
 """Time of the check at the end of a run: seconds, or a share of the run, whichever is longer."""
 
@@ -99,6 +101,14 @@ def _whole(study: Study) -> set[str]:
     return names
 
 
+def usual_backend(study: Study) -> str:
+    """Return threads for so few designs that processes would take longer to start, else processes."""
+    section, scenes = study.section, study.scenarios.values()
+    heavy = study.search is not None or study.states or section.vision is not None or section.population is not None
+    own = section.metrics or section.effects or study.n_designs > _FEW or len(scenes) > 1
+    return "loky" if heavy or own or any(scene.target is not None for scene in scenes) else "threading"
+
+
 def run_study(
     study: Study,
     output: Path,
@@ -106,7 +116,7 @@ def run_study(
     progress: Progress,
     command: Sequence[str] = (),
     *,
-    backend: str = "loky",
+    backend: str | None = None,
     scheduler: str | None = None,
     options: RunOptions = RunOptions(),  # noqa: B008  (a frozen value)
     pool: Workers | None = None,
@@ -114,8 +124,8 @@ def run_study(
     """Run a study into a folder, or continue a stopped run; a finished one is only repaired.
 
     A table of the report that is missing or damaged is made again from the rows that it shows. Where rows, the
-    search's tables or provenance are, all of it is, but for parts that are whole. `pool`: workers; left out, they are
-    started.
+    search's tables or provenance are, all of it is, but for parts that are whole. `pool`: workers; left out, those of
+    `backend` are started.
 
     Raises OutputError: the folder is in use, holds another study or files of others, or cannot be written. Raises
     InfeasibleError: the search finds no feasible design; nothing is left behind. Raises FailedDesignError: a design
@@ -134,6 +144,7 @@ def run_study(
             wrong.add(PROVENANCE)
         if not wrong:
             return ()
+        backend = backend or usual_backend(study)
         with nullcontext(pool) if pool is not None else workers(n_jobs, backend, scheduler) as own:
             how = {"command": list(command), "workers": own.count, "backend": own.backend, "scheduler": scheduler}
             run = _Run(study.with_plans(), manifest, own, progress, options, started, how)

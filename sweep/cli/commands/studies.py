@@ -119,7 +119,10 @@ def run(
     data: DataFolder = None,
     output: Outputs = Path("outputs"),
     jobs: Annotated[int | None, typer.Option(min=1, help="Workers.", show_default="all cores")] = None,
-    backend: Annotated[str, typer.Option(help="loky (processes), threading, or dask (a cluster).")] = "loky",
+    backend: Annotated[
+        str | None,
+        typer.Option(help="loky (processes), threading, or dask (a cluster); by default what is faster."),
+    ] = None,
     scheduler: Annotated[str | None, typer.Option(help="Of Dask: tcp://HOST:PORT.", show_default=False)] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Print the work to do, and do nothing.")] = False,
     fail_fast: Annotated[bool, typer.Option("--fail-fast", help="Stop at the first design that fails.")] = False,
