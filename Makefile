@@ -8,7 +8,7 @@
 # make tables              print the tables of studies/guide/reference.md and outputs/README.md anew
 # make gallery              run every study, draw studies/figures and studies/guide/gallery.md anew (15 minutes)
 # make docs                  build guide and API reference as HTML, outputs/docs/studies/guide/index.html
-# make bench                 measure speed, JSON in outputs/bench
+# make bench                 measure speed, ratios beside those of the last bench, JSON in outputs/bench
 PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
   $$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
 VENV := .venv
@@ -62,6 +62,7 @@ docs: $(VENV)/.ready-docs
 	@echo "Documentation: outputs/docs/studies/guide/index.html"
 
 bench: $(VENV)/.ready-bench
+	$(ONE_THREAD) $(BIN)/python tests/bench_ratios.py
 	$(ONE_THREAD) $(BIN)/python tests/bench.py $(ARGS)
 	$(ONE_THREAD) $(BIN)/python tests/bench_search.py $(ARGS)
 

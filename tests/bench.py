@@ -24,6 +24,7 @@ import joblib
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from bench_ratios import BLOCK, median_s
 from build import large
 from scipy.signal import fftconvolve
 from scipy.spatial.distance import cdist
@@ -45,20 +46,7 @@ from sweep.study import Study, load_study
 
 ROOT = Path(__file__).parent.parent
 OUTPUT = ROOT / "outputs" / "bench"
-BLOCK = 4096
-REPEATS = 7
 SCRIPTED = 2000
-
-
-def median_s(work: Callable[[], object], repeats: int = REPEATS) -> float:
-    """Median wall time of `work`, once warm."""
-    work()
-    times = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        work()
-        times.append(time.perf_counter() - start)
-    return statistics.median(times)
 
 
 def script(setup: Setup, target: np.ndarray, points: np.ndarray) -> np.ndarray:
