@@ -78,7 +78,7 @@ if TYPE_CHECKING:
 
 _FEW = 64
 """Designs that threads compute."""
-_CHECK_S, _CHECK_SHARE = 1.0, 0.1
+_CHECK_S, _CHECK_SHARE = 0.5, 0.05
 """Time of the check at the end of a run: seconds, or a share of the run, whichever is longer."""
 
 
