@@ -1,4 +1,4 @@
-"""Files of a finished run that someone changed, lists included: what the reading of them says then."""
+"""Files of a finished run that someone changed, its manifest included: what the reading of them says then."""
 
 from __future__ import annotations
 
@@ -8,16 +8,15 @@ from pathlib import Path
 import numpy as np
 
 from sweep.base.disk import digest_of
-from sweep.results.inventory import Inventory
+from sweep.results.manifest import Manifest
 from sweep.results.records import to_json
 from sweep.search.problem import Evaluation, SearchRun
 
 
 def listed_anew(folder: Path) -> None:
     """List the files of a run as they are now."""
-    inventory = Inventory(folder)
-    inventory.files = {name: digest_of(folder / name) for name in inventory.files}
-    inventory._save()
+    manifest = Manifest(folder)
+    manifest.add({name: digest_of(folder / name) for name in manifest.files})
 
 
 def hostile() -> list[bytes]:

@@ -21,6 +21,7 @@ STUDY = stopband_study(
     "audited",
     "{left_nm: [600, 610], left_width_nm: 20, right_nm: [640, 650], right_width_nm: 10}",
     before="""\
+columns: all
 wavelengths: {step_nm: 5}
 pixel: {offset_dn: 168}
 scenarios: {chart: {}, dim: {exposure: {kind: white_patch, level: 0.3}}}
@@ -32,35 +33,36 @@ production: {edge_shift_nm: 2}
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, pd.DataFrame]:
+def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, pd.DataFrame, set[int]]:
     folder = tmp_path_factory.mktemp("audit")
     (folder / "audited.yaml").write_text(STUDY)
     study = load_study(folder / "audited.yaml")
     run_study(study, folder / "out", 1, lambda *_: None)
-    return study, pd.read_parquet(folder / "out" / "results.parquet")
+    rows, front = (pd.read_parquet(folder / "out" / f"{name}.parquet") for name in ("results", "pareto"))
+    return study, rows, {*front["design_id"]}
 
 
-def test_every_csd_is_compared(run: tuple[Study, pd.DataFrame]) -> None:
-    study, frame = run
-    assert audit_rows(study, [frame]).issues == []
+def test_every_csd_is_compared(run: tuple[Study, pd.DataFrame, set[int]]) -> None:
+    study, frame, front = run
+    assert audit_rows(study, [frame], front).issues == []
     has_error_bound = [name for name, quantity in study.quantities.items() if quantity.has_error_bound]
     assert [name for name in has_error_bound if name.startswith("worst_")]
-    row = sampled(frame).index[-1]
+    row = sampled(frame, front).index[-1]
     for name in has_error_bound:
         for wrong in (frame.loc[row, name] + 6, np.nan):
             changed = frame.copy()
             changed.loc[row, name] = wrong
-            found = audit_rows(study, [changed])
+            found = audit_rows(study, [changed], front)
             assert list(found.broken["design_id"]) == [frame.loc[row, "design_id"]]
             assert list(found.broken["quantity"]) == [name]
             assert f"design {frame.loc[row, 'design_id']}: {name} is off" in str(found.issues[0])
 
 
-def test_progress_counts_all_that_is_recomputed(run: tuple[Study, pd.DataFrame]) -> None:
-    study, frame = run
+def test_progress_counts_all_that_is_recomputed(run: tuple[Study, pd.DataFrame, set[int]]) -> None:
+    study, frame, front = run
     calls: list[tuple[str, int, int]] = []
-    found = audit_rows(study, [frame.iloc[:5], frame.iloc[5:]], lambda *call: calls.append(call))
-    total = len(sampled(frame))
+    found = audit_rows(study, [frame.iloc[:5], frame.iloc[5:]], front, lambda *call: calls.append(call))
+    total = len(sampled(frame, front))
     assert total == len(found.rows) >= 5
     assert {(phase, n) for phase, _, n in calls} == {("designs computed again", total)}
     assert [done for _, done, _ in calls] == sorted({done for _, done, _ in calls})

@@ -26,6 +26,8 @@ def test_stopband_makes_its_files(stopband: tuple[Path, list[str]]) -> None:
     made = {path.name for path in folder.iterdir()} - {".lock"}
     assert made == {
         "results.parquet",
+        "designs.parquet",
+        "pareto.parquet",
         "search.parquet",
         "curves.parquet",
         "points.parquet",
@@ -39,8 +41,7 @@ def test_stopband_makes_its_files(stopband: tuple[Path, list[str]]) -> None:
         "front.parquet",
         "study.resolved.yaml",
         "provenance.json",
-        "run.json",
-        "SHA256SUMS",
+        "manifest.json",
         "pareto.png",
         "pareto.svg",
         "report.html",
@@ -61,7 +62,7 @@ def test_summary_is_true_and_short(stopband: tuple[Path, list[str]]) -> None:
 
 def test_report_stands_alone(stopband: tuple[Path, list[str]]) -> None:
     page = (stopband[0] / "report.html").read_text()
-    assert page.count("data:image/png;base64,") >= 4
+    assert page.count("data:image/svg+xml;base64,") >= 4
     own = page.replace(str(script("plotly-gl2d.min.js")), "")  # what that may ask for, the page's policy forbids
     assert "default-src 'none'" in own
     assert "http://" not in own

@@ -13,6 +13,7 @@ from scipy.spatial.distance import cdist
 from sweep.base.errors import OutputError, SweepError
 from sweep.cli.audit import audit_output
 from sweep.cli.export import export_design, relative_transmission
+from sweep.results.dataset import part_paths
 from sweep.spectra.builtin.surrogate import surrogate_parameters
 from sweep.spectra.filter_files import HINTS, color_hints, csv_text, isetcam_mat, unique_names
 from sweep.spectra.formats import read_curves
@@ -39,7 +40,7 @@ lights:
 @pytest.fixture(scope="module")
 def tiny(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("export")
-    ran(load_study(study_file(folder, 3)), folder / "tiny", 1)
+    ran(load_study(study_file(folder, 3), changes={"columns": "all"}), folder / "tiny", 1)
     return folder / "tiny"
 
 
@@ -166,13 +167,14 @@ def test_a_row_that_was_tampered_with_is_refused(tiny: Path, tmp_path: Path) -> 
     from shutil import copytree
 
     copytree(tiny, tmp_path / "run")
-    frame = pd.read_parquet(tmp_path / "run" / "results.parquet")
-    assert frame["design_id"].iloc[30] not in set(pd.read_parquet(tiny / "curves.parquet")["design_id"])
+    part = next(path for path in part_paths(tmp_path / "run") if 30 in set(pd.read_parquet(path)["design_id"]))
+    frame = pd.read_parquet(part).set_index("design_id", drop=False)
+    assert 30 not in set(pd.read_parquet(tiny / "curves.parquet")["design_id"])
     frame.loc[30, "right_nm"] += 1
     status = frame["status"].astype(object)
-    status[31] = "error: KeyError: x"
+    status.loc[31] = "error: KeyError: x"
     frame["status"] = status.astype("category")
-    frame.to_parquet(tmp_path / "run" / "results.parquet", index=False)
+    frame.to_parquet(part, index=False)
     listed_anew(tmp_path / "run")
     with pytest.raises(OutputError, match="the sensitivity differs from the run"):
         export_design(tmp_path / "run", "30", None, None)
@@ -193,7 +195,7 @@ def test_unknown_keys_are_one_line(tiny: Path, tmp_path: Path) -> None:
         assert len(caught.value.issues) == 1
         assert words in str(caught.value)
         assert caught.value.exit_code == 2
-    for folder, to in ((tmp_path, None), (tiny, tiny / "run.json")):
+    for folder, to in ((tmp_path, None), (tiny, tiny / "manifest.json")):
         with pytest.raises(OutputError):
             export_design(folder, "best", None, to)
     code, _, said = commanded("export", tiny, "--design", "mime", "--to", tmp_path)

@@ -7,7 +7,6 @@ import json
 import os
 import pickle
 import shutil
-import subprocess
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -19,10 +18,11 @@ import pytest
 from sweep.base.errors import OutputError
 from sweep.cli.status import status_of
 from sweep.report import make_report, read_output
+from sweep.results.answers import ANSWERS
+from sweep.results.dataset import part_name, part_paths
 from sweep.results.identity import run_facts
-from sweep.results.inventory import Inventory
-from sweep.results.parts import PARTS, Parts
-from sweep.results.tables import RUN, SUMS
+from sweep.results.manifest import Manifest
+from sweep.results.tables import MANIFEST
 from sweep.run import output_folder, run_study
 from sweep.study import Study, load_study
 
@@ -42,13 +42,14 @@ search: {starts: 1, max_evaluations: 20, front: {min: 0.8, max: 0.9, count: 2}}
 recognition: {states: [green, yellow, red]}
 published: {Table 2: {RGGB: {csd_yellow_red: 138}}}
 """,
+    cfas="[RGGB, RYYCy, RYNCy]",
 )
-TABLES = ("results", "search", "front", "curves", "points")
-FILES = (
-    *(f"{name}.parquet" for name in (*TABLES, "audit", "paper_comparison")),
-    *("study.resolved.yaml", "provenance.json", "report.html", "pareto.png", "figures/sensor.svg", SUMS),
-)
+PART = part_name(2)
 DRAWN = ("report.html", "pareto.png", "figures/sensor.svg", "paper_comparison.parquet")
+FILES = (
+    *(PART, "designs.parquet", "pareto.parquet", "search.parquet", "front.parquet", "curves.parquet", "points.parquet"),
+    *("audit.parquet", "study.resolved.yaml", "provenance.json", *DRAWN),
+)
 
 
 def cut(path: Path) -> None:
@@ -65,8 +66,26 @@ def emptied(path: Path) -> None:
     path.write_bytes(b"")
 
 
-DAMAGES = (cut, flipped, emptied)
-FAST = {("results.parquet", flipped), ("points.parquet", cut), ("report.html", emptied)}
+def swapped(first: Path, second: Path) -> None:
+    """Of as many rows, so that only their keys tell that they are of other work."""
+    content = first.read_bytes()
+    first.write_bytes(second.read_bytes())
+    second.write_bytes(content)
+
+
+def other_bits(*paths: Path) -> None:
+    """Files that PyArrow reads as before, since it does not look at their first bytes."""
+    for path in paths:
+        path.write_bytes(b"Q" + path.read_bytes()[1:])
+
+
+def removed(path: Path) -> None:
+    path.unlink()
+
+
+DAMAGES = (cut, flipped, emptied, removed)
+COMPUTED_AGAIN = "was damaged on the disk and is computed again"
+FAST = {(PART, flipped), (PART, removed), ("points.parquet", cut), ("report.html", emptied)}
 
 
 @pytest.fixture(scope="module")
@@ -78,12 +97,14 @@ def whole_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         draw_nothing(patch)
         assert commanded("run", base / "small.yaml", "--output", base / "outputs", "--jobs", 1)[0] == 0
         assert commanded("audit", base / "outputs" / "small")[0] == 0
-    assert {*FILES, RUN} <= {*Inventory(base / "outputs" / "small").files, SUMS}
+    assert {*FILES} <= Manifest(base / "outputs" / "small").files.keys()
     return base
 
 
-def same_tables(folder: Path, other: Path) -> bool:
-    return all((folder / f"{name}.parquet").read_bytes() == (other / f"{name}.parquet").read_bytes() for name in TABLES)
+def tables(folder: Path) -> dict[str, bytes]:
+    """Rows and tables of a run; an audit goes with rows that are made again."""
+    found = [path for path in folder.rglob("*.parquet") if path.is_file() and path.name != "audit.parquet"]
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in found}
 
 
 @pytest.mark.usefixtures("plain_pictures")
@@ -103,103 +124,53 @@ def test_a_damaged_file_is_never_served_and_the_same_command_makes_it_again(
     damage(folder / file)
     code, _, said = commanded("status", folder, "--verify")
     assert code == 2
-    if file != SUMS:
-        assert [line.split(": ")[1] for line in said.splitlines()] == [str(folder / file)]
-    if file not in (*DRAWN, SUMS):
+    assert [line.split(": ")[1] for line in said.splitlines()] == [str(folder / file)]
+    if file == PART:
+        for command in ("audit", folder), ("export", folder, "--design", "7"):
+            code, out, said = commanded(*command)
+            assert (code, out, said.count("\n")) == (2, "", 1), command
+            assert "results.parquet" in said
+    elif file not in DRAWN:
         for command in ("report", folder), ("export", folder, "--design", "best"), ("compare", folder, folder):
             if file != "audit.parquet" or command[0] == "report":
                 code, out, said = commanded(*command)
                 assert (code, out) == (2, ""), command
                 assert file in said
     assert commanded("run", tmp_path / "small.yaml", "--output", folder.parent, "--jobs", 1)[0] == 0
-    assert same_tables(folder, whole_folder / "outputs" / "small")
+    assert tables(folder) == tables(whole_folder / "outputs" / "small")
     assert commanded("status", folder, "--verify")[0] == 0
-    assert not (folder / PARTS).exists()
 
 
-@pytest.mark.parametrize("damage", DAMAGES)
-def test_a_run_whose_run_json_is_damaged_is_read_with_a_note_and_repaired(
+@pytest.mark.usefixtures("plain_pictures")
+@pytest.mark.parametrize("damage", [swapped, other_bits])
+def test_parts_that_can_be_read_but_differ_are_computed_again(
+    whole_folder: Path, tmp_path: Path, damage: Callable[[Path, Path], None]
+) -> None:
+    shutil.copytree(whole_folder, tmp_path, dirs_exist_ok=True)
+    folder = tmp_path / "outputs" / "small"
+    first, second = part_paths(folder)[:2]
+    damage(first, second)
+    code, _, said = commanded("status", folder, "--verify")
+    assert (code, [line.split(": ")[1] for line in said.splitlines()]) == (2, [str(first), str(second)])
+    assert commanded("run", tmp_path / "small.yaml", "--output", folder.parent, "--jobs", 1)[0] == 0
+    assert tables(folder) == tables(whole_folder / "outputs" / "small")
+    assert (folder / "provenance.json").read_text().count(COMPUTED_AGAIN) == 2
+    assert commanded("status", folder, "--verify")[0] == 0
+
+
+@pytest.mark.parametrize("damage", [cut, flipped, emptied])
+def test_a_run_of_which_nothing_is_known_is_not_touched(
     whole_folder: Path, tmp_path: Path, damage: Callable[[Path], None]
 ) -> None:
     shutil.copytree(whole_folder, tmp_path, dirs_exist_ok=True)
     folder = tmp_path / "outputs" / "small"
-    damage(folder / RUN)
-    code, _, said = commanded("status", folder)
-    assert (code, said.count("\n"), "run.json: is damaged; `sweep run`" in said) == (2, 1, True)
-    for command in ("report", folder), ("export", folder, "--design", "best"), ("compare", folder, folder):
-        code, out, _ = commanded(*command)
-        assert (code, f"Note: not verified, since lists of {folder} are damaged: run.json;" in out) == (0, True), (
-            command
-        )
-    code, _, said = commanded("run", tmp_path / "small.yaml", "--output", folder.parent, "--jobs", 1)
-    assert (code, "nothing was computed" in said) == (0, True)
-    assert same_tables(folder, whole_folder / "outputs" / "small")
-    code, out, _ = commanded("status", folder, "--verify")
-    assert (code, "ok: its" in out) == (0, True)
-    assert RUN in Inventory(folder).files
-
-
-@pytest.mark.usefixtures("plain_pictures")
-def test_an_emptied_list_hides_no_finished_run(whole_folder: Path, tmp_path: Path) -> None:
-    shutil.copytree(whole_folder, tmp_path, dirs_exist_ok=True)
-    folder = tmp_path / "outputs" / "small"
-    emptied(folder / SUMS)
-    code, out, _ = commanded("export", folder, "--design", "best")
-    assert (code, "Note: not verified" in out, "results.parquet" in out) == (0, True, True)
-    assert commanded("run", tmp_path / "small.yaml", "--output", folder.parent, "--jobs", 1)[0] == 0
-    assert same_tables(folder, whole_folder / "outputs" / "small")
-    assert commanded("status", folder, "--verify")[0] == 0
-    assert RUN in Inventory(folder).files
-
-
-@pytest.mark.usefixtures("plain_pictures")
-@pytest.mark.parametrize(
-    ("name", "other"), [("figures/chart.png", "figures/other.png"), ("pareto.png", "pareto-9.png")]
-)
-def test_a_renamed_entry_of_the_list_loses_no_figure(whole_folder: Path, tmp_path: Path, name: str, other: str) -> None:
-    shutil.copytree(whole_folder, tmp_path, dirs_exist_ok=True)
-    folder = tmp_path / "outputs" / "small"
-    before = (folder / SUMS).read_text()
-    assert before.count(f"  {name}\n") == 1
-    (folder / SUMS).write_text(before.replace(f"  {name}\n", f"  {other}\n"))
-    assert commanded("status", folder, "--verify")[0] == 2
-    assert commanded("run", tmp_path / "small.yaml", "--output", folder.parent, "--jobs", 1)[0] == 0
-    assert (folder / name).read_bytes()
-    assert commanded("status", folder, "--verify")[0] == 0
-    assert Inventory(folder).files.keys() == {line.split()[1] for line in before.splitlines()}
-
-
-def test_a_run_of_which_nothing_is_known_is_not_touched(whole_folder: Path, tmp_path: Path) -> None:
-    shutil.copytree(whole_folder, tmp_path, dirs_exist_ok=True)
-    folder = tmp_path / "outputs" / "small"
-    for name in (RUN, SUMS, "provenance.json"):
-        emptied(folder / name)
+    damage(folder / MANIFEST)
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     for command in ("status", folder), ("report", folder), ("run", tmp_path / "small.yaml", "--output", folder.parent):
         code, _, said = commanded(*command)
         assert (code, said.count("\n")) == (2, 1)
-        assert "run.json: is damaged, so that nothing is known of the run" in said
+        assert f"{MANIFEST}: is damaged, so that nothing is known of the run; move its folder away" in said
     assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
-
-
-def test_parts_whose_names_are_swapped_are_computed_again(plain: Study, whole: pd.DataFrame, tmp_path: Path) -> None:
-    parts = half_done(plain, tmp_path).paths("parquet")
-    first, second = parts[:2]
-    keys, digests = zip(*(path.stem.split("-") for path in (first, second)), strict=True)
-    assert len({*keys}) == len({*digests}) == 2
-    first.rename(first.with_name("kept"))
-    second.rename(second.with_name(f"{keys[0]}-{digests[1]}.parquet"))
-    first.with_name("kept").rename(first.with_name(f"{keys[1]}-{digests[0]}.parquet"))
-    ran(plain, tmp_path, 1)
-    pd.testing.assert_frame_equal(rows(tmp_path), whole)
-    assert (tmp_path / "provenance.json").read_text().count("was damaged on the disk and is computed again") == 2
-
-
-def test_the_list_of_digests_is_in_the_form_of_sha256sum(whole_folder: Path) -> None:
-    folder = whole_folder / "outputs" / "small"
-    done = subprocess.run(["sha256sum", "--strict", "-c", SUMS], cwd=folder, capture_output=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert len(done.stdout.splitlines()) == len(Inventory(folder).files) > 15
 
 
 @pytest.mark.usefixtures("plain_pictures")
@@ -223,15 +194,15 @@ def test_a_cut_study_says_how_to_mend_it(whole_folder: Path, tmp_path: Path) -> 
 
 
 def test_damaged_parts_are_computed_again_and_named(plain: Study, whole: pd.DataFrame, tmp_path: Path) -> None:
-    parts = half_done(plain, tmp_path)
-    large = [path for path in parts.paths("parquet") if path.stat().st_size > 10_000]
-    flipped(large[0])
-    cut(large[1])
-    (tmp_path / PARTS / ".tmp-1-0123456789abcdef.parquet").write_bytes(b"x")
+    first, second = [path for path in half_done(plain, tmp_path) if path.stat().st_size > 50_000][:2]
+    flipped(first)
+    cut(second)
+    left = first.with_name(f".tmp-1-{first.name}")
+    left.write_bytes(b"x")
     ran(plain, tmp_path, 1)
     pd.testing.assert_frame_equal(rows(tmp_path), whole)
-    assert (tmp_path / "provenance.json").read_text().count("was damaged on the disk and is computed again") == 2
-    assert not (tmp_path / PARTS).exists()
+    assert (tmp_path / "provenance.json").read_text().count(COMPUTED_AGAIN) == 2
+    assert not left.exists()
 
 
 def test_an_output_that_cannot_be_written_is_one_line(plain: Study, tmp_path: Path) -> None:
@@ -252,11 +223,10 @@ def test_a_run_of_another_version_names_it(whole_folder: Path, tmp_path: Path) -
         read_output(folder)
 
 
-def test_without_run_json_files_of_a_run_s_names_are_others(whole_folder: Path, tmp_path: Path) -> None:
+def test_without_a_manifest_files_of_a_run_s_names_are_others(whole_folder: Path, tmp_path: Path) -> None:
     shutil.copytree(whole_folder, tmp_path, dirs_exist_ok=True)
     folder = tmp_path / "outputs" / "small"
-    for name in (RUN, SUMS):
-        (folder / name).unlink()
+    (folder / MANIFEST).unlink()
     study = load_study(tmp_path / "small.yaml")
     assert output_folder(folder, run_facts(study))[0] == folder.with_name("small-2")
     with pytest.raises(OutputError, match="file not created by sweep"):
@@ -288,17 +258,16 @@ def interrupted(study: Study, folder: Path) -> list[Path]:
 
     with pytest.raises(StoppedError):
         run_study(study, folder, 1, stop)
-    parts = sorted((folder / PARTS).iterdir())
-    assert {path.suffix for path in parts} == {".json", ".parquet"}
-    return parts
+    parts, answers = part_paths(folder), sorted((folder / ANSWERS).iterdir())
+    assert parts
+    assert answers
+    return [*parts, *answers]
 
 
 def planted(path: Path, content: bytes) -> None:
-    """Other content under a part's key, with its right digest."""
-    path.unlink()
-    key = path.name.split("-")[0]
-    digest = hashlib.sha256(key.encode() + content).hexdigest()[:32]
-    path.with_name(f"{key}-{digest}{path.suffix}").write_bytes(content)
+    """Other content in the place of a part, or of an answer with its right digest."""
+    digest = hashlib.sha256(path.stem.encode() + content).hexdigest().encode() + b"\n"
+    path.write_bytes(content if path.suffix == ".parquet" else digest + content)
 
 
 class Bomb:
@@ -353,22 +322,10 @@ def test_names_in_the_list_that_lead_out_of_the_folder_are_not_followed(small: S
     outside, folder = tmp_path / "outside", tmp_path / "out"
     outside.write_text("precious")
     ran(small, folder, 1)
-    digest = hashlib.sha256(b"precious").hexdigest()
-    with (folder / SUMS).open("a") as sums:
-        sums.write(f"{digest}  ../outside\n{digest}  {outside}\n{digest}  figures/../../outside\n\xff")
-    assert not [name for name in Inventory(folder).files if "outside" in name]
+    names = ("../outside", f"{outside}", "figures/../../outside", "results.parquet/../../outside")
+    Manifest(folder).add(dict.fromkeys(names, hashlib.sha256(b"precious").hexdigest()))
     make_report(read_output(folder))
+    cut(folder / part_name(0))
+    ran(small, folder, 1)
     assert outside.read_text() == "precious"
     assert status_of(folder, verify=True).lines[-1].startswith("ok")
-
-
-def test_a_link_for_the_folder_of_parts_is_refused(small: Study, tmp_path: Path) -> None:
-    folder, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
-    folder.mkdir()
-    elsewhere.mkdir()
-    (folder / PARTS).symlink_to(elsewhere)
-    with pytest.raises(OutputError, match=f"{PARTS}: folder not created by sweep"):
-        Parts(folder)
-    with pytest.raises(OutputError, match=f"{PARTS}: folder not created by sweep"):
-        ran(small, folder, 1)
-    assert list(elsewhere.iterdir()) == []

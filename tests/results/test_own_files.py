@@ -9,18 +9,18 @@ from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
-import pyarrow.parquet as pq
 import pytest
 
 from sweep.base.errors import OutputError
 from sweep.cli.audit import audit_output
 from sweep.cli.status import status_of
 from sweep.report import make_report, read_output
+from sweep.results.answers import ANSWERS
+from sweep.results.dataset import part_name, rows_in
 from sweep.results.identity import run_facts
-from sweep.results.inventory import Inventory
 from sweep.results.lock import LOCK, locked
-from sweep.results.parts import PARTS, ROWS, Parts
-from sweep.results.tables import RUN, is_drawn, is_of_run
+from sweep.results.manifest import Manifest
+from sweep.results.tables import RESULTS, is_drawn, is_of_run
 from sweep.run import output_folder, run_study
 from sweep.study import Study, load_study
 
@@ -30,7 +30,7 @@ from ..conftest import FinishedFolder
 from ..mischief import rows
 
 NAMES = (
-    *("results.parquet", "curves.parquet", "provenance.json", "SHA256SUMS", "study.resolved.yaml"),
+    *("results.parquet", "curves.parquet", "provenance.json", "designs.parquet", "study.resolved.yaml"),
     *("report.html", "pareto.png", "figures/sensor.svg", "audit.parquet", "paper_comparison.csv", "search.parquet"),
 )
 
@@ -76,8 +76,7 @@ def test_a_foreign_file_is_reported_and_stays(few: Study, tmp_path: Path, name: 
 def test_other_files_of_the_folder_stay(few: Study, tmp_path: Path) -> None:
     mine = (
         "notes.md",
-        "parts/mine.txt",
-        "parts/data.parquet",
+        "answers/mine.json",
         "figures/mine.png",
     )
     for name in mine:
@@ -98,7 +97,7 @@ def outside(tmp_path: Path) -> Path:
 
 
 @pytest.mark.usefixtures("plain_pictures")
-@pytest.mark.parametrize("name", [LOCK, PARTS, "figures"])
+@pytest.mark.parametrize("name", [LOCK, ANSWERS, RESULTS, "figures"])
 def test_a_link_in_the_place_of_a_run_folder_is_reported(few: Study, tmp_path: Path, name: str) -> None:
     target, folder = outside(tmp_path), tmp_path / "out"
     folder.mkdir()
@@ -134,7 +133,7 @@ def test_links_in_the_place_of_files_are_replaced_not_followed(
     target, folder = outside(tmp_path), tmp_path / "out"
     ran(few, folder, 1)
     make_report(read_output(folder))
-    for name in ("results.parquet", "report.html", "figures/chart.png"):
+    for name in (part_name(0), "report.html", "figures/chart.svg"):
         (folder / name).unlink()
         (folder / name).symlink_to(target / "precious.txt")
     ran(few, folder, 1)
@@ -157,9 +156,9 @@ def test_names_that_reports_give_are_known(finished: FinishedFolder, study: str)
     """A picture of a new name is to be added to the names of a run's files."""
     folder = finished(study)
     drawn = [path for path in folder.rglob("*") if path.suffix in (".png", ".svg", ".html")]
-    assert len(drawn) > 10
+    assert len(drawn) > 8
     assert all(is_drawn(path.relative_to(folder).as_posix()) for path in drawn)
-    assert all(map(is_of_run, Inventory(folder).files.keys() - {RUN}))
+    assert all(map(is_of_run, Manifest(folder).files))
 
 
 @pytest.mark.usefixtures("plain_pictures")
@@ -205,11 +204,11 @@ def test_wherever_the_disk_refuses_nothing_finished_is_lost(
                 ran(study, folder, 1)
         assert len(caught.value.issues) == 1
         assert not list(folder.rglob(".tmp-*"))
-        kept = sum(pq.read_metadata(path).num_rows for path in Parts(folder).paths(ROWS))
+        kept, _ = rows_in(folder)
         seen = ran(study, folder, 1)
         counts = [done for phase, done, _ in seen if phase == "designs"]
         assert counts[:1] in ([], [kept])
-        assert not (folder / PARTS).exists()
+        assert not (folder / ANSWERS).exists()
         pd.testing.assert_frame_equal(rows(folder), rows(tmp_path / "expected"))
         assert status_of(folder, verify=True).lines[-1].startswith("ok")
 

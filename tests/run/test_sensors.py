@@ -13,6 +13,7 @@ from scipy.special import ndtr
 from sweep.base.errors import StudyError
 from sweep.camera.curve_errors import CurveErrors, drawn_curves
 from sweep.camera.sensor import BUILT_IN_SENSORS
+from sweep.results.dataset import part_paths
 from sweep.search.limit import limit_of
 from sweep.search.solver import smooth_evaluation
 from sweep.spectra.builtin.data_sets.tl16 import lights
@@ -316,13 +317,13 @@ def test_a_plain_run_is_not_overwritten(tmp_path: Path) -> None:
     path = tmp_path / "few.yaml"
     path.write_text(plain)
     assert commanded("run", path, "--output", tmp_path / "out", "--jobs", 1, "--quiet")[0] == 0
-    before = (tmp_path / "out" / "few" / "results.parquet").read_bytes()
+    before = [path.read_bytes() for path in part_paths(tmp_path / "out" / "few")]
     path.write_text(SEVERAL)
     code, out, err = commanded("run", path, "--output", tmp_path / "out", "--jobs", 1, "--dry-run")
     assert (code, "out/few holds another study of this name (of one sensor)" in err) == (0, True)
     assert "Results go to" in out
     assert "few-2" in out
-    assert (tmp_path / "out" / "few" / "results.parquet").read_bytes() == before
+    assert [path.read_bytes() for path in part_paths(tmp_path / "out" / "few")] == before
 
 
 def test_one_that_fails_does_not_stop_the_others(tmp_path: Path) -> None:

@@ -149,7 +149,7 @@ def test_the_shell_completes_studies_and_runs(tmp_path: Path, monkeypatch: pytes
         "studies/one.yaml",
         "studies/two.yml",
         "studies/[x].yaml",
-        "outputs/one/run.json",
+        "outputs/one/manifest.json",
         "outputs/none/x.txt",
     ):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)

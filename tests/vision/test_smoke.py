@@ -21,7 +21,7 @@ from sweep.report import study_of
 from sweep.report.page import _vision_drawings
 from sweep.report.vision import NETWORK, OBSERVER, benchmark_of, ranks_of
 from sweep.report.vision_report import vision_sentences
-from sweep.results.inventory import Inventory
+from sweep.results.manifest import Manifest
 from sweep.results.output import Output, read_output
 from sweep.results.tables import VISION, VISION_TABLES
 from sweep.run.vision import vision_designs
@@ -127,7 +127,7 @@ def test_the_report_has_its_figures(folder: Path) -> None:
     page = (folder / "report.html").read_text()
     assert "Images of traffic lights" in page
     assert "Rank correlation" in page
-    assert {f"figures/vision-{name}.png" for name in ("errors", "ranks", "street")} <= Inventory(folder).files.keys()
+    assert {f"figures/vision-{name}.svg" for name in ("errors", "ranks", "street")} <= Manifest(folder).files.keys()
 
 
 def test_its_drawings_are_plain_values(output: Output) -> None:
