@@ -13,8 +13,8 @@ import pytest
 
 from sweep.designs.families.stopband import MultiStopband
 from sweep.designs.space import Filter
+from sweep.results.dataset import part_paths
 from sweep.results.identity import CHUNK
-from sweep.results.parts import Parts
 from sweep.run import run_study
 from sweep.study import Study
 
@@ -62,8 +62,8 @@ class StoppedError(Exception):
     pass
 
 
-def half_done(study: Study, folder: Path) -> Parts:
-    """A run that was broken off after two whole chunks."""
+def half_done(study: Study, folder: Path) -> list[Path]:
+    """The parts of a run that was broken off after two whole chunks."""
 
     def stop(phase: str, done: int, _total: int) -> None:
         if phase == "designs" and done > 2 * CHUNK:
@@ -71,4 +71,4 @@ def half_done(study: Study, folder: Path) -> Parts:
 
     with pytest.raises(StoppedError):
         run_study(study, folder, 1, stop)
-    return Parts(folder)
+    return part_paths(folder)

@@ -16,8 +16,8 @@ from sweep.camera.pixel import Pixel
 from sweep.metrics.columns.sensitivity import CFA_SENSITIVITY
 from sweep.metrics.quantity import Column
 from sweep.report.price import _row
-from sweep.results.parts import Parts
-from sweep.run.answers import CachedCalls
+from sweep.results.answers import Answers
+from sweep.run.kept import CachedCalls
 from sweep.run.workers import Workers
 
 
@@ -121,7 +121,7 @@ class Pool(Workers):
 def test_answers_of_one_round_are_not_those_of_another(tmp_path: Path) -> None:
     first, again = Pool(), Pool()
     for pool in (first, again):
-        cached = CachedCalls(pool, Parts(tmp_path), "a")  # type: ignore[arg-type]
+        cached = CachedCalls(pool, Answers(tmp_path), "a")  # type: ignore[arg-type]
         assert list(cached([(answer_of, (1,), {}), (answer_of, (2,), {})])) == [1, 2]
         assert list(cached([(answer_of, (3,), {}), (answer_of, (4,), {})])) == [3, 4]
     assert (first.calls, again.calls) == (4, 0)

@@ -14,9 +14,9 @@ import pytest
 from sweep.base.errors import FailedDesignError, OutputError, SweepError
 from sweep.cli.status import status_of
 from sweep.report import make_report, read_output
+from sweep.results.answers import ANSWERS
 from sweep.results.identity import CHUNK, run_facts
 from sweep.results.lock import locked
-from sweep.results.parts import ANSWER, PARTS, ROWS, Parts
 from sweep.run import RunOptions, output_folder, remaining_work, remaining_work_lines, run_study
 from sweep.run.sweep import KILLED
 from sweep.run.workers import Workers, workers
@@ -40,11 +40,7 @@ def unharmed(fewer: Study, tmp_path_factory: pytest.TempPathFactory) -> pd.DataF
     """What a mischievous study gives when its file is missing."""
     folder = tmp_path_factory.mktemp("unharmed")
     ran(mischievous(fewer, folder / "missing"), folder, 1)
-    return pd.read_parquet(folder / "results.parquet")
-
-
-def kept_rows(parts: Parts) -> int:
-    return sum(pq.read_metadata(path).num_rows for path in parts.paths(ROWS))
+    return rows(folder)
 
 
 @pytest.mark.slow
@@ -60,7 +56,7 @@ def test_a_worker_that_is_killed_once_costs_nothing(fewer: Study, unharmed: pd.D
 @pytest.mark.long
 @pytest.mark.parametrize("scenes", ["a", "abcd"])
 def test_a_design_that_kills_its_worker_is_a_row(plain: Study, tmp_path: Path, scenes: str) -> None:
-    """Of four scenes or more, two workers compute whole ones."""
+    """In one part with other designs, or with those of other scenes."""
     wish = tmp_path / "wish"
     wish.write_text("kill 1000000 ")
     few = replace(plain, scenarios=dict.fromkeys(scenes, plain.scenarios["chart"]))
@@ -72,10 +68,9 @@ def test_a_design_that_kills_its_worker_is_a_row(plain: Study, tmp_path: Path, s
     killed = found["left_nm"] == 590
     assert list(found.loc[killed, "status"]) == [KILLED] * len(scenes)
     assert found.loc[killed, "csd_yellow_red"].isna().all()
-    assert not found.loc[killed, ["feasible", "pareto"]].any(axis=None)
-    same = [name for name in found.columns if name != "pareto"]
+    assert not found.loc[killed, "feasible"].any()
     words = {"status": str}  # the word of the killed rows is no category of the others
-    pd.testing.assert_frame_equal(found.loc[~killed, same].astype(words), fine.loc[~killed, same].astype(words))
+    pd.testing.assert_frame_equal(found[~killed].astype(words), fine[~killed].astype(words))
 
 
 def test_failing_designs_stop_a_run_or_are_tried_again(fewer: Study, unharmed: pd.DataFrame, tmp_path: Path) -> None:
@@ -120,31 +115,25 @@ def test_a_named_design_that_fails_is_a_row(
     make_report(read_output(tmp_path / "out"))
 
 
-def test_status_of_a_run(plain: Study, tmp_path: Path) -> None:
+def test_status_and_dry_run_count_finished_designs(plain: Study, tmp_path: Path) -> None:
+    folder, all_rows = tmp_path / "out", f"{plain.n_designs:,}"
     with pytest.raises(OutputError, match="no run here"):
-        status_of(tmp_path)
-    done = kept_rows(half_done(plain, tmp_path))
-    lines = status_of(tmp_path).lines
-    assert lines[0].startswith(f"interrupted; the same command continues: {done:,} of {plain.n_designs:,} designs")
-    assert len(pd.read_parquet(tmp_path / PARTS)) == done  # readable while it runs
-    with locked(tmp_path):
-        lines = status_of(tmp_path).lines
-        assert lines[0].startswith("running")
-    ran(plain, tmp_path, 1)
-    assert status_of(tmp_path).lines[0].startswith(f"finished: {plain.n_designs:,} designs in ")
-
-
-def test_dry_run_counts_finished_designs(plain: Study, tmp_path: Path) -> None:
-    found = remaining_work(plain, tmp_path / "out", 1)
-    assert found.finished == 0
-    assert not (tmp_path / "out").exists()
-    kept = kept_rows(half_done(plain, tmp_path / "out"))
-    found = remaining_work(plain, tmp_path / "out", 2)
-    assert found.finished == kept
-    assert f": {kept:,} finished, {plain.n_designs - kept:,} in " in next(remaining_work_lines(found, tmp_path))
-    ran(plain, tmp_path / "out", 1)
-    first, *_, last = remaining_work_lines(remaining_work(plain, tmp_path / "out", 1), tmp_path)
-    assert first.endswith(f"{plain.n_designs:,} rows: {plain.n_designs:,} finished, 0 in 0 chunks to compute.")
+        status_of(folder)
+    assert remaining_work(plain, folder).finished == 0
+    assert not folder.exists()
+    half_done(plain, folder)
+    done = len(rows(folder))  # readable while it runs
+    lines = status_of(folder).lines
+    assert lines[0].startswith(f"interrupted; the same command continues: {done:,} of {all_rows} designs")
+    found = remaining_work(plain, folder)
+    assert found.finished == done
+    assert f": {done:,} finished, {plain.n_designs - done:,} in " in next(remaining_work_lines(found, tmp_path))
+    with locked(folder):
+        assert status_of(folder).lines[0].startswith("running")
+    ran(plain, folder, 1)
+    assert status_of(folder).lines[0].startswith(f"finished: {all_rows} designs in ")
+    first, *_, last = remaining_work_lines(remaining_work(plain, folder), tmp_path)
+    assert first.endswith(f"{all_rows} rows: {all_rows} finished, 0 in 0 chunks to compute.")
     assert last.endswith("nothing was computed or written.")
 
 
@@ -154,7 +143,7 @@ def test_dry_run_lists_the_work_and_computes_no_design(tmp_path: Path, monkeypat
     path.write_text(path.read_text().replace("starts: 4, max_evaluations: 200", requested))
     monkeypatch.setattr("sweep.run.sweep.run_job", None)
     study = load_study(path)
-    found = remaining_work(study, tmp_path / "out", 1)
+    found = remaining_work(study, tmp_path / "out")
     _, search, front, *effects, _ = remaining_work_lines(found, tmp_path / "out")
     assert search == "Search: 4 starts, 40 evaluations at most."
     assert front == "Its front: 3 levels, 100 evaluations at most."  # two starts each, and one from each neighbor
@@ -244,7 +233,7 @@ def test_a_search_that_was_killed_is_not_repeated(tmp_path: Path) -> None:
 
     with pytest.raises(StoppedError):
         run_study(study, tmp_path / "out", 1, stop)
-    kept = {path: path.stat().st_mtime_ns for path in Parts(tmp_path / "out").paths(ANSWER)}
+    kept = {path: path.stat().st_mtime_ns for path in (tmp_path / "out" / ANSWERS).iterdir()}
     assert len(kept) == 2
     seen: list[dict[Path, int]] = []
 

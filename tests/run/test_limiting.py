@@ -13,10 +13,9 @@ import pytest
 
 from sweep.camera.forward import forward_model
 from sweep.metrics.nearest import nearest_pairs
-from sweep.results import thinning
+from sweep.results import shown
 from sweep.results.designs import row_curves
 from sweep.results.tables import LIMITED_BY
-from sweep.results.thinning import even, swept_points
 from sweep.run import details
 from sweep.run.runner import files_of
 from sweep.study import Study, load_study
@@ -100,21 +99,17 @@ def test_workers_and_routes_change_no_light(study: Study, tmp_path: Path, monkey
 
 
 @pytest.mark.slow
-def test_of_many_designs_those_alone_that_are_drawn_have_lights(
+def test_of_many_designs_those_alone_that_are_shown_have_lights(
     study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(thinning, "MOST_POINTS", 5)
+    for name in ("MOST_POINTS", "BEST_PER_CFA"):
+        monkeypatch.setattr(shown, name, 5)
     ran(study, tmp_path / "out", 1)
     rows = rows_with_lights(tmp_path / "out")
-    swept = rows[rows["kind"] == "sweep"]
-    points = swept_points(tmp_path / "out" / "results.parquet")
-    front = swept[swept["feasible"] & swept["pareto"]]
-    rest = swept.drop(front.index)
-    expected = [own["design_id"].iloc[even(len(own), 5)] for own in (rest[rest["feasible"]], rest[~rest["feasible"]])]
-    assert list(points) == sorted(pd.concat([front["design_id"], *expected]))
-    known = swept[swept["limited_by_yellow_red"].notna()]["design_id"]
-    assert set(points) <= set(known)
-    assert len(known) < N_SWEPT
+    known = rows[(rows["kind"] == "sweep") & rows["limited_by_yellow_red"].notna()]["design_id"]
+    tables = pd.concat(pd.read_parquet(tmp_path / "out" / name) for name in ("pareto.parquet", "designs.parquet"))
+    assert set(known) == set(tables.loc[tables["kind"] == "sweep", "design_id"])
+    assert 10 <= len(known) < N_SWEPT
     assert LIMITED_BY in files_of(study)
 
 

@@ -17,6 +17,7 @@ from sweep.base.user_code import UserCode
 from sweep.camera.linear import linear_model
 from sweep.metrics.smooth import SmoothDesign
 from sweep.report import make_report, read_output
+from sweep.results.dataset import part_paths
 from sweep.results.dictionary import KEYS
 from sweep.run import run_study
 from sweep.study import Study, load_study
@@ -61,7 +62,7 @@ def test_a_csd_written_again_has_the_same_numbers_and_the_same_optimum(tmp_path:
     }
     assert kept["apart"]["unit"] == "DN"
     assert kept["red_spread"]["direction"] == "less"
-    assert pq.read_schema(tmp_path / "own" / "results.parquet").field("apart").type == "double"
+    assert pq.read_schema(part_paths(tmp_path / "own")[0]).field("apart").type == "double"
 
 
 @pytest.mark.slow
@@ -127,7 +128,7 @@ def test_a_run_that_is_stopped_goes_on_and_other_code_is_another_study(tmp_path:
 
     with pytest.raises(InterruptedRunError):
         run_study(made, tmp_path / "some", 1, stop)
-    assert not (tmp_path / "some" / "results.parquet").exists()
+    assert not (tmp_path / "some" / "provenance.json").exists()
     run_study(made, tmp_path / "some", 1, lambda *_: None)
     run_study(made, tmp_path / "whole", 1, lambda *_: None)
     pd.testing.assert_frame_equal(rows_of(tmp_path / "some"), rows_of(tmp_path / "whole"), check_exact=True)
@@ -220,14 +221,15 @@ def test_a_design_that_the_metric_fails_on_costs_a_row(tmp_path: Path) -> None:
         "    def of(",
         "    def bad(self, readings):\n        return self.name and abs(readings.dn[:, 0, -1] - EDGE).min() < 1e-9\n\n    def of(",
     )
-    made = study(tmp_path, OWN_METRIC.partition("search:")[0])
+    text = OWN_METRIC.partition("search:")[0] + "columns: all\n"
+    made = study(tmp_path, text)
     run_study(made, tmp_path / "all", 1, lambda *_: None)
     space = next(space for space in made.spaces if space.kind == "sweep")
     setup = made.plan("chart") and made.setup(space, "chart")
     from sweep.camera.forward import forward_model
 
     edge = forward_model(setup).read(space.curves(space.points(3, 4), made.grid.size))[0][0, 0, 0, -1]
-    bad = study(tmp_path, OWN_METRIC.partition("search:")[0], f"EDGE = {edge!r}\n".replace("np.float64(", "(") + code)
+    bad = study(tmp_path, text, f"EDGE = {edge!r}\n".replace("np.float64(", "(") + code)
     run_study(bad, tmp_path / "some", 1, lambda *_: None)
     found = rows_of(tmp_path / "some")
     failed = found[found["status"] != "ok"]

@@ -45,7 +45,7 @@ def test_a_run_is_interrupted_and_continued(tmp_path: Path) -> None:
     paths = str(path), str(tmp_path / "out")
     first = subprocess.run([sys.executable, "-c", INTERRUPTED, *paths], capture_output=True, text=True, check=False)
     assert "InterruptedRunError" in first.stderr
-    assert list((tmp_path / "out" / "tiny" / "parts").iterdir())
+    assert list((tmp_path / "out" / "tiny" / "results.parquet").iterdir())
     done = subprocess.run([sys.executable, "-c", CONTINUED, *paths], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "out" / "tiny" / "report.html").exists()

@@ -67,7 +67,7 @@ def test_an_audit_notices_a_wrong_row_in_any_csd(road: tuple[Study, Path]) -> No
     few = frame[(frame["kind"] == "reference") & (frame["scenario"] == "road distance_m=250")]
     for column in ("csd_yellow_red", "best_phase_csd_yellow_red"):
         wrong = few.assign(**{column: few[column] + 6})
-        found = audit_rows(study, [wrong])
+        found = audit_rows(study, [wrong], ())
         assert len(found.broken) == len(few) == 1
         assert set(found.broken["quantity"]) == {column}
 
@@ -78,14 +78,14 @@ def test_sampled_rows_are_the_front_and_a_hundredth() -> None:
         {
             "design_id": range(n),
             "kind": ["sweep"] * n,
-            "pareto": [i % 5000 == 7 for i in range(n)],
             "status": ["ok"] * n,
         }
     )
-    chosen = sampled(frame)
-    assert chosen["pareto"].sum() == 10
+    front = range(7, n, 5000)
+    chosen = sampled(frame, front)
+    assert chosen["design_id"].isin(front).sum() == 10
     assert 400 < len(chosen) < 600
-    assert list(sampled(frame)["design_id"]) == list(chosen["design_id"])
+    assert list(sampled(frame, front)["design_id"]) == list(chosen["design_id"])
 
 
 @pytest.mark.usefixtures("plain_pictures")
@@ -105,5 +105,5 @@ def test_a_study_of_a_searched_box_alone(tmp_path: Path) -> None:
 
 
 def test_an_audit_of_nothing_finds_nothing_broken() -> None:
-    frame = pd.DataFrame({"design_id": [0], "kind": ["reference"], "pareto": [False], "status": ["not finite"]})
-    assert audit_rows(load_study(STUDIES / "stopband.yaml"), [frame]).broken.empty
+    frame = pd.DataFrame({"design_id": [0], "kind": ["reference"], "status": ["not finite"]})
+    assert audit_rows(load_study(STUDIES / "stopband.yaml"), [frame], ()).broken.empty

@@ -24,7 +24,7 @@ from sweep.report.summary import summary_lines
 from sweep.results.output import read_output
 from sweep.results.tables import RESULTS
 from sweep.run.robustness import Candidate, drawn_dn
-from sweep.run.rows import jobs_of
+from sweep.run.rows import parts_of
 from sweep.search.gradients import Model
 from sweep.search.limit import limit_of, reason_without_bound
 from sweep.search.problem import Problem, SearchRun, best_feasible, starting_points
@@ -40,6 +40,7 @@ TEXT = """\
 study: share
 sensor: ar0820
 lights: tl16
+columns: all
 cfas: [RGGB, RYNCy]
 population: {temperature_c: [-40, 85], self_heating_k: 20, binning_nm: 2, wanted_yield: 0.99, draws: 4000}
 production: {edge_shift_nm: 2}
@@ -132,7 +133,7 @@ def test_many_designs_are_made_in_blocks_and_read_out_once_for_all_pairs_within_
 
 def test_jobs_are_small_where_each_design_sees_many_draws(tmp_path: Path) -> None:
     given = study(tmp_path)
-    assert max(job.stop - job.start for job in jobs_of(given)) <= 32
+    assert max(job.size for part in parts_of(given) for job in part.jobs) <= 32
 
 
 def share_with(x: np.ndarray, wanted_dn: float, draws: int = 200_000) -> tuple[float, float]:

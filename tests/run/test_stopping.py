@@ -16,7 +16,7 @@ import psutil
 import pyarrow.parquet as pq
 import pytest
 
-from sweep.results.parts import ROWS, Parts
+from sweep.results.dataset import rows_in
 from sweep.run.workers import workers
 from sweep.study import load_study
 
@@ -29,8 +29,8 @@ SAID = "sweep: interrupted; finished parts are kept, the same command continues\
 PHASES = {
     "search": ("sweep.search.solver:search_from", 3),
     "sweep": ("sweep.metrics.evaluate:evaluate", 6),
-    "tables": ("sweep.results.tables:write_tables", 1),
-    "points": ("sweep.results.tables:write_table", 2),
+    "parts": ("sweep.results.dataset:encoded_part", 2),
+    "tables": ("sweep.results.tables:write_table", 4),
     "check": ("sweep.run.check:_checked", 1),
     "report": ("sweep.report.page:make_report", 1),
 }
@@ -75,10 +75,6 @@ def wait_for(path: Path, run: subprocess.Popen[bytes] | Warm, folder: Path) -> N
         time.sleep(0.02)
 
 
-def kept_rows(folder: Path) -> int:
-    return sum(pq.read_metadata(path).num_rows for path in Parts(folder / "out" / "tiny").paths(ROWS))
-
-
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("undisturbed")
@@ -110,7 +106,7 @@ def assert_continues(folder: Path, undisturbed: Path, jobs: int) -> None:
     """The same command, in this process."""
     code, _, said = commanded(*command(folder, "--jobs", str(jobs))[3:])
     assert code == 0, said
-    for name in ("results", "search", "points", "curves"):
+    for name in ("results", "pareto", "designs", "search", "points", "curves"):
         tables = [pq.read_table(place / f"{name}.parquet") for place in (folder / "out" / "tiny", undisturbed)]
         assert tables[0].equals(tables[1]), name
     assert not list((folder / "out").rglob(".tmp-*"))
@@ -131,7 +127,7 @@ def test_a_stop_ends_every_phase(
 ) -> None:
     assert stopped(tmp_path, phase, jobs, number) < WITHIN_S
     if phase == "sweep" and jobs == 2:
-        assert kept_rows(tmp_path) > 0
+        assert rows_in(tmp_path / "out" / "tiny")[0] > 0
     assert_continues(tmp_path, undisturbed, jobs)
 
 
@@ -162,7 +158,7 @@ def workers_of(mark: str) -> list[psutil.Process]:
 def begun(folder: Path, jobs: int) -> Warm:
     """A run without pictures, which has said that it began; its workers bear the folder as a mark."""
     run = Warm(*command(folder, "--jobs", str(jobs))[3:], said=folder / "said", SWEEP_MARK=str(folder))
-    wait_for(folder / "out" / "tiny" / "run.json", run, folder)
+    wait_for(folder / "out" / "tiny" / "manifest.json", run, folder)
     return run
 
 

@@ -130,7 +130,7 @@ production: {edge_shift_nm: 1, thickness: 0.05, broadening: 0.2}
     study = load_study(tmp_path / "mix.yaml")
     run_study(study, tmp_path / "out", 1, lambda *_: None)
     rows = pd.read_parquet(tmp_path / "out" / "results.parquet")
-    assert audit_rows(study, [rows]).issues == []
+    assert audit_rows(study, [rows], ()).issues == []
     (row,) = rows[rows["name"] == "two"].to_dict("records")
     grid, base = study.grid.nodes_nm, study.sensor.qe["Y"]
     absorbed = 0.6 * gaussian_in_wavenumber(grid, 630, 30) + 0.1 * gaussian_in_wavenumber(grid, 580, 30)

@@ -287,7 +287,7 @@ def test_a_global_search_takes_one_start_and_ends_at_the_optimum_of_gradients(tm
     at_levels = log["sensitivity_min"].notna()
     assert facts.evaluations == (~at_levels).sum() > 100
     assert facts.front_evaluations == at_levels.sum()
-    planned = "\n".join(remaining_work_lines(remaining_work(study, tmp_path / "none", 1), tmp_path))
+    planned = "\n".join(remaining_work_lines(remaining_work(study, tmp_path / "none"), tmp_path))
     (most,) = re.findall(r"1 start, then SLSQP, (\d+) evaluations at most", planned)
     assert facts.evaluations <= int(most)
     front = pd.read_parquet(tmp_path / "out" / "front.parquet").set_index("sensitivity_min")

@@ -16,7 +16,7 @@ import pytest
 from ruamel.yaml import YAML
 
 from sweep.base.errors import StudyError
-from sweep.run.rows import Job, rules_of, run_job
+from sweep.run.rows import Job, Rows, rows_of, rules_of
 from sweep.spectra.color import chromaticity, color_matching, display_colors
 from sweep.spectra.spectrum import WavelengthGrid
 from sweep.study import Study, load_study
@@ -111,12 +111,13 @@ def loaded(tmp_path: Path, tree: dict[str, Any]) -> Study:
 
 
 def statuses(study: Study, scenario: str) -> set[str]:
-    """Of the first designs of every space, computed as a run does it, where every warning is an error."""
+    """Of the first designs of every space, computed with all columns, where every warning is an error."""
     planned = replace(study, plans={scenario: study.plan(scenario)})
     rules, found = rules_of(planned), set()
-    for space in planned.spaces:
-        job = Job(space, scenario, 0, min(space.size, 2), 0, 0)
-        found |= set(run_job(job, planned.setup(space, scenario), rules)["status"].to_pylist())
+    for number, space in enumerate(planned.spaces):
+        first = Rows.of(Job(number, scenario, 0, min(space.size, 2), 0, 0), planned)
+        made = rows_of(first, planned.setup(space, scenario), rules, rules.wanted)
+        found |= set(made["status"].to_pylist())
     return found
 
 

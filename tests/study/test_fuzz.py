@@ -17,8 +17,7 @@ from scipy.io import loadmat, savemat
 
 from sweep.base.errors import MOST_ISSUES, SweepError
 from sweep.cli.describe import described
-from sweep.run.rows import rules_of, run_job
-from sweep.run.sweep import Sweep
+from sweep.run.rows import Job, Rows, rows_of, rules_of
 from sweep.spectra.formats import read_curves
 from sweep.study import Study, load_study
 
@@ -67,21 +66,14 @@ def told(error: SweepError) -> None:
 
 
 def first_rows(study: Study, scenario: str) -> set[str]:
-    """The statuses of the first designs of each space, planned and computed as a run does it."""
+    """The statuses of the first designs of each space, planned and computed with all columns."""
     planned = replace(study, plans={scenario: study.plan(scenario)}, scenarios={scenario: study.scenarios[scenario]})
     rules, found = rules_of(planned), set()
-    for job in jobs(planned):
-        made = run_job(replace(job, stop=min(job.stop, job.start + 2)), planned.setup(job.space, scenario), rules)
+    for number, space in enumerate(planned.spaces):
+        first = Rows.of(Job(number, scenario, 0, min(space.size, 2), 0, 0), planned)
+        made = rows_of(first, planned.setup(space, scenario), rules, rules.wanted)
         found |= set(made["status"].to_pylist())
     return found
-
-
-def jobs(study: Study) -> list[Any]:
-    from sweep.results.parts import Parts
-    from sweep.run.workers import Workers
-
-    every = Sweep(study, rules_of(study), Parts(Path("absent")), Workers(1)).jobs
-    return list({(job.space.kind, job.space.name): job for job in reversed(every)}.values())
 
 
 def light(study: Study) -> str | None:

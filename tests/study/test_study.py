@@ -64,7 +64,7 @@ def test_the_measured_study_loads() -> None:
             "search:\n",
             "serach:\n",
             "tiny.yaml:20: serach: unknown key; allowed: study, question, seed, wavelengths, sensor, sensors, camera, pixel, lights, "
-            "scenarios, tolerance_dn, accuracy, geometry, cfas, colorants, designs, sweeps, boxes, production, population, uncertainty, regions, recognition, tasks, vision, metrics, effects, objective, constraints, search, validate, published; did you mean 'search'?",
+            "scenarios, columns, tolerance_dn, accuracy, geometry, cfas, colorants, designs, sweeps, boxes, production, population, uncertainty, regions, recognition, tasks, vision, metrics, effects, objective, constraints, search, validate, published; did you mean 'search'?",
         ),
         (
             "min: 590, max: 610",
