@@ -378,10 +378,10 @@ class FinishedRun:
         """Result table with one row per design and scenario; units and meanings are in ``attrs``."""
         import pyarrow as pa
 
-        from ..results.dataset import batches
+        from ..results.manifest import Manifest
 
         columns: Mapping[str, Column] = self.output.columns
-        return with_units(pa.concat_tables(batches(self.folder)).unify_dictionaries().to_pandas(), columns)
+        return with_units(pa.concat_tables(Manifest(self.folder).batches()).unify_dictionaries().to_pandas(), columns)
 
     @property
     def best(self) -> pd.Series:

@@ -14,7 +14,6 @@ import pyarrow as pa
 from ..base.errors import ValidationIssue
 from ..base.types import Progress
 from ..report import read_output, study_of
-from ..results.dataset import batches
 from ..results.lock import locked
 from ..results.manifest import Manifest
 from ..results.tables import AUDIT
@@ -110,7 +109,7 @@ def audit_output(
     output = read_output(folder, audited=False)
     study = study_of(output, data, allow_code=allow_code)
     front = set(output.front_ids)
-    result = audit_rows(study, (table.to_pandas() for table in batches(folder)), front, progress)
+    result = audit_rows(study, (table.to_pandas() for table in Manifest(folder).batches()), front, progress)
     with locked(folder):
         Manifest(folder).write_table(AUDIT, pa.Table.from_pandas(result.rows, preserve_index=False))
     return result

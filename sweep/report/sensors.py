@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 from ..base.types import Array, Float
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.quantity import Column
-from ..results.dataset import batches, part_paths
+from ..results.dataset import part_paths
 from ..results.manifest import Manifest
 from ..results.output import Output, read_output
 from ..results.tables import ALL_SENSORS, REFERENCE, REPORT, RESULTS, SEARCHED, read_table
@@ -59,7 +59,7 @@ def rows_of_all(runs: Sequence[SensorRun]) -> Iterator[pa.Table]:
         [pa.schema([*own, *(field.remove_metadata() for field in schema)]) for schema in schemas]
     )
     for run in runs:
-        for table in batches(run.folder):
+        for table in Manifest(run.folder).batches():
             whose = [pa.array([value] * len(table)) for value in run.member[:2]]
             rows = pa.table([*whose, *table.columns], names=[*_KEYS, *table.column_names])
             yield pa.concat_tables([together.empty_table(), rows], promote_options="default")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 from contextlib import suppress
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from ..base.errors import OutputError, ValidationIssue
 from .atomic import write_bytes
 
 ANSWERS = "answers"
+_NAME = re.compile(r"[0-9a-f]{64}\.json")
 _MOST_BYTES = 2**30
 
 
@@ -30,7 +32,8 @@ class Answers:
         return len(self._paths())
 
     def _paths(self) -> list[Path]:
-        return [*self.folder.glob("*.json")] if is_real_folder(self.folder) else []
+        paths = [*self.folder.iterdir()] if is_real_folder(self.folder) else []
+        return [path for path in paths if _NAME.fullmatch(path.name)]
 
     def save(self, key: str, text: bytes) -> None:
         """Write an answer."""

@@ -29,6 +29,8 @@ def atomic(path: Path) -> Iterator[Path]:
         yield hidden
         with hidden.open("rb+") as handle:
             os.fsync(handle.fileno())
+        with suppress(OSError):  # an empty folder in its place goes
+            path.rmdir()
         hidden.replace(path)
     except OSError as error:
         raise OutputError(ValidationIssue(f"cannot be written: {error.strerror or error}", str(path))) from None

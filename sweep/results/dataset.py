@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Sequence
+import stat
 from pathlib import Path
 
 import pyarrow as pa
@@ -49,31 +49,16 @@ def read_part(path: Path, key: str, schema: pa.Schema, rows: int) -> pa.Table | 
 
 
 def part_paths(folder: Path) -> list[Path]:
-    """Return the parts in the folder of a run, in the order of their rows."""
+    """Return the parts in the folder of a run, in the order of their rows; a link, pipe or folder is none."""
     inner = folder / RESULTS
-    names = sorted(path.name for path in inner.iterdir()) if is_real_folder(inner) else []
-    return [inner / name for name in names if _PART.fullmatch(name)]
+    paths = sorted(inner.iterdir()) if is_real_folder(inner) else []
+    return [path for path in paths if _PART.fullmatch(path.name) and stat.S_ISREG(path.lstat().st_mode)]
 
 
 def refuse_others(folder: Path) -> None:
     """Raise OutputError if something else has the name of the dataset."""
     if os.path.lexists(folder / RESULTS) and not is_real_folder(folder / RESULTS):
         raise OutputError(ValidationIssue("file not created by sweep; move it", str(folder / RESULTS)))
-
-
-def batches(folder: Path, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
-    """Yield the rows of a run, a part at a time.
-
-    `columns`: columns; left out, all of them. Raises OutputError if a part is damaged, or none is there.
-    """
-    paths = part_paths(folder)
-    if not paths:
-        raise OutputError(ValidationIssue("no rows here", str(folder / RESULTS)))
-    for path in paths:
-        try:
-            yield pq.ParquetFile(path, page_checksum_verification=True).read(columns)
-        except (OSError, pa.ArrowException) as error:
-            raise OutputError(ValidationIssue(f"cannot be read: {error}", str(path))) from None
 
 
 def rows_in(folder: Path) -> tuple[int, int]:

@@ -17,7 +17,7 @@ from ..designs.space import Space
 from ..study import Study, load_study
 from ..study.axes import series_of
 from ..study.sources import KeptSources
-from .dataset import batches
+from .manifest import Manifest
 from .tables import NAMED_KINDS, RESOLVED, RESULTS
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ def find_design_row(output: Output, key: str) -> Mapping[Any, Any]:
     elif len(named):
         row = named.iloc[0].to_dict()
     elif key.isascii() and key.isdecimal() and int(key) < output.provenance.filters:
-        filters = (part.filter(pc.equal(part["filter_id"], int(key))) for part in batches(output.folder))
+        filters = (part.filter(pc.equal(part["filter_id"], int(key))) for part in Manifest(output.folder).batches())
         rows = next((part for part in filters if part.num_rows), pa.table({})).to_pylist()
         if not rows:
             raise OutputError(

@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -30,11 +30,14 @@ from .tables import (
     is_drawn,
     is_of_run,
     json_of,
+    read_table,
     write_table,
 )
 
+_MOST_BYTES = 2**32
+"""No file of a run is larger."""
 _FOLDERS = (FIGURES, RESULTS)
-_MISSING, _DAMAGED = "is missing", "is damaged"
+_MISSING, _DAMAGED, _STRANGE = "is missing", "is damaged", "is not of this run"
 _DIGEST, _FILES = "digest", "files"
 
 
@@ -49,10 +52,19 @@ class Manifest:
         self.folder = folder
         self.facts = read_facts(folder / MANIFEST)
         digest = self.facts.pop(_DIGEST, None)
-        self.damaged = os.path.lexists(folder / MANIFEST) and digest != _digest(self.facts)
-        self.files: dict[str, str] = self.facts.pop(_FILES, {})
+        self.damaged = os.path.lexists(folder / MANIFEST) and not (digest == _digest(self.facts) and self._is_whole())
+        self.files: dict[str, str] = {} if self.damaged else self.facts.pop(_FILES, {})
         if self.damaged:
-            self.facts, self.files = {}, {}
+            self.facts = {}
+
+    def _is_whole(self) -> bool:
+        """Return whether the facts have the types that a run writes."""
+        files, runs = self.facts.get(_FILES), self.facts.get("runs", [])
+        texts = [self.facts.get("fingerprint"), *(files.values() if isinstance(files, dict) else [None])]
+        pairs = [pair if isinstance(pair, list) else [] for pair in (runs if isinstance(runs, list) else [None])]
+        return all(isinstance(text, str) for text in texts) and all(
+            [type(name) for name in pair] == [str, str] for pair in pairs
+        )
 
     @property
     def fingerprint(self) -> str:
@@ -88,6 +100,20 @@ class Manifest:
         """Return the parts in the folder, listed or not."""
         return [f"{RESULTS}/{path.name}" for path in part_paths(self.folder)]
 
+    @property
+    def strange_rows(self) -> list[str]:
+        """Parts in the folder of a finished run that it did not write."""
+        return [name for name in self.rows() if name not in self.files] if PROVENANCE in self.files else []
+
+    def batches(self, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
+        """Yield the rows of a run, a part at a time.
+
+        `columns`: columns; left out, all of them. Raises OutputError if a part is missing or damaged.
+        """
+        for name in sorted(name for name in self.files if name.startswith(f"{RESULTS}/")):
+            self.require([name])
+            yield read_table(self.path(name), columns)
+
     def path(self, name: str) -> Path:
         """Return the path of a file of the run."""
         return self.folder / name
@@ -97,14 +123,14 @@ class Manifest:
 
         `names`: files that are looked at; left out, all; `quick`: only whether they are there.
         """
-        issues: dict[str, str] = {}
+        issues = dict.fromkeys(self.strange_rows if names is None else (), _STRANGE)
         for name in sorted(self.files if names is None else names):
             path = self.path(name)
             if name not in self.files or not os.path.lexists(path) or self._linked(name):
                 issues[name] = _MISSING
             elif not quick:
                 try:
-                    damaged = digest_of(path) != self.files[name]
+                    damaged = path.stat().st_size > _MOST_BYTES or digest_of(path) != self.files[name]
                 except OSError:
                     damaged = True
                 if damaged:
@@ -142,10 +168,7 @@ class Manifest:
         for name, content in contents.items():
             if self._linked(name):
                 raise OutputError(ValidationIssue("file not created by sweep; move it", str(self.path(name).parent)))
-            path = self.path(name)
-            with suppress(OSError):  # an empty folder in its place goes
-                path.rmdir()
-            write_bytes(content, path)
+            write_bytes(content, self.path(name))
         self.add({name: hashlib.sha256(content).hexdigest() for name, content in contents.items()})
 
     def write_table(self, name: str, table: pa.Table) -> None:

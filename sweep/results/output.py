@@ -238,7 +238,9 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
     study = checked_facts(folder / RESOLVED, StudySection, resolved)
     provenance = checked_facts(folder / PROVENANCE, Provenance, facts)
     quantities = (column.name for column in provenance.quantities)
-    _check_columns(folder / files.DESIGNS, [*files.ROW_COLUMNS, *provenance.parameters, *quantities])
+    rows = [*files.ROW_COLUMNS, *provenance.parameters, *quantities]
+    for name in (files.DESIGNS, files.PARETO):
+        _check_columns(folder / name, rows)
     for name, columns in _COLUMNS.items():
         if name in optional or name in _ALWAYS:
             _check_columns(folder / name, columns)

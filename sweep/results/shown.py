@@ -194,7 +194,9 @@ class Gathered:
         rows = self.selection.reduced(joined(self._waiting, self.schema))
         at = rows.schema.get_field_index("pareto")
         marked = rows.set_column(at, rows.schema.field(at), pa.array(self.selection.on_front(rows)))
-        return marked, sampled(joined(self._samples, self.schema), MOST_POINTS)
+        sample = sampled(joined(self._samples, self.schema), MOST_POINTS)
+        no = pa.array(np.zeros(sample.num_rows, dtype=bool))
+        return marked, sample.set_column(at, sample.schema.field(at), no)
 
 
 def shown_rows(designs: pa.Table, pareto: pa.Table) -> pa.Table:
@@ -204,9 +206,15 @@ def shown_rows(designs: pa.Table, pareto: pa.Table) -> pa.Table:
 
 
 def joined(tables: Sequence[pa.Table], schema: pa.Schema) -> pa.Table:
-    """Return rows of several tables by their ids; a column that a table lacks is null."""
+    """Return rows of several tables by their ids, whatever the order of the tables; a missing column is null."""
     together = pa.concat_tables([schema.empty_table(), *tables], promote_options="default").select(schema.names)
-    return together.unify_dictionaries().combine_chunks().cast(schema).sort_by("design_id")
+    ordered = together.unify_dictionaries().combine_chunks().cast(schema).sort_by("design_id")
+    words = [pa.types.is_dictionary(field.type) for field in schema]
+    columns = [
+        column.cast(pa.string()).combine_chunks().dictionary_encode() if is_word else column
+        for column, is_word in zip(ordered.columns, words, strict=True)
+    ]
+    return pa.Table.from_arrays(columns, schema=schema)
 
 
 def drawn_rows(rows: pa.Table, selection: Selection, scenario: str) -> Int[IndexArray, " drawn"]:

@@ -184,12 +184,12 @@ def word_mask(table: pa.Table, column: str, *words: str) -> Bool[BoolArray, " ro
     return np.asarray(pc.is_in(table[column].cast(pa.string()), pa.array(words)).to_numpy(), dtype=bool)
 
 
-def read_table(path: Path) -> pa.Table:
-    """Read a Parquet file.
+def read_table(path: Path, columns: Sequence[str] | None = None) -> pa.Table:
+    """Read a Parquet file; `columns`: some of its columns.
 
     Raises OutputError if it is missing or damaged.
     """
     try:
-        return pq.read_table(path, page_checksum_verification=True)
+        return pq.ParquetFile(path, page_checksum_verification=True).read(columns)
     except (OSError, pa.ArrowException) as error:
         raise OutputError(ValidationIssue(f"cannot be read: {error}", str(path))) from None

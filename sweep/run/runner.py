@@ -142,6 +142,7 @@ def run_study(
         facts = read_facts(manifest.path(PROVENANCE))
         if missing_keys(Provenance, facts) or (options.retry_failed and facts["failed"]):
             wrong.add(PROVENANCE)
+        manifest.remove(manifest.strange_rows)
         if not wrong:
             return ()
         backend = backend or usual_backend(study)
@@ -173,7 +174,7 @@ class _Run:
     def __post_init__(self) -> None:
         self.planned, self.answers = Planned.of(self.study), Answers(self.manifest.folder)
         self.rules, self.selection = self.planned.rules, self.planned.selection
-        self.sweep = Sweep(self.planned, self.manifest.folder.absolute(), self.pool)
+        self.sweep = Sweep(self.planned, self.manifest, self.pool)
         self.gathered = Gathered(self.selection, self.rules.wanted_of_swept.schema)
 
     def make(self, wrong: set[str]) -> tuple[str, ...]:
@@ -231,8 +232,7 @@ class _Run:
         designs = [whole.take(at), sample.filter(pa.array(~np.isin(sampled, ids)))]
         self._write(DESIGNS, joined(designs, shown))
         self._write(PARETO, whole.filter(whole[ON_FRONT]))
-        self.manifest.add(sweep.digests)
-        self.manifest.remove([name for name in self.manifest.rows() if name not in sweep.digests])
+        self.manifest.remove([name for name in self.manifest.rows() if name not in self.manifest.files])
         if answer is not None:
             self._write(SEARCH_LOG, search_log(answer))
             if answer.search.map:

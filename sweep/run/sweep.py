@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import time
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -16,6 +17,7 @@ from ..base.types import Call, DesignNumbers, Progress, delayed
 from ..results.atomic import write_bytes
 from ..results.dataset import encoded_part, part_name, read_part, refuse_others
 from ..results.identity import fingerprint
+from ..results.manifest import Manifest
 from ..results.shown import Gathered, Selection, ShownRows, joined
 from ..results.tables import word_mask
 from ..study import Study
@@ -23,6 +25,7 @@ from .routes import Rules
 from .rows import Job, Part, Rows, failed_rows, marked, parts_of, rows_of, rules_of, run_job, selection_of
 from .workers import Held, WorkerKilledError, Workers, raise_if_stopped
 
+_LISTED_EACH_S = 5.0
 KILLED = "error: its worker died twice"
 _MOST_AT_ONCE = 256
 """Rows of which all columns are computed in one call."""
@@ -45,12 +48,16 @@ class Planned:
 
 @dataclass(frozen=True)
 class FinishedPart:
-    """Finished part: digest of its file, its content if the worker could not write it, and what it shows."""
+    """Finished part: digest of its file, its content if the worker could not write it, and what it shows.
+
+    `failure`: what happened to the first of the designs that failed.
+    """
 
     digest: str
     content: bytes | None
     shown: ShownRows
     failed: int
+    failure: str
 
 
 @dataclass(frozen=True)
@@ -63,19 +70,18 @@ class RunOptions:
 
 @dataclass
 class Sweep:
-    """All parts of a study, finished and remaining, in the folder of a run.
-
-    `digests`: of the files that are finished.
-    """
+    """All parts of a study, finished and remaining, in the folder of a run."""
 
     planned: Planned
-    folder: Path
+    manifest: Manifest
     pool: Workers
-    digests: dict[str, str] = field(default_factory=dict)
+    _digests: dict[str, str] = field(default_factory=dict)
+    _listed_s: float = 0.0
     warnings: list[str] = field(default_factory=list)
     failed: int = 0
 
     def __post_init__(self) -> None:
+        self.folder = self.manifest.folder.absolute()  # a worker may be elsewhere
         refuse_others(self.folder)
         self.held = self.pool.hold(self.planned)
 
@@ -112,42 +118,54 @@ class Sweep:
                 write_bytes(finished.content, self.folder / part_name(todo[at].number))
             self._take(todo[at], replace(finished, content=None), gathered)
             done += todo[at].size
-            if finished.failed and options.fail_fast:
-                raise _first_failure(finished.shown.rows)
+            if finished.failure and options.fail_fast:
+                self._list()
+                raise FailedDesignError(ValidationIssue(f"{finished.failure}; finished parts are kept"))
             progress("designs", done, total)
+        self._list()
 
     def _light_px(self, part: Part) -> float:
         target = self.planned.study.scenarios[part.jobs[0].scenario].target
         return 0.0 if target is None else target.object_resolution_px
 
     def _take(self, part: Part, finished: FinishedPart, gathered: Gathered) -> None:
-        self.digests[part_name(part.number)] = finished.digest
+        self._digests[part_name(part.number)] = finished.digest
         self.failed += finished.failed
         gathered.add(finished.shown)
+        if time.monotonic() - self._listed_s > _LISTED_EACH_S:
+            self._list()
+
+    def _list(self) -> None:
+        """List finished parts; of those after the last listing, their own checksums tell whether they are whole."""
+        self.manifest.add(self._digests)
+        self._listed_s = time.monotonic()
 
     def _kept(self, part: Part, options: RunOptions) -> FinishedPart | None:
         """Return a part of an earlier run; None if it is not there, or not as that run wrote it."""
-        path = self.folder / part_name(part.number)
-        if not path.is_file():
+        name = part_name(part.number)
+        path = self.folder / name
+        if not path.is_file() and name not in self.manifest.files:
             return None
         key, rules = part.key(self.planned.study, self.planned.fingerprint), self.planned.rules
-        table = read_part(path, key, rules.schema, part.size)
+        known = name not in self.manifest.files or not self.manifest.wrong([name])
+        table = read_part(path, key, rules.schema, part.size) if known else None
         if table is None:
             self.warnings.append(f"part {part.number} was damaged on the disk and is computed again")
             return None
-        if options.retry_failed and _failed(table):
+        if options.retry_failed and _failures(table)[0]:
             return None
         shown = self.planned.selection.of_part(marked(table, part, self.planned.study, rules))
-        return FinishedPart(digest_of(path), None, shown, _failed(table))
+        return FinishedPart(digest_of(path), None, shown, *_failures(table))
 
     def write_answers(self, rows: pa.Table, gathered: Gathered) -> None:
         """Write the answers of a search, after all designs."""
         part, planned = Part(len(self.parts), ()), self.planned
         finished = _written(planned, part, self.folder, rows.select(planned.rules.wanted_of_swept.schema.names))
         self._take(part, finished, gathered)
+        self._list()
 
     def with_all_columns(self, rows: pa.Table) -> pa.Table:
-        """Return rows of the parts with all columns of what a report shows; rows that failed stay as they are."""
+        """Return rows of the parts with all columns of what a report shows; rows that fail stay as they are."""
         shown = self.planned.rules.shown
         if rows.schema.names == shown.names:
             return rows
@@ -158,8 +176,14 @@ class Sweep:
             own = ids[of_job == at]
             starts = range(0, own.size, _MOST_AT_ONCE)
             calls += [delayed(_whole, self.held, jobs[at], own[start : start + _MOST_AT_ONCE]) for start in starts]
-        tables = [*self.pool(calls), rows.filter(pa.array(~ok))]
-        return joined(tables, shown)
+        whole = [table.filter(pa.array(word_mask(table, "status", "ok"))) for table in self.pool(calls)]
+        computed = np.concatenate([table["design_id"].to_numpy() for table in whole] or [ids[:0]])
+        if lost := ids.size - computed.size:
+            self.warnings.append(
+                f"{lost} designs of the report have not all columns: a quantity beside those asked for fails"
+            )
+        others = rows.filter(pa.array(~np.isin(rows["design_id"].to_numpy(), computed)))
+        return joined([*whole, others], shown)
 
 
 def _compute(held: Held, part: Part, folder: Path | None) -> FinishedPart:
@@ -178,7 +202,7 @@ def _written(planned: Planned, part: Part, folder: Path | None, table: pa.Table)
         write_bytes(content, folder / part_name(part.number))
     digest = hashlib.sha256(content).hexdigest()
     shown = planned.selection.of_part(table)
-    return FinishedPart(digest, content if folder is None else None, shown, _failed(table))
+    return FinishedPart(digest, content if folder is None else None, shown, *_failures(table))
 
 
 def _whole(held: Held, job: Job, ids: DesignNumbers) -> pa.Table:
@@ -189,8 +213,11 @@ def _whole(held: Held, job: Job, ids: DesignNumbers) -> pa.Table:
     return rows_of(at, study.setup(at.space, job.scenario), rules, rules.wanted)
 
 
-def _failed(table: pa.Table) -> int:
-    return int(np.count_nonzero(~word_mask(table, "status", "ok")))
+def _failures(table: pa.Table) -> tuple[int, str]:
+    """Return how many designs failed, and what happened to the first one."""
+    failed = table.select(["design_id", "status"]).filter(pa.array(~word_mask(table, "status", "ok")))
+    texts = [f"design {row['design_id']} failed ({row['status']})" for row in failed.slice(0, 1).to_pylist()]
+    return failed.num_rows, "".join(texts)
 
 
 def _quarantined(call: Call) -> FinishedPart:
@@ -217,10 +244,3 @@ def _alone(job: Job, held: Held) -> pa.Table:
 
 def _rows_of_job(job: Job, held: Held) -> pa.Table:
     return run_job(job, held.value.study, held.value.rules)
-
-
-def _first_failure(table: pa.Table) -> FailedDesignError:
-    row = table.filter(pa.array(~word_mask(table, "status", "ok"))).slice(0, 1).to_pylist()[0]
-    return FailedDesignError(
-        ValidationIssue(f"design {row['design_id']} failed ({row['status']}); finished parts are kept")
-    )

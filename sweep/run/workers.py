@@ -24,7 +24,7 @@ import psutil
 from joblib.externals.loky.backend import resource_tracker
 from threadpoolctl import threadpool_limits
 
-from ..base.errors import InterruptedRunError, SweepError
+from ..base.errors import InterruptedRunError, SweepError, ValidationIssue
 from ..base.types import Call, Parallel, Progress
 
 BACKENDS = ("loky", "threading", "dask")
@@ -75,7 +75,10 @@ class Workers:
         if self.folder is None:
             return Held(value, None)
         path = self.folder / f"{id(value)}.pickle"
-        path.write_bytes(pickle.dumps(value))
+        try:
+            path.write_bytes(pickle.dumps(value))
+        except OSError as error:
+            raise SweepError(ValidationIssue(f"cannot be written: {error.strerror or error}", str(path))) from None
         return Held(value, path)
 
     @property

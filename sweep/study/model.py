@@ -115,6 +115,7 @@ class Study:
         pair = quantities[self.trade_off[0]].pair
         asked = {*self.constraints, *self.objective.weights, self.objective.column, *self.trade_off, EXPOSURE}
         asked |= {quantities[name].of for name in asked}
+        asked |= {metric.name for metric in self.user_metrics}
         if self.has_swept_tasks:
             asked |= {name for name, quantity in quantities.items() if quantity.metric.startswith(PREFIX)}
         return {

@@ -282,8 +282,8 @@ class StudySection(Section):
     """Scenes, by name: exposure, target, optics, weather, noise."""
     columns: Literal["asked", "all"] = "asked"
     """Columns of swept designs in `results.parquet`: `asked` (CSDs, sensitivities, exposure, the chromatic CSD of the
-    objective's types, and what objective, constraints and front name), or `all`. `pareto.parquet` and `designs.parquet`
-    have all columns of the front, of plain CFAs, named designs and the best."""
+    objective's types, own metrics, and what objective, constraints and front name), or `all`. `pareto.parquet` and
+    `designs.parquet` have all columns of the front, of plain CFAs, named designs and the best."""
     tolerance_dn: Annotated[float, Field(ge=1e-12, le=1e12)] = 0.1
     """By how much the simulation may change any CSD, DN."""
     accuracy: AccuracySection = STANDARD

@@ -171,11 +171,11 @@ def test_a_combined_objective_has_its_own_words(runs: dict[str, Path], tmp_path:
 @pytest.mark.usefixtures("plain_fronts")
 def test_a_scene_of_another_name_is_the_same(runs: dict[str, Path], tmp_path: Path) -> None:
     copytree(runs["chart"], tmp_path / "other")
-    path = tmp_path / "other" / "results.parquet"
-    table = pq.read_table(path)
-    at = table.schema.get_field_index("scenario")
-    names = pa.array(["dusk"] * len(table)).dictionary_encode()
-    pq.write_table(table.set_column(at, table.schema.field(at), names), path)
+    for path in (tmp_path / "other" / "designs.parquet", tmp_path / "other" / "pareto.parquet"):
+        table = pq.read_table(path)
+        at = table.schema.get_field_index("scenario")
+        names = pa.array(["dusk"] * len(table)).dictionary_encode()
+        pq.write_table(table.set_column(at, table.schema.field(at), names), path)
     study = tmp_path / "other" / "study.resolved.yaml"
     study.write_text(re.sub(r"^  chart:", "  dusk:", study.read_text(), flags=re.MULTILINE))
     listed_anew(tmp_path / "other")
