@@ -240,7 +240,7 @@ def test_invalid_comparison_is_one_line(runs: dict[str, Path], tmp_path: Path) -
         assert len(str(caught.value).splitlines()) == 1
         assert caught.value.exit_code == 2
     with pytest.raises(OutputError):
-        compare_runs([runs["chart"]] * 2, runs["chart"] / "run.json")
+        compare_runs([runs["chart"]] * 2, runs["chart"] / "manifest.json")
     assert not (tmp_path / "to").exists()
     code, _, said = commanded("compare", runs["chart"], tmp_path)
     assert (code, len(said.splitlines())) == (2, 1)
