@@ -31,7 +31,7 @@ PLAIN = CHART.split("designs:")[0].replace(", RYNCy]", "]")
 def plain_fronts(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures that take no time, for tests that do not look at them."""
     monkeypatch.setattr("sweep.report.compare.pictures_of", lambda *_: {"png": b"fronts", "svg": b"fronts"})
-    monkeypatch.setattr("sweep.report.compare.inlined", lambda _: "data:image/png;base64,cG5n")
+    monkeypatch.setattr("sweep.report.compare.inlined", lambda _: "data:image/svg+xml;base64,cG5n")
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +90,7 @@ def test_two_runs_say_who_is_best_and_by_how_much(runs: dict[str, Path], tmp_pat
         "fronts.png",
         "fronts.svg",
     }
-    assert page.count("data:image/png;base64,") == 1
+    assert page.count("data:image/svg+xml;base64,") == 1
     assert "http://" not in page
     assert "https://" not in page
     assert "Best yellow/red CSD under the constraints: A chart" in page

@@ -129,11 +129,11 @@ def test_the_scorecard_of_the_project(finished: FinishedFolder) -> None:
     signs = np.sign(factors - 1) * [[1 if each.column.direction == "more" else -1] for each in rows]
     assert (signs > 0).sum(axis=0).tolist() == [22, 22, 20, 22]
     assert (signs < 0).sum(axis=0).tolist() == [3, 3, 5, 3]
-    assert {path.name for path in (folder / "figures").glob("*.png")} >= {
-        "scorecard.png",
-        "color-noise-1.png",
-        "rendered-1.png",
-        "rendered-2.png",
+    assert {path.name for path in (folder / "figures").glob("*.svg")} >= {
+        "scorecard.svg",
+        "color-noise-1.svg",
+        "rendered-1.svg",
+        "rendered-2.svg",
     }
 
 
