@@ -15,7 +15,9 @@ from tempfile import TemporaryDirectory
 import pandas as pd
 from PIL import Image
 
+from sweep.report import read_output
 from sweep.report.figures import rendered
+from sweep.report.page import _drawings, _vision_drawings
 from sweep.report.vision_report import street_drawing
 from sweep.results.tables import VISION_STREETS
 
@@ -98,9 +100,11 @@ def gallery(rows: str) -> str:
     return "\n".join(parts) + "\n"
 
 
-def copy_picture(source: Path, target: Path) -> None:
-    """Copy a picture, at most 1,200 pixels wide and in 256 colors, a third of its size."""
-    with Image.open(source) as picture:
+def copy_picture(folder: Path, name: str, target: Path) -> None:
+    """Draw a picture of a run, at most 1,200 pixels wide and in 256 colors, a third of its size."""
+    output = read_output(folder)
+    drawn = next(draw for own, _, draw in (*_drawings(output), *_vision_drawings(output)) if own == name)
+    with Image.open(BytesIO(rendered(drawn(), "png"))) as picture:
         small = picture.convert("RGB")
         small.thumbnail((1200, 1200), Image.Resampling.LANCZOS)
         small.quantize(256, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(target, optimize=True)
@@ -119,7 +123,9 @@ def main() -> None:
                 document.write_text(with_answer(document.read_text(encoding="utf-8"), study, answer), encoding="utf-8")
         for name, (study, picture) in pictures.items():
             if study in wanted:
-                copy_picture(Path(folder) / study / f"{picture}.png", STUDIES / "figures" / f"{name}.png")
+                copy_picture(
+                    Path(folder) / study, picture.removeprefix("figures/"), STUDIES / "figures" / f"{name}.png"
+                )
         if "vision" in wanted:
             pictures_of = pd.read_parquet(Path(folder) / "vision" / VISION_STREETS)
             drawn = street_drawing(pictures_of[pictures_of["name"].isin(STREETS)])
