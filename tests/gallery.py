@@ -17,7 +17,7 @@ from PIL import Image
 
 from sweep.report import read_output
 from sweep.report.figures import rendered
-from sweep.report.page import _drawings, _vision_drawings
+from sweep.report.page import drawings
 from sweep.report.vision_report import street_drawing
 from sweep.results.tables import VISION_STREETS
 
@@ -103,7 +103,7 @@ def gallery(rows: str) -> str:
 def copy_picture(folder: Path, name: str, target: Path) -> None:
     """Draw a picture of a run, at most 1,200 pixels wide and in 256 colors, a third of its size."""
     output = read_output(folder)
-    drawn = next(draw for own, _, draw in (*_drawings(output), *_vision_drawings(output)) if own == name)
+    drawn = next(drawing for drawn_name, _, drawing in drawings(output) if drawn_name == name)
     with Image.open(BytesIO(rendered(drawn(), "png"))) as picture:
         small = picture.convert("RGB")
         small.thumbnail((1200, 1200), Image.Resampling.LANCZOS)

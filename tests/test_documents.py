@@ -129,7 +129,8 @@ NO_RESULTS = (
     "RYN4Cy",
     "f/2",
     "2.8 um",
-    "(`fast`) to seven (`standard`) to 35 (`reference`)",
+    "one (`fast`) to 1.2 (`standard`) to seven (`reference`)",
+    "as one to ten to 35",
 )
 """Numbers of the README's prose that are no results."""
 

@@ -18,7 +18,6 @@ from .. import run as runner
 from ..base.errors import ErrorBoundExceededError, InterruptedRunError, SweepError, ValidationIssue
 from ..base.types import in_turn
 from ..results.answers import Answers
-from ..results.atomic import write_bytes
 from ..results.dataset import encoded_part, part_name
 from ..results.folder import begin
 from ..results.identity import run_facts, several_facts
@@ -184,9 +183,7 @@ def _join(
     if computed or wrong:
         manifest.remove([PROVENANCE, *manifest.rows()])
         for at, table in enumerate(rows_of_all(runs)):
-            content = encoded_part(table, "")
-            write_bytes(content, manifest.path(part_name(at)))
-            manifest.add({part_name(at): hashlib.sha256(content).hexdigest()})
+            manifest.write({part_name(at): encoded_part(table, "")})
         if {PROVENANCE, ALL_SENSORS} & wrong.keys():
             manifest.remove([ALL_SENSORS])
             answers = Answers(manifest.folder)

@@ -110,7 +110,9 @@ def chromatic_along(
     `unlit`: without lamps, DN. Returns distances, largest reading, and that of the fullest channel of the darkest lamp
     alone, DN.
     """
-    if len(values) < MANY or fixed.shape[1] > MOST_CHANNELS or not np.isfinite(values).all():
+    shared = np.delete(fixed - unlit[0], channel, axis=1)
+    finite = np.isfinite(values).all() and np.isfinite(shared).all()
+    if len(values) < MANY or fixed.shape[1] > MOST_CHANNELS or not finite:
         response = np.repeat(fixed[None], len(values), axis=0)
         response[..., channel] = values
         lit = response - unlit[:, None]
@@ -119,7 +121,7 @@ def chromatic_along(
     from .nearest import nearest_chromatic_along  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     padded = np.zeros((len(fixed), MOST_CHANNELS - 1))
-    padded[:, : fixed.shape[1] - 1] = np.delete(fixed - unlit[0], channel, axis=1)
+    padded[:, : shared.shape[1]] = shared
     order, squared = pair_order(_least, padded, members, pairs), np.empty((len(pairs), len(values)))
     of_pairs, (most_dn, least_dn) = (order.first, order.second, order.starts, order.least), np.empty((2, len(values)))
     dark = np.ascontiguousarray(unlit[:, channel])

@@ -77,7 +77,7 @@ def _contents(output: Output, shown_names: Iterable[str] | None, parallel: Paral
     """Return the files of the report with their content: some of them, or all, since the page holds every picture."""
     contents, drawn = dict[str, bytes](), []
     images: dict[str, list[tuple[str, str]]] = {place: [] for place in _SHOWN}
-    for name, caption, figure in (*_drawings(output), *_vision_drawings(output)):
+    for name, caption, figure in drawings(output):
         where = name if name.startswith(("cfas", "pareto")) else f"{FIGURES}/{name}"
         kinds = ("png", "svg") if name in _RASTERED else ("svg",)
         if shown_names is None or {f"{where}.{kind}" for kind in kinds} & {*shown_names}:
@@ -146,6 +146,12 @@ def _vision(output: Output) -> list[tuple[str, list[list[str]]]]:
     from .vision_report import vision_parts  # noqa: PLC0415  (only where a study asks for images)
 
     return [(title, rows(table)) for title, table in vision_parts(output).items()]
+
+
+def drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
+    """Yield name, caption and drawing of all pictures."""
+    yield from _drawings(output)
+    yield from _vision_drawings(output)
 
 
 def _vision_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:

@@ -54,15 +54,13 @@ def runs_in(folder: Path) -> list[SensorRun]:
 def rows_of_all(runs: Sequence[SensorRun]) -> Iterator[pa.Table]:
     """Yield the rows of all runs, a part at a time, with `sensor` and `lights` before them."""
     schemas = [pq.read_schema(part_paths(run.folder)[0]) for run in runs]
-    own = [pa.field(name, pa.string()) for name in _KEYS]
-    together = pa.unify_schemas(
-        [pa.schema([*own, *(field.remove_metadata() for field in schema)]) for schema in schemas]
-    )
+    keys = [pa.field(name, pa.string()) for name in _KEYS]
+    joint = pa.unify_schemas([pa.schema([*keys, *(field.remove_metadata() for field in schema)]) for schema in schemas])
     for run in runs:
         for table in Manifest(run.folder).batches():
             whose = [pa.array([value] * len(table)) for value in run.member[:2]]
             rows = pa.table([*whose, *table.columns], names=[*_KEYS, *table.column_names])
-            yield pa.concat_tables([together.empty_table(), rows], promote_options="default")
+            yield pa.concat_tables([joint.empty_table(), rows], promote_options="default")
 
 
 def report_sensors(manifest: Manifest, runs: Sequence[SensorRun]) -> list[str]:

@@ -6,6 +6,7 @@ work is computed again.
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 import stat
@@ -33,17 +34,18 @@ def encoded_part(table: pa.Table, key: str) -> bytes:
     return encoded(table.replace_schema_metadata({**(table.schema.metadata or {}), _KEY: key.encode()}))
 
 
-def read_part(path: Path, key: str, schema: pa.Schema, rows: int) -> pa.Table | None:
-    """Return the rows of a part; None if it is not there, damaged, or of other work.
+def read_part(path: Path, key: str, schema: pa.Schema, rows: int) -> tuple[pa.Table, str] | None:
+    """Return the rows of a part and the SHA-256 of its file; None if it is not there, damaged, or of other work.
 
     Size and schema are checked before rows are read, so that no more memory is taken than they need.
     """
     try:
-        file = pq.ParquetFile(pa.BufferReader(read_plain(path, _MOST_BYTES)), page_checksum_verification=True)
-        own = (file.schema_arrow.metadata or {}).get(_KEY) == key.encode()
-        if not own or file.metadata.num_rows != rows or not file.schema_arrow.equals(schema):
+        content = read_plain(path, _MOST_BYTES)
+        file = pq.ParquetFile(pa.BufferReader(content), page_checksum_verification=True)
+        is_of_key = (file.schema_arrow.metadata or {}).get(_KEY) == key.encode()
+        if not is_of_key or file.metadata.num_rows != rows or not file.schema_arrow.equals(schema):
             return None
-        return file.read().replace_schema_metadata(schema.metadata)
+        return file.read().replace_schema_metadata(schema.metadata), hashlib.sha256(content).hexdigest()
     except (OSError, pa.ArrowException):
         return None
 

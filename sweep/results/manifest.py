@@ -161,7 +161,7 @@ class Manifest:
         for name in self.foreign_files():
             raise OutputError(ValidationIssue("file not created by sweep; move it", str(self.folder / name)))
         self.facts = dict(facts)
-        self._save()
+        self.save()
 
     def write(self, contents: Mapping[str, bytes]) -> None:
         """Write files of the run and list them."""
@@ -179,7 +179,7 @@ class Manifest:
     def add(self, digests: Mapping[str, str]) -> None:
         """List files that were written."""
         self.files |= digests
-        self._save()
+        self.save()
 
     def remove(self, names: Iterable[str]) -> None:
         """Remove files of the run and their entries."""
@@ -195,7 +195,7 @@ class Manifest:
                     ) from None
             self.files.pop(name, None)
         if gone:
-            self._save()
+            self.save()
 
     def discard_derived(self) -> None:
         """Remove report and audit, which follow from tables that are gone."""
@@ -207,7 +207,8 @@ class Manifest:
             with suppress(OSError):
                 self.path(MANIFEST).unlink()
 
-    def _save(self) -> None:
+    def save(self) -> None:
+        """Write the manifest."""
         content = json.loads(json_of(self.facts | {_FILES: self.files}))
         write_bytes(json_of(content | {_DIGEST: _digest(content)}).encode("utf-8"), self.path(MANIFEST))
 

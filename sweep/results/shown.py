@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from typing import Any
@@ -15,7 +15,7 @@ import pyarrow.compute as pc
 from ..base.types import Array, Bool, BoolArray, Float, IndexArray, Int
 from ..metrics.columns.exposure import EXPOSURE
 from ..metrics.pareto import non_dominated
-from .tables import NAMED_KINDS, REFERENCE, SWEPT, word_mask
+from .tables import NAMED_KINDS, ON_FRONT, REFERENCE, SWEPT, word_mask
 
 MOST_POINTS = 6_000
 """Swept designs off the front, of those that are feasible and of the others each, that a report draws as points."""
@@ -70,17 +70,17 @@ class Counts:
         """
         return sum(
             n
-            for (kind, own_scenario, own_cfa, status, feasible), n in self.groups.items()
+            for (kind, of_scenario, of_cfa, status, feasible), n in self.groups.items()
             if kind != REFERENCE
             and (status, feasible) == ("ok", met)
-            and scenario in (None, own_scenario)
-            and cfa in (None, own_cfa)
+            and scenario in (None, of_scenario)
+            and cfa in (None, of_cfa)
         )
 
     def front(self, scenario: str | None = None, cfa: str | None = None) -> int:
         """Return the number of feasible designs on the Pareto front."""
         groups = self.on_front.items()
-        return sum(n for (own, own_cfa), n in groups if scenario in (None, own) and cfa in (None, own_cfa))
+        return sum(n for (of, of_cfa), n in groups if scenario in (None, of) and cfa in (None, of_cfa))
 
 
 def counted(table: pa.Table) -> Counter[_Group]:
@@ -136,7 +136,7 @@ class Selection:
 
         `pareto` marks the front of any part of a run's rows, so that it may be applied again to several results.
         """
-        is_named, eligible = word_mask(table, "kind", *NAMED_KINDS), table["pareto"].to_numpy()
+        is_named, eligible = word_mask(table, "kind", *NAMED_KINDS), table[ON_FRONT].to_numpy()
         feasible = table["feasible"].to_numpy()
         selected = [np.flatnonzero(is_named), leading_rows(table, self.front[0], ~is_named)]
         for at in row_groups(table).values():
@@ -153,7 +153,7 @@ class Selection:
 
     def on_front(self, table: pa.Table) -> Bool[BoolArray, " rows"]:
         """Return which of the reduced rows are on the front of their CFA and scenario."""
-        on_front, eligible = np.zeros(table.num_rows, dtype=bool), table["pareto"].to_numpy()
+        on_front, eligible = np.zeros(table.num_rows, dtype=bool), table[ON_FRONT].to_numpy()
         for at in row_groups(table).values():
             marked = at[eligible[at]]
             on_front[marked[non_dominated(self._values(table.take(marked)))]] = True
@@ -192,11 +192,11 @@ class Gathered:
     def finish(self) -> tuple[pa.Table, pa.Table]:
         """Return the rows that stand out, `pareto` where they are on the front of the run, and the sample."""
         rows = self.selection.reduced(joined(self._waiting, self.schema))
-        at = rows.schema.get_field_index("pareto")
-        marked = rows.set_column(at, rows.schema.field(at), pa.array(self.selection.on_front(rows)))
+        at = rows.schema.get_field_index(ON_FRONT)
+        rows = rows.set_column(at, rows.schema.field(at), pa.array(self.selection.on_front(rows)))
         sample = sampled(joined(self._samples, self.schema), MOST_POINTS)
         no = pa.array(np.zeros(sample.num_rows, dtype=bool))
-        return marked, sample.set_column(at, sample.schema.field(at), no)
+        return rows, sample.set_column(at, sample.schema.field(at), no)
 
 
 def shown_rows(designs: pa.Table, pareto: pa.Table) -> pa.Table:
@@ -217,19 +217,28 @@ def joined(tables: Sequence[pa.Table], schema: pa.Schema) -> pa.Table:
     return pa.Table.from_arrays(columns, schema=schema)
 
 
-def drawn_rows(rows: pa.Table, selection: Selection, scenario: str) -> Int[IndexArray, " drawn"]:
-    """Return the rows to draw: all that are not swept, and a scenario's best swept rows of each CFA."""
+def designs_of(rows: pa.Table, sample: pa.Table, selection: Selection, scenario: str) -> pa.Table:
+    """Return the rows that a report shows beside the front, of those that stand out and of a sample of all."""
+    ids, sampled_ids = (table["design_id"].to_numpy() for table in (rows, sample))
+    at = [best_rows(rows, selection, scenario), front_rows(rows, selection, scenario)]
+    at.append(np.flatnonzero(np.isin(ids, sampled_ids)))
+    others = sample.filter(pa.array(~np.isin(sampled_ids, ids)))
+    return joined([rows.take(np.unique(np.concatenate(at))), others], rows.schema)
+
+
+def best_rows(rows: pa.Table, selection: Selection, scenario: str) -> Int[IndexArray, " selected"]:
+    """Return the rows that are not swept, and a scenario's best swept rows of each CFA."""
     swept = _feasible_of(rows, scenario)
     cfas = rows["cfa"].unique().to_pylist()
     best = [best_at(rows, selection.order, BEST_PER_CFA, swept & word_mask(rows, "cfa", cfa)) for cfa in cfas]
     return np.unique(np.concatenate([np.flatnonzero(word_mask(rows, "kind", *NAMED_KINDS)), *best]))
 
 
-def front_rows(rows: pa.Table, selection: Selection, scenario: str) -> Int[IndexArray, " drawn"]:
+def front_rows(rows: pa.Table, selection: Selection, scenario: str) -> Int[IndexArray, " selected"]:
     """Return swept rows: an even sample of a scenario's feasible front, and those that lead a scenario."""
     leaders = leading_rows(rows, selection.front[0])
     at = [leaders[word_mask(rows, "kind", SWEPT)[leaders]]]
-    front, sensitivity = _feasible_of(rows, scenario) & rows["pareto"].to_numpy(), rows[selection.front[1]].to_numpy()
+    front, sensitivity = _feasible_of(rows, scenario) & rows[ON_FRONT].to_numpy(), rows[selection.front[1]].to_numpy()
     for cfa in rows["cfa"].unique().to_pylist():
         of_cfa = np.flatnonzero(front & word_mask(rows, "cfa", cfa))
         of_cfa = of_cfa[np.argsort(sensitivity[of_cfa], kind="stable")]
@@ -244,18 +253,12 @@ def _feasible_of(rows: pa.Table, scenario: str) -> Bool[BoolArray, " rows"]:
 
 def row_groups(table: pa.Table) -> dict[tuple[str, str], Int[IndexArray, " _rows"]]:
     """Return the rows of each CFA and scenario."""
-    return dict(_groups(table))
-
-
-def _groups(table: pa.Table) -> Iterator[tuple[tuple[str, str], Int[IndexArray, " _rows"]]]:
     cfas, scenarios = (
         {name: word_mask(table, column, name) for name in table[column].unique().to_pylist()}
         for column in ("cfa", "scenario")
     )
-    for cfa, scene in product(cfas, scenarios):
-        at = np.flatnonzero(cfas[cfa] & scenarios[scene])
-        if at.size:
-            yield (cfa, scene), at
+    groups = {(cfa, scene): np.flatnonzero(cfas[cfa] & scenarios[scene]) for cfa, scene in product(cfas, scenarios)}
+    return {group: at for group, at in groups.items() if at.size}
 
 
 def best_at(

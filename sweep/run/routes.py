@@ -36,12 +36,11 @@ _MOST_LETTERS = 200
 class Rules:
     """Rules by which designs become rows.
 
-    `schema`: of the rows of a run; `shown`: of those that its report shows; `swept`: quantities in `schema`.
+    `schema`: of the rows of a run; `shown`: of those that its report shows.
     """
 
     schema: pa.Schema
     shown: pa.Schema
-    swept: frozenset[str]
     requested: RequestedQuantities
     objective: Objective
     constraints: Mapping[str, Bound]
@@ -65,7 +64,8 @@ class Rules:
     def wanted_of_swept(self) -> Wanted:
         """Those of the rows of a run."""
         schema = self.schema.append(self.shown.field(ON_FRONT))
-        return Wanted.of({name: q for name, q in self.quantities.items() if name in self.swept}, self.requested, schema)
+        swept = {name: quantity for name, quantity in self.quantities.items() if name in schema.names}
+        return Wanted.of(swept, self.requested, schema)
 
 
 @dataclass(frozen=True)

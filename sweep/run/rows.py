@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -70,13 +70,14 @@ class Part:
 
 def parts_of(study: Study) -> list[Part]:
     """Return all parts in the order of their rows."""
+    sizes = [_job_size(study, space) for space in study.spaces]
     groups: list[list[Job]] = []
     first_id = 0
     for name, scene in study.scenarios.items():
         small: list[Job] = []
         light = scene.target is None and not study.states and study.section.vision is None
         together = light or len(study.scenarios) >= _ENOUGH_SCENES
-        for job in _jobs_of(study, name, first_id):
+        for job in _jobs_of(study, name, first_id, sizes):
             if together and sum(other.size for other in (*small, job)) <= _FEW:
                 small.append(job)
                 groups += [small] if len(small) == 1 else []
@@ -87,10 +88,9 @@ def parts_of(study: Study) -> list[Part]:
     return [Part(number, tuple(jobs)) for number, jobs in enumerate(groups)]
 
 
-def _jobs_of(study: Study, scenario: str, first_id: int) -> Iterator[Job]:
+def _jobs_of(study: Study, scenario: str, first_id: int, sizes: Sequence[int]) -> Iterator[Job]:
     first_filter = 0
-    for number, space in enumerate(study.spaces):
-        size = _job_size(study, space)
+    for number, (space, size) in enumerate(zip(study.spaces, sizes, strict=True)):
         for start in range(0, space.size, size):
             stop, first = min(start + size, space.size), first_filter + start
             yield Job(number, scenario, start, stop, first_id + first, first)
@@ -113,7 +113,6 @@ def rules_of(study: Study) -> Rules:
     return Rules(
         schema=described(result_schema(study.parameters, list(swept), **of_rows), quantities),
         shown=described(result_schema(study.parameters, list(quantities), marked=True, **of_rows), quantities),
-        swept=frozenset(swept),
         requested=study.requested,
         objective=study.objective,
         constraints=study.constraints,

@@ -24,7 +24,7 @@ from ..results.folder import begin
 from ..results.identity import run_facts
 from ..results.lock import LOCK, locked
 from ..results.manifest import Manifest
-from ..results.shown import Gathered, Selection, drawn_rows, front_rows, joined, shown_rows
+from ..results.shown import Gathered, Selection, best_rows, designs_of, front_rows, joined, shown_rows
 from ..results.tables import (
     COMBINATIONS,
     DESIGNS,
@@ -104,9 +104,10 @@ def _whole(study: Study) -> set[str]:
 def usual_backend(study: Study) -> str:
     """Return threads for so few designs that processes would take longer to start, else processes."""
     section, scenes = study.section, study.scenarios.values()
-    heavy = study.search is not None or study.states or section.vision is not None or section.population is not None
-    own = section.metrics or section.effects or study.n_designs > _FEW or len(scenes) > 1
-    return "loky" if heavy or own or any(scene.target is not None for scene in scenes) else "threading"
+    slow = study.search is not None or study.states or section.vision is not None or section.population is not None
+    many = study.n_designs > _FEW or len(scenes) > 1 or any(scene.target is not None for scene in scenes)
+    user_code = section.metrics or section.effects
+    return "loky" if slow or many or user_code else "threading"
 
 
 def run_study(
@@ -146,9 +147,14 @@ def run_study(
         if not wrong:
             return ()
         backend = backend or usual_backend(study)
-        with nullcontext(pool) if pool is not None else workers(n_jobs, backend, scheduler) as own:
-            how = {"command": list(command), "workers": own.count, "backend": own.backend, "scheduler": scheduler}
-            run = _Run(study.with_plans(), manifest, own, progress, options, started, how)
+        with nullcontext(pool) if pool is not None else workers(n_jobs, backend, scheduler) as started_pool:
+            how = {
+                "command": list(command),
+                "workers": started_pool.count,
+                "backend": started_pool.backend,
+                "scheduler": scheduler,
+            }
+            run = _Run(study.with_plans(), manifest, started_pool, progress, options, started, how)
             try:
                 return run.make(wrong)
             except (StudyError, InfeasibleError):
@@ -222,16 +228,11 @@ class _Run:
             sweep.write_answers(answered, self.gathered)
         rows, sample = self.gathered.finish()
         of_parts = rows.filter(pa.array(~word_mask(rows, "kind", SEARCHED)))
-        whole = pa.concat_tables([sweep.with_all_columns(of_parts), answered]).unify_dictionaries()
-        mark = shown.get_field_index(ON_FRONT)
-        whole = whole.sort_by("design_id").set_column(mark, shown.field(mark), rows[ON_FRONT])
-        first = next(iter(self.study.scenarios))
-        drawn = [select(whole, self.selection, first) for select in (drawn_rows, front_rows)]
-        sampled, ids = sample["design_id"].to_numpy(), whole["design_id"].to_numpy()
-        at = np.unique(np.concatenate([*drawn, np.flatnonzero(np.isin(ids, sampled))]))
-        designs = [whole.take(at), sample.filter(pa.array(~np.isin(sampled, ids)))]
-        self._write(DESIGNS, joined(designs, shown))
-        self._write(PARETO, whole.filter(whole[ON_FRONT]))
+        all_columns = joined([sweep.with_all_columns(of_parts), answered], shown)
+        at = shown.get_field_index(ON_FRONT)
+        all_columns = all_columns.set_column(at, shown.field(at), rows[ON_FRONT])
+        self._write(DESIGNS, designs_of(all_columns, sample, self.selection, next(iter(self.study.scenarios))))
+        self._write(PARETO, all_columns.filter(all_columns[ON_FRONT]))
         self.manifest.remove([name for name in self.manifest.rows() if name not in self.manifest.files])
         if answer is not None:
             self._write(SEARCH_LOG, search_log(answer))
@@ -258,7 +259,7 @@ class _Run:
         return frame
 
     def _write_row_tables(self, names: set[str]) -> None:
-        rows, on_front = self._frame(drawn_rows), self._frame(front_rows)
+        rows, on_front = self._frame(best_rows), self._frame(front_rows)
         details = design_details(self.study, names, rows, on_front, self.pool, self.progress)
         swept = word_mask(self.shown, "kind", SWEPT) & word_mask(self.shown, "status", "ok")
         points = self.shown["design_id"].to_numpy()[swept]
@@ -272,7 +273,7 @@ class _Run:
     def _write_vision(self) -> None:
         from .vision import vision_tables  # noqa: PLC0415  (only where a study asks for images)
 
-        tables = vision_tables(self.study, self._frame(drawn_rows), self._kept("vision"), self.progress)
+        tables = vision_tables(self.study, self._frame(best_rows), self._kept("vision"), self.progress)
         for name, table in tables.items():
             self._write(name, table)
 

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
-from ..base.disk import digest_of
 from ..base.errors import FailedDesignError, ValidationIssue
 from ..base.types import Call, DesignNumbers, Progress, delayed
 from ..results.atomic import write_bytes
@@ -26,6 +25,7 @@ from .rows import Job, Part, Rows, failed_rows, marked, parts_of, rows_of, rules
 from .workers import Held, WorkerKilledError, Workers, raise_if_stopped
 
 _LISTED_EACH_S = 5.0
+"""Time between two listings of finished parts."""
 KILLED = "error: its worker died twice"
 _MOST_AT_ONCE = 256
 """Rows of which all columns are computed in one call."""
@@ -75,7 +75,6 @@ class Sweep:
     planned: Planned
     manifest: Manifest
     pool: Workers
-    _digests: dict[str, str] = field(default_factory=dict)
     _listed_s: float = 0.0
     warnings: list[str] = field(default_factory=list)
     failed: int = 0
@@ -89,11 +88,6 @@ class Sweep:
     def parts(self) -> list[Part]:
         """All parts in the order of their rows."""
         return parts_of(self.planned.study)
-
-    @property
-    def todo(self) -> list[Part]:
-        """Parts without a file."""
-        return [part for part in self.parts if not (self.folder / part_name(part.number)).is_file()]
 
     def run(self, gathered: Gathered, progress: Progress, options: RunOptions) -> None:
         """Compute the parts that are not there or not whole.
@@ -129,7 +123,7 @@ class Sweep:
         return 0.0 if target is None else target.object_resolution_px
 
     def _take(self, part: Part, finished: FinishedPart, gathered: Gathered) -> None:
-        self._digests[part_name(part.number)] = finished.digest
+        self.manifest.files[part_name(part.number)] = finished.digest
         self.failed += finished.failed
         gathered.add(finished.shown)
         if time.monotonic() - self._listed_s > _LISTED_EACH_S:
@@ -137,25 +131,24 @@ class Sweep:
 
     def _list(self) -> None:
         """List finished parts; of those after the last listing, their own checksums tell whether they are whole."""
-        self.manifest.add(self._digests)
+        self.manifest.save()
         self._listed_s = time.monotonic()
 
     def _kept(self, part: Part, options: RunOptions) -> FinishedPart | None:
         """Return a part of an earlier run; None if it is not there, or not as that run wrote it."""
-        name = part_name(part.number)
-        path = self.folder / name
-        if not path.is_file() and name not in self.manifest.files:
+        name, planned = part_name(part.number), self.planned
+        path, listed = self.folder / name, self.manifest.files.get(name)
+        if listed is None and not path.is_file():
             return None
-        key, rules = part.key(self.planned.study, self.planned.fingerprint), self.planned.rules
-        known = name not in self.manifest.files or not self.manifest.wrong([name])
-        table = read_part(path, key, rules.schema, part.size) if known else None
-        if table is None:
+        stored = read_part(path, part.key(planned.study, planned.fingerprint), planned.rules.schema, part.size)
+        if stored is None or listed not in (None, stored[1]):
             self.warnings.append(f"part {part.number} was damaged on the disk and is computed again")
             return None
+        table, digest = stored
         if options.retry_failed and _failures(table)[0]:
             return None
-        shown = self.planned.selection.of_part(marked(table, part, self.planned.study, rules))
-        return FinishedPart(digest_of(path), None, shown, *_failures(table))
+        shown = planned.selection.of_part(marked(table, part, planned.study, planned.rules))
+        return FinishedPart(digest, None, shown, *_failures(table))
 
     def write_answers(self, rows: pa.Table, gathered: Gathered) -> None:
         """Write the answers of a search, after all designs."""
@@ -173,17 +166,17 @@ class Sweep:
         ids, jobs, calls = rows["design_id"].to_numpy()[ok], [job for part in self.parts for job in part.jobs], []
         of_job = np.searchsorted([job.first_id for job in jobs], ids, side="right") - 1
         for at in np.unique(of_job):
-            own = ids[of_job == at]
-            starts = range(0, own.size, _MOST_AT_ONCE)
-            calls += [delayed(_whole, self.held, jobs[at], own[start : start + _MOST_AT_ONCE]) for start in starts]
-        whole = [table.filter(pa.array(word_mask(table, "status", "ok"))) for table in self.pool(calls)]
-        computed = np.concatenate([table["design_id"].to_numpy() for table in whole] or [ids[:0]])
+            ids_of_job = ids[of_job == at]
+            for start in range(0, ids_of_job.size, _MOST_AT_ONCE):
+                calls.append(delayed(_all_columns, self.held, jobs[at], ids_of_job[start : start + _MOST_AT_ONCE]))
+        tables = [table.filter(pa.array(word_mask(table, "status", "ok"))) for table in self.pool(calls)]
+        computed = np.concatenate([table["design_id"].to_numpy() for table in tables] or [ids[:0]])
         if lost := ids.size - computed.size:
             self.warnings.append(
                 f"{lost} designs of the report have not all columns: a quantity beside those asked for fails"
             )
         others = rows.filter(pa.array(~np.isin(rows["design_id"].to_numpy(), computed)))
-        return joined([*whole, others], shown)
+        return joined([*tables, others], shown)
 
 
 def _compute(held: Held, part: Part, folder: Path | None) -> FinishedPart:
@@ -205,7 +198,7 @@ def _written(planned: Planned, part: Part, folder: Path | None, table: pa.Table)
     return FinishedPart(digest, content if folder is None else None, shown, *_failures(table))
 
 
-def _whole(held: Held, job: Job, ids: DesignNumbers) -> pa.Table:
+def _all_columns(held: Held, job: Job, ids: DesignNumbers) -> pa.Table:
     """Compute all columns of some designs of a job."""
     study, rules = held.value.study, held.value.rules
     numbers = ids - job.first_id + job.start

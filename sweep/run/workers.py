@@ -74,12 +74,13 @@ class Workers:
         """Return a value that calls may name: worker processes on this machine read it once each."""
         if self.folder is None:
             return Held(value, None)
-        path = self.folder / f"{id(value)}.pickle"
         try:
-            path.write_bytes(pickle.dumps(value))
+            with tempfile.NamedTemporaryFile(dir=self.folder, delete=False) as file:
+                pickle.dump(value, file)
         except OSError as error:
-            raise SweepError(ValidationIssue(f"cannot be written: {error.strerror or error}", str(path))) from None
-        return Held(value, path)
+            problem = f"cannot be written: {error.strerror or error}"
+            raise SweepError(ValidationIssue(problem, str(self.folder))) from None
+        return Held(value, Path(file.name))
 
     @property
     def count(self) -> int:
