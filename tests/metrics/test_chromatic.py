@@ -11,7 +11,13 @@ import pytest
 from sweep.camera.forward import ForwardModel
 from sweep.camera.linear import linear_model
 from sweep.metrics.bound import FEASIBLE
-from sweep.metrics.chromatic import chromatic_separation, chromatic_separations, smooth_chromatic, squared_distance
+from sweep.metrics.chromatic import (
+    chromatic_along,
+    chromatic_separation,
+    chromatic_separations,
+    smooth_chromatic,
+    squared_distance,
+)
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.smooth import SmoothDesign
 from sweep.search.limit import limit_of, reason_without_bound
@@ -150,3 +156,27 @@ def test_lamps_of_different_photons_are_judged_without_brightness(
     assert bool(study.warnings) == warned
     asked = load_study(tmp_path / "a.yaml", changes=changes | {"objective": "csd_yellow_red"})
     assert bool(asked.warnings) == bool(keys)
+
+
+def test_distances_along_one_channel_are_those_of_the_best_brightness() -> None:
+    """Of every pair the nearest point of either ray, by its projection, in any number of channels."""
+    rng = np.random.default_rng(7)
+    members = {"a": np.array([4, 0]), "b": np.array([1, 5, 2]), "c": np.array([3])}
+    for channels in (1, 2, 4, 5):
+        fixed, values = rng.uniform(-5, 90, (6, channels)), rng.uniform(-5, 90, (70, 6))
+        unlit = np.tile(rng.uniform(0, 3, channels), (70, 1))
+        unlit[:, 0] = rng.uniform(0, 3, 70)
+        pairs = [("a", "b"), ("a", "c")]
+        found, most_dn, least_dn = chromatic_along(fixed, 0, values, unlit, members, pairs)
+        response = np.repeat(fixed[None], 70, axis=0)
+        response[..., 0] = values
+        lit = response - unlit[:, None]
+        for a, b in pairs:
+            first, second = lit[:, members[a], None], lit[:, None, members[b]]
+            dot, rays = (first * second).sum(axis=-1), []
+            for point, ray in ((first, second), (second, first)):
+                share = np.maximum(dot / (ray**2).sum(axis=-1), 0.0)
+                rays.append(np.linalg.norm(point - share[..., None] * ray, axis=-1))
+            np.testing.assert_allclose(found[a, b], np.min(rays, axis=(0, 2, 3)), rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(most_dn, response.max(axis=(1, 2)))
+        np.testing.assert_allclose(np.maximum(least_dn, 0), np.maximum(lit.max(axis=2).min(axis=1), 0), atol=1e-9)

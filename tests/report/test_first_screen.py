@@ -153,7 +153,8 @@ def test_the_first_plot_has_every_cfa_at_its_light(finished: FinishedFolder, sta
         rows = table[table["kind"] == kind]
         np.testing.assert_allclose(shown[name][0], rows["cfa_sensitivity"], rtol=1e-6)
         np.testing.assert_allclose(shown[name][1], rows["csd_yellow_red"], rtol=1e-6)
-    swept = table[(table["kind"] == "sweep") & table["pareto"] & table["feasible"]]
+    pareto = pd.read_parquet(folder / "pareto.parquet")
+    swept = pareto[(pareto["kind"] == "sweep") & pareto["feasible"]]
     assert len(shown["swept front"][0]) == len(swept)
     bounded = front.dropna(subset=["limit"])
     np.testing.assert_allclose(shown["upper bound for N of RYNCy, unquantized"][0], bounded["cfa_sensitivity_min"])

@@ -158,8 +158,8 @@ def test_the_saved_front_has_every_digit(finished: FinishedFolder, standing: Any
         seen.page.click("#save")
     text = Path(waiting.value.path()).read_text()
     rows = list(csv.DictReader(io.StringIO(text)))
-    table = pd.read_parquet(folder / "results.parquet").set_index("design_id")
-    front = table[table["pareto"] & table["feasible"] & (table["kind"] == "sweep")]
+    table = pd.read_parquet(folder / "pareto.parquet").set_index("design_id")
+    front = table[table["feasible"] & (table["kind"] == "sweep")]
     assert {int(row["design_id"]) for row in rows} == set(front.index)
     for row in rows:
         for column in ("left_nm", "csd_yellow_red", "sensitivity", "cfa_sensitivity", "slope_per_nm"):
