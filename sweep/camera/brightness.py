@@ -132,7 +132,7 @@ class LampReadings:
 
     def _of_table(
         self, signals: Int[IndexArray, " signals"], factors: Float[Array, "signals factors"], *, spread: bool
-    ) -> tuple[Float[Array, "signals factors channels"], Float[Array, "signals factors channels"]]:
+    ) -> tuple[Float[Array, "signals factors channels"], Float[Array, "_ factors channels"]]:
         """Return mean and variance from the tables of noisy pixels; the variance is empty if not asked for."""
         (lit_e, dark_e), weights = self.full_e, (self.readout.weights[0], self.readout.spread_weights[0])
         shape = (*factors.shape, weights[0].shape[1])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from typing import Any
@@ -46,11 +46,11 @@ class Counts:
     on_front: Counter[tuple[str, str]]
 
     @classmethod
-    def of(cls, facts: Sequence[Sequence[Any]], pareto: Mapping[Any, Any]) -> Counts:
-        """Return the counts that `facts` had, with a front."""
+    def of(cls, facts: Sequence[Sequence[Any]], pareto: pa.Table) -> Counts:
+        """Return the counts of rows that a run stated, with those of its front."""
         groups = {(kind, scenario, cfa, status, feasible): n for kind, scenario, cfa, status, feasible, n in facts}
-        swept = (np.asarray(pareto["kind"]) != REFERENCE) & np.asarray(pareto["feasible"], dtype=bool)
-        on_front = zip(np.asarray(pareto["scenario"])[swept], np.asarray(pareto["cfa"])[swept], strict=True)
+        designs = pareto.filter(pa.array(~word_mask(pareto, "kind", REFERENCE) & pareto["feasible"].to_numpy()))
+        on_front = zip(designs["scenario"].to_pylist(), designs["cfa"].to_pylist(), strict=True)
         return cls(Counter(groups), Counter(on_front))
 
     @property
