@@ -16,6 +16,7 @@ import pyarrow as pa
 from ..base.disk import read_facts
 from ..base.errors import InfeasibleError, StudyError, UpperBoundExceededError
 from ..base.types import IndexArray, Int, Progress
+from ..designs.plugin import PluginFamily
 from ..results.answers import Answers
 from ..results.dataset import part_name
 from ..results.dictionary import described
@@ -106,7 +107,8 @@ def usual_backend(study: Study) -> str:
     section, scenes = study.section, study.scenarios.values()
     slow = study.search is not None or study.states or section.vision is not None or section.population is not None
     many = study.n_designs > _FEW or len(scenes) > 1 or any(scene.target is not None for scene in scenes)
-    user_code = section.metrics or section.effects
+    own_families = any(space.filter and isinstance(space.filter.family, PluginFamily) for space in study.spaces)
+    user_code = section.metrics or section.effects or own_families
     return "loky" if slow or many or user_code else "threading"
 
 

@@ -182,6 +182,7 @@ class Darkest(ReadoutMetric):
 '''
 WITH_METRICS = """\
 study: red
+columns: all
 sensor: ar0820
 lights: tl16
 cfas: [RYNCy]

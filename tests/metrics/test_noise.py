@@ -125,6 +125,7 @@ def test_readouts_that_are_certain_and_the_same_tell_nothing(pixel: dict[str, fl
 
 STUDY = """
 study: noisy
+columns: all
 seed: 5
 sensor: ar0820
 lights: tl16

@@ -75,7 +75,7 @@ def test_a_region_map_is_described_and_drawn(tmp_path: Path) -> None:
     assert f"{share:.1%}" in said
     assert "modeled as hyperbolic secants" in said
     assert "Lamps that norms allow" in (tmp_path / "out" / "report.html").read_text()
-    assert (tmp_path / "out" / "figures" / "regions-1.png").exists()
+    assert (tmp_path / "out" / "figures" / "regions-1.svg").exists()
 
 
 @pytest.mark.parametrize(

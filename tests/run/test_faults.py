@@ -63,7 +63,7 @@ def test_a_design_that_kills_its_worker_is_a_row(plain: Study, tmp_path: Path, s
     sweep = few.spaces[-1]
     few = replace(few, spaces=(replace(sweep, axes=((590.0, 600.0, 610.0), (5.0,), (660.0,), (5.0,), (1.0,))),))
     ran(mischievous(few, tmp_path / "missing"), tmp_path / "fine", 1)
-    ran(mischievous(few, wish), tmp_path / "out", 2)
+    run_study(mischievous(few, wish), tmp_path / "out", 2, lambda *_: None, backend="loky")
     found, fine = rows(tmp_path / "out"), rows(tmp_path / "fine")
     killed = found["left_nm"] == 590
     assert list(found.loc[killed, "status"]) == [KILLED] * len(scenes)

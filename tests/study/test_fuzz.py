@@ -70,6 +70,8 @@ def first_rows(study: Study, scenario: str) -> set[str]:
     planned = replace(study, plans={scenario: study.plan(scenario)}, scenarios={scenario: study.scenarios[scenario]})
     rules, found = rules_of(planned), set()
     for number, space in enumerate(planned.spaces):
+        if not space.size:
+            continue
         first = Rows.of(Job(number, scenario, 0, min(space.size, 2), 0, 0), planned)
         made = rows_of(first, planned.setup(space, scenario), rules, rules.wanted)
         found |= set(made["status"].to_pylist())
