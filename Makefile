@@ -6,7 +6,8 @@
 # make check                 ruff, mypy --strict
 # make accuracy              run the hard cases, measure what accuracy costs in time, outputs/accuracy/accuracy.png
 # make tables              print the tables of studies/guide/reference.md and outputs/README.md anew
-# make gallery              run every study, draw studies/figures and studies/guide/gallery.md anew (15 minutes)
+# make gallery              run every study, draw studies/figures and studies/guide/gallery.md anew, and compare the
+#                            figures in the text with their runs (20 minutes)
 # make docs                  build guide and API reference as HTML, outputs/docs/studies/guide/index.html
 # make bench                 measure speed, ratios beside those of the last bench, JSON in outputs/bench
 PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
@@ -56,6 +57,7 @@ tables: $(VENV)/.ready-dev
 
 gallery: $(VENV)/.ready-dev
 	$(BIN)/python -m tests.gallery $(ARGS)
+	$(TESTS) -m gallery tests/test_documents.py tests/test_guide.py
 
 docs: $(VENV)/.ready-docs
 	$(BIN)/python -m sphinx -q -W --keep-going -c studies/guide . outputs/docs

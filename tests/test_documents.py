@@ -64,7 +64,7 @@ WHOLE = ("fog", "noise", "exposure")
 """Studies that are run with all of their scenarios here."""
 
 
-@pytest.mark.slow
+@pytest.mark.gallery
 @pytest.mark.parametrize(
     "name", [name for name in PICTURES if name in WHOLE or name not in {"vision", "sensors", *FEWER}]
 )
@@ -151,7 +151,7 @@ def test_the_price_in_the_readme_is_that_of_a_run(finished: FinishedFolder) -> N
     assert [line for line in README.splitlines() if line.endswith(("| gain |", "| loss |"))] == printed
 
 
-@pytest.mark.slow
+@pytest.mark.gallery
 def test_the_chromatic_figures_of_the_readme_are_those_of_their_command(finished: FinishedFolder) -> None:
     table = pd.read_parquet(finished("chromatic") / "results.parquet").set_index("name")
     column, limit = table["chromatic_csd_yellow_red"], table["limit"].max()
@@ -166,7 +166,7 @@ def test_a_figure_of_the_readme_is_that_of_its_command(finished: FinishedFolder,
     assert FIGURES[said](stopband(finished)) == said
 
 
-@pytest.mark.slow
+@pytest.mark.gallery
 def test_the_figures_at_an_angle_are_those_of_their_command(finished: FinishedFolder) -> None:
     scene = load_study(STUDIES / "angle.yaml").scenarios["field"]
     assert scene.optics.f_number == 1.6
@@ -179,7 +179,7 @@ def test_the_figures_at_an_angle_are_those_of_their_command(finished: FinishedFo
     }
 
 
-@pytest.mark.slow
+@pytest.mark.gallery
 def test_the_figures_of_accuracy_are_those_of_their_command(tmp_path: Path) -> None:
     study = load_study(STUDIES / "accuracy.yaml")
     measure_accuracy(study, tmp_path, lambda *_: None, presets=("fast", "standard"))
@@ -190,7 +190,7 @@ def test_the_figures_of_accuracy_are_those_of_their_command(tmp_path: Path) -> N
         assert most / 100 <= errors[preset] <= most
 
 
-@pytest.mark.slow
+@pytest.mark.gallery
 def test_the_table_of_the_readme_is_that_of_its_command(finished: FinishedFolder) -> None:
     folder = finished("robust")
     rows = pd.read_parquet(folder / "results.parquet").merge(
@@ -230,7 +230,7 @@ def table_below(text: str, head: str) -> dict[str, list[str]]:
     return {name: cells for name, *cells in ([cell.strip() for cell in line.strip("|").split("|")] for line in lines)}
 
 
-@pytest.mark.slow
+@pytest.mark.gallery
 def test_the_worst_cases_of_the_guide_are_those_of_their_command(finished: FinishedFolder) -> None:
     rows = pd.read_parquet(finished("robust") / "results.parquet").set_index("name")
     cells = table_below(GUIDE_TO_LAMPS, "| | nominal | worst case: temperature |")
@@ -241,7 +241,7 @@ def test_the_worst_cases_of_the_guide_are_those_of_their_command(finished: Finis
     assert bound[2] == f"{math.ceil(rows['limit'].max())}"
 
 
-@pytest.mark.slow
+@pytest.mark.gallery
 def test_the_angles_of_the_guide_are_those_of_their_command(finished: FinishedFolder) -> None:
     rows = pd.read_parquet(finished("angle") / "results.parquet").set_index(["name", "scenario"])
     cells = table_below(GUIDE_TO_LAMPS, "| | nothing moves | on axis, f/1.6 |")
@@ -253,7 +253,7 @@ def test_the_angles_of_the_guide_are_those_of_their_command(finished: FinishedFo
     assert bound[2] == f"{math.ceil(rows['limit'].max())}"
 
 
-@pytest.mark.slow
+@pytest.mark.gallery
 def test_the_figures_of_colorants_are_those_of_their_command(finished: FinishedFolder) -> None:
     """A filter of colorants does not move with the angle, so that the answer, a row in the field, is the same on axis."""
     rows = pd.read_parquet(finished("dye") / "results.parquet").set_index(["name", "scenario"])
@@ -269,7 +269,7 @@ def test_the_figures_of_colorants_are_those_of_their_command(finished: FinishedF
             assert cells[0] == pytest.approx(cells[1], rel=1e-12)
 
 
-@pytest.mark.slow
+@pytest.mark.gallery
 def test_the_figures_of_single_bands_are_those_of_a_search(finished: FinishedFolder, tmp_path: Path) -> None:
     text = " ".join((STUDIES / "guide" / "10-colorants.md").read_text().split())
     study = (STUDIES / "band.yaml").read_text().split("  map:")[0]
@@ -330,7 +330,7 @@ def tables_of_images(folder: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
     return errors.set_index("design"), ranks.set_index("predictor")
 
 
-@pytest.mark.slow
+@pytest.mark.gallery
 def test_the_errors_of_the_ideal_observer_are_those_of_their_command(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -345,7 +345,7 @@ def test_the_errors_of_the_ideal_observer_are_those_of_their_command(
     assert {design: ERRORS_OF_IMAGES[design][1] for design in observed} == observed
 
 
-@pytest.mark.slow
+@pytest.mark.gallery
 def test_the_errors_of_the_network_are_those_of_their_command() -> None:
     """The command is `make study NAME=vision`, too long for a test; this reads what it left."""
     folder = ROOT / "outputs" / "vision"
@@ -390,7 +390,7 @@ def test_the_errors_of_the_network_are_those_of_their_command() -> None:
     assert [figure for figure in figures if figure not in text] == []
 
 
-@pytest.mark.slow
+@pytest.mark.gallery
 def test_the_figures_of_hdr_pixels_are_those_of_their_commands(
     finished: FinishedFolder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -411,7 +411,7 @@ def test_the_figures_of_hdr_pixels_are_those_of_their_commands(
     assert f"in as few as {100 * seen:.1f} % of the phases" in text
 
 
-@pytest.mark.slow
+@pytest.mark.gallery
 def test_the_figures_of_several_sensors_are_those_of_their_command(finished: FinishedFolder) -> None:
     folder = finished("sensors")
     rows = pd.read_parquet(folder / "results.parquet").set_index(["sensor", "lights"])

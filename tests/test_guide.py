@@ -94,8 +94,14 @@ def test_page_runs_as_shown(page: str, tmp_path: Path, monkeypatch: pytest.Monke
     run_page(page, tmp_path, slow=False)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("page", [page for page in PAGES if any(block.word == SLOW for block in blocks(page))])
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(page, marks=pytest.mark.gallery if page.startswith("10") else pytest.mark.slow)
+        for page in PAGES
+        if any(block.word == SLOW for block in blocks(page))
+    ],
+)
 def test_page_with_long_runs_runs_as_shown(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     run_page(page, tmp_path, slow=True)

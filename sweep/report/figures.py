@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -43,6 +44,7 @@ DASHES = ("-", (0, (6, 2)), (0, (1, 1.5)), (0, (6, 2, 1, 2)))
 _DPI = 160
 _COMPRESSION = 3
 """Compression level of a PNG: at its usual 6 a file is a tenth smaller and takes twice as long."""
+_CLIP_PATH = re.compile(rb"\bp[0-9a-f]{10}\b")
 Drawing = Callable[[], "Figure"]
 """A delayed drawing: a process that draws nothing does not load matplotlib."""
 
@@ -167,4 +169,7 @@ def rendered(figure: Figure, kind: str) -> bytes:
         warnings.filterwarnings("ignore", message="Glyph")  # a name in a script that the font lacks
         figure.savefig(buffer, format=kind, dpi=_DPI, **options)
     figure.set_layout_engine("none")  # the layout holds for the other kind, too
-    return buffer.getvalue()
+    if kind != "svg":
+        return buffer.getvalue()
+    numbers: dict[bytes, bytes] = {}  # names of clip paths hash the last bits of a layout, which may differ
+    return _CLIP_PATH.sub(lambda name: numbers.setdefault(name[0], b"clip%d" % len(numbers)), buffer.getvalue())
