@@ -16,6 +16,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import lru_cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,8 @@ from ..base.errors import InterruptedRunError, SweepError, ValidationIssue
 from ..base.types import Call, Parallel, Progress
 
 BACKENDS = ("loky", "threading", "dask")
+_LIBRARIES = ("numba", "matplotlib.figure", "sweep.run.search")
+"""What calls of workers load."""
 STOPPING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 """Signals that stop a run; Windows has no SIGHUP."""
 _LEFT = re.compile(r"(?:sem\.loky-|joblib_memmapping_folder_)(\d+)[-_]")
@@ -256,10 +259,15 @@ def _ask_to_stop(*_: object) -> None:
 
 
 def _begin_worker(parent: int) -> None:
-    """Ignore Ctrl-C and the end of a terminal in a worker, and end the worker with its parent."""
+    """Ignore Ctrl-C and the end of a terminal in a worker, and end the worker with its parent.
+
+    Libraries are loaded here, as loky replaces a worker that grows by 300 MB after its first call.
+    """
     for number in set(STOPPING) - {signal.SIGTERM}:
         signal.signal(number, signal.SIG_IGN)
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    for library in _LIBRARIES:
+        import_module(library)
 
 
 def _end_with(parent: int) -> None:
