@@ -106,6 +106,17 @@ def expose(rates: FloatArray, fixed: FloatArray, uniform: FloatArray, time_s: fl
 
 
 @njit(cache=True, nogil=True)
+def all_near(first: FloatArray, second: FloatArray, share: FloatArray, relative: float, absolute: float) -> bool:
+    """Return whether rows are a share of others, but for a relative or absolute difference; NaN is near nothing."""
+    for row in range(first.shape[0]):
+        for at in range(first.shape[1]):
+            expected = second[row, at] * share[at]
+            if not abs(first[row, at] - expected) <= relative * abs(expected) + absolute:
+                return False
+    return True
+
+
+@njit(cache=True, nogil=True)
 def whole_numbers(
     electrons: FloatArray, top_e: float, dn_per_e: float, offset_dn: float, full_scale_dn: float, out: FloatArray
 ) -> None:

@@ -245,18 +245,18 @@ class ForwardModel:
 
         if not self.setup.camera.pixel.captures:
             return of(self, curves, scales)
-        modified, captured = list(self.setup.camera.modified), []
-        for (factors, model), scale, exposure in zip(
-            self._of_exposures, scales, self.setup.camera.pixel.exposures, strict=True
-        ):
-            electrons = of(model, curves * factors[modified, None], scale)
-            electrons *= exposure.capture.light
-            captured.append(
-                model.readout.of_pixels(electrons)
-                if model.readout.by_channel and not self.readout.by_channel
-                else electrons
-            )
-        return np.stack(captured)
+        modified, exposures = list(self.setup.camera.modified), self.setup.camera.pixel.exposures
+        result, before, electrons = np.empty(0), None, np.empty(0)
+        for at, ((factors, model), scale) in enumerate(zip(self._of_exposures, scales, strict=True)):
+            if model is not before or not np.array_equal(scale, scales[at - 1]):
+                electrons = of(model, curves * factors[modified, None], scale)
+                if model.readout.by_channel and not self.readout.by_channel:
+                    electrons = model.readout.of_pixels(electrons)
+                before = model
+            if not at:
+                result = np.empty((len(exposures), *electrons.shape))
+            np.multiply(electrons, exposures[at].capture.light, out=result[at])
+        return result
 
     @cached_property
     def _of_exposures(self) -> list[tuple[Float[Array, " channels"], ForwardModel]]:
@@ -311,7 +311,7 @@ class ForwardModel:
         return None if self.setup.scene.target is not None else self.readout.few_pixels
 
 
-_models: Cache[tuple[type[ForwardModel], bytes], ForwardModel] = Cache(16)
+_models: Cache[tuple[type[ForwardModel], bytes], ForwardModel] = Cache(4)
 _known: Cache[tuple[type[ForwardModel], int], tuple[Setup, ForwardModel]] = Cache(4)
 """Models of the last blocks' setups, by the identity of the setup, which is immutable."""
 

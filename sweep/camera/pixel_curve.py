@@ -132,10 +132,16 @@ def pixel_curve(pixel: Pixel, light: tuple[float, ...], *, noisy: bool) -> Pixel
     return PixelCurve(pixel, light, noisy)
 
 
-def same_electrons(first: SameShape, second: SameShape) -> bool:
-    """Return whether electrons are the same but for rounding."""
-    difference = np.abs(first - second)
-    return bool((difference <= _EQUAL * np.abs(second) + _NONE).all())
+def same_electrons(
+    first: Float[Array, "*batch pixels"],
+    second: Float[Array, "*batch pixels"],
+    share: float | Float[Array, " pixels"] = 1.0,
+) -> bool:
+    """Return whether electrons are the same but for rounding; `share`: of the second ones that the first have."""
+    from .compiled import all_near  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+    one, other = (np.ascontiguousarray(electrons).reshape(-1, first.shape[-1]) for electrons in (first, second))
+    return bool(all_near(one, other, np.broadcast_to(share, first.shape[-1]), _EQUAL, _NONE))
 
 
 def groups_of(light: Float[Array, "captures pixels"]) -> list[tuple[tuple[float, ...], Int[IndexArray, " _pixels"]]]:

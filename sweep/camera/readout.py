@@ -129,7 +129,8 @@ class Readout:
         light = self.capture_light_of(electrons)
         full_e = electrons[0] / light[0]
         if not all(
-            same_electrons(of_one, full_e * share) for of_one, share in zip(electrons[1:], light[1:], strict=True)
+            same_electrons(of_one, full_e, share)
+            for of_one, share in zip(electrons[1:], self.capture_light[1:], strict=True)
         ):
             return merge.merged(electrons, light, self.pixel).mean
         (first, _), *others = groups_of(self.capture_light)
