@@ -57,8 +57,8 @@ def _made(kind: Any, data: Any) -> Any:
             raise ValueError(f"other fields: {list(data)}")
         return kind(**{name: _made(hints[name], inner) for name, inner in data.items()})  # type: ignore[operator]
     if origin in (Union, types.UnionType):
-        (inner,) = (converted for converted in kinds if converted is not types.NoneType)
-        return None if data is None else _made(inner, data)
+        inner = [converted for converted in kinds if converted is not types.NoneType]
+        return None if data is None else _made(next((one for one in inner if one is type(data)), inner[0]), data)
     if isinstance(kind, type) and issubclass(kind, AbstractArray):
         content = base64.b64decode(data["base64"], validate=True)
         array = np.frombuffer(content, data["dtype"]).reshape(data["shape"])

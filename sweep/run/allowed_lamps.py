@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from ..base.types import Array, DesignCurves, Float, Parallel, Progress, delayed
+from ..base.types import Array, DesignCurves, Float, delayed
 from ..camera.forward import ForwardModel
 from ..camera.setup import Setup
-from ..results.designs import named_rows, row_curves
 from ..spectra.lights import Lights
 from ..spectra.single_leds import Norm, SingleLeds, all_leds
 from ..study import Study
-from .workers import run_with_progress
+from .analysis import Analysis, Calls, named_designs
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,7 +34,7 @@ _SCHEMA = pa.schema(
 )
 
 
-def regions_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: Progress) -> pa.Table:
+def _calls(study: Study, rows: pd.DataFrame) -> Calls:
     """Compute the separations of modeled LEDs with all effects.
 
     One row per design, norm, peak of the yellow and peak of the red LED. `pairs` counts allowed pairs of widths,
@@ -45,14 +44,8 @@ def regions_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
     assert regions is not None
     leds = all_leds(regions)
     allowed = {norm: (leds.allowed(norm, "yellow"), leds.allowed(norm, "red")) for norm in regions.norms}
-    shown, calls = named_rows(rows), []
-    for row in shown:
-        space, curves = row_curves(study, row)
-        setup = study.setup(space, row["scenario"]).with_all_effects
-        calls.append(delayed(_cells, setup, curves, allowed, regions.wanted_dn))
-    answers = zip(shown, run_with_progress(parallel, calls, "color regions", progress), strict=True)
-    cells = [{"design_id": row["design_id"], **cell} for row, cells_of_design in answers for cell in cells_of_design]
-    return pa.Table.from_pylist(cells, schema=_SCHEMA)
+    for design in named_designs(study, rows):
+        yield design.key, delayed(_cells, design.setup.with_all_effects, design.curves, allowed, regions.wanted_dn)
 
 
 def _cells(
@@ -98,3 +91,6 @@ def least_csd(
     """Return the smallest CSD over all phases of each two lights, DN."""
     csd = [np.linalg.norm(a[:, None] - b[None], axis=2) for a, b in zip(first, second, strict=True)]
     return np.asarray(np.min(csd, axis=0), dtype=float)
+
+
+ALLOWED_LAMPS = Analysis("color regions", lambda study: study.section.regions is not None, lambda _: _SCHEMA, _calls)

@@ -10,10 +10,10 @@ import numpy as np
 import pyarrow as pa
 
 from ..base.types import Array, Float
-from ..results.designs import named_rows, row_curves
 from ..results.tables import CHART, NIGHT
 from ..spectra.tasks import Chart, StudyTasks
 from ..study import Study
+from .analysis import named_designs
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,9 +33,8 @@ def _shown(study: Study, highlights: pd.DataFrame) -> Iterator[tuple[dict[str, A
     """Yield keys and colors of plain CFAs, named designs and the answer."""
     from ..metrics.tasks.color import PatchCamera  # noqa: PLC0415  (few studies have tasks)
 
-    for row in named_rows(highlights):
-        space, curves = row_curves(study, row)
-        yield {key: row[key] for key in _KEYS}, PatchCamera(study.setup(space, row["scenario"]), curves)
+    for design in named_designs(study, highlights):
+        yield {key: design.row[key] for key in _KEYS}, PatchCamera(design.setup, design.curves)
 
 
 def _chart_of(tasks: StudyTasks) -> tuple[tuple[str, ...], Chart]:

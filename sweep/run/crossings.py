@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from ..base.types import DesignCurves, Parallel, Progress, delayed
+from ..base.types import DesignCurves, delayed
 from ..camera.forward import ForwardModel
 from ..metrics.columns.chromatic import CHROMATIC_ERROR, ChromaticConfusion
 from ..metrics.columns.confusion import STATE_ERROR, state_errors
 from ..metrics.evaluate import of_lamps
-from ..results.designs import rows_of_series
 from ..spectra.lights import class_pairs, pair_name
 from ..study import Study
-from .between import Between, between, inner_numbers, or_nan
-from .workers import run_with_progress
+from ..study.axes import series_of
+from .analysis import Analysis, Calls, designs_between
+from .between import Between, inner_numbers, or_nan
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -40,7 +40,7 @@ _SCHEMA = pa.schema(
 )
 
 
-def crossings_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: Progress) -> pa.Table:
+def _calls(study: Study, rows: pd.DataFrame) -> Calls:
     """Find all numbers at which an error of a design passes the allowed one, with all effects.
 
     One row per series of scenarios (`series`, `key`), design, kind of error (`quantity`: lamps of equal brightness, or
@@ -48,20 +48,15 @@ def crossings_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progre
     """
     recognition = study.section.recognition
     assert recognition is not None
-    keys, calls = [], []
-    for series, key, scenarios, row, curves, space in rows_of_series(study, rows):
-        scenes = between(study, study.setup(space, next(iter(scenarios))), scenarios)
-        of_design = rows[(rows["name"] == row["name"]) & rows["scenario"].isin(list(scenarios))].set_index("scenario")
+    for design in designs_between(study, rows):
         of_any = [pair_name(CHROMATIC_ERROR, pair) for pair in class_pairs(study.states)]
-        errors = of_design[[STATE_ERROR]].assign(**{CHROMATIC_ERROR: of_design[of_any].max(axis=1)})
-        errors = errors.reindex(list(scenarios)).set_axis(list(scenarios.values()))
-        if scenes is not None and np.isfinite(errors.to_numpy()).all():
-            keys.append({"design_id": row["design_id"], "name": row["name"], "series": series, "key": key})
+        by_scene = design.rows.set_index("scenario")
+        errors = by_scene[[STATE_ERROR]].assign(**{CHROMATIC_ERROR: by_scene[of_any].max(axis=1)})
+        errors = errors.reindex(list(design.numbers)).set_axis(list(design.numbers.values()))
+        if np.isfinite(errors.to_numpy()).all():
             known = {name: errors[name].to_dict() for name in errors}
-            calls.append(delayed(_of_design, ErrorsBetween(scenes, curves, study.states), known, recognition.error_max))
-    answers = run_with_progress(parallel, calls, "where designs stop being usable", progress)
-    crossings = [key | at for key, found in zip(keys, answers, strict=True) for at in found]
-    return pa.Table.from_pylist(crossings, schema=_SCHEMA)
+            between = ErrorsBetween(design.scenes, design.curves, study.states)
+            yield design.key, delayed(_of_design, between, known, recognition.error_max)
 
 
 class ErrorsBetween:
@@ -138,3 +133,10 @@ def crossings_of(
             error = allowed * 10 ** decades(number)
             found.append({"at": number, "error": error, "rises": decades(after) > 0})
     return found
+
+
+def _is_asked(study: Study) -> bool:
+    return study.section.recognition is not None and bool(series_of(study.scenarios))
+
+
+USABLE_RANGES = Analysis("where designs stop being usable", _is_asked, lambda _: _SCHEMA, _calls)

@@ -30,16 +30,16 @@ from ..results.tables import (
 )
 from ..search.limit import Limit
 from ..study import Study
-from ..study.axes import series_of
-from .allowed_lamps import regions_table
+from .allowed_lamps import ALLOWED_LAMPS
+from .analysis import Analysis
 from .colors import error_against_noise_table, rendered_table
-from .crossings import crossings_table
-from .details import Details, limited_by_table, sensor_map_table
-from .handovers import handovers_table
-from .robustness import robustness_table
-from .saturated import saturated_table
+from .crossings import USABLE_RANGES
+from .details import OVER_SENSOR, Details, limited_by_table
+from .handovers import CAPTURES_FULL
+from .robustness import ROBUST
+from .saturated import SATURATION
 from .uncertainty import uncertainty_table
-from .worst import has_worst, worst_table
+from .worst import WORST_VALUES
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -78,30 +78,34 @@ class DerivedInput:
         return computed_rows(self.on_front[~self.on_front["design_id"].isin(ids)])
 
 
+_ANALYSES = {
+    SATURATED: SATURATION,
+    ROBUSTNESS: ROBUST,
+    REGIONS_MAP: ALLOWED_LAMPS,
+    SENSOR_MAP: OVER_SENSOR,
+    HANDOVERS: CAPTURES_FULL,
+    WORST: WORST_VALUES,
+    CROSSINGS: USABLE_RANGES,
+}
+
+
 def row_tables(study: Study) -> dict[str, Callable[[DerivedInput], pa.Table]]:
     """Return the derived tables of a study."""
-    tasks = study.tasks
+
+    def made(analysis: Analysis) -> Callable[[DerivedInput], pa.Table]:
+        return lambda s: analysis.table(
+            s.study, s.rows, s.kept(analysis.phase) if analysis.is_kept else s.parallel, s.progress
+        )
+
     tables: dict[str, Callable[[DerivedInput], pa.Table]] = {
         CURVES: _curves_table,
         POINTS: _points_table,
-        SATURATED: lambda s: saturated_table(s.study, s.rows, s.parallel, s.progress),
         LIMITED_BY: lambda s: limited_by_table(s.study, s.details, s.points, s.parallel, s.progress),
+        **{name: made(analysis) for name, analysis in _ANALYSES.items() if analysis.asked(study)},
     }
-    if study.pair_over_population is not None:
-        tables[ROBUSTNESS] = lambda s: robustness_table(s.study, s.rows, s.kept("robustness"), s.progress)
     if study.section.uncertainty is not None:
         tables[UNCERTAINTY] = lambda s: uncertainty_table(s.study, s.rows, s.parallel, s.progress)
-    if study.section.regions is not None:
-        tables[REGIONS_MAP] = lambda s: regions_table(s.study, s.rows, s.parallel, s.progress)
-    if any(scene.field is not None for scene in study.scenarios.values()):
-        tables[SENSOR_MAP] = lambda s: sensor_map_table(s.study, s.rows, s.parallel, s.progress)
-    if study.section.pixel.captures and series_of(study.scenarios):
-        tables[HANDOVERS] = lambda s: handovers_table(s.study, s.rows, s.parallel, s.progress)
-    if has_worst(study):
-        tables[WORST] = lambda s: worst_table(s.study, s.rows, s.parallel, s.progress)
-    if study.section.recognition is not None and series_of(study.scenarios):
-        tables[CROSSINGS] = lambda s: crossings_table(s.study, s.rows, s.parallel, s.progress)
-    if tasks is not None and "color" in tasks.by_name:
+    if study.tasks is not None and "color" in study.tasks.by_name:
         tables[TRADED] = lambda s: error_against_noise_table(s.study, s.rows)
         tables[RENDERED] = lambda s: rendered_table(s.study, s.rows)
     return tables

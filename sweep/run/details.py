@@ -29,10 +29,11 @@ from ..designs.space import Space
 from ..metrics.limiting import LimitingLights, limited_by_name, limiting_lights, limiting_lights_of
 from ..metrics.separation import csd_name, separations
 from ..metrics.smooth import smooth_response
-from ..results.designs import computed_rows, named_rows, row_curves
+from ..results.designs import computed_rows, row_curves
 from ..results.tables import LIMITED_BY, POINTS, SEARCHED
 from ..spectra.lights import Pair
 from ..study import Study
+from .analysis import Analysis, Calls, named_designs
 from .workers import run_with_progress
 
 if TYPE_CHECKING:
@@ -140,26 +141,22 @@ def _limits(setup: Setup, space: Space, numbers: DesignNumbers) -> LimitingLight
     return {pair: np.concatenate([part[pair] for part in parts]) for pair in parts[0]}
 
 
-def sensor_map_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: Progress) -> pa.Table:
+def _map_schema(study: Study) -> pa.Schema:
+    names = ("height", "cra_deg", *(csd_name(pair) for pair in study.pairs))
+    return pa.schema([("design_id", pa.int64()), *((name, pa.float64()) for name in names)])
+
+
+def _calls(study: Study, rows: pd.DataFrame) -> Calls:
     """Compute CSDs over the image height before clipping and rounding, with all other effects.
 
-    For a pulsed light, the smallest over its moments.
-
-    Returns one row per image height and design, in a scene with a field.
+    One row per image height and design, in a scene with a field. For a pulsed light, the smallest over its moments.
     """
-    calls = []
-    for row in named_rows(rows):
-        if study.scenarios[row["scenario"]].field is not None:
-            space, curves = row_curves(study, row)
-            setup = study.setup(space, row["scenario"])
-            calls.append(delayed(_over_heights, setup, int(row["design_id"]), np.asarray(curves, dtype=float)))
-    maps = [row for answer in run_with_progress(parallel, calls, "field positions", progress) for row in answer]
-    names = ("height", "cra_deg", *(csd_name(pair) for pair in study.pairs))
-    schema = pa.schema([("design_id", pa.int64()), *((name, pa.float64()) for name in names)])
-    return pa.Table.from_pylist(maps, schema=schema).sort_by([("design_id", "ascending"), ("height", "ascending")])
+    for design in sorted(named_designs(study, rows), key=lambda design: int(design.row["design_id"])):
+        if design.setup.scene.field is not None:
+            yield design.key, delayed(_over_heights, design.setup, np.asarray(design.curves, dtype=float))
 
 
-def _over_heights(setup: Setup, design_id: int, curves: DesignCurves) -> list[dict[str, float]]:
+def _over_heights(setup: Setup, curves: DesignCurves) -> list[dict[str, float]]:
     """Return the rows of one design, the center of the image first."""
     field, rows = setup.scene.field, list[dict[str, float]]()
     assert field is not None
@@ -169,5 +166,12 @@ def _over_heights(setup: Setup, design_id: int, curves: DesignCurves) -> list[di
             response = smooth_response(replace(setup, scene=scene_at(setup.scene, height)), curves)
             moments = [separations(response[:, case], setup.members) for case in range(response.shape[1])]
             csds = {csd_name(pair): float(np.min([csd[pair][0] for csd in moments])) for pair in moments[0]}
-        rows.append({"design_id": design_id, "height": height, "cra_deg": field.cra_at(height), **csds})
+        rows.append({"height": height, "cra_deg": field.cra_at(height), **csds})
     return rows
+
+
+def _has_field(study: Study) -> bool:
+    return any(scene.field is not None for scene in study.scenarios.values())
+
+
+OVER_SENSOR = Analysis("field positions", _has_field, _map_schema, _calls)

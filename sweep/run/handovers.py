@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from ..base.types import Array, DesignCurves, Float, FloatArray, MemberNumbers, Parallel, Progress, delayed
+from ..base.types import Array, DesignCurves, Float, FloatArray, MemberNumbers, delayed
 from ..camera.linear import linear_model
 from ..camera.merge import limits_dn
 from ..camera.setup import Setup
-from ..results.designs import rows_of_series
 from ..study import Study
-from .between import Between, between
-from .workers import run_with_progress
+from ..study.axes import series_of
+from .analysis import Analysis, Calls, designs_between
+from .between import Between
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,23 +27,16 @@ _SCHEMA = pa.schema(
 )
 
 
-def handovers_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: Progress) -> pa.Table:
+def _calls(study: Study, rows: pd.DataFrame) -> Calls:
     """Find where the median signal of each type fills the captures of each channel.
 
     One row per series of scenarios (`series`, `key`), design, channel, signal type and capture (from 1 on): `at` is the
     number at which the expected reading reaches the capture's threshold, or saturation for the last one; -inf or inf if
     it is below or above all numbers of the series.
     """
-    keys, calls = [], []
-    for series, key, scenarios, row, curves, space in rows_of_series(study, rows):
-        first = study.setup(space, next(iter(scenarios)))
-        scenes = between(study, first, scenarios)
-        if scenes is not None:
-            keys.append({"name": row["name"], "series": series, "key": key})
-            calls.append(delayed(_handovers, first, scenes, curves, np.array([*scenarios.values()])))
-    answers = run_with_progress(parallel, calls, "handovers of captures", progress)
-    table_rows = [key | row for key, rows_of_design in zip(keys, answers, strict=True) for row in rows_of_design]
-    return pa.Table.from_pylist(table_rows, schema=_SCHEMA)
+    for design in designs_between(study, rows):
+        numbers = np.array([*design.numbers.values()])
+        yield design.key, delayed(_handovers, design.setup, design.scenes, design.curves, numbers)
 
 
 def _handovers(
@@ -92,3 +85,10 @@ def _reached(numbers: Float[Array, " numbers"], value: Callable[[float], float],
         if abs(value(number) / limit - 1) < _CLOSE:
             return float(number)
     return float(brentq(lambda number: value(number) - limit, low, high, rtol=_CLOSE))
+
+
+def _is_asked(study: Study) -> bool:
+    return bool(study.section.pixel.captures and series_of(study.scenarios))
+
+
+CAPTURES_FULL = Analysis("handovers of captures", _is_asked, lambda _: _SCHEMA, _calls)

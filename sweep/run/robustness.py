@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pyarrow as pa
 
-from ..base.types import Array, Float, Parallel, Progress, delayed
+from ..base.types import Array, Float, delayed
 from ..camera.setup import Setup
 from ..designs.space import Space
 from ..designs.tolerance import AS_DESIGNED, NONE, ProductionError, Tolerance
@@ -17,27 +17,28 @@ from ..metrics.drawn import draws_of
 from ..metrics.members import PopulationModel, population_model
 from ..metrics.separation import csd_name
 from ..metrics.share import share_interval
-from ..results.designs import named_rows, row_space
 from ..results.tables import REFERENCE
 from ..spectra.lights import Pair
 from ..study import Study
-from .workers import run_with_progress
+from .analysis import Analysis, Calls, NamedDesign, named_designs
 
 if TYPE_CHECKING:
     import pandas as pd
 
 _LARGEST, _STEP, _HALVINGS = 3.0, 0.25, 6
 """Times the population that are looked at, the steps in which, and how often the last of these is halved."""
-_FIELDS = [
-    ("design_id", pa.int64()),
-    *(
-        (name, pa.float64())
-        for name in ("breaks_at", "breaks_dn", "breaks_edge_nm", "breaks_thickness", "breaks_broadening")
-    ),
-    *((name, pa.string()) for name in ("breaks_first", "breaks_second")),
-    *((name, pa.float64()) for name in ("breaks_first_nm", "breaks_second_nm", "breaks_low_c", "breaks_high_c")),
-    *((name, pa.float64()) for name in ("yield", "yield_low", "yield_high")),
-]
+_SCHEMA = pa.schema(
+    [
+        ("design_id", pa.int64()),
+        *(
+            (name, pa.float64())
+            for name in ("breaks_at", "breaks_dn", "breaks_edge_nm", "breaks_thickness", "breaks_broadening")
+        ),
+        *((name, pa.string()) for name in ("breaks_first", "breaks_second")),
+        *((name, pa.float64()) for name in ("breaks_first_nm", "breaks_second_nm", "breaks_low_c", "breaks_high_c")),
+        *((name, pa.float64()) for name in ("yield", "yield_low", "yield_high")),
+    ]
+)
 
 
 @dataclass(frozen=True)
@@ -70,51 +71,45 @@ class Candidate:
         return float(csds[at]), errors[at]
 
 
-def robustness_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: Progress) -> pa.Table:
+def _calls(study: Study, rows: pd.DataFrame) -> Calls:
     """Compute robustness and yield of designs.
 
     `breaks_at` is the factor of the population and the tolerances at which the worst CSD falls below that of the plain
     CFA that has most at 1 (null if it does not up to 3, in steps of 0.25), with CSD, lights, shifts and temperature
     there; `yield` is the share of lamps and cameras with the wanted CSD, with its 95 % interval (Wilson, 1927).
-
-    Returns one row per design.
     """
     pair = study.pair_over_population
     assert pair is not None
-    shown, calls = named_rows(rows), []
-    for row in shown:
+    designs = [*named_designs(study, rows)]
+    for design in designs:
         plain = [
-            cfa_row for cfa_row in shown if cfa_row["kind"] == REFERENCE and cfa_row["scenario"] == row["scenario"]
+            other
+            for other in designs
+            if other.row["kind"] == REFERENCE and other.row["scenario"] == design.row["scenario"]
         ]
-        best = max(plain, key=lambda cfa_row: cfa_row[f"worst_{csd_name(pair)}"], default=row)
-        rival = None if best["design_id"] == row["design_id"] else _design(study, best)
-        calls.append(delayed(_robustness, _design(study, row), rival, pair, study.section.seed))
-    answers = zip(shown, run_with_progress(parallel, calls, "robustness", progress), strict=True)
-    table_rows = [{"design_id": row["design_id"], **numbers, **lights} for row, (numbers, lights) in answers]
-    return pa.Table.from_pylist(table_rows, schema=pa.schema(_FIELDS))
+        best = max(plain, key=lambda other: other.row[f"worst_{csd_name(pair)}"], default=design)
+        rival = None if best is design else _candidate(study, best)
+        yield design.key, delayed(_robustness, _candidate(study, design), rival, pair, study.section.seed)
 
 
-def _design(study: Study, row: dict[Any, Any]) -> Candidate:
-    space = row_space(study, row)
-    point = np.array([[row[name] for name in space.parameters]], dtype=float)
-    return Candidate(study.setup(space, row["scenario"]), space, point, study.tolerance)
+def _candidate(study: Study, design: NamedDesign) -> Candidate:
+    point = np.array([[design.row[name] for name in design.space.parameters]], dtype=float)
+    return Candidate(design.setup, design.space, point, study.tolerance)
 
 
-def _robustness(
-    design: Candidate, rival: Candidate | None, pair: Pair, seed: int
-) -> tuple[dict[str, float], dict[str, str]]:
+def _robustness(design: Candidate, rival: Candidate | None, pair: Pair, seed: int) -> list[dict[str, float | str]]:
     """Return numbers, and names of lights, of a design by column."""
-    numbers, lights = ({}, {}) if rival is None else _breaks(design, rival, pair)
+    found: dict[str, float | str] = {} if rival is None else _breaks(design, rival, pair)
     population = design.setup.lights.population
     assert population is not None
     if population.wanted_dn is not None:
         successes = int((drawn_dn(design, pair, seed) >= population.wanted_dn).sum())
         low, high = share_interval(successes, population.draws)
-        numbers |= {"yield": successes / population.draws, "yield_low": low, "yield_high": high}
-    return numbers, lights
+        found |= {"yield": successes / population.draws, "yield_low": low, "yield_high": high}
+    return [found]
 
 
-def _breaks(design: Candidate, rival: Candidate, pair: Pair) -> tuple[dict[str, float], dict[str, str]]:
+def _breaks(design: Candidate, rival: Candidate, pair: Pair) -> dict[str, float | str]:
     """Return the scale at which a design first falls below a rival, and its causes."""
 
     def below(scale: float) -> bool:
@@ -122,26 +117,29 @@ def _breaks(design: Candidate, rival: Candidate, pair: Pair) -> tuple[dict[str, 
 
     scale = _first(below)
     if scale is None:
-        return {}, {}
+        return {}
     least, production_error = design.worst(pair, scale)
     model = design.population_model(scale)
     response = model.linear.smooth(design.curves(production_error))[0]
     near = min((model.nearest(case, pair) for case in response), key=lambda pairs: float(pairs.squared.min()))
     at = np.unravel_index(int(near.squared.argmin()), near.squared.shape)
     lights, population = design.setup.lights, design.population_model(scale).members.population
-    names = dict[str, str]()
-    numbers: dict[str, float] = {"breaks_at": scale, "breaks_dn": least, "breaks_edge_nm": production_error.shift_nm}
-    numbers |= {"breaks_thickness": production_error.thickness, "breaks_broadening": production_error.broadening}
+    found: dict[str, float | str] = {
+        "breaks_at": scale,
+        "breaks_dn": least,
+        "breaks_edge_nm": production_error.shift_nm,
+    }
+    found |= {"breaks_thickness": production_error.thickness, "breaks_broadening": production_error.broadening}
     warm = []
     for side, (name, starts) in enumerate((("first", near.first), ("second", near.second))):
         signal = model.members.signal(int(starts[at[side]]))
         nm = model.members.shift_nm(int(near.steps[at][side]), float(near.shares[at][side]))
-        names[f"breaks_{name}"], numbers[f"breaks_{name}_nm"] = lights.names[signal], nm
+        found |= {f"breaks_{name}": lights.names[signal], f"breaks_{name}_nm": nm}
         warm.append(population.temperature_of(lights.types[signal], lights.names[signal], nm))
     together = max(low for low, _ in warm), min(high for _, high in warm)
     if population.temperatures == "common":
-        numbers |= {"breaks_low_c": together[0], "breaks_high_c": together[1]}
-    return numbers, names
+        found |= {"breaks_low_c": together[0], "breaks_high_c": together[1]}
+    return found
 
 
 def _first(below: Callable[[float], bool]) -> float | None:
@@ -168,3 +166,8 @@ def drawn_dn(design: Candidate, pair: Pair, seed: int) -> Float[Array, " draws"]
     for number, production_error in enumerate(draws.production_errors):
         draws.distances(number, model.linear.smooth(design.curves(production_error))[0], dn)
     return dn
+
+
+ROBUST = Analysis(
+    "robustness", lambda study: study.pair_over_population is not None, lambda _: _SCHEMA, _calls, is_kept=True
+)

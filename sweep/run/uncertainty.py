@@ -17,10 +17,10 @@ from ..camera.setup import Setup
 from ..designs.space import Space
 from ..metrics.separation import csd_name
 from ..metrics.smooth import smooth_csd
-from ..results.designs import named_rows, row_curves
 from ..results.tables import REFERENCE
 from ..spectra.lights import Pair, class_pairs
 from ..study import Study
+from .analysis import named_designs
 from .workers import run_with_progress
 
 if TYPE_CHECKING:
@@ -54,12 +54,11 @@ def uncertainty_table(study: Study, rows: pd.DataFrame, parallel: Parallel, prog
     """
     errors = study.section.uncertainty
     assert errors is not None
-    shown, calls = named_rows(rows), []
-    for row in shown:
-        space, curves = row_curves(study, row)
-        setup = study.setup(space, row["scenario"]).with_all_effects
-        names = _names(study, space)
-        calls.append(delayed(_on_sensors, setup, curves[0], study.sensor, names, errors, study.section.seed))
+    shown, calls = [], []
+    for design in named_designs(study, rows):
+        shown.append(design.row)
+        setup, names = design.setup.with_all_effects, _names(study, design.space)
+        calls.append(delayed(_on_sensors, setup, design.curves[0], study.sensor, names, errors, study.section.seed))
     drawn_sensors = [*run_with_progress(parallel, calls, "random sensors", progress)]
     plain = [row for row in shown if row["kind"] == REFERENCE] or shown
     names = [row["name"] for row in plain]

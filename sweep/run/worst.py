@@ -8,16 +8,15 @@ from typing import TYPE_CHECKING
 
 import pyarrow as pa
 
-from ..base.types import DesignCurves, Parallel, Progress, delayed
+from ..base.types import DesignCurves, delayed
 from ..camera.forward import ForwardModel
 from ..metrics.columns.flicker import FALSE_HUE, LAMP_SEEN, MODULATION
 from ..metrics.evaluate import evaluate_some
 from ..metrics.quantity import Quantity
-from ..results.designs import rows_of_series
 from ..study import Study
 from ..study.axes import series_of
-from .between import Between, between, minima_between, or_nan
-from .workers import run_with_progress
+from .analysis import Analysis, Calls, designs_between
+from .between import Between, minima_between, or_nan
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,26 +37,21 @@ def refined_quantities(study: Study, key: str) -> list[Quantity]:
     return [study.quantities[name] for name in names if name in study.quantities]
 
 
-def worst_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: Progress) -> pa.Table:
+def _calls(study: Study, rows: pd.DataFrame) -> Calls:
     """Find the worst values of designs over each series, with all effects.
 
     One row per series of scenarios (`series`, `key`), design and quantity: the worst `value`, and the number `at` which
     it is, also between two scenarios.
     """
-    keys, calls = [], []
-    for series, key, scenarios, row, curves, space in rows_of_series(study, rows):
-        scenes = between(study, study.setup(space, next(iter(scenarios))), scenarios)
-        known = rows[(rows["name"] == row["name"]) & rows["scenario"].isin(list(scenarios))]
-        quantities = [quantity for quantity in refined_quantities(study, key) if known[quantity.name].notna().any()]
-        if scenes is not None and quantities:
-            keys.append({"name": row["name"], "series": series, "key": key})
-            calls.append(delayed(worst_over, scenes, curves, quantities, study.states, [*scenarios.values()]))
-    answers = run_with_progress(parallel, calls, "worst values between scenarios", progress)
-    table_rows = [key | row for key, found in zip(keys, answers, strict=True) for row in found]
-    return pa.Table.from_pylist(table_rows, schema=_SCHEMA)
+    for design in designs_between(study, rows):
+        refined = refined_quantities(study, design.key["key"])
+        quantities = [quantity for quantity in refined if design.rows[quantity.name].notna().any()]
+        if quantities:
+            numbers = [*design.numbers.values()]
+            yield design.key, delayed(_worst_over, design.scenes, design.curves, quantities, study.states, numbers)
 
 
-def worst_over(
+def _worst_over(
     scenes: Between, curves: DesignCurves, quantities: list[Quantity], states: tuple[str, ...], numbers: list[float]
 ) -> list[dict[str, str | float]]:
     """Return the worst value of each quantity of a design, and the number at which it is."""
@@ -77,6 +71,8 @@ def worst_over(
     return found
 
 
-def has_worst(study: Study) -> bool:
-    """Return whether a study has series with quantities whose worst value is told."""
+def _is_asked(study: Study) -> bool:
     return any(refined_quantities(study, key) for _, key in series_of(study.scenarios))
+
+
+WORST_VALUES = Analysis("worst values between scenarios", _is_asked, lambda _: _SCHEMA, _calls)

@@ -106,7 +106,7 @@ def test_a_yield_counts_each_camera_with_the_wanted_distance(tmp_path: Path, mon
     assert population.wanted_dn is not None
     steps = population.wanted_dn * (1 + np.linspace(-0.05, 0.05, population.draws))
     monkeypatch.setattr(robustness, "drawn_dn", lambda *_: steps)
-    numbers, _ = robustness._robustness(design, None, ("yellow", "red"), 1)
+    (numbers,) = robustness._robustness(design, None, ("yellow", "red"), 1)
     assert numbers["yield"] == np.count_nonzero(steps >= population.wanted_dn) / population.draws
 
 
