@@ -139,7 +139,8 @@ def usable_range(
         elif math.isinf(high):
             parts.append(f"from {rounded(low, up=True)}")
         else:
-            parts.append(f"from {rounded(low, up=True)} to {rounded(high, up=False)}")
+            first, last = rounded(low, up=True), rounded(high, up=False)
+            parts.append(f"from {first} to {last}" if float(first) < float(last) else f"near {(low + high) / 2:.3g}")
     return f"{' and '.join([', '.join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)}{of}"
 
 

@@ -17,6 +17,7 @@ from sweep.metrics.limiting import limiting_lights
 from sweep.report import make_report, read_output
 from sweep.report.answer import headline_numbers
 from sweep.report.leaders import capital, full_name, leaders_of
+from sweep.report.noise import usable_range
 from sweep.report.page_data import payload
 from sweep.report.series import Line, SeriesFigure, lead_sentence
 from sweep.report.trade_off import overview_figure
@@ -275,3 +276,12 @@ def test_headline_star_and_details_name_one_filter(finished: FinishedFolder, nam
     design_id = np.frombuffer(base64.b64decode(data["design_id"]["bdata"]), "<u4")[at]
     assert design_id == best["design_id"]
     assert [text.rpartition(" ")[0].rpartition(" ")[0] for text in star] == [best["name"]]
+
+
+@pytest.mark.parametrize(
+    ("ends", "said"),
+    [((69.14, 130.4), "from 69.2 to 130 cd"), ((123.6, 124.3), "near 124 cd"), ((123.2, 123.8), "near 124 cd")],
+)
+def test_a_range_that_three_digits_do_not_tell_apart_is_one_number(ends: tuple[float, float], said: str) -> None:
+    intensities = np.array([1.0, 100.0, 1000.0])
+    assert usable_range(intensities, np.zeros(3, dtype=bool), "cd", np.array(ends)) == said
