@@ -107,7 +107,7 @@ def expose(rates: FloatArray, fixed: FloatArray, uniform: FloatArray, time_s: fl
 
 @njit(cache=True, nogil=True)
 def all_near(first: FloatArray, second: FloatArray, share: FloatArray, relative: float, absolute: float) -> bool:
-    """Return whether rows are a share of others, but for a relative or absolute difference; NaN is near nothing."""
+    """Return whether rows are a share of others, as `np.allclose` has it, without its arrays of their size."""
     for row in range(first.shape[0]):
         for at in range(first.shape[1]):
             expected = second[row, at] * share[at]

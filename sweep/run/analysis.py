@@ -52,7 +52,7 @@ class NamedDesign:
 
     @property
     def key(self) -> dict[str, Any]:
-        """Row's id."""
+        """What rows of the design begin with."""
         return {"design_id": self.row["design_id"]}
 
 
