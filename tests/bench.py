@@ -30,7 +30,7 @@ from scipy.signal import fftconvolve
 from scipy.spatial.distance import cdist
 from scipy.special import j1
 
-from sweep.camera.forward import ForwardModel
+from sweep.camera.model import SceneModel
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.scene import Scene
 from sweep.camera.setup import Setup
@@ -111,18 +111,18 @@ def swept(study: Study) -> tuple[Space, Setup]:
     return space, study.setup(space, "chart")
 
 
-def distances(imager: ForwardModel, block: Any) -> None:
+def distances(imager: SceneModel, block: Any) -> None:
     """All CSDs of a block."""
-    changing = imager.read_changing(block)
+    changing = imager.changing(block)
     assert changing is not None
     members = imager.setup.members
-    separations_along(changing.fixed[0], changing.channel, changing.values[:, 0], members)
+    separations_along(changing.fixed[0], changing.channel, changing.make(slice(None))[:, 0], members)
 
 
 def rate_of(route: str, study: Study, seconds: float) -> float:
     """Designs per second of a route in this process, over some seconds."""
     space, setup = swept(study)
-    imager, points = ForwardModel(setup), space.points(0, BLOCK)
+    imager, points = SceneModel(setup), space.points(0, BLOCK)
     edges = edges_of(space, 0, BLOCK)
     assert edges is not None
     work: dict[str, Callable[[], object]] = {
@@ -157,7 +157,7 @@ def kernels(study: Study, found: dict[str, Any]) -> None:
     """(a) Both routes against the scripts and the machine."""
     space, setup = swept(study)
     points = space.points(0, BLOCK)
-    imager, members = ForwardModel(setup), setup.members
+    imager, members = SceneModel(setup), setup.members
     edges = edges_of(space, 0, BLOCK)
     assert edges is not None
     curves = space.curves(points, setup.camera.grid.size)
@@ -188,9 +188,9 @@ def kernels(study: Study, found: dict[str, Any]) -> None:
     for route, numbers in (("dense", flat.shape[1]), ("separable", table.shape[1])):
         moved = 2 * 8 * numbers * found[f"{route}_designs_per_s"] / 1e9
         found[f"{route}_bytes_over_machine_copy"] = moved / found["copy_gbytes_per_s"]
-    changing = imager.read_changing(edges)
+    changing = imager.changing(edges)
     assert changing is not None
-    fixed, values = changing.fixed[0], changing.values[:, 0]
+    fixed, values = changing.fixed[0], changing.make(slice(None))[:, 0]
     response = np.repeat(fixed[None], BLOCK, axis=0)
     response[..., changing.channel] = values
     arrays = median_s(lambda: [separation(response, members[a], members[b]) for a, b in class_pairs(list(members))])
@@ -228,7 +228,7 @@ def exponents(study: Study, found: dict[str, Any]) -> None:
     space, setup = swept(study)
 
     def timed(made: Setup, designs: int) -> float:
-        imager = ForwardModel(made)
+        imager = SceneModel(made)
         size = min(designs, BLOCK)
         some = space.curves(space.points(0, size), setup.camera.grid.size)
         if made.camera.grid != setup.camera.grid:
@@ -289,11 +289,11 @@ def scene(study: Study, found: dict[str, Any]) -> None:
     assert target is not None
     radius_um = target.object_resolution_px / 2 * setup.camera.pixel.pitch_um
     curves = space.curves(space.points(0, 64), setup.camera.grid.size)
-    imager = ForwardModel(setup)
+    imager = SceneModel(setup)
     direct = median_s(lambda: image_per_design(setup, radius_um), 3)
     found["scene_image_s"] = direct
     found["scene_design_over_image"] = direct / (median_s(lambda: evaluate(imager, curves)) / len(curves))
-    found["scene_first_design_over_image"] = direct / median_s(lambda: evaluate(ForwardModel(setup), curves[:1]), 3)
+    found["scene_first_design_over_image"] = direct / median_s(lambda: evaluate(SceneModel(setup), curves[:1]), 3)
 
 
 def drawn(found: dict[str, Any]) -> None:

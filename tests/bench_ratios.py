@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from build import large
 
-from sweep.camera.forward import ForwardModel
+from sweep.camera.model import SceneModel
 from sweep.designs.block import CurveBlock, edges_of
 from sweep.metrics.evaluate import evaluate
 from sweep.run import run_study
@@ -47,7 +47,7 @@ def ratios() -> dict[str, float]:
         study = load_study(large(Path(folder), 8)).with_plans()
         space, rules = study.spaces[-1], rules_of(study)
         setup = study.setup(space, "chart")
-        model, edges = ForwardModel(setup), edges_of(space, 0, BLOCK)
+        model, edges = SceneModel(setup), edges_of(space, 0, BLOCK)
         assert edges is not None
 
         def columns(wanted: Wanted) -> float:

@@ -9,6 +9,7 @@ from scipy.special import ndtr
 from scipy.stats import poisson
 
 from sweep.camera.pixel import Pixel
+from sweep.camera.readout import Readout
 
 
 def digital_numbers(electrons: float, pixel: Pixel) -> tuple[np.ndarray, np.ndarray]:
@@ -35,6 +36,14 @@ def digital_numbers(electrons: float, pixel: Pixel) -> tuple[np.ndarray, np.ndar
     shares = np.where(across, 1 - tail[:, :-1] - tail[:, 1:], apart)
     found += np.bincount((np.clip(near, 0, top) - first).ravel(), (weights * shares).ravel(), numbers.size)
     return numbers, found
+
+
+def channels_of(readout: Readout, pixels: np.ndarray, phase: int) -> np.ndarray:
+    """The channels from their pixels; of a light that fills the field, from those of one tile."""
+    mosaic = readout.setup.camera.mosaic
+    if readout.setup.scene.target is not None:
+        return pixels @ readout.weights[phase]
+    return pixels @ ((mosaic.indices.ravel()[:, None] == np.arange(len(mosaic.channels))) / mosaic.counts)
 
 
 def moments(electrons: float, pixel: Pixel) -> tuple[float, float]:

@@ -15,7 +15,7 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 
-from sweep.camera.forward import ForwardModel
+from sweep.camera.model import SceneModel
 from sweep.camera.setup import Setup
 
 EPS = float(np.finfo(float).eps)
@@ -50,7 +50,7 @@ def terms_of(setup: Setup) -> int:
 
 def brightest_dn(setup: Setup, curves: np.ndarray) -> float:
     """The largest value that is read, DN, full scale or more: all its terms are positive, so it is their magnitude."""
-    return max(float(setup.camera.pixel.full_scale_dn), float(np.nanmax(np.abs(ForwardModel(setup).read(curves)[0]))))
+    return max(float(setup.camera.pixel.full_scale_dn), float(np.nanmax(np.abs(SceneModel(setup).read(curves)[0]))))
 
 
 def column_rounding(name: str, values: np.ndarray, setup: Setup, magnitude_dn: float, more: int = 0) -> np.ndarray:

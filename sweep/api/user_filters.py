@@ -11,19 +11,20 @@ import numpy as np
 from ..base.errors import DataError, ValidationIssue, nearest
 from ..base.types import DesignCurves
 from ..camera.exposure import largest_sensitivity_not_brightest
-from ..camera.forward import forward_model
+from ..camera.model import scene_model
 from ..camera.setup import Setup
 from ..designs.families.stopband import Stopband
 from ..designs.family import Family
 from ..metrics.bound import FEASIBLE, Bound, total_violation
 from ..metrics.columns.sensitivity import SENSITIVITY
-from ..metrics.evaluate import evaluate, family_quantities, image_quantities
+from ..metrics.evaluate import evaluate
 from ..metrics.objective import COMBINED
 from ..metrics.quantity import WORST, YIELD, Column, Columns
 from ..search.limit import Limit, limit_of, reason_without_bound
 from ..search.problem import Problem
 from ..spectra.lights import class_pairs
 from ..study import Study
+from ..vision.section import SeededVision
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -194,11 +195,12 @@ def evaluate_curves(study: Study, setup: Setup, curves: DesignCurves) -> Columns
         raise DataError(ValidationIssue("a QE above 1", value=round(float(curves.max()), 6), allowed=allowed))
     requested = study.requested
     values = evaluate(
-        forward_model(setup),
+        scene_model(setup),
         curves,
         requested.states,
         probabilities=requested.probabilities,
         user_metrics=requested.user_metrics,
+        images=None if study.section.vision is None else SeededVision(study.section.vision, study.section.seed),
     )
     if setup.lights.population is not None and not study.tolerance:
         from ..metrics.members import population_model  # noqa: PLC0415  (only where lights have a population)
@@ -212,8 +214,6 @@ def evaluate_curves(study: Study, setup: Setup, curves: DesignCurves) -> Columns
                 lambda _, subset: curves[subset], len(curves), class_pairs(setup.lights.classes)
             )
             values |= {YIELD + name: column for name, column in yield_columns.items()}
-    values |= family_quantities(None, np.empty((len(curves), 0)))
-    values |= image_quantities(setup, curves, study.section.vision, study.section.seed)
     unknown = np.full(len(curves), np.nan)
     columns = {name: values.get(name, unknown) for name in study.quantities if name != COMBINED}
     if COMBINED in study.quantities:

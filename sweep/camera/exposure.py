@@ -1,4 +1,4 @@
-"""Exposure time, fixed or set by the brightest channel on a white patch, and the light of a scene."""
+"""Exposure time, fixed or set by the brightest channel on a white patch."""
 
 from __future__ import annotations
 
@@ -8,17 +8,11 @@ from ..base.types import (
     Array,
     ChannelCurves,
     CurvesGradient,
-    DesignCurves,
     Float,
-    FloatArray,
     PerDesign,
     PerParameter,
     PerWavelength,
 )
-from . import pwm
-from .angular import AngularResponse
-from .field import over_field
-from .irradiance import signal_irradiance
 from .pixel import irradiance_factor
 from .scene import WhitePatchExposure
 from .setup import Setup
@@ -89,36 +83,3 @@ def relative_slope(
         return np.zeros(len(curves_gradient))
     top = int(np.argmax(rates))
     return np.asarray(-(curves_gradient[:, top] @ white) / rates[top], dtype=float)
-
-
-class SceneLight:
-    """Light of a scene."""
-
-    def __init__(self, setup: Setup) -> None:
-        self.setup = setup
-        self.moments: FloatArray | None = None
-        self.signals = signal_irradiance(setup) * setup.camera.area_step_m2_nm
-        self.white = white_irradiance(setup) * setup.camera.area_step_m2_nm
-        self.fixed_white = fixed_white(setup)
-        self.positions = over_field(setup)
-        self.angular = [AngularResponse(position) for position in self.positions]
-
-    def exposure_s(self, curves: DesignCurves) -> PerDesign:
-        """Return the exposure time of each design."""
-        return exposure_times(self.setup, curves @ self.white, self.fixed_white)
-
-    def scales(self, exposure_s: PerDesign) -> Float[Array, "... designs moments"]:
-        """Return the light relative to its mean at the moments of a pulsed light.
-
-        Of an HDR pixel those of each exposure, on the first axis.
-        """
-        if self.setup.camera.pixel.captures:
-            scales = pwm.exposure_scales(self.setup, exposure_s, self.moments)
-            return _different_moments(scales) if self.moments is None else scales
-        return pwm.scales(self.setup, exposure_s, self.moments)
-
-
-def _different_moments(scales: Float[Array, "captures _designs _moments"]) -> Float[Array, "captures designs moments"]:
-    """Return scales, without moments of the same light in all of them."""
-    flat = np.round(scales.reshape(-1, scales.shape[-1]), 12)
-    return scales[..., np.sort(np.unique(flat, axis=1, return_index=True)[1])]

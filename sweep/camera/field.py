@@ -8,18 +8,10 @@ exposure.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
-
-from ..base.types import Array, Float, PerValue
 from .scene import Scene
 from .setup import Setup
-
-_STARTS = 2
-"""Image heights from which the smallest value is refined."""
-_HALVINGS = 4
 
 
 def scene_at(scene: Scene, height: float) -> Scene:
@@ -48,43 +40,3 @@ def field_heights(setup: Setup) -> tuple[float, ...]:
         return scene.field.counted_heights
     count = setup.accuracy.field_positions
     return tuple(sorted({*(at / (count - 1) for at in range(count)), *scene.field.knots[0]}))
-
-
-def over_field(setup: Setup) -> tuple[Setup, ...]:
-    """Return a setup for each field position that is computed.
-
-    Returns the setup itself if the scene has no field.
-    """
-    if setup.scene.field is None:
-        return (setup,)
-    return tuple(setup_at(setup, height) for height in field_heights(setup))
-
-
-def refined_heights(
-    heights: tuple[float, ...],
-    values: Float[Array, "values heights"],
-    evaluate: Callable[[float], Float[Array, " _values"]],
-) -> tuple[PerValue, PerValue]:
-    """Refine the smallest values over all image heights.
-
-    The steps around the two smallest known values are halved four times; it is not proven that no lower value lies
-    elsewhere.
-
-    `heights`: known image heights, ascending.
-    """
-    known = dict(zip(heights, values.T, strict=True))
-    at, lowest = np.zeros(len(values)), values.min(axis=1)
-    for value, starts in enumerate(np.argsort(values, axis=1, kind="stable")[:, :_STARTS]):
-        for start in starts:
-            best = heights[start]
-            step = max(np.diff(heights)[max(start - 1, 0) : start + 1]) / 2
-            for _ in range(_HALVINGS):
-                for height in (best - step, best + step):
-                    if 0 <= height <= 1 and height not in known:
-                        known[height] = evaluate(height)
-                near = [height for height in (best - step, best, best + step) if 0 <= height <= 1]
-                best = min(near, key=lambda height: known[height][value])
-                step /= 2
-            if start == starts[0] or known[best][value] < lowest[value]:
-                lowest[value], at[value] = known[best][value], best
-    return lowest, at

@@ -6,129 +6,128 @@ are dithered: gain^2 (n + (PRNU n)^2 + read noise^2) + 1/12 for n expected elect
 
 from __future__ import annotations
 
-import hashlib
-import pickle
+from collections.abc import Iterable
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
-from ..base.cache import Cache
-from ..base.errors import SweepError, ValidationIssue
-from ..base.types import Array, ChannelCurves, CurvesGradient, DesignCases, DesignCurves, Float, MemberNumbers
+from ..base.types import Array, ChannelCurves, CurvesGradient, DesignCases, DesignCurves, Float, FloatArray
 from .brightness import LampReadings, LampSlopes, room_dn
 from .exposure import relative_slope
-from .forward import ForwardModel
-from .pixel import Pixel, unquantized
+from .memory import blocks
+from .model import SceneModel, View, too_many
+from .pixel import unquantized
 from .pixel_curve import STEPS_DN2, groups_of, pixel_curve
-from .pixel_response import SplitLight
-from .readout import Readout, capture_light
+from .readout import Readout
+from .response import SplitLight
 from .setup import READOUT, Setup
 
 _FIELD_POSITIONS = 9
 """Field positions at which a search looks where all field positions count; its best design is read out at more."""
+Slopes = tuple[Float[Array, "cases signals channels"], Float[Array, "parameters cases signals channels"]]
+"""Values of one design, and their exact derivatives with that of its exposure; a pulse's share is held."""
 
 
-class LinearModel(ForwardModel):
-    """Forward model of an unclipped, unrounded readout, which is linear in a design's QE except for the exposure.
+class LinearModel:
+    """Unclipped, unrounded readout of a scene, which is linear in a design's QE except for the exposure.
 
-    `hdr` is the HDR pixel whose merged values have the noise; the model itself reads one of full sensitivity once.
+    `hdr`: HDR pixel whose merged values have the noise; what is linear is one of full sensitivity that is read once. At
+    most 9 field positions and 2 moments of a pulse are used.
     """
 
-    hdr: Pixel | None = None
+    def __init__(self, setup: Setup) -> None:
+        pixel, positions = setup.camera.pixel, min(setup.accuracy.field_positions, _FIELD_POSITIONS)
+        self.hdr = pixel if pixel.captures else None
+        coarse = setup.accuracy.model_copy(update={"field_positions": positions, "pwm_moments": 2})
+        self.setup = replace(setup, left_out=setup.left_out | READOUT, accuracy=coarse)
+        if self.hdr is not None:
+            self.setup = self.setup.with_camera(pixel=pixel.read_once)
+        self.pixel, self.members = self.setup.camera.pixel, self.setup.members
+        self.scene = SceneModel(self.setup)
+        self.n_cases = self.scene.n_cases
+        self._views = [*self.scene.views()]
+
+    @cached_property
+    def _by_pixel(self) -> list[View]:
+        """Views of single pixels; raises SweepError if they do not fit into memory."""
+        if self.scene.phases is not None and len([*blocks(self.setup, self.scene.phases)]) > 1:
+            raise too_many(self.scene, "too many pixels for a search under noise")
+        return [*self.scene.views(by_pixel=True)]
 
     def smooth(self, curves: DesignCurves) -> DesignCases:
         """Return the unquantized, unclipped response, DN."""
-        return self.readout.folded(unquantized(self._expected(curves), self.readout.pixel))
+        expected = self._expected(self._views, curves)
+        parts = zip(self._views, expected, strict=True)
+        return _joined(view.readout.folded(unquantized(e, self.pixel)) for view, e in parts)
 
-    def gradient(
-        self, curves: ChannelCurves, curves_gradient: CurvesGradient
-    ) -> Float[Array, "parameters cases signals channels"]:
-        """Return the exact derivative of `smooth` at one design, with that of its exposure; a pulse's share is held.
-
-        Returns DN per unit of parameter.
-        """
-        return self.smooth_with_gradient(curves, curves_gradient)[1]
+    def unlit(self, curves: DesignCurves) -> Float[Array, "designs cases channels"]:
+        """Return the response without the lamps, DN."""
+        return self.scene.unlit(curves, self.scene.exposure_s(curves))
 
     def smooth_with_gradient(
-        self, curves: ChannelCurves, curves_gradient: CurvesGradient
-    ) -> tuple[Float[Array, "cases signals channels"], Float[Array, "parameters cases signals channels"]]:
-        """Return `smooth` and `gradient` of one design.
+        self, curves: ChannelCurves, curves_gradient: CurvesGradient, *, lamps_only: bool = False
+    ) -> Slopes:
+        """Return the response of one design, DN, and its derivative per unit of parameter.
 
-        Returns `response`: response, DN; `gradient`: DN per unit of parameter.
+        `lamps_only`: without black level, dark current and background.
         """
-        electrons, slope = self._with_slope(curves, curves_gradient)
-        response = self.readout.folded(unquantized(electrons, self.readout.pixel))
-        return response, self.readout.folded(slope * self.setup.camera.pixel.dn_per_e)
+        gain, offset = self.pixel.dn_per_e, 0.0 if lamps_only else self.pixel.offset_dn
+        values, slopes = [], []
+        for view in self._views:
+            electrons, by_u = self._with_slope(view, curves, curves_gradient, lamps_only=lamps_only)
+            values.append(view.readout.folded(electrons[None] * gain + offset)[0])
+            slopes.append(view.readout.folded(by_u * gain))
+        return np.concatenate(values), np.concatenate(slopes, axis=1)
 
-    def lamps_with_gradient(
+    def noisy_with_gradient(
         self, curves: ChannelCurves, curves_gradient: CurvesGradient
-    ) -> tuple[Float[Array, "cases signals channels"], Float[Array, "parameters cases signals channels"]]:
-        """Return the response to the lamps alone, without black level, dark current and background.
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return mean, DN, and variance, DN^2, of one design under noise, and their derivatives.
 
-        Returns `response`: response, DN; `gradient`: DN per unit of parameter.
+        The mean is `smooth`; of an HDR pixel it is that of its merged values, DN of the first capture, which saturate.
         """
-        electrons, slope = self._with_slope(curves, curves_gradient, lamps_only=True)
-        dn_per_e = self.readout.pixel.dn_per_e
-        return self.readout.folded(electrons * dn_per_e), self.readout.folded(slope * dn_per_e)
+        parts = []
+        for view in self._by_pixel:
+            electrons, by_u = self._with_slope(view, curves, curves_gradient)
+            mean, variance, mean_per_e, variance_per_e = self._moments(view, electrons)
+            folded, spread = view.readout.folded, view.readout.spread
+            values = folded(mean[None])[0], spread(variance[None])[0]
+            parts.append((*values, folded(mean_per_e * by_u), spread(variance_per_e * by_u)))
+        mean, variance, mean_by_u, variance_by_u = zip(*parts, strict=True)
+        slopes = np.concatenate(mean_by_u, axis=1), np.concatenate(variance_by_u, axis=1)
+        return np.concatenate(mean), np.concatenate(variance), *slopes
 
     def variance(self, curves: DesignCurves) -> DesignCases:
         """Return the variance of the noise, DN^2."""
-        electrons, pixel = self.by_pixel._expected(curves), self.readout.pixel
-        variance_e2 = electrons + (pixel.prnu * electrons) ** 2 + pixel.read_noise_e**2
-        return self.by_pixel.readout.spread(pixel.dn_per_e**2 * variance_e2 + STEPS_DN2)
+        none = np.empty((0, *curves.shape[1:]))
+        return np.stack([self.noisy_with_gradient(design, none)[1] for design in curves])
 
-    def variance_gradient(
-        self, curves: ChannelCurves, curves_gradient: CurvesGradient
-    ) -> Float[Array, "parameters cases signals channels"]:
-        """Return the exact derivative of `variance` at one design.
-
-        Returns DN^2 per unit of parameter.
-        """
-        pixel = self.readout.pixel
-        electrons, slope = self.by_pixel._with_slope(curves, curves_gradient)
-        per_e = pixel.dn_per_e**2 * (1 + 2 * pixel.prnu**2 * electrons)
-        return self.by_pixel.readout.spread(per_e * slope)
-
-    def merged_with_gradient(
-        self, curves: ChannelCurves, curves_gradient: CurvesGradient
-    ) -> tuple[
-        Float[Array, "cases signals channels"],
-        Float[Array, "cases signals channels"],
-        Float[Array, "parameters cases signals channels"],
-        Float[Array, "parameters cases signals channels"],
-    ]:
-        """Return mean and variance of the merged values of an HDR pixel at one design, and their derivatives.
-
-        Unlike `smooth`, the mean is that of pixels which saturate.
-
-        Returns `mean, variance`: mean, DN of the first capture, and variance, DN^2; `mean_by, variance_by`:
-        derivatives, per unit of parameter.
-        """
-        assert self.hdr is not None
-        by_pixel = self.by_pixel
-        electrons, slope = by_pixel._with_slope(curves, curves_gradient)
-        light = capture_light(self.setup.with_camera(pixel=self.hdr), by_pixel.electrons.response)
-        moments = np.empty((4, *electrons.shape))
-        for of_exposures, which in groups_of(light):
+    def _moments(self, view: View, electrons: FloatArray) -> Float[Array, "4 cases signals pixels"]:
+        """Return mean and variance of pixels, and their derivatives by the electrons."""
+        moments, pixel = np.empty((4, *electrons.shape)), self.pixel
+        if self.hdr is None:
+            variance_e2 = electrons + (pixel.prnu * electrons) ** 2 + pixel.read_noise_e**2
+            moments[0], moments[1] = unquantized(electrons, pixel), pixel.dn_per_e**2 * variance_e2 + STEPS_DN2
+            moments[2], moments[3] = pixel.dn_per_e, pixel.dn_per_e**2 * (1 + 2 * pixel.prnu**2 * electrons)
+            return moments
+        for of_exposures, which in groups_of(self._read(view).capture_light):
             curve = pixel_curve(self.hdr, of_exposures, noisy=True)
             moments[..., which] = *curve.moments(electrons[..., which]), *curve.slopes(electrons[..., which])
-        mean, variance, mean_per_e, variance_per_e = moments
-        variance_per_e = np.where(variance > STEPS_DN2, variance_per_e, 0.0)
-        variance = np.maximum(variance, STEPS_DN2)
-        folded, spread = by_pixel.readout.folded, by_pixel.readout.spread
-        return (
-            folded(mean[None])[0],
-            spread(variance[None])[0],
-            folded(mean_per_e * slope),
-            spread(variance_per_e * slope),
-        )
+        moments[3] = np.where(moments[1] > STEPS_DN2, moments[3], 0.0)
+        moments[1] = np.maximum(moments[1], STEPS_DN2)
+        return moments
+
+    def _read(self, view: View) -> Readout:
+        """Return the readout of a view by the pixel itself."""
+        pixel = self.pixel if self.hdr is None else self.hdr
+        return Readout.of(self.setup.with_camera(pixel=pixel), view.electrons.response)
 
     @cached_property
     def linear_over_brightness(self) -> bool:
         """True if chromatic distances of filters like the base curve have their closed form, with a margin of two."""
         base = self.setup.camera.base_qe[None]
-        response, unlit = self.smooth(base)[0], self.unlit(base, self.light.exposure_s(base))[0]
+        response, unlit = self.smooth(base)[0], self.unlit(base)[0]
         longest_dn = np.sqrt(response.shape[-1]) * (response - unlit[:, None]).max(initial=0.0)
         return self.hdr is None and bool((room_dn(self.setup, response, unlit) >= 2 * longest_dn).all())
 
@@ -137,139 +136,107 @@ class LinearModel(ForwardModel):
 
         `curves`: QE of the modified channels; `curves_gradient`: its derivatives.
         """
-        by_pixel = self.by_pixel
-        pixel = by_pixel.readout.pixel if self.hdr is None else self.hdr
-        electrons, slope = by_pixel._with_slope(curves, curves_gradient)
-        lit, lit_by_u = by_pixel._with_slope(curves, curves_gradient, lamps_only=True)
-        readout = Readout(by_pixel.setup.with_camera(pixel=pixel), by_pixel.electrons.response)
-        light = readout.capture_light if pixel.captures else np.ones((1, electrons.shape[-1]))
-        dark, dark_by_u = electrons[:, 0] - lit[:, 0], slope[:, :, 0] - lit_by_u[:, :, 0]
-        moments, noisy = len(electrons) // readout.n_cases, self.setup.scene.noise is not None
-        result = []
-        for case in range(len(electrons)):
-            here = readout.at(case // moments)
-            lamps = LampReadings(lit[case] * light[:, None], dark[case] * light, light, here, noisy)
-            result.append(LampSlopes(lamps, lit_by_u[:, case], dark_by_u[:, case]))
+        noisy, result = self.setup.scene.noise is not None, []
+        for view in self._by_pixel:
+            readout = self._read(view)
+            electrons, slope = self._with_slope(view, curves, curves_gradient)
+            lit, lit_by_u = self._with_slope(view, curves, curves_gradient, lamps_only=True)
+            light = readout.capture_light if readout.pixel.captures else np.ones((1, electrons.shape[-1]))
+            dark, dark_by_u = electrons[:, 0] - lit[:, 0], slope[:, :, 0] - lit_by_u[:, :, 0]
+            moments = len(electrons) // readout.n_cases
+            for case in range(len(electrons)):
+                here = readout.subset(slice(case // moments, case // moments + 1))
+                lamps = LampReadings(lit[case] * light[:, None], dark[case] * light, light, here, noisy)
+                result.append(LampSlopes(lamps, lit_by_u[:, case], dark_by_u[:, case]))
         return result
 
     def spread_electrons(self, curves: DesignCurves) -> DesignCases:
         """Return expected electrons of the pixels, weighted by their shares of a channel's variance."""
-        return self.by_pixel.readout.spread(self.by_pixel._expected(curves))
+        expected = self._expected(self._by_pixel, curves)
+        return _joined(view.readout.spread(e) for view, e in zip(self._by_pixel, expected, strict=True))
 
     def spread_shares(self) -> Float[Array, "cases channels"]:
         """Return the sum of the pixels' shares of a channel's variance."""
-        response = self.by_pixel.electrons.response
-        repeats = self.by_pixel._expected(self.setup.camera.base_qe[None]).shape[1] // len(response.spread)
-        return np.repeat(response.spread.sum(axis=1), repeats, axis=0)
+        base = self.setup.camera.base_qe[None]
+        repeats = self.scene.scales(self.scene.exposure_s(base)).shape[1]
+        shares = np.concatenate([view.electrons.response.spread.sum(axis=1) for view in self._by_pixel])
+        return np.repeat(shares, repeats, axis=0)
 
-    @cached_property
-    def members(self) -> dict[str, MemberNumbers]:
-        """Indices of the signals of each signal type."""
-        return self.setup.members
-
-    @cached_property
-    def by_pixel(self) -> LinearModel:
-        """Model of the same scene with single pixels; raises SweepError if they do not fit into memory."""
-        setup = replace(self.setup, left_out=self.setup.left_out - {"saturation", "quantization"})
-        result = _ByPixel(setup)
-        if result._phase_blocks:
-            most = f"at most those of {len(result._phase_blocks[0])} sampling phases: a smaller light, or a named phase"
-            problem = "too many pixels for a search under noise"
-            raise SweepError(ValidationIssue(problem, value=f"{result.n_cases} phases", allowed=most))
-        return result
-
-    def _expected(self, curves: DesignCurves) -> DesignCases:
-        """Return expected electrons."""
-        exposure_s = self.light.exposure_s(curves)
-        return self.electrons.expected(curves, self.light.scales(exposure_s), exposure_s)
+    def _expected(self, views: list[View], curves: DesignCurves) -> list[DesignCases]:
+        """Return expected electrons in each view."""
+        exposure_s = self.scene.exposure_s(curves)
+        scales = self.scene.scales(exposure_s)
+        return [view.electrons.expected(curves, scales, exposure_s) for view in views]
 
     def _with_slope(
-        self, curves: ChannelCurves, curves_gradient: CurvesGradient, *, lamps_only: bool = False
-    ) -> tuple[Float[Array, "cases signals channels"], Float[Array, "parameters cases signals channels"]]:
+        self, view: View, curves: ChannelCurves, curves_gradient: CurvesGradient, *, lamps_only: bool = False
+    ) -> Slopes:
         """Return expected electrons and their derivative."""
-        electrons, n = self.electrons, len(curves_gradient)
-        design = curves[None]
-        exposure_s = self.light.exposure_s(design)
-        scales = self.light.scales(exposure_s)
+        electrons, design = view.electrons, curves[None]
+        exposure_s = self.scene.exposure_s(design)
+        scales = self.scene.scales(exposure_s)
         expected = electrons.expected(design, scales, exposure_s)[0]
         if lamps_only:
             expected = expected - np.repeat(electrons.unlit(design)[0], scales.shape[1], axis=0)[:, None] * exposure_s
-        light = (electrons.rates(curves_gradient) - electrons.fixed)[:, :, None] * scales[0][None, None, :, None, None]
-        uniform = electrons.through_filters(electrons.of_background(curves_gradient))
-        uniform = np.zeros_like(uniform) if lamps_only else uniform
-        slope = (light + uniform[:, :, None, None, :]).reshape(n, *expected.shape) * exposure_s
-        relative = relative_slope(self.setup, self.light.white, curves, curves_gradient)
+        rates = (electrons.rates(curves_gradient) - electrons.fixed)[:, :, None] * scales[0][:, None, None]
+        if not lamps_only:
+            rates = rates + electrons.of_background(curves_gradient)[:, :, None, None]
+        slope = rates.reshape(len(curves_gradient), *expected.shape) * exposure_s
+        relative = relative_slope(self.setup, self.scene.white, curves, curves_gradient)
         return expected, np.asarray(slope + relative[:, None, None, None] * expected, dtype=float)
 
     def per_qe(
         self, modified: int, curves: ChannelCurves, *, lamps_only: bool = False
     ) -> Float[Array, "cases signals pixels wavelengths"]:
-        """Return the response per unit of QE of one modified channel at every wavelength.
+        """Return the response per unit of QE of one modified channel at every wavelength, DN.
 
         The smooth response is linear in it if the channel does not set the exposure.
-
-        Returns DN per unit of QE.
         """
-        response, channel = self.electrons.response, self.setup.camera.modified[modified]
-        uniform = response.uniform[:, :, channel] * (not lamps_only)
-        rates = self._per_qe(modified, curves, response.light[:, :, channel], uniform)
-        return rates * self.setup.camera.pixel.dn_per_e
+        channel, parts = self.setup.camera.modified[modified], []
+        for view in self._views:
+            response = view.electrons.response
+            uniform = response.uniform[:, :, channel] * (not lamps_only)
+            parts.append(self._per_qe(view, modified, curves, response.light[:, :, channel], uniform))
+        return np.concatenate(parts) * self.pixel.dn_per_e
 
     def spread_per_qe(self, modified: int, curves: ChannelCurves) -> Float[Array, "cases signals wavelengths"]:
         """Return electrons per unit of QE of one modified channel in its pixels, weighted by shares of variance."""
-        by_pixel, channel = self.by_pixel, self.setup.camera.modified[modified]
-        response = by_pixel.electrons.response
-        share = response.spread[:, :, channel]
-        split = response.source
-        if isinstance(split, SplitLight):
-            light = split.folded(share, channel)
-        else:
-            light = np.einsum("xu,xuw->xw", share, split[:, :, channel])
-        uniform = (share * response.uniform[:, :, channel]).sum(axis=1)
-        return by_pixel._per_qe(modified, curves, light[:, None], uniform[:, None])[:, :, 0]
+        channel, parts = self.setup.camera.modified[modified], []
+        for view in self._by_pixel:
+            response = view.electrons.response
+            share, source = response.spread[:, :, channel], response.source
+            if isinstance(source, SplitLight):
+                light = source.folded(share, channel)
+            else:
+                light = np.einsum("xu,xuw->xw", share, source[:, :, channel])
+            uniform = (share * response.uniform[:, :, channel]).sum(axis=1, keepdims=True)
+            parts.append(self._per_qe(view, modified, curves, light[:, None], uniform)[:, :, 0])
+        return np.concatenate(parts)
 
     def _per_qe(
         self,
+        view: View,
         modified: int,
         curves: ChannelCurves,
-        light: Float[Array, "_ channels wavelengths"],
+        light: Float[Array, "_ channels _wavelengths"],
         uniform: Float[Array, "rows channels"],
     ) -> Float[Array, "_cases _signals channels wavelengths"]:
         """Return electrons per unit of QE of one modified channel, from light and uniform weights of its elements."""
-        electrons, channel = self.electrons, self.setup.camera.modified[modified]
-        exposure_s = self.light.exposure_s(curves[None])
-        scales = self.light.scales(exposure_s)[0]
-        signal_light = light[:, None, None] * self.light.signals[:, None, :]
-        signal_light = electrons.at_each_position(signal_light[..., None, :], [channel])[..., 0, :]
-        background = electrons.background[electrons.position, modified][:, None, None, None]
-        total = signal_light * scales[None, :, None, None, None] + uniform[:, None, None, :, None] * background
+        position, channel = view.electrons.position, self.setup.camera.modified[modified]
+        exposure_s = self.scene.exposure_s(curves[None])
+        scales = self.scene.scales(exposure_s)[0]
+        signal_light = light[:, None, None] * position.signals[:, None, :]
+        signal_light = position.angular.light(signal_light[..., None, :], [channel])[..., 0, :]
+        background = uniform[:, None, None, :, None] * position.background[modified]
+        total = signal_light * scales[None, :, None, None, None] + background
         return np.asarray(total.reshape(-1, *total.shape[2:]) * exposure_s[0], dtype=float)
 
 
-class _ByPixel(LinearModel):
-    """Linear model of single pixels, those of all field positions together."""
-
-    together = True
+def _joined(parts: Iterable[DesignCases]) -> DesignCases:
+    return np.concatenate([*parts], axis=1)
 
 
-_models: Cache[bytes, LinearModel] = Cache(16)
-
-
+@lru_cache(maxsize=16)
 def linear_model(setup: Setup) -> LinearModel:
-    """Return the linear model of a setup; recent models are cached.
-
-    `setup`: camera, lights, scene and accuracy; at most 9 field positions and 2 moments of a pulse are used.
-    """
-    coarse = setup.accuracy.model_copy(
-        update={"field_positions": min(setup.accuracy.field_positions, _FIELD_POSITIONS), "pwm_moments": 2}
-    )
-    hdr = setup.camera.pixel if setup.camera.pixel.captures else None
-    setup = setup if hdr is None else setup.with_camera(pixel=hdr.read_once)
-    without_readout = replace(setup, left_out=setup.left_out | READOUT, accuracy=coarse)
-
-    def build() -> LinearModel:
-        model = LinearModel(without_readout)
-        model.hdr = hdr
-        return model
-
-    return _models.get(hashlib.sha256(pickle.dumps((without_readout, hdr))).digest(), build)
+    """Return the linear model of a setup; recent ones are kept."""
+    return LinearModel(setup)

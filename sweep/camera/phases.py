@@ -7,13 +7,14 @@ half the step are compared, down to the finest one, or until they differ by litt
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.types import Array, Float, IndexArray, Int, PerValue
+from ..base.types import Array, Float, IndexArray, Int
 from .mosaic import Mosaic
+from .refine import Lattice
 from .scene import Target
 from .setup import Setup
 
@@ -21,11 +22,9 @@ MOST_PHASES = 1024
 """Phases of a lattice on a tile, at most."""
 _FINER, _MOST_FINE = 4, 1200
 """Factor by which the lattice is finer from which extremes are refined; its different phases, at most."""
-_STARTS = 2
-"""Phases from which each extreme is refined at the first step, then one."""
 _FLAT_DN, _FLAT_STEPS_DN = 0.05, 1.0
 """A start whose neighbors all differ from it by less is refined no further; the second where whole numbers step."""
-_NEIGHBORS = np.array([[x, y] for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)])
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -135,89 +134,40 @@ def read_at(target: Target, centers_px: Float[Array, "phases 2"]) -> Phases:
     return result
 
 
-def fine_lattice(setup: Setup) -> tuple[Phases, float]:
-    """Return the phases of the lattice from which extremes are refined.
+def fine_lattice(setup: Setup) -> Lattice:
+    """Return the centers of the lattice from which extremes are refined.
 
-    Returns `step_px`: step of the lattice, pixels.
+    Where pixels saturate, extremes are kinks, which are missed by slope times step: steps are halved until neighbors
+    differ by little.
     """
     target, steps = setup.scene.target, _FINER * setup.accuracy.phase_steps_per_px
     assert target is not None
     while True:
         phases = different_phases(setup, read_at(target, lattice_px(setup.camera.mosaic, steps)))[0]
         if len(phases) <= _MOST_FINE or steps <= setup.accuracy.phase_steps_per_px:
-            return phases, 1 / steps
+            break
         steps //= 2
+    centers = np.unique(phases.center_px, axis=0)
+    rounds = setup.scene.noise is None and setup.computes("quantization")
+    return Lattice(
+        centers,
+        np.full(len(centers), 1 / steps),
+        max(0, math.floor(math.log2(1 / (steps * setup.accuracy.finest_phase_px)) + _ROUNDING)),
+        period=np.array(setup.camera.mosaic.indices.shape[::-1], dtype=float),
+        flat=_FLAT_STEPS_DN if rounds else _FLAT_DN,
+    )
 
 
-def refined_minima(
-    setup: Setup,
-    lattice: Phases,
-    step_px: float,
-    values: Float[Array, "values lattice"],
-    evaluate: Callable[[Phases], Float[Array, "_values phases"]],
-) -> tuple[PerValue, Phases]:
-    """Refine the smallest values over all sampling phases.
-
-    A pattern search: from each of the best known phases to the best neighbor at half the step of the lattice; then
-    again, from the best of all known phases, at half the step before; at the finest step as long as values fall. Where
-    pixels saturate, extremes are kinks, which are missed by slope times step: steps are halved until neighbors
-    differ by little. It finds minima near good phases; it does not prove that no lower one lies elsewhere.
-    """
-    target, finest, n_starts = setup.scene.target, setup.accuracy.finest_phase_px, _STARTS
+def phases_at(setup: Setup, centers_px: Float[Array, "places 2"]) -> tuple[Phases, Int[IndexArray, "choices places"]]:
+    """Return the different phases at some centers, and the numbers of those of each: of all equally near pixels."""
+    target = setup.scene.target
     assert target is not None
-    known = dict(zip(lattice.keys, values.T, strict=True))
-    period = np.array(setup.camera.mosaic.indices.shape[::-1])
-    steps = setup.scene.noise is None and setup.computes("quantization")
-    flat_dn = _FLAT_STEPS_DN if steps else _FLAT_DN
-    step = step_px / 2
-    while step >= finest:
-        places, so_far = np.array(list(known))[:, :2], np.stack(list(known.values()), axis=1)
-        starts = _apart(places, so_far, n_starts, 2 * step, period)
-        centers, at_start = places[starts], np.take_along_axis(so_far, starts, axis=1)  # [n_values, n_starts, ...]
-        apart_px = np.abs(np.mod(places[None, None] - centers[:, :, None] + period / 2, period) - period / 2)
-        known_around = (apart_px <= 2 * step * (1 + 1e-9)).all(axis=3)
-        change = np.abs(so_far[:, None] - at_start[..., None])
-        moving = np.max(change, axis=2, where=known_around, initial=0.0) > flat_dn
-        while moving.any():
-            around = np.unique((centers[moving][:, None] + step * _NEIGHBORS).reshape(-1, 2), axis=0)
-            read = read_at(target, around)
-            phases, which = different_phases(setup, read)
-            at_phases = _known_or_evaluated(phases, known, evaluate)[:, which]
-            close = (np.abs(read.center_px - centers[:, :, None]) <= step * (1 + 1e-9)).all(axis=3)
-            at_close = np.where(close & moving[..., None], at_phases[:, None], np.inf)
-            moving = at_close.min(axis=2) < at_start
-            lowest = at_close.argmin(axis=2)[moving]
-            at_start[moving], centers[moving] = at_close.min(axis=2)[moving], read.center_px[lowest]
-            moving &= step < 2 * finest  # elsewhere the next step reaches as far
-        step, n_starts = step / 2, 1
-    places, so_far = np.array(list(known)), np.stack(list(known.values()), axis=1)
-    return so_far.min(axis=1), Phases(*np.split(places[so_far.argmin(axis=1)], 2, axis=1))
-
-
-def _apart(
-    centers_px: Float[Array, "phases 2"],
-    values: Float[Array, "values phases"],
-    n_starts: int,
-    step_px: float,
-    period_px: Int[IndexArray, " 2"],
-) -> Int[IndexArray, "values phases_apart"]:
-    """Return the indices of the smallest values that are more than a step apart."""
-    starts, left = [values.argmin(axis=1)], values.copy()
-    while len(starts) < n_starts:
-        distance = np.mod(centers_px - centers_px[starts[-1]][:, None], period_px)
-        left[np.minimum(distance, period_px - distance).max(axis=2) <= step_px * (1 + 1e-9)] = np.inf
-        starts.append(np.where(np.isfinite(left).any(axis=1), left.argmin(axis=1), starts[0]))
-    return np.stack(starts, axis=1)
-
-
-def _known_or_evaluated(
-    phases: Phases,
-    known: dict[tuple[float, ...], Float[Array, " _values"]],
-    evaluate: Callable[[Phases], Float[Array, "_values phases"]],
-) -> Float[Array, "values phases"]:
-    """Return values at phases, and evaluate the unknown ones."""
-    keys = phases.keys
-    new = np.array([at for at, key in enumerate(keys) if key not in known], dtype=np.intp)
-    if new.size:
-        known.update(zip((keys[at] for at in new), evaluate(phases.subset(new)).T, strict=True))
-    return np.stack([known[key] for key in keys], axis=1)
+    read = read_at(target, centers_px)
+    phases, which = different_phases(setup, read)
+    place = {center: number for number, center in enumerate(map(tuple, centers_px.tolist()))}
+    same = np.array([place[center] for center in map(tuple, read.center_px.tolist())])
+    choices = np.repeat(which[None, : len(centers_px)], 4, axis=0)
+    for number, at in zip(which[len(centers_px) :], same[len(centers_px) :], strict=True):
+        row = np.flatnonzero(choices[1:, at] == choices[0, at])
+        choices[1 + (row[0] if row.size else 2), at] = number
+    return phases, choices

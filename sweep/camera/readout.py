@@ -6,8 +6,7 @@ A channel is the mean over the disc, or the demosaicked center.
 from __future__ import annotations
 
 import math
-from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from . import merge
 from .noise import table
 from .pixel import Pixel, unquantized
 from .pixel_curve import groups_of, pixel_curve, same_electrons
-from .pixel_response import PixelResponse
+from .response import PixelResponse
 from .rounding import DITHERED_DN, MANY_STEPS, rounded
 from .setup import Setup
 
@@ -83,23 +82,39 @@ def capture_light(setup: Setup, response: PixelResponse) -> Float[Array, "captur
     return np.array(light, dtype=float).reshape(len(captures), len(of_element))
 
 
+@dataclass(frozen=True)
 class Readout:
-    """Readout of the elements of a pixel response."""
+    """Readout of the elements of a pixel response.
 
-    def __init__(self, setup: Setup, response: PixelResponse) -> None:
-        self.setup = setup
-        self.n_cases = response.shape[0]
-        self.weights, self.spread_weights = response.readout, response.spread
-        self.pixel = setup.camera.pixel
-        self.capture_light = capture_light(setup, response)
-        self.by_channel = response.by_channel
+    `weights`, `spread_weights`: of each element in the value of each channel and in its variance; `capture_light`:
+    light of the exposures of an HDR pixel on the elements.
+    """
 
-    def at(self, place: int) -> Readout:
-        """Return the readout of one sampling phase or field position alone."""
-        single = copy(self)
-        single.n_cases = 1
-        single.weights, single.spread_weights = self.weights[place][None], self.spread_weights[place][None]
-        return single
+    setup: Setup
+    weights: Float[Array, "cases pixels channels"]
+    spread_weights: Float[Array, "cases pixels channels"]
+    capture_light: Float[Array, "captures pixels"]
+    by_channel: bool
+
+    @classmethod
+    def of(cls, setup: Setup, response: PixelResponse) -> Readout:
+        """Return the readout of a response."""
+        light = capture_light(setup, response)
+        return cls(setup, response.readout, response.spread, light, response.by_channel)
+
+    def subset(self, which: slice | Int[IndexArray, " subset"]) -> Readout:
+        """Return the readout at some sampling phases."""
+        return replace(self, weights=self.weights[which], spread_weights=self.spread_weights[which])
+
+    @property
+    def pixel(self) -> Pixel:
+        """The pixel that is read."""
+        return self.setup.camera.pixel
+
+    @property
+    def n_cases(self) -> int:
+        """Number of sampling phases."""
+        return len(self.weights)
 
     def transfer(self, electrons: Float[Array, "... pixels"]) -> Float[Array, "... pixels"]:
         """Convert expected electrons to digital numbers; under noise, to their means, DN.
@@ -193,17 +208,6 @@ class Readout:
         dn, variance_dn = np.where(certain, np.rint(dn), dn), np.where(certain, 0.0, variance_dn)
         mean, variance = self.folded(dn), self.spread(variance_dn)
         return (mean, variance, *self._shape_of_noise(electrons, variance))
-
-    def channels_of(self, pixels: Float[Array, "signals pixels"], phase_index: int) -> Float[Array, "signals channels"]:
-        """Return the channels from their pixels at one sampling phase.
-
-        `pixels`: values of the pixels of `ForwardModel.pixel_electrons`.
-        """
-        setup = self.setup
-        if setup.scene.target is None:
-            in_channel = setup.camera.mosaic.indices.ravel()[:, None] == np.arange(len(setup.camera.mosaic.channels))
-            return np.asarray(pixels @ (in_channel / setup.camera.mosaic.counts), dtype=float)
-        return np.asarray(pixels @ self.weights[phase_index], dtype=float)
 
     def of_pixels(self, values: Float[Array, " ..."]) -> Float[Array, " ..."]:
         """Return values of the pixels of a tile, row by row, from those of channels that fill the field."""

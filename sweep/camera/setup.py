@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 from ..base.types import MemberNumbers
@@ -17,9 +18,9 @@ READOUT = frozenset({"noise", "quantization", "saturation"})
 """Effects without which digital numbers are linear in electrons."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Setup:
-    """Camera, lights and scene that a batch of designs shares.
+    """Camera, lights and scene that a batch of designs shares; each is itself alone, and may own a model.
 
     `left_out`: effects that are not computed (see `effects`).
     """
@@ -50,7 +51,12 @@ class Setup:
         """The setup with every effect computed."""
         return replace(self, left_out=frozenset())
 
-    @property
+    @cached_property
+    def steady(self) -> Setup:
+        """The setup without pulses of its lamps."""
+        return replace(self, scene=self.scene.model_copy(update={"drive": None}))
+
+    @cached_property
     def over_brightness(self) -> Setup:
         """The setup in which lamps of any brightness are read: pixels may fill; without noise, unrounded."""
         left_out = self.left_out - {"saturation", "noise"}

@@ -20,7 +20,7 @@ from threadpoolctl import threadpool_limits
 from ..base.errors import SweepError, ValidationIssue
 from ..base.types import Array, DesignNumbers, Float, Progress
 from ..camera.accuracy import PRESETS, Accuracy
-from ..camera.forward import ForwardModel
+from ..camera.model import SceneModel
 from ..camera.setup import Setup
 from ..designs.block import CurveBlock, edges_of_some
 from ..designs.space import Space
@@ -118,7 +118,7 @@ def _measure(setup: Setup, space: Space, numbers: DesignNumbers) -> Measured:
     with threadpool_limits(1):
         _warm_up(setup, space)
         started = time.perf_counter()
-        model = ForwardModel(setup)
+        model = SceneModel(setup)
         csds = [_csds(model, space, numbers[:1])]
         first_s = time.perf_counter() - started
         if numbers.size == 1:
@@ -136,11 +136,11 @@ def _warm_up(setup: Setup, space: Space) -> None:
     elsewhere = setup.scene.model_copy(update={"optics": optics})
     chart = elsewhere.model_copy(update={"target": None, "field": None})
     for scene, n_designs in ((chart, 512), (elsewhere, 2)):
-        model = ForwardModel(replace(setup, scene=scene, accuracy=_WARM))
+        model = SceneModel(replace(setup, scene=scene, accuracy=_WARM))
         _evaluated(model, single, np.zeros(n_designs, dtype=np.intp))
 
 
-def _evaluated(model: ForwardModel, space: Space, numbers: DesignNumbers) -> Columns:
+def _evaluated(model: SceneModel, space: Space, numbers: DesignNumbers) -> Columns:
     """Columns of designs, by their edges where the space is separable, as in a run; else by their curves."""
     block = edges_of_some(space, numbers)
     if block is None:
@@ -148,7 +148,7 @@ def _evaluated(model: ForwardModel, space: Space, numbers: DesignNumbers) -> Col
     return evaluate(model, block)
 
 
-def _csds(model: ForwardModel, space: Space, numbers: DesignNumbers) -> Float[Array, "csds designs"]:
+def _csds(model: SceneModel, space: Space, numbers: DesignNumbers) -> Float[Array, "csds designs"]:
     """All CSDs, at the best sampling phase too where all phases count."""
     columns = _evaluated(model, space, numbers)
     names = [csd_name(pair) for pair in class_pairs(model.setup.lights.classes)]

@@ -223,6 +223,6 @@ def smooth_chromatic(setup: Setup, curves: DesignCurves, pair: Pair) -> PerDesig
                 for design in curves
             ]
         )
-    response = model.smooth(curves) - model.unlit(curves, model.light.exposure_s(curves))[:, :, None]
+    response = model.smooth(curves) - model.unlit(curves)[:, :, None]
     over = [chromatic_separation(response[:, case], first, second) for case in range(response.shape[1])]
     return np.asarray(np.min(over, axis=0), dtype=float)

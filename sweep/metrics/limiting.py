@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.types import DesignCases, IndexArray, Int
-from ..camera.forward import ForwardModel
+from ..camera.model import SceneModel
 from ..camera.setup import Setup
 from ..designs.block import Block
 from ..spectra.lights import Pair, class_pairs, pair_name
@@ -49,12 +49,12 @@ def _named(setup: Setup, lights: Int[IndexArray, "rows 2"]) -> NDArray[np.object
     return np.array(names, dtype=object)[which.reshape(-1)]
 
 
-def limiting_lights_of(model: ForwardModel, block: Block) -> LimitingLights:
+def limiting_lights_of(model: SceneModel, block: Block) -> LimitingLights:
     """Return the limiting lights of a batch of designs."""
-    changing = model.read_changing(block)
+    changing = model.changing(block)
     if changing is None:
         return limiting_lights(model.setup, model.read(block.curves())[0])
-    all_channels = changing.whole
+    all_channels = changing.whole(slice(None))
     response = np.empty((len(block), *all_channels.shape[1:]))
     response[changing.which] = all_channels
     if not changing.which.all():

@@ -128,7 +128,7 @@ class SmoothDesign:
     @cached_property
     def lamps(self) -> tuple[Float[Array, "cases signals channels"], Float[Array, "free cases signals channels"]]:
         """Response to the lamps alone and its derivative, DN, in the shapes of `response` and `response_by_u`."""
-        return self._model.lamps_with_gradient(self.curves, self.by_u)
+        return self._model.smooth_with_gradient(self.curves, self.by_u, lamps_only=True)
 
     @cached_property
     def noisy(
@@ -143,15 +143,7 @@ class SmoothDesign:
 
         The mean is `response`; of an HDR pixel it is that of the merged value, which saturates.
         """
-        if self._model.hdr is not None:
-            return self._model.merged_with_gradient(self.curves, self.by_u)
-        variance = np.asarray(self._model.variance(self.curves[None])[0], dtype=float)
-        return (
-            self.response,
-            variance,
-            self.response_by_u,
-            self._model.variance_gradient(self.curves, self.by_u),
-        )
+        return self._model.noisy_with_gradient(self.curves, self.by_u)
 
     @property
     def linear_over_brightness(self) -> bool:
@@ -213,7 +205,9 @@ class SmoothDesign:
                 subset, design_curves = chosen[which == error_index], curves[error_index]
                 differences = draws.differences(subset, model.smooth(design_curves[None])[0])
                 by_u = families[error_index].gradient(self.x)[self._free] * self._span[:, None, None]
-                slopes = (draws.differences(subset, model.gradient(design_curves, by_u)) * differences).sum(axis=-1)
+                slopes = (
+                    draws.differences(subset, model.smooth_with_gradient(design_curves, by_u)[1]) * differences
+                ).sum(axis=-1)
                 length = np.linalg.norm(differences, axis=-1)
                 slope += np.divide(slopes, length, out=np.zeros_like(slopes), where=length > 0).sum(axis=1)
         return Rows(np.array([value]), slope[None] / chosen.size)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
@@ -11,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..base.errors import SweepError, ValidationIssue
-from ..base.types import Array, DesignCases, DesignSignals, Float, PerDesign
+from ..base.types import Array, DesignSignals, Float
 from ..base.user_code import UserCode, name_in_file
 from ..camera.setup import Setup
 
@@ -132,20 +131,3 @@ class UserMetric:
             other = float(values[~np.isfinite(values)][0])
             raise SweepError(ValidationIssue(f"{self.code.name} is not finite", value=other))
         return np.asarray(values.reshape(n, -1), dtype=float)
-
-    def of_cases(self, setup: Setup, response: DesignCases) -> PerDesign:
-        """Return the worst over the cases.
-
-        NaN if the CFA has none.
-        """
-        by_case = [self.parts(Readings.of_setup(setup, response[:, case])) for case in range(response.shape[1])]
-        defined = [values for values in by_case if values is not None]
-        if len(defined) < len(by_case):
-            return np.full(len(response), np.nan)
-        joined = np.concatenate(defined, axis=1)
-        return np.asarray(joined.min(axis=1) if self.direction == "more" else joined.max(axis=1), dtype=float)
-
-
-def user_quantities(metrics: Sequence[UserMetric], setup: Setup, response: DesignCases) -> dict[str, PerDesign]:
-    """Return the column of each metric of user code."""
-    return {metric.name: metric.of_cases(setup, response) for metric in metrics}

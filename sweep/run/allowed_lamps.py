@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow as pa
 
 from ..base.types import Array, DesignCurves, Float, delayed
-from ..camera.forward import ForwardModel
+from ..camera.model import SceneModel
 from ..camera.setup import Setup
 from ..spectra.lights import Lights
 from ..spectra.single_leds import Norm, SingleLeds, all_leds
@@ -81,7 +81,7 @@ def _read(setup: Setup, curves: DesignCurves, leds: SingleLeds) -> Float[Array, 
         part = photons[start : start + _TOGETHER]
         names = tuple(map(str, range(len(part))))
         lights = Lights("leds", names, names, part, setup.lights.photon_ratio, "modeled", surrogate=True)
-        parts.append(ForwardModel(replace(setup, lights=lights), once=True).read(curves)[0][0])
+        parts.append(SceneModel(replace(setup, lights=lights)).read(curves)[0][0])
     return np.concatenate(parts, axis=1)
 
 

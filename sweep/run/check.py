@@ -15,10 +15,10 @@ import pyarrow.parquet as pq
 
 from ..base.types import delayed
 from ..camera.accuracy import REFERENCE
-from ..camera.forward import ForwardModel
+from ..camera.model import SceneModel
 from ..camera.setup import Setup
 from ..designs.space import Space
-from ..metrics.columns.chromatic import CHROMATIC_CSD
+from ..metrics.columns.chromatic import CHROMATIC_CSD, ChromaticSeparation
 from ..metrics.evaluate import evaluate
 from ..metrics.quantity import WORST_CASE
 from ..results.dataset import part_paths
@@ -55,12 +55,17 @@ def compared_rows(study: Study, rows: Sequence[Row]) -> Iterator[list[dict[str, 
 def _compared(study: Study, space: Space, scenario: str, rows: Sequence[Row]) -> list[dict[str, Any]]:
     points = np.array([[row[name] for name in space.parameters] for row in rows], dtype=float)
     setup = study.setup(space, scenario)
-    model = ForwardModel(replace(setup.with_all_effects, accuracy=REFERENCE))
-    nominal = evaluate(model, space.curves(points, study.grid.size))
-    csds = [quantity for quantity in study.quantities.values() if quantity.has_error_bound]
-    if not (setup.all_phases or setup.all_heights or setup.scene.drive is not None):  # elsewhere of a lattice alone
-        csds += [quantity for quantity in study.quantities.values() if quantity.metric == CHROMATIC_CSD]
-    csds = [quantity for quantity in csds if quantity.name in rows[0]]
+    model = SceneModel(replace(setup.with_all_effects, accuracy=REFERENCE))
+    of_lattice = (
+        setup.all_phases or setup.all_heights or setup.scene.drive is not None
+    )  # chromatic ones are, of it alone
+    compared = [of for of in study.quantities.values() if of.metric == CHROMATIC_CSD and not of_lattice]
+    compared += [quantity for quantity in study.quantities.values() if quantity.has_error_bound]
+    csds = [quantity for quantity in compared if quantity.name in rows[0]]
+    chromatic = [of.pair for of in csds if of.metric == CHROMATIC_CSD and of.pair is not None]
+    nominal = evaluate(
+        model, space.curves(points, study.grid.size), metrics=[ChromaticSeparation()], chromatic=chromatic
+    )
     worst = [quantity for quantity in csds if quantity.extreme == WORST_CASE]
     exact = {quantity.name: nominal[quantity.name] for quantity in csds if quantity not in worst}
     if worst:

@@ -12,10 +12,13 @@ import numpy as np
 import pyarrow as pa
 
 from ..base.types import DesignCurves, delayed
-from ..camera.forward import ForwardModel
-from ..metrics.columns.chromatic import CHROMATIC_ERROR, ChromaticConfusion
+from ..camera.model import SceneModel
+from ..camera.setup import Setup
+from ..designs.block import CurveBlock
+from ..metrics.batch import Batch
+from ..metrics.brightness import error_of
+from ..metrics.columns.chromatic import CHROMATIC_ERROR
 from ..metrics.columns.confusion import STATE_ERROR, state_errors
-from ..metrics.evaluate import of_lamps
 from ..spectra.lights import class_pairs, pair_name
 from ..study import Study
 from ..study.axes import series_of
@@ -70,13 +73,14 @@ class ErrorsBetween:
         """Return the error of lamps of equal brightness, or of any, which is no smaller."""
         setup = self._scenes.at(number)
         if number not in self._of_equal:
-            model = ForwardModel(setup, once=True)
-            self._of_equal[number] = float(state_errors(model, self._curves, self._states)[0])
+            self._of_equal[number] = float(state_errors(self._batch(setup))[0])
         if quantity == STATE_ERROR:
             return self._of_equal[number]
-        columns = of_lamps(setup, self._curves, self._states, [ChromaticConfusion()])
-        of_any = [columns[pair_name(CHROMATIC_ERROR, pair)] for pair in class_pairs(self._states)]
-        return max(self._of_equal[number], *of_any)
+        dprimes = self._batch(setup).over_brightness()[1]
+        return max(self._of_equal[number], *(float(error_of(dprime[0])) for dprime in dprimes.values()))
+
+    def _batch(self, setup: Setup) -> Batch:
+        return Batch(SceneModel(setup), CurveBlock(self._curves), self._states, any_brightness=True)
 
 
 def _of_design(

@@ -21,8 +21,8 @@ from ..base.types import (
     Progress,
     delayed,
 )
-from ..camera.field import over_field, scene_at
-from ..camera.forward import forward_model
+from ..camera.field import field_heights, scene_at
+from ..camera.model import scene_model
 from ..camera.setup import Setup
 from ..designs.block import CurveBlock, edges_of_some
 from ..designs.space import Space
@@ -91,7 +91,7 @@ def _details(setup: Setup, designs: Sequence[_Design]) -> dict[int, Details]:
     """Return details by row id."""
     result = {}
     for design_id, curves in designs:
-        response = forward_model(setup).read(curves)[0]
+        response = scene_model(setup).read(curves)[0]
         limited_by = {pair: lights[0] for pair, lights in limiting_lights(setup, response).items()}
         result[design_id] = Details(limited_by, response[0, 0].copy())
     return result
@@ -130,7 +130,7 @@ def limited_by_table(
 
 def _limits(setup: Setup, space: Space, numbers: DesignNumbers) -> LimitingLights:
     """Return the limiting lights of some designs of a space."""
-    model, camera = forward_model(setup), setup.camera
+    model, camera = scene_model(setup), setup.camera
     step = max(1, _MOST_VALUES // (model.n_cases * len(setup.lights.names) * len(camera.mosaic.channels)))
     parts = []
     for start in range(0, numbers.size, step):
@@ -160,7 +160,7 @@ def _over_heights(setup: Setup, curves: DesignCurves) -> list[dict[str, float]]:
     """Return the rows of one design, the center of the image first."""
     field, rows = setup.scene.field, list[dict[str, float]]()
     assert field is not None
-    same = len(over_field(setup)) == 1
+    same = len(field_heights(setup)) == 1
     for height in np.linspace(0.0, 1.0, _HEIGHTS).tolist():
         if not rows or not same:
             response = smooth_response(replace(setup, scene=scene_at(setup.scene, height)), curves)

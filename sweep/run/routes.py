@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 
 from ..base.types import Array, DesignNumbers, DesignParameters, Float
-from ..camera.forward import ForwardModel, forward_model
+from ..camera.model import SceneModel, scene_model
 from ..camera.plan import Plan
 from ..camera.setup import Setup
 from ..designs.block import CurveBlock, edges_of_some
@@ -18,7 +18,7 @@ from ..designs.space import Space
 from ..designs.tolerance import AS_DESIGNED, NONE, Tolerance
 from ..metrics.bound import Bound
 from ..metrics.columns.chromatic import CHROMATIC_CSD
-from ..metrics.evaluate import evaluate, family_quantities, image_quantities
+from ..metrics.evaluate import evaluate
 from ..metrics.metric import Metric
 from ..metrics.objective import COMBINED, Objective, columns_of
 from ..metrics.quantity import OF_A_SHARE, WORST_CASE, YIELD, Columns, Quantity, RequestedQuantities
@@ -27,7 +27,7 @@ from ..metrics.user_metrics import UserMetric
 from ..results.identity import CHUNK
 from ..results.tables import ON_FRONT
 from ..spectra.lights import Pair
-from ..vision.section import Vision
+from ..vision.section import SeededVision, Vision
 
 _MOST_LETTERS = 200
 
@@ -125,7 +125,7 @@ def text_of(error: Exception) -> str:
 def _columns(space: Space, numbers: DesignNumbers, setup: Setup, rules: Rules, wanted: Wanted) -> Columns:
     """Return the quantities of a block of designs."""
     size, requested, points = setup.camera.grid.size, rules.requested, space.points_of(numbers)
-    model = forward_model(setup)
+    model = scene_model(setup)
     edges = edges_of_some(space, numbers)
     designs = CurveBlock(space.curves(points, size)) if edges is None else edges
     columns = evaluate(
@@ -136,10 +136,10 @@ def _columns(space: Space, numbers: DesignNumbers, setup: Setup, rules: Rules, w
         user_metrics=wanted.user_metrics,
         metrics=wanted.metrics,
         chromatic=wanted.chromatic,
+        family=None if space.filter is None else space.filter.family,
+        points=points,
+        images=None if rules.vision is None else SeededVision(rules.vision, rules.seed),
     )
-    columns |= family_quantities(None if space.filter is None else space.filter.family, points, wanted.metrics)
-    if rules.vision is not None:
-        columns |= image_quantities(setup, space.curves(points, size), rules.vision, rules.seed, wanted.metrics)
     if worst := wanted.of_extreme(WORST_CASE):
         columns |= worst_cases(space, model, points, columns, worst, rules.tolerance, wanted.user_metrics)
     if yields := wanted.of_extreme(OF_A_SHARE):
@@ -151,7 +151,7 @@ def _columns(space: Space, numbers: DesignNumbers, setup: Setup, rules: Rules, w
 
 def worst_cases(
     space: Space,
-    model: ForwardModel,
+    model: SceneModel,
     points: DesignParameters,
     nominal: Columns,
     worst: Sequence[Quantity],

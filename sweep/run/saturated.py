@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow as pa
 
 from ..base.types import DesignCurves, delayed
-from ..camera.forward import forward_model
+from ..camera.model import scene_model
 from ..camera.setup import Setup
 from ..study import Study
 from .analysis import Analysis, Calls, named_designs
@@ -27,7 +27,7 @@ def _calls(study: Study, rows: pd.DataFrame) -> Calls:
 def _full_signals(setup: Setup, curves: DesignCurves) -> list[dict[str, int]]:
     """Count the signals of a design that fill a pixel of any channel in any case; of an HDR pixel, all captures."""
     full = np.zeros(len(setup.lights.names), dtype=bool)
-    for lamps in forward_model(setup.over_brightness).lamps(curves):
+    for lamps in scene_model(setup.over_brightness).lamps(curves):
         full |= lamps.full
     return [{"full_signals": int(full.sum()), "signals": full.size}]
 

@@ -12,7 +12,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from ..base.types import ChannelCurves, DesignParameters, Parallel, Progress, delayed
-from ..camera.forward import ForwardModel
+from ..camera.model import SceneModel
 from ..camera.setup import Setup
 from ..metrics.columns.confusion import D_PRIME, STATE_ERROR
 from ..metrics.evaluate import evaluate
@@ -159,7 +159,7 @@ def predictors(setup: Setup, curves: ChannelCurves, vision: Vision) -> list[tupl
     for distance_m, level in product(vision.distances_m, vision.levels.values()):
         there = setup_at(setup, vision, distance_m, level)
         there = replace(there, scene=there.scene.model_copy(update={"intensity_cd": middle_cd}))
-        columns = evaluate(ForwardModel(there, once=True), curves[None], vision.lenses)
+        columns = evaluate(SceneModel(there), curves[None], vision.lenses)
         csd = min(float(columns[csd_name(pair)][0]) for pair in pairs)
         names = [pair_name(D_PRIME, order) for pair in pairs for order in (pair, pair[::-1])]
         dprime = min(float(columns[name][0]) for name in names if name in columns)

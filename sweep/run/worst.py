@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pyarrow as pa
 
 from ..base.types import DesignCurves, delayed
-from ..camera.forward import ForwardModel
+from ..camera.model import SceneModel
 from ..metrics.columns.flicker import FALSE_HUE, LAMP_SEEN, MODULATION
 from ..metrics.evaluate import evaluate_some
 from ..metrics.quantity import Quantity
@@ -59,7 +59,7 @@ def _worst_over(
 
     def value(quantity: Quantity, number: float) -> float:
         if number not in known:
-            model = ForwardModel(scenes.at(number), once=True)
+            model = SceneModel(scenes.at(number))
             known[number] = evaluate_some(model, curves, quantities, states)
         return known[number][quantity.name] * (-1.0 if quantity.direction == "less" else 1.0)
 

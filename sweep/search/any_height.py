@@ -12,9 +12,11 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.types import Array, Float, PerWavelength
-from ..camera.field import field_heights, refined_heights, setup_at
+from ..camera.field import field_heights, setup_at
 from ..camera.linear import LinearModel, linear_model
+from ..camera.refine import Lattice, in_lockstep, search
 from ..camera.sensor_field import SensorField
+from ..metrics.places import HEIGHT_ROUNDS
 from ..metrics.quantity import DN
 from ..metrics.separation import separations
 from ..metrics.smooth import smooth_csd
@@ -58,8 +60,12 @@ class AnyHeight:
             distances = separations(self._models[height].smooth(curve[None, None])[0], setup.members)
             return np.array([distances[pair].min() for pair in self._pairs.values()])
 
-        known = np.stack([at_height(height) for height in self._looked_at], axis=1)
-        return refined_heights(self._looked_at, known, at_height)
+        def at(_: list[int], places: list[Float[Array, "places axes"]]) -> list[Float[Array, "values places"]]:
+            return [np.stack([at_height(height) for height in places[0][:, 0].tolist()], axis=1)]
+
+        lattice = Lattice.along(np.array(self._looked_at), HEIGHT_ROUNDS)
+        ((least, places),) = in_lockstep([search(lattice, at([0], [lattice.places])[0])], at)
+        return least, places[:, 0]
 
     def least(self, curve: PerWavelength) -> dict[str, float]:
         """Return the smallest distances over all field positions, DN."""

@@ -46,7 +46,7 @@ class ChromaticPairs:
         self._types = {name: problem.pairs[name] for name in names}
         self._members = setup.members
         model, channel, base = linear_model(setup), setup.camera.modified[0], setup.camera.base_qe
-        unlit = model.unlit(base[None], model.light.exposure_s(base[None]))[0]
+        unlit = model.unlit(base[None])[0]
         self._gain = model.per_qe(0, base, lamps_only=True)[:, :, channel]
         self._others = np.delete(model.smooth(base[None])[0] - unlit[:, None], channel, axis=2)
         self._known = {name: self._nearest(name, base[0])[0] for name in names}

@@ -29,7 +29,7 @@ def least_variance(
     `row`: coefficients of the sensitivity, >= 0; `least`: least sensitivity: row @ N >= least. `base`: curve at which
     the variance is known; it grows with the light.
     """
-    pixel, channel = model.readout.pixel, model.setup.camera.modified[0]
+    pixel, channel = model.pixel, model.setup.camera.modified[0]
     per_qe = model.spread_per_qe(0, base[None])
     at_base = model.spread_electrons(base[None, None])[0, :, :, channel]
     share = model.spread_shares()[:, None, channel]

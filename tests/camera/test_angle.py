@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from sweep.camera.angular import AngularResponse, Cone, cone_of, gauss_rays
-from sweep.camera.forward import ForwardModel
 from sweep.camera.linear import linear_model
+from sweep.camera.model import SceneModel
 from sweep.camera.plan import plan_scene
 from sweep.camera.scene import Scene
 from sweep.camera.sensor_field import SensorField
@@ -136,7 +136,7 @@ def test_derivatives_agree_with_the_angular_response(given: dict[str, Any]) -> N
     model, channel = linear_model(made.setup), made.setup.camera.modified[0]
     zero, own = model.smooth(np.zeros_like(made.curves))[0], model.smooth(made.curves)[0]
     scale = np.abs(own).max()
-    by_curve = model.gradient(made.curves[0], made.curves)[0]
+    by_curve = model.smooth_with_gradient(made.curves[0], made.curves)[1][0]
     np.testing.assert_allclose(by_curve, own - zero, atol=1e-12 * scale)
     by_wavelength = model.per_qe(0, made.curves[0])[:, :, channel] @ made.curves[0, 0]
     np.testing.assert_allclose(by_wavelength, (own - zero)[..., channel], atol=1e-12 * scale)
@@ -152,8 +152,8 @@ def test_only_interference_filters_move_with_the_angle() -> None:
             choices = {choice.effect: choice for choice in plan.choices}
             assert (choices["angle"].computed, choices["angle"].bound_dn) == (False, 0.0)
         for count in (1, 4, None):
-            found = ForwardModel(with_rays(setup, count)).read(made.curves)[0]
-            np.testing.assert_array_equal(found, ForwardModel(unsaid).read(made.curves)[0])
+            found = SceneModel(with_rays(setup, count)).read(made.curves)[0]
+            np.testing.assert_array_equal(found, SceneModel(unsaid).read(made.curves)[0])
         reasons.append(choices["angle"].reason)
     assert reasons == ["pigments do not move with the angle", "no technology is stated: filters as on axis"]
 
@@ -193,8 +193,8 @@ def test_a_field_is_the_worst_of_its_places(given: dict[str, Any]) -> None:
         own = Scene.model_validate(
             given | {"optics": {"f_number": 1.6, "cra_deg": cra_deg}, "off_axis_deg": off_axis_deg}
         )
-        each.append(evaluate(ForwardModel(replace(setup, scene=own)), curves))
-    model = ForwardModel(replace(setup, scene=field))
+        each.append(evaluate(SceneModel(replace(setup, scene=own)), curves))
+    model = SceneModel(replace(setup, scene=field))
     names = csd_columns(setup)
     for designs in (curves, block):
         found = evaluate(model, designs)
@@ -212,7 +212,9 @@ def test_derivatives_at_every_place_of_a_field() -> None:
     zero, own = model.smooth(np.zeros_like(made.curves))[0], model.smooth(made.curves)[0]
     assert len(own) == 3
     scale = np.abs(own).max()
-    np.testing.assert_allclose(model.gradient(made.curves[0], made.curves)[0], own - zero, atol=1e-12 * scale)
+    np.testing.assert_allclose(
+        model.smooth_with_gradient(made.curves[0], made.curves)[1][0], own - zero, atol=1e-12 * scale
+    )
     by_wavelength = model.per_qe(0, made.curves[0])[:, :, channel] @ made.curves[0, 0]
     np.testing.assert_allclose(by_wavelength, (own - zero)[..., channel], atol=1e-12 * scale)
 
@@ -220,4 +222,4 @@ def test_derivatives_at_every_place_of_a_field() -> None:
 def test_a_field_in_which_nothing_moves_is_one_place() -> None:
     setup = moved({}, cra_deg=0.0).setup.with_camera(technologies=())
     field = setup.scene.model_copy(update={"field": SensorField(cra_max_deg=20.0)})
-    assert ForwardModel(replace(setup, scene=field)).n_cases == 1
+    assert SceneModel(replace(setup, scene=field)).n_cases == 1

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from sweep.base.cache import Cache
-from sweep.camera.forward import forward_model
+from sweep.camera.model import scene_model
 from sweep.designs.block import Tables, edges_of
 
 from ..blocks import SPACE, VIEWS
@@ -118,6 +118,6 @@ def test_imagers_are_shared_by_threads() -> None:
     def work(number: int) -> None:
         for turn in range(20):
             mine = setups[(turn * (number + 1)) % len(setups)]
-            assert forward_model(mine).setup.camera.pixel.read_noise_e == mine.camera.pixel.read_noise_e
+            assert scene_model(mine).setup.camera.pixel.read_noise_e == mine.camera.pixel.read_noise_e
 
     at_once(work)

@@ -13,8 +13,8 @@ from scipy import stats
 
 from sweep.camera.camera import Camera
 from sweep.camera.captures import NAMED_CAPTURES, Capture
-from sweep.camera.forward import forward_model
 from sweep.camera.merge import coded, limits_dn, merged, without_noise
+from sweep.camera.model import scene_model
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
 from sweep.camera.pwm import exposure_scales, light_in, phases_of
@@ -194,14 +194,14 @@ def test_a_single_capture_is_a_pixel_that_is_read_once(merge: Any, prnu: float) 
     pixel = Pixel(read_noise_e=2, offset_dn=64, prnu=prnu, captures=[{}], merge=merge)
     hdr = once.with_camera(pixel=pixel)
     curves = once.camera.base_qe[None]
-    plain, of_capture = (forward_model(setup).read_with_noise(curves) for setup in (once, hdr))
+    plain, of_capture = (scene_model(setup).read_with_noise(curves) for setup in (once, hdr))
     np.testing.assert_allclose(of_capture.mean, plain.mean, rtol=1e-9)
     np.testing.assert_allclose(of_capture.variance, plain.variance, rtol=1e-6)
-    one, other = (evaluate(forward_model(setup), curves, ("yellow", "red")) for setup in (once, hdr))
+    one, other = (evaluate(scene_model(setup), curves, ("yellow", "red")) for setup in (once, hdr))
     for name in ("csd_yellow_red", "chromatic_csd_yellow_red", "dprime_yellow_red"):
         np.testing.assert_allclose(other[name], one[name], rtol=1e-6)
     without = (replace(setup, scene=Scene()) for setup in (once, hdr))
-    one, other = (evaluate(forward_model(setup), curves) for setup in without)
+    one, other = (evaluate(scene_model(setup), curves) for setup in without)
     np.testing.assert_allclose(other["csd_yellow_red"], one["csd_yellow_red"], rtol=1e-12)
 
 
@@ -281,14 +281,14 @@ def test_qe_and_crosstalk_of_a_photodiode_change_its_electrons() -> None:
     small = Capture(sensitivity=0.1, qe_factor={"R": 0.5}, crosstalk=0.1)
     hdr = setup.with_camera(pixel=setup.camera.pixel.model_copy(update={"captures": (Capture(), small)}))
     curves = setup.camera.base_qe[None]
-    electrons = forward_model(hdr).pixel_electrons(curves)
+    electrons = scene_model(hdr).pixel_electrons(curves)
     factor = np.where(np.array(hdr.camera.mosaic.channels) == "R", 0.5, 1.0)
     other = setup.with_camera(
         qe=setup.camera.qe * factor[:, None], pixel=setup.camera.pixel.model_copy(update={"crosstalk": 0.1})
     )
     modified = curves * factor[list(setup.camera.modified)][:, None]
-    np.testing.assert_allclose(electrons[1], 0.1 * forward_model(other).pixel_electrons(modified), rtol=1e-12)
-    np.testing.assert_allclose(electrons[0], forward_model(setup).pixel_electrons(curves), rtol=1e-12)
+    np.testing.assert_allclose(electrons[1], 0.1 * scene_model(other).pixel_electrons(modified), rtol=1e-12)
+    np.testing.assert_allclose(electrons[0], scene_model(setup).pixel_electrons(curves), rtol=1e-12)
 
 
 @pytest.mark.parametrize("duty", [0.05, 0.3, 0.9])
@@ -323,7 +323,7 @@ def test_staggered_exposures_show_a_false_hue_and_a_split_pixel_none() -> None:
     found = {}
     for captures in ("split_pixel", "staggered"):
         setup = chart_setup(scene=scene, pixel=Pixel(captures=captures, read_noise_e=2, offset_dn=64))
-        found[captures] = evaluate(forward_model(setup), setup.camera.base_qe[None])
+        found[captures] = evaluate(scene_model(setup), setup.camera.base_qe[None])
     assert found["split_pixel"]["false_hue_dn"] < 0.1 * found["split_pixel"]["chromatic_csd_yellow_red"]
     assert found["split_pixel"]["lamp_seen"] == pytest.approx(1)
     assert found["staggered"]["false_hue_dn"] > 1_000

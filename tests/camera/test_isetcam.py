@@ -16,8 +16,8 @@ import pytest
 
 from sweep.camera.camera import Camera
 from sweep.camera.effects import Box
-from sweep.camera.forward import ForwardModel
 from sweep.camera.linear import linear_model
+from sweep.camera.model import SceneModel
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Optics, Pixel, irradiance_factor
 from sweep.camera.plan import plan_scene
@@ -113,7 +113,7 @@ def test_digital_numbers_are_the_same(cfa: str, channels: list[int], mode: str) 
         assert expected.max() < 4095
     # The only difference that is allowed: where ISETCam's ADC saturates at 4096, ours does at 4095.
     np.testing.assert_array_equal(
-        ForwardModel(every_channel()).readout.transfer(found)[:, channels], np.minimum(expected, 4095)
+        SceneModel(every_channel()).readout.transfer(found)[:, channels], np.minimum(expected, 4095)
     )
 
 
@@ -169,7 +169,7 @@ def test_a_uniform_field_agrees_through_the_whole_image_chain(cfa: str) -> None:
     smooth = linear_model(setup).smooth(NOTHING)[0, 0]
     volts = np.array(run["uniform_volts_unclipped"], dtype=float)[:, columns]
     np.testing.assert_allclose(smooth, 4096 * volts, atol=0.1, rtol=0)
-    dn = ForwardModel(replace(setup, left_out=plan.left_out)).read(NOTHING)[0][0, 0]
+    dn = SceneModel(replace(setup, left_out=plan.left_out)).read(NOTHING)[0][0, 0]
     expected = np.minimum(np.array(run["uniform_dn"], dtype=float)[:, columns], 4095)
     near_a_step = np.abs(4096 * volts - np.floor(4096 * volts) - 0.5) < 0.1
     assert ((dn == expected) | near_a_step).all()

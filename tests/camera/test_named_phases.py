@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from sweep.camera.accuracy import STANDARD
-from sweep.camera.forward import ForwardModel
+from sweep.camera.model import SceneModel
 from sweep.camera.phases import read_at
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.separation import csd_name, separations
@@ -46,11 +46,11 @@ def allowed_dn(made: DesignScene) -> float:
 def lower_by_dn(made: DesignScene, seed: int) -> float:
     """By how much a named phase has a lower CSD than the worst of all, at most."""
     setup = replace(made.setup, accuracy=STANDARD)
-    worst = evaluate(ForwardModel(setup), made.curves)
+    worst = evaluate(SceneModel(setup), made.curves)
     light = setup.scene.target
     rows, columns = setup.camera.mosaic.indices.shape
     named_px = np.random.default_rng([seed, 31]).uniform(0, (columns, rows), (NAMED, 2))
-    response = ForwardModel(setup, read_at(light, named_px), once=True).read(made.curves)[0][0]
+    response = SceneModel(setup, read_at(light, named_px)).read(made.curves)[0][0]
     distances = separations(response, setup.members)
     return max(float(worst[csd_name(pair)][0] - distances[pair].min()) for pair in class_pairs(setup.lights.classes))
 
@@ -61,10 +61,8 @@ def test_a_named_phase_is_read_as_among_others() -> None:
     light = made.setup.scene.target
     named = light.model_copy(update={"phase_px": (0.3, 0.85)})
     setup = replace(made.setup, scene=made.setup.scene.model_copy(update={"target": named}))
-    among = ForwardModel(made.setup, read_at(light, np.array([[0.3, 0.85], [1.2, 0.4]])), once=True).read(made.curves)[
-        0
-    ]
-    np.testing.assert_allclose(ForwardModel(setup).read(made.curves)[0][:, 0], among[:, 0], rtol=1e-12)
+    among = SceneModel(made.setup, read_at(light, np.array([[0.3, 0.85], [1.2, 0.4]])), once=True).read(made.curves)[0]
+    np.testing.assert_allclose(SceneModel(setup).read(made.curves)[0][:, 0], among[:, 0], rtol=1e-12)
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import cycle, product
 
@@ -10,16 +11,15 @@ import numpy as np
 import pytest
 
 from sweep.camera.accuracy import REFERENCE, STANDARD
-from sweep.camera.forward import ForwardModel
+from sweep.camera.model import SceneModel
 from sweep.camera.phases import (
-    Phases,
     different_phases,
     fine_lattice,
     lattice_px,
     read_at,
-    refined_minima,
     scene_phases,
 )
+from sweep.camera.refine import Lattice, in_lockstep, search
 from sweep.camera.setup import READOUT, Setup
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.quantity import BEST_PHASE
@@ -77,7 +77,8 @@ def brute_force(made: DesignScene, how: str) -> dict[str, tuple[float, float]]:
     phases = read_at(light, lattice_px(setup.camera.mosaic, STEPS_PER_PX))
     if light.readout == "mean":
         phases = different_phases(setup, phases)[0]
-    response = ForwardModel(setup, phases, once=True).read(made.curves)[0][0]
+    model = SceneModel(setup)
+    response = model.read(made.curves, [*model.views(phases)])[0][0]
     ends = {}
     for pair, distances in separations(response, setup.members).items():
         each = distances.reshape(len(phases), -1).min(axis=1)
@@ -92,7 +93,7 @@ def allowed_dn(made: DesignScene, how: str) -> float:
 
 def missed_dn(made: DesignScene, how: str) -> tuple[float, float]:
     """By how much the smallest CSDs are above, and the largest ones below, those of all phases, at most."""
-    found = evaluate(ForwardModel(setup_of(made, how)), made.curves)
+    found = evaluate(SceneModel(setup_of(made, how)), made.curves)
     above = below = -math.inf
     for name, (smallest, largest) in brute_force(made, how).items():
         above = max(above, float(found[name][0]) - smallest)
@@ -131,9 +132,9 @@ def test_mirrored_phases_have_equal_readouts(name: str, readout: str) -> None:
     every = scene_phases(made.setup)
     few, which = different_phases(made.setup, every)
     assert len(few) == (MIRRORED[name] if readout == "mean" else len(every))
-    model = ForwardModel(made.setup)
+    model = SceneModel(made.setup)
     assert model.n_cases == len(few)
-    own, whole = (each.read_with_noise(made.curves) for each in (model, ForwardModel(made.setup, every)))
+    own, whole = (model.read_with_noise(made.curves, [*model.views(phases)]) for phases in (few, every))
     np.testing.assert_allclose(own.mean[:, which], whole.mean, rtol=0, atol=1e-9)
     np.testing.assert_allclose(own.variance[:, which], whole.variance, rtol=1e-9)
 
@@ -159,6 +160,12 @@ def test_named_and_missing_lights_have_one_phase() -> None:
     assert len(scene_phases(scene("patch", "RGGB", {}).setup)) == 1
 
 
+def refined(lattice: Lattice, value: Callable[[np.ndarray], np.ndarray]) -> float:
+    """The smallest value that a search finds."""
+    searches = [search(lattice, value(lattice.places))]
+    return float(in_lockstep(searches, lambda _, places: [value(places[0])])[0][0][0])
+
+
 @pytest.mark.parametrize("finest_phase_px", thinned([1 / 8, 1 / 16, 1 / 64], 2))
 def test_finer_steps_find_no_worse_an_extreme_of_a_smooth_function(finest_phase_px: float) -> None:
     """A function with one minimum over the tile: within the curvature times the square of a step."""
@@ -166,15 +173,14 @@ def test_finer_steps_find_no_worse_an_extreme_of_a_smooth_function(finest_phase_
     setup = replace(made.setup, accuracy=STANDARD.model_copy(update={"finest_phase_px": finest_phase_px}))
     lowest = np.array([0.83, 1.37])
 
-    def value(phases: Phases) -> np.ndarray:
-        off = np.mod(phases.center_px - lowest + 1, 2) - 1
+    def value(centers_px: np.ndarray) -> np.ndarray:
+        off = np.mod(centers_px - lowest + 1, 2) - 1
         return 1000 * (off**2).sum(axis=1)[None]
 
-    lattice, step_px = fine_lattice(setup)
-    found = refined_minima(setup, lattice, step_px, value(lattice), value)
-    assert 0 <= found[0] <= 1000 * finest_phase_px**2 / 2 * (1 + 1e-9)
-    on_lattice = float(value(lattice).min())
-    assert found[0] < on_lattice if finest_phase_px < step_px else found[0] == on_lattice
+    lattice = fine_lattice(setup)
+    found, on_lattice = refined(lattice, value), float(value(lattice.places).min())
+    assert 0 <= found <= 1000 * finest_phase_px**2 / 2 * (1 + 1e-9)
+    assert found < on_lattice if finest_phase_px < lattice.steps[0] else found == on_lattice
 
 
 def test_a_kink_is_found_as_exactly_as_a_smooth_extreme() -> None:
@@ -182,11 +188,10 @@ def test_a_kink_is_found_as_exactly_as_a_smooth_extreme() -> None:
     made = scene("any", "RGGB", {"target": FAR | {"phase_px": "any", "readout": "center"}, "noise": True})
     setup = replace(made.setup, accuracy=STANDARD)
 
-    def value(phases: Phases) -> np.ndarray:
-        return 3000 * np.abs(np.mod(phases.center_px - [0.8337, 1.3713] + 1, 2) - 1).max(axis=1)[None]
+    def value(centers_px: np.ndarray) -> np.ndarray:
+        return 3000 * np.abs(np.mod(centers_px - [0.8337, 1.3713] + 1, 2) - 1).max(axis=1)[None]
 
-    lattice, step_px = fine_lattice(setup)
-    assert refined_minima(setup, lattice, step_px, value(lattice), value)[0][0] < 0.2
+    assert refined(fine_lattice(setup), value) < 0.2
 
 
 def test_standard_is_near_the_reference_at_the_phases_where_pixels_saturate() -> None:

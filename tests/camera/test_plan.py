@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from sweep.base.cache import Cache
-from sweep.camera import angular, irradiance, pixel_response, psf, pwm, readout, sampling
+from sweep.camera import angular, irradiance, psf, pwm, readout, response, sampling
 from sweep.camera.accuracy import STANDARD, Accuracy
 from sweep.camera.effects import EFFECTS, Box
-from sweep.camera.forward import ForwardModel
+from sweep.camera.model import SceneModel
 from sweep.camera.pixel import Pixel
 from sweep.camera.plan import Plan, plan_scene
 from sweep.camera.setup import READOUT
@@ -170,9 +170,9 @@ def test_omitted_effects_are_not_computed(name: str, monkeypatch: pytest.MonkeyP
         monkeypatch.setattr(owner, function, stage)
 
     def read(left_out: frozenset[str]) -> None:
-        monkeypatch.setattr(pixel_response, "_RESPONSES", Cache(1))
+        monkeypatch.setattr(response, "_RESPONSES", Cache(1))
         monkeypatch.setattr(angular, "_MATRICES", Cache(4))
-        ForwardModel(replace(setup, left_out=left_out)).read(ALL_ON.curves)
+        SceneModel(replace(setup, left_out=left_out)).read(ALL_ON.curves)
 
     with pytest.raises(AssertionError, match="computed"):
         read(frozenset())
@@ -200,7 +200,7 @@ def test_plans_that_compute_the_same_have_one_key() -> None:
 
 @pytest.mark.parametrize("made", [made for made in HARD if not made.setup.all_phases], ids=lambda made: made.name)
 def test_no_pixel_is_brighter_than_the_brightest(made: DesignScene) -> None:
-    model = ForwardModel(replace(made.setup, left_out=frozenset({"quantization", "noise"})))
+    model = SceneModel(replace(made.setup, left_out=frozenset({"quantization", "noise"})))
     electrons = model.pixel_electrons(made.curves)
     assert electrons.shape[2] == len(lights().names)
     assert electrons.max() * made.setup.camera.pixel.dn_per_e <= made.box.brightest_pixel_dn * (1 + 1e-9)

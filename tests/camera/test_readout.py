@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sweep.camera.effects import _steepness
-from sweep.camera.forward import ForwardModel
+from sweep.camera.model import SceneModel
 from sweep.camera.noise import moments, table
 from sweep.camera.pixel import Pixel
 
@@ -104,7 +104,7 @@ def test_a_whole_pedestal_cancels_to_the_last_digit() -> None:
     steps = np.arange(1, 41) + 0.5
     electrons = np.concatenate([np.nextafter(steps, 0), steps, np.nextafter(steps, 99)])
     with_it, without = (
-        ForwardModel(scene("one", "RGGB", {}, deep | more).setup).readout.transfer(electrons)
+        SceneModel(scene("one", "RGGB", {}, deep | more).setup).readout.transfer(electrons)
         for more in ({"offset_dn": 4_000_000.0}, {})
     )
     np.testing.assert_array_equal(with_it - without, 4_000_000.0)

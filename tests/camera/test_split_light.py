@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sweep.camera.phases import Phases
-from sweep.camera.pixel_response import PixelResponse, SplitLight, pixel_response
+from sweep.camera.response import PixelResponse, Responses, SplitLight
 
 from ..hard.scenes import DARK, F2, FAR, DesignScene, scene
 from ..rounding import rounding
@@ -20,9 +20,9 @@ PHASES = Phases(CENTERS_PX, np.floor(CENTERS_PX + 0.5))
 def pixels(made: DesignScene, psf_step_nm: float | None) -> PixelResponse:
     """Response of pixels at three phases, sharp where no step of wavelengths is given."""
     if psf_step_nm is None:
-        return pixel_response(replace(made.setup, left_out=frozenset({"blur"})), PHASES, by_pixel=True)
+        return Responses(replace(made.setup, left_out=frozenset({"blur"}))).pixels(PHASES)
     accuracy = made.setup.accuracy.model_copy(update={"psf_step_nm": psf_step_nm})
-    return pixel_response(replace(made.setup, accuracy=accuracy), PHASES, by_pixel=True)
+    return Responses(replace(made.setup, accuracy=accuracy)).pixels(PHASES)
 
 
 @pytest.mark.parametrize("psf_step_nm", [1e-3, 10.0, None], ids=["every wavelength", "every 10 nm", "sharp"])
@@ -33,11 +33,12 @@ def test_sums_are_those_of_the_array(psf_step_nm: float | None, crosstalk: float
     response = pixels(made, psf_step_nm)
     split = response.source
     assert isinstance(split, SplitLight)
-    assert split.shape == response.light.shape
+    size = made.setup.camera.grid.size
     rng = np.random.default_rng(1)
     channels = [0, 2, 3]
-    spectra = rng.uniform(size=(2, 3, 5, response.light.shape[3]))
-    expected = np.einsum("xucw,ncsw->nxsu", response.light[:, :, channels], spectra)
+    spectra = rng.uniform(size=(2, 3, 5, size))
+    light = np.broadcast_to(response.light, (*response.light.shape[:3], size))
+    expected = np.einsum("xucw,ncsw->nxsu", light[:, :, channels], spectra)
     before = rng.uniform(size=expected.shape)
     found = before.copy()
     split.add_sums(spectra, channels, found)
@@ -45,11 +46,11 @@ def test_sums_are_those_of_the_array(psf_step_nm: float | None, crosstalk: float
     # A design is changed by those beside it no more than by the order of its sums, over wavelengths, functions and parts.
     alone = before[1:].copy()
     split.add_sums(spectra[1:], channels, alone)
-    shares = np.ones((1, split.factor.size)) if split.shares is None else split.shares
+    shares = np.ones((1, size)) if split.shares is None else split.shares
     in_size = replace(split, values=np.abs(split.values), shares=np.abs(shares), parts=np.abs(split.parts))
     magnitude = before[1:].copy()
     in_size.add_sums(spectra[1:], channels, magnitude)
-    terms = split.factor.size + len(shares) + split.parts.size + 3
+    terms = size + len(shares) + split.parts.size + 3
     assert (np.abs(alone[0] - found[1]) <= rounding(terms, magnitude[0])).all()
     weights = rng.uniform(size=response.shape)
     folded = np.einsum("xu,xuw->xw", weights, response.light[:, :, 3])
@@ -60,5 +61,5 @@ def test_a_channel_is_the_mean_of_its_pixels() -> None:
     """The response of channels, made on another way, is that of the pixels, weighed as they are read out."""
     made = scene("mean", "RGGB", {"target": FAR, "optics": F2}, DARK | {"crosstalk": 0.1})
     apart = pixels(made, made.setup.accuracy.psf_step_nm)
-    whole = pixel_response(made.setup, PHASES, by_pixel=False)
+    whole = Responses(made.setup).channels(PHASES)
     np.testing.assert_allclose(np.einsum("xuv,xucw->xvcw", apart.readout, apart.light), whole.light, rtol=1e-11)

@@ -13,7 +13,7 @@ from scipy.spatial.distance import cdist
 
 from sweep.base.errors import SweepError
 from sweep.camera.camera import Camera
-from sweep.camera.forward import ForwardModel
+from sweep.camera.model import SceneModel
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Optics, Pixel, irradiance_factor
 from sweep.camera.readout import rounded
@@ -134,7 +134,7 @@ def test_electrons_of_a_flat_light() -> None:
     light = Lights("flat", ("flat",), ("flat",), np.full((1, 301), 1 / 301), 1.0, "", True)
     scenario = Scene(photon_radiance=1e15 * 301 / factor, exposure=FixedExposure(exposure_s=1.0))
     setup = Setup(Camera(grid, Mosaic.from_rows("RB", [["R", "B"]]), qe, (), qe[0], pixel), light, scenario)
-    rate = ForwardModel(setup).electrons.rates(np.empty((1, 0, 301)))
+    rate = SceneModel(setup).electrons.rates(np.empty((1, 0, 301)))
     # 1e15 photons/s/m^2/nm x 301 nm x 0.25 x 2e-12 m^2
     np.testing.assert_allclose(rate, 1e15 * 301 * 0.25 * 2e-12, rtol=1e-13)
 

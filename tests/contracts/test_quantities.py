@@ -15,8 +15,8 @@ from scipy.spatial.distance import cdist
 from scipy.stats import norm
 
 from sweep.camera.accuracy import Accuracy
-from sweep.camera.forward import ForwardModel
 from sweep.camera.linear import linear_model
+from sweep.camera.model import SceneModel
 from sweep.camera.scene import FixedExposure
 from sweep.camera.setup import Setup
 from sweep.metrics.discrimination import error_bounds
@@ -38,7 +38,7 @@ class Made:
     def __init__(self, setup: Setup, states: tuple[str, ...] = ()) -> None:
         self.setup, self.family, self.states = setup, FAMILY, states
         self.curves = FAMILY.curves(X)
-        imager = ForwardModel(setup)
+        imager = SceneModel(setup)
         self.found = evaluate(imager, self.curves, states, probabilities=bool(states)) | family_quantities(FAMILY, X)
         self.read, self.exposure_s = imager.read(self.curves)
         self.noisy = imager.read_with_noise(self.curves) if states else None
@@ -90,7 +90,7 @@ def readings_of(made: Made, design: int, brightness: float) -> tuple[np.ndarray,
     exposure = FixedExposure(kind="fixed", exposure_s=made.exposure_s[design])
     light = {"photon_radiance": brightness * made.setup.scene.photon_radiance, "exposure": exposure}
     setup = replace(made.setup, scene=made.setup.scene.model_copy(update=light))
-    read = ForwardModel(setup).read_with_noise(made.curves[design : design + 1])
+    read = SceneModel(setup).read_with_noise(made.curves[design : design + 1])
     return read.mean[0, 0], read.variance[0, 0]
 
 
@@ -334,7 +334,7 @@ def test_smooth_rows_are_the_quantity_with_its_derivative(name: str) -> None:
 
     for x in X:
         if name not in OF_NOISE:
-            found = evaluate(ForwardModel(linear.setup), FAMILY.curves(x[None])) | family_quantities(FAMILY, x[None])
+            found = evaluate(SceneModel(linear.setup), FAMILY.curves(x[None])) | family_quantities(FAMILY, x[None])
             assert quantity.value(rows(x)) == pytest.approx(found[name][0], rel=1e-12)
         for at, span in enumerate(SPAN):
             step = np.eye(5)[at] * span * 1e-5

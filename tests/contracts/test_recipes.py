@@ -124,7 +124,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from sweep.metrics.quantity import LinearRows, Quantity
-from sweep.metrics.metric import DesignMetric
+from sweep.metrics.metric import Metric
 from sweep.metrics.smooth import Rows
 
 NAME = "red_share"
@@ -140,8 +140,9 @@ def _rows(design):
     return Rows(design.curves @ weights, (design.by_u @ weights).T)
 
 
-class RedShare(DesignMetric):
+class RedShare(Metric):
     order = 9
+    needs = "filters"
 
     def quantities(self, requested):
         return (
@@ -159,26 +160,26 @@ class RedShare(DesignMetric):
             ),
         )
 
-    def of_designs(self, setup, block):
-        if not setup.camera.modified:
-            return {NAME: np.full(len(block), np.nan)}
-        return {NAME: block.curves()[:, 0] @ _weights(setup)}
+    def of_batch(self, batch):
+        if not batch.setup.camera.modified:
+            return {NAME: np.full(batch.size, np.nan)}
+        return {NAME: batch.curves[:, 0] @ _weights(batch.setup)}
 '''
 DARKEST = '''\
 """The weakest signal of a scene."""
 
 from sweep.metrics.quantity import Quantity
-from sweep.metrics.metric import ReadoutMetric
+from sweep.metrics.metric import Metric
 
 
-class Darkest(ReadoutMetric):
+class Darkest(Metric):
     order = 10
 
     def quantities(self, requested):
         return (Quantity("darkest_dn", "darkest_dn", "weakest signal in its best channel", "DN", direction="more", ends=("min",)),)
 
-    def of_readout(self, setup, response, unlit):
-        return {"darkest_dn": response.max(axis=2).min(axis=1)}
+    def of_readings(self, readings):
+        return {"darkest_dn": readings.whole.max(axis=2).min(axis=1)}
 '''
 WITH_METRICS = """\
 study: red

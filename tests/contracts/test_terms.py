@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import sweep
-from sweep.camera.forward import forward_model
 from sweep.camera.merge import merged
+from sweep.camera.model import scene_model
 from sweep.camera.pixel import Pixel
 from sweep.metrics.columns.sensitivity import CFA_SENSITIVITY
 from sweep.metrics.quantity import Column
@@ -38,7 +38,7 @@ def model_of(**scene: Any) -> Any:
     )
     (space,) = made.study.spaces
     setup = made.study.setup(space, "s").with_all_effects
-    return forward_model(setup), setup
+    return scene_model(setup), setup
 
 
 ROAD = {

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
 
 from sweep.camera import electrons
-from sweep.camera.forward import ForwardModel
+from sweep.camera.model import SceneModel
 from sweep.designs import block as blocks
 from sweep.designs.block import CurveBlock, edges_of
 from sweep.designs.families.free_form import FreeForm
@@ -34,8 +34,8 @@ def test_both_routes_say_the_same(name: str) -> None:
     setup = VIEWS[name]
     edges = edges_of(SPACE, 3, 69)
     assert edges is not None
-    dense = evaluate(ForwardModel(setup), CurveBlock(edges.curves()))
-    fast = evaluate(ForwardModel(setup), edges)
+    dense = evaluate(SceneModel(setup), CurveBlock(edges.curves()))
+    fast = evaluate(SceneModel(setup), edges)
     assert list(fast) == list(dense)
     magnitude_dn = brightest_dn(setup, edges.curves())
     for column, values in dense.items():
@@ -77,7 +77,7 @@ def test_few_designs_are_the_same_within_rounding_without_compiled_code(
         monkeypatch.setattr(separation, "MANY", many)
         monkeypatch.setattr(chromatic, "MANY", many)
         monkeypatch.setattr(electrons, "_MANY", many)
-        found.append([evaluate(ForwardModel(VIEWS[name]), block) for block in (curves, edges)])
+        found.append([evaluate(SceneModel(VIEWS[name]), block) for block in (curves, edges)])
     magnitude_dn = brightest_dn(VIEWS[name], edges.curves())
     for plain, compiled in zip(*found, strict=True):
         assert list(plain) == list(compiled)
@@ -90,7 +90,7 @@ def test_no_spectrum_is_made_by_the_separable_route(monkeypatch: pytest.MonkeyPa
     assert edges is not None
     monkeypatch.setattr(Stopband, "curves", None)
     monkeypatch.setattr(Stopband, "edges", None)
-    evaluate(ForwardModel(VIEWS["rounded"]), edges)
+    evaluate(SceneModel(VIEWS["rounded"]), edges)
 
 
 def test_designs_that_set_the_exposure_take_the_dense_route() -> None:
@@ -98,8 +98,8 @@ def test_designs_that_set_the_exposure_take_the_dense_route() -> None:
     crossed = replace(SPACE, axes=((690.0, 600.0), (5.0,), (410.0, 650.0), (5.0,), (0.5, 1.0)))
     edges = edges_of(crossed, 0, crossed.size)
     assert edges is not None
-    imager = ForwardModel(VIEWS["chart"])
-    changing = imager.read_changing(edges)
+    imager = SceneModel(VIEWS["chart"])
+    changing = imager.changing(edges)
     assert changing is not None
     found, dense = evaluate(imager, edges), evaluate(imager, edges.curves())
     brighter = edges.curves().sum(axis=(1, 2)) > SENSOR.qe["Y"].sum()
@@ -110,7 +110,7 @@ def test_designs_that_set_the_exposure_take_the_dense_route() -> None:
     assert_within_rounding(
         "csd_yellow_red", found["csd_yellow_red"], dense["csd_yellow_red"], imager.setup, magnitude_dn
     )
-    every = imager.read_changing(edges.subset(np.flatnonzero(brighter)))
+    every = imager.changing(edges.subset(np.flatnonzero(brighter)))
     assert every is None
 
 

@@ -11,7 +11,7 @@ import mpmath as mp
 import numpy as np
 
 from sweep.camera.camera import Camera
-from sweep.camera.forward import ForwardModel
+from sweep.camera.model import SceneModel
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
 from sweep.camera.scene import FixedExposure, Scene
@@ -102,7 +102,7 @@ def metamers() -> Result:
         qe = random_qe(1, 3)
         qe[:, RED] = qe[:, YELLOW]
         setup = made(qe, lights, scenario, pixel, left_out=left_out)
-        errors += [evaluate(ForwardModel(setup), plain(setup))["csd_yellow_red"], smooth_csd(setup, plain(setup), PAIR)]
+        errors += [evaluate(SceneModel(setup), plain(setup))["csd_yellow_red"], smooth_csd(setup, plain(setup), PAIR)]
     return Result(float(np.max(errors)), 0.0)
 
 
@@ -118,7 +118,7 @@ def metamers_beside_a_band() -> Result:
     x = np.random.default_rng(3).uniform([605, 0, 618, 0, 0], [612, 6, 626, 6, 1], (200, 5))
     curves = Stopband(WAVE, qe[2], 0.1 * qe[2]).curves(x)
     assert (curves[:, 0] != qe[2]).any()
-    found = [evaluate(ForwardModel(setup), curves)["csd_yellow_red"], smooth_csd(setup, curves, PAIR)]
+    found = [evaluate(SceneModel(setup), curves)["csd_yellow_red"], smooth_csd(setup, curves, PAIR)]
     return Result(float(np.max(found)), 0.0)
 
 
@@ -141,7 +141,7 @@ def broad_metamers() -> Result:
     setup = made(qe, lights_of(PAIR, photons), {"exposure": {"kind": "fixed", "exposure_s": 1e-3}})
     found = smooth_csd(setup, plain(setup), PAIR)[0]
     response = float(smooth_response(setup, plain(setup)).max())
-    read = evaluate(ForwardModel(setup), plain(setup))["csd_yellow_red"][0]
+    read = evaluate(SceneModel(setup), plain(setup))["csd_yellow_red"][0]
     return Result(found if read == 0 else math.inf, 64 * EPS / 2 * response * 2 * math.sqrt(3))
 
 
@@ -172,7 +172,7 @@ def exposures() -> Result:
         gain = electrons_per_s(1.0) * mp.mpf(exposure_s) * 4095 / 10_000
         exact = gain * mp.sqrt(sum((mp.mpf(float(a)) - mp.mpf(float(b))) ** 2 for a, b in qe[:, [YELLOW, RED]]))
         allowed = 12 * EPS * float(gain) * math.sqrt(3) + 4 * 5e-324
-        read = evaluate(ForwardModel(setup), plain(setup))["csd_yellow_red"][0]  # all is dark, or full
+        read = evaluate(SceneModel(setup), plain(setup))["csd_yellow_red"][0]  # all is dark, or full
         results.append((relative(found, exact), float(allowed / exact)))
         results.append((float(read), 0.0))
     return worst(results)
@@ -205,13 +205,11 @@ def no_light() -> Result:
     for qe, radiance in ((np.zeros((3, N)), 2e18), (random_qe(8, 3), 5e-324)):
         setup = beyond(made(qe, lights, FIXED), photon_radiance=radiance)
         good &= (
-            evaluate(ForwardModel(setup), plain(setup))["csd_yellow_red"][0]
-            == 0
-            == smooth_csd(setup, plain(setup), PAIR)
+            evaluate(SceneModel(setup), plain(setup))["csd_yellow_red"][0] == 0 == smooth_csd(setup, plain(setup), PAIR)
         )
     with np.errstate(invalid="ignore"):
         setup = made(np.zeros((3, N)), lights)
-        dark = evaluate(ForwardModel(setup), plain(setup))
+        dark = evaluate(SceneModel(setup), plain(setup))
     return outcome(bool(good and np.isnan(dark["csd_yellow_red"][0]) and np.isinf(dark["exposure_s"][0])))
 
 
@@ -227,7 +225,7 @@ def everything_clipped() -> Result:
     for pixel in pixels:
         for more in ({}, {"target": NEAR | {"readout": "center"}}, {"drive": {"duty": 0.9, "frequency_hz": 100.0}}):
             setup = made(random_qe(9, 3), lights, bright | more, pixel)
-            found = evaluate(ForwardModel(setup), plain(setup))
+            found = evaluate(SceneModel(setup), plain(setup))
             errors += [v for name, v in found.items() if name.startswith(("csd_", "best_phase_"))]
     return Result(float(np.max(errors)), 0.0)
 
@@ -261,7 +259,7 @@ def float32_curves() -> Result:
     curves = Stopband(WAVE, qe[2], 0.2 * qe[2]).curves(x)
     setup = made(qe, lights, FIXED, cfa="RYNC")
     narrow, small = setup.with_camera(qe=qe.astype(np.float32)), curves.astype(np.float32)
-    found = evaluate(ForwardModel(narrow), small)
+    found = evaluate(SceneModel(narrow), small)
     base, counts = narrow.camera.qe[2], narrow.camera.mosaic.counts
     results = []
     for index, curve in enumerate(small[:, 0]):
@@ -295,7 +293,7 @@ def nan_in_one_design() -> Result:
     bad[17, 0, RED] = np.nan
     error = 0.0
     for scenario, pixel, left_out in SCENES.values():
-        model = ForwardModel(made(qe, lights, scenario, pixel, "RYNC", left_out))
+        model = SceneModel(made(qe, lights, scenario, pixel, "RYNC", left_out))
         one, other = evaluate(model, clean), evaluate(model, bad)
         if not np.isnan(other["csd_yellow_red"][17]):
             return Result(np.inf, 0.0)

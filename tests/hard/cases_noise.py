@@ -6,7 +6,7 @@ import mpmath as mp
 import numpy as np
 
 from sweep.camera.camera import Camera
-from sweep.camera.forward import ForwardModel
+from sweep.camera.model import SceneModel
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.noise.gaussian import rounding
 from sweep.camera.noise.moments import moments
@@ -143,12 +143,12 @@ def at_the_ends() -> Result:
     return moments_result([*cases, (PIXELS["ADC first"], 6700.0), (PIXELS["well below the ADC"], 9990.0)])
 
 
-def chain(pixel: Pixel) -> ForwardModel:
+def chain(pixel: Pixel) -> SceneModel:
     """A scene of noise whose table of readouts the chain uses."""
     grid = WavelengthGrid(step_nm=100)
     lights = Lights("two", ("a", "b"), ("a", "b"), np.eye(4)[:2] / 100, 1.0, "", True)
     scenario = Scene.model_validate({"noise": True, "exposure": {"kind": "fixed", "exposure_s": 1.0}})
-    return ForwardModel(
+    return SceneModel(
         Setup(Camera(grid, Mosaic.from_rows("W", [["W"]]), np.ones((1, 4)), (), np.ones(4), pixel), lights, scenario)
     )
 

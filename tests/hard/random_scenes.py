@@ -11,7 +11,7 @@ import numpy as np
 from sweep.camera.accuracy import Accuracy
 from sweep.camera.camera import Camera
 from sweep.camera.effects import Box
-from sweep.camera.forward import ForwardModel
+from sweep.camera.model import SceneModel
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
 from sweep.camera.scene import Scene
@@ -117,7 +117,7 @@ def _technologies(seed: int, mosaic: Mosaic, *, moved: bool) -> tuple[Technology
 
 def columns(made: RandomScene, left_out: frozenset[str], accuracy: Accuracy) -> dict[str, np.ndarray]:
     """Every CSD of all designs of a scene, ndarray[n_designs], as a run has them."""
-    model = ForwardModel(replace(made.setup, left_out=left_out, accuracy=accuracy))
+    model = SceneModel(replace(made.setup, left_out=left_out, accuracy=accuracy))
     cases = [evaluate(model, curves) for curves in made.curves]
     found = {name: cases[0][name] for name in csd_columns(made.setup)}
     if len(cases) > 1:

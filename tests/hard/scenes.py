@@ -11,7 +11,7 @@ import numpy as np
 from sweep.camera.accuracy import REFERENCE, Accuracy
 from sweep.camera.camera import Camera
 from sweep.camera.effects import Box
-from sweep.camera.forward import ForwardModel
+from sweep.camera.model import SceneModel
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
 from sweep.camera.scene import Scene
@@ -214,7 +214,7 @@ HARD: tuple[DesignScene, ...] = (
 
 def columns(made: DesignScene, left_out: frozenset[str] = frozenset(), accuracy: Accuracy = REFERENCE) -> np.ndarray:
     """Every CSD of the scene's design; of the best phase only where any is asked for."""
-    found = evaluate(ForwardModel(replace(made.setup, left_out=left_out, accuracy=accuracy)), made.curves)
+    found = evaluate(SceneModel(replace(made.setup, left_out=left_out, accuracy=accuracy)), made.curves)
     return np.array([found[name][0] for name in csd_columns(made.setup)])
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from sweep.base.errors import StudyError
 from sweep.camera import merge
-from sweep.camera.forward import ForwardModel, forward_model
+from sweep.camera.model import SceneModel, scene_model
 from sweep.camera.noise import table
 from sweep.camera.pixel import Pixel
 from sweep.camera.pixel_curve import pixel_curve
@@ -21,6 +21,7 @@ from sweep.study import Study, load_study
 
 from ..hard import random_scenes
 from ..hard.scenes import scene, target
+from ..readout_oracle import channels_of
 
 PAIR = ("yellow", "red")
 _BASINS = 16
@@ -42,9 +43,7 @@ def chromatic(study: Study, cfa: str, scenario: str, name: str = "chromatic_csd_
     space = next(space for space in study.spaces if space.name == cfa)
     setup = study.setup(space, scenario)
     setup = replace(setup, scene=setup.scene.model_copy(update=changes))
-    return float(
-        evaluate(forward_model(setup), space.curves(space.points(0, 1), study.grid.size), study.states)[name][0]
-    )
+    return float(evaluate(scene_model(setup), space.curves(space.points(0, 1), study.grid.size), study.states)[name][0])
 
 
 @pytest.fixture(scope="module")
@@ -118,20 +117,22 @@ class Lamps:
         self.setup = setup
         self.noisy = setup.scene.noise is not None
         models = [
-            ForwardModel(replace(setup, scene=setup.scene.model_copy(update={"intensity_cd": cd}), left_out=left_out))
+            SceneModel(replace(setup, scene=setup.scene.model_copy(update={"intensity_cd": cd}), left_out=left_out))
             for cd in (setup.scene.intensity_cd, 2 * setup.scene.intensity_cd)
             for left_out in [frozenset() if self.noisy else frozenset({"quantization"})]
         ]
         once, twice = (model.pixel_electrons(curves)[..., 0, 0, :, :] for model in models)
         self.lit, self.dark, self.model = twice - once, 2 * once - twice, models[0]
-        self.weights = self.model.channels_of(np.eye(once.shape[-1]), 0)
+        self.weights = channels_of(self.model.readout, np.eye(once.shape[-1]), 0)
+        readout = self.model.readout
+        self.light = readout.of_pixels(readout.capture_light)
 
     def read(self, signals: np.ndarray, factors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and variance of the channels, [n_signals, n_factors, n_channels]."""
         pixel = self.setup.camera.pixel
         electrons = self.dark[..., signals, None, :] + factors[:, None] * self.lit[..., signals, None, :]
         if pixel.captures and self.noisy:
-            merged = merge.merged(electrons, self.model.capture_light[:, None, None], pixel)
+            merged = merge.merged(electrons, self.light[:, None, None], pixel)
             mean, variance = merged.mean, merged.variance
         elif pixel.captures:
             mean = self.first_usable(electrons, pixel)
@@ -145,7 +146,7 @@ class Lamps:
 
     def first_usable(self, electrons: np.ndarray, pixel: Pixel) -> np.ndarray:
         """The first capture below its threshold, in electrons of full sensitivity."""
-        light = self.model.capture_light
+        light = self.light
         result = np.full(electrons.shape[1:], np.nan)
         for capture, one in enumerate(pixel.read_as):
             exposure = next(at for at, of in enumerate(pixel.exposures) if capture in of.numbers)
@@ -208,7 +209,7 @@ def test_no_chromatic_figure_is_above_a_scan_nor_below(first: int) -> None:
     for seed in range(first, first + 10):
         setup, curves = random_scene(seed)
         lamps = Lamps(setup, curves)
-        found = evaluate(forward_model(setup), curves, PAIR if lamps.noisy else ())
+        found = evaluate(scene_model(setup), curves, PAIR if lamps.noisy else ())
         channels = len(setup.camera.mosaic.channels)
         rounding = 0.0 if lamps.noisy or setup.camera.pixel.captures else np.sqrt(channels)
         for name, noise in (("chromatic_csd_yellow_red", False), ("chromatic_dprime_yellow_red", True)):
@@ -225,6 +226,6 @@ def test_no_chromatic_figure_is_above_a_scan_nor_below(first: int) -> None:
 def test_designs_without_curves_have_no_chromatic_figures() -> None:
     setup = random_scenes.random_scene(3).setup
     assert setup.scene.noise is not None
-    columns = evaluate(ForwardModel(setup), np.full((2, 1, setup.camera.grid.size), np.nan), setup.lights.classes[:2])
+    columns = evaluate(SceneModel(setup), np.full((2, 1, setup.camera.grid.size), np.nan), setup.lights.classes[:2])
     assert all(np.isnan(values).all() for name, values in columns.items() if name.startswith("chromatic_"))
     assert "chromatic_error_green_yellow" in columns

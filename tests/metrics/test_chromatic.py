@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sweep.camera.forward import ForwardModel
 from sweep.camera.linear import linear_model
+from sweep.camera.model import SceneModel
 from sweep.metrics.bound import FEASIBLE
 from sweep.metrics.chromatic import (
     chromatic_along,
@@ -106,7 +106,7 @@ def test_values_of_the_shipped_cfas() -> None:
     for name, expected in {"RGGB": 138.1, "RCCC": 28.0, "RCCB": 28.0, "RYYCy": 30.9, "RYN4Cy": 121.8}.items():
         (space,) = [space for space in study.spaces if space.name == name]
         setup = study.setup(space, "chart")
-        columns = evaluate(ForwardModel(setup), space.curves(space.points(0, 1), study.grid.size))
+        columns = evaluate(SceneModel(setup), space.curves(space.points(0, 1), study.grid.size))
         assert columns["chromatic_csd_yellow_red"][0] == pytest.approx(expected, abs=0.1)
         assert columns["chromatic_csd_yellow_red"][0] <= columns["csd_yellow_red"][0] + 1.0
 

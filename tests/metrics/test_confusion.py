@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sweep.camera.forward import ForwardModel
+from sweep.camera.model import SceneModel
 from sweep.camera.pixel import Pixel
 from sweep.metrics import confusion
 from sweep.metrics.discrimination import NoiseShape, error_bounds, pairwise_error
@@ -137,7 +137,7 @@ def test_error_of_coarse_digital_numbers_is_not_below_the_exact_one(
     path.write_text(COARSE.format(bits=bits, well=well, level=level))
     study = load_study(path)
     space = next(iter(study.spaces))
-    imager = ForwardModel(study.setup(space, "dim"))
+    imager = SceneModel(study.setup(space, "dim"))
     curves = np.empty((1, 0, study.grid.size))
     found = {name: values[0] for name, values in evaluate(imager, curves, ["green", "yellow", "red"]).items()}
     electrons = imager.pixel_electrons(curves)[0, 0]
@@ -175,12 +175,12 @@ def test_a_bound_of_many_pixels_holds_where_they_are_few_too(pixels: int) -> Non
 
 def test_noise_is_not_gaussian_where_a_pixel_is_cut_or_few_steps_flicker() -> None:
     far = {"noise": True, "target": FAR, "optics": F2}
-    fine = ForwardModel(scene("fine", "RYNCy", far, DARK).setup)
+    fine = SceneModel(scene("fine", "RYNCy", far, DARK).setup)
     read = fine.read_with_noise(scene("fine", "RYNCy", far, DARK).curves)
     assert read.gaussian.all()
     for pixel in ({"bits": 8, "read_noise_e": 2.0}, {"read_noise_e": 3.0}, {"read_noise_e": 2.0, "offset_dn": 4090}):
         made = scene("coarse", "RYNCy", far, pixel)
-        assert not ForwardModel(made.setup).read_with_noise(made.curves).gaussian.all()
+        assert not SceneModel(made.setup).read_with_noise(made.curves).gaussian.all()
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -241,7 +241,7 @@ def test_where_exact_sums_are_too_many_the_noise_is_gaussian(tmp_path: Path, see
         f"pixel: {pixel}\nscenarios: {{dim: {{noise: true, exposure: {{kind: white_patch, level: 0.3}}}}}}\n"
     )
     study = load_study(path)
-    imager = ForwardModel(study.setup(study.spaces[0], "dim"))
+    imager = SceneModel(study.setup(study.spaces[0], "dim"))
     curves = np.empty((1, 0, study.grid.size))
     own = imager.readout.few_pixels
     assert own is not None

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from sweep.camera.camera import Camera
-from sweep.camera.forward import forward_model
 from sweep.camera.linear import linear_model
+from sweep.camera.model import scene_model
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Optics, Pixel
 from sweep.camera.scene import FixedExposure, Scene, WhitePatchExposure
@@ -58,10 +58,10 @@ def test_response_is_the_papers_exposure(level: float, ratio: float | None) -> N
 
 
 def test_response_does_not_depend_on_well_pitch_or_optics() -> None:
-    usual = evaluate(forward_model(setup()), FAMILY.curves(X))
+    usual = evaluate(scene_model(setup()), FAMILY.curves(X))
     scenario = Scene(photon_radiance=1e15, optics=Optics(f_number=1.6, transmission=0.7))
     other = setup(scenario=scenario).with_camera(pixel=Pixel(pitch_um=3.0, well_e=50_000.0))
-    found = evaluate(forward_model(other), FAMILY.curves(X))
+    found = evaluate(scene_model(other), FAMILY.curves(X))
     for name, values in usual.items():
         if name != "exposure_s":
             np.testing.assert_allclose(found[name], values, rtol=1e-12)
@@ -78,7 +78,7 @@ def test_fixed_exposure_counts_photons() -> None:
 
 def test_csd_is_of_the_quantized_readout() -> None:
     curves = FAMILY.curves(X)
-    found = evaluate(forward_model(setup()), curves)
+    found = evaluate(scene_model(setup()), curves)
     points = np.floor(smooth_response(setup(), curves)[:, 0] + 0.5)
     for design in range(2):
         yellow, red = (points[design, LIGHTS.members[c]] for c in ("yellow", "red"))
@@ -95,13 +95,13 @@ def test_csd_is_of_the_quantized_readout() -> None:
 
 
 def test_sensitivities_of_a_design() -> None:
-    found = evaluate(forward_model(setup()), FAMILY.curves(X))
+    found = evaluate(scene_model(setup()), FAMILY.curves(X))
     n = FAMILY.curves(X)[:, 0].sum(axis=1)
     # A quotient of two sums over wavelengths; the second one's are of four channels.
     np.testing.assert_allclose(found["sensitivity"], n / SENSOR.qe["Y"].sum(), rtol=2 * gamma(301 + 1))
     total = sum(SENSOR.qe[c].sum() for c in ("R", "Y", "Cy")) + n
     np.testing.assert_allclose(found["cfa_sensitivity"], total / 4 / SENSOR.qe["C"].sum(), rtol=2 * gamma(301 + 4))
-    plain = evaluate(forward_model(setup("RGGB")), np.empty((1, 0, 301)))
+    plain = evaluate(scene_model(setup("RGGB")), np.empty((1, 0, 301)))
     assert np.isnan(plain["sensitivity"][0])
     rggb = (SENSOR.qe["R"] + 2 * SENSOR.qe["G"] + SENSOR.qe["B"]).sum() / 4 / SENSOR.qe["C"].sum()
     assert plain["cfa_sensitivity"][0] == pytest.approx(rggb, rel=2 * gamma(301 + 4), abs=0)
@@ -115,7 +115,7 @@ def test_gradients_agree_with_central_differences(kind: str) -> None:
         made = setup(base="C")
         family = Stopband(GRID.nodes_nm, SENSOR.qe["C"], SENSOR.qe["G"])
     x, step = X[1], 1e-4
-    exact = linear_model(made).gradient(family.curves(x[None])[0], family.gradient(x))
+    exact = linear_model(made).smooth_with_gradient(family.curves(x[None])[0], family.gradient(x))[1]
     amounts = sensitivities_gradient(made, family.gradient(x))
     for index in range(5):
         shift = np.eye(5)[index] * step
@@ -131,6 +131,6 @@ def test_field_positions_that_differ_by_nothing_that_is_computed_are_one() -> No
     """The light's fall-off, left out of a slightly tilted scene with pigments, is all that differs between positions."""
     scenario = Scene(off_axis_deg=0.4, field=SensorField(cra_max_deg=20.0, places="any"))
     tilted = replace(setup(scenario=scenario), left_out=frozenset({"illumination"}))
-    found, on_axis = (evaluate(forward_model(v), FAMILY.curves(X)) for v in (tilted, setup()))
+    found, on_axis = (evaluate(scene_model(v), FAMILY.curves(X)) for v in (tilted, setup()))
     for name, values in on_axis.items():
         np.testing.assert_allclose(found[name], values, rtol=1e-12, err_msg=name)

@@ -13,7 +13,7 @@ from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
 
 import sweep
 from sweep.base.errors import StudyError
-from sweep.camera.forward import ForwardModel
+from sweep.camera.model import SceneModel
 from sweep.metrics.columns.confusion import D_PRIME, ERROR, STATE_ERROR
 from sweep.metrics.evaluate import evaluate
 from sweep.report import make_report, read_output, summary_lines
@@ -23,6 +23,7 @@ from sweep.study import load_study
 
 from ..draws import draws_dn
 from ..hard.scenes import DARK, F2, FAR, FIXED, DesignScene, scene
+from ..readout_oracle import channels_of
 
 NOISY = (
     scene("patch", "RGGB", {"noise": True}, DARK),
@@ -42,10 +43,10 @@ NOISY = (
 
 @pytest.mark.parametrize("made", NOISY, ids=lambda made: made.name)
 def test_mean_and_variance_of_the_readout_agree_with_draws_of_every_pixel(made: DesignScene) -> None:
-    model = ForwardModel(made.setup)
+    model = SceneModel(made.setup)
     read = model.read_with_noise(made.curves)
     mean, variance = read.mean, read.variance
-    np.testing.assert_array_equal(mean, ForwardModel(made.setup).read(made.curves)[0])
+    np.testing.assert_array_equal(mean, SceneModel(made.setup).read(made.curves)[0])
     electrons = model.pixel_electrons(made.curves)[0]
     per_place = len(electrons) // model.n_cases
     draws, rng = 20_000, np.random.default_rng(7)
@@ -54,7 +55,7 @@ def test_mean_and_variance_of_the_readout_agree_with_draws_of_every_pixel(made: 
             pixels = draws_dn(
                 np.broadcast_to(electrons[case, signal], (draws, electrons.shape[2])), model.readout.pixel, rng
             )
-            values = model.readout.channels_of(pixels, case // per_place)
+            values = channels_of(model.readout, pixels, case // per_place)
             # 4 sigma of the mean and, by the fourth moment, of the variance.
             off = 4 * values.std(axis=0) / draws**0.5
             np.testing.assert_array_less(np.abs(values.mean(axis=0) - mean[0, case, signal]), off + 1e-9)
@@ -76,11 +77,11 @@ def test_a_discriminant_of_drawn_pixels_errs_as_often_as_the_closed_form_says() 
     lights = made.setup.lights
     kept = [lights.types.index("yellow"), lights.types.index("red")]
     two = Lights("two", ("y", "r"), ("yellow", "red"), lights.photons[kept], lights.photon_ratio, "", True)
-    model = ForwardModel(replace(made.setup, lights=two))
+    model = SceneModel(replace(made.setup, lights=two))
     closed = {name: float(values[0]) for name, values in evaluate(model, made.curves, ["yellow", "red"]).items()}
     electrons, rng, n = model.pixel_electrons(made.curves)[0, 0], np.random.default_rng(3), 200_000
     pixels = [draws_dn(np.broadcast_to(of, (2 * n, of.size)), model.readout.pixel, rng) for of in electrons]
-    dn, truth = np.concatenate([model.channels_of(drawn, 0) for drawn in pixels]), np.repeat([0, 1], 2 * n)
+    dn, truth = np.concatenate([channels_of(model.readout, drawn, 0) for drawn in pixels]), np.repeat([0, 1], 2 * n)
     learned = LinearDiscriminantAnalysis().fit(dn[::2], truth[::2])
     wrong = float((learned.predict(dn[1::2]) != truth[1::2]).mean())
     deviation = (wrong / (2 * n)) ** 0.5
@@ -100,7 +101,7 @@ def test_more_noise_is_never_better() -> None:
         noise_of = made.setup.scene.noise
         assert noise_of is not None
         setup = made.setup.with_camera(pixel=noise_of.of(made.setup.camera.pixel))
-        found.append(evaluate(ForwardModel(setup), made.curves, made.setup.lights.classes))
+        found.append(evaluate(SceneModel(setup), made.curves, made.setup.lights.classes))
     for name in found[0]:
         values = [float(columns[name][0]) for columns in found]
         if name.startswith((D_PRIME, "cnr_")):
@@ -112,7 +113,7 @@ def test_more_noise_is_never_better() -> None:
 @pytest.mark.parametrize("pixel", [{"offset_dn": 4090}, {"bits": 2}])
 def test_readouts_that_are_certain_and_the_same_tell_nothing(pixel: dict[str, float]) -> None:
     made = scene("patch", "RGGB", {"noise": {"read_noise_e": 3}}, pixel)
-    model = ForwardModel(made.setup.with_camera(pixel=made.setup.camera.pixel.model_copy(update={"read_noise_e": 3.0})))
+    model = SceneModel(made.setup.with_camera(pixel=made.setup.camera.pixel.model_copy(update={"read_noise_e": 3.0})))
     read = model.read_with_noise(made.curves)
     mean, variance = read.mean, read.variance
     certain = variance == 0

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sweep.camera.forward import ForwardModel
+from sweep.camera.model import SceneModel
 from sweep.camera.pixel import Pixel
 from sweep.camera.scene import Scene
 from sweep.metrics.columns.probabilities import detection
@@ -26,7 +26,7 @@ def test_cta_is_near_one_where_d_prime_still_differs() -> None:
     problem = study.problem(study.search)
     scenario = Scene.model_validate({"noise": True})
     pixel = Pixel(read_noise_e=10, prnu=0.01, offset_dn=168)
-    model = ForwardModel(replace(problem.setup, scene=scenario).with_camera(pixel=pixel))
+    model = SceneModel(replace(problem.setup, scene=scenario).with_camera(pixel=pixel))
     curves = problem.family.curves(TWO)
     assert "cta_yellow_red" not in evaluate(model, curves, ("yellow", "red"))
     found = evaluate(model, curves, ("yellow", "red"), probabilities=True)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from sweep.camera.accuracy import STANDARD
-from sweep.camera.forward import ForwardModel
+from sweep.camera.model import SceneModel
 from sweep.designs.space import Space
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.separation import csd_name, separations
@@ -25,10 +25,9 @@ STUDY = load_study(Path("studies/accuracy.yaml"))
 def test_no_moment_of_a_pulse_has_a_smaller_csd(space: Space) -> None:
     setup = STUDY.setup(space, "pulsed")
     curves = space.curves(space.points(0, min(space.size, 24)), STUDY.grid.size)
-    columns, model = evaluate(ForwardModel(setup), curves), ForwardModel(setup)
-    every_moment = model.at(model.phases, np.linspace(0.0, 1.0, 2001))
+    columns, model = evaluate(SceneModel(setup), curves), SceneModel(setup)
     for design in range(len(curves)):
-        response = every_moment.read(curves[design : design + 1])[0][0]
+        response = model.read(curves[design : design + 1], moments=np.linspace(0.0, 1.0, 2001))[0][0]
         for pair, distances in separations(response, setup.members).items():
             assert columns[csd_name(pair)][design] <= distances.min() + 0.05
 
@@ -42,8 +41,8 @@ def test_no_moment_has_a_smaller_csd_where_whole_numbers_clip(places: int | None
     field = {"field": {"cra_max_deg": 20.0, "places": places}} if places else {}
     made = scene("pulsed and full", "RYNCy", pulsed | field, pixel)
     setup = replace(made.setup, accuracy=STANDARD)
-    columns = evaluate(ForwardModel(setup), made.curves)
+    columns = evaluate(SceneModel(setup), made.curves)
     finer = replace(setup, accuracy=STANDARD.model_copy(update={"pwm_moments": 1000}))
-    response = ForwardModel(finer).read(made.curves)[0][0]
+    response = SceneModel(finer).read(made.curves)[0][0]
     for pair, distances in separations(response, made.setup.members).items():
         assert columns[csd_name(pair)][0] <= distances.min() + math.sqrt(4), pair

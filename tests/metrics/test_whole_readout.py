@@ -11,12 +11,13 @@ import pytest
 
 from sweep.base.user_code import UserCode
 from sweep.camera.accuracy import Accuracy
-from sweep.camera.forward import ForwardModel
+from sweep.camera.model import SceneModel
 from sweep.designs.block import CurveBlock, EdgeBlock, edges_of
-from sweep.metrics import evaluate as route
-from sweep.metrics import registry
+from sweep.metrics import batch, registry
+from sweep.metrics.batch import Readings
+from sweep.metrics.columns import color_separation
 from sweep.metrics.evaluate import evaluate
-from sweep.metrics.metric import ReadoutMetric
+from sweep.metrics.metric import Metric
 from sweep.metrics.quantity import Columns, Quantity, RequestedQuantities
 from sweep.metrics.user_metrics import UserMetric
 
@@ -41,7 +42,7 @@ brightest.direction, CALLS = "less", []
 BRIGHTEST, ABSENT = (UserMetric(UserCode(f"mine.py:{name}", CODE)) for name in ("brightest", "absent"))
 
 
-class Darkest(ReadoutMetric):
+class Darkest(Metric):
     """A metric that another file of `metrics/columns` would add."""
 
     order = 10
@@ -50,9 +51,9 @@ class Darkest(ReadoutMetric):
         """Its column."""
         return (Quantity("darkest_dn", "darkest_dn", "the weakest signal", "DN", direction="more", ends=("min",)),)
 
-    def of_readout(self, setup: Any, response: np.ndarray, unlit: np.ndarray) -> Columns:  # noqa: ARG002
+    def of_readings(self, readings: Readings) -> Columns:
         """The weakest signal in its best channel."""
-        return {"darkest_dn": response.max(axis=2).min(axis=1)}
+        return {"darkest_dn": readings.whole.max(axis=2).min(axis=1)}
 
 
 @pytest.fixture
@@ -64,22 +65,22 @@ def darkest(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     registry.quantities_of.cache_clear()
 
 
-def counted(monkeypatch: pytest.MonkeyPatch, name: str) -> list[int]:
+def counted(monkeypatch: pytest.MonkeyPatch, owner: Any, name: str) -> list[int]:
     """How often a route is taken from now on, a number for each time."""
     calls: list[int] = []
-    way: Callable[..., Any] = getattr(route, name)
+    way: Callable[..., Any] = getattr(owner, name)
 
     def taken(*arguments: Any, **named: Any) -> Any:
         calls.append(1)
         return way(*arguments, **named)
 
-    monkeypatch.setattr(route, name, taken)
+    monkeypatch.setattr(owner, name, taken)
     return calls
 
 
 def by_hand(name: str, block: EdgeBlock) -> dict[str, np.ndarray]:
     """Both metrics from the readout of the designs' curves."""
-    response, _ = ForwardModel(SCENES[name]).read(block.curves())
+    response, _ = SceneModel(SCENES[name]).read(block.curves())
     best = response.max(axis=3)
     return {"darkest_dn": best.min(axis=(1, 2)), "brightest": best.max(axis=(1, 2))}
 
@@ -90,11 +91,11 @@ def by_hand(name: str, block: EdgeBlock) -> dict[str, np.ndarray]:
 def test_csds_are_those_without_other_metrics_and_these_are_of_the_whole_readout(
     name: str, at_once: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(route, "_READ_AT_ONCE", at_once)
+    monkeypatch.setattr(batch, "_READ_AT_ONCE", at_once)
     block = edges_of(SPACE, 3, 9 if name == "refined" else 69)
     assert block is not None
-    columns = evaluate(ForwardModel(SCENES[name]), block, user_metrics=[BRIGHTEST], metrics=registry.METRICS)
-    alone = evaluate(ForwardModel(SCENES[name]), block)
+    columns = evaluate(SceneModel(SCENES[name]), block, user_metrics=[BRIGHTEST], metrics=registry.METRICS)
+    alone = evaluate(SceneModel(SCENES[name]), block)
     assert {*columns} == {*alone, "darkest_dn", "brightest"}
     for column, values in alone.items():
         np.testing.assert_array_equal(columns[column], values, err_msg=column)
@@ -103,14 +104,11 @@ def test_csds_are_those_without_other_metrics_and_these_are_of_the_whole_readout
 
 
 @pytest.mark.usefixtures("darkest")
-@pytest.mark.parametrize(
-    ("name", "way", "n"), [("rounded", "separations_along", SPACE.size), ("refined", "_refine_phases", 3)]
-)
-def test_other_metrics_switch_no_fast_route_off(name: str, way: str, n: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    fast, slow = counted(monkeypatch, way), counted(monkeypatch, "_read")
-    block = edges_of(SPACE, 0, n)
+def test_other_metrics_switch_no_fast_route_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    fast, slow = counted(monkeypatch, color_separation, "separations_along"), counted(monkeypatch, SceneModel, "read")
+    block = edges_of(SPACE, 0, SPACE.size)
     assert block is not None
-    evaluate(ForwardModel(SCENES[name]), block, user_metrics=[BRIGHTEST], metrics=registry.METRICS)
+    evaluate(SceneModel(SCENES["rounded"]), block, user_metrics=[BRIGHTEST], metrics=registry.METRICS)
     assert (len(fast), len(slow)) == (1, 0)
 
 
@@ -119,7 +117,7 @@ def test_a_cfa_without_a_user_metric_is_reported_once() -> None:
     calls.clear()
     for block in (edges_of(SPACE, 0, SPACE.size), CurveBlock(SPACE.curves(SPACE.points(0, 9), 301))):
         assert block is not None
-        columns = evaluate(ForwardModel(VIEWS["rounded"]), block, user_metrics=[ABSENT, BRIGHTEST])
+        columns = evaluate(SceneModel(VIEWS["rounded"]), block, user_metrics=[ABSENT, BRIGHTEST])
         assert np.isnan(columns["absent"]).all()
         assert np.isfinite(columns["brightest"]).all()
     assert calls == [1, 1]

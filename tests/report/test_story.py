@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sweep.camera.forward import ForwardModel, forward_model
+from sweep.camera.model import SceneModel, scene_model
 from sweep.designs.block import edges_of
 from sweep.metrics.columns.sensitivity import cfa_sensitivity_at
 from sweep.metrics.limiting import limiting_lights
@@ -125,7 +125,7 @@ def test_each_swept_design_of_the_page_is_limited_by_its_nearest_lights(finished
     block = edges_of(space, 0, space.size)
     assert block is not None
     setup = study.setup(space, "chart")
-    read = ForwardModel(setup).read_changing(block.subset(rows.index.to_numpy() - first))
+    read = SceneModel(setup).read_changing(block.subset(rows.index.to_numpy() - first))
     assert read is not None
     whole_response, names = read.whole[:, 0], np.array(setup.lights.names)
     for one, other in study.pairs:
@@ -155,7 +155,7 @@ def test_lights_without_a_distance_limit_nothing() -> None:
     space = next(space for space in study.spaces if space.filter is not None)
     setup = study.setup(space, "chart")
     nothing = np.zeros((1, 1, study.grid.size))
-    response = forward_model(setup).read(nothing)[0]
+    response = scene_model(setup).read(nothing)[0]
     assert set(limiting_lights(setup, response)) == set(study.pairs)
     assert all(lights[0] is not None for lights in limiting_lights(setup, response).values())
     assert all(lights[0] is None for lights in limiting_lights(setup, response * np.nan).values())

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sweep.camera.camera import Camera
-from sweep.camera.forward import ForwardModel
+from sweep.camera.model import SceneModel
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
 from sweep.camera.scene import Scene
@@ -62,7 +62,7 @@ SOME = [*((name, True) for name in (*VIEWS, *MORE) if name not in ("pulsed", "no
 def test_a_design_alone_is_the_one_of_its_block_within_rounding(name: str, separable: bool, step: int) -> None:
     setup = (VIEWS | MORE)[name]
     states = STATES if setup.computes("quantization") and setup.computes("noise") else ()
-    imager = ForwardModel(setup)
+    imager = SceneModel(setup)
     space = MIXED if setup.scene.target is None else SPACE
     block = edges_of(space, 0, space.size)
     assert block is not None
@@ -80,9 +80,7 @@ def test_a_design_alone_is_the_one_of_its_block_within_rounding(name: str, separ
 
 @pytest.mark.parametrize("separable", [True, False])
 def test_a_bad_design_changes_no_other_beyond_rounding(separable: bool) -> None:
-    imager = ForwardModel(
-        VIEWS["saturated" if separable else "chart"]
-    )  # one exposure for all; one that the design sets
+    imager = SceneModel(VIEWS["saturated" if separable else "chart"])  # one exposure for all; one that the design sets
     fine = edges_of(SPACE, 0, SPACE.size)
     assert fine is not None
     bad = np.array([0, 17, 30])
@@ -111,7 +109,7 @@ def test_two_modified_channels_within_rounding(scenario: dict[str, Any]) -> None
     family = Dual(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["C"])
     space = Space("sweep", "dual", "RAACy", Filter(family, {"Na": "Y", "Nb": "Y"}, "C"), AXES)
     curves = space.curves(space.points(0, 40), GRID.size)
-    imager = ForwardModel(setup)
+    imager = SceneModel(setup)
     whole, magnitude_dn = evaluate(imager, curves), brightest_dn(setup, curves)
     for at in range(0, 40, 3):
         assert_same(whole, slice(at, at + 1), evaluate(imager, curves[at : at + 1]), setup, magnitude_dn)

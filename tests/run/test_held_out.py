@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from sweep.base.errors import StudyError
-from sweep.camera.forward import forward_model
+from sweep.camera.model import scene_model
 from sweep.report import make_report, read_output, summary_lines
 from sweep.results.identity import fingerprint
 from sweep.run import held_out, run_study
@@ -102,7 +102,7 @@ def test_another_light_changes_no_reading_of_a_resolved_study(folder: Path) -> N
     def read(study: object) -> np.ndarray:
         assert isinstance(study, type(more))
         space = next(space for space in study.spaces if space.name == "RGGB")
-        return forward_model(study.setup(space, "chart")).read(np.empty((1, 0, study.grid.size)))[0][0, 0]
+        return scene_model(study.setup(space, "chart")).read(np.empty((1, 0, study.grid.size)))[0][0, 0]
 
     np.testing.assert_array_equal(read(more)[:3], read(one))
 

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sweep.camera.forward import forward_model
+from sweep.camera.model import scene_model
 from sweep.metrics.nearest import nearest_pairs
 from sweep.results import shown
 from sweep.results.designs import row_curves
@@ -58,7 +58,7 @@ def distances(study: Study, row: dict[str, Any]) -> Iterator[tuple[str, dict[str
     """Of each pair of types every pair of lights with its smallest distance over the cases, from the curves alone."""
     space, curves = row_curves(study, row)
     setup = study.setup(space, row["scenario"])
-    cases = forward_model(setup).read(curves)[0][0]
+    cases = scene_model(setup).read(curves)[0][0]
     lights = list(zip(setup.lights.names, setup.lights.types, np.moveaxis(cases, 1, 0), strict=True))
     for one, other in study.pairs:
         found = {

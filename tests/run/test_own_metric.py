@@ -226,9 +226,9 @@ def test_a_design_that_the_metric_fails_on_costs_a_row(tmp_path: Path) -> None:
     run_study(made, tmp_path / "all", 1, lambda *_: None)
     space = next(space for space in made.spaces if space.kind == "sweep")
     setup = made.plan("chart") and made.setup(space, "chart")
-    from sweep.camera.forward import forward_model
+    from sweep.camera.model import scene_model
 
-    edge = forward_model(setup).read(space.curves(space.points(3, 4), made.grid.size))[0][0, 0, 0, -1]
+    edge = scene_model(setup).read(space.curves(space.points(3, 4), made.grid.size))[0][0, 0, 0, -1]
     bad = study(tmp_path, text, f"EDGE = {edge!r}\n".replace("np.float64(", "(") + code)
     run_study(bad, tmp_path / "some", 1, lambda *_: None)
     found = rows_of(tmp_path / "some")

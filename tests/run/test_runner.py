@@ -17,7 +17,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from sweep.base.errors import OutputError
-from sweep.camera.forward import forward_model
+from sweep.camera.model import scene_model
 from sweep.designs.families.stopband import MultiStopband
 from sweep.designs.space import Filter, Space
 from sweep.metrics.bound import FEASIBLE
@@ -81,7 +81,7 @@ def test_a_row_follows_from_its_parameters(study: Study, output: Path, name: str
         rows = frame[(frame["kind"] == "sweep") & (frame["scenario"] == scenario)].sample(5, random_state=3)
         for _, row in rows.iterrows():
             x = row[list(sweep.parameters)].to_numpy(dtype=float)[None]
-            found = evaluate(forward_model(study.setup(sweep, scenario)), sweep.curves(x, study.grid.size))
+            found = evaluate(scene_model(study.setup(sweep, scenario)), sweep.curves(x, study.grid.size))
             for column in set(frame.columns) & set(found):
                 assert row[column] == pytest.approx(found[column][0], rel=1e-12)
             ordered = row["left_nm"] <= row["right_nm"] and (sweep.violation(x) <= FEASIBLE).all()
@@ -229,7 +229,7 @@ def test_worst_cases_and_combined_objectives_are_columns(tmp_path: Path) -> None
     sweep = study.spaces[-1]
     x = np.repeat(row[list(sweep.parameters)].to_numpy(dtype=float)[None], 5, axis=0)
     x[:, [0, 2]] += np.array([-3.0, -1.5, 0, 1.5, 3.0])[:, None]
-    found = evaluate(forward_model(study.setup(sweep, row["scenario"])), sweep.curves(x, study.grid.size))
+    found = evaluate(scene_model(study.setup(sweep, row["scenario"])), sweep.curves(x, study.grid.size))
     assert row["worst_csd_yellow_red"] == found["csd_yellow_red"].min()
     assert row["worst_sensitivity"] == pytest.approx(found["sensitivity"].min(), rel=1e-12)
     assert row["objective"] == min(2 * row["worst_csd_yellow_red"], 300 * row["sensitivity"])

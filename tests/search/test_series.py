@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sweep.camera.forward import ForwardModel
 from sweep.camera.linear import linear_model
+from sweep.camera.model import SceneModel
 from sweep.camera.pixel import Pixel
 from sweep.camera.scene import Scene
 from sweep.metrics.objective import Objective
@@ -79,7 +79,7 @@ def test_merged_noise_is_that_of_the_readout(pixel: dict[str, Any]) -> None:
     for setup, _ in problem.scenes:
         design = SmoothDesign(linear_model(setup), problem.family, x, problem.free, np.ones(4))
         mean, variance, *_ = design.noisy
-        read = ForwardModel(setup).read_with_noise(problem.family.curves(x[None]))
+        read = SceneModel(setup).read_with_noise(problem.family.curves(x[None]))
         deviation = np.sqrt(read.variance[0] + 1 / 12)
         assert (np.abs(mean - read.mean[0]) < 5e-3 * deviation).all()
         np.testing.assert_allclose(variance, read.variance[0], rtol=3e-3, atol=0.084)

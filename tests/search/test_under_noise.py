@@ -11,8 +11,8 @@ import pytest
 
 from sweep.base.errors import StudyError
 from sweep.camera.accuracy import Accuracy
-from sweep.camera.forward import ForwardModel
 from sweep.camera.linear import linear_model
+from sweep.camera.model import SceneModel
 from sweep.camera.pixel_curve import STEPS_DN2
 from sweep.designs.families.dual import Dual
 from sweep.designs.families.free_form import FreeForm
@@ -36,6 +36,7 @@ from ..conftest import STUDIES
 from ..draws import draws_dn
 from ..hard.random_scenes import random_scene
 from ..hard.scenes import FAMILY, GRID, SENSOR
+from ..readout_oracle import channels_of
 from .problems import STATES, best_of, best_random, noisy_problem
 
 FAMILIES: tuple[Family, ...] = (
@@ -148,7 +149,7 @@ def test_the_objective_is_met_by_the_readout() -> None:
     """Of the design that is found: exact sums over digital numbers, as the result table has them."""
     problem = noisy_problem("stopband", 30, 0.3, Objective(least={"state_error": 1.0}))
     best = best_of(problem, 2, 120)
-    imager = ForwardModel(problem.setup.with_all_effects)
+    imager = SceneModel(problem.setup.with_all_effects)
     found = evaluate(imager, problem.family.curves(best.x[None]), STATES)
     # Gaussians beside exact sums of Poisson electrons: the error itself within 5 %.
     assert problem.objective.of(found)[0] == pytest.approx(best.objective, abs=0.02)
@@ -161,7 +162,7 @@ def test_error_constraints_are_met_and_their_reach_is_reported() -> None:
     )
     best = best_of(problem, 2, 120)
     curves = problem.family.curves(best.x[None])
-    found = evaluate(ForwardModel(problem.setup.with_all_effects), curves, STATES)
+    found = evaluate(SceneModel(problem.setup.with_all_effects), curves, STATES)
     assert found["dprime_yellow_red"][0] == pytest.approx(5.0, rel=2e-3)  # light is bought with distance
     assert found["error_green_red"][0] <= 1e-4
     alone = {"error_yellow_red": Bound(max=1e-12)}
@@ -202,7 +203,7 @@ def test_invalid_error_constraint_is_one_line(told: str, issue: str, tmp_path: P
 
 def drawn_error(problem: Problem, x: np.ndarray, rng: np.random.Generator, draws: int) -> float:
     """How often the most likely of the worst two lights is the wrong one, of patches drawn pixel by pixel."""
-    imager, curves = ForwardModel(problem.setup.with_all_effects), problem.family.curves(x[None])
+    imager, curves = SceneModel(problem.setup.with_all_effects), problem.family.curves(x[None])
     read, members = imager.read_with_noise(curves), problem.setup.members
     mean, variance, electrons = read.mean[0, 0], read.variance[0, 0], imager.pixel_electrons(curves)[0, 0]
     pairs = [(a, b) for a in members["yellow"] for b in members["red"]]
@@ -210,7 +211,7 @@ def drawn_error(problem: Problem, x: np.ndarray, rng: np.random.Generator, draws
     wrong = 0
     for own, other in (worst, worst[::-1]):
         pixels = draws_dn(np.broadcast_to(electrons[own], (draws, electrons.shape[1])), imager.readout.pixel, rng)
-        read_out = imager.readout.channels_of(pixels, 0)
+        read_out = channels_of(imager.readout, pixels, 0)
         far = [((read_out - mean[i]) ** 2 / variance[i] + np.log(variance[i])).sum(axis=1) for i in (own, other)]
         wrong += int((far[0] > far[1]).sum())
     return wrong / (2 * draws)

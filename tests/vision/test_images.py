@@ -12,8 +12,8 @@ import pytest
 from scipy.spatial.distance import cdist
 
 from sweep.base.types import FloatArray
-from sweep.camera.forward import ForwardModel
 from sweep.camera.merge import light_of, limits_dn
+from sweep.camera.model import SceneModel
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.noise import table
 from sweep.camera.pixel import Pixel
@@ -49,7 +49,7 @@ def test_lamp_image_equals_the_camera_model(cfa: str, place: int) -> None:
     target = there.scene.target.model_copy(update={"phase_px": (float(center[0]), float(center[1]))})
     scenario = there.scene.model_copy(update={"target": target, "intensity_cd": candelas})
     wanted = (
-        ForwardModel(replace(there, left_out=READOUT, scene=scenario)).read(NO_FILTERS[None])[0][0, 0]
+        SceneModel(replace(there, left_out=READOUT, scene=scenario)).read(NO_FILTERS[None])[0][0, 0]
         - setup.camera.pixel.offset_dn
     )
     heads = camera.electrons(0, 0)

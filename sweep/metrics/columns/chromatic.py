@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from functools import partial
 
 import numpy as np
 
-from ...base.types import Array, DesignSignals, Float, MemberNumbers
+from ...base.types import PerDesign
 from ...camera.brightness import room_dn, room_of
-from ...camera.setup import Setup
 from ...spectra.lights import Pair, class_pairs, pair_name
-from ..brightness import BrightnessCurves, chromatic_distance, error_of
+from ..batch import Batch, Readings
+from ..brightness import error_of
 from ..chromatic import chromatic_along, chromatic_rows, chromatic_separations
-from ..metric import LampMetric, ReadoutMetric
+from ..metric import Metric
 from ..quantity import DN, Columns, Quantity, RequestedQuantities
 from .confusion import ERROR
 
 CHROMATIC_CSD, CHROMATIC_DPRIME, CHROMATIC_ERROR = "chromatic_csd", "chromatic_dprime", "chromatic_error"
 
 
-class ChromaticSeparation(ReadoutMetric, LampMetric):
-    """Chromatic CSD of each pair of signal types: in closed form where readings are linear in the light."""
+class ChromaticSeparation(Metric):
+    """Chromatic CSD of each pair of signal types."""
 
     order = 1
 
@@ -47,57 +46,50 @@ class ChromaticSeparation(ReadoutMetric, LampMetric):
             for pair in class_pairs(requested.classes)
         )
 
-    def of_readout(self, setup: Setup, response: DesignSignals, unlit: Float[Array, "designs channels"]) -> Columns:
+    def of_readings(self, readings: Readings) -> Columns:
         """Compute the columns in closed form; NaN where a pixel may fill before lamps look most alike."""
-        room = room_dn(setup, response, unlit)
-        if not (room > 0).any():
-            distances = {pair: np.full(len(response), np.nan) for pair in class_pairs(list(setup.members))}
-        else:
-            distances = chromatic_separations(response - unlit[:, None], setup.members)
-        return {
-            pair_name(CHROMATIC_CSD, pair): np.where(distance <= room, distance, np.nan)
-            for pair, distance in distances.items()
-        }
-
-    def along(
-        self,
-        setup: Setup,
-        fixed: Float[Array, "signals channels"],
-        channel: int,
-        values: Float[Array, "designs signals"],
-        unlit: Float[Array, "designs channels"],
-        pairs: Sequence[Pair],
-    ) -> Columns:
-        """Compute columns as `of_readout`, for designs that differ in one channel alone.
-
-        `fixed`: shared channels, DN, whose response without lamps is the same too; `values`: those of that channel, DN.
-        """
+        setup, pairs = readings.setup, readings.pairs
         if not pairs:
             return {}
-        distances, most_dn, least_dn = chromatic_along(fixed, channel, values, unlit, setup.members, pairs)
-        dark_dn, others_dn = unlit[:, channel], np.delete(unlit[0], channel)
-        darkest_dn = np.minimum(dark_dn, others_dn.min(initial=np.inf))
-        room = room_of(setup, most_dn, least_dn, darkest_dn, np.maximum(dark_dn, others_dn.max(initial=-np.inf)))
+        if readings.dn is None:
+            distances, room = _along(readings)
+        else:
+            room = room_dn(setup, readings.dn, readings.dark)
+            distances = dict.fromkeys(pairs, np.full(len(readings.dn), np.nan))
+            if (room > 0).any():
+                distances = chromatic_separations(readings.dn - readings.dark[:, None], setup.members)
         return {
-            pair_name(CHROMATIC_CSD, pair): np.where(distance <= room, distance, np.nan)
-            for pair, distance in distances.items()
+            pair_name(CHROMATIC_CSD, pair): np.where(distances[pair] <= room, distances[pair], np.nan) for pair in pairs
         }
 
-    def of_lamps(
-        self, cases: Sequence[BrightnessCurves], members: Mapping[str, MemberNumbers], pairs: Sequence[Pair]
-    ) -> dict[str, float]:
-        """Compute the columns from brightness curves."""
-        return {
-            pair_name(CHROMATIC_CSD, (a, b)): chromatic_distance(cases, members[a], members[b], noise=False)
-            for a, b in pairs
-        }
+    def of_batch(self, batch: Batch) -> Columns:
+        """Compute columns that have no closed form from brightness curves."""
+        closed = {pair: batch.columns[pair_name(CHROMATIC_CSD, pair)] for pair in batch.pairs}
+        if not closed:
+            return {}
+        missing = np.any([np.isnan(values) for values in closed.values()], axis=0)
+        walked = batch.over_brightness(missing)[0]
+        return {pair_name(CHROMATIC_CSD, p): np.where(missing, walked[p], values) for p, values in closed.items()}
 
 
-class ChromaticConfusion(LampMetric):
+def _along(readings: Readings) -> tuple[dict[Pair, PerDesign], PerDesign]:
+    """Return distances, DN, of designs that differ in one channel, and up to which of them the closed form holds."""
+    assert readings.fixed is not None
+    assert readings.values is not None
+    setup, channel, dark = readings.setup, readings.channel, readings.dark
+    distances, most_dn, least_dn = chromatic_along(
+        readings.fixed, channel, readings.values, dark, setup.members, readings.pairs
+    )
+    own, others = dark[:, channel], np.delete(dark[0], channel)
+    darkest_dn, brightest_dn = np.minimum(own, others.min(initial=np.inf)), np.maximum(own, others.max(initial=-np.inf))
+    return distances, room_of(setup, most_dn, least_dn, darkest_dn, brightest_dn)
+
+
+class ChromaticConfusion(Metric):
     """d' and error of each pair of states of lamps of unknown brightness, the worst over phases and moments."""
 
     order = 5
-    of_states = True
+    needs = "any brightness"
 
     def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
         return tuple(
@@ -138,19 +130,13 @@ class ChromaticConfusion(LampMetric):
             )
         )
 
-    def of_lamps(
-        self, cases: Sequence[BrightnessCurves], members: Mapping[str, MemberNumbers], pairs: Sequence[Pair]
-    ) -> dict[str, float]:
-        """Compute the columns from brightness curves; see `with_equal_brightness`."""
-        columns = {}
-        for pair in pairs:
-            dprime = chromatic_distance(cases, members[pair[0]], members[pair[1]], noise=True)
+    def of_batch(self, batch: Batch) -> Columns:
+        """Compute the columns from brightness curves; errors are at least those of equal brightness, if known."""
+        columns: Columns = {}
+        if not batch.any_brightness:
+            return {}
+        for pair, dprime in batch.over_brightness()[1].items():
+            error, equal = error_of(dprime), batch.columns.get(pair_name(ERROR, pair))
             columns[pair_name(CHROMATIC_DPRIME, pair)] = dprime
-            columns[pair_name(CHROMATIC_ERROR, pair)] = float(error_of(np.array(dprime)))
+            columns[pair_name(CHROMATIC_ERROR, pair)] = error if equal is None else np.maximum(error, equal)
         return columns
-
-
-def with_equal_brightness(columns: Columns, states: Sequence[str]) -> Columns:
-    """Return errors of lamps of unknown brightness that are at least those of equal brightness."""
-    names = {pair_name(CHROMATIC_ERROR, pair): pair_name(ERROR, pair) for pair in class_pairs(list(states))}
-    return {chromatic: np.maximum(columns[chromatic], columns[equal]) for chromatic, equal in names.items()}

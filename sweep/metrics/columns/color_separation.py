@@ -5,19 +5,18 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 
-from ...base.types import Array, DesignSignals, Float
-from ...camera.setup import Setup
 from ...spectra.lights import class_pairs
-from ..metric import ReadoutMetric
+from ..batch import Readings
+from ..metric import Metric
 from ..quantity import BEST_PHASE, DN, Columns, Quantity, RequestedQuantities
-from ..separation import csd_name, separations
+from ..separation import csd_name, separations, separations_along
 from ..smooth import SmoothDesign
 
 CSD = "csd"
 """Metric of the separations, without those at the best place."""
 
 
-class ColorSeparation(ReadoutMetric):
+class ColorSeparation(Metric):
     """CSD of each pair of signal types, and the best one over all sampling phases."""
 
     order = 0
@@ -69,6 +68,12 @@ class ColorSeparation(ReadoutMetric):
         ]
         return (*nearest, *best) if requested.any_place else tuple(nearest)
 
-    def of_readout(self, setup: Setup, response: DesignSignals, unlit: Float[Array, "designs channels"]) -> Columns:
+    def of_readings(self, readings: Readings) -> Columns:
         """Compute the columns; see `separation.separations`."""
-        return {csd_name(pair): distances for pair, distances in separations(response, setup.members).items()}
+        members = readings.setup.members
+        if readings.dn is not None:
+            return {csd_name(pair): distances for pair, distances in separations(readings.dn, members).items()}
+        assert readings.fixed is not None
+        assert readings.values is not None
+        along = separations_along(readings.fixed, readings.channel, readings.values, members)
+        return {csd_name(pair): distances for pair, distances in along.items()}

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import partial
 
 import numpy as np
 
-from ...base.types import DesignCurves, FloatArray, MemberNumbers, PerDesign
-from ...camera.forward import ForwardModel
+from ...base.types import FloatArray, MemberNumbers, PerDesign
 from ...camera.readout import NoisyReadout
 from ...spectra.lights import Pair, class_pairs, pair_name
 from .. import confusion
+from ..batch import Batch
 from ..discrimination import NoiseShape, contrast_to_noise, detectability, error_bounds, pairwise_error
-from ..metric import NoiseMetric
+from ..metric import Metric
 from ..quantity import Columns, Quantity, RequestedQuantities
 from ..smooth_noise import bound_rows, error_decades, pair_rows, squared_contrast, squared_detectability
 
@@ -35,10 +35,11 @@ _ByPair = dict[Pair, FloatArray]
 _LESS = (ERROR, ERROR_BOUND, STATE_ERROR, STATE_ERROR_BOUND)
 
 
-class Confusion(NoiseMetric):
+class Confusion(Metric):
     """The worst over sampling phases and moments."""
 
     order = 5
+    needs = "noise"
 
     def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
         if not requested.states:
@@ -53,12 +54,13 @@ class Confusion(NoiseMetric):
             *(_quantity(metric, metric, requested.states) for metric in (STATE_ERROR, STATE_ERROR_BOUND)),
         )
 
-    def of_noise(
-        self, model: ForwardModel, curves: DesignCurves, read: NoisyReadout, members: Mapping[str, MemberNumbers]
-    ) -> Columns:
+    def of_batch(self, batch: Batch) -> Columns:
         """Compute exact sums over the digital numbers of a few pixels, else Gaussian errors or bounds."""
+        if not batch.noisy:
+            return {}
+        read, members = batch.read_with_noise, batch.confused
         mean, variance, _ = NoiseShape.of_cases(read)
-        error, bound, state_bound = _errors(model, curves, read, members)
+        error, bound, state_bound = _errors(batch, members)
         columns: Columns = {}
         for pair in class_pairs(list(members)):
             pair_members = members[pair[0]], members[pair[1]]
@@ -97,28 +99,23 @@ def _quantity(metric: str, name: str, types: tuple[str, ...]) -> Quantity:
     )
 
 
-def state_errors(model: ForwardModel, curves: DesignCurves, states: Sequence[str]) -> PerDesign:
+def state_errors(batch: Batch) -> PerDesign:
     """Return the error of the worst pair of states alone."""
-    members = {name: model.setup.members[name] for name in states}
-    exact = _exact(model, curves, members)
+    exact, members = _exact(batch), batch.confused
     if exact is not None:
         return np.asarray(np.max([error for case in exact for error in case.error.values()], axis=0), dtype=float)
-    error = _gaussian(model.read_with_noise(curves), members)
-    return np.asarray(np.max(list(error.values()), axis=0), dtype=float)
+    return np.asarray(np.max(list(_gaussian(batch.read_with_noise, members).values()), axis=0), dtype=float)
 
 
-def _exact(
-    model: ForwardModel, curves: DesignCurves, members: Mapping[str, MemberNumbers]
-) -> list[confusion.Errors] | None:
+def _exact(batch: Batch) -> list[confusion.Errors] | None:
     """Return errors and bounds in each case by exact sums; None if these are too many."""
-    pixels = model.few_pixels
-    if pixels is None or not confusion.affordable(model.readout.pixel, pixels):
+    readout = batch.model.readout
+    pixels = readout.few_pixels
+    if pixels is None or not confusion.affordable(readout.pixel, pixels):
         return None
-    electrons = model.pixel_electrons(curves)
-    light = model.capture_light
-    return [
-        confusion.errors(case, pixels, model.readout.pixel, members, light) for case in np.moveaxis(electrons, -3, 0)
-    ]
+    light = readout.of_pixels(readout.capture_light) if readout.pixel.captures else None
+    electrons = np.moveaxis(batch.model.pixel_electrons(batch.curves), -3, 0)
+    return [confusion.errors(case, pixels, readout.pixel, batch.confused, light) for case in electrons]
 
 
 def _gaussian(read: NoisyReadout, members: Mapping[str, MemberNumbers]) -> _ByPair:
@@ -130,17 +127,16 @@ def _gaussian(read: NoisyReadout, members: Mapping[str, MemberNumbers]) -> _ByPa
     }
 
 
-def _errors(
-    model: ForwardModel, curves: DesignCurves, read: NoisyReadout, members: Mapping[str, MemberNumbers]
-) -> tuple[_ByPair, _ByPair, PerDesign]:
+def _errors(batch: Batch, members: Mapping[str, MemberNumbers]) -> tuple[_ByPair, _ByPair, PerDesign]:
     """Return error and bound of each pair, and the bound of all states, the largest over the cases."""
-    exact, pairs = _exact(model, curves, members), class_pairs(list(members))
+    exact, pairs = _exact(batch), class_pairs(list(members))
     if exact is not None:
         return (
             {pair: np.max([errors.error[pair] for errors in exact], axis=0) for pair in pairs},
             {pair: np.max([errors.bound[pair] for errors in exact], axis=0) for pair in pairs},
             np.max([errors.state_bound for errors in exact], axis=0),
         )
+    read = batch.read_with_noise
     mean, variance, shape = NoiseShape.of_cases(read)
     bounds, state_bound = error_bounds(mean, variance, members, shape)
     cases = read.mean.shape[:2]

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from ...base.types import Array, DesignCurves, Float
+from ...base.types import Array, Float
 from ...camera.brightness import LampReadings
-from ...camera.forward import ForwardModel, forward_model
+from ...camera.model import scene_model
 from ...camera.pwm import exposure_scales, phases_of
 from ...camera.setup import Setup
+from ..batch import Batch
 from ..chromatic import squared_distance
-from ..metric import PulseMetric
+from ..metric import Metric
 from ..quantity import DN, Columns, Quantity, RequestedQuantities
 
 MODULATION, LAMP_SEEN, FALSE_HUE = "flicker_modulation", "lamp_seen", "false_hue_dn"
@@ -24,11 +23,11 @@ _MANY = 16
 _SEEN_DN = 1.0
 
 
-class Flicker(PulseMetric):
+class Flicker(Metric):
     """Changes of a lamp's readout with the phase of its pulses, which is uniform."""
 
     order = 6
-    names = (MODULATION, LAMP_SEEN, FALSE_HUE)
+    needs = "pulses"
 
     def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
         if not requested.flicker:
@@ -64,21 +63,15 @@ class Flicker(PulseMetric):
             ),
         )
 
-    def of_pulses(self, model: ForwardModel, curves: DesignCurves) -> Columns:
+    def of_batch(self, batch: Batch) -> Columns:
         """Compute the columns, design by design, since phases depend on the exposure."""
-        setup = model.setup
-        steady = forward_model(replace(setup, scene=setup.scene.model_copy(update={"drive": None})))
-        exposure_s, rows = model.light.exposure_s(curves), []
-        for design, time_s in zip(curves, exposure_s, strict=True):
-            of_places = [_of_lamps(lamps, setup, time_s) for lamps in steady.lamps(design[None])]
-            rows.append(
-                {
-                    MODULATION: max(place[MODULATION] for place in of_places),
-                    LAMP_SEEN: min(place[LAMP_SEEN] for place in of_places),
-                    FALSE_HUE: max(place[FALSE_HUE] for place in of_places),
-                }
-            )
-        return {name: np.array([row[name] for row in rows]) for name in rows[0]}
+        setup, rows = batch.setup, []
+        if setup.scene.drive is None or not setup.camera.pixel.captures:
+            return {}
+        for design, time_s in zip(batch.curves, batch.exposure_s, strict=True):
+            rows.append([_of_lamps(lamps, setup, time_s) for lamps in scene_model(setup.steady).lamps(design[None])])
+        worst = {MODULATION: max, LAMP_SEEN: min, FALSE_HUE: max}
+        return {name: np.array([of(place[name] for place in row) for row in rows]) for name, of in worst.items()}
 
 
 def _of_lamps(lamps: LampReadings, setup: Setup, time_s: float) -> dict[str, float]:

@@ -6,10 +6,9 @@ from functools import partial
 
 import numpy as np
 
-from ...base.types import DesignParameters
-from ...designs.family import Family
 from ...designs.products import row_products
-from ..metric import FamilyMetric
+from ..batch import Batch
+from ..metric import Metric
 from ..quantity import Columns, Quantity, RequestedQuantities
 from ..smooth import Rows, SmoothDesign
 
@@ -19,10 +18,11 @@ _MEANINGS = {
 }
 
 
-class SmallestWidths(FamilyMetric):
+class SmallestWidths(Metric):
     """Narrowest edge and band."""
 
     order = 4
+    needs = "parameters"
 
     def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
         return tuple(
@@ -41,11 +41,12 @@ class SmallestWidths(FamilyMetric):
             for name in _MEANINGS
         )
 
-    def of_parameters(self, family: Family | None, points: DesignParameters) -> Columns:
+    def of_batch(self, batch: Batch) -> Columns:
         """Return the columns of the narrowest edge and band of each design, nm; NaN where the family has none."""
-        rows = {} if family is None else family.dimensions
-        nothing = np.full((len(points), 1), np.nan)
-        lengths = {name: row_products(points, rows[name].T) if name in rows else nothing for name in _MEANINGS}
+        if batch.points is None:
+            return {}
+        rows, nothing = {} if batch.family is None else batch.family.dimensions, np.full((batch.size, 1), np.nan)
+        lengths = {name: row_products(batch.points, rows[name].T) if name in rows else nothing for name in _MEANINGS}
         return {name: values.min(axis=1) for name, values in lengths.items()}
 
 

@@ -9,17 +9,14 @@ detection probability: implementation and use cases" (2019). Here the pedestal i
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
-from ...base.types import Array, DesignCurves, IndexArray, Int, MemberNumbers, Num, PerDesign, SameShape
-from ...camera.forward import ForwardModel
+from ...base.types import Array, IndexArray, Int, Num, PerDesign, SameShape
 from ...camera.noise.gaussian import share_below
-from ...camera.readout import NoisyReadout
 from ...spectra.lights import class_pairs, pair_name
+from ..batch import Batch
 from ..discrimination import NoiseShape
-from ..metric import NoiseMetric
+from ..metric import Metric
 from ..quantity import Columns, Quantity, RequestedQuantities
 
 CTA = "cta"
@@ -33,11 +30,11 @@ _MEANING = (
 )
 
 
-class Probabilities(NoiseMetric):
+class Probabilities(Metric):
     """The least over sampling phases and moments."""
 
     order = 6
-    extra = True
+    needs = "noise"
 
     def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
         if not requested.probabilities:
@@ -55,15 +52,15 @@ class Probabilities(NoiseMetric):
             for pair in class_pairs(requested.states)
         )
 
-    def of_noise(
-        self, model: ForwardModel, curves: DesignCurves, read: NoisyReadout, members: Mapping[str, MemberNumbers]
-    ) -> Columns:
+    def of_batch(self, batch: Batch) -> Columns:
         """Compute the columns from mean and variance of the digital numbers."""
-        columns: Columns = {}
+        if not (batch.noisy and batch.probabilities):
+            return {}
+        columns, read, members = Columns(), batch.read_with_noise, batch.confused
         mean, variance, _ = NoiseShape.of_cases(read)
         for pair in class_pairs(list(members)):
             pair_members = members[pair[0]], members[pair[1]]
-            detected = detection(mean - model.readout.pixel.offset_dn, variance, *pair_members)
+            detected = detection(mean - batch.setup.camera.pixel.offset_dn, variance, *pair_members)
             columns[pair_name(CTA, pair)] = detected.reshape(read.mean.shape[:2]).min(axis=1)
         return columns
 

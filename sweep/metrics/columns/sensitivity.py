@@ -9,7 +9,8 @@ import numpy as np
 from ...base.types import CurvesGradient, PerRow
 from ...camera.setup import Setup
 from ...designs.block import Block, CurveBlock
-from ..metric import DesignMetric
+from ..batch import Batch
+from ..metric import Metric
 from ..quantity import Columns, LinearRows, Quantity, RequestedQuantities
 from ..separation import cfa_sensitivity
 from ..smooth import Rows, SmoothDesign
@@ -26,10 +27,11 @@ def reference_of(brightest: str) -> str:
     return alone if brightest else "a sensor without color filters"
 
 
-class Sensitivity(DesignMetric):
+class Sensitivity(Metric):
     """Total QE of the modified channels relative to the replaced curves, and of the CFA relative to a clear sensor."""
 
     order = 1
+    needs = "filters"
 
     def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
         of_filter = Quantity(
@@ -59,19 +61,24 @@ class Sensitivity(DesignMetric):
         )
         return of_filter, of_cfa
 
-    def of_designs(self, setup: Setup, block: Block) -> Columns:
+    def of_batch(self, batch: Batch) -> Columns:
         """Compute the sensitivity of N relative to Y, NaN without a modified channel, and that of the CFA."""
-        modified, counts = list(setup.camera.modified), setup.camera.mosaic.counts
-        indicators = np.repeat(
-            np.eye(len(modified)), setup.camera.grid.size, axis=0
-        )  # the sum over wavelengths of each channel
-        totals = block.product(indicators, np.arange(setup.camera.grid.size)) if modified else np.empty((len(block), 0))
-        every = np.empty((len(block), len(counts)))
-        every[:] = setup.camera.qe.sum(axis=1, dtype=float)
-        every[:, modified] = totals
-        base_qe = np.asarray(setup.camera.base_qe, dtype=float)
-        sensitivity = totals.sum(axis=1) / base_qe.sum() if modified else np.full(len(block), np.nan)
-        return {SENSITIVITY: sensitivity, CFA_SENSITIVITY: cfa_sensitivity(every, counts, setup.camera.clear_qe)}
+        return sensitivities(batch.setup, batch.block)
+
+
+def sensitivities(setup: Setup, block: Block) -> Columns:
+    """Return the sensitivities of designs."""
+    modified, counts = list(setup.camera.modified), setup.camera.mosaic.counts
+    indicators = np.repeat(
+        np.eye(len(modified)), setup.camera.grid.size, axis=0
+    )  # the sum over wavelengths of each channel
+    totals = block.product(indicators, np.arange(setup.camera.grid.size)) if modified else np.empty((len(block), 0))
+    every = np.empty((len(block), len(counts)))
+    every[:] = setup.camera.qe.sum(axis=1, dtype=float)
+    every[:, modified] = totals
+    base_qe = np.asarray(setup.camera.base_qe, dtype=float)
+    sensitivity = totals.sum(axis=1) / base_qe.sum() if modified else np.full(len(block), np.nan)
+    return {SENSITIVITY: sensitivity, CFA_SENSITIVITY: cfa_sensitivity(every, counts, setup.camera.clear_qe)}
 
 
 def sensitivities_gradient(setup: Setup, curves_gradient: CurvesGradient) -> Columns:
@@ -98,7 +105,7 @@ def cfa_sensitivity_at(setup: Setup, sensitivity: float) -> float | None:
 def light_of(design: SmoothDesign) -> Columns:
     """Return both sensitivities of one design."""
     block = CurveBlock(design.curves[None])
-    return design.cached("light", lambda: Sensitivity().of_designs(design.setup, block))
+    return design.cached("light", lambda: sensitivities(design.setup, block))
 
 
 def _row(design: SmoothDesign, *, name: str) -> Rows:

@@ -5,18 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from ...camera.setup import Setup
-from ...designs.block import Block
-from ..metric import DesignMetric
+from ..batch import Batch
+from ..metric import Metric
 from ..quantity import Columns, LinearRows, Quantity, RequestedQuantities
 from ..smooth import Rows, SmoothDesign
 
 _SLOPE, _LEAST = "slope_per_nm", "min_transmission"
 
 
-class Shape(DesignMetric):
+class Shape(Metric):
     """Slope and smallest transmission."""
 
     order = 2
+    needs = "filters"
 
     def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
         slope = Quantity(
@@ -45,12 +46,13 @@ class Shape(DesignMetric):
         )
         return slope, least
 
-    def of_designs(self, setup: Setup, block: Block) -> Columns:
+    def of_batch(self, batch: Batch) -> Columns:
         """Compute the steepest slope and the smallest ratio over the wavelengths; NaN without a modified channel."""
-        if not setup.camera.modified:
-            return dict.fromkeys((_SLOPE, _LEAST), np.full(len(block), np.nan))
-        steepest, lowest = block.shapes(np.asarray(setup.camera.base_qe, dtype=float))
-        return {_SLOPE: steepest / setup.camera.grid.step_nm, _LEAST: lowest}
+        camera = batch.setup.camera
+        if not camera.modified:
+            return dict.fromkeys((_SLOPE, _LEAST), np.full(batch.size, np.nan))
+        steepest, lowest = batch.block.shapes(np.asarray(camera.base_qe, dtype=float))
+        return {_SLOPE: steepest / camera.grid.step_nm, _LEAST: lowest}
 
 
 def _slopes(design: SmoothDesign) -> Rows:

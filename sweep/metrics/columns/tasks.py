@@ -5,10 +5,9 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from ...camera.setup import Setup
-from ...designs.block import Block
 from ...spectra.tasks import LightName
-from ..metric import DesignMetric
+from ..batch import Batch
+from ..metric import Metric
 from ..quantity import Columns, Quantity, RequestedQuantities
 from ..smooth import Rows, SmoothDesign
 
@@ -19,10 +18,11 @@ PREFIX = "task_"
 """How the metrics of tasks begin."""
 
 
-class TaskFigures(DesignMetric):
+class TaskFigures(Metric):
     """Columns of tasks; none if a study has no tasks."""
 
     order = 6
+    needs = "filters"
 
     def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
         if not requested.tasks:
@@ -47,13 +47,13 @@ class TaskFigures(DesignMetric):
             for name, figure, case in figures_of(task)
         )
 
-    def of_designs(self, setup: Setup, block: Block) -> Columns:
+    def of_batch(self, batch: Batch) -> Columns:
         """Compute the columns; see `evaluation.task_columns`."""
-        if setup.tasks is None:
+        if batch.setup.tasks is None:
             return {}
         from ..tasks.evaluation import task_columns
 
-        return task_columns(setup, block)
+        return task_columns(batch.setup, batch.block)
 
 
 def _rows(design: SmoothDesign, *, task: str, what: str, case: LightName) -> Rows:

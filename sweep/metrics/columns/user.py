@@ -8,19 +8,24 @@ import numpy as np
 
 from ...base.errors import SweepError, ValidationIssue
 from ...base.types import Array, DesignSignals, Float
+from ..batch import Readings
 from ..metric import Metric
-from ..quantity import Quantity, RequestedQuantities
+from ..quantity import Columns, Quantity, RequestedQuantities
 from ..smooth import Rows, SmoothDesign
-from ..user_metrics import Readings, UserMetric
+from ..user_metrics import Readings as UserReadings
+from ..user_metrics import UserMetric
 
 _STEP = 1e-5
 """Half of a central difference, in units of the box."""
 
 
 class UserColumns(Metric):
-    """Columns that `user_quantities` computes with the readout."""
+    """Columns of metrics of user code; `metric`: the one that is evaluated."""
 
     order = 9
+
+    def __init__(self, metric: UserMetric | None = None) -> None:
+        self._metric = metric
 
     def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
         return tuple(
@@ -41,6 +46,19 @@ class UserColumns(Metric):
             for metric in requested.user_metrics
         )
 
+    def of_readings(self, readings: Readings) -> Columns:
+        """Return the worst of the numbers that the metric says of each design; NaN if it has none for the CFA."""
+        metric, n = self._metric, len(readings.dark)
+        if metric is None:
+            return {}
+        first = metric.parts(UserReadings.of_setup(readings.setup, readings.whole[:1]))
+        if first is None:  # and no more are read
+            return {metric.name: np.full(n, np.nan)}
+        parts = metric.parts(UserReadings.of_setup(readings.setup, readings.whole))
+        if parts is None:
+            return {metric.name: np.full(n, np.nan)}
+        return {metric.name: parts.min(axis=1) if metric.direction == "more" else parts.max(axis=1)}
+
 
 def _rows(design: SmoothDesign, *, metric: UserMetric) -> Rows:
     """Return a row for each of its numbers in every case, with derivatives by differences along the response's."""
@@ -53,7 +71,9 @@ def _rows(design: SmoothDesign, *, metric: UserMetric) -> Rows:
 
 
 def _parts(metric: UserMetric, design: SmoothDesign, dn: DesignSignals) -> Float[Array, "designs parts"]:
-    parts = metric.parts(Readings.of_setup(design.setup, dn), finite=False)  # a design without light is not feasible
+    parts = metric.parts(
+        UserReadings.of_setup(design.setup, dn), finite=False
+    )  # a design without light is not feasible
     if parts is None:
         raise SweepError(
             ValidationIssue(

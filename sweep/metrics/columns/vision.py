@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.types import DesignCurves
+from ...base.types import ChannelCurves
 from ...camera.setup import Setup
-from ...vision.section import Vision
-from ..metric import VisionMetric
+from ...vision.section import SeededVision
+from ..batch import Batch
+from ..metric import Metric
 from ..quantity import Columns, Quantity, RequestedQuantities
 from ..smooth import Rows, SmoothDesign
 
 VISION_ERROR = "vision_error"
 
 
-class ImageReading(VisionMetric):
+class ImageReading(Metric):
     """Ideal observer over the images of the benchmark's first seed, with the lenses in any order."""
 
     order = 8
+    needs = "images"
 
     def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
         meaning = (
@@ -37,15 +39,23 @@ class ImageReading(VisionMetric):
         )
         return (error,) if requested.vision else ()
 
-    def of_images(self, setup: Setup, curves: DesignCurves, vision: Vision, seed: int) -> Columns:
+    def of_batch(self, batch: Batch) -> Columns:
         """Compute the mean over the images of one less the probability of the most probable state."""
-        from ...vision.readers import observer_error  # noqa: PLC0415  (only where a study asks for images)
+        if batch.images is None:
+            return {}
+        errors = [_error(batch.setup, curves, batch.images) for curves in batch.curves]
+        return {VISION_ERROR: np.array(errors)}
 
-        return {VISION_ERROR: np.array([observer_error(setup, curve, vision, (seed, 0)) for curve in curves])}
+
+def _error(setup: Setup, curves: ChannelCurves, images: SeededVision) -> float:
+    from ...vision.readers import observer_error  # noqa: PLC0415  (only where a study asks for images)
+
+    vision, seed = images
+    return observer_error(setup, curves, vision, (seed, 0))
 
 
 def _rows(design: SmoothDesign) -> Rows:
     """Return its value, for the same scenes and random numbers of all designs."""
     assert design.images is not None
-    error = ImageReading().of_images(design.setup, design.curves[None], *design.images)[VISION_ERROR]
+    error = np.array([_error(design.setup, design.curves, design.images)])
     return Rows(error, np.zeros((1, len(design.by_u))))
