@@ -68,7 +68,7 @@ class Electrons:
         if isinstance(self.response.source, SplitLight):
             self.response.source.add_sums(spectra, channels, out)
             return
-        cases, size = len(out[0]), spectra.shape[-1]
+        cases, size = out.shape[1], spectra.shape[-1]
         for at, channel in enumerate(channels):
             seen = np.flatnonzero(self.response.uniform[:, :, channel].any(axis=0))
             light = self.response.light[:, seen, channel]

@@ -146,7 +146,7 @@ class LinearModel:
             moments = len(electrons) // readout.n_cases
             for case in range(len(electrons)):
                 here = readout.subset(slice(case // moments, case // moments + 1))
-                lamps = LampReadings(lit[case] * light[:, None], dark[case] * light, light, here, noisy)
+                lamps = LampReadings(lit[case] * light[:, None], dark[case] * light, light, here, noisy, lit.shape[-1])
                 result.append(LampSlopes(lamps, lit_by_u[:, case], dark_by_u[:, case]))
         return result
 

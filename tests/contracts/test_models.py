@@ -134,7 +134,7 @@ def test_electrons_of_a_flat_light() -> None:
     light = Lights("flat", ("flat",), ("flat",), np.full((1, 301), 1 / 301), 1.0, "", True)
     scenario = Scene(photon_radiance=1e15 * 301 / factor, exposure=FixedExposure(exposure_s=1.0))
     setup = Setup(Camera(grid, Mosaic.from_rows("RB", [["R", "B"]]), qe, (), qe[0], pixel), light, scenario)
-    rate = SceneModel(setup).electrons.rates(np.empty((1, 0, 301)))
+    rate = next(SceneModel(setup).views()).electrons.rates(np.empty((1, 0, 301)))
     # 1e15 photons/s/m^2/nm x 301 nm x 0.25 x 2e-12 m^2
     np.testing.assert_allclose(rate, 1e15 * 301 * 0.25 * 2e-12, rtol=1e-13)
 

@@ -125,9 +125,9 @@ def test_each_swept_design_of_the_page_is_limited_by_its_nearest_lights(finished
     block = edges_of(space, 0, space.size)
     assert block is not None
     setup = study.setup(space, "chart")
-    read = SceneModel(setup).read_changing(block.subset(rows.index.to_numpy() - first))
+    read = SceneModel(setup).changing(block.subset(rows.index.to_numpy() - first))
     assert read is not None
-    whole_response, names = read.whole[:, 0], np.array(setup.lights.names)
+    whole_response, names = read.whole(slice(None))[:, 0], np.array(setup.lights.names)
     for one, other in study.pairs:
         a, b = (np.flatnonzero(np.array(setup.lights.types) == kind) for kind in (one, other))
         for start in range(0, len(rows), 1000):
