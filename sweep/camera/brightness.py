@@ -13,10 +13,10 @@ import numpy as np
 
 from ..base.types import Array, Bool, BoolArray, DesignSignals, Float, IndexArray, Int, PerDesign, PerValue
 from .effects import any_filter
-from .merge import merged, without_noise
+from .noise.merge import merged, without_noise
+from .noise.pixel_curve import PixelCurve, groups_of, pixel_curve, same_electrons
 from .noise.table import unclipped_e
 from .pixel import unquantized
-from .pixel_curve import PixelCurve, groups_of, pixel_curve, same_electrons
 from .readout import Readout
 from .setup import Setup
 

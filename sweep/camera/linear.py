@@ -17,8 +17,8 @@ from .brightness import LampReadings, LampSlopes, room_dn
 from .exposure import relative_slope
 from .memory import blocks
 from .model import SceneModel, View, too_many
+from .noise.pixel_curve import STEPS_DN2, groups_of, pixel_curve
 from .pixel import unquantized
-from .pixel_curve import STEPS_DN2, groups_of, pixel_curve
 from .readout import Readout
 from .response import SplitLight
 from .setup import READOUT, Setup

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import sweep
-from sweep.camera.merge import merged
 from sweep.camera.model import scene_model
+from sweep.camera.noise.merge import merged
 from sweep.camera.pixel import Pixel
 from sweep.metrics.columns.sensitivity import CFA_SENSITIVITY
 from sweep.metrics.quantity import Column

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from sweep.camera.model import scene_model
-from sweep.metrics.nearest import nearest_pairs
+from sweep.metrics.separation_kernels import nearest_pairs
 from sweep.results import shown
 from sweep.results.designs import row_curves
 from sweep.results.tables import LIMITED_BY

@@ -12,10 +12,10 @@ import pytest
 from scipy.spatial.distance import cdist
 
 from sweep.base.types import FloatArray
-from sweep.camera.merge import light_of, limits_dn
 from sweep.camera.model import SceneModel
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.noise import table
+from sweep.camera.noise.merge import light_of, limits_dn
 from sweep.camera.pixel import Pixel
 from sweep.camera.sampling import Window, center_weights
 from sweep.camera.setup import READOUT
