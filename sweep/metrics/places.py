@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from ..base.errors import SweepError, ValidationIssue
 from ..base.types import Array, DesignCurves, Float, IndexArray, Int, PerValue
 from ..camera.memory import blocks
 from ..camera.model import SceneModel, View
@@ -37,6 +38,8 @@ def over_cases(model: SceneModel, cases: Columns, user_metrics: Sequence[UserMet
     best = {quantity.of: name for name, quantity in quantities.items() if quantity.extreme == "best place"}
     columns: Columns = {}
     for name, values in cases.items():
+        if name not in quantities:
+            raise SweepError(ValidationIssue("a metric gives a column that is none of its `quantities`", value=name))
         if len(values) == 1:
             columns |= {column: values[0].copy() for column in (name, best.get(name)) if column is not None}
             continue
