@@ -244,44 +244,45 @@ def _geometric(
     return np.asarray(first * np.exp(decades * np.arange(steps + 1) / steps), dtype=float)
 
 
+Alike = tuple[Int[IndexArray, " groups"], Float[Array, "groups pixels"]]
+"""The first of each group of pixels with the same light, and 1 for the pixels of each group."""
+
+
 def of_case(
     electrons: Float[Array, "captures signals pixels"],
     dark: Float[Array, "captures pixels"],
     readout: Readout,
+    alike: Alike | None,
     *,
     noisy: bool,
 ) -> LampReadings:
     """Return the readings of a case from electrons with and without lamps.
 
-    `dark` is `electrons` without lamps.
+    `dark` is `electrons` without lamps; `alike` are the pixels with the same light.
     """
     light = readout.capture_light if readout.pixel.captures else np.ones((1, dark.shape[1]))
-    lit, alike, n_pixels = electrons - dark[:, None], _alike(electrons, dark, light), dark.shape[1]
+    lit, n_pixels = electrons - dark[:, None], dark.shape[1]
     if alike is not None:
-        first, which = alike
-        groups = np.arange(first.size)[:, None] == which
+        first, groups = alike
         weights, spread_weights = groups @ readout.weights, groups @ readout.spread_weights
         lit, dark, light = lit[..., first], dark[:, first], light[:, first]
         readout = replace(readout, weights=weights, spread_weights=spread_weights, capture_light=light)
     return LampReadings(lit, dark, light, readout, noisy, n_pixels)
 
 
-def _alike(
-    electrons: Float[Array, "captures signals pixels"],
-    dark: Float[Array, "captures pixels"],
-    light: Float[Array, "captures pixels"],
-) -> tuple[Int[IndexArray, " groups"], Int[IndexArray, " pixels"]] | None:
-    """Return the first of each group of pixels with the same light, as around a centered lamp, and the group of each.
-
-    None if all differ.
-    """
+def alike_pixels(
+    electrons: Float[Array, "captures signals pixels"], dark: Float[Array, "captures pixels"], readout: Readout
+) -> Alike | None:
+    """Return the pixels with the same light, as around a centered lamp; None if all differ."""
     if dark.shape[1] <= _FEW:
         return None
-    key = np.concatenate([electrons.sum(axis=1), dark, light])
+    key = np.concatenate([electrons.sum(axis=1), dark, readout.capture_light])
     key = np.round(key / np.maximum(key.max(axis=1, keepdims=True), 1e-300), _DIGITS)
     first, which = np.unique(key, axis=1, return_index=True, return_inverse=True)[1:]
-    same = same_electrons(electrons, electrons[..., first[which.ravel()]])
-    return (first, which.ravel()) if same and first.size < which.size else None
+    which = which.ravel()
+    if first.size == which.size or not same_electrons(electrons, electrons[..., first[which]]):
+        return None
+    return first, (np.arange(first.size)[:, None] == which).astype(float)
 
 
 def room_dn(setup: Setup, response: DesignSignals, unlit: Float[Array, "designs channels"]) -> PerDesign:

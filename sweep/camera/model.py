@@ -29,7 +29,7 @@ from ..base.types import (
 )
 from ..designs.block import Block
 from . import pwm
-from .brightness import LampReadings, of_case
+from .brightness import LampReadings, alike_pixels, of_case
 from .electrons import Electrons, FieldPosition
 from .exposure import exposure_times, fixed_white, white_irradiance
 from .field import field_heights, scene_at
@@ -338,10 +338,14 @@ class SceneModel:
             dark = view.captured(curves, scales, exposure_s, lit=False)
             if not self.setup.camera.pixel.captures:
                 electrons, dark = electrons[None], dark[None]
-            for case in range(electrons.shape[2]):
-                phase = case // scales.shape[-1]
+            moments = scales.shape[-1]
+            for phase in range(electrons.shape[2] // moments):
                 readout = view.readout.subset(slice(phase, phase + 1))
-                yield of_case(electrons[:, 0, case], dark[:, 0, case, 0], readout, noisy=is_noisy(self.setup))
+                part = slice(phase * moments, (phase + 1) * moments)
+                lit, unlit = electrons[:, 0, part], dark[:, 0, part, 0]
+                alike = alike_pixels(lit.sum(axis=1), unlit.sum(axis=1), readout)  # at every moment of a pulse
+                for at in range(moments):
+                    yield of_case(lit[:, at], unlit[:, at], readout, alike, noisy=is_noisy(self.setup))
 
     def pixel_electrons(self, curves: DesignCurves) -> Float[Array, "*captures designs cases signals pixels"]:
         """Return expected electrons of the pixels that are read.
