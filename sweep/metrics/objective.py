@@ -88,7 +88,7 @@ def columns_of(requested: RequestedQuantities, objective: Objective) -> Mapping[
     """Return the quantities of a study's result table."""
     if objective.column != COMBINED:
         return quantities_of(requested)
-    combined = Quantity(COMBINED, COMBINED, f"the study's objective: {objective}", direction="more")
+    combined = Quantity(COMBINED, COMBINED, f"the study's objective: {objective}", direction="more", constrained=False)
     if objective.rule.direction == "less":
         combined = replace(combined, unit=LOG10, label=str(objective), digits=3, infinite=True)
     return {**quantities_of(requested), COMBINED: combined}

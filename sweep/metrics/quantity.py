@@ -103,15 +103,15 @@ class Quantity(Column):
     Parameters
     ----------
     ends : tuple of str
-        Ends that a constraint may have.
+        Ends that a constraint may have; left out, the least if more is wanted, and the most if less is.
+    constrained : bool
+        A constraint may name it.
     goal : bool
         A search may maximize it (or minimize it, if less is wanted).
     needs : {'modified', 'family', 'own', ''}
         It exists only with a modified channel, in some families, or for some CFAs.
     infinite, signed : bool
         It may be infinite, or negative.
-    has_error_bound : bool
-        The error bound of a plan covers it.
     nominal : bool
         It has no worst case.
     scale : {'linear', 'squared', 'log10'}
@@ -133,11 +133,11 @@ class Quantity(Column):
     """
 
     ends: tuple[End, ...] = ()
+    constrained: bool = True
     goal: bool = False
     needs: Literal["modified", "family", "own", ""] = ""
     infinite: bool = False
     signed: bool = False
-    has_error_bound: bool = False
     nominal: bool = False
     scale: Literal["linear", "squared", "log10"] = "linear"
     distance_kind: Literal["", "DN", "noise", "chromatic"] = ""
@@ -149,6 +149,16 @@ class Quantity(Column):
     smooth_members: Callable[[SmoothDesign], Rows] | None = field(default=None, repr=False)
     yield_rows: Callable[[SmoothDesign], Rows] | None = field(default=None, repr=False)
     linear: Callable[[Setup], LinearRows] | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        usual: dict[str, tuple[End, ...]] = {"more": ("min",), "less": ("max",), "": ()}
+        ends = (self.ends or usual[self.direction]) if self.constrained else ()
+        object.__setattr__(self, "ends", ends)
+
+    @property
+    def has_error_bound(self) -> bool:
+        """True for a CSD, also at its best place, which the error bound of a plan covers."""
+        return self.distance_kind == DN or self.extreme == "best place"
 
     @property
     def has_limit(self) -> bool:
@@ -178,7 +188,7 @@ class Quantity(Column):
         )
         label = f"{self.words} of {percent} of drawn lamps and cameras"
         named = replace(self, name=YIELD + self.name, meaning=meaning, label=label, extreme=OF_A_SHARE, of=self.name)
-        unknown = replace(named, distance_kind="", linear=None, has_error_bound=False, smooth_members=None)
+        unknown = replace(named, distance_kind="", linear=None, smooth_members=None)
         return replace(unknown, scale="linear", smooth=self.yield_rows, yield_rows=None)
 
     def value(self, rows: Rows) -> float:

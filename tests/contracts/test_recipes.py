@@ -176,7 +176,7 @@ class Darkest(Metric):
     order = 10
 
     def quantities(self, requested):
-        return (Quantity("darkest_dn", "darkest_dn", "weakest signal in its best channel", "DN", direction="more", ends=("min",)),)
+        return (Quantity("darkest_dn", "darkest_dn", "weakest signal in its best channel", "DN", direction="more"),)
 
     def of_readings(self, readings):
         return {"darkest_dn": readings.dn.max(axis=2).min(axis=1)}

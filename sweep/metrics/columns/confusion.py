@@ -89,7 +89,6 @@ def _quantity(metric: str, name: str, types: tuple[str, ...]) -> Quantity:
         states=types,
         label=f"{'/'.join(types)} {_TOLD[metric]}" if metric in _TOLD else "",
         direction="less" if less else "more",
-        ends=("max",) if less else ("min",),
         goal=True,
         nominal=True,  # each shift would take an evaluation with noise
         infinite=True,  # signals without noise are separated with certainty

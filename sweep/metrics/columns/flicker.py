@@ -39,7 +39,6 @@ class Flicker(Metric):
                 meaning="flicker modulation of a pulsed lamp: (most - least) / (most + least) of its brightest channel "
                 "over all phases of its pulses (IEEE P2020), for the lamp with most",
                 direction="less",
-                ends=("max",),
                 digits=3,
             ),
             Quantity(
@@ -48,7 +47,6 @@ class Flicker(Metric):
                 meaning="share of the phases of its pulses in which a lamp's brightest channel has 1 DN or more above "
                 "the readout without lamps, for the lamp with least",
                 direction="more",
-                ends=("min",),
                 digits=3,
             ),
             Quantity(
@@ -58,7 +56,6 @@ class Flicker(Metric):
                 "between its color at a phase of its pulses and its mean color",
                 unit=DN,
                 direction="less",
-                ends=("max",),
                 digits=1,
             ),
         )

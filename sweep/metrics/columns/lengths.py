@@ -34,7 +34,6 @@ class SmallestWidths(Metric):
                 label=name.removesuffix("_nm").replace("_", " "),
                 digits=2,
                 direction="more",
-                ends=("min",),
                 needs="family",
                 smooth=partial(_rows, name=name),
             )

@@ -46,7 +46,6 @@ class Probabilities(Metric):
                 meaning=_MEANING,
                 pair=pair,
                 direction="more",
-                ends=("min",),
                 most=1.0,
             )
             for pair in class_pairs(requested.states)

@@ -38,7 +38,6 @@ class TaskFigures(Metric):
                 label=" ".join(part for part in (task.name.replace("_", " "), figure.words, case.upper()) if part),
                 digits=figure.digits,
                 direction=figure.direction,
-                ends=("min",) if figure.direction == "more" else ("max",),
                 goal=True,
                 signed=figure.signed,
                 smooth=partial(_rows, task=task.name, what=figure.what, case=case),

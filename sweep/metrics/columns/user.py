@@ -36,7 +36,6 @@ class UserColumns(Metric):
                 label=metric.label,
                 digits=metric.digits,
                 direction=metric.direction,
-                ends=("min",) if metric.direction == "more" else ("max",),
                 goal=True,
                 needs="own",
                 signed=True,

@@ -31,7 +31,6 @@ class ImageReading(Metric):
             VISION_ERROR,
             meaning,
             direction="less",
-            ends=("max",),
             goal=True,
             nominal=True,
             smooth=_rows,
