@@ -47,9 +47,9 @@ class Lattice:
         steps = np.maximum(*(np.where(np.isfinite(side), side, 0.0) for side in (gaps[:-1], gaps[1:])))
         return cls(places[:, None], steps, rounds, finer, ends=(float(places[0]), float(places[-1])))
 
-    def apart(self, one: Float[Array, "*batch axes"], other: Float[Array, "*batch axes"]) -> Float[Array, " ..."]:
-        """Return the largest distance along an axis."""
-        distance = np.abs(one - other)
+    def apart(self, places: _Places, center: Float[Array, " axes"]) -> Float[Array, " places"]:
+        """Return the largest distance of places along an axis."""
+        distance = np.abs(places - center)
         if self.period is not None:
             distance = np.abs(np.mod(distance + self.period / 2, self.period) - self.period / 2)
         return np.asarray(distance.max(axis=-1), dtype=float)

@@ -61,7 +61,7 @@ def refine(batch: Batch, cases: Columns) -> Columns:
         return {}
     for start in range(0, known.size, _TOGETHER):
         designs = known[start : start + _TOGETHER]
-        curves = [batch.curves_of(design) for design in designs]
+        curves = [batch.curves_of(int(design)) for design in designs]
         if setup.all_phases and fine:
             lattice, at = fine_lattice(setup), _at_phases(model)
             on_lattice = at(curves, [lattice.places] * len(curves))
