@@ -20,17 +20,6 @@ def tiny(tmp_path_factory: pytest.TempPathFactory) -> sweep.LoadedStudy:
     return sweep.load_study(study_file(tmp_path_factory.mktemp("api")))
 
 
-def test_a_filter_gets_the_very_numbers_of_the_same_named_design(tiny: sweep.LoadedStudy) -> None:
-    named = tiny.evaluate()
-    mine = named[(named.name == "mine")].reset_index(drop=True)
-    family = sweep.Stopband(tiny.wavelength_nm, tiny.curve("Y").to_numpy(), tiny.curve("G").to_numpy())
-    curve = family.curves(np.array([[606.0, 36, 646, 7, 1]]))[0, 0]
-    found = tiny.evaluate(N=pd.Series(curve, index=tiny.wavelength_nm))
-    same = [name for name in tiny.quantities if name not in ("edge_width_nm", "band_width_nm")]
-    assert found.scenario.tolist() == ["chart", "dim"]
-    pd.testing.assert_frame_equal(found[same], mine[same], rtol=1e-12)
-
-
 def test_csd_is_the_smallest_distance_of_rounded_digital_numbers() -> None:
     """By the equations of the white patch, in plain sums: level x full scale x K x light of a channel over the largest."""
     study = sweep.make_study(

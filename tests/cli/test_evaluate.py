@@ -14,7 +14,6 @@ import sweep
 
 from ..build import study_file
 from ..commanded import commanded
-from ..conftest import FinishedFolder
 from ..curve_texts import WAVE, bell, csv
 
 
@@ -165,16 +164,6 @@ def test_faults_are_lines(own: Path, monkeypatch: pytest.MonkeyPatch, requested:
     assert (code, out) == (2, "")
     assert said in err
     assert len(err.splitlines()) == 1
-
-
-@pytest.mark.slow
-def test_a_design_of_a_run_moves_as_it_did_there(finished: FinishedFolder) -> None:
-    folder = finished("angle")
-    table = pd.read_parquet(folder / "results.parquet")
-    best = table[table["kind"] == "search"].iloc[0]
-    found = sweep.evaluate(folder)
-    assert found.table["csd_yellow_red"].iloc[-1] == pytest.approx(best["csd_yellow_red"], abs=1e-9)
-    assert "that works by interference with effective index 1.8" in str(found)
 
 
 def loaded_by(*requested: object) -> tuple[str, set[str]]:

@@ -16,7 +16,7 @@ from sweep.camera.model import SceneModel
 from sweep.designs import block as blocks
 from sweep.designs.block import CurveBlock, edges_of
 from sweep.designs.families.free_form import FreeForm
-from sweep.designs.families.stopband import MultiStopband, Stopband
+from sweep.designs.families.stopband import MultiStopband
 from sweep.designs.space import Filter, Space
 from sweep.metrics import chromatic, separation
 from sweep.metrics.evaluate import evaluate
@@ -83,14 +83,6 @@ def test_few_designs_are_the_same_within_rounding_without_compiled_code(
         assert list(plain) == list(compiled)
         for column, values in plain.items():
             assert_within_rounding(column, compiled[column], values, VIEWS[name], magnitude_dn)
-
-
-def test_no_spectrum_is_made_by_the_separable_route(monkeypatch: pytest.MonkeyPatch) -> None:
-    edges = edges_of(SPACE, 0, SPACE.size)
-    assert edges is not None
-    monkeypatch.setattr(Stopband, "curves", None)
-    monkeypatch.setattr(Stopband, "edges", None)
-    evaluate(SceneModel(VIEWS["rounded"]), edges)
 
 
 def test_designs_that_set_the_exposure_take_the_dense_route() -> None:

@@ -101,28 +101,6 @@ def test_the_answer_three_numbers_and_the_plot_are_on_one_screen(
     assert apart(page, "#cfas .annotation")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("width", "most"), [(1440, 900), (400, 1200)])
-def test_gains_and_losses_are_on_the_first_screen(
-    finished: FinishedFolder, standing: Any, width: int, most: float
-) -> None:
-    """On a telephone they follow the plot."""
-    page = standing(finished("stopband"), width).page
-    page.evaluate("window.scrollTo(0, 0)")
-    assert box(page, ".first table")["y"] < most
-    if width == 1440:
-        assert box(page, ".first table tr:last-child >> nth=-1")["y"] < most - 20
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("width", [400, 1440])
-def test_the_noise_report_is_short(finished: FinishedFolder, opened: Any, width: int) -> None:
-    page = opened(finished("noise"), width).page
-    page.evaluate("document.querySelectorAll('details.section').forEach((box) => { box.open = false; })")
-    page.wait_for_function("document.getElementById('series-2').data || window.scrollTo(0, 1e6)")
-    assert page.evaluate("document.documentElement.scrollHeight") <= {400: 4 * 800, 1440: 3 * 900}[width] + 20
-
-
 @pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow) for name in ("fog", "dual", "paper")])
 def test_nothing_is_drawn_as_a_trade_off_where_nothing_trades_off(
     finished: FinishedFolder, standing: Any, name: str
@@ -201,53 +179,6 @@ def test_the_limiting_lights_stand_in_hover_details_and_clouds(finished: Finishe
         for light, u, v in zip(lights.split(" / "), x, y, strict=True):
             assert u == pytest.approx(own.loc[light, "R"], rel=1e-6)
             assert v == pytest.approx(own.loc[light, channel], rel=1e-6)
-
-
-def test_the_lights_stand_shaded_behind_the_qe(finished: FinishedFolder, standing: Any) -> None:
-    seen = standing(finished("stopband"))
-    shades = seen.page.evaluate(
-        "document.getElementById('curves').data.filter((t) => t.fill === 'tozeroy').map((t) => t.name)"
-    )
-    assert shades == ["green lights", "yellow lights", "orange lights", "red lights"]
-
-
-@pytest.mark.parametrize("name", ["stopband", pytest.param("paper", marks=pytest.mark.slow)])
-def test_no_table_is_cut_off(finished: FinishedFolder, standing: Any, name: str) -> None:
-    seen = standing(finished(name))
-    cut = seen.page.evaluate(
-        "[...document.querySelectorAll('.scroll')].filter((e) => e.offsetParent && e.querySelector('table')"
-        " && e.scrollWidth > e.clientWidth + 1).map((e) => e.innerText.slice(0, 60))"
-    )
-    assert cut == []
-
-
-def test_no_figure_is_shown_twice(finished: FinishedFolder, standing: Any) -> None:
-    seen = standing(finished("stopband"))
-    pictures = seen.page.evaluate("[...document.querySelectorAll('figure figcaption')].map((e) => e.textContent)")
-    assert pictures
-    assert not any("Trade-off" in text or "Filters" in text or "All CFAs" in text for text in pictures)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["stopband", "distance", "noise", "dual"])
-def test_on_paper_the_first_figure_stands_below_the_answer_and_no_legend_is_cut(
-    finished: FinishedFolder, opened: Any, name: str
-) -> None:
-    page = opened(finished(name), 1032).page  # A4 landscape less its margins, 96 pixels to the inch
-    page.emulate_media(media="print")
-    page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
-    page.wait_for_function("[...document.querySelectorAll('.plot')].every((e) => e.hidden || e.data)")
-    page.wait_for_timeout(500)
-    plot = box(page, ".first .plot")
-    assert plot["y"] + plot["height"] <= 703
-    assert plot["x"] + plot["width"] <= 1032
-    assert apart(page, "#curves .legend, #curves .xtitle")
-    scrolled = (
-        "[...document.querySelectorAll('.legend .scrollbar')].filter((e) => e.getBoundingClientRect().height > 0)"
-    )
-    assert page.evaluate(f"{scrolled}.length") == 0
-    page.evaluate("window.dispatchEvent(new Event('afterprint'))")
-    assert page.evaluate("document.querySelector('.first .plot').layout.height") > plot["height"]
 
 
 @pytest.mark.slow

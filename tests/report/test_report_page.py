@@ -103,24 +103,6 @@ def test_the_page_holds_the_limiting_lights_of_every_design(finished: FinishedFo
         assert [told["words"][code] for code in codes] == list(limited.loc[rows, f"limited_by_{pair}"])
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("trace", ["not feasible", "feasible", "Pareto front", "best of the search"])
-def test_pointing_at_any_design_tells_its_limiting_lights(finished: FinishedFolder, opened: Any, trace: str) -> None:
-    folder = finished("stopband")
-    limited = pd.read_parquet(folder / "limited_by.parquet").set_index("design_id")
-    seen = opened(folder)
-    seen.page.mouse.move(*seen.point_at(trace)[:2])
-    seen.page.wait_for_selector("#hover", state="visible")
-    title, *pointed = seen.page.inner_text("#hover").splitlines()
-    table = pd.read_parquet(folder / "results.parquet").set_index("design_id")
-    column, sought = ("filter_id", int(title.split()[1])) if title.startswith("filter ") else ("name", title)
-    (design,) = table.index[table[column] == sought]
-    for pair in ("green_yellow", "green_red", "yellow_red"):
-        at = [line.startswith(f"{pair.replace('_', '/')} CSD: ") for line in pointed].index(True)
-        lights = limited.loc[design, f"limited_by_{pair}"]
-        assert pointed[at + 1] == f"{pair.replace('_', '/')} CSD limited by: {lights}"
-
-
 def test_the_parallel_plot_leaves_out_infeasible_designs(finished: FinishedFolder, standing: Any) -> None:
     seen = standing(finished("stopband"))
     before = seen.number_of_points()
@@ -177,19 +159,6 @@ def test_brushing_an_axis_counts_the_selected_designs(finished: FinishedFolder, 
     dimension = seen.page.evaluate("Array.from(document.getElementById('parallel').data[0].dimensions[0].values)")
     assert kept == sum(610 <= value <= 616 for value in dimension)
     assert 0 < kept < drawn == len(dimension)
-
-
-@pytest.mark.slow
-def test_another_scenario_is_drawn_when_it_is_chosen(finished: FinishedFolder, standing: Any) -> None:
-    folder = finished("fog")
-    seen = standing(folder, 1280)
-    table = pd.read_parquet(folder / "results.parquet")
-    last = list(dict.fromkeys(table["scenario"]))[-1]
-    seen.page.select_option("#scenario", last)
-    rows = table[(table["scenario"] == last) & (table["kind"] == "design") & (table["name"] == "RYN4Cy")]
-    drawn = seen.page.evaluate("document.getElementById('cfas').data.find((t) => t.name === 'named designs').y[0]")
-    assert drawn == pytest.approx(rows["chromatic_csd_yellow_red"].iloc[0], rel=1e-6)
-    assert seen.errors == []
 
 
 HOSTILE = """

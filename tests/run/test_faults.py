@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,7 +18,7 @@ from sweep.results.identity import CHUNK, run_facts
 from sweep.results.lock import locked
 from sweep.run import RunOptions, output_folder, remaining_work, remaining_work_lines, run_study
 from sweep.run.sweep import KILLED
-from sweep.run.workers import Workers, workers
+from sweep.run.workers import workers
 from sweep.study import Study, load_study
 
 from ..build import ran, study_file
@@ -176,13 +175,6 @@ def test_a_changed_study_goes_beside_the_old_one(plain: Study, tmp_path: Path) -
 def test_threads_give_the_same_rows(plain: Study, whole: pd.DataFrame, tmp_path: Path) -> None:
     run_study(plain, tmp_path, 2, lambda *_: None, backend="threading")
     pd.testing.assert_frame_equal(rows(tmp_path), whole)
-
-
-def test_workers_never_outnumber_the_cores(plain: Study, tmp_path: Path) -> None:
-    assert Workers(1000).count == os.cpu_count()
-    run_study(plain, tmp_path, 1000, lambda *_: None, backend="threading")
-    facts = pd.read_json(tmp_path / "provenance.json", typ="series")
-    assert facts["workers"] * facts["threads_per_worker"] <= facts["cores"]
 
 
 @pytest.mark.parametrize(

@@ -98,18 +98,6 @@ def test_a_yield_is_that_of_draws_of_their_own(tmp_path: Path) -> None:
     agree(street(tmp_path), 20_000)
 
 
-def test_a_yield_counts_each_camera_with_the_wanted_distance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    study = street(tmp_path)
-    design = candidate(study)
-    population = design.setup.lights.population
-    assert population is not None
-    assert population.wanted_dn is not None
-    steps = population.wanted_dn * (1 + np.linspace(-0.05, 0.05, population.draws))
-    monkeypatch.setattr(robustness, "drawn_dn", lambda *_: steps)
-    (numbers,) = robustness._robustness(design, None, ("yellow", "red"), 1)
-    assert numbers["yield"] == np.count_nonzero(steps >= population.wanted_dn) / population.draws
-
-
 def thick(folder: Path) -> Study:
     path = folder / "street.yaml"
     street(folder)
@@ -143,12 +131,6 @@ def test_a_worst_case_is_over_edges_and_films_together(tmp_path: Path) -> None:
     assert rows.loc["mine", "worst_csd_yellow_red"] == pytest.approx(worst, abs=1e-9)
     said = "\n".join(summary_lines(read_output(tmp_path / "out")))
     assert re.search(r"Mine falls below RGGB at .*, films [+-][\d.]+%, \d+ DN", said)
-
-
-@pytest.mark.slow
-@pytest.mark.long
-def test_yields_agree_with_a_million_draws(tmp_path: Path) -> None:
-    agree(street(tmp_path, 1_000_000), 1_000_000)
 
 
 def test_the_interval_of_a_share() -> None:

@@ -17,7 +17,6 @@ from sweep.results.dataset import part_paths
 from sweep.search.limit import limit_of
 from sweep.search.solver import smooth_evaluation
 from sweep.spectra.builtin.data_sets.tl16 import lights
-from sweep.spectra.builtin.measured_sets import LUXEON, SENSORS
 from sweep.spectra.spectrum import WavelengthGrid
 from sweep.study import Study, load_study, sensor_studies_in
 
@@ -78,20 +77,6 @@ def test_opencam_is_what_an_own_computation_says() -> None:
     (ryycy,), _ = own_csd(np.stack([curves[c] for c in ("R", "Y", "Cy")])[None], np.array([1.0, 2, 1]))
     assert ryycy / rggb == pytest.approx(0.42, abs=0.005)
     assert limit_of(study.problem(study.search)).proven == pytest.approx(319.7, abs=0.05)
-
-
-def test_every_measured_set_has_its_source_and_its_curves() -> None:
-    readme = (MEASURED / "README.md").read_text()
-    for name, measured in (*SENSORS.items(), ("luxeon", LUXEON)):
-        assert measured.license == "MIT"
-        assert measured.source
-        assert f"`{name}`" in readme or f": {name}`" in readme
-        for file in measured.digests:
-            assert f"`{file}`" in readme
-    for name in SENSORS:
-        sensor = BUILT_IN_SENSORS[name](GRID)
-        assert not sensor.surrogate
-        assert sensor.qe[sensor.clear].sum() == pytest.approx(max(q.sum() for q in sensor.qe.values()), rel=0.02)
 
 
 ERRORS = CurveErrors(gain=0.05, shift_nm=2.0, noise=0.03, correlation_nm=30.0, ir_cut_nm=3.0, draws=2000)
@@ -242,22 +227,6 @@ def test_one_table_has_all_sensors_and_lights(several: tuple[Path, str]) -> None
     assert f"has {ratio.min():.2f} to {ratio.max():.2f} times the yellow/red CSD of RGGB" in out.splitlines()[0]
 
 
-def test_the_report_is_drawn_again(several: tuple[Path, str]) -> None:
-    folder, out = several
-    page = folder / "out" / "few" / "report.html"
-    before = page.read_text()
-    page.unlink()
-    with pytest.MonkeyPatch.context() as patch:
-        draw_nothing(patch)
-        patch.setattr("sweep.report.sensors.rendered", lambda _, kind: kind.encode())
-        code, again, err = commanded("report", page.parent)
-    assert code == 0, err
-    assert page.read_text() == before
-    assert again.splitlines()[0] in out
-    code, _, err = commanded("report", folder)
-    assert (code, "no run here" in err) == (2, True)
-
-
 def test_filters_for_several_sensors_are_the_worst_on_them(several: tuple[Path, str]) -> None:
     folder, _ = several
     table = pd.read_parquet(folder / "out" / "few" / "all_sensors.parquet")
@@ -338,19 +307,6 @@ def test_one_that_fails_does_not_stop_the_others(tmp_path: Path) -> None:
     rows = pd.read_parquet(tmp_path / "out" / "few" / "results.parquet")
     assert set(rows["sensor"]) == {"ar0820"}
     assert "report.html" in out
-
-
-def test_several_sensors_and_scenarios_count_together() -> None:
-    from dataclasses import replace as changed
-
-    from sweep.run.all_sensors import _joined
-
-    study = load_study(STUDIES / "hdr_filter.yaml")
-    problem = study.problem(study.search)
-    n = len(problem.scenes)
-    assert n == 17
-    assert len(_joined([problem, changed(problem, seed=2)]).scenes) == 2 * n
-    assert len(_joined([problem]).scenes) == n
 
 
 def test_uncertain_curves_of_thin_layers_are_refused(tmp_path: Path) -> None:

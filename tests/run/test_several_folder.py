@@ -121,18 +121,6 @@ def test_damage_is_noticed_and_repaired(whole: Path, tmp_path: Path, name: str) 
         assert (folder / file).read_bytes() == before[Path(file)]
 
 
-def test_a_lost_run_is_made_again_alone(whole: Path, tmp_path: Path) -> None:
-    folder = copied(whole, tmp_path)
-    before = contents(folder)
-    shutil.rmtree(folder / MEMBERS[1])
-    assert "opencam tl16: not run." in commanded("status", folder)[1]
-    code, _, err = run(tmp_path)
-    assert (code, err.count("nothing was computed")) == (0, 1)
-    again = contents(folder)
-    assert all(again[path] == before[path] for path in before if path.suffix == ".parquet")
-    assert commanded("status", folder, "--verify")[0] == 0
-
-
 def test_a_changed_study_goes_beside_with_its_own_filters(whole: Path, tmp_path: Path) -> None:
     folder = copied(whole, tmp_path)
     before = contents(folder)

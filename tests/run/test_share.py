@@ -12,12 +12,9 @@ import pyarrow.parquet as pq
 import pytest
 from scipy.stats import binom
 
-from sweep.camera.linear import LinearModel
-from sweep.designs.tolerance import ProductionError, Tolerance
-from sweep.metrics import drawn as drawn_module
+from sweep.designs.tolerance import Tolerance
 from sweep.metrics.bound import Bound
-from sweep.metrics.drawn import LampsAndCameras, rank_below
-from sweep.metrics.members import population_model
+from sweep.metrics.drawn import rank_below
 from sweep.metrics.objective import Objective
 from sweep.metrics.share import share_interval
 from sweep.report.summary import summary_lines
@@ -34,7 +31,6 @@ from sweep.study import Search, Study, load_study
 from ..build import one_line, ran
 from ..cases import thinned
 from ..conftest import STUDIES
-from ..rounding import rounding_of_distance, terms_of
 
 TEXT = """\
 study: share
@@ -99,36 +95,6 @@ def test_its_derivative_is_exact(thickness: float) -> None:
             step[free] = 1e-6
             above, below = (model.at(u + sign * step).evaluation.objective for sign in (1, -1))
             assert (above - below) / 2e-6 == pytest.approx(slope, rel=1e-6, abs=1e-6 * np.abs(slopes).max())
-
-
-def test_many_designs_are_made_in_blocks_and_read_out_once_for_all_pairs_within_rounding(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    loaded, search = lamps()
-    points = search.space.points(0, 7)
-    drawn = LampsAndCameras(population_model(problem().setup), loaded.tolerance, 1)
-    pairs = [("green", "yellow"), YELLOW_RED]
-    size, read, made = loaded.grid.size, list[int](), list[int]()
-    monkeypatch.setattr(drawn_module, "_HELD", 3 * 101 * size)
-    smooth = LinearModel.smooth
-    monkeypatch.setattr(LinearModel, "smooth", lambda self, curves: read.append(len(curves)) or smooth(self, curves))
-
-    def come_out(off: ProductionError, some: slice) -> np.ndarray:
-        made.append(len(points[some]))
-        return search.space.curves(points[some], size, off)
-
-    found = drawn.columns(come_out, len(points), pairs)
-    assert max(made) == 3
-    assert sum(read) == 7 * 101
-    setup = problem().setup
-    allowed = rounding_of_distance(terms_of(setup), setup.camera.pixel.full_scale_dn, len(setup.camera.mosaic.channels))
-    for at in range(7):
-        alone = np.concatenate(
-            [search.space.curves(points[at : at + 1], size, off) for off in drawn.draws(pairs[0]).production_errors]
-        )
-        for pair in pairs:
-            own = drawn.kept(alone, [pair])[pair][0]
-            assert found[f"csd_{pair[0]}_{pair[1]}"][at] == pytest.approx(own, rel=0, abs=allowed)
 
 
 def test_jobs_are_small_where_each_design_sees_many_draws(tmp_path: Path) -> None:

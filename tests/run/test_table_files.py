@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gzip
 import io
-import json
 import lzma
 import os
 import tarfile
@@ -147,21 +146,3 @@ def little_memory() -> Iterator[None]:
     )
     yield
     assert 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss <= most
-
-
-@pytest.mark.slow
-def test_of_100_mutated_json_files_each_is_one_line(tmp_path: Path) -> None:
-    rng = np.random.default_rng(5)
-    boxes = [{"image_id": at, "category_id": 1, "bbox": [1.0, 2.0, 3.0, 4.0], "score": 0.5} for at in range(30)]
-    whole = json.dumps(boxes).encode()
-    path = tmp_path / "detections.json"
-    for _ in range(100):
-        mutated = bytearray(whole)
-        for _ in range(int(rng.integers(0, 4))):
-            at = int(rng.integers(len(mutated)))
-            mutated[at : at + int(rng.integers(0, 30))] = bytes(rng.integers(32, 127, 3, dtype=np.uint8))
-        path.write_bytes(mutated)
-        with little_memory():
-            assert read_or_one_line(path)[1] == 0
-    path.write_bytes(b"[" * 1_000_000)
-    assert read_or_one_line(path)[1] == 0

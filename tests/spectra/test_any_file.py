@@ -458,13 +458,6 @@ def test_digitized_pairs_keep_their_own_wavelengths_and_doubles_are_averaged(tmp
     assert any("samples at the same wavelength were averaged" in note for note in curves.notes)
 
 
-def test_curves_of_two_lengths_end_where_they_end(tmp_path: Path) -> None:
-    (tmp_path / "a.csv").write_text("nm,a,b\n400,1,\n410,2,\n420,3,1\n430,4,2\n440,,3\n")
-    curves = read_curves(tmp_path / "a.csv")
-    assert [list(wave) for wave, _ in map(curves.samples, ("a", "b"))] == [[400, 410, 420, 430], [420, 430, 440]]
-    assert "a: there are no values beyond 400 to 430 nm" in curves.notes
-
-
 @pytest.mark.parametrize(
     ("text", "said"),
     [

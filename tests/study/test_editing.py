@@ -43,19 +43,6 @@ def test_the_shipped_schema_equals_the_output_of_the_command(tmp_path: Path) -> 
     assert json.loads(schema_text()) == study_schema()
 
 
-def test_every_study_names_the_schema_first() -> None:
-    assert FILES
-    for path in FILES:
-        assert path.read_text().startswith(f"# yaml-language-server: $schema={SCHEMA_FILE}\n"), path
-
-
-def test_every_key_has_a_description() -> None:
-    schema = study_schema()
-    for name, section in {"study": schema, **schema["$defs"]}.items():
-        for key, prop in section.get("properties", {}).items():
-            assert prop.get("description") or "$ref" in prop, (name, key)
-
-
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_every_study_fits_the_schema(path: Path) -> None:
     assert errors(Document(path).data) == []

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from io import StringIO
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
 from sweep.base.errors import MOST_ISSUES, StudyError, SweepError, ValidationIssue, nearest
 from sweep.cli.listing import list_lines, studies_of
@@ -196,31 +193,6 @@ scalars = st.none() | st.booleans() | st.integers(-(10**20), 10**20) | st.floats
 values = st.recursive(
     scalars, lambda one: st.lists(one, max_size=4) | st.dictionaries(words, one, max_size=4), max_leaves=20
 )
-
-
-def has_words_for_keys(value: object) -> bool:
-    if isinstance(value, dict):
-        return all(isinstance(key, str) for key in value) and all(map(has_words_for_keys, value.values()))
-    return not isinstance(value, list) or all(map(has_words_for_keys, value))
-
-
-@given(values)
-@example({"": None, ":0": None})
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-def test_yaml_written_by_the_library_is_read_equally(value: object) -> None:
-    yaml, text = YAML(typ="safe", pure=True), StringIO()
-    yaml.dump({"top": value}, text)
-    try:
-        expected = yaml.load(text.getvalue())
-    except YAMLError:
-        # It does not read all that it writes: it takes a word that begins with a colon in braces, {:0: null}, for the
-        # value of an empty key, and stops behind it. Where such a key was there before, that is the first fault.
-        with pytest.raises(StudyError, match=r"not valid YAML|found duplicate key ''"):
-            Tree(text.getvalue(), "a.yaml", 10_000)
-        return
-    # Nor does it read {?0: null} as it wrote it: it finds a number, where keys are words.
-    assume(has_words_for_keys(expected))
-    assert Tree(text.getvalue(), "a.yaml", 10_000).root == expected
 
 
 def test_aliases_may_be_used_up_to_the_limit(tmp_path: Path) -> None:

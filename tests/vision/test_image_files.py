@@ -107,14 +107,6 @@ def test_the_observer_s_own_answers_are_scored(run: Path, tmp_path: Path) -> Non
     assert "<table" in (tmp_path / "scores" / "scores.html").read_text()
 
 
-def test_lamps_and_scenes_of_splits_are_apart(run: Path, tmp_path: Path) -> None:
-    manifest = exported(run, tmp_path / "raw").dropna(subset=["lamp"])
-    for _, of_seed in manifest.groupby("seed"):
-        lamps = {split: set(part["lamp"]) for split, part in of_seed.groupby("split")}
-        assert not lamps["test"] & (lamps["train"] | lamps["check"])
-        assert not lamps["train"] & lamps["check"]
-
-
 def test_the_lit_lens_is_where_the_label_says(run: Path, tmp_path: Path) -> None:
     """At night, the center of the light above the darkest pixels: within half a pixel of the lens."""
     manifest = exported(run, tmp_path / "raw")

@@ -123,19 +123,6 @@ def test_the_observer_of_an_hdr_pixel_sees_what_saturates_another() -> None:
     assert 0.01 < wrong["split_pixel"] < 0.6 * wrong["dual_gain"]
 
 
-def test_an_observer_of_other_lenses_is_worse() -> None:
-    """It does not take the order of the lenses from the scene: in the street's order it would know the color."""
-    requested, setup = (
-        vision(distances_m=[400.0], levels={"day": {"illuminance_lx": 4e4, "exposure_s": 5e-5}}),
-        head_setup(),
-    )
-    camera, lamps = HeadCamera(setup, NO_FILTERS, requested), split_lamps(setup.lights, requested, (1, 0))[TEST]
-    scenes = draw_scenes(requested, lamps, SHUFFLED, 200, (9,))
-    images = camera.images(scenes)
-    right = [(posteriors(camera, scenes, images, lamps, o).argmax(axis=1) == scenes.state).mean() for o in ORDERS]
-    assert right[ORDERS.index(SHUFFLED)] > right[ORDERS.index(FIXED)] + 0.1
-
-
 def test_lamps_of_the_test_are_nowhere_else() -> None:
     lights = head_setup().lights
     for seed in range(5):
