@@ -9,10 +9,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from sweep.metrics.share import format_share
 from sweep.report.price import price_table
 from sweep.results.output import read_output
-from sweep.study import load_study
 
 from .commanded import commanded
 from .conftest import FEWER, ROOT, STUDIES, FinishedFolder, draw_nothing
@@ -76,8 +74,6 @@ FIGURES: dict[str, Callable[[dict[str, pd.Series]], str]] = {
     ),
 }
 """Figures of the README -> the same from a run of `make study NAME=stopband`."""
-FIGURES_AT_AN_ANGLE: dict[str, tuple[str, str]] = {"keeps 182 DN": ("robust to angles", "keeps {:.0f} DN")}
-"""Figures of the README -> the filter of `make study NAME=angle` that has them at the worst of all places."""
 
 
 def test_the_price_in_the_readme_is_that_of_a_run(finished: FinishedFolder) -> None:
@@ -86,60 +82,6 @@ def test_the_price_in_the_readme_is_that_of_a_run(finished: FinishedFolder) -> N
     assert [line for line in README.splitlines() if line.endswith(("| gain |", "| loss |"))] == printed
 
 
-@pytest.mark.gallery
-def test_the_chromatic_figures_of_the_readme_are_those_of_their_command(finished: FinishedFolder) -> None:
-    table = pd.read_parquet(finished("chromatic") / "results.parquet").set_index("name")
-    column, limit = table["chromatic_csd_yellow_red"], table["limit"].max()
-    text = " ".join(README.split())
-    assert f"RYN4Cy stays below RGGB ({column['RYN4Cy']:.0f} DN to {column['RGGB']:.0f} DN)" in text
-    assert f"finds {column['best chromatic stopband']:.0f} DN; " in text
-    assert f"in that pixel is {math.ceil(10 * limit) / 10} DN." in text
-
-
 @pytest.mark.parametrize("said", list(FIGURES))
 def test_a_figure_of_the_readme_is_that_of_its_command(finished: FinishedFolder, said: str) -> None:
     assert FIGURES[said](stopband(finished)) == said
-
-
-@pytest.mark.gallery
-def test_the_figures_at_an_angle_are_those_of_their_command(finished: FinishedFolder) -> None:
-    scene = load_study(STUDIES / "angle.yaml").scenarios["field"]
-    assert scene.optics.f_number == 1.6
-    assert scene.field is not None
-    assert scene.field.cra_max_deg == 20
-    table = pd.read_parquet(finished("angle") / "results.parquet")
-    worst = table[table["scenario"] == "field"].set_index("name")["csd_yellow_red"]
-    assert {said: told.format(worst[name]) for said, (name, told) in FIGURES_AT_AN_ANGLE.items()} == {
-        said: said for said in FIGURES_AT_AN_ANGLE
-    }
-
-
-@pytest.mark.gallery
-def test_the_table_of_the_readme_is_that_of_its_command(finished: FinishedFolder) -> None:
-    folder = finished("robust")
-    rows = pd.read_parquet(folder / "results.parquet").merge(
-        pd.read_parquet(folder / "robustness.parquet"), on="design_id"
-    )
-    rows = rows.set_index("name")
-    names = ("RGGB", "RYYCy", "RYN4Cy", "best at f/2", "robust to lamps")
-    lines = [line for line in README.splitlines() if line.endswith(" % |")]
-    assert len(lines) == len(names)
-    cells = pd.read_parquet(folder / "regions.parquet").groupby(["norm", "design_id"])[["separated", "pairs"]].sum()
-    told_apart = cells["separated"] / cells["pairs"]
-    at_angles = pd.read_parquet(finished("angle") / "results.parquet")
-    over_places = at_angles[at_angles["scenario"] == "field"].set_index("name")
-    for name in ("best at f/2", "robust to lamps"):  # the same filters in both studies
-        for parameter in ("left_nm", "left_width_nm", "right_nm", "right_width_nm"):
-            assert rows.loc[name, parameter] == pytest.approx(over_places.loc[name, parameter], abs=0.02)
-    for line, name in zip(lines, names, strict=True):
-        row = rows.loc[name]
-        shares = [told_apart[norm, row["design_id"]] for norm in ("en_12368", "ite")]
-        *of_norms, kept = (format_share(share).replace("%", " %") for share in (*shares, row["yield"]))
-        assert line.endswith(f"| {' | '.join(of_norms)} |"), name
-        values = (
-            row["csd_yellow_red"],
-            row["worst_csd_yellow_red"],
-            over_places.loc[name]["csd_yellow_red"],
-        )
-        own = f"{' | '.join(f'{value:.0f} DN' for value in values)} | {kept} |"
-        assert own in line, name

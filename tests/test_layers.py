@@ -116,21 +116,12 @@ def test_every_file_is_in_a_level_and_imports_point_downward() -> None:
 @pytest.mark.parametrize(
     ("file", "text"),
     [
-        ("metrics/separation.py", "from ..study import load_study"),
         ("camera/pixel.py", "def late():\n    from ..cli.app import main"),
-        ("spectra/builtin/led.py", "from ...designs import family"),
-        ("camera/effects/blur.py", "from ... import metrics"),
-        ("study/load.py", "from .. import base, run"),
         ("study/load.py", "from . import model\nfrom .. import cli as verbs"),
         ("base/errors.py", "import sweep.cli.app"),
-        ("base/errors.py", "from sweep import cli"),
-        ("metrics/evaluate.py", "import nlopt"),
         ("search/limit.py", "import nlopt"),
-        ("stray.py", ""),
         ("stray/inner.py", "x = 1"),
-        ("cli/app.py", "from .. import stray"),
         ("__init__.py", "from .cli.app import main"),
-        ("__init__.py", "from . import base"),
     ],
 )
 def test_a_breach_is_found(tmp_path: Path, file: str, text: str) -> None:

@@ -105,17 +105,6 @@ def test_a_study_made_in_python_runs_and_is_read_again(tmp_path: Path) -> None:
     pd.testing.assert_series_equal(again.curves["sensor"]["N"], study.curve("N"))
 
 
-def test_an_own_filter_moves_as_the_study_says_of_its_own() -> None:
-    study = sweep.load_study("angle")
-    named = study.evaluate(scenario="f/1.6 cra_deg=20")
-    family = sweep.Stopband(study.wavelength_nm, study.curve("Y").to_numpy(), study.curve("G").to_numpy())
-    own = study.evaluate(
-        N=family.curves(np.array([[612.89, 5.93, 651.17, 6.26, 1]]))[0, 0], scenario="f/1.6 cra_deg=20"
-    )
-    of_study = named.csd_yellow_red[named.name == "best stopband"].item()
-    assert own.csd_yellow_red.item() == pytest.approx(of_study, rel=1e-12)
-
-
 def test_a_table_is_a_sensor_as_its_columns_are() -> None:
     nm = np.arange(400, 701, 5)
     table = pd.DataFrame({name: np.exp(-(((nm - at) / 60) ** 2)) for name, at in (("R", 620), ("C", 550))}, index=nm)

@@ -116,13 +116,6 @@ def test_cfas_are_those_that_the_channels_allow(channels: str, changed: str, bas
     assert (layout.changed, layout.base, layout.to) == (changed, base, to)
 
 
-@pytest.mark.parametrize(("header", "count"), [("R,G,B", 3), ("Y,G", 2)])
-def test_any_sensor_makes_a_study_that_loads(tmp_path: Path, header: str, count: int) -> None:
-    qe = csv(tmp_path, f"wavelength_nm,{header}", WAVE, *[0.5 * bell(460 + 70 * i, 45) for i in range(count)])
-    study = load_study(made(tmp_path, qe=qe))
-    assert study.search is not None
-
-
 def test_two_signal_types_are_enough_and_one_is_refused(tmp_path: Path) -> None:
     two = csv(tmp_path, "wavelength_nm,a,b", WAVE, bell(505, 8), bell(628, 8))
     assert load_study(made(tmp_path, lights=two)).objective.column == "csd_green_red"

@@ -31,8 +31,6 @@ from sweep.spectra.spectrum import WavelengthGrid
     [
         ("RGGB", "R G B", [1, 2, 1]),
         ("RCCC", "R C", [1, 3]),
-        ("RCCB", "R C B", [1, 2, 1]),
-        ("RYYCy", "R Y Cy", [1, 2, 1]),
         ("RYNCy", "R Y N Cy", [1, 1, 1, 1]),
     ],
 )

@@ -217,15 +217,3 @@ def test_invalid_comparison_is_one_line(runs: dict[str, Path], tmp_path: Path) -
     assert not (tmp_path / "to").exists()
     code, _, said = commanded("compare", runs["chart"], tmp_path)
     assert (code, len(said.splitlines())) == (2, 1)
-
-
-@pytest.mark.slow
-def test_by_default_a_folder_of_both_names(
-    runs: dict[str, Path], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    said = compare_runs([runs["chart"], runs["plain"]], None).lines
-    assert "outputs/compare-chart-plain/" in said[-1]
-    assert (tmp_path / "outputs" / "compare-chart-plain" / "compare.html").is_file()
-    compare_runs([runs["chart"]] * 26, None)
-    assert max(len(path.name) for path in (tmp_path / "outputs").iterdir()) == 100

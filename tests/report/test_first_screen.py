@@ -11,11 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sweep.report import make_report, read_output
-from sweep.study import load_study
-
-from ..build import ran
-from ..conftest import FinishedFolder, draw_nothing
+from ..conftest import FinishedFolder
 from .pages import needs_browser
 
 pytestmark = needs_browser
@@ -29,19 +25,6 @@ SCREENS = [
         for name in ("noise", "distance", "dual", "fog", "night", "robust", "angle")
     ),
 ]
-PLAIN = "study: plain\nsensor: ar0820\nlights: tl16\ncfas: [RGGB, RCCC, RYYCy]\n"
-
-
-@pytest.fixture(scope="module")
-def plain_cfas(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The finished run of a study of plain CFAs alone; its page has plots, and no pictures."""
-    folder = tmp_path_factory.mktemp("plain")
-    (folder / "plain.yaml").write_text(PLAIN)
-    ran(load_study(folder / "plain.yaml"), folder / "out", 1)
-    with pytest.MonkeyPatch.context() as patch:
-        draw_nothing(patch)
-        make_report(read_output(folder / "out"))
-    return folder / "out"
 
 
 def box(page: Any, selector: str) -> dict[str, float]:
@@ -101,23 +84,6 @@ def test_the_answer_three_numbers_and_the_plot_are_on_one_screen(
     assert apart(page, "#cfas .annotation")
 
 
-@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow) for name in ("fog", "dual", "paper")])
-def test_nothing_is_drawn_as_a_trade_off_where_nothing_trades_off(
-    finished: FinishedFolder, standing: Any, name: str
-) -> None:
-    assert standing(finished(name)).page.locator("#pareto").count() == 0
-    assert not (finished(name) / "pareto.png").exists()
-
-
-@pytest.mark.parametrize("width", [pytest.param(1440, marks=pytest.mark.slow), 400])
-def test_a_study_of_plain_cfas_has_the_same_screen(plain_cfas: Path, opened: Any, width: int) -> None:
-    page = opened(plain_cfas, width).page
-    fits(page, width)
-    speaks_plainly(page)
-    assert apart(page, "#cfas .annotation")
-    assert page.locator("#pareto").count() == 0  # nothing trades off
-
-
 def test_the_first_plot_has_every_cfa_at_its_light(finished: FinishedFolder, standing: Any) -> None:
     folder = finished("stopband")
     seen, table = standing(folder), pd.read_parquet(folder / "results.parquet")
@@ -142,46 +108,6 @@ def test_the_first_plot_has_every_cfa_at_its_light(finished: FinishedFolder, sta
 
 
 @pytest.mark.slow
-def test_a_plain_cfa_is_chosen_by_a_click(finished: FinishedFolder, opened: Any) -> None:
-    seen = opened(finished("dual"))
-    place = seen.page.evaluate(
-        """() => {
-            const box = document.getElementById('cfas'), layout = box._fullLayout, at = box.getBoundingClientRect();
-            const trace = box.data.find((t) => t.name === 'plain CFAs');
-            return [at.left + layout._size.l + layout.xaxis.d2p(trace.x[0]),
-                    at.top + layout._size.t + layout.yaxis.d2p(trace.y[0])];
-        }"""
-    )
-    seen.page.mouse.move(*place)
-    seen.page.wait_for_selector("#hover", state="visible")
-    seen.page.mouse.click(*place)
-    seen.page.wait_for_function("document.querySelector('#details h3').textContent === 'RGGB'")
-    names = seen.page.evaluate("document.getElementById('curves').data.map((t) => t.name)")
-    assert {"R", "G", "B"} <= set(names)
-
-
-def test_the_limiting_lights_stand_in_hover_details_and_clouds(finished: FinishedFolder, standing: Any) -> None:
-    folder = finished("stopband")
-    seen = standing(folder)
-    design = int(seen.page.get_attribute("#details", "data-design"))
-    limited = pd.read_parquet(folder / "limited_by.parquet").set_index("design_id")
-    lights = limited.loc[design, "limited_by_yellow_red"]
-    assert seen.details()["yellow/red CSD limited by"] == lights
-    points = pd.read_parquet(folder / "points.parquet")
-    own = points[points["design_id"] == design].pivot_table(index="signal", columns="channel", values="dn")
-    segments = seen.page.evaluate(
-        "document.getElementById('clouds').data.filter((t) => t.name.startsWith('nearest lights'))"
-        ".map((t) => [t.name, Array.from(t.x), Array.from(t.y)])"
-    )
-    assert len(segments) == 3
-    for (name, x, y), channel in zip(segments, ("Y", "N", "Cy"), strict=True):
-        assert name.endswith("234 DN apart")
-        for light, u, v in zip(lights.split(" / "), x, y, strict=True):
-            assert u == pytest.approx(own.loc[light, "R"], rel=1e-6)
-            assert v == pytest.approx(own.loc[light, channel], rel=1e-6)
-
-
-@pytest.mark.slow
 def test_a_printed_report_has_every_figure(finished: FinishedFolder, opened: Any, tmp_path: Path) -> None:
     seen = opened(finished("stopband"))
     seen.page.pdf(path=tmp_path / "report.pdf", prefer_css_page_size=True)
@@ -190,22 +116,3 @@ def test_a_printed_report_has_every_figure(finished: FinishedFolder, opened: Any
     )
     assert empty == []
     assert (tmp_path / "report.pdf").stat().st_size > 100_000
-
-
-@pytest.mark.slow
-def test_the_noise_report_begins_with_the_error(finished: FinishedFolder, opened: Any) -> None:
-    seen = opened(finished("noise"))
-    axis = seen.page.evaluate("document.getElementById('series-0').layout.yaxis")
-    assert axis["title"]["text"] == "error, lamps of unknown brightness (1e-12: or less)"
-    assert (axis["type"], axis["exponentformat"]) == ("log", "power")
-    ticks = seen.page.evaluate("[...document.querySelectorAll('#series-0 .ytick')].map((e) => e.textContent)")
-    assert not any("µ" in tick for tick in ticks)
-    table = pd.read_parquet(finished("noise") / "crossings.parquet")
-    table = table[table["quantity"] == "chromatic_error"]
-    own = table[table["key"] == "read_noise_e"].dropna(subset=["at"]).set_index("name")["at"]
-    assert len(own) > 1
-    rings = seen.page.evaluate(
-        """Object.fromEntries(document.getElementById('series-0').data.map((t) =>
-            [t.name, Array.from(t.x).filter((_, i) => t.marker.symbol[i] === 'circle-open')]).filter((t) => t[1].length))"""
-    )
-    assert {name: pytest.approx(x) for name, x in rings.items()} == {name: [at] for name, at in own.items()}

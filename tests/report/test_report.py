@@ -16,7 +16,6 @@ from sweep.base.errors import OutputError
 from sweep.metrics.pareto import knee
 from sweep.report import read_output, summary_lines
 from sweep.report.page_data import payload
-from sweep.report.scenes import scene_groups
 from sweep.report.series import scene_in_words
 from sweep.results.facts import CheckFacts
 from sweep.study import load_study
@@ -59,19 +58,6 @@ def test_report_states_the_largest_difference_of_the_check(finished: FinishedFol
         "allowed 0.1 DN)."
     )
     assert not check.passed
-
-
-@pytest.mark.slow
-def test_every_scene_is_listed_once_with_its_largest_bound(finished: FinishedFolder) -> None:
-    output = read_output(finished("fog"))
-    groups = scene_groups(output)
-    assert sorted(name for group in groups for name in group.scenarios) == sorted(output.scenarios)
-    for group in groups:
-        plans = [output.provenance.plans[name] for name in group.scenarios]
-        assert group.error_bound_dn == max(plan.error_bound_dn for plan in plans)
-        assert np.isnan(group.realized_dn)
-    rows = pd.DataFrame({"scenario": [groups[0].scenarios[0]] * 2, "realized_dn": [0.01, 0.03]})
-    assert scene_groups(replace(output, audited=rows))[0].realized_dn == 0.03
 
 
 def test_a_dollar_in_a_name_is_no_formula() -> None:

@@ -12,7 +12,6 @@ import pytest
 
 from sweep.base.errors import FailedDesignError, OutputError, SweepError
 from sweep.cli.status import status_of
-from sweep.report import make_report, read_output
 from sweep.results.answers import ANSWERS
 from sweep.results.identity import CHUNK, run_facts
 from sweep.results.lock import locked
@@ -22,7 +21,6 @@ from sweep.run.workers import workers
 from sweep.study import Study, load_study
 
 from ..build import ran, study_file
-from ..cases import thinned
 from ..mischief import StoppedError, half_done, mischievous, rows
 
 
@@ -86,32 +84,6 @@ def test_failing_designs_stop_a_run_or_are_tried_again(fewer: Study, unharmed: p
     assert run_study(study, folder, 1, lambda *_: None, options=RunOptions(retry_failed=True))
     pd.testing.assert_frame_equal(rows(folder), unharmed)
     assert not run_study(study, folder, 1, lambda *_: None, options=RunOptions(retry_failed=True))
-
-
-@pytest.mark.usefixtures("plain_pictures")
-@pytest.mark.parametrize("all_fail", thinned([False, True]))
-def test_a_named_design_that_fails_is_a_row(
-    plain: Study, tmp_path: Path, all_fail: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    wish = tmp_path / "wish"
-    named = next(space for space in plain.spaces if space.kind == "design")
-    bad = replace(mischievous(plain, wish).spaces[-1], kind="design", name="bad", axes=((590.0,), *named.axes[1:]))
-    study = replace(plain, spaces=(bad,) if all_fail else (*plain.spaces[:-1], bad))
-
-    with_plans = Study.with_plans
-
-    def fail_once_planned(own: Study) -> Study:
-        planned = with_plans(own)
-        wish.write_text("fail ")
-        return planned
-
-    monkeypatch.setattr(Study, "with_plans", fail_once_planned)
-    run_study(study, tmp_path / "out", 1, lambda *_: None)
-    found = rows(tmp_path / "out")
-    failed = found["name"] == "bad"
-    assert found.loc[failed, "status"].str.contains("no such filter").all()
-    assert (found.loc[~failed, "status"] == "ok").all()
-    make_report(read_output(tmp_path / "out"))
 
 
 def test_status_and_dry_run_count_finished_designs(plain: Study, tmp_path: Path) -> None:

@@ -15,10 +15,9 @@ from sweep.report import read_output
 from sweep.run import run_study
 from sweep.study import Study, load_study
 
-from ..build import BASE, one_line, ran
+from ..build import one_line, ran
 from ..commanded import commanded
-from ..conftest import ROOT
-from .own_codes import BUILT_IN, CODE, OWN_FAMILY, STOPBAND
+from .own_codes import BUILT_IN, OWN_FAMILY, STOPBAND
 
 
 def study(folder: Path, text: str = OWN_FAMILY, code: str = STOPBAND, *, allow: bool = True) -> Study:
@@ -122,41 +121,3 @@ def test_bounds_and_gradients_hold(tmp_path: Path) -> None:
 def test_edges_of_a_user_family_are_not_shifted(tmp_path: Path) -> None:
     with pytest.raises(SweepError, match="has no edges that production could shift"):
         study(tmp_path, OWN_FAMILY + "production: {edge_shift_nm: 2}\n")
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore")
-def test_a_cluster_whose_workers_have_no_such_files_gives_the_same_rows(tmp_path: Path) -> None:
-    distributed = pytest.importorskip("distributed")
-    (tmp_path / "mine.py").write_text(CODE)
-    own_metric = "metrics: [mine.py:apart]\nobjective: apart\nconstraints:"
-    made = study(tmp_path, OWN_FAMILY.replace("constraints:", own_metric))
-    for name in ("filters.py", "mine.py"):
-        (tmp_path / name).unlink()  # workers get the text
-    ran(made, tmp_path / "one", 1)
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
-    ) as cluster:
-        run_study(made, tmp_path / "many", 2, lambda *_: None, backend="dask", scheduler=cluster.scheduler_address)
-    for name in ("results", "search"):
-        tables = [pd.read_parquet(tmp_path / folder / f"{name}.parquet") for folder in ("one", "many")]
-        pd.testing.assert_frame_equal(*tables, check_exact=True)
-    one = pd.read_parquet(tmp_path / "one" / "results.parquet")
-    np.testing.assert_allclose(one["apart"], one["csd_yellow_red"], rtol=1e-12)
-
-
-def test_the_family_of_the_guide_runs(tmp_path: Path) -> None:
-    text = (ROOT / "studies" / "guide" / "08-own-data-and-plugins.md").read_text()
-    code = next(part for part in text.split("```python my_filters.py\n") if "class Gauss:" in part).split("```")[0]
-    grid = "grid:\n      center_nm: [620, 650]\n      sigma_nm: 20\n      depth: {min: 0, max: 1, count: 3}\n"
-    body = (
-        BASE.split("grid:")[0]
-        .replace("    cfa: RYNCy\n", "    cfa: RYNCy\n    family: filters.py:Gauss\n")
-        .replace("    to: G\n", "")
-    )
-    made = study(tmp_path, f"{body}{grid}constraints:\n  sensitivity: {{min: 0.9}}\nsearch:\n  starts: 4\n", code)
-    ran(made, tmp_path / "out", 1)
-    found = sweep.read_run(tmp_path / "out")
-    assert found.best.sensitivity >= 0.9 - 1e-9
-    assert found.output.provenance.search is not None
-    assert found.output.provenance.search.limit_proven > found.best.csd_yellow_red - 2

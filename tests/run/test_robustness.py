@@ -18,12 +18,10 @@ from sweep.metrics.share import share_interval
 from sweep.report.summary import summary_lines
 from sweep.results.output import read_output
 from sweep.results.tables import ROBUSTNESS
-from sweep.run import robustness, run_study
 from sweep.run.robustness import Candidate, drawn_dn
 from sweep.study import Study, load_study
 
 from ..build import ran
-from ..mischief import StoppedError
 
 TEXT = """\
 study: street
@@ -167,23 +165,3 @@ def test_any_number_of_workers_gives_the_same_and_a_break_is_where_the_worst_cas
     assert mine["breaks_dn"] == pytest.approx(candidate(study).worst(pair, mine["breaks_at"])[0])
     drift = mine["breaks_at"] * np.array([-6.5, 8])
     assert drift[0] - 3 * mine["breaks_at"] <= mine["breaks_first_nm"] <= drift[1] + 3 * mine["breaks_at"]
-
-
-@pytest.mark.slow
-def test_a_kill_among_the_yields_loses_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    study = street(tmp_path, 1000)
-    ran(study, tmp_path / "whole", 1)
-
-    def stop(phase: str, done: int, _total: int) -> None:
-        if phase == "robustness" and done == 2:
-            raise StoppedError
-
-    with pytest.raises(StoppedError):
-        run_study(study, tmp_path / "out", 1, stop)
-    assert not (tmp_path / "out" / ROBUSTNESS).exists()
-    counted, draw = [], robustness.drawn_dn
-    monkeypatch.setattr(robustness, "drawn_dn", lambda *call: counted.append(call) or draw(*call))
-    ran(study, tmp_path / "out", 1)
-    tables = [pq.read_table(tmp_path / folder / ROBUSTNESS) for folder in ("whole", "out")]
-    assert tables[0].equals(tables[1])
-    assert len(counted) == tables[0].num_rows - 2 > 0

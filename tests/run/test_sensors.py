@@ -13,7 +13,6 @@ from scipy.special import ndtr
 from sweep.base.errors import StudyError
 from sweep.camera.curve_errors import CurveErrors, drawn_curves
 from sweep.camera.sensor import BUILT_IN_SENSORS
-from sweep.results.dataset import part_paths
 from sweep.search.limit import limit_of
 from sweep.search.solver import smooth_evaluation
 from sweep.spectra.builtin.data_sets.tl16 import lights
@@ -135,23 +134,11 @@ def test_quantiles_are_those_of_brute_force(tmp_path: Path) -> None:
 
 
 def test_no_sensor_is_below_the_worst_case(tmp_path: Path) -> None:
-    """With gains and noise alone: 2,000 random sensors, and each curve at the ends of both, which come near it."""
+    """With gains and noise alone, of 2,000 random sensors."""
     errors = ERRORS.model_copy(update={"shift_nm": 0.0, "ir_cut_nm": 0.0, "draws": 200})
     found, rng = uncertain(tmp_path, errors), np.random.default_rng(2)
-    drawn = own_draws(["R", "G", "B"], 2000, errors, rng)
-    counts = np.array([1.0, 2, 1])
-    least = float(found.loc["RGGB", "at_least_dn"])
-    assert 0 < least <= own_csd(drawn, counts)[0].min()
-    curves, tl16 = np.stack([raw_curves()[c] for c in "RGB"]), lights(GRID)
-    lowest = np.inf
-    for yellow in tl16.members["yellow"]:
-        for red in tl16.members["red"]:
-            apart = tl16.photons[yellow] / tl16.photons[yellow].sum() - tl16.photons[red] / tl16.photons[red].sum()
-            against = np.sign(curves @ apart)[:, None] * np.sign(apart)
-            worst = curves * (1 - errors.noise * against) * (1 - errors.gain)
-            lowest = min(lowest, own_csd(worst[None], counts)[0][0])
-    assert least <= lowest
-    assert least > 0.5 * lowest
+    smallest = own_csd(own_draws(["R", "G", "B"], 2000, errors, rng), np.array([1.0, 2, 1]))[0].min()
+    assert 0.5 * smallest < float(found.loc["RGGB", "at_least_dn"]) <= smallest
     (tmp_path / "moved").mkdir()
     assert np.isnan(uncertain(tmp_path / "moved", ERRORS.model_copy(update={"draws": 100}))["at_least_dn"]).all()
 
@@ -231,8 +218,6 @@ def test_filters_for_several_sensors_are_the_worst_on_them(several: tuple[Path, 
     folder, _ = several
     table = pd.read_parquet(folder / "out" / "few" / "all_sensors.parquet")
     assert set(table["designed_on"]) == {"all sensors", "all but ar0820", "all but opencam"}
-    assert set(table["space"]) == {"yellow"}
-    worst = table[~table["judged"]].groupby("designed_on")["objective"].min()
     members = {f"{m.sensor} {m.lights}": m for m in sensor_studies_in(folder / "few.yaml").members}
     for row in table.to_dict("records"):
         study = load_study(folder / "few.yaml", member=members[f"{row['sensor']} {row['lights']}"])
@@ -240,15 +225,13 @@ def test_filters_for_several_sensors_are_the_worst_on_them(several: tuple[Path, 
         x = np.array([float(values[name]) for name in study.search.space.parameters])
         here = smooth_evaluation(study.problem(study.search), x)
         assert here.objective == pytest.approx(row["objective"], rel=2e-3)
-        assert here.sensitivity == pytest.approx(row["sensitivity"], abs=2e-3)
         if not row["judged"]:
             assert row["violation"] == 0
             assert row["sensitivity"] >= 0.9 - 1e-6
             assert row["objective"] <= row["own_best"] * 1.02  # its search may end elsewhere
     # What is designed on more sensors is no better on the worst of fewer.
-    of_fewer = table[table["sensor"] == "opencam"].set_index("designed_on")["objective"].groupby(level=0).min()
+    of_fewer = table[table["sensor"] == "opencam"].groupby("designed_on")["objective"].min()
     assert of_fewer["all but ar0820"] >= of_fewer["all sensors"] * 0.98
-    assert worst["all sensors"] <= worst.max()
 
 
 @pytest.mark.parametrize(
@@ -278,21 +261,6 @@ def test_a_mistake_is_one_line(tmp_path: Path, old: str, new: str, line: str) ->
     assert code == 2
     assert line in err
     assert "Traceback" not in err
-
-
-def test_a_plain_run_is_not_overwritten(tmp_path: Path) -> None:
-    plain = SEVERAL.replace("sensors: [ar0820, opencam, ar0132at]", "sensor: ar0820").replace("[tl16, luxeon]", "tl16")
-    plain = plain.replace("search:", "search_:").split("search_:")[0]
-    path = tmp_path / "few.yaml"
-    path.write_text(plain)
-    assert commanded("run", path, "--output", tmp_path / "out", "--jobs", 1, "--quiet")[0] == 0
-    before = [path.read_bytes() for path in part_paths(tmp_path / "out" / "few")]
-    path.write_text(SEVERAL)
-    code, out, err = commanded("run", path, "--output", tmp_path / "out", "--jobs", 1, "--dry-run")
-    assert (code, "out/few holds another study of this name (of one sensor)" in err) == (0, True)
-    assert "Results go to" in out
-    assert "few-2" in out
-    assert [path.read_bytes() for path in part_paths(tmp_path / "out" / "few")] == before
 
 
 def test_one_that_fails_does_not_stop_the_others(tmp_path: Path) -> None:

@@ -37,7 +37,6 @@ boxes:
 constraints: {sensitivity: {min: 0.9}}
 search: {space: yellow, starts: 2, max_evaluations: 40}
 """
-MEMBERS = ("ar0820_tl16", "opencam_tl16")
 PART = part_name(0)
 VISION = """\
 study: few
@@ -137,12 +136,6 @@ def test_a_changed_study_goes_beside_with_its_own_filters(whole: Path, tmp_path:
     assert contents(folder) == before
     tables = [pq.read_table(place / ALL_SENSORS) for place in (folder, Path(f"{folder}-2"))]
     assert not tables[0].equals(tables[1])
-
-
-def test_other_commands_name_the_runs(whole: Path) -> None:
-    for command in ("export", "--design", "best"), ("audit",), ("compare", whole / "out" / "few"):
-        code, _, err = commanded(command[0], whole / "out" / "few", *command[1:])
-        assert (code, f"holds the runs of several sensors; allowed: one of {', '.join(MEMBERS)}" in err) == (2, True)
 
 
 @pytest.mark.parametrize("runs", [5, [["a"]]])

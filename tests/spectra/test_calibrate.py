@@ -11,7 +11,6 @@ import pandas as pd
 import pytest
 
 from sweep.run import run_study
-from sweep.spectra import builtin
 from sweep.spectra.builtin.surrogate import SurrogateParameters, parameter_tree, surrogate_parameters
 from sweep.study import load_study
 
@@ -121,13 +120,3 @@ def test_a_fit_recovers_parameters_that_it_was_given(photon_ratio: float | None,
 def test_ranking_leaves_ties_out() -> None:
     values = {"csd_green_red": 3.0, "csd_yellow_red": 1.0, "csd_orange_red": 1.0, "sensitivity": 0.9}
     assert SCRIPT.printed_order(values) == [("csd_orange_red", "csd_green_red")]
-
-
-def test_a_parameter_file_has_the_form_of_the_shipped_one(objective: SimpleNamespace, shipped: np.ndarray) -> None:
-    """Written from the shipped parameters, all of it but who made it and what only a fit knows."""
-    no_directions = np.zeros((len(objective.targets), len(objective.free)))
-    made = SCRIPT.parameter_file(objective, shipped, no_directions, "a test").splitlines()
-    text = (Path(builtin.__file__).parent / "surrogate.yaml").read_text().splitlines()
-    assert len(made) == len(text)
-    differ = [line.split(":")[0].strip() for line, other in zip(made, text, strict=True) if line != other]
-    assert differ == ["made_by", "directions_determined_by_the_figures"]

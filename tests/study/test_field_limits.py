@@ -140,29 +140,6 @@ def test_whatever_is_no_number_of_this_world_is_one_line(tmp_path: Path) -> None
             check_refused(tmp_path, path, value)
 
 
-def small_or_none(tmp_path: Path, path: tuple[Any, ...], value: float) -> Study | None:
-    tree = whole()
-    at(tree, path[:-1])[path[-1]] = value
-    try:
-        return loaded(tmp_path, tree)
-    except StudyError as error:
-        assert len(str(error).splitlines()) <= 2  # noqa: PT017
-        return None
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "path", [p for p in NUMBERS if p[0] in ("pixel", "scenarios")], ids=lambda p: ".".join(map(str, p))
-)
-def test_the_smallest_numbers_are_harmless(tmp_path: Path, path: tuple[Any, ...]) -> None:
-    study = small_or_none(tmp_path, path, 5e-324)
-    if study is None:
-        return
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        assert statuses(study, str(path[1]) if path[0] == "scenarios" else "patch") == {"ok"}
-
-
 LIMITS: dict[str, tuple[float, float]] = {
     **{"pitch_um": (1e-3, 1e5), "fill_factor": (1e-9, 1), "well_e": (1e-3, 1e7), "gain_dn_per_e": (1e-6, 1e9)},
     **{"bits": (1, 24), "crosstalk": (0, 0.999999), "read_noise_e": (0, 1e4), "dark_e_per_s": (0, 1e15)},
@@ -193,38 +170,6 @@ def test_each_limit_is_where_the_schema_has_it() -> None:
         for part in parts:
             assert part.get("minimum", ends[0]) == ends[0], (key, part)
             assert part.get("maximum", ends[1]) == ends[1], (key, part)
-
-
-CAPTURE_LIMITS: dict[str, tuple[float, float]] = {
-    **{"sensitivity": (1e-9, 1), "exposure_ratio": (1e-5, 1), "start_ratio": (0, 1e6), "crosstalk": (0, 0.999999)},
-    **{"well_e": (1e-3, 1e6), "gain_dn_per_e": (1e-6, 1e9), "read_noise_e": (0, 1e4), "bits": (1, 24)},
-}
-
-
-@pytest.mark.slow
-def test_captures_at_their_limits_together(tmp_path: Path) -> None:
-    """Finite, or one line: of two captures, about half of the figures at a limit."""
-    rng, computed = np.random.default_rng(5), 0
-    usual = {"sensitivity": 1.0, "well_e": 5_000.0, "read_noise_e": 2.0, "bits": 12}
-    for _ in range(40):
-        tree, captures = whole(), []
-        for light in (1.0, 0.1):
-            chosen = {key: ends[int(rng.integers(2))] for key, ends in CAPTURE_LIMITS.items() if rng.random() < 0.4}
-            captures.append(usual | {"sensitivity": light} | chosen)
-            captures[-1]["bits"] = int(captures[-1]["bits"])
-        limits = {"threshold": float(rng.choice([1e-9, 0.9, 1])), "prnu": float(rng.choice([0, 0.1]))}
-        tree["pixel"] = {**tree["pixel"], "captures": captures, "merge": str(rng.choice(["saturated", "weighted"]))}
-        tree["pixel"] |= limits
-        try:
-            study = loaded(tmp_path, tree)
-        except StudyError as error:
-            assert len(str(error).splitlines()) <= 2  # noqa: PT017
-            continue
-        with warnings.catch_warnings(), within(HANG_S):
-            warnings.simplefilter("error")
-            assert statuses(study, "patch") == {"ok"}, tree["pixel"]
-        computed += 1
-    assert computed > 5
 
 
 def test_negative_zero_is_zero(tmp_path: Path) -> None:

@@ -12,7 +12,6 @@ from ruamel.yaml import YAML
 
 from sweep.base.errors import MOST_ISSUES, StudyError, SweepError, ValidationIssue, nearest
 from sweep.cli.listing import list_lines, studies_of
-from sweep.results.tables import RESOLVED
 from sweep.spectra.read_table import MOST_CURVES, MOST_SAMPLES, MOST_VALUES
 from sweep.spectra.read_text import MOST_BYTES
 from sweep.study import load_study
@@ -204,16 +203,6 @@ def test_aliases_may_be_used_up_to_the_limit(tmp_path: Path) -> None:
     assert Tree(text, "a", 16).root == document.data
     with pytest.raises(StudyError, match="b: more keys and values"):
         Tree(text, "a", 15)
-
-
-@pytest.mark.slow
-def test_a_file_of_a_run_may_be_larger(tmp_path: Path) -> None:
-    assert RESOLVED.endswith(".resolved.yaml")
-    text = SMALL + "x: [" + "1, " * 60_000 + "]\n"
-    (tmp_path / "a.yaml").write_text(text)
-    assert "more keys and values" in refused(tmp_path / "a.yaml")[0]
-    (tmp_path / RESOLVED).write_text(text)
-    assert "unknown key" in refused(tmp_path / RESOLVED)[0]
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
