@@ -101,6 +101,8 @@ def test_a_study_made_in_python_runs_and_is_read_again(tmp_path: Path) -> None:
         run.table[requested].astype({"name": object}), study.evaluate()[requested], check_dtype=False
     )
     again = sweep.read_run(run.folder)
+    with pytest.raises(SweepError, match="no feasible design"):
+        run.best  # noqa: B018
     pd.testing.assert_frame_equal(again.study.evaluate(), study.evaluate())
     pd.testing.assert_series_equal(again.curves["sensor"]["N"], study.curve("N"))
 

@@ -216,3 +216,10 @@ def test_measured_files_lead_to_a_report_without_editing(tmp_path: Path) -> None
     assert "RGBN" in out.splitlines()[0]
     assert "finished, search found" in list_lines(path.parent, studies_of(path.parent, tmp_path / "out"))[0]
     assert np.all([(tmp_path / "out" / "mine" / name).is_file() for name in ("report.html", "pareto.png")])
+
+
+def test_a_short_range_of_the_sensor_is_the_grid(tmp_path: Path) -> None:
+    inside = (WAVE >= 420) & (WAVE <= 690)
+    qe = csv(tmp_path, "wavelength_nm,R,C", WAVE[inside], bell(600, 50)[inside], bell(550, 90)[inside])
+    study = load_study(made(tmp_path, qe=qe))
+    assert (study.grid.start_nm, study.grid.stop_nm) == (420, 690)

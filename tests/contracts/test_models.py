@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.spatial.distance import cdist
 
 from sweep.base.errors import SweepError
 from sweep.camera.camera import Camera
@@ -50,18 +49,6 @@ def test_any_tile() -> None:
     for ragged in ([], [[]], [["R"], ["G", "B"]]):
         with pytest.raises(SweepError, match="equal length"):
             Mosaic.from_rows("ragged", ragged)
-
-
-@settings(max_examples=40)
-@given(st.integers(1, 30), st.integers(1, 30), st.integers(1, 5), st.integers(1, 40), st.integers(0, 2**32 - 1))
-def test_separation_is_the_nearest_pair(n_a: int, n_b: int, channels: int, designs: int, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    response = rng.uniform(0, 4095, (designs, n_a + n_b, channels))
-    order = rng.permutation(n_a + n_b)
-    first, second = order[:n_a], order[n_a:]
-    found = separation(response, first, second)
-    brute = [cdist(r[first], r[second]).min() for r in response]
-    np.testing.assert_allclose(found, brute, rtol=1e-12)
 
 
 def test_separation_of_near_points_at_a_large_offset() -> None:

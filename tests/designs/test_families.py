@@ -7,8 +7,6 @@ from itertools import pairwise
 import mpmath as mp
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from sweep.base.errors import SweepError
 from sweep.base.types import Section
@@ -210,18 +208,6 @@ def test_films_that_are_too_thick_stretch_every_edge(name: str) -> None:
     np.testing.assert_allclose(off.curves(x[None]), family.curves(moved[None]), rtol=1e-12)
     by_length = np.where(lengths, 1.01, 1.0)[:, None, None]
     np.testing.assert_allclose(off.gradient(x), by_length * family.gradient(moved), rtol=1e-9, atol=1e-14)
-
-
-@settings(max_examples=100)
-@given(st.floats(450, 650), st.floats(0, 60), st.floats(500, 720), st.floats(0, 60), st.floats(0, 1))
-def test_dual_keeps_the_sum_and_the_ceiling(left: float, lw: float, right: float, rw: float, depth: float) -> None:
-    family = Dual(WAVE, BASE, CEILING)
-    x = np.array([[left, lw, right, rw, depth]])
-    a, b = family.curves(x)[0]
-    np.testing.assert_allclose(a + b, 2 * BASE, rtol=1e-15)
-    if (family.violation(x) <= 0).all():
-        assert (a >= -1e-15).all()
-        assert (b <= np.maximum(CEILING, BASE) + 1e-15).all()
 
 
 def test_free_form_starts_are_smooth_and_inside() -> None:

@@ -10,8 +10,10 @@ import psutil
 import pyarrow.parquet as pq
 import pytest
 
-from sweep.base.errors import FailedDesignError, OutputError, SweepError
+from sweep.base.errors import FailedDesignError, InterruptedRunError, OutputError, SweepError
 from sweep.cli.status import status_of
+from sweep.report import read_output
+from sweep.report.summary import counts_line
 from sweep.results.answers import ANSWERS
 from sweep.results.identity import CHUNK, run_facts
 from sweep.results.lock import locked
@@ -21,7 +23,7 @@ from sweep.run.workers import workers
 from sweep.study import Study, load_study
 
 from ..build import ran, study_file
-from ..mischief import StoppedError, half_done, mischievous, rows
+from ..mischief import half_done, mischievous, rows
 
 
 @pytest.fixture(scope="module")
@@ -78,6 +80,7 @@ def test_failing_designs_stop_a_run_or_are_tried_again(fewer: Study, unharmed: p
         run_study(study, folder, 1, lambda *_: None, options=RunOptions(fail_fast=True))
     assert run_study(study, folder, 1, lambda *_: None)
     failed = (rows(folder)["status"] != "ok").sum()
+    assert f", {failed} failed" in counts_line(read_output(folder))
     assert failed == 2 * 2 * 6 * 2  # in both scenes, every design of this edge
     assert not run_study(study, folder, 1, lambda *_: None)
     wish.unlink()
@@ -193,9 +196,9 @@ def test_a_search_that_was_killed_is_not_repeated(tmp_path: Path) -> None:
 
     def stop(phase: str, done: int, _total: int) -> None:
         if phase == "search starts" and done == 2:
-            raise StoppedError
+            raise KeyboardInterrupt
 
-    with pytest.raises(StoppedError):
+    with pytest.raises(InterruptedRunError):
         run_study(study, tmp_path / "out", 1, stop)
     kept = {path: path.stat().st_mtime_ns for path in (tmp_path / "out" / ANSWERS).iterdir()}
     assert len(kept) == 2

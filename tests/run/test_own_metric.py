@@ -178,33 +178,6 @@ def test_invalid_user_metrics_of_a_study_are_refused(tmp_path: Path, text: str, 
         study(tmp_path, text)
 
 
-def test_a_design_that_the_metric_fails_on_costs_a_row(tmp_path: Path) -> None:
-    code = CODE.replace(
-        "return np.ptp",
-        "if (readings.dn.max() > 0) and self.bad(readings): raise OverflowError('dark')\n        return np.ptp",
-    )
-    code = code.replace(
-        "    def of(",
-        "    def bad(self, readings):\n        return self.name and abs(readings.dn[:, 0, -1] - EDGE).min() < 1e-9\n\n    def of(",
-    )
-    text = OWN_METRIC.partition("search:")[0] + "columns: all\n"
-    made = study(tmp_path, text)
-    run_study(made, tmp_path / "all", 1, lambda *_: None)
-    space = next(space for space in made.spaces if space.kind == "sweep")
-    setup = made.plan("chart") and made.setup(space, "chart")
-    from sweep.camera.model import scene_model
-
-    edge = scene_model(setup).read(space.curves(space.points(3, 4), made.grid.size))[0][0, 0, 0, -1]
-    bad = study(tmp_path, text, f"EDGE = {edge!r}\n".replace("np.float64(", "(") + code)
-    run_study(bad, tmp_path / "some", 1, lambda *_: None)
-    found = rows_of(tmp_path / "some")
-    failed = found[found["status"] != "ok"]
-    assert 0 < len(failed) < len(found)
-    assert failed["status"].astype(str).str.contains("mine.py:Spread: OverflowError: dark").all()
-    fine, same = rows_of(tmp_path / "all"), found["status"] == "ok"
-    assert (found.loc[same, "red_spread"] == fine.loc[same, "red_spread"]).all()  # of whole digital numbers
-
-
 def test_a_file_may_have_dataclasses_and_types(tmp_path: Path) -> None:
     typed = "from __future__ import annotations\nfrom dataclasses import dataclass\n" + CODE.replace(
         "class Spread:", "@dataclass\nclass Spread:\n    times: float = 1.0"

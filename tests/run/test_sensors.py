@@ -16,6 +16,7 @@ from sweep.camera.sensor import BUILT_IN_SENSORS
 from sweep.search.limit import limit_of
 from sweep.search.solver import smooth_evaluation
 from sweep.spectra.builtin.data_sets.tl16 import lights
+from sweep.spectra.builtin.measured_sets import SENSORS
 from sweep.spectra.spectrum import WavelengthGrid
 from sweep.study import Study, load_study, sensor_studies_in
 
@@ -146,11 +147,14 @@ def test_no_sensor_is_below_the_worst_case(tmp_path: Path) -> None:
 def test_curves_are_the_same_for_every_design() -> None:
     sensor = BUILT_IN_SENSORS["opencam"](GRID)
     errors = ERRORS.model_copy(update={"draws": 100})
-    together = drawn_curves(sensor, GRID, ["R", "G", "Y"], errors, 1)
-    np.testing.assert_array_equal(together[:, 2], drawn_curves(sensor, GRID, ["Y"], errors, 1)[:, 0])
-    assert np.abs(together[:, 2] - drawn_curves(sensor, GRID, ["Y"], errors, 2)[:, 0]).max() > 0
-    nothing = drawn_curves(sensor, GRID, ["R"], CurveErrors(draws=100), 1)
-    np.testing.assert_allclose(nothing[:, 0], np.broadcast_to(sensor.qe["R"], nothing[:, 0].shape), rtol=1e-12)
+    together, alone, other = (
+        drawn_curves(sensor, GRID, names, errors, seed)[:, -1]
+        for names, seed in ((["R", "G", "Y"], 1), (["Y"], 1), (["Y"], 2))
+    )
+    np.testing.assert_array_equal(together, alone)
+    assert (other != alone).any()
+    nothing = drawn_curves(sensor, GRID, ["R"], CurveErrors(draws=100), 1)[:, 0]
+    np.testing.assert_allclose(nothing, np.tile(sensor.qe["R"], (100, 1)), rtol=1e-12)
 
 
 SEVERAL = """\
@@ -302,3 +306,21 @@ def test_other_commands_say_how_to_choose_one(tmp_path: Path) -> None:
     code, _, err = commanded("plan", path)
     assert code == 2
     assert "a study of several sensors or lights" in err
+
+
+def test_a_plain_run_is_not_overwritten(tmp_path: Path) -> None:
+    plain = SEVERAL.replace("sensors: [ar0820, opencam, ar0132at]", "sensor: ar0820").replace("[tl16, luxeon]", "tl16")
+    path, told = tmp_path / "few.yaml", ("--output", tmp_path / "out", "--jobs", 1)
+    path.write_text(plain.split("search:")[0])
+    assert commanded("run", path, *told, "--quiet")[0] == 0
+    path.write_text(SEVERAL)
+    code, out, err = commanded("run", path, *told, "--dry-run")
+    assert (code, "out/few holds another study of this name (of one sensor)" in err) == (0, True)
+    assert "few-2" in out
+
+
+@pytest.mark.parametrize("name", SENSORS)
+def test_a_measured_sensor_has_its_brightest_curve_for_clear(name: str) -> None:
+    sensor = BUILT_IN_SENSORS[name](GRID)
+    assert not sensor.surrogate
+    assert sensor.qe[sensor.clear].sum() == pytest.approx(max(q.sum() for q in sensor.qe.values()), rel=0.02)

@@ -203,3 +203,16 @@ def test_kills_at_random_moments_lose_nothing(tmp_path: Path, text: str) -> None
         assert pq.read_table(again).equals(pq.read_table(table)), table.name
     assert not [*(tmp_path / "out").rglob(".tmp-*"), *(tmp_path / "out").rglob(ANSWERS)]
     assert not left_by(numbers)
+
+
+def test_a_lost_run_is_made_again_alone(whole: Path, tmp_path: Path) -> None:
+    folder = copied(whole, tmp_path)
+    before = contents(folder)
+    shutil.rmtree(folder / "opencam_tl16")
+    assert "opencam tl16: not run." in commanded("status", folder)[1]
+    code, _, err = commanded("audit", folder)
+    assert (code, "several sensors; allowed: one of ar0820_tl16" in err) == (2, True)
+    code, _, err = run(tmp_path)
+    assert (code, err.count("nothing was computed")) == (0, 1)
+    again = contents(folder)
+    assert all(again[path] == before[path] for path in before if path.suffix == ".parquet")

@@ -12,9 +12,11 @@ import pyarrow.parquet as pq
 import pytest
 from scipy.stats import binom
 
-from sweep.designs.tolerance import Tolerance
+from sweep.designs.tolerance import ProductionError, Tolerance
+from sweep.metrics import drawn as drawn_module
 from sweep.metrics.bound import Bound
-from sweep.metrics.drawn import rank_below
+from sweep.metrics.drawn import LampsAndCameras, rank_below
+from sweep.metrics.members import population_model
 from sweep.metrics.objective import Objective
 from sweep.metrics.share import share_interval
 from sweep.report.summary import summary_lines
@@ -166,3 +168,23 @@ def test_the_limit_leaves_a_constraint_on_it_out_and_says_so() -> None:
     without, found = limit_of(plain), limit_of(requested)
     assert found.left_out == ("yield_csd_yellow_red",)
     assert found.proven == without.proven > 0
+
+
+def test_many_designs_are_made_in_blocks_and_read_out_once_for_all_pairs_within_rounding(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    loaded, search = lamps()
+    points, size, made = search.space.points(0, 7), loaded.grid.size, list[int]()
+    drawn = LampsAndCameras(population_model(problem().setup), loaded.tolerance, 1)
+    monkeypatch.setattr(drawn_module, "_HELD", 3 * 101 * size)
+
+    def come_out(off: ProductionError, some: slice) -> np.ndarray:
+        made.append(len(points[some]))
+        return search.space.curves(points[some], size, off)
+
+    found = drawn.columns(come_out, len(points), [YELLOW_RED])["csd_yellow_red"]
+    assert max(made) == 3
+    errors = drawn.draws(YELLOW_RED).production_errors
+    for at in range(7):
+        alone = np.concatenate([search.space.curves(points[at : at + 1], size, off) for off in errors])
+        assert found[at] == pytest.approx(drawn.kept(alone, [YELLOW_RED])[YELLOW_RED][0], rel=1e-9)

@@ -709,3 +709,10 @@ def test_a_trap_is_read_as_meant_or_refused(tmp_path: Path, name: str) -> None:
     if right >= 0:
         found = np.interp(NM31, *made.samples(list(made.values)[right]))
         np.testing.assert_allclose(found, SHARE, rtol=2e-5 if use != "light" else 1e-3)
+
+
+def test_curves_of_two_lengths_end_where_they_end(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("nm,a,b\n400,1,\n410,2,\n420,3,1\n430,4,2\n440,,3\n")
+    curves = read_curves(tmp_path / "a.csv")
+    assert [list(wave) for wave, _ in map(curves.samples, ("a", "b"))] == [[400, 410, 420, 430], [420, 430, 440]]
+    assert "a: there are no values beyond 400 to 430 nm" in curves.notes

@@ -204,3 +204,13 @@ def test_pipes_are_no_curve_files_and_no_pictures(tmp_path: Path) -> None:
     good = lines(tmp_path / "a.csv", "wavelength_nm,R", "400,0.1", "550,0.5", "700,0.1")
     with pytest.raises(SweepError, match="not a file"), within(HANG_S):
         described(good, tmp_path)
+
+
+def test_a_picture_of_very_many_curves_is_of_an_even_share(monkeypatch: pytest.MonkeyPatch) -> None:
+    from sweep.cli import describe_picture as picture
+    from sweep.spectra.facts import Curve, Facts
+
+    monkeypatch.setattr(picture, "_MOST_DRAWN", 3)
+    axes = picture.draw("many", Facts(tuple(Curve(f"c{i}", WAVE, np.full(WAVE.size, i)) for i in range(8))), {}).axes[0]
+    assert axes.get_title() == "many: 3 of 8 curves"
+    assert [line.get_ydata()[0] for line in axes.lines if len(line.get_xdata()) == WAVE.size] == [0, 3, 6]
