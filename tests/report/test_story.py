@@ -97,8 +97,10 @@ def test_the_limiting_lights_are_as_far_apart_as_the_csd(finished: FinishedFolde
     assert set(limited.index) >= set(points["design_id"])
     for design, rows in points.groupby("design_id"):
         dn = rows.pivot_table(index="signal", columns="channel", values="dn")
+        types = dict(zip(rows["signal"], rows["signal_type"], strict=True))
         for pair in ("green_yellow", "yellow_red", "orange_red"):
             first, second = limited.loc[design, f"limited_by_{pair}"].split(" / ")
+            assert f"{types[first]}_{types[second]}" == pair
             apart = np.linalg.norm(dn.loc[first] - dn.loc[second])
             assert apart == pytest.approx(table.loc[design, f"csd_{pair}"], rel=1e-12)
 

@@ -176,3 +176,7 @@ def test_demosaicking_keeps_linear_images_and_measured_pixels() -> None:
     assert found.shape == (12, 12, 3)
     for plane in np.moveaxis(found, -1, 0):
         np.testing.assert_allclose(plane[2:-2, 2:-2], light[2:-2, 2:-2])
+    single = np.zeros((12, 12))
+    single[4, 5] = 1  # a green pixel: it has half of the weight where it is, a quarter beside it
+    green = demosaicked(single, mosaic)[..., 1]
+    np.testing.assert_allclose([green[4, 5], green[4, 4], green[5, 5]], [0.5, 0.25, 0.25])
