@@ -9,8 +9,11 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from sweep.base.types import in_turn
 from sweep.report.price import price_table
 from sweep.results.output import read_output
+from sweep.run.search import run_search
+from sweep.study import load_study
 
 from .commanded import commanded
 from .conftest import FEWER, ROOT, STUDIES, FinishedFolder, draw_nothing
@@ -85,3 +88,18 @@ def test_the_price_in_the_readme_is_that_of_a_run(finished: FinishedFolder) -> N
 @pytest.mark.parametrize("said", list(FIGURES))
 def test_a_figure_of_the_readme_is_that_of_its_command(finished: FinishedFolder, said: str) -> None:
     assert FIGURES[said](stopband(finished)) == said
+
+
+def test_the_figure_of_measured_films_is_that_of_a_search(tmp_path: Path) -> None:
+    (tmp_path / "films.yaml").write_text(
+        (STUDIES / "band.yaml").read_text().split("tasks:")[0].replace("catalog: modeled", "catalog: films")
+        + "boxes: {films: {cfa: RYNCy, channel: N, base: Y, family: mixture, options: {at_most: 1}, box: {absorbance_1: [0, 6]}}}\n"
+        "constraints: {sensitivity: {min: 0.9}}\nsearch: {starts: 1}\n"
+    )
+    loaded = load_study(tmp_path / "films.yaml")
+    assert loaded.search is not None
+    answer = run_search(loaded, loaded.search, in_turn, lambda *_: None)
+    assert answer.choice is not None
+    assert answer.best.objective >= answer.choice.tried[answer.choice.best].objective * (1 - 1e-9)
+    said = f"The best single one has {answer.best.objective:.1f}, "
+    assert said in " ".join((STUDIES / "guide" / "10-colorants.md").read_text().split())

@@ -323,4 +323,5 @@ def test_a_plain_run_is_not_overwritten(tmp_path: Path) -> None:
 def test_a_measured_sensor_has_its_brightest_curve_for_clear(name: str) -> None:
     sensor = BUILT_IN_SENSORS[name](GRID)
     assert not sensor.surrogate
+    assert all(len(digest) == 64 for digest in SENSORS[name].digests.values())
     assert sensor.qe[sensor.clear].sum() == pytest.approx(max(q.sum() for q in sensor.qe.values()), rel=0.02)
