@@ -36,8 +36,8 @@ def designs_and_metrics() -> None:
     """Blocks of filters, distances, errors under noise, worst cases over lamps, drawn images."""
     import numpy as np
 
+    from sweep.camera.noise import errors as confusion
     from sweep.camera.pixel import Pixel
-    from sweep.metrics import confusion
     from sweep.run import run_study
     from sweep.study import load_study
     from sweep.vision.images import HeadCamera

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from sweep.camera.merge import coded, exposure_of, merged_readings
+from sweep.camera.noise.merge import coded, exposure_of, merged_readings
+from sweep.camera.noise.rounding import rounded
 from sweep.camera.pixel import Pixel
-from sweep.camera.rounding import rounded
 
 
 def draws_dn(electrons: np.ndarray, pixel: Pixel, rng: np.random.Generator) -> np.ndarray:

@@ -39,7 +39,7 @@ ONLY_USER = {
     "typer": ["cli/"],
     "jax": ["vision/network"],
     "optax": ["vision/network"],
-    "numba": ["base/machine_code", "designs/vectorized"],
+    "numba": ["base/machine_code", "base/lane_kernels"],
 }
 """The files, or all of a folder, that alone may import a library."""
 

@@ -192,7 +192,8 @@ class LoadedStudy:
                 for text in issues.values():
                     raise SweepError(ValidationIssue(f"{space.name} in {name}: {text}"))
                 worst = total_violation(values, study.constraints, space.violation(points))
-                columns = {quantity: values[quantity] for quantity in study.quantities}
+                unknown = np.full(space.size, np.nan)  # of a lamp that is not pulsed in this scenario
+                columns = {quantity: values.get(quantity, unknown) for quantity in study.quantities}
                 rows.append((space.name, space.cfa, name, columns | {"violation": worst}))
         return table_of_results(study, rows)
 

@@ -28,8 +28,8 @@ from platformdirs import user_cache_path
 from .errors import SweepError, ValidationIssue
 
 _ROOT = Path(__file__).parent.parent
-_NAMES = ("compiled", "nearest", "vectorized")
-"""Prefix of the names of files with kernels."""
+_NAMES = "kernels.py"
+"""How names of files with kernels end."""
 _FORGOTTEN_S = 7 * 24 * 3600.0
 """Seconds after which code of other sources is removed."""
 _FORM = "each file after its SHA-256"
@@ -42,7 +42,7 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 
 def sources() -> list[Path]:
     """Return the files with kernels, in order."""
-    return sorted(path for path in _ROOT.rglob("*.py") if path.name.startswith(_NAMES))
+    return sorted(path for path in _ROOT.rglob("*.py") if path.name.endswith(_NAMES))
 
 
 def njit(**options: Any) -> Callable[[_F], _F]:

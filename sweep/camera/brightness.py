@@ -6,17 +6,17 @@ merge and noise follow. The curve is smooth but for a knee wherever a pixel fill
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from ..base.types import Array, Bool, BoolArray, DesignSignals, Float, IndexArray, Int, PerDesign, PerValue
 from .effects import any_filter
-from .merge import merged, without_noise
+from .noise.merge import merged, without_noise
+from .noise.pixel_curve import PixelCurve, groups_of, pixel_curve, same_electrons
 from .noise.table import unclipped_e
 from .pixel import unquantized
-from .pixel_curve import PixelCurve, groups_of, pixel_curve, same_electrons
 from .readout import Readout
 from .setup import Setup
 
@@ -32,6 +32,8 @@ _BESIDE = 1e-9
 """Nodes beside a knee without noise, where the reading may jump, relative."""
 _FEW, _MOST_KNEES = 16, 32
 """Pixels around whose knees nodes are, and knees of many pixels that are nodes."""
+_DIGITS = 10
+"""Digits to which light of pixels is the same."""
 _SEEN = 1e-4
 """Weight of a pixel in a channel, relative to the largest, below which its knees are not waited for."""
 _MOST_RATIO = 1e9
@@ -44,7 +46,7 @@ class LampReadings:
 
     `lit_e` and `dark_e`: electrons of the lamps at
     the brightness of the scene, and without lamps. `light`: of the exposures on the elements, relative to a pixel of
-    full sensitivity. `readout`: that of the case alone.
+    full sensitivity. `readout`: that of the case alone. Pixels with the same light are one element: `n_pixels` of them.
     """
 
     lit_e: Float[Array, "captures signals pixels"]
@@ -52,6 +54,7 @@ class LampReadings:
     light: Float[Array, "captures pixels"]
     readout: Readout
     noisy: bool
+    n_pixels: int
 
     @property
     def n_signals(self) -> int:
@@ -221,7 +224,7 @@ class LampReadings:
                 at_knees * (1 + _BESIDE),
                 _geometric(first, last, _RATIO ** (1 / steps)),
             ]
-        elif lit_e.shape[1] <= _FEW:
+        elif self.n_pixels <= _FEW:
             parts += [np.concatenate(around, axis=1).reshape(len(lit_e), -1)]
             parts.append(_geometric(first, last, _RATIO ** (1 / steps)))
         else:
@@ -253,7 +256,32 @@ def of_case(
     `dark` is `electrons` without lamps.
     """
     light = readout.capture_light if readout.pixel.captures else np.ones((1, dark.shape[1]))
-    return LampReadings(electrons - dark[:, None], dark, light, readout, noisy)
+    lit, alike, n_pixels = electrons - dark[:, None], _alike(electrons, dark, light), dark.shape[1]
+    if alike is not None:
+        first, which = alike
+        groups = np.arange(first.size)[:, None] == which
+        weights, spread_weights = groups @ readout.weights, groups @ readout.spread_weights
+        lit, dark, light = lit[..., first], dark[:, first], light[:, first]
+        readout = replace(readout, weights=weights, spread_weights=spread_weights, capture_light=light)
+    return LampReadings(lit, dark, light, readout, noisy, n_pixels)
+
+
+def _alike(
+    electrons: Float[Array, "captures signals pixels"],
+    dark: Float[Array, "captures pixels"],
+    light: Float[Array, "captures pixels"],
+) -> tuple[Int[IndexArray, " groups"], Int[IndexArray, " pixels"]] | None:
+    """Return the first of each group of pixels with the same light, as around a centered lamp, and the group of each.
+
+    None if all differ.
+    """
+    if dark.shape[1] <= _FEW:
+        return None
+    key = np.concatenate([electrons.sum(axis=1), dark, light])
+    key = np.round(key / np.maximum(key.max(axis=1, keepdims=True), 1e-300), _DIGITS)
+    first, which = np.unique(key, axis=1, return_index=True, return_inverse=True)[1:]
+    same = same_electrons(electrons, electrons[..., first[which.ravel()]])
+    return (first, which.ravel()) if same and first.size < which.size else None
 
 
 def room_dn(setup: Setup, response: DesignSignals, unlit: Float[Array, "designs channels"]) -> PerDesign:

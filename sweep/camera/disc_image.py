@@ -25,7 +25,7 @@ def covered(x: SameShape, y: SameShape, half: float, radius: float) -> SameShape
 
     `radius`: radius of the disc; all lengths are in one unit, such as pixels.
     """
-    from .compiled import covered_shares  # noqa: PLC0415  (compiled: kept off the start-up path)
+    from .disc_kernels import covered_shares  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     x, y = np.broadcast_arrays(x, y)
     return covered_shares(x.ravel(), y.ravel(), half, radius).reshape(x.shape)

@@ -68,13 +68,13 @@ class Electrons:
         if isinstance(self.response.source, SplitLight):
             self.response.source.add_sums(spectra, channels, out)
             return
-        cases, size = len(out[0]), spectra.shape[-1]
+        (cases, n_signals, _), size = out.shape[1:], spectra.shape[-1]
         for at, channel in enumerate(channels):
             seen = np.flatnonzero(self.response.uniform[:, :, channel].any(axis=0))
             light = self.response.light[:, seen, channel]
             weights = np.broadcast_to(light, (cases, seen.size, size)).reshape(-1, size)
             # A product for each design, so that how many there are changes it by no more than rounding.
-            products = (spectra[:, at] @ weights.T).reshape(len(qe), -1, cases, seen.size)
+            products = (spectra[:, at] @ weights.T).reshape(len(qe), n_signals, cases, seen.size)
             out[..., seen] += np.moveaxis(products, 1, 2)
 
     def rates(self, curves: DesignCurves) -> DesignPixels:
@@ -145,7 +145,7 @@ class Electrons:
         electrons = products[:, 1:].reshape(-1, *fixed.shape).copy()
         if electrons.size < _MANY:
             return np.asarray(((fixed + electrons) + unlit[..., None]) * time_s)
-        from .compiled import expose  # noqa: PLC0415  (compiled: kept off the start-up path)
+        from .pixel_kernels import expose  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         expose(electrons, fixed, unlit, time_s)
         return electrons

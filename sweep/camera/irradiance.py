@@ -29,7 +29,9 @@ def scene_irradiance(setup: Setup) -> Irradiance:
     if setup.scene.veiling_glare is not None:
         glare = setup.scene.veiling_glare
         mean_cd_m2 = setup.scene.background_cd_m2 if glare.field_cd_m2 is None else glare.field_cd_m2
-        irradiance = with_veiling_glare(irradiance, glare.share, _uniform(setup, mean_cd_m2))
+        # As much in the corner as in the center: the loss of the lens off axis, which follows, does not touch it.
+        dimmed = relative_illumination(setup.scene) if setup.computes("illumination") else 1.0
+        irradiance = with_veiling_glare(irradiance, glare.share, _uniform(setup, mean_cd_m2) / dimmed)
     for effect in setup.user_effects:
         signals, background = effect.applied(irradiance, setup.scene)
         irradiance = replace(irradiance, signals=signals, background=background)

@@ -17,8 +17,8 @@ from .brightness import LampReadings, LampSlopes, room_dn
 from .exposure import relative_slope
 from .memory import blocks
 from .model import SceneModel, View, too_many
+from .noise.pixel_curve import STEPS_DN2, groups_of, pixel_curve
 from .pixel import unquantized
-from .pixel_curve import STEPS_DN2, groups_of, pixel_curve
 from .readout import Readout
 from .response import SplitLight
 from .setup import READOUT, Setup
@@ -146,7 +146,7 @@ class LinearModel:
             moments = len(electrons) // readout.n_cases
             for case in range(len(electrons)):
                 here = readout.subset(slice(case // moments, case // moments + 1))
-                lamps = LampReadings(lit[case] * light[:, None], dark[case] * light, light, here, noisy)
+                lamps = LampReadings(lit[case] * light[:, None], dark[case] * light, light, here, noisy, lit.shape[-1])
                 result.append(LampSlopes(lamps, lit_by_u[:, case], dark_by_u[:, case]))
         return result
 

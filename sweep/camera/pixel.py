@@ -177,15 +177,15 @@ def _read_as(pixel: Pixel) -> tuple[Pixel, ...]:
     return tuple(pixel.model_copy(update=once | figures) for figures in given)
 
 
-def irradiance_factor(optics: Optics, magnification: float = 0.0, field_angle_rad: float = 0.0) -> float:
+def irradiance_factor(optics: Optics, magnification: float = 0.0) -> float:
     """Return the ratio of irradiance on the sensor to radiance of the scene, sr.
 
-    pi T cos^4 / (1 + 4 N^2 (1 + |m|)^2), the camera equation without the small-aperture approximation, as in ISETCam.
+    pi T / (1 + 4 N^2 (1 + |m|)^2) on axis, the camera equation without the small-aperture approximation, as in ISETCam.
 
     `magnification`: 0 for a distant scene.
     """
     cone = 1 + 4 * optics.f_number**2 * (1 + abs(magnification)) ** 2
-    return math.pi * optics.transmission * math.cos(field_angle_rad) ** 4 / cone
+    return math.pi * optics.transmission / cone
 
 
 def unquantized(electrons: SameShape, pixel: Pixel) -> SameShape:

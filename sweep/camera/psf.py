@@ -225,7 +225,7 @@ class DiscProfile:
         `places_um`: centers of the pixels from the disc's center, micrometers; within the table's reach. Times `shares`
         those of h.
         """
-        from .compiled import means_of_cubic  # noqa: PLC0415  (compiled: kept off the start-up path)
+        from .disc_kernels import means_of_cubic  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         nodes, weights = gauss_legendre(3 + math.ceil(4 * self.highest_per_um * half_um))  # 2 for each finest period
         result = np.empty((len(places_um), len(self.shares)))

@@ -11,12 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.types import Array, Bool, BoolArray, DesignCases, DesignPixels, Float, IndexArray, Int, PerDesign, SameShape
-from . import merge
-from .noise import table
+from .noise import merge, table
+from .noise.pixel_curve import groups_of, pixel_curve, same_electrons
+from .noise.rounding import DITHERED_DN, MANY_STEPS, rounded
 from .pixel import Pixel, unquantized
-from .pixel_curve import groups_of, pixel_curve, same_electrons
 from .response import PixelResponse
-from .rounding import DITHERED_DN, MANY_STEPS, rounded
 from .setup import Setup
 
 _CERTAIN_DN2 = 1e-9
@@ -158,7 +157,7 @@ class Readout:
         self, electrons: Float[Array, "captures *batch pixels"], clips: bool
     ) -> Float[Array, "captures *batch pixels"]:
         """Convert electrons to whole digital numbers without noise, in one pass."""
-        from .compiled import whole_numbers  # noqa: PLC0415  (compiled: kept off the start-up path)
+        from .pixel_kernels import whole_numbers  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         many = np.ascontiguousarray(electrons)
         numbers = np.empty_like(many)

@@ -61,7 +61,7 @@ class SplitLight:
 
         Results of one design do not depend on other designs, except for rounding.
         """
-        from .compiled import gather  # noqa: PLC0415  (compiled: kept off the start-up path)
+        from .pixel_kernels import gather  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         by_function = spectra.sum(axis=-1, keepdims=True) if self.shares is None else spectra @ self.shares.T
         by_place = self.values @ np.swapaxes(by_function, -1, -2)

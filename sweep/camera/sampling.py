@@ -74,7 +74,7 @@ def mean_weights(window: Window, half: float, readout_px: float, n_channels: int
 
     `half`: half of the side of a pixel's light-sensitive square, pixels. The weights of each channel sum to 1.
     """
-    from .compiled import covered_by_disc  # noqa: PLC0415  (compiled: kept off the start-up path)
+    from .disc_kernels import covered_by_disc  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     weights = covered_by_disc(window.columns, window.rows, half, readout_px)
     for channel in range(n_channels):

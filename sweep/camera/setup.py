@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
+from uuid import uuid4
+from weakref import WeakValueDictionary
 
 from ..base.types import MemberNumbers
 from ..spectra.lights import Lights
@@ -32,6 +34,16 @@ class Setup:
     accuracy: Accuracy = field(default=STANDARD, kw_only=True)
     left_out: frozenset[str] = field(default=frozenset(), kw_only=True)
     user_effects: tuple[UserEffect, ...] = field(default=(), kw_only=True)
+
+    @cached_property
+    def _token(self) -> str:
+        """Name under which copies in other processes know one another, so that one model serves them there."""
+        token = uuid4().hex
+        _ALIVE[token] = self
+        return token
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _arrived, (self._token, {each.name: getattr(self, each.name) for each in fields(self)})
 
     def with_camera(self, **changes: Any) -> Setup:
         """Return the setup with some attributes of its camera changed."""
@@ -83,3 +95,14 @@ class Setup:
         """True if the scene asks for the worst of all field positions, and they differ."""
         field = self.scene.field
         return field is not None and field.everywhere and self.positions_differ
+
+
+_ALIVE: WeakValueDictionary[str, Setup] = WeakValueDictionary()
+
+
+def _arrived(token: str, values: dict[str, Any]) -> Setup:
+    """Return the setup that came to this process with a call, the same for all calls that carry it."""
+    setup = _ALIVE.get(token)
+    if setup is None:
+        setup = _ALIVE[token] = Setup(**values)
+    return setup

@@ -54,7 +54,7 @@ class Bands:
             edges = self.edges(bands[:, :, :DEPTH].reshape(-1, 2)).reshape(len(x), self._count, 2, -1)
             each = bands[:, :, DEPTH, None] * (edges[:, :, 0] - edges[:, :, 1])
             return np.asarray(sum(each.swapaxes(0, 1), start=np.zeros((len(x), self._wave.size))), dtype=float)
-        from .compiled import between_edges  # noqa: PLC0415  (compiled: kept off the start-up path)
+        from .edge_kernels import between_edges  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         shape = np.zeros((len(x), self._wave.size))
         centers_nm, widths_nm = (bands[:, :, at:DEPTH:2].reshape(len(x), -1) for at in (LEFT, LEFT_WIDTH))

@@ -7,8 +7,6 @@ look-ups in tables over the edges of the grid, exact up to rounding, without a s
 
 from __future__ import annotations
 
-import hashlib
-import pickle
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple, Protocol
@@ -139,13 +137,13 @@ class Tables:
     @cached_property
     def spans(self) -> tuple[Int[IndexArray, "_edges 2"], Int[IndexArray, "_edges 2"]]:
         """Range in which each edge rises, see `compiled.spans`."""
-        from .compiled import spans  # noqa: PLC0415  (compiled: kept off the start-up path)
+        from .edge_kernels import spans  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         return spans(self.left), spans(self.right)
 
     def shapes(self, base_qe: PerWavelength, deep: float) -> KnownShapes:
         """Return the shapes of the grid's edges at one depth; cached."""
-        from .compiled import edge_shapes, outside, ranges_of  # noqa: PLC0415  (compiled: kept off the start-up path)
+        from .edge_kernels import edge_shapes, outside, ranges_of  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         def compute() -> KnownShapes:
             ratio, (left, right) = _inverse(base_qe), self.spans
@@ -197,7 +195,7 @@ class EdgeBlock:
         self, weights: Float[Array, "_modified k"], nodes: Int[IndexArray, " nodes"]
     ) -> Float[Array, "designs k"]:
         """Sum QE times weights by table lookup."""
-        from .compiled import through_edges  # noqa: PLC0415  (compiled: kept off the start-up path)
+        from .edge_kernels import through_edges  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         sums_of_designs = np.empty((len(self), weights.shape[1]))
         sums = self.tables.product(weights, nodes)
@@ -206,7 +204,7 @@ class EdgeBlock:
 
     def shapes(self, base_qe: ChannelCurves) -> tuple[PerDesign, PerDesign]:
         """Return slope and transmission of the curves by table lookup."""
-        from .compiled import shapes_of_edges  # noqa: PLC0415  (compiled: kept off the start-up path)
+        from .edge_kernels import shapes_of_edges  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         steepest, lowest = np.empty(len(self)), np.empty(len(self))
         tables = self.tables
@@ -229,14 +227,14 @@ def _shapes(
     if len(curves) < _MANY:
         steps = np.abs(np.diff(curves, axis=1))
         return steps.max(axis=1, initial=0.0), (curves * inverse + dark).min(axis=1)
-    from .compiled import shapes  # noqa: PLC0415  (compiled: kept off the start-up path)
+    from .edge_kernels import shapes  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     step, low = np.empty(len(curves)), np.empty(len(curves))
     shapes(curves, inverse, dark, step, low)
     return step, low
 
 
-_tables: Cache[bytes, Tables] = Cache(_KEPT_TABLES)
+_tables: Cache[tuple[Any, ...], Tables] = Cache(_KEPT_TABLES)
 _known: Cache[int, tuple[Space, Tables | None]] = Cache(_KEPT_TABLES)
 """Tables of the spaces of the last blocks, by the spaces, which are immutable."""
 
@@ -287,7 +285,8 @@ def _tables_of(space: Space) -> Tables | None:
     if family_and_curves is None:
         return None
     family, base, change = family_and_curves
-    key = hashlib.sha256(pickle.dumps((space.axes, base, change, family.edges(np.array([[600.0, 10.0]]))))).digest()
+    of_family = type(family), family.edges(np.array([[600.0, 10.0]])).tobytes()
+    key = space.axes, base.tobytes(), change.tobytes(), *of_family
 
     def compute() -> Tables:
         pairs = [

@@ -37,25 +37,26 @@ _READ_AT_ONCE = 2**19
 
 
 @dataclass(frozen=True)
-class Readings:
-    """Digital numbers of designs in one case, DN; `dark`: those without lamps.
+class CaseReadings:
+    """Digital numbers of designs, each row of a design in one case, DN; `dark`: those without lamps.
 
-    Of designs that differ in one `channel` alone, `values` are its numbers, and `fixed` those of the others.
+    Of designs that differ in one `channel` alone, `values` are its numbers, and `fixed` those of the others; of
+    others, `whole` are the numbers of all channels.
     """
 
     setup: Setup
     pairs: Sequence[Pair]
     dark: Float[Array, "designs channels"]
-    dn: DesignSignals | None = None
+    whole: DesignSignals | None = None
     fixed: Float[Array, "signals channels"] | None = None
     channel: int = 0
     values: Float[Array, "designs signals"] | None = None
 
     @cached_property
-    def whole(self) -> DesignSignals:
-        """All channels."""
-        if self.dn is not None:
-            return self.dn
+    def dn(self) -> DesignSignals:
+        """Digital numbers of all channels, with the pedestal."""
+        if self.whole is not None:
+            return self.whole
         assert self.fixed is not None
         assert self.values is not None
         whole = np.repeat(self.fixed[None], len(self.values), axis=0)
@@ -145,7 +146,7 @@ class Batch:
 
     @cached_property
     def changing(self) -> Changing | None:
-        """Readings of the designs that differ in one channel alone."""
+        """CaseReadings of the designs that differ in one channel alone."""
         return None if self.noisy else self.model.changing(self.block)
 
     @cached_property
@@ -168,7 +169,7 @@ class Batch:
             return self.curves
         return self.block.subset(np.flatnonzero(~self.changing.which)).curves()
 
-    def readings(self) -> Iterator[tuple[np.ndarray, slice, Readings]]:
+    def readings(self) -> Iterator[tuple[np.ndarray, slice, CaseReadings]]:
         """Yield designs, cases, and their readings, cases first."""
         changing = self.changing
         if changing is not None:
@@ -178,12 +179,12 @@ class Batch:
                 values, dark = changing.make(part), changing.unlit(part)
                 for case, fixed in enumerate(changing.fixed):
                     of_case = self.setup, self.pairs, dark[:, case], None, fixed, changing.channel, values[:, case]
-                    yield own[part], slice(case, case + 1), Readings(*of_case)
+                    yield own[part], slice(case, case + 1), CaseReadings(*of_case)
         rest = np.arange(self.size) if changing is None else np.flatnonzero(~changing.which)
         if rest.size:
             yield from self._whole_readings(rest)
 
-    def _whole_readings(self, designs: np.ndarray) -> Iterator[tuple[np.ndarray, slice, Readings]]:
+    def _whole_readings(self, designs: np.ndarray) -> Iterator[tuple[np.ndarray, slice, CaseReadings]]:
         response, exposure_s = self._response, self.model.exposure_s(self._rest)
         n_cases, n_signals, n_channels = response.shape[1:]
         step = max(1, _READ_AT_ONCE // (n_cases * n_signals * n_channels))
@@ -195,4 +196,4 @@ class Batch:
                 cases = slice(first, min(first + max(1, _AT_ONCE // n), n_cases))
                 dn, unlit = (np.swapaxes(values[:, cases], 0, 1) for values in (response[part], dark))
                 flat = dn.reshape(-1, n_signals, n_channels), unlit.reshape(-1, n_channels)
-                yield designs[part], cases, Readings(self.setup, self.pairs, flat[1], flat[0])
+                yield designs[part], cases, CaseReadings(self.setup, self.pairs, flat[1], flat[0])

@@ -157,7 +157,7 @@ class BrightnessCurves:
         nearest: float = np.inf,
     ) -> Nearest:
         """Return the nearest points on curves between nodes; `rows`: the row of `curves` and `nodes` of each."""
-        from .compiled_brightness import nearest_on_curves  # noqa: PLC0415  (compiled: kept off the start-up path)
+        from .brightness_kernels import nearest_on_curves  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         squared, share = np.empty(rows.size), np.zeros(rows.size)
         segment = np.zeros(rows.size, dtype=np.intp)

@@ -15,13 +15,11 @@ from functools import partial
 
 import numpy as np
 
-from ..base.types import Array, DesignCurves, DesignSignals, Float, IndexArray, Int, MemberNumbers, PerDesign, SameShape
+from ..base.types import Array, DesignSignals, Float, IndexArray, Int, MemberNumbers, PerDesign, SameShape
 from ..camera.brightness import LampSlopes
-from ..camera.linear import linear_model
-from ..camera.pixel_curve import STEPS_DN2
-from ..camera.setup import Setup
+from ..camera.noise.pixel_curve import STEPS_DN2
 from ..spectra.lights import Pair, class_pairs
-from .brightness import BrightnessCurves, chromatic_distance
+from .brightness import BrightnessCurves
 from .separation import MANY, MOST_CHANNELS, packed_response, pair_blocks, pair_order
 from .smooth import Rows, SmoothDesign
 from .tasks.colorimetry import COMPLEX_STEP, Smooth
@@ -89,7 +87,7 @@ def chromatic_separations(response: DesignSignals, members: Mapping[str, MemberN
     packed = packed_response(response, members)
     if packed is None:
         return {(a, b): chromatic_separation(response, members[a], members[b]) for a, b in pairs}
-    from .nearest import nearest_chromatic_squared  # noqa: PLC0415  (compiled: kept off the start-up path)
+    from .separation_kernels import nearest_chromatic_squared  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     squared = np.empty((len(response), len(pairs)))
     nearest_chromatic_squared(*packed, squared)
@@ -118,7 +116,7 @@ def chromatic_along(
         lit = response - unlit[:, None]
         distances = {(a, b): chromatic_separation(lit, members[a], members[b]) for a, b in pairs}
         return distances, response.max(axis=(1, 2)), lit.max(axis=2).min(axis=1)
-    from .nearest import nearest_chromatic_along  # noqa: PLC0415  (compiled: kept off the start-up path)
+    from .separation_kernels import nearest_chromatic_along  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     padded = np.zeros((len(fixed), MOST_CHANNELS - 1))
     padded[:, : shared.shape[1]] = shared
@@ -204,25 +202,3 @@ def _closed_rows(design: SmoothDesign, pairs: Sequence[Pair]) -> Rows:
 
     response, by_u = design.lamps
     return Rows(of(response), of(response + 1j * COMPLEX_STEP * by_u).imag.T / COMPLEX_STEP)
-
-
-def smooth_chromatic(setup: Setup, curves: DesignCurves, pair: Pair) -> PerDesign:
-    """Return the chromatic separation of the smooth response, the smallest over the cases, DN."""
-    model = linear_model(setup)
-    first, second = (setup.members[name] for name in pair)
-    if not model.linear_over_brightness:
-        limits, none = setup.scene.brightness, np.empty((0, *curves.shape[1:]))
-        return np.array(
-            [
-                chromatic_distance(
-                    [BrightnessCurves(case.lamps, limits) for case in model.lamps_over_brightness(design, none)],
-                    first,
-                    second,
-                    noise=False,
-                )
-                for design in curves
-            ]
-        )
-    response = model.smooth(curves) - model.unlit(curves)[:, :, None]
-    over = [chromatic_separation(response[:, case], first, second) for case in range(response.shape[1])]
-    return np.asarray(np.min(over, axis=0), dtype=float)

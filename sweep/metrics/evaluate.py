@@ -56,7 +56,7 @@ def evaluate(
     batch = Batch(model, block, states, tuple(pairs), probabilities, family, points, images, *wanted)
     own = [metric for metric in metrics if not isinstance(metric, ColorSeparation | UserColumns)]
     by_case = _by_case(batch, [_CSD, *own, *map(UserColumns, user_metrics)])
-    batch.columns = over_cases(model, by_case) | {EXPOSURE: batch.exposure_s}
+    batch.columns = over_cases(model, by_case, user_metrics) | {EXPOSURE: batch.exposure_s}
     for metric in sorted(
         own, key=lambda metric: metric.needs == "any brightness"
     ):  # their errors are the larger of two

@@ -28,7 +28,7 @@ def limiting_lights(setup: Setup, response: DesignCases) -> LimitingLights:
 
     The light of the first type stands first; over the lattice where all phases count.
     """
-    from .nearest import nearest_pairs  # noqa: PLC0415  (compiled: kept off the start-up path)
+    from .separation_kernels import nearest_pairs  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     members = [setup.members[name] for name in setup.lights.classes]
     bounds = np.cumsum([0, *map(len, members)])

@@ -6,17 +6,14 @@ the grid (see `curves.members`): the smallest distance over all shifts is found 
 
 from __future__ import annotations
 
-import hashlib
-import pickle
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.cache import Cache
 from ..base.types import Array, DesignCurves, Float, IndexArray, Int, PerDesign
 from ..camera.linear import LinearModel, linear_model
 from ..camera.setup import Setup
@@ -87,7 +84,7 @@ class PopulationModel:
 
         `response`: response to every spectrum, DN.
         """
-        from .compiled_members import nearest_members  # noqa: PLC0415  (compiled: kept off the start-up path)
+        from .member_kernels import nearest_members  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         first, second, which, starts, cells, spans, along = self._table(pair)
         shape = (first.size, second.size, parts)
@@ -107,9 +104,7 @@ class PopulationModel:
         return self._tables[pair]
 
 
-_imagers: Cache[bytes, PopulationModel] = Cache(16)
-
-
+@lru_cache(maxsize=16)
 def population_model(setup: Setup) -> PopulationModel:
-    """Return the population of a setup's lights; recent ones are cached."""
-    return _imagers.get(hashlib.sha256(pickle.dumps(setup)).digest(), lambda: PopulationModel(setup))
+    """Return the population of a setup's lights; recent ones are kept."""
+    return PopulationModel(setup)

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import ClassVar, Literal
 
-from .batch import Batch, Readings
+from .batch import Batch, CaseReadings
 from .quantity import Columns, Quantity, RequestedQuantities
 
 
@@ -18,7 +18,7 @@ class Metric(ABC):
     batch for whatever it needs.
     """
 
-    order: ClassVar[int]
+    order: ClassVar[int] = 99
     needs: ClassVar[Literal["readings", "noise", "any brightness", "pulses", "filters", "parameters", "images"]] = (
         "readings"
     )
@@ -38,12 +38,12 @@ class Metric(ABC):
             Columns; none if they are not requested.
         """
 
-    def of_readings(self, readings: Readings) -> Columns:  # noqa: ARG002
-        """Compute the columns of designs in one case.
+    def of_readings(self, readings: CaseReadings) -> Columns:  # noqa: ARG002
+        """Compute the columns of designs, each in one case.
 
         Parameters
         ----------
-        readings : Readings
+        readings : CaseReadings
             Digital numbers of the designs.
 
         Returns

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from ..base.errors import SweepError, ValidationIssue
 from ..base.types import Array, DesignCurves, Float, IndexArray, Int, PerValue
 from ..camera.memory import blocks
 from ..camera.model import SceneModel, View
@@ -18,6 +19,7 @@ from .batch import Batch
 from .quantity import BEST_PHASE, Columns, RequestedQuantities
 from .registry import quantities_of
 from .separation import csd_name, separations
+from .user_metrics import UserMetric
 
 _FINER_MOMENTS, _MOMENT_ROUNDS, _MOMENTS_FINER = 8, 3, 4
 """Factor by which moments of a pulse are finer at one place; rounds around the worst, each so many times finer."""
@@ -29,12 +31,15 @@ _At = Callable[[Sequence[DesignCurves], Sequence[Float[Array, "places axes"]]], 
 """From designs, and places of each, to their CSDs there."""
 
 
-def over_cases(model: SceneModel, cases: Columns) -> Columns:
+def over_cases(model: SceneModel, cases: Columns, user_metrics: Sequence[UserMetric] = ()) -> Columns:
     """Return the worst of all cases, and for CSDs the largest over the places of the smallest over the moments."""
-    quantities = quantities_of(RequestedQuantities(model.setup.lights.classes, any_place=True))
+    classes = model.setup.lights.classes
+    quantities = quantities_of(RequestedQuantities(classes, any_place=True, user_metrics=tuple(user_metrics)))
     best = {quantity.of: name for name, quantity in quantities.items() if quantity.extreme == "best place"}
     columns: Columns = {}
     for name, values in cases.items():
+        if name not in quantities:
+            raise SweepError(ValidationIssue("a metric gives a column that is none of its `quantities`", value=name))
         if len(values) == 1:
             columns |= {column: values[0].copy() for column in (name, best.get(name)) if column is not None}
             continue
@@ -52,6 +57,8 @@ def refine(batch: Batch, cases: Columns) -> Columns:
     known = np.flatnonzero(np.isfinite(batch.columns[names[0]])) if names else np.empty(0, dtype=np.intp)
     found = {name: batch.columns[name].copy() for name in (*names, *(BEST_PHASE + name for name in names))}
     fine, pulsed = setup.accuracy.finest_phase_px > 0, _bends_over_pulse(setup)
+    if not (pulsed or (fine and (setup.all_phases or setup.all_heights))):
+        return {}
     for start in range(0, known.size, _TOGETHER):
         designs = known[start : start + _TOGETHER]
         curves = [batch.curves_of(design) for design in designs]

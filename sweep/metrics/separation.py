@@ -59,7 +59,7 @@ def separation(
         distances[start : start + step] = np.sqrt(total.min(axis=(1, 2)))
     odd = np.flatnonzero(~((distances >= 1 / _LARGEST) & (distances <= _LARGEST)))
     if odd.size:
-        from .nearest import nearest_scaled  # noqa: PLC0415  (compiled: kept off the start-up path)
+        from .separation_kernels import nearest_scaled  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         scaled = np.empty(odd.size)
         nearest_scaled(response[odd], first, second, scaled)
@@ -83,7 +83,7 @@ def separations(response: DesignSignals, members: Mapping[str, MemberNumbers]) -
     packed = packed_response(response, members)
     if packed is None:
         return {(a, b): separation(response, members[a], members[b]) for a, b in pairs}
-    from .nearest import nearest_squared  # noqa: PLC0415  (compiled: kept off the start-up path)
+    from .separation_kernels import nearest_squared  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     squared = np.empty((n_designs, len(pairs)))
     nearest_squared(*packed, squared)
@@ -125,7 +125,7 @@ def separations_along(
             squares = order.least + (values[:, order.first] - values[:, order.second]) ** 2
         squared = np.minimum.reduceat(squares, order.starts[:-1], axis=1).T
     else:
-        from .nearest import nearest_along_squared  # noqa: PLC0415  (compiled: kept off the start-up path)
+        from .separation_kernels import nearest_along_squared  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         squared = np.empty((len(pairs), len(values)))
         of_pairs = order.least, order.first, order.second, order.starts

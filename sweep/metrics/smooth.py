@@ -12,7 +12,7 @@ import numpy as np
 from ..base.types import Array, DesignCases, DesignCurves, Float, IndexArray, Int, PerDesign, PerFree, PerParameter
 from ..camera.brightness import LampSlopes
 from ..camera.linear import LinearModel, linear_model
-from ..camera.pixel_curve import STEPS_DN2
+from ..camera.noise.pixel_curve import STEPS_DN2
 from ..camera.setup import Setup
 from ..designs.family import Family
 from ..spectra.lights import Pair

@@ -10,7 +10,7 @@ import pyarrow as pa
 
 from ..base.types import Array, DesignCurves, Float, FloatArray, MemberNumbers, delayed
 from ..camera.linear import linear_model
-from ..camera.merge import limits_dn
+from ..camera.noise.merge import limits_dn
 from ..camera.setup import Setup
 from ..study import Study
 from ..study.axes import series_of

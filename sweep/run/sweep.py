@@ -124,6 +124,8 @@ class Sweep:
 
     def _take(self, part: Part, finished: FinishedPart, gathered: Gathered) -> None:
         self.manifest.files[part_name(part.number)] = finished.digest
+        if finished.failed and not self.failed:
+            self.warnings.append(f"{finished.failure}: not in the report")
         self.failed += finished.failed
         gathered.add(finished.shown)
         if time.monotonic() - self._listed_s > _LISTED_EACH_S:

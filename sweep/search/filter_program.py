@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import linprog
@@ -24,13 +23,10 @@ from ..camera.linear import LinearModel, linear_model
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.columns.sensitivity import SENSITIVITY
 from .certificate import ROUNDING, Certificate, LinearSolution, Sides
+from .cuts import Pool
 from .least_noise import least_variance
 from .perturbed import Distances
 from .problem import Problem
-
-if TYPE_CHECKING:
-    from .chromatic_pairs import ChromaticPairs
-    from .member_pairs import MemberPairs
 
 _SUM_ROUNDING = 1e-12
 """Rounding of a sum over rows and wavelengths, relative to the sum of its terms' sizes."""
@@ -65,10 +61,10 @@ class _Rows:
 class FilterProgram:
     """Filters of a problem, and every pair of signals that may come too near."""
 
-    def __init__(self, problem: Problem, members: MemberPairs | ChromaticPairs | None = None) -> None:
+    def __init__(self, problem: Problem, pool: Pool | None = None) -> None:
         """Compute the rows of constraints and pairs."""
         self.problem = problem
-        self._members = members
+        self._pool = pool
         self.base = problem.setup.camera.base_qe[0]
         bound = problem.constraints.get("min_transmission", Bound(min=0.0))
         least = bound.min or 0.0
@@ -121,7 +117,7 @@ class FilterProgram:
         fixed = np.delete(model.smooth(self.base[None, None])[0], channel, axis=2)
         noise = self._noise(model) if self.noisy else None
         for name, (a, b) in self.problem.pairs.items():
-            if self.problem.quantities[name].distance_kind == "chromatic":  # their pairs are members of the program
+            if self._pool is not None and name in self._pool.names:
                 continue
             first, second = setup.members[a], setup.members[b]
             differences = gain[:, first, None] - gain[:, None, second]
@@ -131,10 +127,10 @@ class FilterProgram:
                 differences, squares = differences / np.sqrt(own_noise)[..., None], squares / others
             others_squared = squares.sum(axis=3).ravel()
             rows = differences.reshape(-1, self.base.size)
-            yield name, Distances(rows, others_squared, np.zeros((others_squared.size, 2)))
-        if self._members is not None:
-            for name in self._members.names:
-                yield name, self._members.distances(name)
+            yield name, Distances.of(rows, others_squared)
+        if self._pool is not None:
+            for name in self._pool.names:
+                yield name, self._pool.distances(name)
 
     def _set_pairs(self) -> None:
         problem = self.problem

@@ -22,7 +22,6 @@ from ..base.types import PerWavelength
 from ..camera.exposure import may_be_brightest
 from ..camera.pixel import unquantized
 from ..metrics.bound import FEASIBLE, Bound
-from ..metrics.chromatic import smooth_chromatic
 from ..metrics.columns.sensitivity import SENSITIVITY
 from ..metrics.evaluate import designed_quantities
 from ..metrics.objective import Objective
@@ -34,10 +33,8 @@ from .perturbed import all_ways, perturbed_filters
 from .problem import Problem
 
 if TYPE_CHECKING:
-    from .any_height import AnyHeight
-    from .chromatic_pairs import ChromaticPairs
+    from .cuts import Pool
     from .filter_program import FilterProgram
-    from .member_pairs import MemberPairs
     from .sides import Proof
 
 _SENSITIVITY_TOLERANCE = 1e-6
@@ -51,7 +48,7 @@ _SHARES = (0.0, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5)
 """How far a solver's filter is moved toward one that is inside, to make up for the solver's tolerance."""
 
 
-_DISTANCES = {DN: smooth_csd, "noise": smooth_detectability, "chromatic": smooth_chromatic}
+_DISTANCES = {DN: smooth_csd, "noise": smooth_detectability}
 """Smallest distance of the smooth response, by `Quantity.distance_kind`."""
 
 
@@ -89,20 +86,17 @@ def limit_of(
     if refused is not None:
         raise SweepError(ValidationIssue(f"no limit: {refused}"))
     relaxed, left_out = _relaxed(problem)
-    heights = _any_height_of(relaxed) if relaxed.setup.all_heights else None
     distances = any(relaxed.quantities[name].distance_kind for name in relaxed.objective.weights)
     tolerance = tolerance_dn if distances else _SENSITIVITY_TOLERANCE
-    members, solved = _members_of(relaxed), 0
+    pool, solved = _pool_of(relaxed), 0
     while True:
-        relaxed = relaxed if heights is None else heights.problem
-        program, proof = _proof(relaxed, members, tolerance, most_programs - solved)
+        program, proof = _proof(relaxed, pool, tolerance, most_programs - solved)
         solved += program.solved
-        known = members if heights is None else heights
-        if known is None or proof.curve is None or solved >= most_programs or not known.more(proof.curve):
+        if proof.curve is None or solved >= most_programs or not pool.more(proof.curve):
             break
     attained, curve = proof.attained, proof.curve
-    if curve is not None and (known is not None or program.noisy):
-        attained, curve, more = _attaining(relaxed, curve, members, heights, tolerance)
+    if curve is not None and (pool.names or program.noisy):
+        attained, curve, more = _attaining(relaxed, curve, pool, tolerance)
         solved += more
     least = relaxed.constraints.get(SENSITIVITY)
     from_here = -np.inf if not program.noisy or least is None or least.min is None else least.min
@@ -133,48 +127,28 @@ def gap_between(value: float, proven: float) -> float:
     return 1 - min(value, proven) / proven
 
 
-def _members_of(problem: Problem) -> MemberPairs | ChromaticPairs | None:
-    """Return the pairs of worst cases or of chromatic separations; None if there are none of them."""
-    names = dict.fromkeys((*problem.objective.weights, *problem.constraints))
-    if chromatic := [name for name in names if problem.quantities[name].distance_kind == "chromatic"]:
-        from .chromatic_pairs import ChromaticPairs  # noqa: PLC0415  (only for chromatic separations)
+def _pool_of(problem: Problem) -> Pool:
+    from .cuts import Pool  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
-        return ChromaticPairs(problem, chromatic)
-    if over := [name for name in names if problem.worst_distance(name)]:
-        from .member_pairs import MemberPairs  # noqa: PLC0415  (only where lights have a population)
-
-        return MemberPairs(problem, over)
-    return None
+    return Pool(problem)
 
 
-def _any_height_of(problem: Problem) -> AnyHeight:
-    from .any_height import AnyHeight  # noqa: PLC0415  (only where all field positions count)
-
-    return AnyHeight(problem)
-
-
-def _proof(
-    problem: Problem, members: MemberPairs | ChromaticPairs | None, tolerance: float, most_programs: int
-) -> tuple[FilterProgram, Proof]:
+def _proof(problem: Problem, pool: Pool, tolerance: float, most_programs: int) -> tuple[FilterProgram, Proof]:
     """Return the linear programs of a problem, and the proof of the bound."""
     from .filter_program import FilterProgram  # noqa: PLC0415  (slow to import: kept off the start-up path)
     from .sides import SideSearch  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
-    program = FilterProgram(problem, members)
+    program = FilterProgram(problem, pool)
 
     def value(curve: PerWavelength, inside: PerWavelength | None) -> tuple[float, PerWavelength]:
-        attained, moved = _inside(program.problem, np.clip(curve, program.low, program.base), inside, members)
+        attained, moved = _inside(program.problem, np.clip(curve, program.low, program.base), inside, pool)
         return (program.reaches(moved) if program.noisy and attained > -np.inf else attained), moved
 
     return program, SideSearch(program, value, tolerance, most_programs).run()
 
 
 def _attaining(
-    problem: Problem,
-    curve: PerWavelength,
-    members: MemberPairs | ChromaticPairs | None,
-    heights: AnyHeight | None,
-    tolerance: float,
+    problem: Problem, curve: PerWavelength, pool: Pool, tolerance: float
 ) -> tuple[float, PerWavelength | None, int]:
     """Return the value of a program's filter in all worst cases, the filter, and the number of further programs.
 
@@ -183,8 +157,7 @@ def _attaining(
     """
     requested, solved = problem, 0
     for _ in range(_ATTEMPTS):
-        worst = {} if members is None else {name: members.least(name, curve) for name in members.names}
-        worst |= {} if heights is None else heights.least(curve)
+        worst = pool.least(curve)
         attained = _attained(problem, curve, worst)
         if attained > -np.inf:
             return attained, curve, solved
@@ -195,7 +168,7 @@ def _attaining(
         bounds = requested.constraints
         raised = {n: Bound.model_construct(min=(bounds[n].min or 0.0) + 2 * lack) for n, lack in shortfall.items()}
         requested = replace(requested, constraints={**bounds, **raised})
-        program, solution = _proof(requested, members, tolerance, _ATTEMPT_PROGRAMS)
+        program, solution = _proof(requested, pool, tolerance, _ATTEMPT_PROGRAMS)
         solved += program.solved
         if solution.curve is None:
             break
@@ -231,7 +204,7 @@ def reason_without_bound(problem: Problem) -> str | None:
         ),
         (
             lambda: _mixes_chromatic(problem),
-            "of a chromatic separation none is known for these worst cases",
+            "of a chromatic separation none is known over all field positions or within limits of the brightness",
         ),
         (lambda: _clips(problem), "signals exceed the full well or the range of the ADC"),
         (
@@ -249,11 +222,10 @@ def _merges(problem: Problem) -> bool:
 
 
 def _mixes_chromatic(problem: Problem) -> bool:
-    """Return whether a chromatic separation has a worst case beside it, all field positions, or limited brightness."""
+    """Return whether a chromatic separation is asked for over all field positions, or in a limited brightness."""
     names, setup = (*problem.objective.weights, *problem.constraints), problem.setup
     chromatic = any(problem.quantities[name].distance_kind == "chromatic" for name in names)
-    others = setup.all_heights or setup.scene.brightness is not None
-    return chromatic and (others or any(problem.worst_distance(name) for name in names))
+    return chromatic and (setup.all_heights or setup.scene.brightness is not None)
 
 
 def _most_sensitive(problem: Problem) -> float:
@@ -326,7 +298,7 @@ def _clips(problem: Problem) -> bool:
 
 
 def _inside(
-    problem: Problem, curve: PerWavelength, inside: PerWavelength | None, members: MemberPairs | ChromaticPairs | None
+    problem: Problem, curve: PerWavelength, inside: PerWavelength | None, pool: Pool
 ) -> tuple[float, PerWavelength]:
     """Return the value of a solver's filter, moved by its tolerance toward a feasible one, and the filter.
 
@@ -336,8 +308,7 @@ def _inside(
     for end in (base,) if inside is None else (base, inside):
         for share in _SHARES:
             moved = np.asarray(curve + share * (end - curve), dtype=float)
-            over = {} if members is None else {name: members.counted(name, moved) for name in members.names}
-            attained = _attained(problem, moved, over)
+            attained = _attained(problem, moved, pool.counted(moved))
             if attained > -np.inf:
                 return attained, moved
     return -np.inf, curve
@@ -346,16 +317,14 @@ def _inside(
 def _attained(problem: Problem, curve: PerWavelength, over: Mapping[str, float]) -> float:
     """Return the objective of a filter as the search evaluates it; -inf if it does not meet the constraints.
 
-    `over` has worst cases, or smallest distances of the scene, that are already known.
+    `over` has the distances that are already known.
     """
     curves = curve[None, None]
     columns = designed_quantities(problem.setup, curves) | {name: np.array([value]) for name, value in over.items()}
     for name in {*problem.objective.weights, *problem.constraints} & problem.pairs.keys():
-        distance_kind = problem.quantities[name].distance_kind
-        if distance_kind == "chromatic" and name in over:  # over the known brightnesses
-            continue
-        of = _DISTANCES[distance_kind]
-        columns[name] = np.minimum(of(problem.setup, curves, problem.pairs[name]), over.get(name, np.inf))
+        if name not in over:
+            of = _DISTANCES[problem.quantities[name].distance_kind]
+            columns[name] = of(problem.setup, curves, problem.pairs[name])
     for name, bound in problem.constraints.items():
         if not bound.violation(columns[name])[0] <= FEASIBLE:
             return -np.inf

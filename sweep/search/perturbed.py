@@ -31,12 +31,26 @@ class Distances:
     """Squared distances of pairs of lights: `squared` + (rows @ N + unknown part)^2.
 
     `rows`: differences in the modified channel, DN per QE; `squared`: in the other channels, DN^2; `added`: upper
-    bounds on the unknown part and on its negative, DN.
+    bounds on the unknown part and on its negative, DN; `highest`: the part of a filter at its upper bound there.
     """
 
     rows: Float[Array, "distances wavelengths"]
     squared: Float[Array, " distances"]
     added: Float[Array, "distances 2"]
+    highest: Float[Array, " distances"]
+
+    @classmethod
+    def of(cls, rows: Float[Array, "distances wavelengths"], squared: Float[Array, " distances"]) -> Distances:
+        """Return distances that N determines."""
+        return cls(rows, squared, np.zeros((squared.size, 2)), np.zeros(squared.size))
+
+    def subset(self, which: Bool[BoolArray, " distances"]) -> Distances:
+        """Return some of the distances."""
+        return Distances(self.rows[which], self.squared[which], self.added[which], self.highest[which])
+
+    def produced(self, curve: PerWavelength) -> Float[Array, " distances"]:
+        """Return the distances of a filter as it is produced where its unknown part is at its upper bound, DN."""
+        return np.asarray(np.sqrt(self.squared + (self.rows @ curve + self.highest) ** 2))
 
     def least(self, curve: PerWavelength) -> float:
         """Return a lower bound on the smallest distance of a filter, DN."""
@@ -63,17 +77,16 @@ class PerturbedFilter:
         """Return the produced filter, at its upper bound where it is unknown."""
         return np.where(self.known, self.scale * curve[self.source] + self.constant, self.high)
 
-    def rows(
-        self, differences: Float[Array, "distances wavelengths"]
-    ) -> tuple[Float[Array, "distances wavelengths"], Float[Array, "distances 2"]]:
-        """Convert sums over the produced filter to sums over N."""
+    def distances(self, differences: Float[Array, "distances wavelengths"]) -> Distances:
+        """Convert differences in the produced filter to those of N; those in other channels are 0."""
         rows = np.zeros_like(differences)
         known = np.flatnonzero(self.known)  # each has a source of its own
         rows[:, self.source[known]] = differences[:, known] * self.scale[known]
         other = differences * ~self.known
         ends = [np.maximum(sign * other, 0) @ self.high + np.minimum(sign * other, 0) @ self.low for sign in (1, -1)]
         fixed = differences[:, known] @ self.constant[known]
-        return rows, np.stack([ends[0] + fixed, ends[1] - fixed], axis=1)
+        added = np.stack([ends[0] + fixed, ends[1] - fixed], axis=1)
+        return Distances(rows, np.zeros(len(rows)), added, other @ self.high + fixed)
 
 
 def perturbed_filters(problem: Problem) -> tuple[PerturbedFilter, ...]:

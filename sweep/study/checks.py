@@ -8,10 +8,10 @@ from dataclasses import replace
 
 from ..camera import psf
 from ..camera.memory import MOST_BYTES, memory_problem
-from ..camera.merge import light_of
 from ..camera.mosaic import Mosaic
+from ..camera.noise.merge import light_of
+from ..camera.noise.merged_readings import NOISE_BINS, countable, n_roots
 from ..camera.pixel import Pixel
-from ..camera.readings import NOISE_BINS, countable, n_roots
 from ..camera.scene import OBJECT_RESOLUTION, FixedExposure, Scene
 from ..metrics.quantity import Quantity, RequestedQuantities
 from ..metrics.registry import listed, quantities_of

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -79,6 +80,11 @@ class Study:
     user_effects: tuple[UserEffect, ...] = ()
     colorants: Colorants | None = None
     plans: Mapping[str, Plan] = field(default_factory=dict)
+    _setups: dict[tuple[Any, ...], Setup] = field(init=False, repr=False, compare=False, default_factory=dict)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a worker is given: it makes setups of its own."""
+        return self.__dict__ | {"_setups": {}}
 
     @property
     def pairs(self) -> tuple[Pair, ...]:
@@ -176,8 +182,8 @@ class Study:
         """Return the setup shared by the designs of a space."""
         bases = {} if space.filter is None else space.filter.bases
         technology = None if space.filter is None else space.filter.technology
-        setup = self.setup_of(space.cfa, scenario, bases, technology)
-        return replace(setup, tasks=None) if space.kind == "sweep" and not self.has_swept_tasks else setup
+        with_tasks = space.kind != "sweep" or self.has_swept_tasks
+        return self.setup_of(space.cfa, scenario, bases, technology, with_tasks=with_tasks)
 
     @property
     def has_swept_tasks(self) -> bool:
@@ -189,12 +195,31 @@ class Study:
         )
 
     def setup_of(
-        self, cfa: str, scenario: str, bases: Mapping[str, str], technology: Technology | None = None
+        self,
+        cfa: str,
+        scenario: str,
+        bases: Mapping[str, str],
+        technology: Technology | None = None,
+        *,
+        with_tasks: bool = True,
     ) -> Setup:
-        """Return the setup of a CFA.
+        """Return the setup of a CFA, the same one each time, which owns its model.
 
         `bases`: modified channel -> curve that it replaces.
         """
+        key = cfa, scenario, *bases.items(), technology, with_tasks
+        if key not in self._setups:
+            self._setups[key] = self._setup(cfa, scenario, bases, technology, self.tasks if with_tasks else None)
+        return self._setups[key]
+
+    def _setup(
+        self,
+        cfa: str,
+        scenario: str,
+        bases: Mapping[str, str],
+        technology: Technology | None,
+        tasks: StudyTasks | None,
+    ) -> Setup:
         mosaic, scene = self.mosaics[cfa], self.scenarios[scenario]
         replaced = {**self.section.cfas[cfa].curves, **bases}
         modified = tuple(mosaic.channels.index(channel) for channel in bases)
@@ -214,7 +239,7 @@ class Study:
             camera,
             self.lights,
             scene,
-            tasks=self.tasks,
+            tasks=tasks,
             accuracy=self.section.accuracy,
             user_effects=self.user_effects,
             left_out=self.plans[scenario].left_out if scenario in self.plans else frozenset(),

@@ -17,8 +17,8 @@ from ..camera.scene import FixedExposure, Noise, Scene
 from ..camera.setup import Setup
 from ..spectra.color import luminance_per_photon_radiance
 from ..spectra.spectrum import linear_basis
-from .compiled_images import draw_numbers
 from .head import MARGIN, HeadMaps, head_maps, lamp_maps
+from .image_kernels import draw_numbers
 from .materials import ambient_light, phantom, reflectance
 from .pixel_table import PixelTable, pixel_table
 from .scenes import Scenes, orders_of_lenses, uniforms

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.types import Array, Float, IndexArray, Int
-from ..camera.readings import ROOT_STEP
-from .compiled_images import cases_on_table, log_likelihoods
+from ..camera.noise.merged_readings import ROOT_STEP
+from .image_kernels import cases_on_table, log_likelihoods
 from .images import HeadCamera, HeadElectrons, Numbers
 from .lamps import Lamps
 from .scenes import PHANTOM_SHARE, SHUFFLED, Scenes, orders_of_lenses, states_of

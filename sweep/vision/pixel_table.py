@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from ..base.types import Array, Float, PerValue
 from ..camera.captures import Capture
-from ..camera.merge import light_of, saturating_e
 from ..camera.noise import gaussian
+from ..camera.noise.merge import light_of, saturating_e
+from ..camera.noise.merged_readings import ROOT_STEP, nodes_of, readings_of
 from ..camera.noise.moments import without_prnu
 from ..camera.pixel import Pixel
-from ..camera.readings import ROOT_STEP, nodes_of, readings_of
 
 _LEAST = 1e-30
 
@@ -60,7 +60,7 @@ def pixel_table(pixel: Pixel) -> PixelTable:
 
     `pixel`: full well, gain, noise and ADC; captures of an HDR pixel have its QE and crosstalk.
     """
-    from ..camera.noise.compiled import merged_shares  # noqa: PLC0415  (compiled: kept off the start-up path)
+    from ..camera.noise.kernels import merged_shares  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     merged = _merged(without_prnu(pixel))
     light, most_e = light_of(merged), saturating_e(merged)

@@ -24,7 +24,7 @@ from sweep.base.errors import SweepError
 
 PACKAGE = Path(sweep.__file__).parent
 HELPER = "from .machine_code import njit\n@njit(cache=True)\ndef value(x):\n    return x + {}\n"
-CALLER = "from .machine_code import njit\nfrom .compiled_b import value\n@njit(cache=True)\ndef twice(x):\n    return 2 * value(x)\n"
+CALLER = "from .machine_code import njit\nfrom .b_kernels import value\n@njit(cache=True)\ndef twice(x):\n    return 2 * value(x)\n"
 
 
 def test_every_file_that_compiles_is_a_source() -> None:
@@ -42,11 +42,11 @@ def test_a_kernel_is_compiled_anew_when_another_file_changes(tmp_path: Path) -> 
     (package / "base").mkdir(parents=True)
     for name in ("machine_code.py", "errors.py"):
         shutil.copy(PACKAGE / "base" / name, package / "base" / name)
-    (package / "base" / "compiled_a.py").write_text(CALLER)
-    program = "from own.base.compiled_a import twice; print(twice(1), sum(twice.stats.cache_hits.values()))"
+    (package / "base" / "a_kernels.py").write_text(CALLER)
+    program = "from own.base.a_kernels import twice; print(twice(1), sum(twice.stats.cache_hits.values()))"
     said = []
     for more in (1, 15, 15):  # Python itself looks at a file's length, and at the second in which it was written
-        (package / "base" / "compiled_b.py").write_text(HELPER.format(more))
+        (package / "base" / "b_kernels.py").write_text(HELPER.format(more))
         run = [sys.executable, "-c", program]
         done = subprocess.run(run, cwd=tmp_path, capture_output=True, text=True, check=True)
         said.append(done.stdout.split())

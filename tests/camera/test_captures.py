@@ -13,15 +13,15 @@ from scipy import stats
 
 from sweep.camera.camera import Camera
 from sweep.camera.captures import NAMED_CAPTURES, Capture
-from sweep.camera.merge import coded, limits_dn, merged, without_noise
 from sweep.camera.model import scene_model
 from sweep.camera.mosaic import Mosaic
+from sweep.camera.noise import errors as confusion
+from sweep.camera.noise.merge import coded, limits_dn, merged, without_noise
 from sweep.camera.pixel import Pixel
 from sweep.camera.pwm import exposure_scales, light_in, phases_of
 from sweep.camera.scene import FixedExposure, PwmDrive, Scene
 from sweep.camera.sensor import BUILT_IN_SENSORS
 from sweep.camera.setup import Setup
-from sweep.metrics import confusion
 from sweep.metrics.evaluate import evaluate
 from sweep.spectra.builtin.registry import BUILT_IN_LIGHTS
 from sweep.spectra.spectrum import WavelengthGrid

@@ -91,7 +91,7 @@ def electrons(cfa: str, mode: str) -> tuple[np.ndarray, dict[str, Any]]:
     run = next(r for r in ref["runs"] if r["cfa"] == cfa and r["mode"] == mode)
     every = Mosaic.from_rows("all", [ref["qe_names"]])
     setup = isetcam_setup(every, ref["skip_magnification"], run["skip_exposure_s"])
-    return linear_model(setup).electrons.rates(NOTHING)[0, 0] * run["skip_exposure_s"], run
+    return next(linear_model(setup).scene.views()).electrons.rates(NOTHING)[0, 0] * run["skip_exposure_s"], run
 
 
 @pytest.mark.parametrize("mode", ["fixed", "auto"])

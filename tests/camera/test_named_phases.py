@@ -50,7 +50,8 @@ def lower_by_dn(made: DesignScene, seed: int) -> float:
     light = setup.scene.target
     rows, columns = setup.camera.mosaic.indices.shape
     named_px = np.random.default_rng([seed, 31]).uniform(0, (columns, rows), (NAMED, 2))
-    response = SceneModel(setup, read_at(light, named_px)).read(made.curves)[0][0]
+    model = SceneModel(setup)
+    response = model.read(made.curves, [*model.views(read_at(light, named_px))])[0][0]
     distances = separations(response, setup.members)
     return max(float(worst[csd_name(pair)][0] - distances[pair].min()) for pair in class_pairs(setup.lights.classes))
 
@@ -61,7 +62,8 @@ def test_a_named_phase_is_read_as_among_others() -> None:
     light = made.setup.scene.target
     named = light.model_copy(update={"phase_px": (0.3, 0.85)})
     setup = replace(made.setup, scene=made.setup.scene.model_copy(update={"target": named}))
-    among = SceneModel(made.setup, read_at(light, np.array([[0.3, 0.85], [1.2, 0.4]])), once=True).read(made.curves)[0]
+    model = SceneModel(made.setup)
+    among = model.read(made.curves, [*model.views(read_at(light, np.array([[0.3, 0.85], [1.2, 0.4]])))])[0]
     np.testing.assert_allclose(SceneModel(setup).read(made.curves)[0][:, 0], among[:, 0], rtol=1e-12)
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from sweep.base.errors import StudyError, SweepError
 from sweep.base.user_code import UserCode
-from sweep.camera.irradiance import background_irradiance, scene_irradiance, signal_irradiance
+from sweep.camera.irradiance import background_irradiance, path_factor, scene_irradiance, signal_irradiance
 from sweep.camera.scene import Scene
 from sweep.camera.user_effects import UserEffect
 from sweep.study import load_study
@@ -76,6 +76,18 @@ def test_veiling_glare_spreads_a_share_of_the_mean_light(field_cd_m2: float | No
     np.testing.assert_allclose(
         background_irradiance(setup), 0.95 * background_irradiance(plain) + 0.05 * mean, rtol=1e-13
     )
+
+
+def test_veiling_glare_is_the_same_off_axis() -> None:
+    """Light that the lens scatters is no image, and is not dimmed as one."""
+    glare = LIT | {"veiling_glare": {"share": 0.05, "field_cd_m2": 2000.0}, "background_cd_m2": 0.0}
+    found = []
+    for off_axis_deg in (0.0, 30.0):
+        setup = scene("glare", "RGGB", glare | {"off_axis_deg": off_axis_deg}).setup
+        nodes_nm = setup.camera.grid.nodes_nm
+        found.append(background_irradiance(setup) * path_factor(setup, nodes_nm, background=True))
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-12)
+    assert found[0].min() > 0
 
 
 def test_veiling_glare_needs_a_target() -> None:

@@ -20,7 +20,7 @@ from sweep.camera.model import SceneModel
 from sweep.camera.scene import FixedExposure
 from sweep.camera.setup import Setup
 from sweep.metrics.discrimination import error_bounds
-from sweep.metrics.evaluate import evaluate, family_quantities
+from sweep.metrics.evaluate import evaluate
 from sweep.metrics.quantity import WORST_CASE, Quantity, RequestedQuantities
 from sweep.metrics.registry import quantities_of
 from sweep.metrics.smooth import Rows, SmoothDesign
@@ -39,7 +39,7 @@ class Made:
         self.setup, self.family, self.states = setup, FAMILY, states
         self.curves = FAMILY.curves(X)
         imager = SceneModel(setup)
-        self.found = evaluate(imager, self.curves, states, probabilities=bool(states)) | family_quantities(FAMILY, X)
+        self.found = evaluate(imager, self.curves, states, probabilities=bool(states), family=FAMILY, points=X)
         self.read, self.exposure_s = imager.read(self.curves)
         self.noisy = imager.read_with_noise(self.curves) if states else None
 
@@ -329,7 +329,7 @@ def test_smooth_rows_are_the_quantity_with_its_derivative(name: str) -> None:
 
     for x in X:
         if name not in OF_NOISE:
-            found = evaluate(SceneModel(linear.setup), FAMILY.curves(x[None])) | family_quantities(FAMILY, x[None])
+            found = evaluate(SceneModel(linear.setup), FAMILY.curves(x[None]), family=FAMILY, points=x[None])
             assert quantity.value(rows(x)) == pytest.approx(found[name][0], rel=1e-12)
         for at, span in enumerate(SPAN):
             step = np.eye(5)[at] * span * 1e-5

@@ -179,7 +179,7 @@ class Darkest(Metric):
         return (Quantity("darkest_dn", "darkest_dn", "weakest signal in its best channel", "DN", direction="more", ends=("min",)),)
 
     def of_readings(self, readings):
-        return {"darkest_dn": readings.whole.max(axis=2).min(axis=1)}
+        return {"darkest_dn": readings.dn.max(axis=2).min(axis=1)}
 '''
 WITH_METRICS = """\
 study: red

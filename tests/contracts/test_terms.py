@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import sweep
-from sweep.camera.merge import merged
 from sweep.camera.model import scene_model
+from sweep.camera.noise.merge import merged
 from sweep.camera.pixel import Pixel
 from sweep.metrics.columns.sensitivity import CFA_SENSITIVITY
 from sweep.metrics.quantity import Column
@@ -51,7 +51,7 @@ ROAD = {
 
 def unlit(**scene: Any) -> np.ndarray:
     model, setup = model_of(**ROAD, **scene)
-    return np.asarray(model.electrons.unlit(np.empty((1, 0, setup.camera.grid.size))))
+    return np.asarray(next(model.views()).electrons.unlit(np.empty((1, 0, setup.camera.grid.size))))
 
 
 def test_dark_current_adds_its_electrons_to_every_element() -> None:

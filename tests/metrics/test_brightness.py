@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 
 from sweep.base.errors import StudyError
-from sweep.camera import merge
 from sweep.camera.model import SceneModel, scene_model
-from sweep.camera.noise import table
+from sweep.camera.noise import merge, table
+from sweep.camera.noise.pixel_curve import pixel_curve
 from sweep.camera.pixel import Pixel
-from sweep.camera.pixel_curve import pixel_curve
 from sweep.camera.setup import Setup
 from sweep.metrics.evaluate import evaluate
 from sweep.study import Study, load_study

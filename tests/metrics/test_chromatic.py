@@ -10,17 +10,19 @@ import pytest
 
 from sweep.camera.linear import linear_model
 from sweep.camera.model import SceneModel
+from sweep.camera.setup import Setup
 from sweep.metrics.bound import FEASIBLE
 from sweep.metrics.chromatic import (
     chromatic_along,
     chromatic_separation,
     chromatic_separations,
-    smooth_chromatic,
     squared_distance,
 )
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.smooth import SmoothDesign
-from sweep.search.limit import limit_of, reason_without_bound
+from sweep.search.limit import limit_of
+from sweep.search.problem import best_feasible, starting_points
+from sweep.search.solver import search_from
 from sweep.study.load import load_study
 
 from ..hard.scenes import FAMILY, scene
@@ -38,6 +40,13 @@ def least_over_brightness(fixed: np.ndarray, scaled: np.ndarray) -> np.ndarray:
         distances = [np.linalg.norm(fixed - a[:, None] * scaled, axis=1) for a in (one, other)]
         low, high = np.where(distances[0] < distances[1], [low, other], [one, high])
     return np.linalg.norm(fixed - ((low + high) / 2)[:, None] * scaled, axis=1)
+
+
+def smooth_chromatic(setup: Setup, curves: np.ndarray, pair: tuple[str, str]) -> np.ndarray:
+    """Chromatic separation of the response before clipping and rounding, the smallest over the cases, DN."""
+    model, members = linear_model(setup), [setup.members[name] for name in pair]
+    response = model.smooth(curves) - model.unlit(curves)[:, :, None]
+    return np.min([chromatic_separation(response[:, case], *members) for case in range(response.shape[1])], axis=0)
 
 
 @pytest.mark.parametrize("channels", [2, 3, 4])
@@ -131,11 +140,19 @@ def test_no_filter_exceeds_the_upper_bound() -> None:
             assert smooth_chromatic(problem.setup, curve[None, None], PAIR)[0] <= limit.proven
 
 
-def test_a_worst_case_beside_it_has_no_upper_bound() -> None:
-    changes = {"production": {"edge_shift_nm": 2}, "constraints.worst_csd_yellow_red": {"min": 10}}
-    study = load_study(STUDIES / "chromatic.yaml", changes=changes)
-    assert study.search is not None
-    assert "chromatic" in str(reason_without_bound(study.problem(study.search)))
+def test_no_answer_exceeds_the_upper_bound_beside_a_worst_case() -> None:
+    """Rows of brightness and of production in one program."""
+    proven = []
+    for least_dn in (10, 256):
+        changes = {"production": {"edge_shift_nm": 2}, "constraints.worst_csd_yellow_red": {"min": least_dn}}
+        study = load_study(STUDIES / "chromatic.yaml", changes=changes)
+        assert study.search is not None
+        problem = study.problem(study.search)
+        proven.append(limit_of(problem).proven)
+        runs = [search_from(problem, 0, u, "SLSQP", 300) for u in starting_points(problem, 3, 1)]
+        best = best_feasible([evaluation for run in runs for evaluation in run.log])
+        assert best is None or best.objective <= proven[-1] * (1 + 1e-9)
+    assert proven[1] < proven[0] - 0.5
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from sweep.camera.model import SceneModel
+from sweep.camera.noise import errors as confusion
 from sweep.camera.pixel import Pixel
-from sweep.metrics import confusion
 from sweep.metrics.discrimination import NoiseShape, error_bounds, pairwise_error
 from sweep.metrics.evaluate import evaluate
 from sweep.study import load_study

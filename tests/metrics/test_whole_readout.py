@@ -14,7 +14,7 @@ from sweep.camera.accuracy import Accuracy
 from sweep.camera.model import SceneModel
 from sweep.designs.block import CurveBlock, EdgeBlock, edges_of
 from sweep.metrics import batch, registry
-from sweep.metrics.batch import Readings
+from sweep.metrics.batch import CaseReadings
 from sweep.metrics.columns import color_separation
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.metric import Metric
@@ -51,9 +51,9 @@ class Darkest(Metric):
         """Its column."""
         return (Quantity("darkest_dn", "darkest_dn", "the weakest signal", "DN", direction="more", ends=("min",)),)
 
-    def of_readings(self, readings: Readings) -> Columns:
+    def of_readings(self, readings: CaseReadings) -> Columns:
         """The weakest signal in its best channel."""
-        return {"darkest_dn": readings.whole.max(axis=2).min(axis=1)}
+        return {"darkest_dn": readings.dn.max(axis=2).min(axis=1)}
 
 
 @pytest.fixture

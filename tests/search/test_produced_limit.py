@@ -58,7 +58,8 @@ def test_a_way_is_the_family_as_production_has_it() -> None:
     for way, shift in zip(ways, (0, -2, -1, 1, 2), strict=True):
         came_out = family.perturbed(ProductionError(shift)).curves(points)[:, 0]
         assert way.known.sum() >= 295
-        rows, added = way.rows(apart)
+        distances = way.distances(apart)
+        rows, added = distances.rows, distances.added
         for curve, out in zip(curves, came_out, strict=True):
             np.testing.assert_allclose(way.curve(curve)[way.known], out[way.known], rtol=1e-12, atol=1e-14)
             assert (apart @ out <= rows @ curve + added[:, 0] + 1e-9).all()

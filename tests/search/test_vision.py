@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from sweep.base.errors import StudyError
-from sweep.metrics.evaluate import image_quantities
+from sweep.camera.model import SceneModel
+from sweep.metrics.evaluate import evaluate
 from sweep.search.problem import best_feasible, starting_points
 from sweep.search.solver import refinement_of, search_from
 from sweep.study.load import study_of_keys
+from sweep.vision.section import SeededVision
 
 from .problems import PROBLEM
 
@@ -48,7 +50,8 @@ def test_the_least_error_of_the_observer_is_searched_for() -> None:
     problem = study.problem(study.search)
 
     def errors(x: np.ndarray) -> np.ndarray:
-        return image_quantities(problem.setup, problem.family.curves(x), study.section.vision, 1)["vision_error"]
+        images = SeededVision(study.section.vision, 1)
+        return evaluate(SceneModel(problem.setup), problem.family.curves(x), images=images)["vision_error"]
 
     over = errors(problem.from_unit(np.linspace(0, 1, 5)[:, None]))
     assert over.max() > 1.05 * over.min() > 0

@@ -9,9 +9,9 @@ from typing import Any, get_args
 
 import numpy as np
 import pytest
+from sweep.camera.merge import light_of, limits_dn
 
 from sweep.base.types import FloatArray
-from sweep.camera.merge import light_of, limits_dn
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
 from sweep.spectra.builtin.spectra import shipped_groups

@@ -13,7 +13,7 @@ from scipy.special import ndtr
 
 from sweep.base.errors import SweepError
 from sweep.vision.batches import formed
-from sweep.vision.compiled_images import draw_numbers, log_likelihoods
+from sweep.vision.image_kernels import draw_numbers, log_likelihoods
 from sweep.vision.images import HeadCamera
 from sweep.vision.installed import require_network
 from sweep.vision.lamps import CHECK, TEST, TRAIN, split_lamps

@@ -62,7 +62,7 @@ def clipped_and_rounded(mean: PerValue, sigma: float, top: float) -> tuple[PerVa
     if sigma == 0:
         return np.clip(np.floor(mean + 0.5), 0.0, top), np.zeros_like(mean)
     if sigma < _EULER_DN:
-        from .compiled import rounded_gaussian  # noqa: PLC0415  (compiled: kept off the start-up path)
+        from .kernels import rounded_gaussian  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         out = np.empty((2, mean.size))
         rounded_gaussian(np.ascontiguousarray(mean), sigma, top, out)

@@ -96,7 +96,7 @@ def without_prnu(pixel: Pixel) -> Pixel:
 
 def counted(electrons: PerValue, pixel: Pixel) -> Float[Array, "3 values"]:
     """Return the moments of pixels without PRNU."""
-    from .compiled import poisson_means  # noqa: PLC0415  (compiled: kept off the start-up path)
+    from .kernels import poisson_means  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     result = linear_moments(electrons, pixel)
     for run, first, counts in runs(electrons, pixel):
@@ -159,7 +159,7 @@ def with_prnu(electrons: PerValue, pixel: Pixel) -> Float[Array, "3 values"]:
     The integrand is a Gaussian times a function that is smooth over a deviation 2 / (prnu root of the electrons), so
     that the rule converges exponentially; its step leaves less than 1e-13.
     """
-    from .compiled import means_over_gains  # noqa: PLC0415  (compiled: kept off the start-up path)
+    from .kernels import means_over_gains  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     even = without_prnu(pixel)
     table = table_without_prnu(even)

@@ -140,7 +140,7 @@ def _moments(
     electrons: PerValue, captures: Sequence[Pixel], limits_dn: Sequence[int | None]
 ) -> dict[Subset, Float[Array, "_moments _values"]]:
     """Return rows of `SubsetTable` at ascending expected electrons by summing over counts."""
-    from .compiled import poisson_means  # noqa: PLC0415  (compiled: kept off the start-up path)
+    from .kernels import poisson_means  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     ranges = [counts_of(electrons, pixel) for pixel in captures]
     first, last = min(low for low, _ in ranges), max(high for _, high in ranges)

@@ -41,7 +41,7 @@ class MomentTable(NamedTuple):
 
     def look_up(self, electrons: SameShape, row: int) -> SameShape:
         """Return one of the values at some electrons."""
-        from .compiled import cubic_of_electrons  # noqa: PLC0415  (compiled: kept off the start-up path)
+        from .kernels import cubic_of_electrons  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         values = np.empty(electrons.shape)
         of_row = self.nodes, self.coefficients[row], self.piece, self.step
@@ -62,7 +62,7 @@ class MomentTable(NamedTuple):
 
         `weights`: of means and of variances; `variance`: empty where it is not wanted. Of a table of these two.
         """
-        from .compiled import moments_of_lamps  # noqa: PLC0415  (compiled: kept off the start-up path)
+        from .kernels import moments_of_lamps  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         lit_e, factors, own, spread = (np.ascontiguousarray(values) for values in (lit_e, factors, *weights))
         of_table = self.nodes, self.coefficients, self.piece, self.step

@@ -9,7 +9,7 @@ import numpy as np
 from ...base.types import PerDesign
 from ...camera.brightness import room_dn, room_of
 from ...spectra.lights import Pair, class_pairs, pair_name
-from ..batch import Batch, Readings
+from ..batch import Batch, CaseReadings
 from ..brightness import error_of
 from ..chromatic import chromatic_along, chromatic_rows, chromatic_separations
 from ..metric import Metric
@@ -46,12 +46,12 @@ class ChromaticSeparation(Metric):
             for pair in class_pairs(requested.classes)
         )
 
-    def of_readings(self, readings: Readings) -> Columns:
+    def of_readings(self, readings: CaseReadings) -> Columns:
         """Compute the columns in closed form; NaN where a pixel may fill before lamps look most alike."""
         setup, pairs = readings.setup, readings.pairs
         if not pairs:
             return {}
-        if readings.dn is None:
+        if readings.whole is None:
             distances, room = _along(readings)
         else:
             room = room_dn(setup, readings.dn, readings.dark)
@@ -72,7 +72,7 @@ class ChromaticSeparation(Metric):
         return {pair_name(CHROMATIC_CSD, p): np.where(missing, walked[p], values) for p, values in closed.items()}
 
 
-def _along(readings: Readings) -> tuple[dict[Pair, PerDesign], PerDesign]:
+def _along(readings: CaseReadings) -> tuple[dict[Pair, PerDesign], PerDesign]:
     """Return distances, DN, of designs that differ in one channel, and up to which of them the closed form holds."""
     assert readings.fixed is not None
     assert readings.values is not None

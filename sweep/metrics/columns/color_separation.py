@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import partial
 
 from ...spectra.lights import class_pairs
-from ..batch import Readings
+from ..batch import CaseReadings
 from ..metric import Metric
 from ..quantity import BEST_PHASE, DN, Columns, Quantity, RequestedQuantities
 from ..separation import csd_name, separations, separations_along
@@ -68,11 +68,11 @@ class ColorSeparation(Metric):
         ]
         return (*nearest, *best) if requested.any_place else tuple(nearest)
 
-    def of_readings(self, readings: Readings) -> Columns:
+    def of_readings(self, readings: CaseReadings) -> Columns:
         """Compute the columns; see `separation.separations`."""
         members = readings.setup.members
-        if readings.dn is not None:
-            return {csd_name(pair): distances for pair, distances in separations(readings.dn, members).items()}
+        if readings.whole is not None:
+            return {csd_name(pair): distances for pair, distances in separations(readings.whole, members).items()}
         assert readings.fixed is not None
         assert readings.values is not None
         along = separations_along(readings.fixed, readings.channel, readings.values, members)

@@ -8,9 +8,9 @@ from functools import partial
 import numpy as np
 
 from ...base.types import FloatArray, MemberNumbers, PerDesign
+from ...camera.noise import errors
 from ...camera.readout import NoisyReadout
 from ...spectra.lights import Pair, class_pairs, pair_name
-from .. import confusion
 from ..batch import Batch
 from ..discrimination import NoiseShape, contrast_to_noise, detectability, error_bounds, pairwise_error
 from ..metric import Metric
@@ -107,15 +107,15 @@ def state_errors(batch: Batch) -> PerDesign:
     return np.asarray(np.max(list(_gaussian(batch.read_with_noise, members).values()), axis=0), dtype=float)
 
 
-def _exact(batch: Batch) -> list[confusion.Errors] | None:
+def _exact(batch: Batch) -> list[errors.Errors] | None:
     """Return errors and bounds in each case by exact sums; None if these are too many."""
     readout = batch.model.readout
     pixels = readout.few_pixels
-    if pixels is None or not confusion.affordable(readout.pixel, pixels):
+    if pixels is None or not errors.affordable(readout.pixel, pixels):
         return None
     light = readout.of_pixels(readout.capture_light) if readout.pixel.captures else None
     electrons = np.moveaxis(batch.model.pixel_electrons(batch.curves), -3, 0)
-    return [confusion.errors(case, pixels, readout.pixel, batch.confused, light) for case in electrons]
+    return [errors.errors(case, pixels, readout.pixel, batch.confused, light) for case in electrons]
 
 
 def _gaussian(read: NoisyReadout, members: Mapping[str, MemberNumbers]) -> _ByPair:

@@ -8,12 +8,11 @@ import numpy as np
 
 from ...base.errors import SweepError, ValidationIssue
 from ...base.types import Array, DesignSignals, Float
-from ..batch import Readings
+from ..batch import CaseReadings
 from ..metric import Metric
 from ..quantity import Columns, Quantity, RequestedQuantities
 from ..smooth import Rows, SmoothDesign
-from ..user_metrics import Readings as UserReadings
-from ..user_metrics import UserMetric
+from ..user_metrics import Readings, UserMetric
 
 _STEP = 1e-5
 """Half of a central difference, in units of the box."""
@@ -46,15 +45,15 @@ class UserColumns(Metric):
             for metric in requested.user_metrics
         )
 
-    def of_readings(self, readings: Readings) -> Columns:
+    def of_readings(self, readings: CaseReadings) -> Columns:
         """Return the worst of the numbers that the metric says of each design; NaN if it has none for the CFA."""
         metric, n = self._metric, len(readings.dark)
         if metric is None:
             return {}
-        first = metric.parts(UserReadings.of_setup(readings.setup, readings.whole[:1]))
+        first = metric.parts(Readings.of_setup(readings.setup, readings.dn[:1]))
         if first is None:  # and no more are read
             return {metric.name: np.full(n, np.nan)}
-        parts = metric.parts(UserReadings.of_setup(readings.setup, readings.whole))
+        parts = metric.parts(Readings.of_setup(readings.setup, readings.dn))
         if parts is None:
             return {metric.name: np.full(n, np.nan)}
         return {metric.name: parts.min(axis=1) if metric.direction == "more" else parts.max(axis=1)}
@@ -71,9 +70,7 @@ def _rows(design: SmoothDesign, *, metric: UserMetric) -> Rows:
 
 
 def _parts(metric: UserMetric, design: SmoothDesign, dn: DesignSignals) -> Float[Array, "designs parts"]:
-    parts = metric.parts(
-        UserReadings.of_setup(design.setup, dn), finite=False
-    )  # a design without light is not feasible
+    parts = metric.parts(Readings.of_setup(design.setup, dn), finite=False)  # a design without light is not feasible
     if parts is None:
         raise SweepError(
             ValidationIssue(

@@ -12,11 +12,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..base.types import Array, Bool, BoolArray, Float, IndexArray, Int, PerValue
+from ...base.types import Array, Bool, BoolArray, Float, IndexArray, Int, PerValue
+from ..pixel import Pixel
+from . import gaussian
 from .merge import exposure_of, limits_dn, saturating_e
-from .noise import gaussian
-from .noise.subsets import share_beyond
-from .pixel import Pixel
+from .subsets import share_beyond
 
 NOISE_BINS = 8.0
 """Bins per standard deviation of the noise of a merged value."""

@@ -7,10 +7,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..base.types import Array, Float, FloatArray, IndexArray, Int, PerValue
-from ..camera.merge import saturating_e
-from ..camera.pixel import Pixel
-from ..camera.readings import readings_of
+from ...base.types import Array, Float, FloatArray, IndexArray, Int, PerValue
+from ..pixel import Pixel
+from .merge import saturating_e
+from .merged_readings import readings_of
 
 
 def merged_numbers(
@@ -52,7 +52,7 @@ def merged_numbers(
 @lru_cache(maxsize=4096)
 def _pixel(electrons: tuple[float, ...], pixel: Pixel, light: tuple[float, ...]) -> tuple[int, PerValue]:
     """Return first bin and shares of one pixel; cached, since CFAs share channels."""
-    from ..camera.noise.compiled import merged_shares  # noqa: PLC0415  (compiled: kept off the start-up path)
+    from .kernels import merged_shares  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     table = readings_of(pixel, light)
     arrays = table.exposure, table.passed, table.starts, table.columns, table.shares
@@ -62,7 +62,7 @@ def _pixel(electrons: tuple[float, ...], pixel: Pixel, light: tuple[float, ...])
 
 def _channel(pixels: Float[Array, "signals pixels"], pixel: Pixel, light: tuple[float, ...]) -> tuple[int, PerValue]:
     """Return first bin and shares of the mean of independent pixels."""
-    from .compiled import mean_shares  # noqa: PLC0415  (compiled: kept off the start-up path)
+    from .error_kernels import mean_shares  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     parts, bins = [_pixel(tuple(expected), pixel, light) for expected in pixels], readings_of(pixel, light).bins
     low, chance = parts[0]

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.lane_kernels import larger, smaller
 from ..base.machine_code import njit
 from ..base.types import FloatArray, IndexArray
-from .vectorized import larger, smaller
 
 _NUMBERS = {"nnan", "nsz"}
 """Lets the compiler take the smaller of several numbers at once; callers hand in no NaN."""

@@ -12,12 +12,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.types import Array, Float, IndexArray, Int, SameShape
-from . import merge
-from .noise import moments, table
-from .pixel import Pixel, unquantized
-from .readings import ROOT_STEP, nodes_of
-from .setup import Setup
+from ...base.types import Array, Float, IndexArray, Int, SameShape
+from ..pixel import Pixel, unquantized
+from ..setup import Setup
+from . import merge, moments, table
+from .merged_readings import ROOT_STEP, nodes_of
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
@@ -138,7 +137,7 @@ def same_electrons(
     share: float | Float[Array, " pixels"] = 1.0,
 ) -> bool:
     """Return whether electrons are the same but for rounding; `share`: of the second ones that the first have."""
-    from .compiled import all_near  # noqa: PLC0415  (compiled: kept off the start-up path)
+    from .kernels import all_near  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     one, other = (np.ascontiguousarray(electrons).reshape(-1, first.shape[-1]) for electrons in (first, second))
     return bool(all_near(one, other, np.broadcast_to(share, first.shape[-1]), _EQUAL, _NONE))

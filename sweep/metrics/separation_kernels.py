@@ -10,9 +10,9 @@ import math
 
 import numpy as np
 
+from ..base.lane_kernels import larger, smaller
 from ..base.machine_code import njit
 from ..base.types import FloatArray, IndexArray
-from ..designs.vectorized import larger, smaller
 
 _NUMBERS = {"nnan", "nsz"}
 """Lets the compiler compare several numbers at once; the result for NaN is undefined."""

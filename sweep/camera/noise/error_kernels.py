@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from ..base.machine_code import njit
-from ..base.types import FloatArray, IndexArray
-from ..camera.noise.compiled import occurring, poisson_shares
+from ...base.machine_code import njit
+from ...base.types import FloatArray, IndexArray
+from .kernels import occurring, poisson_shares
 
 RARE = 1e-40
 """Counts less probable than this, relative to the most probable one, are left out."""

@@ -1,7 +1,4 @@
-"""Compiled inner loops: areas of a disc on squares, sums over splines, electrons of pixels, exposure and readout.
-
-They release the GIL.
-"""
+"""Compiled inner loops of a disc: its area on squares, and means of a spline over squares. They release the GIL."""
 
 from __future__ import annotations
 
@@ -10,7 +7,7 @@ import math
 import numpy as np
 
 from ..base.machine_code import njit
-from ..base.types import FloatArray, IndexArray
+from ..base.types import FloatArray
 
 
 @njit(cache=True, nogil=True)
@@ -64,74 +61,6 @@ def covered_by_disc(x: FloatArray, y: FloatArray, half: float, radius: float) ->
             for column in range(x.shape[1]):
                 shares[case, row, column] = covered_share(x[case, column], y[case, row], half, radius)
     return shares
-
-
-@njit(cache=True, nogil=True)
-def gather(light: FloatArray, shares: FloatArray, place: IndexArray, through: IndexArray, out: FloatArray) -> None:
-    """Add the light of pixels in place, pixel by pixel.
-
-    `light`: light behind each channel's filter at each place; `shares`: weight of each part of a pixel; `through`: row
-    of `light`, or -1 for a channel that does not count; `out`: array that is changed.
-    """
-    n_signals = out.shape[2]
-    pixel_light = np.empty(n_signals)
-    for design in range(out.shape[0]):
-        for case in range(out.shape[1]):
-            for unit in range(out.shape[3]):
-                pixel_light[:] = 0.0
-                lit = False
-                for part in range(shares.size):
-                    channel = through[part, unit]
-                    if channel >= 0:
-                        lit = True
-                        share, part_light = shares[part], light[design, channel, place[part, case, unit]]
-                        for s in range(n_signals):
-                            pixel_light[s] += share * part_light[s]
-                if lit:
-                    for s in range(n_signals):
-                        out[design, case, s, unit] += pixel_light[s]
-
-
-@njit(cache=True, nogil=True)
-def expose(rates: FloatArray, fixed: FloatArray, uniform: FloatArray, time_s: float) -> None:
-    """Replace `rates` by (rates + fixed + uniform) time_s.
-
-    `rates`: electrons/s; changed in place; `fixed`: electrons/s of fixed channels; `uniform`: electrons/s of background
-    and dark current.
-    """
-    for d in range(rates.shape[0]):
-        for case in range(rates.shape[1]):
-            for s in range(rates.shape[2]):
-                rates[d, case, s] = ((fixed[case, s] + rates[d, case, s]) + uniform[d, case]) * time_s
-
-
-@njit(cache=True, nogil=True)
-def all_near(first: FloatArray, second: FloatArray, share: FloatArray, relative: float, absolute: float) -> bool:
-    """Return whether rows are a share of others, as `np.allclose` has it, without its arrays of their size."""
-    for row in range(first.shape[0]):
-        for at in range(first.shape[1]):
-            expected = second[row, at] * share[at]
-            if not abs(first[row, at] - expected) <= relative * abs(expected) + absolute:
-                return False
-    return True
-
-
-@njit(cache=True, nogil=True)
-def whole_numbers(
-    electrons: FloatArray, top_e: float, dn_per_e: float, offset_dn: float, full_scale_dn: float, out: FloatArray
-) -> None:
-    """Convert electrons to whole digital numbers; NaN stays NaN.
-
-    `dn_per_e`, `offset_dn`, `full_scale_dn`: gain, pedestal and full scale, DN; `out`: digital numbers, DN.
-    """
-    whole_dn = math.floor(offset_dn)
-    rest = offset_dn - whole_dn
-    for i in range(electrons.size):
-        held = electrons[i]
-        held = top_e if held > top_e else held
-        steps = np.floor((held * dn_per_e + rest) + 0.5) + whole_dn
-        steps = 0.0 if steps < 0.0 else steps
-        out[i] = full_scale_dn if steps > full_scale_dn else steps
 
 
 @njit(cache=True, nogil=True)

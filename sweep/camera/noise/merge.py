@@ -20,12 +20,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.types import Array, Bool, BoolArray, Float, FloatArray, PerCapture, SameShape
-from .noise.moments import DRAWN, LinearRange
-from .noise.subsets import Subset, SubsetMoments, subset_table, threshold_dn
-from .noise.table import unclipped_e
-from .pixel import Pixel, unquantized
+from ...base.types import Array, Bool, BoolArray, Float, FloatArray, PerCapture, SameShape
+from ..pixel import Pixel, unquantized
+from .moments import DRAWN, LinearRange
 from .rounding import DITHERED_DN, MANY_STEPS, rounded
+from .subsets import Subset, SubsetMoments, subset_table, threshold_dn
+from .table import unclipped_e
 
 _PER_DEVIATION = 1.3
 _CERTAIN = 1 - 1e-12

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.types import Array, Float, FloatArray, IndexArray, Int, MemberNumbers, PerDesign
-from ..camera.pixel import Pixel
-from ..camera.readings import countable
-from ..spectra.lights import class_pairs
+from ...base.types import Array, Float, FloatArray, IndexArray, Int, MemberNumbers, PerDesign
+from ...spectra.lights import class_pairs
+from ..pixel import Pixel
 from .merged_numbers import merged_numbers
+from .merged_readings import countable
 
 FLOOR = 1e-18
 """Largest contribution of neglected tails to an error or to its bound."""
@@ -78,7 +78,7 @@ def _numbers(
     Int[IndexArray, "_numbers captures signals"],
 ]:
     """Return first bin, start and roots of shares of each distinct signal, and the row of each design's signal."""
-    from .compiled import bin_shares, channel_numbers  # noqa: PLC0415  (compiled: kept off the start-up path)
+    from .error_kernels import bin_shares, channel_numbers  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     wide, sigma, n_bins = _bins(pixel)
     table = bin_shares(sigma) if sigma > _LEAST_BINS else np.empty((0, 0))
@@ -114,7 +114,7 @@ def errors(
     `electrons`: expected electrons of each pixel; of an HDR pixel those of each exposure, on the first axis; `light`:
     light of the exposures of an HDR pixel relative to that of a pixel of full sensitivity.
     """
-    from . import compiled as kernels  # noqa: PLC0415  (compiled: kept off the start-up path)
+    from . import error_kernels as kernels  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     used = np.unique(np.concatenate(list(members.values())))
     members = {name: np.searchsorted(used, signals) for name, signals in members.items()}

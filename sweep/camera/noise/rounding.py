@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from ..base.types import SameShape
-from .pixel import Pixel
+from ...base.types import SameShape
+from ..pixel import Pixel
 
 DITHERED_DN = 0.7
 """Read noise, DN, from which on rounding shows in no error."""
