@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from sweep.metrics.nearest import nearest_pairs
 
 from sweep.camera.model import scene_model
+from sweep.metrics.separation_kernels import nearest_pairs
 from sweep.results.designs import row_curves
 from sweep.results.tables import LIMITED_BY
 from sweep.study import Study, load_study

@@ -9,10 +9,10 @@ from typing import Any, get_args
 
 import numpy as np
 import pytest
-from sweep.camera.merge import light_of, limits_dn
 
 from sweep.base.types import FloatArray
 from sweep.camera.mosaic import Mosaic
+from sweep.camera.noise.merge import light_of, limits_dn
 from sweep.camera.pixel import Pixel
 from sweep.spectra.builtin.spectra import shipped_groups
 from sweep.spectra.color import luminance_per_photon_radiance
