@@ -1,7 +1,7 @@
 """Speed, as ratios within one run: `make bench`. Writes outputs/bench/bench.json and .png; nothing here asserts a time.
 
-The yardsticks: what an engineer would write instead (a script with SciPy's cdist, one design at a time; one with
-colour-science's spectra; an image per design), and what the machine can do (matrix products, a bare Parquet write).
+The yardsticks: what an engineer would write instead (a script with SciPy's cdist, one design at a time), and what the
+machine can do (matrix products, a bare Parquet write).
 """
 
 from __future__ import annotations
@@ -15,24 +15,18 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import colour
 import joblib
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 from bench_ratios import BLOCK, median_s
 from build import large
-from scipy.signal import fftconvolve
 from scipy.spatial.distance import cdist
-from scipy.special import j1
 
 from sweep.camera.model import SceneModel
-from sweep.camera.mosaic import Mosaic
-from sweep.camera.scene import Scene
 from sweep.camera.setup import Setup
 from sweep.designs.block import CurveBlock, edges_of
 from sweep.designs.edge import SPAN_PER_WIDTH
@@ -40,8 +34,6 @@ from sweep.designs.space import Space
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.separation import class_pairs, csd_name, separation, separations_along
 from sweep.run import run_study
-from sweep.spectra.lights import Lights
-from sweep.spectra.spectrum import WavelengthGrid
 from sweep.study import Study, load_study
 
 ROOT = Path(__file__).parent.parent
@@ -71,38 +63,6 @@ def script(setup: Setup, target: np.ndarray, points: np.ndarray) -> np.ndarray:
         seen = fixed.T
         found[row] = [cdist(seen[a], seen[b]).min() for a, b in pairs]
     return found
-
-
-def colour_script(setup: Setup, space: Space, points: np.ndarray) -> None:
-    """The same with colour-science's spectral distributions."""
-    waves = setup.camera.grid.nodes_nm
-    shape = colour.SpectralShape(waves[0], waves[-1], setup.camera.grid.step_nm)
-    lights = [colour.SpectralDistribution(photons, waves).align(shape) for photons in setup.lights.photons]
-    for point in points:
-        qe = setup.camera.qe.copy()
-        qe[setup.camera.modified[0]] = space.curves(point[None], setup.camera.grid.size)[0, 0]
-        channels = [colour.SpectralDistribution(curve, waves).align(shape) for curve in qe]
-        response = np.array([[(light * channel).values.sum() for channel in channels] for light in lights])
-        members = list(setup.members.values())
-        for i, first in enumerate(members):
-            for second in members[i + 1 :]:
-                cdist(response[first], response[second]).min()
-
-
-def image_per_design(setup: Setup, radius_um: float, pixels: int = 24, per_pixel: int = 8) -> None:
-    """A disc's image through an f/2 lens for every wavelength, sampled by the pixels, for one design."""
-    pitch = setup.camera.pixel.pitch_um
-    x = (np.arange(pixels * per_pixel) + 0.5) / per_pixel * pitch - pixels * pitch / 2
-    r = np.hypot(*np.meshgrid(x, x))
-    disc = (r <= radius_um).astype(float)
-    light = np.empty((setup.camera.grid.size, pixels, pixels))
-    for index, wave_nm in enumerate(setup.camera.grid.nodes_nm):
-        v = np.maximum(np.pi * r / (wave_nm * 1e-3 * 2.0), 1e-9)
-        airy = (2 * j1(v) / v) ** 2
-        image = fftconvolve(disc, airy / airy.sum(), mode="same")
-        light[index] = image.reshape(pixels, per_pixel, pixels, per_pixel).mean(axis=(1, 3))
-    for qe in setup.camera.qe:
-        np.tensordot(setup.lights.photons * qe, light, axes=1)
 
 
 def swept(study: Study) -> tuple[Space, Setup]:
@@ -168,7 +128,6 @@ def kernels(study: Study, found: dict[str, Any]) -> None:
     for pair, distances_dn in zip(class_pairs(list(members)), theirs, strict=True):  # the same figures, or no yardstick
         np.testing.assert_allclose(ours[csd_name(pair)][:SCRIPTED], distances_dn, rtol=1e-12)
     found["script_designs_per_s"] = SCRIPTED / median_s(lambda: script(setup, target, points[:SCRIPTED]), 5)
-    found["colour_designs_per_s"] = 2 / median_s(lambda: colour_script(setup, space, points[:2]), 1)
     found["separable_designs_per_s"] = BLOCK / median_s(lambda: distances(imager, edges), 30)
     found["dense_designs_per_s"] = BLOCK / median_s(
         lambda: distances(imager, CurveBlock(space.curves(points, setup.camera.grid.size)))
@@ -197,7 +156,6 @@ def kernels(study: Study, found: dict[str, Any]) -> None:
     compiled = median_s(lambda: separations_along(fixed, changing.channel, values, members))
     found["compiled_pairs_over_numpy_pairs"] = arrays / compiled
     found["separable_over_dense"] = found["separable_designs_per_s"] / found["dense_designs_per_s"]
-    found["dense_over_colour"] = found["dense_designs_per_s"] / found["colour_designs_per_s"]
 
 
 def end_to_end(found: dict[str, Any]) -> None:
@@ -223,79 +181,6 @@ def end_to_end(found: dict[str, Any]) -> None:
     )
 
 
-def exponents(study: Study, found: dict[str, Any]) -> None:
-    """(d) How the dense route's time grows, in blocks as a run has them: d log(time) / d log(size), from a fit."""
-    space, setup = swept(study)
-
-    def timed(made: Setup, designs: int) -> float:
-        imager = SceneModel(made)
-        size = min(designs, BLOCK)
-        some = space.curves(space.points(0, size), setup.camera.grid.size)
-        if made.camera.grid != setup.camera.grid:
-            some = np.array(
-                [[np.interp(made.camera.grid.nodes_nm, setup.camera.grid.nodes_nm, c) for c in d] for d in some]
-            )
-        block = CurveBlock(np.repeat(some, len(made.camera.modified), axis=1))
-
-        def all_blocks() -> None:
-            for _ in range(designs // size):
-                evaluate(imager, block)
-
-        return median_s(all_blocks, 5)
-
-    def with_signals(n: int) -> Setup:
-        at = np.arange(n) % len(setup.lights.names)
-        kinds = ("green", "yellow", "orange", "red")
-        types = tuple(kinds[k * 4 // n] for k in range(n))
-        names = tuple(map(str, range(n)))
-        lights = Lights("many", names, types, setup.lights.photons[at], setup.lights.photon_ratio, "", True)
-        return replace(setup, lights=lights)
-
-    def with_channels(n: int) -> Setup:
-        """A camera whose n channels are all modified."""
-        names = tuple(f"N{k}" for k in range(n))
-        mosaic = Mosaic.from_rows("many", [names])
-        qe = np.repeat(setup.camera.base_qe, n, axis=0)
-        return setup.with_camera(mosaic=mosaic, qe=qe, modified=tuple(range(n)))
-
-    def with_wavelengths(n: int) -> Setup:
-        old = setup.camera.grid.nodes_nm
-        grid = WavelengthGrid(start_nm=old[0], stop_nm=old[-1], step_nm=(old[-1] - old[0]) / (n - 1))
-
-        def of(curves: np.ndarray) -> np.ndarray:
-            return np.array([np.interp(grid.nodes_nm, old, curve) for curve in curves])
-
-        lights = replace(setup.lights, photons=of(setup.lights.photons))
-        qe, clear_qe = of(setup.camera.qe), of(setup.camera.clear_qe[None])[0]
-        return replace(setup.with_camera(grid=grid, qe=qe, clear_qe=clear_qe), lights=lights)
-
-    def exponent(sizes: tuple[int, ...], times: list[float]) -> float:
-        return float(np.polyfit(np.log(sizes), np.log(times), 1)[0])
-
-    designs, signals = (4096, 8192, 16384, 32768), (40, 80, 160, 320)
-    channels, wavelengths = (1, 2, 3, 4), (151, 301, 601, 1201)
-    found["exponent_designs"] = exponent(designs, [timed(setup, n) for n in designs])
-    found["exponent_signals"] = exponent(signals, [timed(with_signals(n), 1024) for n in signals])
-    found["exponent_channels"] = exponent(channels, [timed(with_channels(n), 1024) for n in channels])
-    found["exponent_wavelengths"] = exponent(wavelengths, [timed(with_wavelengths(n), 1024) for n in wavelengths])
-
-
-def scene(study: Study, found: dict[str, Any]) -> None:
-    """(f) A light at 250 m: each further design, and the first one with its kernels, against an image per design."""
-    space, setup = swept(study)
-    far = {"target": {"distance_m": 250, "fov_deg": 30}, "optics": {"f_number": 2}}
-    setup = replace(setup, scene=Scene.model_validate(far))
-    target = setup.scene.target
-    assert target is not None
-    radius_um = target.object_resolution_px / 2 * setup.camera.pixel.pitch_um
-    curves = space.curves(space.points(0, 64), setup.camera.grid.size)
-    imager = SceneModel(setup)
-    direct = median_s(lambda: image_per_design(setup, radius_um), 3)
-    found["scene_image_s"] = direct
-    found["scene_design_over_image"] = direct / (median_s(lambda: evaluate(imager, curves)) / len(curves))
-    found["scene_first_design_over_image"] = direct / median_s(lambda: evaluate(SceneModel(setup), curves[:1]), 3)
-
-
 def drawn(found: dict[str, Any]) -> None:
     """The ratios as bars."""
     from matplotlib.figure import Figure
@@ -318,8 +203,6 @@ def main() -> None:
     OUTPUT.mkdir(parents=True, exist_ok=True)
     kernels(study, found)
     on_all_cores(study, found)
-    exponents(study, found)
-    scene(study, found)
     end_to_end(found)
     found["help_s"] = median_s(
         lambda: subprocess.run([sys.executable, "-m", "sweep", "--help"], capture_output=True, check=True)

@@ -24,46 +24,6 @@ EXTREMES: tuple[Any, ...] = (
     ),
     *("x" * 300, "../" * 50, "\0", "\x1b[2J", "\u202e", "\U0001f6a6", [0.5] * 1000, {"a": {"b": {"c": {}}}}),
 )
-SCRAPS = (
-    *(
-        "*a",
-        "&a ",
-        "!!omap ",
-        "!x ",
-        "<<: ",
-        "? ",
-        "- ",
-        ": ",
-        "{",
-        "}",
-        "[",
-        "]",
-        '"',
-        "'",
-        "|\n",
-        ">\n",
-        "#",
-        "%YAML 1.1\n",
-    ),
-    *(
-        "---\n",
-        "...\n",
-        "\t",
-        "\r",
-        "\0",
-        "\x07",
-        "\ufeff",
-        "\u2028",
-        "\ud7ff",
-        "é",
-        "@",
-        "`",
-        "~",
-        "0x",
-        "1e",
-        "&a [*a]",
-    ),
-)
 
 
 def places(node: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
@@ -118,30 +78,3 @@ def written(tree: dict[str, Any]) -> bytes:
     text = StringIO()
     YAML(typ="safe", pure=True).dump(tree, text)
     return text.getvalue().encode("utf-8", "surrogatepass")
-
-
-def torn(rng: np.random.Generator, content: bytes, most: int = 4) -> bytes:
-    """A file with one to `most` of its bytes, lines or parts changed, lost, doubled or put elsewhere."""
-    for _ in range(int(rng.integers(1, most + 1))):
-        cut, other = sorted(int(v) for v in rng.integers(0, len(content) + 1, 2))
-        match int(rng.integers(8)):
-            case 0:
-                content = content[:other]
-            case 1:
-                content = content[:cut] + content[cut : cut + 30] * int(rng.integers(2, 200)) + content[cut:]
-            case 2:
-                content = content[:cut] + content[min(other, cut + 100) :]
-            case 3:
-                content = content[:cut] + rng.bytes(int(rng.integers(1, 9))) + content[cut:]
-            case 4:
-                lines = content.splitlines(keepends=True)
-                content = b"".join(lines[int(i)] for i in rng.permutation(len(lines))) if lines else content
-            case 5:
-                content = content[:cut] + one_of(rng, SCRAPS).encode() + content[cut:]
-            case 6 if content:
-                flipped = bytearray(content)
-                flipped[min(cut, len(content) - 1)] ^= 1 << int(rng.integers(8))
-                content = bytes(flipped)
-            case _:
-                content = content[:cut] + b" " * int(rng.integers(1, 9)) + content[cut:]
-    return content

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 import pytest
 from ruamel.yaml import YAML
 
-import sweep
 from sweep.study import load_study
 
 from .commanded import commanded
@@ -20,7 +19,6 @@ from .conftest import STUDIES
 
 GUIDE = STUDIES / "guide"
 PAGES = sorted(path.name for path in GUIDE.glob("[0-9]*.md"))
-PUBLIC = {*sweep.__all__} - {"__version__"}
 SLOW = "slow"
 """After the language of a block: it takes more than a few seconds."""
 
@@ -105,16 +103,3 @@ def test_page_runs_as_shown(page: str, tmp_path: Path, monkeypatch: pytest.Monke
 def test_page_with_long_runs_runs_as_shown(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     run_page(page, tmp_path, slow=True)
-
-
-def test_guide_shows_every_public_name() -> None:
-    text = "".join(block.text for page in PAGES for block in blocks(page) if block.language == "python")
-    assert {*re.findall(r"sweep\.(\w+)", text)} >= PUBLIC
-
-
-@pytest.mark.parametrize("page", [*PAGES, "reference.md"])
-def test_page_begins_with_its_question(page: str) -> None:
-    title, _, question = (GUIDE / page).read_text().splitlines()[:3]
-    assert title.startswith("# ")
-    assert question.startswith("**Question: ")
-    assert question.endswith("?**")

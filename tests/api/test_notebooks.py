@@ -34,9 +34,3 @@ def test_a_notebook_runs(
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     runpy.run_path(str(notebook), run_name="__main__")
     assert "csd_yellow_red" in capsys.readouterr().out
-
-
-def test_there_is_a_notebook_for_each_way_in() -> None:
-    assert {path.stem for path in NOTEBOOKS} >= {
-        *("first_filter", "own_sensor_and_lights", "own_family", "own_detector", "calibrate")
-    }

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import hashlib
 import os
 import pickle
 import shutil
@@ -22,9 +21,6 @@ from numba.core import caching
 import sweep
 from sweep.base import machine_code
 from sweep.base.errors import SweepError
-
-from ..build import study_file
-from ..commanded import UNDRAWN
 
 PACKAGE = Path(sweep.__file__).parent
 HELPER = "from .machine_code import njit\n@njit(cache=True)\ndef value(x):\n    return x + {}\n"
@@ -152,30 +148,3 @@ def test_machine_code_of_another_user_is_not_run(folder: Path) -> None:
     os.chown(folder, 65534, -1)
     with pytest.raises(SweepError, match="others may change"):
         kernel()
-
-
-@pytest.mark.long
-def test_a_run_whose_machine_code_is_damaged_or_of_others_ends_in_lines(tmp_path: Path) -> None:
-    """In the process of the command and in its workers; a kernel for each kind of damage."""
-    study, kept = study_file(tmp_path, 2), machine_code._kept_in("")
-    folder = tmp_path / "kept" / kept.name
-
-    def run(name: str, cache: Path = folder.parent) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, "-c", UNDRAWN, "run", str(study), "--output", str(tmp_path / name), "--jobs", "2"]
-        own = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
-        return subprocess.run(command, capture_output=True, text=True, check=False, env=own)
-
-    done = run("compiled", kept.parent)
-    assert done.returncode == 0, done.stderr
-    shutil.copytree(kept, folder)
-    names = ["through_edges-*.nbc", "spans-*.nbc", "outside-*.nbc", "ranges_of-*.nbc", "edge_shapes-*.nbi"]
-    files = [next(folder.rglob(f"edge_kernels.{name}")) for name in names]
-    for file, damage in zip(files, [*DAMAGES.values(), DAMAGES["empty"]], strict=True):
-        file.write_bytes(damage(file.read_bytes()))
-    done = run("damaged")
-    assert done.returncode == 0, done.stderr
-    assert all(hashlib.sha256(held[32:]).digest() == held[:32] for held in (file.read_bytes() for file in files))
-    folder.chmod(0o777)
-    done = run("open")
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
-    assert "others may change" in done.stderr

@@ -58,17 +58,6 @@ def test_every_csd_is_compared(run: tuple[Study, pd.DataFrame, set[int]]) -> Non
             assert f"design {frame.loc[row, 'design_id']}: {name} is off" in str(found.issues[0])
 
 
-def test_progress_counts_all_that_is_recomputed(run: tuple[Study, pd.DataFrame, set[int]]) -> None:
-    study, frame, front = run
-    calls: list[tuple[str, int, int]] = []
-    found = audit_rows(study, [frame.iloc[:5], frame.iloc[5:]], front, lambda *call: calls.append(call))
-    total = len(sampled(frame, front))
-    assert total == len(found.rows) >= 5
-    assert {(phase, n) for phase, _, n in calls} == {("designs computed again", total)}
-    assert [done for _, done, _ in calls] == sorted({done for _, done, _ in calls})
-    assert calls[-1][1] == total
-
-
 def broken_audit() -> Audit:
     columns = {"design_id": [3, 4, 7], "scenario": ["chart"] * 3, "plan": "x", "allowed_dn": 0.1}
     realized = {"realized_dn": [0.05, 1.4, 0.3], "quantity": "worst_csd_yellow_red"}

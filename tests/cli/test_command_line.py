@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 import webbrowser
 from pathlib import Path
 
@@ -51,16 +50,6 @@ def test_the_measured_study_finds_its_curves_from_anywhere(tmp_path: Path, monke
     monkeypatch.chdir(tmp_path)
     code, said, err = commanded("check", "measured")
     assert (code, "232,564 designs" in said) == (0, True), err
-
-
-def test_an_installed_copy_has_every_file_of_the_studies() -> None:
-    project = tomllib.loads((STUDIES.parent / "pyproject.toml").read_text())
-    shared = Path("share/cfa-sweep")
-    for folder, patterns in project["tool"]["setuptools"]["data-files"].items():
-        inside = STUDIES.parent / Path(folder).relative_to(shared)
-        files = {path for pattern in patterns for path in STUDIES.parent.glob(pattern)}
-        assert {path.parent for path in files} == {inside}
-        assert files >= {*inside.glob("*.yaml"), *inside.glob("*.csv")}
 
 
 def test_a_changed_key_is_checked_like_the_file_and_kept(tmp_path: Path) -> None:

@@ -240,15 +240,3 @@ def test_names_that_a_file_cannot_hold_are_made_so(tmp_path: Path) -> None:
     assert [name[1:] for name in found] == unique_names(names)
     for values, made in zip(found.values(), curves.values(), strict=True):
         np.testing.assert_array_equal(values, made)
-
-
-@pytest.mark.parametrize("command", ["export", "compare"])
-def test_the_shell_completes_run_folders(tiny: Path, command: str) -> None:
-    from typer.main import get_command
-
-    from sweep.cli.app import app
-
-    own = get_command(app).commands[command]  # type: ignore[attr-defined]
-    context = own.make_context(command, [], resilient_parsing=True)
-    found = own.params[0].shell_complete(context, str(tiny.parent) + "/")
-    assert [str(item.value) for item in found] == [str(tiny)]

@@ -116,26 +116,6 @@ def test_cfas_are_those_that_the_channels_allow(channels: str, changed: str, bas
     assert (layout.changed, layout.base, layout.to) == (changed, base, to)
 
 
-@pytest.mark.parametrize(("header", "count"), [("R,G,B", 3), ("Y,G", 2)])
-def test_any_sensor_makes_a_study_that_loads(tmp_path: Path, header: str, count: int) -> None:
-    qe = csv(tmp_path, f"wavelength_nm,{header}", WAVE, *[0.5 * bell(460 + 70 * i, 45) for i in range(count)])
-    study = load_study(made(tmp_path, qe=qe))
-    assert study.search is not None
-
-
-def test_columns_that_name_no_channel_are_refused(tmp_path: Path) -> None:
-    qe = csv(tmp_path, "wavelength_nm,curve_1,curve_2", WAVE, 0.5 * bell(460, 45), 0.5 * bell(530, 45))
-    with pytest.raises(DataError, match="columns named by channels"):
-        new_study("mine", tmp_path, [qe], [])
-
-
-def test_a_short_range_of_the_sensor_is_the_grid(tmp_path: Path) -> None:
-    inside = (WAVE >= 420) & (WAVE <= 690)
-    qe = csv(tmp_path, "wavelength_nm,R,C", WAVE[inside], bell(600, 50)[inside], bell(550, 90)[inside])
-    study = load_study(made(tmp_path, qe=qe))
-    assert (study.grid.start_nm, study.grid.stop_nm) == (420, 690)
-
-
 def test_two_signal_types_are_enough_and_one_is_refused(tmp_path: Path) -> None:
     two = csv(tmp_path, "wavelength_nm,a,b", WAVE, bell(505, 8), bell(628, 8))
     assert load_study(made(tmp_path, lights=two)).objective.column == "csd_green_red"
@@ -236,3 +216,10 @@ def test_measured_files_lead_to_a_report_without_editing(tmp_path: Path) -> None
     assert "RGBN" in out.splitlines()[0]
     assert "finished, search found" in list_lines(path.parent, studies_of(path.parent, tmp_path / "out"))[0]
     assert np.all([(tmp_path / "out" / "mine" / name).is_file() for name in ("report.html", "pareto.png")])
+
+
+def test_a_short_range_of_the_sensor_is_the_grid(tmp_path: Path) -> None:
+    inside = (WAVE >= 420) & (WAVE <= 690)
+    qe = csv(tmp_path, "wavelength_nm,R,C", WAVE[inside], bell(600, 50)[inside], bell(550, 90)[inside])
+    study = load_study(made(tmp_path, qe=qe))
+    assert (study.grid.start_nm, study.grid.stop_nm) == (420, 690)

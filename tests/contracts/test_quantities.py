@@ -288,11 +288,6 @@ def test_every_quantity_has_a_definition() -> None:
     assert undefined(dict(QUANTITIES)) == set()
 
 
-def test_a_quantity_without_a_definition_is_found() -> None:
-    planted = Quantity("grayness", "grayness", "how gray a design is")
-    assert undefined({**QUANTITIES, "grayness": planted}) == {"grayness"}
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_a_quantity_equals_its_definition(name: str) -> None:
     quantity = QUANTITIES[name]

@@ -198,39 +198,6 @@ sweeps:
 constraints: {red_share: {min: 0.8}}
 search: {starts: 3, max_evaluations: 150}
 """
-GEOMETRIC = '''\
-"""The geometric mean of the terms."""
-
-import numpy as np
-
-from sweep.metrics.rule import Rule
-
-
-class Geometric(Rule):
-    name = "geometric"
-
-    def of(self, terms):
-        return np.exp(np.log(np.maximum(terms, 1e-12)).mean(axis=0))
-
-    def gradient(self, terms):
-        return self.of(terms) / (len(terms) * np.maximum(terms, 1e-12))
-
-    def words(self, terms):
-        return f"geometric mean of {', '.join(terms)}"
-'''
-LAMPS = '''\
-"""Three lamps of one wavelength each."""
-
-import numpy as np
-
-from sweep.spectra.lights import make_lights
-
-
-def lights(grid):
-    lines = {"green": 520, "yellow": 590, "red": 630}
-    signals = [(f"{name} lamp", name, np.exp(-(((grid.nodes_nm - at) / 9) ** 2))) for name, at in lines.items()]
-    return make_lights(grid, "lamps", signals, "made for a test")
-'''
 
 
 ROOM = """\
@@ -322,32 +289,6 @@ def test_a_metric_is_one_new_file(tmp_path: Path) -> None:
     assert search["limit_proven"] >= best["csd_yellow_red"] - 1
     assert search["limit_left_out"] == []
     assert "share of red" in (folder / "report.html").read_text()
-
-
-@pytest.mark.slow
-def test_an_objective_rule_is_one_new_file(tmp_path: Path) -> None:
-    study = WITH_METRICS.replace(
-        "constraints: {red_share: {min: 0.8}}",
-        "objective: {geometric: {csd_yellow_red: 1, csd_green_yellow: 1}}\nconstraints: {sensitivity: {min: 0.8}}",
-    )
-    folder = run_with(tmp_path, "sweep.metrics.rules", "geometric.py", GEOMETRIC, study)
-    rows = pd.read_parquet(folder / "results.parquet")
-    swept = rows[rows["kind"] == "sweep"]
-    mean = np.sqrt(swept["csd_yellow_red"] * swept["csd_green_yellow"])
-    assert swept["objective"].tolist() == pytest.approx(mean.tolist(), rel=1e-12)
-    search = json.loads((folder / "provenance.json").read_text())["search"]
-    assert search["best_smooth_objective"] >= swept[swept["feasible"]]["objective"].max() - 1
-    assert "geometric mean of csd_yellow_red, csd_green_yellow" in (folder / "report.html").read_text()
-
-
-@pytest.mark.slow
-def test_a_data_set_is_one_new_file(tmp_path: Path) -> None:
-    study = "study: lamps\nsensor: ar0820\nlights: lamps\ncfas: [RGGB]\n"
-    folder = run_with(tmp_path, "sweep.spectra.builtin.data_sets", "lamps.py", LAMPS, study)
-    (row,) = pd.read_parquet(folder / "results.parquet").to_dict("records")
-    points = pd.read_parquet(folder / "points.parquet").pivot_table(index="signal_type", columns="channel", values="dn")
-    apart = np.linalg.norm(points.loc["yellow"] - points.loc["red"])
-    assert row["csd_yellow_red"] == pytest.approx(apart)
 
 
 def distance_dn(tint: float) -> float:

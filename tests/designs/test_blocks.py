@@ -11,14 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
 
-from sweep.camera import electrons
 from sweep.camera.model import SceneModel
 from sweep.designs import block as blocks
 from sweep.designs.block import CurveBlock, edges_of
 from sweep.designs.families.free_form import FreeForm
-from sweep.designs.families.stopband import MultiStopband, Stopband
+from sweep.designs.families.stopband import MultiStopband
 from sweep.designs.space import Filter, Space
-from sweep.metrics import chromatic, separation
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.separation import class_pairs, separations, separations_along
 
@@ -62,35 +60,6 @@ def test_shapes_of_edges_are_those_of_their_curves(
     np.testing.assert_allclose(steepest, np.abs(np.diff(curves)).max(axis=1), rtol=0, atol=4 * EPS)
     kept = base[0] > 0
     np.testing.assert_allclose(lowest, (curves[:, kept] / base[0, kept]).min(axis=1), rtol=1e-12, atol=4 * EPS)
-
-
-@pytest.mark.parametrize("name", list(VIEWS))
-def test_few_designs_are_the_same_within_rounding_without_compiled_code(
-    name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    edges = edges_of(SPACE, 0, 60)
-    assert edges is not None
-    curves = CurveBlock(edges.curves())
-    found = []
-    for many in (10**9, 0):
-        monkeypatch.setattr(blocks, "_MANY", many)
-        monkeypatch.setattr(separation, "MANY", many)
-        monkeypatch.setattr(chromatic, "MANY", many)
-        monkeypatch.setattr(electrons, "_MANY", many)
-        found.append([evaluate(SceneModel(VIEWS[name]), block) for block in (curves, edges)])
-    magnitude_dn = brightest_dn(VIEWS[name], edges.curves())
-    for plain, compiled in zip(*found, strict=True):
-        assert list(plain) == list(compiled)
-        for column, values in plain.items():
-            assert_within_rounding(column, compiled[column], values, VIEWS[name], magnitude_dn)
-
-
-def test_no_spectrum_is_made_by_the_separable_route(monkeypatch: pytest.MonkeyPatch) -> None:
-    edges = edges_of(SPACE, 0, SPACE.size)
-    assert edges is not None
-    monkeypatch.setattr(Stopband, "curves", None)
-    monkeypatch.setattr(Stopband, "edges", None)
-    evaluate(SceneModel(VIEWS["rounded"]), edges)
 
 
 def test_designs_that_set_the_exposure_take_the_dense_route() -> None:

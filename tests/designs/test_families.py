@@ -7,8 +7,6 @@ from itertools import pairwise
 import mpmath as mp
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from sweep.base.errors import SweepError
 from sweep.base.types import Section
@@ -136,20 +134,6 @@ def test_conditions_and_dimensions_are_linear(name: str) -> None:
     assert set(family.dimensions) == (set() if name in EDGELESS else {"edge_width_nm", "band_width_nm"})
 
 
-@pytest.mark.parametrize("name", ["stopband", "multi_stopband", "dual"])
-def test_a_shifted_family_moves_every_edge(name: str) -> None:
-    family, x = FAMILIES[name]
-    moved = x.copy()
-    moved[0::5] += 3.0
-    moved[2::5] += 3.0
-    np.testing.assert_allclose(
-        family.perturbed(ProductionError(3.0)).curves(x[None]), family.curves(moved[None]), rtol=1e-13
-    )
-    np.testing.assert_allclose(
-        family.perturbed(ProductionError(3.0)).gradient(x), family.gradient(moved), rtol=1e-10, atol=1e-15
-    )
-
-
 @pytest.mark.parametrize("name", ["stopband", "multi_stopband", "free_form", "absorption_bands", "mixture"])
 def test_production_moves_the_shape_that_a_family_names(name: str) -> None:
     family, x = FAMILIES[name]
@@ -160,25 +144,30 @@ def test_production_moves_the_shape_that_a_family_names(name: str) -> None:
     np.testing.assert_allclose(came_out[:-4], shape[4:], rtol=1e-12, atol=1e-14)
 
 
+def assert_smooth_and_bounded(family: Family, x: np.ndarray) -> None:
+    """Its gradient is that of differences, and a box of one design is that design."""
+    step = 1e-6 * np.where(family.gradient(x).any(axis=(1, 2)), np.maximum(np.abs(x), 1), 0)
+    for k in np.flatnonzero(step):
+        moved = step * (np.arange(x.size) == k)
+        ends = family.curves(np.stack([x + moved, x - moved]))
+        np.testing.assert_allclose(family.gradient(x)[k], (ends[0] - ends[1]) / (2 * step[k]), atol=1e-8)
+    for end, bound in zip(family.hull(x, x), (family.lower(x, x), family.upper(x, x)), strict=True):
+        np.testing.assert_allclose(end, family.curves(x[None])[0], rtol=1e-12)
+        assert (bound <= end + 1e-12).all()
+
+
 @pytest.mark.parametrize("name", ["absorption_bands", "mixture"])
 def test_a_film_that_is_too_thick_absorbs_more(name: str) -> None:
     family, x = FAMILIES[name]
     off = family.perturbed(ProductionError(0.0, 0.1))
     absorbed, more = (-np.log10(made.curves(x[None])[0, 0] / BASE) for made in (family, off))
     np.testing.assert_allclose(more, 1.1 * absorbed, rtol=1e-12, atol=1e-14)
-    step = 1e-6 * np.where(family.gradient(x).any(axis=(1, 2)), np.maximum(np.abs(x), 1), 0)
-    for k in np.flatnonzero(step):
-        ends = off.curves(np.stack([x + step * (np.arange(x.size) == k), x - step * (np.arange(x.size) == k)]))
-        np.testing.assert_allclose(off.gradient(x)[k], (ends[0] - ends[1]) / (2 * step[k]), atol=1e-8)
-    for end, bound in zip(off.hull(x, x), (off.lower(x, x), off.upper(x, x)), strict=True):
-        np.testing.assert_allclose(end, off.curves(x[None])[0], rtol=1e-12)
-        assert (bound <= end + 1e-12).all()
+    assert_smooth_and_bounded(off, x)
 
 
 @pytest.mark.parametrize("name", ["absorption_bands", "mixture"])
 def test_bands_of_a_film_may_be_broader_with_equal_area(name: str) -> None:
     """One colorant alone: 1.3 times as wide about its peak, 1 / 1.3 as high, and then 2 nm to the red."""
-    _, x = FAMILIES[name]
     if name == "mixture":
         family, x = Mixture(WAVE, BASE, SPECTRA, 1), np.array([2.0, 0.8, 0.8])
     else:
@@ -188,24 +177,14 @@ def test_bands_of_a_film_may_be_broader_with_equal_area(name: str) -> None:
     peak_nm = WAVE[absorbed.argmax()]
     expected = np.interp(peak_nm + (WAVE - 2 - peak_nm) / 1.3, WAVE, absorbed) / 1.3
     np.testing.assert_allclose(broader, expected, atol=1e-10 if name == "mixture" else 5e-4)
-    step = 1e-6 * np.where(family.gradient(x).any(axis=(1, 2)), np.maximum(np.abs(x), 1), 0)
-    for k in np.flatnonzero(step):
-        ends = off.curves(np.stack([x + step * (np.arange(x.size) == k), x - step * (np.arange(x.size) == k)]))
-        np.testing.assert_allclose(off.gradient(x)[k], (ends[0] - ends[1]) / (2 * step[k]), atol=1e-8)
-    for end, bound in zip(off.hull(x, x), (off.lower(x, x), off.upper(x, x)), strict=True):
-        np.testing.assert_allclose(end, off.curves(x[None])[0], rtol=1e-12)
-        assert (bound <= end + 1e-12).all()
+    assert_smooth_and_bounded(off, x)
 
 
 def test_bands_that_are_gaussian_in_wavelength_are_symmetric() -> None:
     family = AbsorptionBands(WAVE, BASE, 1, "wavelength")
     ratio = -np.log10(family.curves(np.array([[600.0, 30.0, 0.7, 0.0]]))[0, 0] / BASE)
     np.testing.assert_allclose(ratio[[185, 200, 215]], [0.35, 0.7, 0.35], rtol=1e-12)
-    x, step = np.array([603.0, 31.0, 0.7, 0.1]), 1e-6
-    differences = [
-        (family.curves((x + one)[None]) - family.curves((x - one)[None]))[0] / (2 * step) for one in step * np.eye(4)
-    ]
-    np.testing.assert_allclose(family.gradient(x), differences, atol=1e-9)
+    assert_smooth_and_bounded(family, np.array([603.0, 31.0, 0.7, 0.1]))
 
 
 def test_hard_amounts_leave_numbers() -> None:
@@ -229,48 +208,6 @@ def test_films_that_are_too_thick_stretch_every_edge(name: str) -> None:
     np.testing.assert_allclose(off.curves(x[None]), family.curves(moved[None]), rtol=1e-12)
     by_length = np.where(lengths, 1.01, 1.0)[:, None, None]
     np.testing.assert_allclose(off.gradient(x), by_length * family.gradient(moved), rtol=1e-9, atol=1e-14)
-
-
-def test_a_shifted_free_form_moves_its_transmission() -> None:
-    family, x = FAMILIES["free_form"]
-    ratio = family.perturbed(ProductionError(5.0)).curves(x[None])[0, 0] / BASE
-    np.testing.assert_allclose(ratio[155:296], np.interp(WAVE[155:296] - 5, [550, 600, 613.5, 690], x), rtol=1e-14)
-    assert (ratio[:155] == 1).all()
-
-
-@settings(max_examples=100)
-@given(st.floats(450, 650), st.floats(0, 60), st.floats(500, 720), st.floats(0, 60), st.floats(0, 1))
-def test_dual_keeps_the_sum_and_the_ceiling(left: float, lw: float, right: float, rw: float, depth: float) -> None:
-    family = Dual(WAVE, BASE, CEILING)
-    x = np.array([[left, lw, right, rw, depth]])
-    a, b = family.curves(x)[0]
-    np.testing.assert_allclose(a + b, 2 * BASE, rtol=1e-15)
-    if (family.violation(x) <= 0).all():
-        assert (a >= -1e-15).all()
-        assert (b <= np.maximum(CEILING, BASE) + 1e-15).all()
-
-
-@settings(max_examples=100)
-@given(st.lists(st.floats(0, 40), min_size=8, max_size=8), st.lists(st.floats(0, 1), min_size=2, max_size=2))
-def test_well_formed_bands_do_not_overlap(gaps: list[float], depths: list[float]) -> None:
-    family = MultiStopband(WAVE, BASE, TARGET, 2)
-    l1 = 460 + gaps[0]
-    r1 = l1 + gaps[1]
-    l2 = r1 + gaps[2]
-    r2 = l2 + gaps[3]
-    x = np.array([[l1, gaps[4], r1, gaps[5], depths[0], l2, gaps[6], r2, gaps[7], depths[1]]])
-    if (family.violation(x) <= 0).all():
-        curve = family.curves(x)[0, 0]
-        assert (curve >= np.minimum(BASE, TARGET) - 1e-15).all()
-        assert (curve <= np.maximum(BASE, TARGET) + 1e-15).all()
-
-
-def test_free_form_is_linear_between_its_nodes_and_the_base_outside() -> None:
-    family, x = FAMILIES["free_form"]
-    ratio = family.curves(x[None])[0, 0] / BASE
-    assert (ratio[:150] == 1).all()
-    assert (ratio[291:] == 1).all()
-    np.testing.assert_allclose(ratio[150:291], np.interp(WAVE[150:291], [550, 600, 613.5, 690], x), rtol=1e-14)
 
 
 def test_free_form_starts_are_smooth_and_inside() -> None:
@@ -336,22 +273,10 @@ def test_a_name_in_no_registry_is_refused_and_one_that_is_added_gets_its_own_cla
         test_every_family_is_tested()
 
 
-@pytest.mark.parametrize("name", list(FAMILIES))
-def test_no_filter_of_a_box_exceeds_its_upper_curve(name: str) -> None:
-    family, x = FAMILIES[name]
-    low, high = np.maximum(x - np.minimum(0.3 * x, 8), 0), np.minimum(x * 1.3, x + 8)
-    limits = np.array([p.high for p in family.parameters])
-    high = np.minimum(high, limits)
-    points = low + (high - low) * np.random.default_rng(2).uniform(size=(2000, x.size))
-    points = points[(family.violation(points) <= 0).all(axis=1)]
-    assert len(points) > 100
-    assert (family.curves(points) <= family.upper(low, high) + 1e-12).all()
-
-
 @pytest.mark.parametrize("shift_nm", [0.0, 4.0])
 @pytest.mark.parametrize("name", list(FAMILIES))
 def test_every_filter_of_a_box_lies_in_its_hull(name: str, shift_nm: float) -> None:
-    """Also where edges come out of order; and of a box of one design the hull is its filter."""
+    """Also where edges come out of order; those in order between its bounds; a box of one design is its filter."""
     family, x = FAMILIES[name]
     family = family.perturbed(ProductionError(shift_nm))
     rng = np.random.default_rng(4)
@@ -360,11 +285,14 @@ def test_every_filter_of_a_box_lies_in_its_hull(name: str, shift_nm: float) -> N
         half = rng.uniform(0, 1, x.size) * np.where(x > 100, 40.0, 0.9 * x)
         low, high = x - half, np.minimum(x + half, [p.high for p in family.parameters])
         points = low + (high - low) * np.round(rng.uniform(-0.3, 1.3, (300, x.size)).clip(0, 1), 1)
-        curves = family.curves(points)
-        disordered += int((family.violation(points) > 0).any(axis=1).sum())
-        lower, upper = family.hull(low, high)
-        assert (curves >= lower - 1e-12).all()
-        assert (curves <= upper + 1e-12).all()
+        curves, ordered = family.curves(points), (family.violation(points) <= 0).all(axis=1)
+        disordered += int((~ordered).sum())
+        for (lower, upper), seen in (
+            (family.hull(low, high), curves),
+            ((family.lower(low, high), family.upper(low, high)), curves[ordered]),
+        ):
+            assert (seen >= lower - 1e-12).all()
+            assert (seen <= upper + 1e-12).all()
     assert disordered > 100 or name in EDGELESS
     for end in family.hull(x, x):
         np.testing.assert_allclose(end, family.curves(x[None])[0], atol=1e-15)

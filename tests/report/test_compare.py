@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from shutil import copytree
 
 import numpy as np
 import pandas as pd
-import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
 
 from sweep.base.errors import OutputError, SweepError
 from sweep.report.compare import compare_runs
-from sweep.report.compare_fronts import ComparedFront, draw_fronts
 from sweep.study import load_study
 
 from ..build import STUDY, ran
@@ -123,14 +119,6 @@ def test_equal_scenes_are_compared_whatever_their_names(runs: dict[str, Path], t
 
 
 @pytest.mark.usefixtures("plain_fronts")
-def test_the_same_folder_twice_is_equal(runs: dict[str, Path], tmp_path: Path) -> None:
-    said, _ = compared([runs["tiny"], runs["tiny"]], tmp_path)
-    assert "A tiny and B tiny are the same folder." in said
-    assert "; B tiny is equal." in said
-    assert "Equal in every CSD: RGGB, RYYCy, mine." in said
-
-
-@pytest.mark.usefixtures("plain_fronts")
 def test_fronts_of_shared_scenes_are_compared(runs: dict[str, Path], tmp_path: Path) -> None:
     said, _ = compared([runs["tiny"], runs["chart"], runs["sparse"]], tmp_path)
     assert "Fronts are compared in the scenes that two runs or more have: chart." in said
@@ -166,21 +154,6 @@ def test_other_objectives_and_axes_are_not_mixed(runs: dict[str, Path], tmp_path
 def test_a_combined_objective_has_its_own_words(runs: dict[str, Path], tmp_path: Path) -> None:
     said, _ = compared([runs["combined"], runs["combined"]], tmp_path)
     assert "Best csd_yellow_red + 2 csd_orange_red under the constraints: A combined with" in said
-
-
-@pytest.mark.usefixtures("plain_fronts")
-def test_a_scene_of_another_name_is_the_same(runs: dict[str, Path], tmp_path: Path) -> None:
-    copytree(runs["chart"], tmp_path / "other")
-    for path in (tmp_path / "other" / "designs.parquet", tmp_path / "other" / "pareto.parquet"):
-        table = pq.read_table(path)
-        at = table.schema.get_field_index("scenario")
-        names = pa.array(["dusk"] * len(table)).dictionary_encode()
-        pq.write_table(table.set_column(at, table.schema.field(at), names), path)
-    study = tmp_path / "other" / "study.resolved.yaml"
-    study.write_text(re.sub(r"^  chart:", "  dusk:", study.read_text(), flags=re.MULTILINE))
-    listed_anew(tmp_path / "other")
-    said, _ = compared([runs["chart"], tmp_path / "other"], tmp_path / "to")
-    assert re.search(r"A chart with [0-9.]+ DN; B chart is equal\.", said)
 
 
 @pytest.mark.usefixtures("plain_fronts")
@@ -244,31 +217,3 @@ def test_invalid_comparison_is_one_line(runs: dict[str, Path], tmp_path: Path) -
     assert not (tmp_path / "to").exists()
     code, _, said = commanded("compare", runs["chart"], tmp_path)
     assert (code, len(said.splitlines())) == (2, 1)
-
-
-@pytest.mark.slow
-def test_by_default_a_folder_of_both_names(
-    runs: dict[str, Path], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    said = compare_runs([runs["chart"], runs["plain"]], None).lines
-    assert "outputs/compare-chart-plain/" in said[-1]
-    assert (tmp_path / "outputs" / "compare-chart-plain" / "compare.html").is_file()
-    compare_runs([runs["chart"]] * 26, None)
-    assert max(len(path.name) for path in (tmp_path / "outputs").iterdir()) == 100
-
-
-def test_every_front_has_its_own_mark_and_runs_their_dash() -> None:
-    x = np.linspace(0.8, 1.0, 40)
-    order = [f"run {run} $" for run in range(3)]
-    fronts = [
-        ComparedFront(run, "X", traced, np.stack([x * (at + 1), x], axis=1))
-        for at, run in enumerate(order)
-        for traced in (False, True)
-    ]
-    (axes,) = draw_fronts("a $ title", ("x", "y"), order, fronts, [(order[0], 0.9, 1.0)]).axes
-    drawn = axes.get_lines()
-    assert len({line.get_marker() for line in drawn}) == len(fronts)
-    assert len({str(line._unscaled_dash_pattern) for line in drawn}) == 3  # type: ignore[attr-defined]
-    assert len({line.get_color() for line in drawn}) == 3
-    assert [line.get_markerfacecolor() == "white" for line in drawn] == [False, True] * 3

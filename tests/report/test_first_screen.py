@@ -11,11 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sweep.report import make_report, read_output
-from sweep.study import load_study
-
-from ..build import ran
-from ..conftest import FinishedFolder, draw_nothing
+from ..conftest import FinishedFolder
 from .pages import needs_browser
 
 pytestmark = needs_browser
@@ -29,19 +25,6 @@ SCREENS = [
         for name in ("noise", "distance", "dual", "fog", "night", "robust", "angle")
     ),
 ]
-PLAIN = "study: plain\nsensor: ar0820\nlights: tl16\ncfas: [RGGB, RCCC, RYYCy]\n"
-
-
-@pytest.fixture(scope="module")
-def plain_cfas(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The finished run of a study of plain CFAs alone; its page has plots, and no pictures."""
-    folder = tmp_path_factory.mktemp("plain")
-    (folder / "plain.yaml").write_text(PLAIN)
-    ran(load_study(folder / "plain.yaml"), folder / "out", 1)
-    with pytest.MonkeyPatch.context() as patch:
-        draw_nothing(patch)
-        make_report(read_output(folder / "out"))
-    return folder / "out"
 
 
 def box(page: Any, selector: str) -> dict[str, float]:
@@ -101,45 +84,6 @@ def test_the_answer_three_numbers_and_the_plot_are_on_one_screen(
     assert apart(page, "#cfas .annotation")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("width", "most"), [(1440, 900), (400, 1200)])
-def test_gains_and_losses_are_on_the_first_screen(
-    finished: FinishedFolder, standing: Any, width: int, most: float
-) -> None:
-    """On a telephone they follow the plot."""
-    page = standing(finished("stopband"), width).page
-    page.evaluate("window.scrollTo(0, 0)")
-    assert box(page, ".first table")["y"] < most
-    if width == 1440:
-        assert box(page, ".first table tr:last-child >> nth=-1")["y"] < most - 20
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("width", [400, 1440])
-def test_the_noise_report_is_short(finished: FinishedFolder, opened: Any, width: int) -> None:
-    page = opened(finished("noise"), width).page
-    page.evaluate("document.querySelectorAll('details.section').forEach((box) => { box.open = false; })")
-    page.wait_for_function("document.getElementById('series-2').data || window.scrollTo(0, 1e6)")
-    assert page.evaluate("document.documentElement.scrollHeight") <= {400: 4 * 800, 1440: 3 * 900}[width] + 20
-
-
-@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow) for name in ("fog", "dual", "paper")])
-def test_nothing_is_drawn_as_a_trade_off_where_nothing_trades_off(
-    finished: FinishedFolder, standing: Any, name: str
-) -> None:
-    assert standing(finished(name)).page.locator("#pareto").count() == 0
-    assert not (finished(name) / "pareto.png").exists()
-
-
-@pytest.mark.parametrize("width", [pytest.param(1440, marks=pytest.mark.slow), 400])
-def test_a_study_of_plain_cfas_has_the_same_screen(plain_cfas: Path, opened: Any, width: int) -> None:
-    page = opened(plain_cfas, width).page
-    fits(page, width)
-    speaks_plainly(page)
-    assert apart(page, "#cfas .annotation")
-    assert page.locator("#pareto").count() == 0  # nothing trades off
-
-
 def test_the_first_plot_has_every_cfa_at_its_light(finished: FinishedFolder, standing: Any) -> None:
     folder = finished("stopband")
     seen, table = standing(folder), pd.read_parquet(folder / "results.parquet")
@@ -164,93 +108,6 @@ def test_the_first_plot_has_every_cfa_at_its_light(finished: FinishedFolder, sta
 
 
 @pytest.mark.slow
-def test_a_plain_cfa_is_chosen_by_a_click(finished: FinishedFolder, opened: Any) -> None:
-    seen = opened(finished("dual"))
-    place = seen.page.evaluate(
-        """() => {
-            const box = document.getElementById('cfas'), layout = box._fullLayout, at = box.getBoundingClientRect();
-            const trace = box.data.find((t) => t.name === 'plain CFAs');
-            return [at.left + layout._size.l + layout.xaxis.d2p(trace.x[0]),
-                    at.top + layout._size.t + layout.yaxis.d2p(trace.y[0])];
-        }"""
-    )
-    seen.page.mouse.move(*place)
-    seen.page.wait_for_selector("#hover", state="visible")
-    seen.page.mouse.click(*place)
-    seen.page.wait_for_function("document.querySelector('#details h3').textContent === 'RGGB'")
-    names = seen.page.evaluate("document.getElementById('curves').data.map((t) => t.name)")
-    assert {"R", "G", "B"} <= set(names)
-
-
-def test_the_limiting_lights_stand_in_hover_details_and_clouds(finished: FinishedFolder, standing: Any) -> None:
-    folder = finished("stopband")
-    seen = standing(folder)
-    design = int(seen.page.get_attribute("#details", "data-design"))
-    limited = pd.read_parquet(folder / "limited_by.parquet").set_index("design_id")
-    lights = limited.loc[design, "limited_by_yellow_red"]
-    assert seen.details()["yellow/red CSD limited by"] == lights
-    points = pd.read_parquet(folder / "points.parquet")
-    own = points[points["design_id"] == design].pivot_table(index="signal", columns="channel", values="dn")
-    segments = seen.page.evaluate(
-        "document.getElementById('clouds').data.filter((t) => t.name.startsWith('nearest lights'))"
-        ".map((t) => [t.name, Array.from(t.x), Array.from(t.y)])"
-    )
-    assert len(segments) == 3
-    for (name, x, y), channel in zip(segments, ("Y", "N", "Cy"), strict=True):
-        assert name.endswith("234 DN apart")
-        for light, u, v in zip(lights.split(" / "), x, y, strict=True):
-            assert u == pytest.approx(own.loc[light, "R"], rel=1e-6)
-            assert v == pytest.approx(own.loc[light, channel], rel=1e-6)
-
-
-def test_the_lights_stand_shaded_behind_the_qe(finished: FinishedFolder, standing: Any) -> None:
-    seen = standing(finished("stopband"))
-    shades = seen.page.evaluate(
-        "document.getElementById('curves').data.filter((t) => t.fill === 'tozeroy').map((t) => t.name)"
-    )
-    assert shades == ["green lights", "yellow lights", "orange lights", "red lights"]
-
-
-@pytest.mark.parametrize("name", ["stopband", pytest.param("paper", marks=pytest.mark.slow)])
-def test_no_table_is_cut_off(finished: FinishedFolder, standing: Any, name: str) -> None:
-    seen = standing(finished(name))
-    cut = seen.page.evaluate(
-        "[...document.querySelectorAll('.scroll')].filter((e) => e.offsetParent && e.querySelector('table')"
-        " && e.scrollWidth > e.clientWidth + 1).map((e) => e.innerText.slice(0, 60))"
-    )
-    assert cut == []
-
-
-def test_no_figure_is_shown_twice(finished: FinishedFolder, standing: Any) -> None:
-    seen = standing(finished("stopband"))
-    pictures = seen.page.evaluate("[...document.querySelectorAll('figure figcaption')].map((e) => e.textContent)")
-    assert pictures
-    assert not any("Trade-off" in text or "Filters" in text or "All CFAs" in text for text in pictures)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["stopband", "distance", "noise", "dual"])
-def test_on_paper_the_first_figure_stands_below_the_answer_and_no_legend_is_cut(
-    finished: FinishedFolder, opened: Any, name: str
-) -> None:
-    page = opened(finished(name), 1032).page  # A4 landscape less its margins, 96 pixels to the inch
-    page.emulate_media(media="print")
-    page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
-    page.wait_for_function("[...document.querySelectorAll('.plot')].every((e) => e.hidden || e.data)")
-    page.wait_for_timeout(500)
-    plot = box(page, ".first .plot")
-    assert plot["y"] + plot["height"] <= 703
-    assert plot["x"] + plot["width"] <= 1032
-    assert apart(page, "#curves .legend, #curves .xtitle")
-    scrolled = (
-        "[...document.querySelectorAll('.legend .scrollbar')].filter((e) => e.getBoundingClientRect().height > 0)"
-    )
-    assert page.evaluate(f"{scrolled}.length") == 0
-    page.evaluate("window.dispatchEvent(new Event('afterprint'))")
-    assert page.evaluate("document.querySelector('.first .plot').layout.height") > plot["height"]
-
-
-@pytest.mark.slow
 def test_a_printed_report_has_every_figure(finished: FinishedFolder, opened: Any, tmp_path: Path) -> None:
     seen = opened(finished("stopband"))
     seen.page.pdf(path=tmp_path / "report.pdf", prefer_css_page_size=True)
@@ -259,22 +116,3 @@ def test_a_printed_report_has_every_figure(finished: FinishedFolder, opened: Any
     )
     assert empty == []
     assert (tmp_path / "report.pdf").stat().st_size > 100_000
-
-
-@pytest.mark.slow
-def test_the_noise_report_begins_with_the_error(finished: FinishedFolder, opened: Any) -> None:
-    seen = opened(finished("noise"))
-    axis = seen.page.evaluate("document.getElementById('series-0').layout.yaxis")
-    assert axis["title"]["text"] == "error, lamps of unknown brightness (1e-12: or less)"
-    assert (axis["type"], axis["exponentformat"]) == ("log", "power")
-    ticks = seen.page.evaluate("[...document.querySelectorAll('#series-0 .ytick')].map((e) => e.textContent)")
-    assert not any("µ" in tick for tick in ticks)
-    table = pd.read_parquet(finished("noise") / "crossings.parquet")
-    table = table[table["quantity"] == "chromatic_error"]
-    own = table[table["key"] == "read_noise_e"].dropna(subset=["at"]).set_index("name")["at"]
-    assert len(own) > 1
-    rings = seen.page.evaluate(
-        """Object.fromEntries(document.getElementById('series-0').data.map((t) =>
-            [t.name, Array.from(t.x).filter((_, i) => t.marker.symbol[i] === 'circle-open')]).filter((t) => t[1].length))"""
-    )
-    assert {name: pytest.approx(x) for name, x in rings.items()} == {name: [at] for name, at in own.items()}

@@ -16,14 +16,11 @@ from sweep.base.errors import OutputError
 from sweep.metrics.pareto import knee
 from sweep.report import read_output, summary_lines
 from sweep.report.page_data import payload
-from sweep.report.scenes import scene_groups
 from sweep.report.series import scene_in_words
 from sweep.results.facts import CheckFacts
-from sweep.results.identity import CHUNK
-from sweep.run.rows import Job, parts_of, rules_of, run_job
-from sweep.study import Study, load_study
+from sweep.study import load_study
 
-from ..build import large, ran, study_file
+from ..build import ran, study_file
 from ..conftest import FinishedFolder
 from ..tampering import listed_anew
 
@@ -63,45 +60,6 @@ def test_report_states_the_largest_difference_of_the_check(finished: FinishedFol
     assert not check.passed
 
 
-@pytest.mark.slow
-def test_every_scene_is_listed_once_with_its_largest_bound(finished: FinishedFolder) -> None:
-    output = read_output(finished("fog"))
-    groups = scene_groups(output)
-    assert sorted(name for group in groups for name in group.scenarios) == sorted(output.scenarios)
-    for group in groups:
-        plans = [output.provenance.plans[name] for name in group.scenarios]
-        assert group.error_bound_dn == max(plan.error_bound_dn for plan in plans)
-        assert np.isnan(group.realized_dn)
-    rows = pd.DataFrame({"scenario": [groups[0].scenarios[0]] * 2, "realized_dn": [0.01, 0.03]})
-    assert scene_groups(replace(output, audited=rows))[0].realized_dn == 0.03
-
-
-def test_a_job_of_several_chunks_has_their_rows(tmp_path: Path) -> None:
-    study: Study = load_study(large(tmp_path, 20))
-    whole = next(part.jobs[0] for part in parts_of(study) if part.size > CHUNK)
-    assert whole.stop - whole.start > CHUNK
-    rules = rules_of(study)
-    parts = [
-        Job(
-            whole.space,
-            whole.scenario,
-            start,
-            min(start + CHUNK, whole.stop),
-            whole.first_id + start,
-            whole.first_filter + start,
-        )
-        for start in range(0, whole.stop, CHUNK)
-    ]
-    together = run_job(whole, study, rules).to_pandas()
-    each = pd.concat([run_job(part, study, rules).to_pandas() for part in parts], ignore_index=True)
-    pd.testing.assert_frame_equal(together.drop(columns="pareto"), each.drop(columns="pareto"), check_categorical=False)
-
-
-def test_a_small_study_has_one_chunk_per_job(tmp_path: Path) -> None:
-    study = load_study(study_file(tmp_path))
-    assert all(part.size <= CHUNK for part in parts_of(study))
-
-
 def test_a_dollar_in_a_name_is_no_formula() -> None:
     from sweep.report.figures import CurvesFigure, draw_curves, rendered
 
@@ -110,19 +68,6 @@ def test_a_dollar_in_a_name_is_no_formula() -> None:
         figure = draw_curves(CurvesFigure(name, "QE", wave, {name: np.ones(4)}))
         assert rendered(figure, "svg").startswith(b"<?xml")
         assert not figure.axes[0].title.get_parse_math()
-
-
-@pytest.mark.slow
-def test_a_camera_of_one_channel_has_a_report(tmp_path: Path) -> None:
-    from sweep.report import make_report
-
-    path = tmp_path / "one.yaml"
-    path.write_text("study: one\nsensor: ar0820\nlights: tl16\ncfas: {CCCC: {tile: [[C, C], [C, C]]}}\n")
-    ran(load_study(path), tmp_path / "out", 1)
-    output = read_output(tmp_path / "out")
-    make_report(output)
-    assert payload(output)["views"] == []
-    assert "CCCC" in (tmp_path / "out" / "report.html").read_text()
 
 
 @pytest.mark.parametrize(

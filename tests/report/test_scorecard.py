@@ -14,7 +14,6 @@ from sweep.report.colors import error_curves, noise_optimal, renderings
 from sweep.report.scorecard import ScoreRow, _row, scorecard
 
 from ..commanded import commanded
-from ..conftest import FinishedFolder
 
 TINY = """
 study: tiny
@@ -113,36 +112,3 @@ def test_without_tasks_there_is_nothing_of_them(tiny: Path) -> None:
     assert not {"color_noise.parquet", "rendered.parquet"} & {path.name for path in (tiny / "without").iterdir()}
     assert "elsewhere" not in (tiny / "without" / "report.html").read_text().lower()
     assert not any("Elsewhere" in line for line in summary_lines(output))
-
-
-@pytest.mark.slow
-def test_the_scorecard_of_the_project(finished: FinishedFolder) -> None:
-    """The stopbands cost no more than RYYCy does: in no figure are they the worst, in most they are better."""
-    folder = finished("scorecard")
-    card = scorecard(read_output(folder))
-    assert card is not None
-    stopbands = ("RYN4Cy", "best stopband", "robust to lamps", "robust to angles")
-    assert card.names == ("RGGB", *stopbands, "RCCC", "RCCB", "RYYCy")
-    assert not any({1, 2, 3, 4} & each.worst for each in card.rows)
-    rows = [each for each in card.rows if each.best]
-    factors = np.array([each.values[1:5] / each.values[7] for each in rows])
-    signs = np.sign(factors - 1) * [[1 if each.column.direction == "more" else -1] for each in rows]
-    assert (signs > 0).sum(axis=0).tolist() == [22, 22, 20, 22]
-    assert (signs < 0).sum(axis=0).tolist() == [3, 3, 5, 3]
-    assert {path.name for path in (folder / "figures").glob("*.svg")} >= {
-        "scorecard.svg",
-        "color-noise-1.svg",
-        "rendered-1.svg",
-        "rendered-2.svg",
-    }
-
-
-@pytest.mark.slow
-def test_a_balanced_stopband_keeps_its_bounds(finished: FinishedFolder) -> None:
-    """The bounds of the study are 1.1 times the figures of its own RYYCy."""
-    output = read_output(finished("balanced"))
-    ryycy = output.named_rows.set_index("name").loc["RYYCy"]
-    for name, digits in (("color_delta_e_mean_d65", 2), ("low_light_lux_a", 0)):
-        assert output.constraints[name].max == pytest.approx(1.1 * ryycy[name], abs=0.5 * 10.0**-digits)
-        assert output.best.iloc[0][name] <= output.constraints[name].max
-    assert output.best.iloc[0]["csd_yellow_red"] > 5 * ryycy["csd_yellow_red"]

@@ -118,15 +118,6 @@ def test_the_bound_of_one_scenario_is_not_shown_beside_the_design_of_another(tmp
     assert upper_bound_beside(output, bright) is None
 
 
-def test_the_bound_of_one_cfa_is_not_shown_beside_the_design_of_another(tmp_path: Path) -> None:
-    text = study_text({"chart": 2e-3}, ["RGBN", "RYNCy"], {"RYNCy": GRID, "RGBN": GRID}, "RGBN", "chart", 0.9)
-    output = finished_output(tmp_path, text)
-    check_shown_bounds(output)
-    rows = output.best[output.best["cfa"] == "RYNCy"]
-    assert len(rows)
-    assert all(upper_bound_beside(output, row) is None for row in rows.to_dict("records"))
-
-
 def test_a_value_above_its_own_bound_is_an_error(tmp_path: Path) -> None:
     text = study_text({"chart": 2e-3}, ["RYNCy"], {"RYNCy": GRID}, "RYNCy", "chart", 0.9)
     output = finished_output(tmp_path, text)

@@ -173,16 +173,6 @@ def test_a_run_of_which_nothing_is_known_is_not_touched(
     assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
 
 
-@pytest.mark.usefixtures("plain_pictures")
-def test_an_intact_run_is_not_touched_again(whole_folder: Path, tmp_path: Path) -> None:
-    shutil.copytree(whole_folder, tmp_path, dirs_exist_ok=True)
-    folder = tmp_path / "outputs" / "small"
-    before = {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file() and path.name != ".lock"}
-    code, _, said = commanded("run", tmp_path / "small.yaml", "--output", folder.parent, "--jobs", 1)
-    assert (code, "nothing was computed" in said) == (0, True)
-    assert {p: p.stat().st_mtime_ns for p in folder.rglob("*") if p.is_file() and p.name != ".lock"} == before
-
-
 def test_a_cut_study_says_how_to_mend_it(whole_folder: Path, tmp_path: Path) -> None:
     shutil.copytree(whole_folder, tmp_path, dirs_exist_ok=True)
     folder = tmp_path / "outputs" / "small"

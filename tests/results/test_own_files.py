@@ -71,24 +71,6 @@ def test_a_foreign_file_is_reported_and_stays(few: Study, tmp_path: Path, name: 
     assert (base / name).read_text() == "mine"
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("plain_pictures")
-def test_other_files_of_the_folder_stay(few: Study, tmp_path: Path) -> None:
-    mine = (
-        "notes.md",
-        "answers/mine.json",
-        "figures/mine.png",
-    )
-    for name in mine:
-        (tmp_path / name).parent.mkdir(exist_ok=True)
-        (tmp_path / name).write_text(name)
-    ran(few, tmp_path, 1)
-    make_report(read_output(tmp_path))
-    make_report(read_output(tmp_path))
-    for name in mine:
-        assert (tmp_path / name).read_text() == name
-
-
 def outside(tmp_path: Path) -> Path:
     target = tmp_path / "outside"
     target.mkdir()

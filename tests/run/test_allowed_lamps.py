@@ -100,11 +100,3 @@ def test_a_region_map_is_described_and_drawn(tmp_path: Path) -> None:
 def test_a_wrong_map_is_one_line(tmp_path: Path, requested: str, said: str) -> None:
     found = issues(tmp_path, TEXT.replace(ASKED, requested))
     assert any(said in issue for issue in found), found
-
-
-def test_a_study_without_regions_makes_no_map(tmp_path: Path) -> None:
-    path = tmp_path / "allowed.yaml"
-    path.write_text(TEXT.replace(ASKED, ""))
-    ran(load_study(path), tmp_path / "out", 1)
-    assert not (tmp_path / "out" / REGIONS_MAP).exists()
-    assert "LED that" not in "\n".join(summary_lines(read_output(tmp_path / "out")))

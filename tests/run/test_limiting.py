@@ -13,11 +13,8 @@ import pytest
 
 from sweep.camera.model import scene_model
 from sweep.metrics.separation_kernels import nearest_pairs
-from sweep.results import shown
 from sweep.results.designs import row_curves
 from sweep.results.tables import LIMITED_BY
-from sweep.run import details
-from sweep.run.runner import files_of
 from sweep.study import Study, load_study
 
 from ..build import ran
@@ -81,36 +78,6 @@ def test_every_swept_design_is_limited_by_its_nearest_lights(study: Study, tmp_p
             assert apart[row[f"limited_by_{pair}"]] == pytest.approx(min(apart.values()), rel=1e-12)
             if row["scenario"] == "chart":  # no places between those of a lattice
                 assert apart[row[f"limited_by_{pair}"]] == pytest.approx(row[f"csd_{pair}"], rel=1e-12)
-
-
-@pytest.mark.slow
-def test_workers_and_routes_change_no_light(study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    ran(study, tmp_path / "out", 1)
-    expected = pd.read_parquet(tmp_path / "out" / LIMITED_BY)
-    assert (expected["design_id"].diff().dropna() > 0).all()
-    ran(study, tmp_path / "two", 2)
-    pd.testing.assert_frame_equal(pd.read_parquet(tmp_path / "two" / LIMITED_BY), expected)
-
-    (tmp_path / "out" / LIMITED_BY).unlink()
-    with monkeypatch.context() as patch:
-        patch.setattr(details, "edges_of_some", lambda *_: None)
-        ran(study, tmp_path / "out", 1)
-    pd.testing.assert_frame_equal(pd.read_parquet(tmp_path / "out" / LIMITED_BY), expected)
-
-
-@pytest.mark.slow
-def test_of_many_designs_those_alone_that_are_shown_have_lights(
-    study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for name in ("MOST_POINTS", "BEST_PER_CFA"):
-        monkeypatch.setattr(shown, name, 5)
-    ran(study, tmp_path / "out", 1)
-    rows = rows_with_lights(tmp_path / "out")
-    known = rows[(rows["kind"] == "sweep") & rows["limited_by_yellow_red"].notna()]["design_id"]
-    tables = pd.concat(pd.read_parquet(tmp_path / "out" / name) for name in ("pareto.parquet", "designs.parquet"))
-    assert set(known) == set(tables.loc[tables["kind"] == "sweep", "design_id"])
-    assert 10 <= len(known) < N_SWEPT
-    assert LIMITED_BY in files_of(study)
 
 
 BOUNDS = np.array([0, 2, 4])

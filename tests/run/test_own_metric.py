@@ -6,22 +6,19 @@ import json
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 from scipy.spatial.distance import cdist
 
 import sweep
-from sweep.base.errors import InterruptedRunError, StudyError, SweepError
+from sweep.base.errors import StudyError
 from sweep.base.user_code import UserCode
 from sweep.camera.linear import linear_model
 from sweep.metrics.smooth import SmoothDesign
-from sweep.report import make_report, read_output
+from sweep.report import read_output
 from sweep.results.dataset import part_paths
-from sweep.results.dictionary import KEYS
 from sweep.run import run_study
 from sweep.study import Study, load_study
-from sweep.study.user_code import RESERVED
 
 from ..build import one_line, ran
 from ..cases import thinned
@@ -65,20 +62,6 @@ def test_a_csd_written_again_has_the_same_numbers_and_the_same_optimum(tmp_path:
     assert pq.read_schema(part_paths(tmp_path / "own")[0]).field("apart").type == "double"
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("plain_pictures")
-def test_report_and_comparison_show_a_user_metric_without_running_it(tmp_path: Path) -> None:
-    ran(study(tmp_path), tmp_path / "own", 1)
-    ran(study(tmp_path, PLAIN), tmp_path / "plain", 1)
-    (tmp_path / "mine.py").unlink()
-    make_report(read_output(tmp_path / "own"))
-    page = (tmp_path / "own" / "report.html").read_text()
-    assert "yellow/red gap" in page
-    assert "no filter exceeds" not in page.lower()
-    assert commanded("compare", tmp_path / "own", tmp_path / "plain", "--output", tmp_path / "beside")[0] == 0
-    assert "apart" in pd.read_csv(next((tmp_path / "beside").glob("*.csv"))).to_string()
-
-
 def test_less_is_searched_for_constrained_and_below_zero(tmp_path: Path) -> None:
     spread = "metrics: [mine.py:Spread, mine.py:below_zero]\n"
     least = PLAIN.replace("constraints:", f"{spread}objective: {{least: {{red_spread: 1}}}}\nconstraints:")
@@ -117,23 +100,6 @@ def test_slopes_are_those_of_the_metric(tmp_path: Path) -> None:
     members = setup.members
     distances = cdist(design.response[0][members["yellow"]], design.response[0][members["red"]])
     assert own.value(mine) == pytest.approx(distances.min(), rel=1e-12)
-
-
-def test_a_run_that_is_stopped_goes_on_and_other_code_is_another_study(tmp_path: Path) -> None:
-    made = study(tmp_path, OWN_METRIC.replace("count: 3}", "count: 1100}"))
-
-    def stop(phase: str, done: int, _: int) -> None:
-        if phase == "designs" and 0 < done < 4400:
-            raise KeyboardInterrupt
-
-    with pytest.raises(InterruptedRunError):
-        run_study(made, tmp_path / "some", 1, stop)
-    assert not (tmp_path / "some" / "provenance.json").exists()
-    run_study(made, tmp_path / "some", 1, lambda *_: None)
-    run_study(made, tmp_path / "whole", 1, lambda *_: None)
-    pd.testing.assert_frame_equal(rows_of(tmp_path / "some"), rows_of(tmp_path / "whole"), check_exact=True)
-    with pytest.raises(SweepError, match="holds another study"):
-        run_study(study(tmp_path, code=CODE + "# changed\n"), tmp_path / "whole", 1, lambda *_: None)
 
 
 def test_user_metric_of_user_filters_and_plain_cfas_in_python(tmp_path: Path) -> None:
@@ -210,37 +176,6 @@ def test_faults_of_a_metric_are_one_line_before_any_work(tmp_path: Path, old: st
 def test_invalid_user_metrics_of_a_study_are_refused(tmp_path: Path, text: str, said: str) -> None:
     with one_line(said):
         study(tmp_path, text)
-
-
-def test_a_design_that_the_metric_fails_on_costs_a_row(tmp_path: Path) -> None:
-    code = CODE.replace(
-        "return np.ptp",
-        "if (readings.dn.max() > 0) and self.bad(readings): raise OverflowError('dark')\n        return np.ptp",
-    )
-    code = code.replace(
-        "    def of(",
-        "    def bad(self, readings):\n        return self.name and abs(readings.dn[:, 0, -1] - EDGE).min() < 1e-9\n\n    def of(",
-    )
-    text = OWN_METRIC.partition("search:")[0] + "columns: all\n"
-    made = study(tmp_path, text)
-    run_study(made, tmp_path / "all", 1, lambda *_: None)
-    space = next(space for space in made.spaces if space.kind == "sweep")
-    setup = made.plan("chart") and made.setup(space, "chart")
-    from sweep.camera.model import scene_model
-
-    edge = scene_model(setup).read(space.curves(space.points(3, 4), made.grid.size))[0][0, 0, 0, -1]
-    bad = study(tmp_path, text, f"EDGE = {edge!r}\n".replace("np.float64(", "(") + code)
-    run_study(bad, tmp_path / "some", 1, lambda *_: None)
-    found = rows_of(tmp_path / "some")
-    failed = found[found["status"] != "ok"]
-    assert 0 < len(failed) < len(found)
-    assert failed["status"].astype(str).str.contains("mine.py:Spread: OverflowError: dark").all()
-    fine, same = rows_of(tmp_path / "all"), found["status"] == "ok"
-    assert (found.loc[same, "red_spread"] == fine.loc[same, "red_spread"]).all()  # of whole digital numbers
-
-
-def test_no_verdict_is_left_out_of_the_reserved_names() -> None:
-    assert {name for name in KEYS if name.isidentifier()} <= {*RESERVED}
 
 
 def test_a_file_may_have_dataclasses_and_types(tmp_path: Path) -> None:

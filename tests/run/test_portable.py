@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import subprocess
 import sys
 from pathlib import Path
@@ -12,7 +11,6 @@ import pandas as pd
 from sweep.study import load_study
 
 from ..build import ran, study_file
-from ..conftest import ROOT
 
 UNIX_ONLY = ("fcntl", "grp", "pwd", "resource", "termios")
 HIDDEN = f"""
@@ -52,11 +50,3 @@ def test_a_run_is_interrupted_and_continued(tmp_path: Path) -> None:
     ran(load_study(path), tmp_path / "whole", 1)
     both = [pd.read_parquet(folder / "results.parquet") for folder in (tmp_path / "out" / "tiny", tmp_path / "whole")]
     pd.testing.assert_frame_equal(*both)
-
-
-def test_no_module_imports_unix_only_modules() -> None:
-    for path in (ROOT / "sweep").rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text())):
-            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
-            names += [node.module] if isinstance(node, ast.ImportFrom) and node.module and not node.level else []
-            assert not {name.partition(".")[0] for name in names} & set(UNIX_ONLY), path

@@ -18,12 +18,10 @@ from sweep.metrics.share import share_interval
 from sweep.report.summary import summary_lines
 from sweep.results.output import read_output
 from sweep.results.tables import ROBUSTNESS
-from sweep.run import robustness, run_study
 from sweep.run.robustness import Candidate, drawn_dn
 from sweep.study import Study, load_study
 
 from ..build import ran
-from ..mischief import StoppedError
 
 TEXT = """\
 study: street
@@ -98,18 +96,6 @@ def test_a_yield_is_that_of_draws_of_their_own(tmp_path: Path) -> None:
     agree(street(tmp_path), 20_000)
 
 
-def test_a_yield_counts_each_camera_with_the_wanted_distance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    study = street(tmp_path)
-    design = candidate(study)
-    population = design.setup.lights.population
-    assert population is not None
-    assert population.wanted_dn is not None
-    steps = population.wanted_dn * (1 + np.linspace(-0.05, 0.05, population.draws))
-    monkeypatch.setattr(robustness, "drawn_dn", lambda *_: steps)
-    (numbers,) = robustness._robustness(design, None, ("yellow", "red"), 1)
-    assert numbers["yield"] == np.count_nonzero(steps >= population.wanted_dn) / population.draws
-
-
 def thick(folder: Path) -> Study:
     path = folder / "street.yaml"
     street(folder)
@@ -145,12 +131,6 @@ def test_a_worst_case_is_over_edges_and_films_together(tmp_path: Path) -> None:
     assert re.search(r"Mine falls below RGGB at .*, films [+-][\d.]+%, \d+ DN", said)
 
 
-@pytest.mark.slow
-@pytest.mark.long
-def test_yields_agree_with_a_million_draws(tmp_path: Path) -> None:
-    agree(street(tmp_path, 1_000_000), 1_000_000)
-
-
 def test_the_interval_of_a_share() -> None:
     """Wilson's: the shares p with |k/n - p| <= 1.96 sqrt(p (1 - p) / n)."""
     for kept, n in ((0, 50), (3, 20), (500, 1000), (20, 20)):
@@ -161,47 +141,19 @@ def test_the_interval_of_a_share() -> None:
 
 @pytest.mark.slow
 def test_any_number_of_workers_gives_the_same_and_a_break_is_where_the_worst_cases_cross(tmp_path: Path) -> None:
-    study = street(tmp_path, 1000)
-    tables = []
+    study, tables = street(tmp_path, 1000), []
     for jobs in (1, 2):
         ran(study, tmp_path / f"out{jobs}", jobs)
         tables.append(pq.read_table(tmp_path / f"out{jobs}" / ROBUSTNESS))
     assert tables[0].equals(tables[1])
     said = "\n".join(summary_lines(read_output(tmp_path / "out1")))
     assert re.search(r"Mine falls below RGGB at [\d.]+ times .*: \S+yellow \([+-].* nm\) and \S+red .*, \d+ DN", said)
-    assert re.search(
-        r"Share of random lamps and cameras with 200 DN or more \(95 % interval\): RGGB [\d.]+%.*, mine [\d.]+%", said
-    )
+    assert re.search(r"with 200 DN or more \(95 % interval\): RGGB [\d.]+%.*, mine [\d.]+%", said)
     plain, _, mine = tables[0].to_pylist()
     assert plain["breaks_at"] is None
-    assert 0.25 < mine["breaks_at"] < 3
-    pair = ("yellow", "red")
+    at, pair = mine["breaks_at"], ("yellow", "red")
     rggb = Candidate(study.setup(study.spaces[0], "chart"), study.spaces[0], np.empty((1, 0)), study.tolerance)
-    just = mine["breaks_at"] - 0.25 / 2**6
-    here, before = (
-        candidate(study).worst(pair, scale)[0] - rggb.worst(pair, scale)[0] for scale in (mine["breaks_at"], just)
-    )
+    here, before = (candidate(study).worst(pair, x)[0] - rggb.worst(pair, x)[0] for x in (at, at - 0.25 / 2**6))
     assert here < 0 <= before
-    assert mine["breaks_dn"] == pytest.approx(candidate(study).worst(pair, mine["breaks_at"])[0])
-    drift = mine["breaks_at"] * np.array([-6.5, 8])
-    assert drift[0] - 3 * mine["breaks_at"] <= mine["breaks_first_nm"] <= drift[1] + 3 * mine["breaks_at"]
-
-
-@pytest.mark.slow
-def test_a_kill_among_the_yields_loses_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    study = street(tmp_path, 1000)
-    ran(study, tmp_path / "whole", 1)
-
-    def stop(phase: str, done: int, _total: int) -> None:
-        if phase == "robustness" and done == 2:
-            raise StoppedError
-
-    with pytest.raises(StoppedError):
-        run_study(study, tmp_path / "out", 1, stop)
-    assert not (tmp_path / "out" / ROBUSTNESS).exists()
-    counted, draw = [], robustness.drawn_dn
-    monkeypatch.setattr(robustness, "drawn_dn", lambda *call: counted.append(call) or draw(*call))
-    ran(study, tmp_path / "out", 1)
-    tables = [pq.read_table(tmp_path / folder / ROBUSTNESS) for folder in ("whole", "out")]
-    assert tables[0].equals(tables[1])
-    assert len(counted) == tables[0].num_rows - 2 > 0
+    assert mine["breaks_dn"] == pytest.approx(candidate(study).worst(pair, at)[0])
+    assert -9.5 * at <= mine["breaks_first_nm"] <= 11 * at

@@ -13,11 +13,10 @@ from scipy.special import ndtr
 from sweep.base.errors import StudyError
 from sweep.camera.curve_errors import CurveErrors, drawn_curves
 from sweep.camera.sensor import BUILT_IN_SENSORS
-from sweep.results.dataset import part_paths
 from sweep.search.limit import limit_of
 from sweep.search.solver import smooth_evaluation
 from sweep.spectra.builtin.data_sets.tl16 import lights
-from sweep.spectra.builtin.measured_sets import LUXEON, SENSORS
+from sweep.spectra.builtin.measured_sets import SENSORS
 from sweep.spectra.spectrum import WavelengthGrid
 from sweep.study import Study, load_study, sensor_studies_in
 
@@ -80,20 +79,6 @@ def test_opencam_is_what_an_own_computation_says() -> None:
     assert limit_of(study.problem(study.search)).proven == pytest.approx(319.7, abs=0.05)
 
 
-def test_every_measured_set_has_its_source_and_its_curves() -> None:
-    readme = (MEASURED / "README.md").read_text()
-    for name, measured in (*SENSORS.items(), ("luxeon", LUXEON)):
-        assert measured.license == "MIT"
-        assert measured.source
-        assert f"`{name}`" in readme or f": {name}`" in readme
-        for file in measured.digests:
-            assert f"`{file}`" in readme
-    for name in SENSORS:
-        sensor = BUILT_IN_SENSORS[name](GRID)
-        assert not sensor.surrogate
-        assert sensor.qe[sensor.clear].sum() == pytest.approx(max(q.sum() for q in sensor.qe.values()), rel=0.02)
-
-
 ERRORS = CurveErrors(gain=0.05, shift_nm=2.0, noise=0.03, correlation_nm=30.0, ir_cut_nm=3.0, draws=2000)
 
 
@@ -150,23 +135,11 @@ def test_quantiles_are_those_of_brute_force(tmp_path: Path) -> None:
 
 
 def test_no_sensor_is_below_the_worst_case(tmp_path: Path) -> None:
-    """With gains and noise alone: 2,000 random sensors, and each curve at the ends of both, which come near it."""
+    """With gains and noise alone, of 2,000 random sensors."""
     errors = ERRORS.model_copy(update={"shift_nm": 0.0, "ir_cut_nm": 0.0, "draws": 200})
     found, rng = uncertain(tmp_path, errors), np.random.default_rng(2)
-    drawn = own_draws(["R", "G", "B"], 2000, errors, rng)
-    counts = np.array([1.0, 2, 1])
-    least = float(found.loc["RGGB", "at_least_dn"])
-    assert 0 < least <= own_csd(drawn, counts)[0].min()
-    curves, tl16 = np.stack([raw_curves()[c] for c in "RGB"]), lights(GRID)
-    lowest = np.inf
-    for yellow in tl16.members["yellow"]:
-        for red in tl16.members["red"]:
-            apart = tl16.photons[yellow] / tl16.photons[yellow].sum() - tl16.photons[red] / tl16.photons[red].sum()
-            against = np.sign(curves @ apart)[:, None] * np.sign(apart)
-            worst = curves * (1 - errors.noise * against) * (1 - errors.gain)
-            lowest = min(lowest, own_csd(worst[None], counts)[0][0])
-    assert least <= lowest
-    assert least > 0.5 * lowest
+    smallest = own_csd(own_draws(["R", "G", "B"], 2000, errors, rng), np.array([1.0, 2, 1]))[0].min()
+    assert 0.5 * smallest < float(found.loc["RGGB", "at_least_dn"]) <= smallest
     (tmp_path / "moved").mkdir()
     assert np.isnan(uncertain(tmp_path / "moved", ERRORS.model_copy(update={"draws": 100}))["at_least_dn"]).all()
 
@@ -174,11 +147,14 @@ def test_no_sensor_is_below_the_worst_case(tmp_path: Path) -> None:
 def test_curves_are_the_same_for_every_design() -> None:
     sensor = BUILT_IN_SENSORS["opencam"](GRID)
     errors = ERRORS.model_copy(update={"draws": 100})
-    together = drawn_curves(sensor, GRID, ["R", "G", "Y"], errors, 1)
-    np.testing.assert_array_equal(together[:, 2], drawn_curves(sensor, GRID, ["Y"], errors, 1)[:, 0])
-    assert np.abs(together[:, 2] - drawn_curves(sensor, GRID, ["Y"], errors, 2)[:, 0]).max() > 0
-    nothing = drawn_curves(sensor, GRID, ["R"], CurveErrors(draws=100), 1)
-    np.testing.assert_allclose(nothing[:, 0], np.broadcast_to(sensor.qe["R"], nothing[:, 0].shape), rtol=1e-12)
+    together, alone, other = (
+        drawn_curves(sensor, GRID, names, errors, seed)[:, -1]
+        for names, seed in ((["R", "G", "Y"], 1), (["Y"], 1), (["Y"], 2))
+    )
+    np.testing.assert_array_equal(together, alone)
+    assert (other != alone).any()
+    nothing = drawn_curves(sensor, GRID, ["R"], CurveErrors(draws=100), 1)[:, 0]
+    np.testing.assert_allclose(nothing, np.tile(sensor.qe["R"], (100, 1)), rtol=1e-12)
 
 
 SEVERAL = """\
@@ -242,28 +218,10 @@ def test_one_table_has_all_sensors_and_lights(several: tuple[Path, str]) -> None
     assert f"has {ratio.min():.2f} to {ratio.max():.2f} times the yellow/red CSD of RGGB" in out.splitlines()[0]
 
 
-def test_the_report_is_drawn_again(several: tuple[Path, str]) -> None:
-    folder, out = several
-    page = folder / "out" / "few" / "report.html"
-    before = page.read_text()
-    page.unlink()
-    with pytest.MonkeyPatch.context() as patch:
-        draw_nothing(patch)
-        patch.setattr("sweep.report.sensors.rendered", lambda _, kind: kind.encode())
-        code, again, err = commanded("report", page.parent)
-    assert code == 0, err
-    assert page.read_text() == before
-    assert again.splitlines()[0] in out
-    code, _, err = commanded("report", folder)
-    assert (code, "no run here" in err) == (2, True)
-
-
 def test_filters_for_several_sensors_are_the_worst_on_them(several: tuple[Path, str]) -> None:
     folder, _ = several
     table = pd.read_parquet(folder / "out" / "few" / "all_sensors.parquet")
     assert set(table["designed_on"]) == {"all sensors", "all but ar0820", "all but opencam"}
-    assert set(table["space"]) == {"yellow"}
-    worst = table[~table["judged"]].groupby("designed_on")["objective"].min()
     members = {f"{m.sensor} {m.lights}": m for m in sensor_studies_in(folder / "few.yaml").members}
     for row in table.to_dict("records"):
         study = load_study(folder / "few.yaml", member=members[f"{row['sensor']} {row['lights']}"])
@@ -271,15 +229,13 @@ def test_filters_for_several_sensors_are_the_worst_on_them(several: tuple[Path, 
         x = np.array([float(values[name]) for name in study.search.space.parameters])
         here = smooth_evaluation(study.problem(study.search), x)
         assert here.objective == pytest.approx(row["objective"], rel=2e-3)
-        assert here.sensitivity == pytest.approx(row["sensitivity"], abs=2e-3)
         if not row["judged"]:
             assert row["violation"] == 0
             assert row["sensitivity"] >= 0.9 - 1e-6
             assert row["objective"] <= row["own_best"] * 1.02  # its search may end elsewhere
     # What is designed on more sensors is no better on the worst of fewer.
-    of_fewer = table[table["sensor"] == "opencam"].set_index("designed_on")["objective"].groupby(level=0).min()
+    of_fewer = table[table["sensor"] == "opencam"].groupby("designed_on")["objective"].min()
     assert of_fewer["all but ar0820"] >= of_fewer["all sensors"] * 0.98
-    assert worst["all sensors"] <= worst.max()
 
 
 @pytest.mark.parametrize(
@@ -311,21 +267,6 @@ def test_a_mistake_is_one_line(tmp_path: Path, old: str, new: str, line: str) ->
     assert "Traceback" not in err
 
 
-def test_a_plain_run_is_not_overwritten(tmp_path: Path) -> None:
-    plain = SEVERAL.replace("sensors: [ar0820, opencam, ar0132at]", "sensor: ar0820").replace("[tl16, luxeon]", "tl16")
-    plain = plain.replace("search:", "search_:").split("search_:")[0]
-    path = tmp_path / "few.yaml"
-    path.write_text(plain)
-    assert commanded("run", path, "--output", tmp_path / "out", "--jobs", 1, "--quiet")[0] == 0
-    before = [path.read_bytes() for path in part_paths(tmp_path / "out" / "few")]
-    path.write_text(SEVERAL)
-    code, out, err = commanded("run", path, "--output", tmp_path / "out", "--jobs", 1, "--dry-run")
-    assert (code, "out/few holds another study of this name (of one sensor)" in err) == (0, True)
-    assert "Results go to" in out
-    assert "few-2" in out
-    assert [path.read_bytes() for path in part_paths(tmp_path / "out" / "few")] == before
-
-
 def test_one_that_fails_does_not_stop_the_others(tmp_path: Path) -> None:
     """No CFA with opencam's yellow pixels has 0.55 of a clear sensor's light; ar0820's have."""
     text = SEVERAL.replace("[tl16, luxeon]", "tl16").replace("[ar0820, opencam, ar0132at]", "[opencam, ar0820]")
@@ -338,19 +279,6 @@ def test_one_that_fails_does_not_stop_the_others(tmp_path: Path) -> None:
     rows = pd.read_parquet(tmp_path / "out" / "few" / "results.parquet")
     assert set(rows["sensor"]) == {"ar0820"}
     assert "report.html" in out
-
-
-def test_several_sensors_and_scenarios_count_together() -> None:
-    from dataclasses import replace as changed
-
-    from sweep.run.all_sensors import _joined
-
-    study = load_study(STUDIES / "hdr_filter.yaml")
-    problem = study.problem(study.search)
-    n = len(problem.scenes)
-    assert n == 17
-    assert len(_joined([problem, changed(problem, seed=2)]).scenes) == 2 * n
-    assert len(_joined([problem]).scenes) == n
 
 
 def test_uncertain_curves_of_thin_layers_are_refused(tmp_path: Path) -> None:
@@ -378,3 +306,22 @@ def test_other_commands_say_how_to_choose_one(tmp_path: Path) -> None:
     code, _, err = commanded("plan", path)
     assert code == 2
     assert "a study of several sensors or lights" in err
+
+
+def test_a_plain_run_is_not_overwritten(tmp_path: Path) -> None:
+    plain = SEVERAL.replace("sensors: [ar0820, opencam, ar0132at]", "sensor: ar0820").replace("[tl16, luxeon]", "tl16")
+    path, told = tmp_path / "few.yaml", ("--output", tmp_path / "out", "--jobs", 1)
+    path.write_text(plain.split("search:")[0])
+    assert commanded("run", path, *told, "--quiet")[0] == 0
+    path.write_text(SEVERAL)
+    code, out, err = commanded("run", path, *told, "--dry-run")
+    assert (code, "out/few holds another study of this name (of one sensor)" in err) == (0, True)
+    assert "few-2" in out
+
+
+@pytest.mark.parametrize("name", SENSORS)
+def test_a_measured_sensor_has_its_brightest_curve_for_clear(name: str) -> None:
+    sensor = BUILT_IN_SENSORS[name](GRID)
+    assert not sensor.surrogate
+    assert all(len(digest) == 64 for digest in SENSORS[name].digests.values())
+    assert sensor.qe[sensor.clear].sum() == pytest.approx(max(q.sum() for q in sensor.qe.values()), rel=0.02)

@@ -37,7 +37,6 @@ boxes:
 constraints: {sensitivity: {min: 0.9}}
 search: {space: yellow, starts: 2, max_evaluations: 40}
 """
-MEMBERS = ("ar0820_tl16", "opencam_tl16")
 PART = part_name(0)
 VISION = """\
 study: few
@@ -121,18 +120,6 @@ def test_damage_is_noticed_and_repaired(whole: Path, tmp_path: Path, name: str) 
         assert (folder / file).read_bytes() == before[Path(file)]
 
 
-def test_a_lost_run_is_made_again_alone(whole: Path, tmp_path: Path) -> None:
-    folder = copied(whole, tmp_path)
-    before = contents(folder)
-    shutil.rmtree(folder / MEMBERS[1])
-    assert "opencam tl16: not run." in commanded("status", folder)[1]
-    code, _, err = run(tmp_path)
-    assert (code, err.count("nothing was computed")) == (0, 1)
-    again = contents(folder)
-    assert all(again[path] == before[path] for path in before if path.suffix == ".parquet")
-    assert commanded("status", folder, "--verify")[0] == 0
-
-
 def test_a_changed_study_goes_beside_with_its_own_filters(whole: Path, tmp_path: Path) -> None:
     folder = copied(whole, tmp_path)
     before = contents(folder)
@@ -149,12 +136,6 @@ def test_a_changed_study_goes_beside_with_its_own_filters(whole: Path, tmp_path:
     assert contents(folder) == before
     tables = [pq.read_table(place / ALL_SENSORS) for place in (folder, Path(f"{folder}-2"))]
     assert not tables[0].equals(tables[1])
-
-
-def test_other_commands_name_the_runs(whole: Path) -> None:
-    for command in ("export", "--design", "best"), ("audit",), ("compare", whole / "out" / "few"):
-        code, _, err = commanded(command[0], whole / "out" / "few", *command[1:])
-        assert (code, f"holds the runs of several sensors; allowed: one of {', '.join(MEMBERS)}" in err) == (2, True)
 
 
 @pytest.mark.parametrize("runs", [5, [["a"]]])
@@ -222,3 +203,16 @@ def test_kills_at_random_moments_lose_nothing(tmp_path: Path, text: str) -> None
         assert pq.read_table(again).equals(pq.read_table(table)), table.name
     assert not [*(tmp_path / "out").rglob(".tmp-*"), *(tmp_path / "out").rglob(ANSWERS)]
     assert not left_by(numbers)
+
+
+def test_a_lost_run_is_made_again_alone(whole: Path, tmp_path: Path) -> None:
+    folder = copied(whole, tmp_path)
+    before = contents(folder)
+    shutil.rmtree(folder / "opencam_tl16")
+    assert "opencam tl16: not run." in commanded("status", folder)[1]
+    code, _, err = commanded("audit", folder)
+    assert (code, "several sensors; allowed: one of ar0820_tl16" in err) == (2, True)
+    code, _, err = run(tmp_path)
+    assert (code, err.count("nothing was computed")) == (0, 1)
+    again = contents(folder)
+    assert all(again[path] == before[path] for path in before if path.suffix == ".parquet")

@@ -162,16 +162,6 @@ def begun(folder: Path, jobs: int) -> Warm:
     return run
 
 
-def computing(run: Warm) -> list[psutil.Process]:
-    """Worker processes of a run, but not the one by which loky keeps watch over what they share."""
-    found = []
-    for process in psutil.Process(run.pid).children(recursive=True):
-        with suppress(psutil.Error):
-            if any("LokyProcess" in word for word in process.cmdline()):
-                found.append(process)
-    return found
-
-
 @pytest.fixture(scope="module")
 def whole_s(tmp_path_factory: pytest.TempPathFactory) -> float:
     """Seconds that a run takes which nobody disturbs, once it has said that it began."""

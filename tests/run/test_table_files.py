@@ -4,30 +4,24 @@ from __future__ import annotations
 
 import gzip
 import io
-import json
 import lzma
 import os
 import tarfile
 import zipfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import psutil
 import pyarrow as pa
 import pytest
 from pyarrow import parquet as pq
 
-from sweep.base.errors import DataError
-from sweep.run.score import reader_of, table_of
-from sweep.run.score_streets import read_detections
+from sweep.run.score import table_of
 
 from ..build import one_line
 from ..watchdog import within
 
-MOST_BYTES = 500_000_000
 GOOD = "image_id,state\n" + "".join(f"i{at},red\n" for at in range(50))
 
 
@@ -91,77 +85,3 @@ def test_what_is_no_file_is_not_read(tmp_path: Path) -> None:
 def test_a_text_index_is_a_column(tmp_path: Path) -> None:
     pd.DataFrame({"image_id": ["a", "b"], "state": ["red", "red"]}, index=["x", "y"]).to_parquet(tmp_path / "a.parquet")
     assert list(table_of(tmp_path / "a.parquet").index) == [0, 1]
-
-
-@pytest.mark.slow
-def test_of_200_mutated_tables_each_is_read_or_one_line(tmp_path: Path) -> None:
-    rng, read = np.random.default_rng(4), 0
-    held = io.BytesIO()
-    pd.read_csv(io.StringIO(GOOD)).to_parquet(held)
-    for number in range(200):
-        whole = bytearray((GOOD.encode(), held.getvalue())[number % 2])
-        for _ in range(int(rng.integers(1, 4))):
-            at = int(rng.integers(len(whole)))
-            match int(rng.integers(3)):
-                case 0:
-                    whole[at] = int(rng.integers(256))
-                case 1:
-                    del whole[at : at + int(rng.integers(1, 30))]
-                case _:
-                    whole[at:at] = bytes(rng.integers(0, 256, 5, dtype=np.uint8))
-        path = tmp_path / f"a.{('csv', 'parquet')[number % 2]}"
-        path.write_bytes(whole)
-        with little_memory():
-            read += read_or_one_line(path)[0]
-    assert read > 10
-
-
-def read_or_one_line(path: Path) -> tuple[bool, int]:
-    """Read a file as predictions and as detections, each in two seconds: whether it is a table, and how many took it."""
-    with within(2):
-        try:
-            table = table_of(path)
-        except DataError as error:
-            assert len(error.issues) == 1  # noqa: PT017
-            return False, 0
-    images = pd.DataFrame({"image_id": [f"i{at}" for at in range(50)], "state": "red"})
-    taken = 0
-    for reads in (lambda: reader_of(table, path, images, ["red", "green"]), lambda: detections_in(path)):
-        with within(2), suppress(DataError):
-            reads()
-            taken += 1
-    return True, taken
-
-
-def detections_in(path: Path) -> pd.DataFrame:
-    labels = pd.DataFrame({"image_id": ["i0"], "design_id": [0], "width": [100], "height": [100]})
-    return read_detections(path, labels, ["red", "green"])
-
-
-@contextmanager
-def little_memory() -> Iterator[None]:
-    """Fail if the process takes 500 MB more than it has, and more than any test before took."""
-    resource = pytest.importorskip("resource")
-    most = max(
-        psutil.Process().memory_info().rss + MOST_BYTES, 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    )
-    yield
-    assert 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss <= most
-
-
-@pytest.mark.slow
-def test_of_100_mutated_json_files_each_is_one_line(tmp_path: Path) -> None:
-    rng = np.random.default_rng(5)
-    boxes = [{"image_id": at, "category_id": 1, "bbox": [1.0, 2.0, 3.0, 4.0], "score": 0.5} for at in range(30)]
-    whole = json.dumps(boxes).encode()
-    path = tmp_path / "detections.json"
-    for _ in range(100):
-        mutated = bytearray(whole)
-        for _ in range(int(rng.integers(0, 4))):
-            at = int(rng.integers(len(mutated)))
-            mutated[at : at + int(rng.integers(0, 30))] = bytes(rng.integers(32, 127, 3, dtype=np.uint8))
-        path.write_bytes(mutated)
-        with little_memory():
-            assert read_or_one_line(path)[1] == 0
-    path.write_bytes(b"[" * 1_000_000)
-    assert read_or_one_line(path)[1] == 0

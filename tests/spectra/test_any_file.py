@@ -438,31 +438,15 @@ def test_a_spreadsheet_is_read_from_its_first_sheet_with_a_table(tmp_path: Path)
 
 def test_digitized_pairs_keep_their_own_wavelengths_and_doubles_are_averaged(tmp_path: Path) -> None:
     """As WebPlotDigitizer exports clicks: names above X, Y; in no order, some of them twice."""
-    rng = np.random.default_rng(3)
-    clicks = [np.sort(rng.uniform(395, 705, 45)) for _ in QE]
-    values = [100 * np.interp(x, NM, qe) for x, qe in zip(clicks, QE.values(), strict=True)]
-    columns: list[list[str]] = []
-    for x, y in zip(clicks, values, strict=True):
-        order = rng.permutation([*range(x.size), 7])
-        near = np.where(np.arange(order.size) == np.flatnonzero(order == 7)[0], 0.3, 0.0) - np.where(
-            np.arange(order.size) == np.flatnonzero(order == 7)[1], 0.3, 0.0
-        )
-        columns += [[f"{v:.8f}" for v in x[order]], [f"{v:.8f}" for v in y[order] + near]]
-    head = ",".join(itertools.chain(*([name, ""] for name in QE)))
-    (tmp_path / "a.csv").write_text(f"{head}\n{','.join(['X', 'Y'] * 4)}\n" + rows(columns))
+    (tmp_path / "a.csv").write_text("Red,,Green,\nX,Y,X,Y\n500,20,410,10\n400,8,700,30\n600,50,550,60\n500,22,450,20\n")
     curves = read_curves(tmp_path / "a.csv")
     made = used_as(curves, list(curves.values), "sensor")
-    assert list(made.values) == list(QE)
-    for name, x, y in zip(QE, clicks, values, strict=True):
-        np.testing.assert_allclose(np.interp(x, *made.samples(name)), y / 100, atol=1e-8)
+    for name, nm, expected in (
+        ("Red", [400, 500, 600], [0.08, 0.21, 0.5]),
+        ("Green", [410, 450, 550, 700], [0.1, 0.2, 0.6, 0.3]),
+    ):
+        np.testing.assert_allclose(np.interp(nm, *made.samples(name)), expected, rtol=1e-12)
     assert any("samples at the same wavelength were averaged" in note for note in curves.notes)
-
-
-def test_curves_of_two_lengths_end_where_they_end(tmp_path: Path) -> None:
-    (tmp_path / "a.csv").write_text("nm,a,b\n400,1,\n410,2,\n420,3,1\n430,4,2\n440,,3\n")
-    curves = read_curves(tmp_path / "a.csv")
-    assert [list(wave) for wave, _ in map(curves.samples, ("a", "b"))] == [[400, 410, 420, 430], [420, 430, 440]]
-    assert "a: there are no values beyond 400 to 430 nm" in curves.notes
 
 
 @pytest.mark.parametrize(
@@ -511,26 +495,13 @@ def test_an_unknown_or_contradicting_unit_is_refused_or_stated(
         assert used_as(curves, [head], use, stated).samples(head)[1].max() == top
 
 
-def csd(sensor: object, cfas: Sequence[str] = ("RGGB",)) -> list[float]:
-    table = sweep.make_study(sensor=sensor, cfas=list(cfas)).evaluate()
-    return [float(value) for value in table["csd_yellow_red"]]
-
-
 def test_responsivities_give_the_same_electrons_as_qe(tmp_path: Path) -> None:
-    """Heads of a data sheet in A/W; 176.4 DN and 0.278 of a clear pixel are from the QE by an independent program."""
-    qe = rows([["Wavelength (nm)", *NM], *([name, *(f"{v:.9f}" for v in values)] for name, values in QE.items())])
-    (tmp_path / "qe.csv").write_text(qe)
+    """Heads of a data sheet in A/W; 176.4 DN are from the QE by an independent program."""
     per_w = {name: values * NM * 1e-9 * E_C / (H * C) for name, values in QE.items()}
-    (tmp_path / "aw.csv").write_text(
-        rows(
-            [
-                ["Wavelength (nm)", *NM],
-                *([f"{name} (A/W)", *(f"{v:.9f}" for v in values)] for name, values in per_w.items()),
-            ]
-        )
-    )
-    assert csd(sweep.sensor(tmp_path / "aw.csv")) == pytest.approx(csd(sweep.sensor(tmp_path / "qe.csv")), rel=1e-6)
-    assert csd(sweep.sensor(tmp_path / "qe.csv"))[0] == pytest.approx(176.4, abs=0.05)
+    columns = [[f"{name} (A/W)", *(f"{v:.9f}" for v in values)] for name, values in per_w.items()]
+    (tmp_path / "aw.csv").write_text(rows([["Wavelength (nm)", *NM], *columns]))
+    table = sweep.make_study(sensor=sweep.sensor(tmp_path / "aw.csv"), cfas=["RGGB"]).evaluate()
+    assert float(table["csd_yellow_red"].iloc[0]) == pytest.approx(176.4, abs=0.05)
 
 
 @pytest.mark.parametrize(("head", "density", "right"), [("OD", 4.0, 234.1), ("Absorbance", 0.9, 167.0)])
@@ -548,89 +519,62 @@ def test_a_notch_in_optical_density_is_judged_as_its_transmission(
 
 def test_a_folder_of_one_file_each_is_a_sensor_and_lights(tmp_path: Path) -> None:
     """`describe`, `new`, `run` and `evaluate`."""
+    for folder in ("qe", "leds", "filters"):
+        (tmp_path / folder).mkdir()
     for name, values in QE.items():
-        (tmp_path / "qe").mkdir(exist_ok=True)
         (tmp_path / "qe" / f"{name}.csv").write_text(rows([["nm", *NM], ["QE", *ppf(values)]]))
+    fine = np.arange(380.0, 781)
     for name, peak in (("go", 505), ("wait", 592), ("stop", 632)):
-        (tmp_path / "leds").mkdir(exist_ok=True)
-        fine = np.arange(380.0, 781)
-        (tmp_path / "leds" / f"{name}.txt").write_text(
-            OCEAN.split("380.0\t")[0] + rows([fine, ppf(np.exp(-(((fine - peak) / 12) ** 2)))], "\t")
-        )
-    code, out, err = commanded("describe", tmp_path / "qe", "--output", tmp_path)
-    assert (code, err) == (0, "")
-    assert "4 curves: Blue, Clear, Green, Red." in out
-    code, out, err = commanded(
-        "new", "mine", "--qe", tmp_path / "qe", "--lights", tmp_path / "leds", "--folder", tmp_path
-    )
-    assert (code, err) == (0, "")
+        spectrum = rows([fine, ppf(np.exp(-(((fine - peak) / 12) ** 2)))], "\t")
+        (tmp_path / "leds" / f"{name}.txt").write_text(OCEAN.split("380.0\t")[0] + spectrum)
+    (tmp_path / "filters" / "notch.asc").write_text(PERKIN_ELMER)
+    own = ("--lights", tmp_path / "leds")
+    for words, said in (
+        (("describe", tmp_path / "qe", "--output", tmp_path), "4 curves: Blue, Clear, Green, Red."),
+        (("new", "mine", "--qe", tmp_path / "qe", *own, "--folder", tmp_path), "Next: "),
+        (
+            ("evaluate", tmp_path / "filters", "--sensor", tmp_path / "qe", *own),
+            "transmission, times C; it is N of RGBN",
+        ),
+    ):
+        code, out, err = commanded(*words)
+        assert (code, err) == (0, "")
+        assert said in out
     study = load_study(tmp_path / "mine.yaml")
     np.testing.assert_allclose(study.sensor.qe["R"], np.interp(study.grid.nodes_nm, NM, QE["Red"]), atol=1e-6)
-    assert {kind: list(study.lights.names)[at[0]] for kind, at in study.lights.members.items()} == {
-        "green": "leds:go",
-        "yellow": "leds:wait",
-        "red": "leds:stop",
-    }
-    again = commanded(
-        "new",
-        "files",
-        "--folder",
-        tmp_path,
-        *itertools.chain(*(("--qe", tmp_path / "qe" / f"{name}.csv") for name in QE)),
-        *itertools.chain(*(("--lights", tmp_path / "leds" / f"{name}.txt") for name in ("go", "wait", "stop"))),
-    )
-    assert again[0] == 0, again
-    other = load_study(tmp_path / "files.yaml")
-    np.testing.assert_array_equal(other.sensor.qe["R"], study.sensor.qe["R"])
-    np.testing.assert_array_equal(other.lights.photons, study.lights.photons)
-    (tmp_path / "filters").mkdir()
-    (tmp_path / "filters" / "notch.asc").write_text(PERKIN_ELMER)
-    code, out, err = commanded(
-        "evaluate", tmp_path / "filters", "--sensor", tmp_path / "qe", "--lights", tmp_path / "leds"
-    )
-    assert (code, err) == (0, ""), err
-    assert "notch: transmission, times C; it is N of RGBN" in out
+    named = {kind: study.lights.names[at[0]] for kind, at in study.lights.members.items()}
+    assert named == {"green": "leds:go", "yellow": "leds:wait", "red": "leds:stop"}
 
 
 def test_words_of_three_languages_are_channels(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(GERMAN.replace("Klar", "Gelb"), encoding="utf-8")
     code, out, _ = commanded("new", "mine", "--qe", tmp_path / "a.csv", "--folder", tmp_path)
     assert code == 0
-    assert "RYNB" in out
     assert "R from QE Rot [%], G from QE Grün [%], B from QE Blau [%], Y from QE Gelb [%]" in out
-    (tmp_path / "b.csv").write_text(
-        GERMAN.replace("Rot", "x1").replace("Blau", "x2").replace("Klar", "x3"), encoding="utf-8"
-    )
+    unknown = GERMAN.replace("Rot", "x1").replace("Blau", "x2").replace("Klar", "x3")
+    (tmp_path / "b.csv").write_text(unknown, encoding="utf-8")
     code, _, err = commanded("new", "other", "--qe", tmp_path / "b.csv", "--folder", tmp_path)
     assert code == 2
     assert "only G was understood (got 'QE x1 [%], QE x2 [%], QE x3 [%]')" in err
-    (tmp_path / "c.csv").write_text(
-        "nm,QE Grün [%],x1,x2\n" + rows([NM.astype(int), *(ppf(100 * QE["Green"]) for _ in range(3))])
-    )
-    code, _, err = commanded("new", "third", "--qe", tmp_path / "c.csv", "--folder", tmp_path)
-    assert code == 2
-    assert "only G was understood (got 'x1, x2')" in err
 
 
 def test_a_study_with_own_ir_cut_runs_to_1000_nm_with_built_in_lights(tmp_path: Path) -> None:
     nm = np.arange(380, 1011, 5)
-    broad = [f"{v:.6f}" for v in 0.5 * np.exp(-(((nm - 600) / 200.0) ** 2))]
-    (tmp_path / "qe.csv").write_text(rows([["nm", *nm], *([f"{name} QE", *broad] for name in ("R", "G", "C"))]))
-    (tmp_path / "cut.csv").write_text(rows([["nm", *nm], ["%T", *np.where(nm < 690, 90, 1)]]))
+    broad, cut = 0.5 * np.exp(-(((nm - 600) / 200.0) ** 2)), np.where(nm < 690, 0.9, 0.01)
+    (tmp_path / "qe.csv").write_text(rows([["nm", *nm], *([f"{name} QE", *broad] for name in ("R", "C"))]))
+    (tmp_path / "cut.csv").write_text(rows([["nm", *nm], ["%T", *(100 * cut)]]))
     text = (
-        "study: ir\nsensor: {files: [{file: qe.csv, columns: {R: R QE, G: G QE, C: C QE}}], clear: C, ir_cut: cut.csv}\n"
+        "study: ir\nsensor: {files: [{file: qe.csv, columns: {R: R QE, C: C QE}}], clear: C, ir_cut: cut.csv}\n"
         "wavelengths: {start_nm: 400, stop_nm: 1000}\nlights: {builtin: tl16, outside: zero}\ncfas: [RCCC]\n"
     )
     (tmp_path / "ir.yaml").write_text(text)
     study = load_study(tmp_path / "ir.yaml")
-    cut = np.interp(study.grid.nodes_nm, nm, np.where(nm < 690, 0.9, 0.01))
-    np.testing.assert_allclose(
-        study.sensor.qe["C"], cut * np.interp(study.grid.nodes_nm, nm, [float(v) for v in broad]), rtol=1e-9
-    )
-    inside = study.grid.nodes_nm <= 700
+    nodes = study.grid.nodes_nm
+    expected = np.interp(nodes, nm, cut) * np.interp(nodes, nm, broad)
+    np.testing.assert_allclose(study.sensor.qe["C"], expected, rtol=1e-9)
     short = sweep.make_study(lights="tl16", cfas=["RGGB"]).study.lights.photons
-    np.testing.assert_array_equal(study.lights.photons[:, inside], short)
-    assert not study.lights.photons[:, ~inside].any()
+    np.testing.assert_array_equal(study.lights.photons[:, nodes <= 700], short)
+    assert not study.lights.photons[:, nodes > 700].any()
     (tmp_path / "ir.yaml").write_text(text.replace("{builtin: tl16, outside: zero}", "tl16"))
     with one_line("the built-in curves end before the grid"):
         load_study(tmp_path / "ir.yaml")
@@ -765,3 +709,10 @@ def test_a_trap_is_read_as_meant_or_refused(tmp_path: Path, name: str) -> None:
     if right >= 0:
         found = np.interp(NM31, *made.samples(list(made.values)[right]))
         np.testing.assert_allclose(found, SHARE, rtol=2e-5 if use != "light" else 1e-3)
+
+
+def test_curves_of_two_lengths_end_where_they_end(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("nm,a,b\n400,1,\n410,2,\n420,3,1\n430,4,2\n440,,3\n")
+    curves = read_curves(tmp_path / "a.csv")
+    assert [list(wave) for wave, _ in map(curves.samples, ("a", "b"))] == [[400, 410, 420, 430], [420, 430, 440]]
+    assert "a: there are no values beyond 400 to 430 nm" in curves.notes

@@ -76,14 +76,6 @@ def test_regions_are_en_12368(kind: str, inside: tuple[float, float], outside: t
     assert found[0] < 0 < found[1]
 
 
-def test_display_colors_have_the_hue_of_the_signal() -> None:
-    colors = {kind: display_colors(GRID, LIGHTS.photons[index[:1]])[0] for kind, index in LIGHTS.members.items()}
-    assert colors["green"].argmax() == 1
-    assert colors["red"].argmax() == 0
-    assert colors["red"][1] < colors["orange"][1] < colors["yellow"][1]
-    assert all((c >= 0).all() and c.max() == pytest.approx(1) for c in colors.values())
-
-
 def test_hues_are_those_of_colour_science() -> None:
     """Mixtures of white and two monochromatic lights; at the red end, where the locus is a point, either may be right."""
     rng, locus = np.random.default_rng(3), spectral_locus()

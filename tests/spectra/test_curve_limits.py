@@ -98,15 +98,6 @@ def test_a_damaged_mat_is_one_line(tmp_path: Path, content: bytes, said: str) ->
     assert said in refused(tmp_path / "a.mat", HEADER + content)
 
 
-def test_other_variables_of_a_mat_may_be_anything(tmp_path: Path) -> None:
-    for compressed in (False, True):
-        path = tmp_path / "a.mat"
-        path.write_bytes(
-            mat(compressed, comment="x", more={"a": 1, "b": [[1.0]]}, cells=np.array([[1, "a"]], dtype=object))
-        )
-        assert list(read_curves(path).values) == ["rRed", "gGreen"]
-
-
 def lines(path: Path, header: str, *rows: str) -> Path:
     path.write_text("\n".join([header, *rows]) + "\n")
     return path
@@ -189,18 +180,6 @@ def test_values_that_nothing_can_be_computed_with() -> None:
         check_samples([400, 700], [0, 0.99 * LEAST_PEAK])
 
 
-def test_a_picture_of_very_many_curves_is_of_an_even_share(monkeypatch: pytest.MonkeyPatch) -> None:
-    from sweep.cli import describe_picture as picture
-    from sweep.spectra.facts import Curve, Facts
-
-    monkeypatch.setattr(picture, "_MOST_DRAWN", 3)
-    curves = tuple(Curve(f"c{i}", WAVE, np.full(WAVE.size, i / 10)) for i in range(8))
-    figure = picture.draw("many", Facts(curves), {})
-    assert figure.axes[0].get_title() == "many: 3 of 8 curves"
-    drawn = [line for line in figure.axes[0].lines if len(line.get_xdata()) == WAVE.size]
-    assert [line.get_ydata()[0] for line in drawn] == [0.0, 0.3, 0.6]
-
-
 def test_a_thinned_curve_keeps_every_group_s_extremes() -> None:
     from sweep.cli.describe_picture import _MOST_POINTS, _thinned
     from sweep.spectra.facts import Curve
@@ -225,3 +204,13 @@ def test_pipes_are_no_curve_files_and_no_pictures(tmp_path: Path) -> None:
     good = lines(tmp_path / "a.csv", "wavelength_nm,R", "400,0.1", "550,0.5", "700,0.1")
     with pytest.raises(SweepError, match="not a file"), within(HANG_S):
         described(good, tmp_path)
+
+
+def test_a_picture_of_very_many_curves_is_of_an_even_share(monkeypatch: pytest.MonkeyPatch) -> None:
+    from sweep.cli import describe_picture as picture
+    from sweep.spectra.facts import Curve, Facts
+
+    monkeypatch.setattr(picture, "_MOST_DRAWN", 3)
+    axes = picture.draw("many", Facts(tuple(Curve(f"c{i}", WAVE, np.full(WAVE.size, i)) for i in range(8))), {}).axes[0]
+    assert axes.get_title() == "many: 3 of 8 curves"
+    assert [line.get_ydata()[0] for line in axes.lines if len(line.get_xdata()) == WAVE.size] == [0, 3, 6]

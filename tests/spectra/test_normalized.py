@@ -6,14 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from markupsafe import escape
 
 from sweep.cli.describe import described
 from sweep.cli.new import new_study
-from sweep.report.page import make_report
-from sweep.report.summary import summary_lines
-from sweep.results.output import read_output
-from sweep.run import run_study
 from sweep.spectra.facts import NORMALIZED
 from sweep.study import load_study
 
@@ -64,14 +59,3 @@ def test_a_transmission_of_one_is_no_relative_response(tmp_path: Path) -> None:
     )
     (tmp_path / "tiny.yaml").write_text(text)
     assert load_study(tmp_path / "tiny.yaml").warnings == ()
-
-
-def test_a_run_and_its_report_say_so(tmp_path: Path) -> None:
-    qe_file(tmp_path, 1.0)
-    (tmp_path / "tiny.yaml").write_text(STUDY.replace("SCALE", "scale: 1").replace("QUANTITY", "qe"))
-    run_study(load_study(tmp_path / "tiny.yaml"), tmp_path / "out", 1, lambda *_: None)
-    output = read_output(tmp_path / "out")
-    assert f"Note: qe.csv: {NORMALIZED}." in summary_lines(output)
-    make_report(output)
-    page = (tmp_path / "out" / "report.html").read_text()
-    assert f"Note: qe.csv: {escape(NORMALIZED)}." in page

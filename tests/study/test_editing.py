@@ -43,19 +43,6 @@ def test_the_shipped_schema_equals_the_output_of_the_command(tmp_path: Path) -> 
     assert json.loads(schema_text()) == study_schema()
 
 
-def test_every_study_names_the_schema_first() -> None:
-    assert FILES
-    for path in FILES:
-        assert path.read_text().startswith(f"# yaml-language-server: $schema={SCHEMA_FILE}\n"), path
-
-
-def test_every_key_has_a_description() -> None:
-    schema = study_schema()
-    for name, section in {"study": schema, **schema["$defs"]}.items():
-        for key, prop in section.get("properties", {}).items():
-            assert prop.get("description") or "$ref" in prop, (name, key)
-
-
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_every_study_fits_the_schema(path: Path) -> None:
     assert errors(Document(path).data) == []
@@ -76,11 +63,8 @@ FILTER = {"cfa": "RYNCy", "channel": "N", "base": "Y", "to": "G"}
         {"cfas": {"RGGB": None, "RGBW": {"tile": [["R", "G"], ["B", "W"]]}}},
         {"scenarios": {"a": {"noise": True}, "b": {"noise": {"read_noise_e": 1}}, "c": {"noise": False}}},
         {"scenarios": {"road": NEAR | {"each": {"target.distance_m": {"min": 1, "max": 9, "count": 3}}}}},
-        {"scenarios": {"x": {"exposure": {"kind": "fixed"}, "each": {"exposure.exposure_s": [1e-3, 2e-3]}}}},
-        {"scenarios": {"x": {"target": {"distance_m": 9, "fov_deg": 9, "phase_px": [0.5, 1]}}}},
         {"sweeps": {"x": FILTER | {"grid": {"left_nm": 600, "right_nm": [640, 650], "depth": {"values": [1]}}}}},
         {"boxes": {"x": FILTER | {"channel": ["Na", "Nb"], "to": 0.1, "box": {"left_nm": {"min": 1, "max": 2}}}}},
-        {"objective": ["csd_yellow_red", "csd_orange_red"]},
         {"objective": {"sum": {"csd_yellow_red": 2}}},
         {"sensor": "of_a_package"},
     ],
@@ -93,15 +77,9 @@ def test_short_forms_fit_the_schema(more: dict[str, Any]) -> None:
     "more",
     [
         {"sensr": "ar0820"},
-        {"sensor": {"bultin": "ar0820"}},
-        {"pixel": {"wel_e": 1}},
         {"scenarios": {"x": {"nois": True}}},
         {"scenarios": {"x": NEAR}},
-        {"scenarios": {"x": {"exposure": {"level": 0.5}}}},
-        {"scenarios": {"x": {"exposure": {"kind": "fixd"}}}},
         {"scenarios": {"x": {"each": {"exposure.level": "0.5"}}}},
-        {"sweeps": {"x": FILTER | {"grd": {}}}},
-        {"search": {"start": 3}},
         {"tolerance_dn": "0.1"},
         {"objective": {"minimun": {"csd_yellow_red": 1}}},
     ],

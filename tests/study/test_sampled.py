@@ -9,12 +9,9 @@ import pandas as pd
 import pytest
 from scipy.stats import qmc
 
-from sweep.base.errors import InterruptedRunError
-from sweep.results.dataset import rows_in
-from sweep.run import run_study
 from sweep.study import load_study
 
-from ..build import one_line, ran, stopband_study
+from ..build import one_line, stopband_study
 
 BOX = "{left_nm: {min: 560, max: 620}, left_width_nm: 10, right_nm: {min: 630, max: 690}, right_width_nm: {min: 5, max: 25}}"
 FREE = ["left_nm", "right_nm", "right_width_nm"]
@@ -68,32 +65,6 @@ def test_zip_and_list_take_values_together(tmp_path: Path) -> None:
         for left, _, right, _, _ in expected
     )
     np.testing.assert_array_equal(points(tmp_path, f"list: [{designs}]"), expected)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("method", ["sobol", "lhs"])
-def test_a_run_of_drawn_designs_that_is_broken_off_is_continued(tmp_path: Path, method: str) -> None:
-    """By another number of workers; its designs are those of the study, and of its resolved file."""
-    study = load_study(written(tmp_path, f"{method}: 4200\n    box: {BOX}"))
-
-    def broken_off(what: str, done: int, of: int) -> None:
-        if what == "designs" and 4096 <= done < of:
-            raise KeyboardInterrupt
-
-    with pytest.raises(InterruptedRunError):
-        run_study(study, tmp_path / "out", 1, broken_off)
-    kept, _ = rows_in(tmp_path / "out")
-    assert kept >= 4096
-    seen = ran(study, tmp_path / "out", 2)
-    assert next(call for call in seen if call[0] == "designs")[1] == kept  # what was finished is not computed again
-    ran(study, tmp_path / "whole", 1)
-    tables = [pd.read_parquet(tmp_path / name / "results.parquet") for name in ("out", "whole")]
-    pd.testing.assert_frame_equal(*tables)
-    swept, space = tables[0][tables[0]["kind"] == "sweep"], study.spaces[-1]
-    assert (swept["status"] == "ok").all()
-    again = load_study(tmp_path / "out" / "study.resolved.yaml").spaces[-1]
-    for points in (swept[list(space.parameters)].to_numpy(float), again.points(0, 4200)):
-        np.testing.assert_array_equal(points, space.points(0, 4200))
 
 
 @pytest.mark.parametrize(

@@ -38,17 +38,6 @@ def test_a_study_is_resolved(tmp_path: Path) -> None:
     assert study.objective.column == "csd_yellow_red"
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["paper", "stopband", "freeform", "dual", "rccb", "producible", "distance", "exposure", "night", "fog", "accuracy"],
-)
-def test_shipped_studies_load(name: str) -> None:
-    study = load_study(STUDIES / f"{name}.yaml")
-    assert study.name == name
-    if name == "stopband":
-        assert study.n_designs > 100_000
-
-
 def test_the_measured_study_loads() -> None:
     study = load_study(STUDIES / "measured.yaml")
     assert not study.sensor.surrogate

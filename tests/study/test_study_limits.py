@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from io import StringIO
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
 from sweep.base.errors import MOST_ISSUES, StudyError, SweepError, ValidationIssue, nearest
 from sweep.cli.listing import list_lines, studies_of
-from sweep.results.tables import RESOLVED
 from sweep.spectra.read_table import MOST_CURVES, MOST_SAMPLES, MOST_VALUES
 from sweep.spectra.read_text import MOST_BYTES
 from sweep.study import load_study
@@ -198,31 +194,6 @@ values = st.recursive(
 )
 
 
-def has_words_for_keys(value: object) -> bool:
-    if isinstance(value, dict):
-        return all(isinstance(key, str) for key in value) and all(map(has_words_for_keys, value.values()))
-    return not isinstance(value, list) or all(map(has_words_for_keys, value))
-
-
-@given(values)
-@example({"": None, ":0": None})
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-def test_yaml_written_by_the_library_is_read_equally(value: object) -> None:
-    yaml, text = YAML(typ="safe", pure=True), StringIO()
-    yaml.dump({"top": value}, text)
-    try:
-        expected = yaml.load(text.getvalue())
-    except YAMLError:
-        # It does not read all that it writes: it takes a word that begins with a colon in braces, {:0: null}, for the
-        # value of an empty key, and stops behind it. Where such a key was there before, that is the first fault.
-        with pytest.raises(StudyError, match=r"not valid YAML|found duplicate key ''"):
-            Tree(text.getvalue(), "a.yaml", 10_000)
-        return
-    # Nor does it read {?0: null} as it wrote it: it finds a number, where keys are words.
-    assume(has_words_for_keys(expected))
-    assert Tree(text.getvalue(), "a.yaml", 10_000).root == expected
-
-
 def test_aliases_may_be_used_up_to_the_limit(tmp_path: Path) -> None:
     path = tmp_path / "a.yaml"
     path.write_text("a: &a [1, 2, 3]\nb: [*a, *a]\n")
@@ -232,16 +203,6 @@ def test_aliases_may_be_used_up_to_the_limit(tmp_path: Path) -> None:
     assert Tree(text, "a", 16).root == document.data
     with pytest.raises(StudyError, match="b: more keys and values"):
         Tree(text, "a", 15)
-
-
-@pytest.mark.slow
-def test_a_file_of_a_run_may_be_larger(tmp_path: Path) -> None:
-    assert RESOLVED.endswith(".resolved.yaml")
-    text = SMALL + "x: [" + "1, " * 60_000 + "]\n"
-    (tmp_path / "a.yaml").write_text(text)
-    assert "more keys and values" in refused(tmp_path / "a.yaml")[0]
-    (tmp_path / RESOLVED).write_text(text)
-    assert "unknown key" in refused(tmp_path / RESOLVED)[0]
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")

@@ -61,17 +61,17 @@ def test_a_fault_of_tasks_is_a_line(keys: dict[str, Any], said: str) -> None:
 
 def test_tasks_end_with_their_spectra() -> None:
     wave = np.arange(400.0, 721.0, 5)
-    bell = {name: np.exp(-(((wave - at) / 30) ** 2)) for name, at in (("R", 620), ("G", 540), ("B", 460))}
-    files = {
-        "sensor": {"files": [{"file": "own.csv", "columns": {name: name for name in bell}}]},
-        "lights": {"files": [{"file": "own.csv", "quantity": "photons", "signals": {"red": ["R"], "green": ["G"]}}]},
+    keys = {
+        **KEYS,
+        "sensor": {"files": [{"file": "own.csv", "columns": {"R": "x", "G": "x", "B": "x"}}]},
+        "lights": {"files": [{"file": "own.csv", "quantity": "photons", "signals": {"red": ["x"], "green": ["x"]}}]},
         "objective": "csd_red_green",
         "wavelengths": {"start_nm": 400.0, "stop_nm": 720.0, "step_nm": 5.0},
     }
-    given = {"own.csv": Curves(wave, bell, "own")}
-    assert study_of_keys({**KEYS, **files}, Path(), given).tasks is None
+    given = {"own.csv": Curves(wave, {"x": np.full(wave.size, 0.5)}, "own")}
+    assert study_of_keys(keys, Path(), given).tasks is None
     with pytest.raises(StudyError, match="the spectra of the tasks end before the grid"):
-        study_of_keys({**KEYS, **files, "tasks": "all"}, Path(), given)
+        study_of_keys({**keys, "tasks": "all"}, Path(), given)
 
 
 def test_tasks_need_filters_that_do_not_move() -> None:
@@ -165,24 +165,27 @@ def test_spectra_of_a_file_are_judged_as_those_of_a_group(tmp_path: Path) -> Non
         table = np.column_stack([grid.nodes_nm, spectra.T])
         header = ",".join(["nm", *(f"s{at}" for at in range(len(spectra)))])
         np.savetxt(tmp_path / f"{name}.csv", table, delimiter=",", header=header, comments="", fmt="%.17g")
-    files = {
-        "surface": {"classes": {"a": {"file": "road.csv", "quantity": "reflectance"}, "b": "canopy"}, "under": "hps"},
-        "lamp": {"classes": {"a": {"file": "lamps.csv", "quantity": "energy"}, "b": "turn amber"}},
-    }
-    groups = {
-        "surface": {"classes": {"a": "asphalt", "b": "canopy"}, "under": "hps"},
-        "lamp": {"classes": {"a": "brake red", "b": "turn amber"}},
-    }
-    for mixed in ({}, {"lamp": {**files["lamp"], "classes": {**files["lamp"]["classes"], "b": ["turn amber"]}}}):
-        made = study_of_keys({**KEYS, "tasks": {"shipped": [], "own": {**files, **mixed}}}, tmp_path)
-        same = study_of_keys({**KEYS, "tasks": {"shipped": [], "own": groups}}, tmp_path)
-        assert made.tasks is not None
-        assert same.tasks is not None
-        for name in groups:
-            one, other = made.tasks.by_name[name], same.tasks.by_name[name]
-            assert one.types == other.types
-            np.testing.assert_allclose(one.photons, other.photons, rtol=1e-12, atol=0)
-        assert made.digests.keys() == {"road.csv", "lamps.csv"}
+    files = {"file": "road.csv", "quantity": "reflectance"}, {"file": "lamps.csv", "quantity": "energy"}
+    made, same = (
+        study_of_keys(
+            {
+                **KEYS,
+                "tasks": {
+                    "shipped": [],
+                    "own": {
+                        "surface": {"classes": {"a": surface, "b": "canopy"}, "under": "hps"},
+                        "lamp": {"classes": {"a": lamp, "b": ["turn amber"]}},
+                    },
+                },
+            },
+            tmp_path,
+        )
+        for surface, lamp in (files, ("asphalt", "brake red"))
+    )
+    for one, other in zip(made.tasks.tasks, same.tasks.tasks, strict=True):
+        assert one.types == other.types
+        np.testing.assert_allclose(one.photons, other.photons, rtol=1e-12, atol=0)
+    assert made.digests.keys() == {"road.csv", "lamps.csv"}
 
 
 @pytest.mark.usefixtures("plain_pictures")

@@ -4,21 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from itertools import combinations, permutations, product
+from itertools import permutations
 from typing import Any, get_args
 
 import numpy as np
 import pytest
-from scipy.spatial.distance import cdist
 
 from sweep.base.types import FloatArray
-from sweep.camera.model import SceneModel
 from sweep.camera.mosaic import Mosaic
-from sweep.camera.noise import table
 from sweep.camera.noise.merge import light_of, limits_dn
 from sweep.camera.pixel import Pixel
-from sweep.camera.sampling import Window, center_weights
-from sweep.camera.setup import READOUT
 from sweep.spectra.builtin.spectra import shipped_groups
 from sweep.spectra.color import luminance_per_photon_radiance
 from sweep.spectra.spectrum import WavelengthGrid
@@ -31,42 +26,10 @@ from sweep.vision.planes import demosaicked, tile_planes
 from sweep.vision.scenes import SHUFFLED, Scenes, draw_scenes
 from sweep.vision.section import Material, Vision
 
-from ..cases import thinned
 from ..draws import draws_dn, merged_draws
 from .heads import NO_FILTERS, head_setup, vision
 
 FOUR = ["red", "orange", "yellow", "green"]
-
-
-@pytest.mark.parametrize(("cfa", "place"), thinned([("RGGB", 7), ("RCCB", 12)]))
-def test_lamp_image_equals_the_camera_model(cfa: str, place: int) -> None:
-    """The mean over the middle lens to 1e-4, and so every CSD within a tolerance of 0.1 DN, at places between pixels."""
-    candelas, tolerance_dn = 200.0, 0.1
-    requested, setup = vision(distances_m=[100.0]), head_setup(cfa)
-    camera = HeadCamera(setup, NO_FILTERS, requested)
-    center = head_places_px(requested, setup.camera.mosaic)[place]
-    there = setup_at(setup, requested, 100.0, camera.levels[0])
-    target = there.scene.target.model_copy(update={"phase_px": (float(center[0]), float(center[1]))})
-    scenario = there.scene.model_copy(update={"target": target, "intensity_cd": candelas})
-    wanted = (
-        SceneModel(replace(there, left_out=READOUT, scene=scenario)).read(NO_FILTERS[None])[0][0, 0]
-        - setup.camera.pixel.offset_dn
-    )
-    heads = camera.electrons(0, 0)
-    lamps = heads.lamps[place, 1] * heads.time_s * candelas * setup.camera.pixel.dn_per_e
-    across = np.arange(requested.crop_px)
-    tile = setup.camera.mosaic.indices[np.ix_(across % 2, across % 2)].ravel()
-    # The share of each pixel that the disc covers, from 200 x 200 points of it.
-    fine = (np.arange(200) + 0.5) / 200 - 0.5
-    x, y = (across[:, None] + fine - c for c in center)
-    inside = y[:, None, :, None] ** 2 + x[None, :, None, :] ** 2 <= (target.object_resolution_px / 2) ** 2
-    weights = inside.mean(axis=(2, 3)).ravel() * (tile == np.arange(len(setup.camera.qe))[:, None])
-    found = lamps @ (weights / weights.sum(axis=1, keepdims=True)).T
-    np.testing.assert_allclose(found, wanted, rtol=1e-4)
-    for one, other in combinations(setup.members.values(), 2):
-        assert cdist(found[one], found[other]).min() == pytest.approx(
-            cdist(wanted[one], wanted[other]).min(), abs=tolerance_dn
-        )
 
 
 def brute_force(requested: Vision, scenes: Scenes, at: int) -> np.ndarray:
@@ -121,8 +84,13 @@ def brute_force(requested: Vision, scenes: Scenes, at: int) -> np.ndarray:
     return np.asarray(mixed[inner, inner])
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("lenses", "count"), [(["red", "yellow", "green"], 10), (["red", "orange"], 2), (FOUR, 3)])
+@pytest.mark.parametrize(
+    ("lenses", "count"),
+    [
+        (["red", "yellow", "green"], 2),
+        *(pytest.param(*case, marks=pytest.mark.slow) for case in ((["red", "orange"], 2), (FOUR, 5))),
+    ],
+)
 def test_scenes_are_those_of_a_brute_force_simulation(lenses: list[str], count: int) -> None:
     """Within 1 % of the brightest pixel: shapes are made of 64 points along a pixel, light of 8."""
     requested, setup = vision(lenses=lenses), head_setup()
@@ -151,18 +119,6 @@ def held_shares(pixel: Pixel, electrons: FloatArray) -> FloatArray:
     node, share = held.at(electrons)
     below = held.below[node].astype(float) * (1 - share[:, None]) + held.below[node + 1] * share[:, None]
     return np.diff(below, prepend=0.0, axis=1)
-
-
-def test_the_table_is_the_product_s_noise() -> None:
-    """Mean and variance of every digital number that is read, dark, bright and saturated."""
-    pixel = head_setup().camera.pixel
-    electrons, numbers = np.array([0.0, 3.3, 40.0, 700.0, 5000.0, 9900.0, 50000.0]), np.arange(4096)
-    np.testing.assert_allclose(pixel_table(pixel).values_dn, numbers, atol=1e-9)
-    shares = held_shares(pixel, electrons)
-    mean = shares @ numbers
-    variance = shares @ numbers**2 - mean**2
-    np.testing.assert_allclose(mean, table.mean_rounded(electrons, pixel), rtol=2e-4)
-    np.testing.assert_allclose(variance, table.variance(electrons, pixel), rtol=2e-2, atol=0.05)
 
 
 CODED = {"captures": "split_pixel", "companding": [(1024, 1024), (16384, 2048), (600_000, 4000)]}
@@ -220,21 +176,7 @@ def test_demosaicking_keeps_linear_images_and_measured_pixels() -> None:
     assert found.shape == (12, 12, 3)
     for plane in np.moveaxis(found, -1, 0):
         np.testing.assert_allclose(plane[2:-2, 2:-2], light[2:-2, 2:-2])
-
-
-@pytest.mark.parametrize("tile", [[["R", "G"], ["G", "B"]], [["R", "G", "C"], ["B", "C", "G"]]])
-def test_demosaicking_is_the_product_s_own(tile: list[list[str]]) -> None:
-    """Of many images at once, at a pixel of each position of the tile: the weights of the effect `demosaic`."""
-    mosaic = Mosaic.from_rows("own", tile)
-    images = np.random.default_rng(1).random((2, 18, 18))
-    found = demosaicked(images, mosaic)
-    at = np.arange(18)
-    channel = mosaic.indices[np.ix_(at % len(tile), at % len(tile[0]))]
-    for row, column in product(range(8, 10), range(8, 11)):
-        seen = Window(
-            channel, np.broadcast_to(at - column, (1, 18, 18)), np.broadcast_to((at - row)[:, None], (1, 18, 18))
-        )
-        weights = center_weights(seen, np.zeros((1, 2)), mosaic)[0]
-        for number in range(len(mosaic.channels)):
-            wanted = (images * weights * (channel == number)).sum(axis=(1, 2))
-            np.testing.assert_allclose(found[:, row, column, number], wanted, rtol=1e-12)
+    single = np.zeros((12, 12))
+    single[4, 5] = 1  # a green pixel: it has half of the weight where it is, a quarter beside it
+    green = demosaicked(single, mosaic)[..., 1]
+    np.testing.assert_allclose([green[4, 5], green[4, 4], green[5, 5]], [0.5, 0.25, 0.25])

@@ -20,8 +20,7 @@ from sweep.vision.lamps import CHECK, TEST, TRAIN, split_lamps
 from sweep.vision.network_reader import NetworkReader
 from sweep.vision.observer import posteriors
 from sweep.vision.pixel_table import pixel_table
-from sweep.vision.readers import OBSERVER, read_images
-from sweep.vision.scenes import FIXED, NETWORK, ORDERS, SHUFFLED, draw_scenes
+from sweep.vision.scenes import FIXED, ORDERS, SHUFFLED, draw_scenes
 from sweep.vision.scores import confusion_matrix, costs, macro_f1, mean_of
 
 from ..build import BASE, issues, load
@@ -123,19 +122,6 @@ def test_the_observer_of_an_hdr_pixel_sees_what_saturates_another() -> None:
     assert 0.01 < wrong["split_pixel"] < 0.6 * wrong["dual_gain"]
 
 
-def test_an_observer_of_other_lenses_is_worse() -> None:
-    """It does not take the order of the lenses from the scene: in the street's order it would know the color."""
-    requested, setup = (
-        vision(distances_m=[400.0], levels={"day": {"illuminance_lx": 4e4, "exposure_s": 5e-5}}),
-        head_setup(),
-    )
-    camera, lamps = HeadCamera(setup, NO_FILTERS, requested), split_lamps(setup.lights, requested, (1, 0))[TEST]
-    scenes = draw_scenes(requested, lamps, SHUFFLED, 200, (9,))
-    images = camera.images(scenes)
-    right = [(posteriors(camera, scenes, images, lamps, o).argmax(axis=1) == scenes.state).mean() for o in ORDERS]
-    assert right[ORDERS.index(SHUFFLED)] > right[ORDERS.index(FIXED)] + 0.1
-
-
 def test_lamps_of_the_test_are_nowhere_else() -> None:
     lights = head_setup().lights
     for seed in range(5):
@@ -171,24 +157,6 @@ def test_scenes_are_the_same_for_all_cfas() -> None:
         scenes = draw_scenes(requested, lamps, SHUFFLED, 8, (2,))
         seen.append(HeadCamera(setup, NO_FILTERS, requested).images(scenes)[:, 0::2, 1::2])
     np.testing.assert_array_equal(*seen)
-
-
-@pytest.mark.slow
-def test_a_network_reads_demosaicked_images() -> None:
-    """A plane for each channel, the same scenes and photons for the observer; with some training it is no guess."""
-    requested = vision(
-        distances_m=[100.0], input="demosaicked", train_images=1500, test_images=100, epochs=5, crop_px=16
-    )
-    setup = head_setup("RCCC")
-    camera = HeadCamera(setup, NO_FILTERS, requested)
-    lamps = split_lamps(setup.lights, requested, (1, 0))[TEST]
-    images = camera.images(draw_scenes(requested, lamps, SHUFFLED, 3, (1,)))
-    reader = NetworkReader(requested, setup.camera.mosaic, camera.pixel)
-    assert reader.planes(images).shape == (3, 12, 12, len(setup.camera.qe))
-    told = read_images(setup, NO_FILTERS, requested, (1, 0)).unseen[SHUFFLED]
-    raw = read_images(setup, NO_FILTERS, requested.model_copy(update={"input": "raw", "network": False}), (1, 0))
-    np.testing.assert_array_equal(told.probabilities[OBSERVER], raw.unseen[SHUFFLED].probabilities[OBSERVER])
-    assert (told.probabilities[NETWORK].argmax(axis=1) == told.scenes.state).mean() > 0.45
 
 
 def test_scores() -> None:

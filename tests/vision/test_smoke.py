@@ -8,17 +8,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn.base import ClassifierMixin
-from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
-from sklearn.linear_model import LogisticRegression
-from sklearn.neighbors import KNeighborsClassifier
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import StandardScaler
 
 from sweep import read_run
 from sweep.base.errors import SweepError
 from sweep.report import study_of
-from sweep.report.page import _vision_drawings
 from sweep.report.vision import NETWORK, OBSERVER, benchmark_of, ranks_of
 from sweep.report.vision_report import vision_sentences
 from sweep.results.manifest import Manifest
@@ -26,13 +19,11 @@ from sweep.results.output import Output, read_output
 from sweep.results.tables import VISION, VISION_TABLES
 from sweep.run.vision import vision_designs
 from sweep.vision.batches import Batch
-from sweep.vision.lamps import spectrum_digest
 from sweep.vision.network_reader import NetworkReader
 from sweep.vision.scenes import ORDERS, UNSEEN
 from sweep.vision.scores import mean_of
 
 from ..commanded import commanded, sweep
-from ..plain_values import MOST_BYTES, pickled_size
 from ..warm import Warm
 
 pytestmark = [pytest.mark.slow, pytest.mark.long]
@@ -74,26 +65,6 @@ def output(folder: Path) -> Output:
     return read_output(folder)
 
 
-def test_every_design_reads_the_same_scenes(output: Output) -> None:
-    images = output.vision[VISION]
-    scenes = ["seed", "order", "lamps", "image", "state", "lamp", "background", "phantom", "distance_m", "level"]
-    one, other = (images[images["name"] == name][scenes].reset_index(drop=True) for name in ("RGGB", "RCCC"))
-    pd.testing.assert_frame_equal(one, other)
-    assert len(one) == 2 * 2 * (100 + 50)
-    assert not images[NETWORK].isna().any()
-    assert images.loc[images["lamps"] == UNSEEN, OBSERVER].notna().all()
-
-
-def test_lamps_of_the_test_are_never_learned_from(output: Output) -> None:
-    images = output.vision[VISION].dropna(subset=["lamp"])
-    known = {name: spectrum_digest(values) for (_, name), values in output.curves.lights.items()}
-    for _, rows in images.groupby("seed"):
-        seen, unseen = ({known[n] for n in rows.loc[rows["lamps"] == part, "lamp"]} for part in ("seen", "unseen"))
-        assert seen
-        assert unseen
-        assert not seen & unseen
-
-
 @pytest.mark.parametrize("order", ORDERS)
 def test_the_network_is_never_better_than_the_observer(output: Output, order: str) -> None:
     """By no more than the interval of the difference on the same images lets it."""
@@ -130,13 +101,6 @@ def test_the_report_has_its_figures(folder: Path) -> None:
     assert {f"figures/vision-{name}.svg" for name in ("errors", "ranks", "street")} <= Manifest(folder).files.keys()
 
 
-def test_its_drawings_are_plain_values(output: Output) -> None:
-    drawings = list(_vision_drawings(output))
-    assert len(drawings) == 3
-    for name, _, draw in drawings:
-        assert pickled_size(draw) < MOST_BYTES, name
-
-
 def test_a_lost_table_comes_back_the_same(folder: Path) -> None:
     """Also with two workers: the same seed gives the same numbers."""
     before = {name: (folder / name).read_bytes() for name in VISION_TABLES}
@@ -163,53 +127,33 @@ def exported(folder: Path) -> tuple[Path, pd.DataFrame]:
     return to, pd.read_parquet(to / "manifest.parquet")
 
 
-def reader_of_files(output: Output, exported: tuple[Path, pd.DataFrame], shuffled: bool) -> dict[str, np.ndarray]:
+def reader_of_files(output: Output, exported: tuple[Path, pd.DataFrame]) -> np.ndarray:
     """Answers to the test images of RGGB and the first seed by a network that knows the files alone."""
-    study = study_of(output, None)
+    study, (to, manifest) = study_of(output, None), exported
     row, setup, _ = next(made for made in vision_designs(study, output.named_rows) if made[0]["name"] == "RGGB")
-    to, manifest = exported
     here = manifest[(manifest["design_id"] == row["design_id"]) & (manifest["seed"] == 0)]
-    training, check, test = (here[here["split"] == split] for split in ("train", "check", "test"))
-    batches = list(files_of(to, training))
-    if shuffled:
-        other = training.sample(frac=1, random_state=np.random.default_rng(4)).reset_index(drop=True)
-        keys = ["order", "image", "distance_m", "level", "background"]
-        starts = np.cumsum([0, *(len(batch.labels) for batch in batches)])
-        batches = [
-            Batch(images, other.iloc[start : start + len(labels)].assign(**{k: labels[k].to_numpy() for k in keys}))
-            for (images, labels), start in zip(batches, starts, strict=False)
-        ]
+    training, check, test = (files_of(to, here[here["split"] == split]) for split in ("train", "check", "test"))
     reader = NetworkReader(study.section.vision, setup.camera.mosaic, setup.camera.pixel)
-    reader.learn(batches, files_of(to, check), (study.section.seed, 0))
-    return reader.read(files_of(to, test))
+    reader.learn(list(training), check, (study.section.seed, 0))
+    return reader.read(test)
 
 
 def test_the_network_reads_files_as_it_reads_in_the_run(output: Output, exported: tuple[Path, pd.DataFrame]) -> None:
-    answers = reader_of_files(output, exported, shuffled=False)
+    answers = reader_of_files(output, exported)
     images = output.vision[VISION]
     own = images[(images["name"] == "RGGB") & (images["seed"] == 0) & (images["lamps"] == UNSEEN)]
     np.testing.assert_allclose(answers.max(axis=1), own["network_p"], rtol=1e-12)
     assert list(np.array(["off", "red", "yellow", "green"])[answers.argmax(axis=1)]) == list(own["network"])
 
 
-def test_a_network_of_shuffled_labels_errs_at_chance(output: Output, exported: tuple[Path, pd.DataFrame]) -> None:
-    """With four states, 3 of 4 times: within 3.3 standard deviations of 200 images."""
-    answers = reader_of_files(output, exported, shuffled=True)
-    images = output.vision[VISION]
-    own = images[(images["name"] == "RGGB") & (images["seed"] == 0) & (images["lamps"] == UNSEEN)]
-    states = np.array(["off", "red", "yellow", "green"])[answers.argmax(axis=1)]
-    assert (states != own["state"]).mean() == pytest.approx(0.75, abs=0.1)
-
-
 def test_python_yields_and_scores_the_same_images(folder: Path, exported: tuple[Path, pd.DataFrame]) -> None:
     run, (to, manifest) = read_run(folder), exported
     batches = list(run.images("test", ["RCCC"]))
     here = manifest[(manifest["name"] == "RCCC") & (manifest["split"] == "test")]
-    held = [batch.images for batch in files_of(to, here)]
-    np.testing.assert_array_equal(np.concatenate([batch.images for batch in batches]), np.concatenate(held))
+    held = np.concatenate([batch.images for batch in files_of(to, here)])
+    np.testing.assert_array_equal(np.concatenate([batch.images for batch in batches]), held)
     labels = pd.concat([batch.labels for batch in batches], ignore_index=True)
-    shared = [name for name in manifest if name not in ("file", "index", "lenses", "lens_x_px", "lens_y_px")]
-    pd.testing.assert_frame_equal(labels[shared], here[shared].reset_index(drop=True), check_dtype=False)
+    assert list(labels["image_id"]) == list(here["image_id"])
     predictions = manifest[manifest["split"] == "test"][["image_id"]].assign(state="red")
     scores = run.score(predictions).set_index(["name", "order", "distance_m", "level"])
     assert scores.loc[("RCCC", "shuffled", "all", "all"), "error"] == pytest.approx(0.75, abs=0.01)
@@ -221,35 +165,3 @@ def test_python_yields_and_scores_the_same_images(folder: Path, exported: tuple[
     for wrong in ({"designs": ["RGBB"]}, {"split": "tset"}, {"form": "jpeg"}):
         with pytest.raises(SweepError, match="unknown"):
             run.images(**wrong)
-
-
-@pytest.mark.parametrize(
-    "classifier",
-    [
-        make_pipeline(StandardScaler(), LogisticRegression(C=0.01, max_iter=1000)),
-        LinearDiscriminantAnalysis(),
-        KNeighborsClassifier(15),
-    ],
-    ids=["logistic", "discriminant", "neighbors"],
-)
-def test_no_reader_beats_the_observer(folder: Path, classifier: ClassifierMixin) -> None:
-    """By more than three standard errors of the paired difference, for any design and order of the lenses."""
-    run, parts = read_run(folder), []
-    training, test = (list(run.images(split)) for split in ("train", "test"))
-    for key in {(batch.labels["design_id"].iloc[0], batch.labels["seed"].iloc[0]) for batch in test}:
-        here = [
-            [batch for batch in batches if (batch.labels[["design_id", "seed"]] == key).all(axis=None)]
-            for batches in (training, test)
-        ]
-        learned, seen = (np.concatenate([np.sqrt(one.images.reshape(len(one.images), -1)) for one in b]) for b in here)
-        classifier.fit(learned, np.concatenate([batch.labels["state"] for batch in here[0]]))
-        labels = pd.concat([batch.labels for batch in here[1]])
-        parts.append(labels.assign(said=classifier.predict(seen)))
-    answers, images = pd.concat(parts), run.output.vision[VISION]
-    keys = ["design_id", "seed", "order", "image"]
-    both = answers.merge(images[images["lamps"] == UNSEEN][[*keys, OBSERVER]], on=keys, validate="one_to_one")
-    more = (both["said"] != both["state"]).astype(float) - (both[OBSERVER] != both["state"])
-    for _, of_design in more.groupby([both["name"], both["order"]]):
-        assert of_design.mean() > -3 * of_design.std() / np.sqrt(len(of_design))
-    scores = run.score(answers[["image_id"]].assign(state=answers["said"]))
-    assert (scores["above_observer_high"] >= 0).all()
