@@ -105,7 +105,7 @@ def _keep(
                 found[BEST_PHASE + name][design] = -both[number + len(names)]
 
 
-def _both_ends(csds: _Values) -> _Values:
+def _both_ends(csds: Float[Array, "pairs places"]) -> _Values:
     return np.concatenate([csds, -csds])
 
 
