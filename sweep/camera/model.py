@@ -380,7 +380,7 @@ def _different_moments(scales: Float[Array, "captures _designs _moments"]) -> Fl
     return scales[..., np.sort(np.unique(flat, axis=1, return_index=True)[1])]
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=8)
 def scene_model(setup: Setup) -> SceneModel:
     """Return the model of a setup, which owns it: recent ones are kept."""
     return SceneModel(setup)
