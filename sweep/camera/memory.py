@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from .field import field_heights
@@ -15,6 +17,7 @@ _COPIES = 4
 """So many arrays of the size of a response are held while it is made."""
 
 
+@lru_cache(maxsize=64)
 def pixels_per_phase(setup: Setup) -> int:
     """Estimate the number of pixels that are computed around a light."""
     target, rows_columns = setup.scene.target, setup.camera.mosaic.indices.shape
@@ -23,6 +26,7 @@ def pixels_per_phase(setup: Setup) -> int:
     return int(np.prod([2 * reach + n + 3 for n in rows_columns]))
 
 
+@lru_cache(maxsize=64)
 def bytes_per_phase(setup: Setup, *, by_pixel: bool) -> int:
     """Estimate the memory of the response at one phase.
 

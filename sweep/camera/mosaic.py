@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -56,17 +57,12 @@ class Mosaic:
             )
         return cls.from_rows(name, [tokens[:2], tokens[2:]])
 
-    @property
-    def without_filters(self) -> Mosaic:
-        """The same tile with numbers for channels: the part that the light on a pixel depends on before its filter."""
-        return Mosaic("", tuple(str(at) for at in range(len(self.channels))), self.tile)
-
-    @property
+    @cached_property
     def indices(self) -> Int[IndexArray, "rows columns"]:
         """Tile of channel indices."""
         return np.asarray(self.tile, dtype=np.intp)
 
-    @property
+    @cached_property
     def counts(self) -> Int[IndexArray, " channels"]:
         """Pixels of each channel per tile."""
         return np.bincount(self.indices.ravel(), minlength=len(self.channels))

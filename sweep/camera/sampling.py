@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -39,6 +40,7 @@ class Window:
         return np.ascontiguousarray(self.dy[:, :, 0])
 
 
+@lru_cache(maxsize=64)
 def radii_px(setup: Setup, target: Target) -> tuple[float, float]:
     """Return the radii of light and readout; the readout reaches a pixel of every channel."""
     radius = target.object_resolution_px / 2
@@ -46,6 +48,7 @@ def radii_px(setup: Setup, target: Target) -> tuple[float, float]:
     return radius, max(radius, math.hypot(rows, columns) / 2)
 
 
+@lru_cache(maxsize=64)
 def reach_px(setup: Setup, target: Target) -> float:
     """Return the largest distance along a row or column of a pixel with a weight."""
     if target.readout == "mean":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -43,12 +44,12 @@ class Lights:
     surrogate: bool
     population: Population | None = None
 
-    @property
+    @cached_property
     def classes(self) -> tuple[str, ...]:
         """Distinct signal types, in order."""
         return tuple(dict.fromkeys(self.types))
 
-    @property
+    @cached_property
     def members(self) -> dict[str, MemberNumbers]:
         """Indices of the signals of each type."""
         types = np.asarray(self.types)
