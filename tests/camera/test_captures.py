@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -36,10 +35,6 @@ def chart_setup(scene: Scene, pixel: Pixel) -> Setup:
     sensor, modified = BUILT_IN_SENSORS["ar0820"](grid), (mosaic.channels.index("N"),)
     qe = sensor.mosaic_qe(mosaic, {"N": "Y"})
     return Setup(Camera(grid, mosaic, qe, modified, sensor.qe["C"], pixel), BUILT_IN_LIGHTS["tl16"](grid), scene)
-
-
-def base_curves(setup: Setup) -> Array:
-    return setup.camera.base_qe[None]
 
 
 def relative_light(pixel: Pixel) -> Array:
@@ -121,12 +116,6 @@ def test_mean_and_variance_are_those_of_draws(seed: int) -> None:
     agree_with_draws(seed)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(12, 80))
-def test_mean_and_variance_are_those_of_draws_in_many_pixels(seed: int) -> None:
-    agree_with_draws(seed)
-
-
 def outcomes(expected: Array, pixel: Pixel) -> dict[float, float]:
     """Probability of each merged value of `merge: saturated` without PRNU, from SciPy's distributions alone."""
     light, at, limits = relative_light(pixel), exposure_of(pixel), limits_dn(pixel)
@@ -168,41 +157,6 @@ def test_errors_are_those_of_all_outcomes(seed: int) -> None:
     error = sum(min(one.get(v, 0.0), other.get(v, 0.0)) for v in one | other) / 2
     assert sum(one.values()) == pytest.approx(1, abs=1e-9)
     assert found.error["one", "other"][0] == pytest.approx(error, rel=0.02)
-
-
-def test_the_error_is_that_of_draws_judged_by_all_outcomes() -> None:
-    """With PRNU, and two pixels in the channel: the share of draws that a Gaussian mixture of the draws themselves misreads."""
-    rng = np.random.default_rng(3)
-    pixel = Pixel(captures="dual_gain", offset_dn=64, prnu=0.01)
-    light, signals = relative_light(pixel), np.array([4_800.0, 4_890.0])
-    expected = light[:, None, None, None] * np.repeat(signals, 2).reshape(1, 1, 2, 2)
-    members = {"one": np.array([0]), "other": np.array([1])}
-    found = confusion.errors(expected, [np.array([0, 1])], pixel, members, np.ones((1, 2)))
-    values = [np.mean([drawn(light * e, pixel, rng, DRAWS) for _ in range(2)], axis=0) for e in signals]
-    edges = np.linspace(min(v.min() for v in values), max(v.max() for v in values), 120)
-    halves = [[np.histogram(part, edges)[0] for part in np.split(v, 2)] for v in values]
-    chosen = halves[0][0] >= halves[1][0]  # a rule from one half, judged on the other
-    wrong = (halves[0][1][~chosen].sum() + halves[1][1][chosen].sum()) / DRAWS
-    assert found.error["one", "other"][0] == pytest.approx(wrong, rel=0.02)
-
-
-@pytest.mark.parametrize("merge", ["saturated", "weighted"])
-@pytest.mark.parametrize("prnu", [0.0, 0.01])
-def test_a_single_capture_is_a_pixel_that_is_read_once(merge: Any, prnu: float) -> None:
-    scene = Scene(noise=True)
-    once = chart_setup(scene=scene, pixel=Pixel(read_noise_e=2, offset_dn=64, prnu=prnu))
-    pixel = Pixel(read_noise_e=2, offset_dn=64, prnu=prnu, captures=[{}], merge=merge)
-    hdr = once.with_camera(pixel=pixel)
-    curves = once.camera.base_qe[None]
-    plain, of_capture = (scene_model(setup).read_with_noise(curves) for setup in (once, hdr))
-    np.testing.assert_allclose(of_capture.mean, plain.mean, rtol=1e-9)
-    np.testing.assert_allclose(of_capture.variance, plain.variance, rtol=1e-6)
-    one, other = (evaluate(scene_model(setup), curves, ("yellow", "red")) for setup in (once, hdr))
-    for name in ("csd_yellow_red", "chromatic_csd_yellow_red", "dprime_yellow_red"):
-        np.testing.assert_allclose(other[name], one[name], rtol=1e-6)
-    without = (replace(setup, scene=Scene()) for setup in (once, hdr))
-    one, other = (evaluate(scene_model(setup), curves) for setup in without)
-    np.testing.assert_allclose(other["csd_yellow_red"], one["csd_yellow_red"], rtol=1e-12)
 
 
 def test_the_rule_of_saturation_is_that_of_isetcam() -> None:

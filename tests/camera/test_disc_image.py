@@ -9,7 +9,7 @@ import pytest
 
 from sweep.base.types import FloatArray
 from sweep.camera import psf
-from sweep.camera.disc_image import covered, different, light_on_pixels
+from sweep.camera.disc_image import covered, light_on_pixels
 from sweep.camera.pixel import Optics, Pixel
 from sweep.camera.sampling import Window
 from sweep.camera.scene import Scene, Target
@@ -37,56 +37,6 @@ def window_around(places_px: list[tuple[float, float]], reach: int) -> Window:
 def pixel_light(window: Window, profile: psf.DiscProfile | None, radius_px: float, pitch_um: float) -> FloatArray:
     wanted = np.ones(window.dx.shape, dtype=bool)
     return light_on_pixels(window, wanted, 0.5, radius_px, profile, pitch_um).by_pixel()
-
-
-@pytest.mark.parametrize(("radius_um", "f_number"), [(0.3, 4.0), (8.0, 2.0)])
-def test_an_image_in_focus_is_its_integral(radius_um: float, f_number: float) -> None:
-    from scipy.integrate import quad
-    from scipy.special import j0, j1
-
-    profile = psf.DiscProfile(radius_um, 12.0, _VISIBLE_UM, f_number, 0.0)
-    for index in (0, 17, -1):
-        cutoff = 1 / (_VISIBLE_UM[index] * f_number)
-        for r_um in (0.0, 0.9 * radius_um, radius_um, radius_um + 1.0, 11.7):
-
-            def integrand(nu: float, cutoff: float = cutoff, r_um: float = r_um) -> float:
-                s = min(nu / cutoff, 1.0)
-                otf = 2 / math.pi * (math.acos(s) - s * math.sqrt(1 - s * s))
-                disc = 2 * math.pi * radius_um * j1(2 * math.pi * radius_um * nu)
-                return float(disc * j0(2 * math.pi * r_um * nu) * otf)
-
-            expected = quad(integrand, 0.0, cutoff, epsabs=1e-12, epsrel=1e-12, limit=500)[0]
-            assert profile.at(np.array(r_um))[index] == pytest.approx(expected, abs=_IMAGE)
-
-
-@pytest.mark.parametrize("w20_um", [0.0, 1.5])
-@pytest.mark.parametrize(("radius_um", "reach_um"), [(0.1, 1.0), (5.0, 6.0), (40.0, 70.0)])
-def test_few_functions_are_the_image_at_every_wavelength(radius_um: float, reach_um: float, w20_um: float) -> None:
-    from scipy.special import j0
-
-    profile = psf.DiscProfile(radius_um, reach_um, _VISIBLE_UM, 4.0, w20_um)
-    frequency, spectrum = profile.spectrum
-    nodes_um = profile._spline.t[4:-4]  # at its nodes a spline is what it goes through
-    r_um = nodes_um[(nodes_um >= 0) & (nodes_um <= reach_um)]
-    exact = j0(2 * math.pi * np.outer(r_um, frequency)) @ spectrum
-    np.testing.assert_allclose(profile.at(r_um), exact, rtol=0, atol=_FUNCTIONS)
-    assert len(profile.shares) <= _VISIBLE_UM.size
-    np.testing.assert_allclose(profile.shares @ profile.shares.T, np.eye(len(profile.shares)), atol=1e-13)
-
-
-def test_the_same_profile_is_made_once() -> None:
-    given = 6.0, 20.0, tuple(_VISIBLE_UM), 2.8, 0.0
-    assert psf.profile(*given) is psf.profile(*given)
-    assert psf.profile(*given) is not psf.profile(*given[:-1], 0.1)
-
-
-def test_the_otf_ends_at_the_cutoff() -> None:
-    nu = np.array([0.0, 0.5, 1.0, 2.0])
-    in_focus, defocused = (psf.otf(nu, np.array([0.5]), 2.0, w20_um)[:, 0] for w20_um in (0.0, 0.7))
-    for result in (in_focus, defocused):
-        assert result[0] == pytest.approx(1.0, abs=1e-14)
-        np.testing.assert_allclose(result[2:], 0.0, atol=1e-15)
-    assert abs(defocused[1]) < in_focus[1]
 
 
 @pytest.mark.parametrize(
@@ -145,28 +95,6 @@ def test_a_fast_lens_is_sharp_in_the_limit() -> None:
     assert away[0] < 0.1 / 3.0 * 0.5  # lambda N in pixels
     # What goes over an edge is about proportional to lambda N.
     assert np.all(away[:-1] < 0.55 * away[1:])
-
-
-@pytest.mark.parametrize("blurred", [False, True])
-def test_mirrored_pixels_see_the_same(blurred: bool) -> None:
-    radius_px, pitch_um = 1.7, 2.1
-    window = window_around([(0.0, 0.0), (0.25, 0.0), (-0.25, 0.0), (0.0, 0.25), (0.1, 0.3), (0.3, 0.1)], 4)
-    profile = psf.DiscProfile(radius_px * pitch_um, 7 * pitch_um, _VISIBLE_UM, 4.0, 0.1) if blurred else None
-    light = pixel_light(window, profile, radius_px, pitch_um)
-    np.testing.assert_array_equal(light[0], light[0].swapaxes(0, 1))
-    np.testing.assert_array_equal(light[0], light[0, ::-1])
-    np.testing.assert_array_equal(light[1], light[2, :, ::-1])
-    np.testing.assert_array_equal(light[1], light[3].swapaxes(0, 1))
-    np.testing.assert_array_equal(light[4], light[5].swapaxes(0, 1))
-
-
-def test_different_places_lead_back_to_each_pixel() -> None:
-    window = window_around([(0.0, 0.0), (0.25, 0.5), (0.5, 0.25)], 3)
-    wanted = np.hypot(window.dx, window.dy) < 3
-    places_px, place = different(window, wanted)
-    both = np.abs(np.stack([window.dx[wanted], window.dy[wanted]], axis=1))
-    np.testing.assert_allclose(places_px[place], np.sort(both, axis=1), atol=1e-12)
-    assert len(np.unique(places_px, axis=0)) == len(places_px) < wanted.sum() / 3
 
 
 def test_pixels_that_are_not_wanted_are_dark_and_sums_are_weighted() -> None:

@@ -55,11 +55,3 @@ def test_sums_are_those_of_the_array(psf_step_nm: float | None, crosstalk: float
     weights = rng.uniform(size=response.shape)
     folded = np.einsum("xu,xuw->xw", weights, response.light[:, :, 3])
     np.testing.assert_allclose(split.folded(weights, 3), folded, rtol=1e-12)
-
-
-def test_a_channel_is_the_mean_of_its_pixels() -> None:
-    """The response of channels, made on another way, is that of the pixels, weighed as they are read out."""
-    made = scene("mean", "RGGB", {"target": FAR, "optics": F2}, DARK | {"crosstalk": 0.1})
-    apart = pixels(made, made.setup.accuracy.psf_step_nm)
-    whole = Responses(made.setup).channels(PHASES)
-    np.testing.assert_allclose(np.einsum("xuv,xucw->xvcw", apart.readout, apart.light), whole.light, rtol=1e-11)

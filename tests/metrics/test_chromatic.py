@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -71,17 +70,6 @@ def test_an_unknown_response_has_an_unknown_distance() -> None:
     distances = chromatic_separation(response, np.array([0]), np.array([1]))
     assert np.isnan(distances[0])
     assert distances[1] == 0.0
-
-
-def test_background_and_brightness_do_not_count() -> None:
-    """A lamp of another intensity before another background changes no distance but by the dimmer one of both."""
-    keys = {"exposure": {"kind": "fixed", "exposure_s": 1e-4}, "photon_radiance": 1e17}
-    curves = FAMILY.curves(np.array([[612.0, 6.0, 651.0, 6.0, 1.0]]))
-    dark, bright = (scene("chart", "RYNCy", keys | {"background_cd_m2": cd}).setup for cd in (0.0, 300.0))
-    distances = [smooth_chromatic(setup, curves, PAIR)[0] for setup in (dark, bright)]
-    assert distances[0] == pytest.approx(distances[1], rel=1e-9)
-    doubled = replace(dark, scene=dark.scene.model_copy(update={"photon_radiance": 2e17}))
-    assert smooth_chromatic(doubled, curves, PAIR)[0] == pytest.approx(2 * distances[0], rel=1e-12)
 
 
 def test_derivative_equals_that_of_the_rejection_by_complex_step() -> None:

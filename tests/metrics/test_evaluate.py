@@ -11,7 +11,7 @@ from sweep.camera.camera import Camera
 from sweep.camera.linear import linear_model
 from sweep.camera.model import scene_model
 from sweep.camera.mosaic import Mosaic
-from sweep.camera.pixel import Optics, Pixel
+from sweep.camera.pixel import Pixel
 from sweep.camera.scene import FixedExposure, Scene, WhitePatchExposure
 from sweep.camera.sensor import BUILT_IN_SENSORS
 from sweep.camera.sensor_field import SensorField
@@ -55,25 +55,6 @@ def test_response_is_the_papers_exposure(level: float, ratio: float | None) -> N
     for design, curve in zip(found, FAMILY.curves(X)[:, 0], strict=True):
         qe = {"R": SENSOR.qe["R"], "Y": SENSOR.qe["Y"], "N": curve, "Cy": SENSOR.qe["Cy"]}
         np.testing.assert_allclose(design, by_hand(qe, level, ratio or LIGHTS.photon_ratio), rtol=1e-12)
-
-
-def test_response_does_not_depend_on_well_pitch_or_optics() -> None:
-    usual = evaluate(scene_model(setup()), FAMILY.curves(X))
-    scenario = Scene(photon_radiance=1e15, optics=Optics(f_number=1.6, transmission=0.7))
-    other = setup(scenario=scenario).with_camera(pixel=Pixel(pitch_um=3.0, well_e=50_000.0))
-    found = evaluate(scene_model(other), FAMILY.curves(X))
-    for name, values in usual.items():
-        if name != "exposure_s":
-            np.testing.assert_allclose(found[name], values, rtol=1e-12)
-
-
-def test_fixed_exposure_counts_photons() -> None:
-    scenario = Scene(photon_radiance=1e18, exposure=FixedExposure(exposure_s=0.004))
-    pixel = Pixel(pitch_um=2.0)
-    found = smooth_response(setup("RGGB", scenario).with_camera(pixel=pixel), np.empty((1, 0, 301)))[:, 0]
-    mean_qe = (LIGHTS.photons * SENSOR.qe["G"]).sum(axis=1)
-    n_e = 1e18 * np.pi / 65 * mean_qe * 4e-12 * 0.004
-    np.testing.assert_allclose(found[0, :, 1], n_e * 4095 / 10_000, rtol=1e-12)
 
 
 def test_csd_is_of_the_quantized_readout() -> None:

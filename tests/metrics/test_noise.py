@@ -14,7 +14,7 @@ from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
 import sweep
 from sweep.base.errors import StudyError
 from sweep.camera.model import SceneModel
-from sweep.metrics.columns.confusion import D_PRIME, ERROR, STATE_ERROR
+from sweep.metrics.columns.confusion import STATE_ERROR
 from sweep.metrics.evaluate import evaluate
 from sweep.report import make_report, read_output, summary_lines
 from sweep.run import run_study
@@ -92,36 +92,6 @@ def test_a_discriminant_of_drawn_pixels_errs_as_often_as_the_closed_form_says() 
         closed["error_yellow_red"] / 1.07 - 4 * deviation <= wrong <= 1.1 * closed["error_yellow_red"] + 4 * deviation
     )
     assert wrong + 4 * deviation >= (1 - (1 - closed["error_bound_yellow_red"] ** 2) ** 0.5) / 2
-
-
-def test_more_noise_is_never_better() -> None:
-    levels = [scene("read", "RYNCy", {"noise": {"read_noise_e": e}}, {"offset_dn": 900}) for e in (1, 10, 50, 200)]
-    found = []
-    for made in levels:
-        noise_of = made.setup.scene.noise
-        assert noise_of is not None
-        setup = made.setup.with_camera(pixel=noise_of.of(made.setup.camera.pixel))
-        found.append(evaluate(SceneModel(setup), made.curves, made.setup.lights.classes))
-    for name in found[0]:
-        values = [float(columns[name][0]) for columns in found]
-        if name.startswith((D_PRIME, "cnr_")):
-            assert values == sorted(values, reverse=True), name
-        elif name.startswith((ERROR, STATE_ERROR)):
-            assert values == sorted(values), name
-
-
-@pytest.mark.parametrize("pixel", [{"offset_dn": 4090}, {"bits": 2}])
-def test_readouts_that_are_certain_and_the_same_tell_nothing(pixel: dict[str, float]) -> None:
-    made = scene("patch", "RGGB", {"noise": {"read_noise_e": 3}}, pixel)
-    model = SceneModel(made.setup.with_camera(pixel=made.setup.camera.pixel.model_copy(update={"read_noise_e": 3.0})))
-    read = model.read_with_noise(made.curves)
-    mean, variance = read.mean, read.variance
-    certain = variance == 0
-    assert certain.any()
-    assert (mean[certain] == np.rint(mean[certain])).all()
-    states = made.setup.lights.classes
-    found = evaluate(model, made.curves, states)
-    assert 0 < found[STATE_ERROR][0] <= found["state_error_bound"][0]
 
 
 STUDY = """

@@ -18,7 +18,6 @@ from scipy.stats import norm
 
 from sweep.camera.linear import linear_model
 from sweep.camera.setup import Setup
-from sweep.designs.block import CurveBlock
 from sweep.metrics.discrimination import detectability, pairwise_error
 from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.quantity import Quantity, RequestedQuantities
@@ -328,12 +327,3 @@ def test_a_figure_has_the_derivative_of_its_rows(name: str) -> None:
         if quantity.metric in ("task_csd", "task_dprime"):
             allowed = max(allowed, 1e-9)  # under sodium light of one line all is one color, and a distance is rounding
         np.testing.assert_allclose(by_u[:, at], slope, rtol=1e-6, atol=allowed)
-
-
-def test_a_plain_cfa_has_every_figure() -> None:
-    study = study_of_keys({**KEYS, "tasks": "all"}, Path())
-    setup = study.setup_of("RGGB", "chart", {})
-    found = designed_quantities(setup, CurveBlock(np.empty((1, 0, study.grid.size))))
-    wanted = [name for name, quantity in study.quantities.items() if quantity.metric.startswith("task_")]
-    assert len(wanted) == 63
-    assert all(np.isfinite(found[name]).all() for name in wanted)

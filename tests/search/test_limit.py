@@ -80,13 +80,6 @@ def test_no_random_feasible_filter_beats_the_limit(kind: str) -> None:
     assert csd_of(SETUP, curves).max() <= LIMIT.proven
 
 
-@pytest.mark.slow
-def test_free_form_search_comes_within_one_percent() -> None:
-    problem = problem_of("freeform")
-    assert problem.constraints == PROBLEM.constraints
-    assert 0.99 * LIMIT.proven <= best_of(problem, 4, 300).objective <= LIMIT.proven
-
-
 def test_a_tighter_study_has_a_lower_limit() -> None:
     tight = limit_of(constrained(min_transmission=Bound(min=0.3)))
     assert tight.proven < LIMIT.attained
@@ -117,20 +110,6 @@ def test_least_loss_of_sensitivity_is_the_inverse_of_the_largest_separation() ->
     back = limit_of(replace(PROBLEM, constraints={**slope, "sensitivity": Bound(min=found.attained)}))
     assert back.attained == pytest.approx(200, abs=0.05)
     assert 0.9 < best_of(most, 4, 125).objective <= found.proven
-
-
-@pytest.mark.slow
-def test_the_limit_of_the_smallest_of_several_distances() -> None:
-    two = replace(PROBLEM, objective=Objective(minimum={"csd_yellow_red": 1.0, "csd_orange_red": 2.0}))
-    found = limit_of(two)
-    yellow, orange = (csd_of(SETUP, found.curve[None, None], (kind, "red"))[0] for kind in ("yellow", "orange"))
-    assert min(yellow, 2 * orange) == pytest.approx(found.attained, rel=1e-12)
-    assert found.proven <= LIMIT.proven + 1e-3
-    assert best_of(two, 4, 125).objective <= found.proven
-    # A constraint on another distance that binds lowers the limit; one that holds anyway changes nothing.
-    held = constrained(csd_green_red=Bound(min=100.0))
-    assert limit_of(held).proven == pytest.approx(LIMIT.proven, abs=2e-3)
-    assert limit_of(constrained(csd_orange_red=Bound(min=float(orange) * 1.02))).proven < LIMIT.proven
 
 
 def test_upper_bound_leaves_out_constraints_of_edges() -> None:

@@ -21,7 +21,6 @@ from sweep.study import load_study
 
 from ..build import ran
 from ..commanded import commanded
-from ..conftest import FinishedFolder
 
 STUDY = """\
 study: tiny band
@@ -138,15 +137,6 @@ def test_the_specification_has_amounts_for_every_width(folder: Path, tmp_path: P
     np.testing.assert_allclose(
         table["csd_yellow_red"], cells.groupby("fwhm_nm")["objective"].max().to_numpy(), rtol=1e-9
     )
-
-
-def test_without_a_map_there_is_no_specification(finished: FinishedFolder, tmp_path: Path) -> None:
-    code, _, said = commanded(
-        *("export", finished("stopband"), "--design", "RGGB", "--specification", "--to", tmp_path)
-    )
-    assert code == 2
-    assert "no map of absorption bands" in said
-    assert not list(tmp_path.iterdir())
 
 
 def test_the_width_of_a_colorant_is_that_at_half_height() -> None:

@@ -73,18 +73,6 @@ def test_settled_search_misses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
         assert best_feasible(whole.log).objective <= best_feasible(ended[i].log).objective * (1 + 1e-9)
 
 
-def test_a_search_whose_budget_is_spent_says_so_even_where_it_lies_in_one_place() -> None:
-    start = starting_points(PROBLEM, 1, 1)[0]
-    whole = search_from(PROBLEM, 0, start, "COBYLA", 2000)
-    assert whole.status == "xtol_reached"
-    budget = len(whole.log) - 1
-    latest = [PROBLEM.to_unit(evaluation.x) for evaluation in whole.log[budget - 16 : budget]]
-    assert np.ptp(latest, axis=0).max() <= 1e-6
-    run = search_from(PROBLEM, 0, start, "COBYLA", budget)
-    assert len(run.log) == budget
-    assert run.status == "maxeval_reached"
-
-
 def test_a_search_has_not_settled_while_its_objective_moves() -> None:
     """In a box a million times as wide as what matters in it."""
     wide = replace(PROBLEM, high=PROBLEM.high + np.array([0, 0, 0, 1e7, 0]))
@@ -124,12 +112,6 @@ def test_best_of_a_log() -> None:
     assert best_feasible(log[1:2]) is None
 
 
-def test_constraint_on_another_pair_is_met() -> None:
-    bounds = {"sensitivity": Bound(min=0.85), "csd_orange_red": Bound(min=100)}
-    best = best_of(replace(PROBLEM, constraints=PROBLEM.constraints | bounds), 4, 125)
-    assert csd_of(SETUP, FAMILY.curves(best.x[None]), ("orange", "red"))[0] >= 100 * (1 - FEASIBLE)
-
-
 @pytest.mark.parametrize(
     ("algorithm", "share"),
     [
@@ -149,13 +131,6 @@ def test_every_algorithm_finds_feasible_designs_within_its_budget(algorithm: str
     ]
     assert len(log) <= 400
     assert share * optimum <= best_feasible(log).objective <= optimum * (1 + 1e-6)
-
-
-@pytest.mark.parametrize("algorithm", ["ISRES", "COBYLA"])
-def test_direct_algorithms_repeat(algorithm: str) -> None:
-    u = starting_points(PROBLEM, 1, 5)[0]
-    logs = [[e.objective for e in search_from(PROBLEM, 3, u, algorithm, 60, seed=9).log] for _ in range(2)]
-    assert logs[0] == logs[1]
 
 
 def test_a_filter_without_light_does_not_end_the_search() -> None:
