@@ -22,7 +22,6 @@ from sweep.metrics.evaluate import evaluate
 from sweep.spectra.spectrum import WavelengthGrid
 from sweep.study import load_study
 
-from ..cases import thinned
 from ..conftest import STUDIES
 from ..hard.scenes import FAR, FINE, DesignScene, csd_columns, scene
 
@@ -63,7 +62,7 @@ def over_pupil(wave: float, knots: np.ndarray, values: np.ndarray, half: float, 
     return total
 
 
-@pytest.mark.parametrize(("f_number", "cra_deg"), thinned(_CONES))
+@pytest.mark.parametrize(("f_number", "cra_deg"), _CONES[::2])
 def test_the_mean_over_a_cone_is_that_over_the_pupil(f_number: float, cra_deg: float) -> None:
     grid = WavelengthGrid(start_nm=500, stop_nm=700, step_nm=10)
     made = scene("cone", "RYNCy", {"optics": {"f_number": f_number, "cra_deg": cra_deg}}, grid=grid, index=1.7)
@@ -77,7 +76,7 @@ def test_the_mean_over_a_cone_is_that_over_the_pupil(f_number: float, cra_deg: f
         assert seen[at] == pytest.approx(exact, abs=1e-9)
 
 
-@pytest.mark.parametrize(("f_number", "cra_deg"), _CONES)
+@pytest.mark.parametrize(("f_number", "cra_deg"), _CONES[1:4])
 def test_few_rays_stand_for_the_cone(f_number: float, cra_deg: float) -> None:
     """Moments of the squared sine, which a Gauss rule has exactly, against rays spread evenly over the pupil."""
     cone = cone_of(scene("cone", "RYNCy", {"optics": {"f_number": f_number, "cra_deg": cra_deg}}).setup.scene)
@@ -103,17 +102,10 @@ def with_rays(setup: Setup, count: int | None) -> Setup:
     return replace(setup, accuracy=setup.accuracy.model_copy(update={"rays": count}))
 
 
-GIVEN: dict[str, dict[str, Any]] = {
-    "patch": {"background_cd_m2": 200.0},
-    "target": {"target": FAR, "background_cd_m2": 200.0, "visibility_m": 900.0, "off_axis_deg": 20.0},
-}
-
-
-@pytest.mark.parametrize("given", GIVEN.values(), ids=GIVEN)
-@pytest.mark.parametrize("count", [1, 4, 16])
-def test_digital_numbers_are_means_over_rays(given: dict[str, Any], count: int) -> None:
+@pytest.mark.parametrize("count", [1, 4])
+def test_digital_numbers_are_means_over_rays(count: int) -> None:
     """Each ray's filter put in as a design that does not move: digital numbers are the weighted sum."""
-    made = moved(given)
+    made = moved({"target": FAR, "background_cd_m2": 200.0, "visibility_m": 900.0, "off_axis_deg": 20.0})
     setup = with_rays(made.setup, count)
     sine_squared, weights = gauss_rays(cone_of(setup.scene), count)
     base, wave = setup.camera.base_qe[0], setup.camera.grid.nodes_nm
@@ -154,15 +146,9 @@ def test_a_plain_curve_of_interference_moves_on_the_clear_one() -> None:
     np.testing.assert_allclose(seen, expected, rtol=1e-12)
 
 
-FIELDS: dict[str, dict[str, Any]] = {
-    "patch": {"background_cd_m2": 200.0, "off_axis_deg": 35.0},
-    "noisy target": {"target": FAR, "noise": True, "background_cd_m2": 200.0, "off_axis_deg": 35.0},
-}
-
-
-@pytest.mark.parametrize("given", FIELDS.values(), ids=FIELDS)
-def test_a_field_is_the_worst_of_its_places(given: dict[str, Any]) -> None:
+def test_a_field_is_the_worst_of_its_places() -> None:
     """Chief ray angle and field angle follow one image height, and the worst place counts in every column."""
+    given: dict[str, Any] = {"target": FAR, "noise": True, "background_cd_m2": 200.0, "off_axis_deg": 35.0}
     angles = [0.0, 8.0, 20.0]
     setup = moved(given, cra_deg=0.0).setup
     field = setup.scene.model_copy(update={"field": SensorField(cra_deg=tuple(angles))})

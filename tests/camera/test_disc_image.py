@@ -21,8 +21,6 @@ _IMAGE = 16 * 3e-7
 """Error of h(r): that of a cubic spline grows by 16 where its nodes are 12 per period of the finest detail, not 24."""
 _PIXEL_MEAN = 3e-7
 """Error of a pixel's mean, of a uniform field: over periods that are finer than a pixel the spline's error cancels."""
-_FUNCTIONS = 1e-10
-"""What the functions of the radius leave out, cut at that."""
 
 
 def window_around(places_px: list[tuple[float, float]], reach: int) -> Window:
@@ -39,9 +37,7 @@ def pixel_light(window: Window, profile: psf.DiscProfile | None, radius_px: floa
     return light_on_pixels(window, wanted, 0.5, radius_px, profile, pitch_um).by_pixel()
 
 
-@pytest.mark.parametrize(
-    ("f_number", "allowed"), [(1.4, _PIXEL_MEAN), (2.0, _PIXEL_MEAN), (8.0, _IMAGE), (32.0, _IMAGE), (64.0, _IMAGE)]
-)
+@pytest.mark.parametrize(("f_number", "allowed"), [(1.4, _PIXEL_MEAN), (8.0, _IMAGE), (64.0, _IMAGE)])
 @pytest.mark.parametrize("radius_um", [1.5, 6.2])
 def test_pixel_means_are_those_of_the_integral(radius_um: float, f_number: float, allowed: float) -> None:
     """Also in the middle of the light and at the table's end; slow lenses have no detail that is finer than a pixel."""
@@ -147,7 +143,7 @@ def test_an_image_that_is_too_much_is_named(
 
 
 def test_pixels_of_a_lattice_are_computed_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """All CFAs whose tiles are of one size ask for them; those of a few phases are computed when they are asked for."""
+    """All CFAs whose tiles are of one size ask for them."""
     calls, means = [], psf.DiscProfile.pixel_means
     monkeypatch.setattr(psf.DiscProfile, "pixel_means", lambda *of: calls.append(1) or means(*of))  # type: ignore[func-returns-value]
     lattice = window_around([(x / 16, y / 16) for x in range(16) for y in range(16)], 2)
@@ -156,6 +152,3 @@ def test_pixels_of_a_lattice_are_computed_once(monkeypatch: pytest.MonkeyPatch) 
     first, again = (light_on_pixels(lattice, wanted, 0.5, 1.0, profile, 2.1) for _ in range(2))
     np.testing.assert_array_equal(first.values, again.values)
     assert len(calls) == 1
-    for _ in range(2):
-        light_on_pixels(window_around([(0.25, 0.5)], 2), wanted[:1], 0.5, 1.0, profile, 2.1)
-    assert len(calls) == 3

@@ -24,7 +24,6 @@ from .problems import YELLOW_RED, best_of
 STUDY = load_study(STUDIES / "angle.yaml")
 assert STUDY.search is not None
 PLACES_DEG = (0.0, 10.0, 20.0)
-INDEX, F_NUMBER = 1.8, 1.6
 
 
 @cache
