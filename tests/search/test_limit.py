@@ -16,7 +16,6 @@ from sweep.designs.families.stopband import Stopband
 from sweep.designs.tolerance import NONE, Tolerance
 from sweep.metrics.bound import FEASIBLE, Bound
 from sweep.metrics.objective import Objective
-from sweep.metrics.smooth import smooth_response
 from sweep.report.summary import _limit_line
 from sweep.results.facts import SearchFacts
 from sweep.results.output import Output
@@ -24,7 +23,6 @@ from sweep.search.gradients import Model
 from sweep.search.limit import _relaxed, limit_of, reason_without_bound
 from sweep.search.problem import Problem, SearchRun, starting_points
 from sweep.search.trade_off import check_proof
-from sweep.spectra.lights import Lights
 from sweep.spectra.population import Population
 
 from ..cases import thinned
@@ -39,30 +37,6 @@ BASE = SETUP.camera.base_qe[0]
 def constrained(**bounds: Bound) -> Problem:
     """The search of `stopband` with other or more constraints."""
     return replace(PROBLEM, constraints={**PROBLEM.constraints, **bounds})
-
-
-def test_one_pair_of_signals_has_a_closed_form() -> None:
-    """Without a slope bound, light is given up where it helps most per photon: the fractional knapsack's greedy rule."""
-    lights = STUDY.lights
-    keep = [lights.members["yellow"][3], lights.members["red"][5]]
-    two = Lights("two", ("y", "r"), ("yellow", "red"), lights.photons[keep], lights.photon_ratio, "", True)
-    problem = replace(PROBLEM, setup=replace(SETUP, lights=two), constraints={"sensitivity": Bound(min=0.93)})
-    found = limit_of(problem)
-    response = smooth_response(problem.setup, BASE[None, None])[0, 0]
-    channel = problem.setup.camera.modified[0]
-    gain = response[:, channel] / (two.photons @ BASE)
-    per_qe = gain[0] * two.photons[0] - gain[1] * two.photons[1]
-    budget = 0.07 * BASE.sum()
-    taken = np.zeros_like(BASE)
-    for index in np.argsort(per_qe):
-        if per_qe[index] >= 0 or budget <= 0:
-            break
-        taken[index] = min(BASE[index], budget)
-        budget -= taken[index]
-    fixed = np.delete(response, channel, axis=1)
-    exact = np.hypot(np.linalg.norm(fixed[0] - fixed[1]), per_qe @ (BASE - taken))
-    assert found.attained == pytest.approx(exact, abs=2e-3)
-    assert found.proven >= exact - 1e-6
 
 
 @pytest.mark.parametrize("kind", ["free_form", "stopband"])
