@@ -147,9 +147,10 @@ def test_a_plain_curve_of_interference_moves_on_the_clear_one() -> None:
     np.testing.assert_allclose(seen, expected, rtol=1e-12)
 
 
-def test_a_field_is_the_worst_of_its_places() -> None:
+@pytest.mark.parametrize("noisy", [{}, {"target": FAR, "noise": True}], ids=["patch", "noisy target"])
+def test_a_field_is_the_worst_of_its_places(noisy: dict[str, Any]) -> None:
     """Chief ray angle and field angle follow one image height, and the worst place counts in every column."""
-    given: dict[str, Any] = {"target": FAR, "noise": True, "background_cd_m2": 200.0, "off_axis_deg": 35.0}
+    given: dict[str, Any] = noisy | {"background_cd_m2": 200.0, "off_axis_deg": 35.0}
     angles = [0.0, 8.0, 20.0]
     setup = moved(given, cra_deg=0.0).setup
     field = setup.scene.model_copy(update={"field": SensorField(cra_deg=tuple(angles))})
@@ -169,6 +170,9 @@ def test_a_field_is_the_worst_of_its_places() -> None:
         for name in names:
             worst = np.min([place[name] for place in each], axis=0)
             np.testing.assert_allclose(found[name], worst, atol=1e-9)
+    every = setup.scene.model_copy(update={"field": SensorField(cra_deg=tuple(angles), places="any")})
+    anywhere = evaluate(SceneModel(replace(setup, scene=every)), curves[:2])[names[0]]
+    assert (anywhere <= np.min([place[names[0]][:2] for place in each], axis=0) + 1e-9).all()
     assert any((np.argmin([place[name] for place in each], axis=0) == 2).any() for name in names)
 
 

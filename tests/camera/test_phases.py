@@ -158,10 +158,10 @@ def test_finer_steps_find_no_worse_an_extreme_of_a_smooth_function(finest_phase_
 
 def test_a_kink_is_found_as_exactly_as_a_smooth_extreme() -> None:
     """A function that rises by 3000 DN a pixel on all sides of its minimum."""
-    made = scene("any", "RGGB", {"target": FAR | {"phase_px": "any", "readout": "center"}, "noise": True})
+    made = scene("any", "quad", {"target": FAR | {"phase_px": "any", "readout": "center"}, "noise": True})
     setup = replace(made.setup, accuracy=STANDARD)
 
     def value(centers_px: np.ndarray) -> np.ndarray:
-        return 3000 * np.abs(np.mod(centers_px - [0.8337, 1.3713] + 1, 2) - 1).max(axis=1)[None]
+        return 3000 * np.abs(np.mod(centers_px - [0.8337, 1.3713] + 2, 4) - 2).max(axis=1)[None]
 
     assert refined(fine_lattice(setup), value) < 0.2

@@ -158,11 +158,8 @@ def test_nan_of_one_design_leaves_others_unchanged() -> None:
     assert np.isnan(found.error["a", "b"]).tolist() == [False, True, False]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(2))
-def test_where_exact_sums_are_too_many_the_noise_is_gaussian(tmp_path: Path, seed: int) -> None:
-    rng = np.random.default_rng([seed, 37])
-    pixel = {"bits": 12, "well_e": 2e6, "prnu": float(rng.uniform(0.04, 0.08)), "read_noise_e": 1e4}
+def test_where_exact_sums_are_too_many_the_noise_is_gaussian(tmp_path: Path) -> None:
+    pixel = {"bits": 12, "well_e": 2e6, "prnu": 0.05, "read_noise_e": 1e4}
     path = tmp_path / "deep.yaml"
     path.write_text(
         "study: deep\nseed: 1\nsensor: ar0820\nlights: tl16\ncfas: [RYYCy]\nrecognition: {states: [yellow, red]}\n"

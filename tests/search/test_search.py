@@ -93,6 +93,14 @@ def test_a_search_ends_where_its_algorithm_asks_for_no_number() -> None:
     assert len(run.log) == 1
 
 
+def test_a_solver_that_fails_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: object) -> None:
+        raise RuntimeError
+
+    monkeypatch.setattr("nlopt.opt.optimize", fails)
+    assert search_from(PROBLEM, 0, np.full(N_FREE, 0.5), "SLSQP", 10).status == "failed"
+
+
 def test_same_seed_gives_the_same_log() -> None:
     u = starting_points(PROBLEM, 3, 5)
     np.testing.assert_array_equal(u, starting_points(PROBLEM, 3, 5))

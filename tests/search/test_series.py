@@ -10,9 +10,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from sweep.camera.linear import linear_model
+from sweep.camera.model import SceneModel
 from sweep.camera.pixel import Pixel
 from sweep.camera.scene import Scene
 from sweep.metrics.objective import Objective
+from sweep.metrics.smooth import SmoothDesign
 from sweep.search.limit import limit_of, reason_without_bound
 from sweep.search.problem import Problem, starting_points
 from sweep.search.solver import smooth_objective
@@ -66,6 +69,17 @@ def test_derivatives_of_merged_noise_agree_with_differences(objective: Objective
         assert own[bent].min(initial=np.inf) > 2 * own.min()
         even = ~bent & (own < 1e4)
         np.testing.assert_allclose((by_u[:, k] / scale)[even], ((4 * near - wide) / 3 / scale)[even], atol=1e-4)
+
+
+def test_merged_noise_is_that_of_the_readout() -> None:
+    """Mean to 1/200 of the noise and variance to 0.3 %, or to rounding."""
+    problem = hdr_problem(CHROMATIC, [0.5, 16.0, 90.0, 5000.0], **OWN_QE)
+    x = problem.from_unit(np.array([0.41, 0.33, 0.57, 0.62]))
+    for setup, _ in problem.scenes:
+        mean, variance, *_ = SmoothDesign(linear_model(setup), problem.family, x, problem.free, np.ones(4)).noisy
+        read = SceneModel(setup).read_with_noise(problem.family.curves(x[None]))
+        assert (np.abs(mean - read.mean[0]) < 5e-3 * np.sqrt(read.variance[0] + 1 / 12)).all()
+        np.testing.assert_allclose(variance, read.variance[0], rtol=3e-3, atol=0.084)
 
 
 def test_a_search_over_intensities_is_for_the_worst() -> None:
