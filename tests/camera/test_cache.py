@@ -6,14 +6,10 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 
 import pytest
 
 from sweep.base.cache import Cache
-from sweep.designs.block import edges_of
-
-from ..blocks import SPACE
 
 N_THREADS = 8
 
@@ -76,15 +72,3 @@ def test_threads_make_a_value_once_and_always_get_one() -> None:
 
     at_once(work)
     assert len(cache) == 2
-
-
-def test_tables_of_grids_are_shared_by_threads() -> None:
-    spaces = [replace(SPACE, axes=((590.0 + at, 600.0), *SPACE.axes[1:])) for at in range(30)]
-
-    def work(number: int) -> None:
-        for turn in range(40):
-            space = spaces[(turn * (number + 1)) % len(spaces)]
-            edges = edges_of(space, 0, 3)
-            assert edges.space is space
-
-    at_once(work)

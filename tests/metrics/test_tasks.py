@@ -28,7 +28,6 @@ from sweep.metrics.tasks.color import (
     ChannelNoise,
     color_matrix,
     least_illuminance,
-    luminance_noise,
     metamerism_index,
     vora,
 )
@@ -236,18 +235,14 @@ def test_the_matrix_is_the_best_one_under_noise() -> None:
     assert expected(color_matrix(electrons[None], xyz, white, noise, 3.0)[0]) > least
 
 
-def test_luminance_snr_is_that_of_a_million_draws() -> None:
-    rng = np.random.default_rng(4)
+def test_the_least_illuminance_has_its_luminance_snr() -> None:
+    """Of four pixels: photons, and two electrons of read noise of each."""
     gray, noise = np.array([[0.6, 1.1, 0.4]]), ChannelNoise(np.array([0.25, 0.5, 0.25]), 2.0)
-    matrix = rng.uniform(-1, 2, (1, 3, 3))
+    matrix = np.random.default_rng(4).uniform(-1, 2, (1, 3, 3))
     lux = least_illuminance(matrix, gray, noise, 10.0)[0]
-    assert luminance_noise(matrix, gray * lux, noise)[0] == pytest.approx(10, rel=1e-12)
-    counts = 4 * noise.shares
-    drawn = np.zeros(1_000_000)
-    for at, count in enumerate(counts.astype(int)):  # each pixel by itself
-        own = rng.poisson(gray[0, at] * lux, (int(count), drawn.size)) + rng.normal(0, 2, (int(count), drawn.size))
-        drawn += matrix[0, at, 1] * own.mean(axis=0)
-    assert drawn.mean() / drawn.std() == pytest.approx(10, rel=0.01)
+    variance = (gray[0] * lux + 4) / [1, 2, 1]
+    row = matrix[0, :, 1]
+    assert row @ gray[0] * lux / np.sqrt(row**2 @ variance) == pytest.approx(10, rel=1e-12)
 
 
 def test_color_figures_are_those_of_their_chart() -> None:
