@@ -187,6 +187,13 @@ def test_codes_of_companding_add_their_steps() -> None:
         value = coded(drawn(light * electrons, linear, rng, 200_000), pixel)
         assert found.mean[0] == pytest.approx(value.mean(), abs=4 * value.std() / 200_000**0.5 + 0.02 * value.std())
         assert found.variance[0] == pytest.approx(value.var(), rel=0.05)
+    signals = light[:, None, None, None] * (electrons * np.array([1.0, 1.05]))[None, None, :, None]
+    members = {"one": np.array([0]), "other": np.array([1])}
+    without, with_codes = (
+        confusion.errors(signals, [np.array([0])], one, members, light[:, None]).error["one", "other"][0]
+        for one in (linear, pixel)
+    )
+    assert with_codes > 0.97 * without  # whose own bins cost up to 2 %
 
 
 def test_equal_captures_and_pixels_of_one_electron() -> None:
