@@ -196,13 +196,7 @@ def test_codes_of_companding_add_their_steps() -> None:
     assert with_codes > 0.97 * without  # whose own bins cost up to 2 %
 
 
-def test_equal_captures_and_pixels_of_one_electron() -> None:
-    twins = Pixel(captures=[{"read_noise_e": 2}, {"read_noise_e": 2}], merge="weighted")
-    alone = Pixel(captures=[{"read_noise_e": 2}])
-    e = np.array([[0.0, 1e-9, 1.0, 500.0, 1e12]])
-    both, one = (merged(e, np.ones((1, 1)), pixel) for pixel in (twins, alone))
-    np.testing.assert_allclose(both.mean[2:], one.mean[2:], rtol=1e-3)
-    assert (both.variance[:4] < one.variance[:4]).all()
+def test_pixels_of_one_electron() -> None:
     tiny = Pixel(captures=[{"well_e": 1.0, "bits": 1}, {"sensitivity": 0.5, "well_e": 1.0, "bits": 1}], threshold=1.0)
     found = merged(np.array([[1.0], [0.5]]), np.array([[1.0], [0.5]]), tiny)
     assert np.isfinite([found.mean, found.variance]).all()
@@ -213,8 +207,6 @@ def test_equal_captures_and_pixels_of_one_electron() -> None:
     [
         ({"captures": [{"sensitivity": 0.1}, {}]}, "captures.1 is more sensitive"),
         ({"captures": "split"}, "one of split_pixel, dual_gain, staggered"),
-        ({"captures": [{"exposure_ratio": 0.0}]}, "greater than or equal to"),
-        ({"captures": [{}] * 5}, "at most 4"),
         ({"captures": [{}], "companding": [[100.0, 50.0], [90.0, 60.0]]}, "knees must ascend"),
         ({"captures": [{}], "companding": [[100.0, 50.0]]}, "the last knee must be at 4095 DN or more"),
         ({"companding": [[5000.0, 50.0]]}, "companding needs captures"),
