@@ -96,7 +96,6 @@ def missed_dn(made: DesignScene, how: str) -> tuple[float, float]:
     return above, below
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("made", "how"), SCENES, ids=[made.name for made, _ in SCENES])
 def test_no_phase_of_a_fine_lattice_is_worse_or_better_than_the_refined_ones(made: DesignScene, how: str) -> None:
     above, below = missed_dn(made, how)
