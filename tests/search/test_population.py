@@ -30,11 +30,10 @@ def problem(**given: float) -> Problem:
     return replace(PROBLEM, setup=setup, objective=Objective(minimum={"worst_csd_yellow_red": 1.0}))
 
 
-@pytest.mark.slow
 def test_rows_over_the_population_have_their_derivative() -> None:
     shifted = replace(problem(binning_nm=1), tolerance=Tolerance(2.0, 0.003))
     model, checked = Model(shifted, SearchRun(0), 1000), 0
-    for u in starting_points(shifted, 4, 3):
+    for u in starting_points(shifted, 2, 3):
         here = model.at(u)
         assert np.sqrt(here.terms.values.min()) == pytest.approx(here.evaluation.objective, rel=1e-12)
         rows = np.argsort(here.terms.values)[:20]
@@ -46,7 +45,7 @@ def test_rows_over_the_population_have_their_derivative() -> None:
             ends = [model.at(u + sign * step).terms.values[rows] for sign in (1, -1)]
             np.testing.assert_allclose((ends[0] - ends[1]) / 2e-6, here.terms.by_u[rows, free], rtol=1e-3, atol=1e-2)
             checked += 1
-    assert checked >= 12
+    assert checked >= 6
 
 
 def test_a_point_that_is_no_number_has_as_many_rows_and_is_never_feasible() -> None:
