@@ -46,6 +46,25 @@ def test_a_bound_on_the_designed_sensitivity_does_not_hold_for_perturbed_filters
     assert reason_without_bound(replace(moved, objective=Objective(minimum={"csd_yellow_red": 1.0}))) is None
 
 
+def test_a_way_is_the_family_as_production_has_it() -> None:
+    """Of random stopbands: the curve where it is known, and sums over it between the ends that rows have."""
+    rng, family = np.random.default_rng(5), MOVED.family
+    points = MOVED.from_unit(starting_points(MOVED, 64, 1))
+    curves = family.curves(points)[:, 0]
+    apart = rng.normal(size=(7, BASE.size))
+    ways = perturbed_filters(MOVED)
+    assert all_ways(MOVED)
+    for way, shift in zip(ways, (0, -2, -1, 1, 2), strict=True):
+        came_out = family.perturbed(ProductionError(shift)).curves(points)[:, 0]
+        assert way.known.sum() >= 295
+        distances = way.distances(apart)
+        rows, added = distances.rows, distances.added
+        for curve, out in zip(curves, came_out, strict=True):
+            np.testing.assert_allclose(way.curve(curve)[way.known], out[way.known], rtol=1e-12, atol=1e-14)
+            assert (apart @ out <= rows @ curve + added[:, 0] + 1e-9).all()
+            assert (-(apart @ out) <= -(rows @ curve) + added[:, 1] + 1e-9).all()
+
+
 def test_nonlinear_constraints_are_left_out_and_reported() -> None:
     """Moves by part of a step, films that are too thick, a field of all places."""
     assert not all_ways(replace(MOVED, tolerance=Tolerance(1.5)))
