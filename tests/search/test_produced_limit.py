@@ -15,6 +15,7 @@ from sweep.metrics.objective import Objective
 from sweep.metrics.smooth import smooth_csd
 from sweep.search.limit import Limit, limit_of, reason_without_bound
 from sweep.search.perturbed import all_ways, perturbed_filters
+from sweep.search.problem import starting_points
 from sweep.study import load_study
 
 from ..conftest import STUDIES
