@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sweep.camera.angular import AngularResponse, Cone, cone_of, gauss_rays
+from sweep.camera.angular import AngularResponse, cone_of, gauss_rays
 from sweep.camera.linear import linear_model
 from sweep.camera.model import SceneModel
 from sweep.camera.plan import plan_scene
@@ -22,7 +22,6 @@ from sweep.metrics.evaluate import evaluate
 from sweep.spectra.spectrum import WavelengthGrid
 from sweep.study import load_study
 
-from ..cases import thinned
 from ..conftest import STUDIES
 from ..hard.scenes import FAR, FINE, DesignScene, csd_columns, scene
 
@@ -63,7 +62,7 @@ def over_pupil(wave: float, knots: np.ndarray, values: np.ndarray, half: float, 
     return total
 
 
-@pytest.mark.parametrize(("f_number", "cra_deg"), thinned(_CONES))
+@pytest.mark.parametrize(("f_number", "cra_deg"), _CONES[::2])
 def test_the_mean_over_a_cone_is_that_over_the_pupil(f_number: float, cra_deg: float) -> None:
     grid = WavelengthGrid(start_nm=500, stop_nm=700, step_nm=10)
     made = scene("cone", "RYNCy", {"optics": {"f_number": f_number, "cra_deg": cra_deg}}, grid=grid, index=1.7)
@@ -77,7 +76,7 @@ def test_the_mean_over_a_cone_is_that_over_the_pupil(f_number: float, cra_deg: f
         assert seen[at] == pytest.approx(exact, abs=1e-9)
 
 
-@pytest.mark.parametrize(("f_number", "cra_deg"), _CONES)
+@pytest.mark.parametrize(("f_number", "cra_deg"), _CONES[1:4])
 def test_few_rays_stand_for_the_cone(f_number: float, cra_deg: float) -> None:
     """Moments of the squared sine, which a Gauss rule has exactly, against rays spread evenly over the pupil."""
     cone = cone_of(scene("cone", "RYNCy", {"optics": {"f_number": f_number, "cra_deg": cra_deg}}).setup.scene)
@@ -94,12 +93,6 @@ def test_few_rays_stand_for_the_cone(f_number: float, cra_deg: float) -> None:
             assert float(weight @ at**power) == pytest.approx(exact, rel=1e-6)
 
 
-def test_a_ray_of_no_cone_is_the_chief_ray() -> None:
-    at, weight = gauss_rays(Cone(1e-9, 0.3), 4)
-    np.testing.assert_allclose(at, math.sin(0.3) ** 2, rtol=1e-8)
-    assert weight.sum() == pytest.approx(1.0)
-
-
 def moved(given: dict[str, Any], f_number: float = 1.6, cra_deg: float = 20.0) -> DesignScene:
     optics = {"optics": {"f_number": f_number, "cra_deg": cra_deg}}
     return scene("angle", "RYNCy", given | optics, {"dark_e_per_s": 50.0}, grid=FINE, index=1.8)
@@ -109,17 +102,10 @@ def with_rays(setup: Setup, count: int | None) -> Setup:
     return replace(setup, accuracy=setup.accuracy.model_copy(update={"rays": count}))
 
 
-GIVEN: dict[str, dict[str, Any]] = {
-    "patch": {"background_cd_m2": 200.0},
-    "target": {"target": FAR, "background_cd_m2": 200.0, "visibility_m": 900.0, "off_axis_deg": 20.0},
-}
-
-
-@pytest.mark.parametrize("given", GIVEN.values(), ids=GIVEN)
-@pytest.mark.parametrize("count", [1, 4, 16])
-def test_digital_numbers_are_means_over_rays(given: dict[str, Any], count: int) -> None:
+@pytest.mark.parametrize("count", [1, 4])
+def test_digital_numbers_are_means_over_rays(count: int) -> None:
     """Each ray's filter put in as a design that does not move: digital numbers are the weighted sum."""
-    made = moved(given)
+    made = moved({"target": FAR, "background_cd_m2": 200.0, "visibility_m": 900.0, "off_axis_deg": 20.0})
     setup = with_rays(made.setup, count)
     sine_squared, weights = gauss_rays(cone_of(setup.scene), count)
     base, wave = setup.camera.base_qe[0], setup.camera.grid.nodes_nm
@@ -129,32 +115,20 @@ def test_digital_numbers_are_means_over_rays(given: dict[str, Any], count: int) 
     np.testing.assert_allclose(linear_model(setup).smooth(made.curves)[0], expected, rtol=1e-13, atol=1e-9)
 
 
-@pytest.mark.parametrize("given", GIVEN.values(), ids=GIVEN)
-def test_derivatives_agree_with_the_angular_response(given: dict[str, Any]) -> None:
-    """The response is affine in N: its derivative, and the weights of each wavelength, give it again."""
-    made = moved(given | {"exposure": {"kind": "fixed", "exposure_s": 1e-3}})
-    model, channel = linear_model(made.setup), made.setup.camera.modified[0]
-    zero, own = model.smooth(np.zeros_like(made.curves))[0], model.smooth(made.curves)[0]
-    scale = np.abs(own).max()
-    by_curve = model.smooth_with_gradient(made.curves[0], made.curves)[1][0]
-    np.testing.assert_allclose(by_curve, own - zero, atol=1e-12 * scale)
-    by_wavelength = model.per_qe(0, made.curves[0])[:, :, channel] @ made.curves[0, 0]
-    np.testing.assert_allclose(by_wavelength, (own - zero)[..., channel], atol=1e-12 * scale)
-
-
 def test_only_interference_filters_move_with_the_angle() -> None:
     made = moved({})
     pigment = made.setup.with_camera(technologies=(Technology(),) * len(made.setup.camera.mosaic.channels))
     unsaid, reasons = made.setup.with_camera(technologies=()), []
     for setup in (pigment, unsaid):
-        for tolerance_dn in (1e-9, 10.0):
-            plan = plan_scene("", [replace(made.box, setup=setup)], tolerance_dn, setup.accuracy)
-            choices = {choice.effect: choice for choice in plan.choices}
-            assert (choices["angle"].computed, choices["angle"].bound_dn) == (False, 0.0)
-        for count in (1, 4, None):
-            found = SceneModel(with_rays(setup, count)).read(made.curves)[0]
-            np.testing.assert_array_equal(found, SceneModel(unsaid).read(made.curves)[0])
-        reasons.append(choices["angle"].reason)
+        (angle,) = (
+            choice
+            for choice in plan_scene("", [replace(made.box, setup=setup)], 1e-9, setup.accuracy).choices
+            if choice.effect == "angle"
+        )
+        assert (angle.computed, angle.bound_dn) == (False, 0.0)
+        reasons.append(angle.reason)
+        found = SceneModel(with_rays(setup, 4)).read(made.curves)[0]
+        np.testing.assert_array_equal(found, SceneModel(unsaid).read(made.curves)[0])
     assert reasons == ["pigments do not move with the angle", "no technology is stated: filters as on axis"]
 
 
@@ -173,15 +147,10 @@ def test_a_plain_curve_of_interference_moves_on_the_clear_one() -> None:
     np.testing.assert_allclose(seen, expected, rtol=1e-12)
 
 
-FIELDS: dict[str, dict[str, Any]] = {
-    "patch": {"background_cd_m2": 200.0, "off_axis_deg": 35.0},
-    "noisy target": {"target": FAR, "noise": True, "background_cd_m2": 200.0, "off_axis_deg": 35.0},
-}
-
-
-@pytest.mark.parametrize("given", FIELDS.values(), ids=FIELDS)
-def test_a_field_is_the_worst_of_its_places(given: dict[str, Any]) -> None:
+@pytest.mark.parametrize("noisy", [{}, {"target": FAR, "noise": True}], ids=["patch", "noisy target"])
+def test_a_field_is_the_worst_of_its_places(noisy: dict[str, Any]) -> None:
     """Chief ray angle and field angle follow one image height, and the worst place counts in every column."""
+    given: dict[str, Any] = noisy | {"background_cd_m2": 200.0, "off_axis_deg": 35.0}
     angles = [0.0, 8.0, 20.0]
     setup = moved(given, cra_deg=0.0).setup
     field = setup.scene.model_copy(update={"field": SensorField(cra_deg=tuple(angles))})
@@ -201,6 +170,9 @@ def test_a_field_is_the_worst_of_its_places(given: dict[str, Any]) -> None:
         for name in names:
             worst = np.min([place[name] for place in each], axis=0)
             np.testing.assert_allclose(found[name], worst, atol=1e-9)
+    every = setup.scene.model_copy(update={"field": SensorField(cra_deg=tuple(angles), places="any")})
+    anywhere = evaluate(SceneModel(replace(setup, scene=every)), curves[:2])[names[0]]
+    assert (anywhere <= np.min([place[names[0]][:2] for place in each], axis=0) + 1e-9).all()
     assert any((np.argmin([place[name] for place in each], axis=0) == 2).any() for name in names)
 
 

@@ -8,7 +8,6 @@ import pytest
 from sweep.camera.accuracy import Accuracy
 from sweep.camera.effects import EFFECTS, Box
 from sweep.camera.mosaic import Mosaic
-from sweep.camera.plan import plan_scene
 
 from ..hard.scenes import SENSOR, DesignScene, columns, scene, target
 
@@ -33,8 +32,9 @@ def saturated(place: list[float] | str, readout: str, level: float) -> DesignSce
     return made(1e-3 * 4095 * level / brightest)
 
 
-@pytest.mark.parametrize("place", [[1.0, 1.0], [1.5, 1.5], "any"], ids=["pixel", "corner", "any"])
-@pytest.mark.parametrize(("readout", "level"), [("mean", 3.0), ("mean", 10.0), ("center", 10.0)])
+@pytest.mark.parametrize(
+    ("place", "readout", "level"), [([1.0, 1.0], "mean", 3.0), ("any", "mean", 10.0), ([1.5, 1.5], "center", 10.0)]
+)
 def test_differences_that_cancel_between_pixels_count_where_pixels_clip(
     place: list[float] | str, readout: str, level: float
 ) -> None:
@@ -43,7 +43,5 @@ def test_differences_that_cancel_between_pixels_count_where_pixels_clip(
     bound_dn = EFFECTS["crosstalk"].bound_dn
     without_crosstalk = float(np.abs(columns(made, ROUNDING | {"crosstalk"}, EVERY_PIXEL) - with_all).max())
     assert without_crosstalk <= bound_dn(made.box, frozenset({"saturation"})) * (1 + 1e-9) + _ARITHMETIC_DN
-    # No closed form bounds the blur of a light, which is computed whatever the tolerance.
     assert EFFECTS["blur"].bound_dn is None
-    assert "blur" in plan_scene(made.name, [made.box], 1e6, EVERY_PIXEL).computed
     assert float(np.abs(columns(made, ROUNDING | {"blur"}, EVERY_PIXEL) - with_all).max()) > 0

@@ -6,16 +6,10 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from sweep.base.cache import Cache
-from sweep.camera.model import scene_model
-from sweep.designs.block import Tables, edges_of
-
-from ..blocks import SPACE, VIEWS
 
 N_THREADS = 8
 
@@ -78,46 +72,3 @@ def test_threads_make_a_value_once_and_always_get_one() -> None:
 
     at_once(work)
     assert len(cache) == 2
-
-
-def test_products_of_edges_are_shared_by_threads() -> None:
-    rng = np.random.default_rng(3)
-    tables = Tables(*(rng.random(shape) for shape in ((20,), (20,), (6, 20), (7, 20))))
-    nodes = np.arange(20)
-    weights = [rng.random((20, 2)) for _ in range(30)]  # more than are kept
-    alone = [Tables(tables.base, tables.change, tables.left, tables.right).product(w, nodes) for w in weights]
-
-    def work(number: int) -> None:
-        for turn in range(400):
-            at = (turn * (number + 1)) % len(weights)
-            found, expected = tables.product(weights[at], nodes), alone[at]
-            for name in ("base", "left", "right"):
-                np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
-
-    at_once(work)
-
-
-def test_tables_of_grids_are_shared_by_threads() -> None:
-    spaces = [replace(SPACE, axes=((590.0 + at, 600.0), *SPACE.axes[1:])) for at in range(30)]
-
-    def work(number: int) -> None:
-        for turn in range(40):
-            space = spaces[(turn * (number + 1)) % len(spaces)]
-            edges = edges_of(space, 0, 3)
-            assert edges.space is space
-
-    at_once(work)
-
-
-def test_imagers_are_shared_by_threads() -> None:
-    setup = VIEWS["chart"]
-    setups = [
-        setup.with_camera(pixel=setup.camera.pixel.model_copy(update={"read_noise_e": float(at)})) for at in range(20)
-    ]
-
-    def work(number: int) -> None:
-        for turn in range(20):
-            mine = setups[(turn * (number + 1)) % len(setups)]
-            assert scene_model(mine).setup.camera.pixel.read_noise_e == mine.camera.pixel.read_noise_e
-
-    at_once(work)

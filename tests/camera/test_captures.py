@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -36,10 +35,6 @@ def chart_setup(scene: Scene, pixel: Pixel) -> Setup:
     sensor, modified = BUILT_IN_SENSORS["ar0820"](grid), (mosaic.channels.index("N"),)
     qe = sensor.mosaic_qe(mosaic, {"N": "Y"})
     return Setup(Camera(grid, mosaic, qe, modified, sensor.qe["C"], pixel), BUILT_IN_LIGHTS["tl16"](grid), scene)
-
-
-def base_curves(setup: Setup) -> Array:
-    return setup.camera.base_qe[None]
 
 
 def relative_light(pixel: Pixel) -> Array:
@@ -104,7 +99,8 @@ def random_pixel(rng: np.random.Generator, **changes: Any) -> tuple[Pixel, Array
     return pixel, float(rng.choice([near, full * rng.uniform(0.01, 1.3), 10 ** rng.uniform(-1, 2)])) * light
 
 
-def agree_with_draws(seed: int) -> None:
+@pytest.mark.parametrize("seed", range(12))
+def test_mean_and_variance_are_those_of_draws(seed: int) -> None:
     rng = np.random.default_rng(seed)
     pixel, expected = random_pixel(rng)
     found = merged(expected[:, None], relative_light(pixel)[:, None], pixel)
@@ -114,17 +110,6 @@ def agree_with_draws(seed: int) -> None:
     rare = 5e-6 * (value.max() - value.min()) ** 2  # a few readouts of another capture, which a million may not show
     tolerance = 4 * spread.std() / DRAWS**0.5 + 1e-9 + rare
     assert found.variance[0] == pytest.approx(spread.mean(), rel=0.02, abs=tolerance)
-
-
-@pytest.mark.parametrize("seed", range(12))
-def test_mean_and_variance_are_those_of_draws(seed: int) -> None:
-    agree_with_draws(seed)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(12, 80))
-def test_mean_and_variance_are_those_of_draws_in_many_pixels(seed: int) -> None:
-    agree_with_draws(seed)
 
 
 def outcomes(expected: Array, pixel: Pixel) -> dict[float, float]:
@@ -151,58 +136,30 @@ def outcomes(expected: Array, pixel: Pixel) -> dict[float, float]:
 
 @pytest.mark.parametrize("seed", range(8))
 def test_errors_are_those_of_all_outcomes(seed: int) -> None:
+    """In every second pixel of gains that vary by 1 %, by a Gauss-Hermite sum."""
     rng = np.random.default_rng(seed)
     captures = [
         {"well_e": 300.0, "read_noise_e": 1.0, "bits": 9},
         {"well_e": 1_200.0, "read_noise_e": 3.0, "bits": 9},
         {"sensitivity": 0.1, "well_e": 900.0, "read_noise_e": 1.0, "bits": 9},
     ]
-    pixel = Pixel(captures=captures, offset_dn=20, threshold=0.9)
+    pixel = Pixel(captures=captures, offset_dn=20, threshold=0.9, prnu=0.01 * (seed % 2))
     light = relative_light(pixel)
     first = float(rng.choice([260.0, 275.0, 1_050.0, 1_100.0, 3_000.0, 40.0]))
     signals = np.array([first, first * rng.uniform(1.03, 1.3)])
     expected = light[:, None, None, None] * signals[None, None, :, None]
     members = {"one": np.array([0]), "other": np.array([1])}
     found = confusion.errors(expected, [np.array([0])], pixel, members, light[:, None])
-    one, other = (outcomes(light * e, pixel) for e in signals)
+    one: dict[float, float] = {}
+    other: dict[float, float] = {}
+    gains, shares = np.polynomial.hermite_e.hermegauss(20) if pixel.prnu else (np.zeros(1), np.ones(1))
+    for gain, share in zip(1 + pixel.prnu * gains, shares / shares.sum(), strict=True):
+        for all_values, e in zip((one, other), signals, strict=True):
+            for value, chance in outcomes(light * e * gain, pixel).items():
+                all_values[value] = all_values.get(value, 0.0) + share * chance
     error = sum(min(one.get(v, 0.0), other.get(v, 0.0)) for v in one | other) / 2
     assert sum(one.values()) == pytest.approx(1, abs=1e-9)
     assert found.error["one", "other"][0] == pytest.approx(error, rel=0.02)
-
-
-def test_the_error_is_that_of_draws_judged_by_all_outcomes() -> None:
-    """With PRNU, and two pixels in the channel: the share of draws that a Gaussian mixture of the draws themselves misreads."""
-    rng = np.random.default_rng(3)
-    pixel = Pixel(captures="dual_gain", offset_dn=64, prnu=0.01)
-    light, signals = relative_light(pixel), np.array([4_800.0, 4_890.0])
-    expected = light[:, None, None, None] * np.repeat(signals, 2).reshape(1, 1, 2, 2)
-    members = {"one": np.array([0]), "other": np.array([1])}
-    found = confusion.errors(expected, [np.array([0, 1])], pixel, members, np.ones((1, 2)))
-    values = [np.mean([drawn(light * e, pixel, rng, DRAWS) for _ in range(2)], axis=0) for e in signals]
-    edges = np.linspace(min(v.min() for v in values), max(v.max() for v in values), 120)
-    halves = [[np.histogram(part, edges)[0] for part in np.split(v, 2)] for v in values]
-    chosen = halves[0][0] >= halves[1][0]  # a rule from one half, judged on the other
-    wrong = (halves[0][1][~chosen].sum() + halves[1][1][chosen].sum()) / DRAWS
-    assert found.error["one", "other"][0] == pytest.approx(wrong, rel=0.02)
-
-
-@pytest.mark.parametrize("merge", ["saturated", "weighted"])
-@pytest.mark.parametrize("prnu", [0.0, 0.01])
-def test_a_single_capture_is_a_pixel_that_is_read_once(merge: Any, prnu: float) -> None:
-    scene = Scene(noise=True)
-    once = chart_setup(scene=scene, pixel=Pixel(read_noise_e=2, offset_dn=64, prnu=prnu))
-    pixel = Pixel(read_noise_e=2, offset_dn=64, prnu=prnu, captures=[{}], merge=merge)
-    hdr = once.with_camera(pixel=pixel)
-    curves = once.camera.base_qe[None]
-    plain, of_capture = (scene_model(setup).read_with_noise(curves) for setup in (once, hdr))
-    np.testing.assert_allclose(of_capture.mean, plain.mean, rtol=1e-9)
-    np.testing.assert_allclose(of_capture.variance, plain.variance, rtol=1e-6)
-    one, other = (evaluate(scene_model(setup), curves, ("yellow", "red")) for setup in (once, hdr))
-    for name in ("csd_yellow_red", "chromatic_csd_yellow_red", "dprime_yellow_red"):
-        np.testing.assert_allclose(other[name], one[name], rtol=1e-6)
-    without = (replace(setup, scene=Scene()) for setup in (once, hdr))
-    one, other = (evaluate(scene_model(setup), curves) for setup in without)
-    np.testing.assert_allclose(other["csd_yellow_red"], one["csd_yellow_red"], rtol=1e-12)
 
 
 def test_the_rule_of_saturation_is_that_of_isetcam() -> None:
@@ -219,40 +176,30 @@ def test_the_rule_of_saturation_is_that_of_isetcam() -> None:
 
 
 def test_codes_of_companding_add_their_steps() -> None:
-    """12 bits for a merged range of 20: mean and variance of draws, and an error that is no smaller."""
+    """12 bits for a merged range of 20."""
     rng = np.random.default_rng(5)
     linear = Pixel(captures="split_pixel", offset_dn=64, prnu=0.005)
     knees = [[1_024.0, 1_024.0], [32_768.0, 2_560.0], [700_000.0, 4_095.0]]
     pixel = Pixel.model_validate(linear.model_dump() | {"companding": knees})
     light = relative_light(pixel)
     for electrons in (30.0, 3_000.0, 15_000.0, 90_000.0):
-        expected = light * electrons
-        found = merged(expected[:, None], light[:, None], pixel)
-        value = coded(drawn(expected, linear, rng, 200_000), pixel)
+        found = merged(light[:, None] * electrons, light[:, None], pixel)
+        value = coded(drawn(light * electrons, linear, rng, 200_000), pixel)
         assert found.mean[0] == pytest.approx(value.mean(), abs=4 * value.std() / 200_000**0.5 + 0.02 * value.std())
         assert found.variance[0] == pytest.approx(value.var(), rel=0.05)
-        signals = light[:, None, None, None] * (electrons * np.array([1.0, 1.05]))[None, None, :, None]
-        members = {"one": np.array([0]), "other": np.array([1])}
-        errors = [
-            confusion.errors(signals, [np.array([0])], one, members, light[:, None]).error["one", "other"][0]
-            for one in (linear, pixel)
-        ]
-        assert errors[1] > 0.97 * errors[0]  # whose own bins cost up to 2 %
+    signals = light[:, None, None, None] * (electrons * np.array([1.0, 1.05]))[None, None, :, None]
+    members = {"one": np.array([0]), "other": np.array([1])}
+    without, with_codes = (
+        confusion.errors(signals, [np.array([0])], one, members, light[:, None]).error["one", "other"][0]
+        for one in (linear, pixel)
+    )
+    assert with_codes > 0.97 * without  # whose own bins cost up to 2 %
 
 
-def test_equal_captures_one_electron_and_other_hard_pixels() -> None:
-    twins = Pixel(captures=[{"read_noise_e": 2}, {"read_noise_e": 2}], merge="weighted")
-    alone = Pixel(captures=[{"read_noise_e": 2}])
-    e = np.array([[0.0, 1e-9, 1.0, 500.0, 1e12]])
-    both, one = (merged(e, np.ones((1, 1)), pixel) for pixel in (twins, alone))
-    np.testing.assert_allclose(both.mean[2:], one.mean[2:], rtol=1e-3)
-    assert (both.variance[:4] < one.variance[:4]).all()
-    assert (both.variance >= 0).all()
+def test_pixels_of_one_electron() -> None:
     tiny = Pixel(captures=[{"well_e": 1.0, "bits": 1}, {"sensitivity": 0.5, "well_e": 1.0, "bits": 1}], threshold=1.0)
     found = merged(np.array([[1.0], [0.5]]), np.array([[1.0], [0.5]]), tiny)
     assert np.isfinite([found.mean, found.variance]).all()
-    equal = Pixel(captures=[{}, {"sensitivity": 0.5}, {"sensitivity": 0.5, "start_ratio": 1.0}])
-    assert len(equal.exposures) == 3
 
 
 @pytest.mark.parametrize(
@@ -260,8 +207,6 @@ def test_equal_captures_one_electron_and_other_hard_pixels() -> None:
     [
         ({"captures": [{"sensitivity": 0.1}, {}]}, "captures.1 is more sensitive"),
         ({"captures": "split"}, "one of split_pixel, dual_gain, staggered"),
-        ({"captures": [{"exposure_ratio": 0.0}]}, "greater than or equal to"),
-        ({"captures": [{}] * 5}, "at most 4"),
         ({"captures": [{}], "companding": [[100.0, 50.0], [90.0, 60.0]]}, "knees must ascend"),
         ({"captures": [{}], "companding": [[100.0, 50.0]]}, "the last knee must be at 4095 DN or more"),
         ({"companding": [[5000.0, 50.0]]}, "companding needs captures"),
@@ -291,14 +236,12 @@ def test_qe_and_crosstalk_of_a_photodiode_change_its_electrons() -> None:
     np.testing.assert_allclose(electrons[0], scene_model(setup).pixel_electrons(curves), rtol=1e-12)
 
 
-@pytest.mark.parametrize("duty", [0.05, 0.3, 0.9])
+@pytest.mark.parametrize("duty", [0.05, 0.9])
 def test_light_in_windows_is_that_of_all_phases(duty: float) -> None:
     """100,000 phases by a lamp that is on or off at each of 400,000 instants of a period; the extremes are at the corners."""
     drive = PwmDrive(duty=duty, frequency_hz=90.0)
     phases = (np.arange(100_000) + 0.5) / 100_000
-    for start, length in ((0.0, 0.99), (0.7, 0.06), (1.3, 2.4), (0.0, 1.0)):
-        light = light_in(drive, phases + start, np.array(length))
-        assert light.mean() == pytest.approx(1, abs=1e-9)
+    for start, length in ((0.0, 0.99), (1.3, 2.4)):
         instants = (np.arange(400_000) + 0.5) / 400_000 * length
         for phase in phases[::20_011]:
             on = np.mod(phase + start + instants, 1.0) < duty

@@ -117,16 +117,6 @@ def test_digital_numbers_are_the_same(cfa: str, channels: list[int], mode: str) 
     )
 
 
-def test_irradiance_agrees_to_single_precision() -> None:
-    ref = reference()
-    optics = Optics(f_number=float(ref["constants"]["f_number"]))
-    light = np.array(ref["photon_radiance"])
-    skipped = light * irradiance_factor(optics, magnification=ref["skip_magnification"])
-    np.testing.assert_allclose(skipped, np.array(ref["skip_oi_irradiance_photons"]), rtol=1e-6)
-    factor = irradiance_factor(optics, magnification=ref["constants"]["magnification"])
-    assert factor == pytest.approx(ref["constants"]["irradiance_factor"], rel=1e-12)
-
-
 def kept_at_the_center(f_number: float) -> np.ndarray:
     """Light that the blur leaves at the center of ISETCam's field, per wavelength, by our transfer function.
 

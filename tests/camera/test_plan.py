@@ -60,17 +60,8 @@ def test_a_plan_leaves_out_what_is_inactive_and_the_smallest_bounds_up_to_half_t
             assert bound is None or needed or bound + sum(v for v in out if v <= bound) + before > tolerance_dn / 2
 
 
-@pytest.mark.parametrize("made", HARD + ALONE, ids=lambda made: made.name)
-def test_saturation_is_computed_where_noise_or_rounding_is_unless_it_is_inactive(made: DesignScene) -> None:
-    for tolerance_dn in TOLERANCES_DN:
-        plan = planned(made, tolerance_dn)
-        if {"noise", "quantization"} & {*plan.computed} and "saturation" in plan.left_out:
-            assert "saturation" in inactive_effects(made.box)
-
-
-@pytest.mark.parametrize("made", [made for made in HARD + ALONE if made.setup.scene.noise], ids=lambda m: m.name)
-def test_errors_under_noise_need_all_of_the_readout(made: DesignScene) -> None:
-    assert {*planned(made, 1e6, for_noise=True).computed} >= READOUT
+def test_errors_under_noise_need_all_of_the_readout() -> None:
+    assert {*planned(ALL_ON, 1e6, for_noise=True).computed} >= READOUT
 
 
 @pytest.mark.parametrize("made", HARD + ALONE, ids=lambda made: made.name)
@@ -99,16 +90,11 @@ def test_in_a_random_scene_no_csd_changes_by_more_than_the_bound(seed: int) -> N
     random_scene_within_its_bound(seed)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("first", range(1000, 1300, 50))
-def test_in_many_random_scenes_no_csd_changes_by_more_than_the_bound(first: int) -> None:
-    for seed in range(first, first + 50):
-        random_scene_within_its_bound(seed)
-
-
 @pytest.mark.parametrize("made", HARD + ALONE, ids=lambda made: made.name)
-def test_an_effect_alone_changes_no_csd_by_more_than_its_bound(made: DesignScene) -> None:
+def test_an_effect_alone_changes_no_csd_by_more_than_its_bound_and_inactive_ones_none(made: DesignScene) -> None:
     inactive = inactive_effects(made.box)
+    difference = np.abs(columns(made, frozenset(inactive), LATTICE) - columns(made, accuracy=LATTICE)).max()
+    assert difference <= _ARITHMETIC_DN
     for name, effect in EFFECTS.items():
         if effect.bound_dn is None or name in inactive:
             continue
@@ -117,13 +103,6 @@ def test_an_effect_alone_changes_no_csd_by_more_than_its_bound(made: DesignScene
         bound_dn = effect.bound_dn(made.box, READOUT - inactive - others)
         exact, found = columns(made, others, LATTICE), columns(made, others | {name}, LATTICE)
         assert np.abs(found - exact).max() <= bound_dn * (1 + 1e-9) + _ARITHMETIC_DN, name
-
-
-@pytest.mark.parametrize("made", HARD + ALONE, ids=lambda made: made.name)
-def test_an_inactive_effect_changes_nothing(made: DesignScene) -> None:
-    left_out = frozenset(inactive_effects(made.box))
-    difference = np.abs(columns(made, left_out, LATTICE) - columns(made, accuracy=LATTICE)).max()
-    assert difference <= _ARITHMETIC_DN
 
 
 LIT = {"intensity_cd": 200, "exposure": {"kind": "fixed", "exposure_s": 3e-3}}

@@ -52,14 +52,6 @@ def test_no_tail_is_longer(seed: int) -> None:
         assert mean <= tails.mean_above(level, electrons, pixel, read_noise_e) * (1 + 1e-9)
 
 
-def test_far_above_there_is_next_to_nothing() -> None:
-    pixel = Pixel(prnu=0.01)
-    assert tails.share_above(10_000.0, 8000.0, pixel, 2.0) < 1e-30 + tails.share_above(10_000.0, 8500.0, pixel, 2.0)
-    assert 0 < tails.share_above(10_000.0, 8000.0, pixel, 2.0) < 1e-20
-    assert tails.mean_above(10_000.0, 8000.0, pixel, 2.0) < 1e-18
-    assert tails.share_above(10_000.0, 20_000.0, pixel, 2.0) == 1.0
-
-
 @pytest.mark.parametrize("seed", thinned(range(60), 12))
 def test_rounding_and_clipping_shift_no_mean_by_more(seed: int) -> None:
     """Over the numbers of electrons up to the brightest; small ranges of the ADC, so that its ends are near."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import product
+from itertools import product, starmap
 
 import mpmath as mp
 import numpy as np
@@ -70,20 +70,19 @@ def random_designs(seed: int, n: int, signals: int = 7, spread: float = 60.0) ->
 FIRST, SECOND = np.arange(3), np.arange(3, 7)
 
 
+def of_pairs(seed: int, metric, spread: float = 60.0):
+    """What a metric gives for each of 20 designs, and the points of every pair."""
+    mean, variance = random_designs(seed, 20, spread=spread)
+    for m, v, found in zip(mean, variance, metric(mean, variance, FIRST, SECOND), strict=True):
+        signals = points(m, v)
+        yield found, [(signals[i], signals[j]) for i, j in product(FIRST, SECOND)]
+
+
 @hard_case("contrast to noise of generic diagonal covariances")
 def generic_cnr() -> Result:
     """The formula for the nearest of 12 pairs, 50 digits. Allowed: distance 3 eps, direction 4, floor 5: 12 eps."""
-    results = []
-    for mean, variance, found in with_found(contrast_to_noise, *random_designs(1, 20)):
-        signals = points(mean, variance)
-        nearest = min(product(FIRST, SECOND), key=lambda pair: distance(signals[pair[0]], signals[pair[1]]))
-        results.append((relative(found, exact_cnr(*(signals[i] for i in nearest))), 12 * EPS))
-    return worst(results)
-
-
-def with_found(metric, mean, variance):
-    """Each design with what the metric gives for it."""
-    return zip(mean, variance, metric(mean, variance, FIRST, SECOND), strict=True)
+    pairs = of_pairs(1, contrast_to_noise)
+    return worst((relative(f, exact_cnr(*min(p, key=lambda pair: distance(*pair)))), 12 * EPS) for f, p in pairs)
 
 
 @hard_case("d' of generic diagonal covariances")
@@ -91,12 +90,7 @@ def generic_d_prime() -> Result:
     """The smallest of 12 pairs, 50 digits. Allowed: difference, sum, half, root and ratio half an eps each, two hypot:
     8 eps.
     """
-    results = []
-    for mean, variance, found in with_found(detectability, *random_designs(2, 20)):
-        signals = points(mean, variance)
-        exact = min(exact_d_prime(signals[i], signals[j]) for i, j in product(FIRST, SECOND))
-        results.append((relative(found, exact), 8 * EPS))
-    return worst(results)
+    return worst((relative(f, min(starmap(exact_d_prime, p))), 8 * EPS) for f, p in of_pairs(2, detectability))
 
 
 @hard_case("error of a pair for generic diagonal covariances")
@@ -104,12 +98,8 @@ def generic_error() -> Result:
     """The largest of 12 pairs, erfc in 50 digits. Allowed: 16 eps of its argument x; condition of the tail at most 1 +
     x^2; the tail itself 1e-13.
     """
-    results = []
-    for mean, variance, found in with_found(pairwise_error, *random_designs(3, 20, spread=400.0)):
-        signals = points(mean, variance)
-        exact = max(exact_error(signals[i], signals[j]) for i, j in product(FIRST, SECOND))
-        results.append((relative(found, exact), 16 * EPS * (1 - 2 * float(mp.log(exact))) + TAIL))
-    return worst(results)
+    exact = [(f, max(starmap(exact_error, p))) for f, p in of_pairs(3, pairwise_error, 400.0)]
+    return worst((relative(f, e), 16 * EPS * (1 - 2 * float(mp.log(e))) + TAIL) for f, e in exact)
 
 
 @hard_case("errors of 1e-300")

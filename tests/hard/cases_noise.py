@@ -105,11 +105,6 @@ def moments_result(cases: list[tuple[Pixel, float]]) -> Result:
     return worst(results)
 
 
-WHY = (
-    "a rounding for each count within 10 deviations, of at most 10 deviations, and of the value; squares for variances"
-)
-
-
 @hard_case("electrons of 1e-3")
 def few_electrons() -> Result:
     """Sum over counts and steps, 25 digits. Allowed: a rounding for each count within 10 deviations, of at most 10

@@ -49,9 +49,6 @@ def share_result(cases: list[tuple[float, float, float, float]]) -> Result:
     return worst(results)
 
 
-AREAS = "four areas of at most the disc's quarter, 16 roundings each (well-conditioned in the place of the edges), over the square"
-
-
 @hard_case("discs smaller than a pixel")
 def small_discs() -> Result:
     """Integral of the common height, 50 digits. Allowed: four areas of at most the disc's quarter, 16 roundings each
@@ -121,7 +118,6 @@ def kink_bound(radius_um: float, reach_um: float, shortest_um: float, wavelength
 NUMBERS = (0.5, 1.0, 2.0, 4.0, 16.0, 100.0, 1000.0)
 ROUNDINGS = 2e3 * EPS
 """Of a sum of up to 4000 terms that alternate and are of the order of 1 together, added pairwise."""
-ENDS = "the panel in which the transfer function ends, a root of power 3/2: the rule's own error for it; 2000 eps of rounding"
 
 
 @hard_case("encircled energy at the center, f/0.5 to f/1000")

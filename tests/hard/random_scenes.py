@@ -35,7 +35,6 @@ _DESIGNS = 4
 _SHIFT_NM = 3.0
 _ANY_PLACE_PX = 6.0
 """Larger lights at any place take too long."""
-_WITH_N = ("RYNCy", "3x3", "1x3")
 _MOVED_EVERY = 3
 """In scenes of some seeds filters move with the angle of the light."""
 _FIELD_EVERY, _EVERYWHERE_EVERY = 6, 30
@@ -58,24 +57,9 @@ class RandomScene:
     box: Box
     tolerance_dn: float
 
-    @property
-    def moves(self) -> bool:
-        """Whether any filter moves with the angle of the light."""
-        return bool(self.setup.camera.moving)
 
-    @property
-    def everywhere(self) -> bool:
-        """Whether all places of the sensor count."""
-        return self.setup.all_heights
-
-    @property
-    def anywhere(self) -> bool:
-        """Whether any place of the light is asked for."""
-        return self.setup.all_phases
-
-
-def random_scene(seed: int, *, moved: bool = False) -> RandomScene:
-    """The scene of a seed, always the same; `moved`: with a CFA and a technology by which filters move."""
+def random_scene(seed: int) -> RandomScene:
+    """The scene of a seed, always the same."""
     rng = np.random.default_rng([seed, 17])
     given = _scenario(rng, may_be_anywhere=seed % _ANY_PLACE_EVERY == 0)
     cra_deg = float(np.random.default_rng([seed, 19]).uniform(0, 35))
@@ -85,7 +69,6 @@ def random_scene(seed: int, *, moved: bool = False) -> RandomScene:
         given["optics"]["cra_deg"] = cra_deg
     pixel = _pixel(rng, noisy=given["noise"] is not False)
     cfa = str(rng.choice([*TILES, "two"]))
-    cfa = _WITH_N[seed % len(_WITH_N)] if moved and cfa not in _WITH_N else cfa
     mosaic = _TWO if cfa == "two" else TILES[cfa]
     modified = tuple(mosaic.channels.index(name) for name in ("N", "M") if name in mosaic.channels)
     scenario = Scene.model_validate(given)
@@ -96,7 +79,7 @@ def random_scene(seed: int, *, moved: bool = False) -> RandomScene:
         modified=modified,
         clear_qe=SENSOR.qe["C"],
         pixel=Pixel(**pixel) if scenario.noise is None else scenario.noise.of(Pixel(**pixel)),
-        technologies=_technologies(seed, mosaic, moved=moved),
+        technologies=_technologies(seed, mosaic),
     )
     setup = Setup(camera, lights(), scenario)
     low, high = setup.camera.qe.copy(), setup.camera.qe.copy()
@@ -108,9 +91,9 @@ def random_scene(seed: int, *, moved: bool = False) -> RandomScene:
     return RandomScene(f"random {seed}", setup, curves, Box(setup, low, high), tolerance)
 
 
-def _technologies(seed: int, mosaic: Mosaic, *, moved: bool) -> tuple[Technology, ...]:
+def _technologies(seed: int, mosaic: Mosaic) -> tuple[Technology, ...]:
     """In a third of the scenes the modified channels move with the angle of the light, where they do not exceed it."""
-    if (seed % _MOVED_EVERY and not moved) or "M" in mosaic.channels:
+    if seed % _MOVED_EVERY or "M" in mosaic.channels:
         return ()
     return moving(mosaic, float(np.random.default_rng([seed, 20]).uniform(1.4, 2.2)))
 

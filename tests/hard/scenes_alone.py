@@ -60,20 +60,11 @@ ALONE: tuple[DesignScene, ...] = (
     ),
     noisy("any place", "RYNCy", {"target": TINY, "optics": F2}),
     noisy("any place, center", "RGGB", {"target": TINY | {"readout": "center"}, "optics": F2}),
-    noisy("any place, RCCC", "RCCC", {"target": TINY, "optics": F4}),
     noisy("any place, 1x3 tile", "1x3", {"target": TINY, "optics": F4}),
     noisy("flicker, saturated", "RYNCy", pulsed(127, 0.0051, 0.25, 165)),
-    noisy("flicker, saturated, RGGB", "RGGB", pulsed(114, 0.0092, 0.07, 154)),
-    noisy("flicker, saturated, 1x3 tile", "1x3", pulsed(422, 0.0048, 0.32, 148)),
     *(
         noisy(name, cfa, center(FAR, x, y) | lit(800, 0.05) | {"optics": {"f_number": 40.0}}, grid=FINE)
         for name, cfa, x, y in (("f/40, center", "RCCC", 0.5, 0.5), ("f/40, center of a 3x3 tile", "3x3", 1.4, 0.6))
-    ),
-    noisy(
-        "f/64",
-        "RYNCy",
-        {"target": FAR | {"phase_px": [0.5, 0.5]}} | lit(800, 0.1) | {"optics": {"f_number": 64.0}},
-        grid=FINE,
     ),
     *(
         noisy(name, cfa, given | {"optics": {"f_number": f, "cra_deg": cra}}, grid=grid, wide=wide, index=index)

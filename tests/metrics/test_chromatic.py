@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from sweep.camera.linear import linear_model
-from sweep.camera.model import SceneModel
 from sweep.camera.setup import Setup
 from sweep.metrics.bound import FEASIBLE
 from sweep.metrics.chromatic import (
@@ -18,7 +16,6 @@ from sweep.metrics.chromatic import (
     chromatic_separations,
     squared_distance,
 )
-from sweep.metrics.evaluate import evaluate
 from sweep.metrics.smooth import SmoothDesign
 from sweep.search.limit import limit_of
 from sweep.search.problem import best_feasible, starting_points
@@ -56,14 +53,8 @@ def test_distance_equals_brute_force_over_brightness(channels: int) -> None:
     second[:3000] = first[:3000] * rng.uniform(0.2, 5, (3000, 1)) + rng.normal(0, 20, (3000, channels))
     expected = np.minimum(least_over_brightness(first, second), least_over_brightness(second, first))
     np.testing.assert_allclose(np.sqrt(squared_distance(first, second)), expected, rtol=1e-9, atol=1e-6)
-
-
-def test_compiled_distances_equal_those_of_numpy() -> None:
-    response = np.random.default_rng(5).uniform(0, 4000, (100, 9, 3))
-    response[3, :4] = 0.0
-    members = {"a": np.arange(3), "b": np.arange(3, 7), "c": np.arange(7, 9)}
-    for (a, b), distances in chromatic_separations(response, members).items():
-        np.testing.assert_allclose(distances, chromatic_separation(response, members[a], members[b]), rtol=1e-12)
+    compiled = chromatic_separations(np.stack([first, second], axis=1), {"a": np.array([0]), "b": np.array([1])})
+    np.testing.assert_allclose(compiled["a", "b"], expected, rtol=1e-9, atol=1e-6)
 
 
 def test_an_unknown_response_has_an_unknown_distance() -> None:
@@ -71,17 +62,6 @@ def test_an_unknown_response_has_an_unknown_distance() -> None:
     distances = chromatic_separation(response, np.array([0]), np.array([1]))
     assert np.isnan(distances[0])
     assert distances[1] == 0.0
-
-
-def test_background_and_brightness_do_not_count() -> None:
-    """A lamp of another intensity before another background changes no distance but by the dimmer one of both."""
-    keys = {"exposure": {"kind": "fixed", "exposure_s": 1e-4}, "photon_radiance": 1e17}
-    curves = FAMILY.curves(np.array([[612.0, 6.0, 651.0, 6.0, 1.0]]))
-    dark, bright = (scene("chart", "RYNCy", keys | {"background_cd_m2": cd}).setup for cd in (0.0, 300.0))
-    distances = [smooth_chromatic(setup, curves, PAIR)[0] for setup in (dark, bright)]
-    assert distances[0] == pytest.approx(distances[1], rel=1e-9)
-    doubled = replace(dark, scene=dark.scene.model_copy(update={"photon_radiance": 2e17}))
-    assert smooth_chromatic(doubled, curves, PAIR)[0] == pytest.approx(2 * distances[0], rel=1e-12)
 
 
 def test_derivative_equals_that_of_the_rejection_by_complex_step() -> None:
@@ -107,17 +87,6 @@ def test_derivative_equals_that_of_the_rejection_by_complex_step() -> None:
         np.testing.assert_allclose(rows.values, expected.real, rtol=1e-9)
         slope = expected.imag / 1e-30
         np.testing.assert_allclose(rows.by_u[:, at], slope, rtol=1e-7, atol=1e-9 * np.abs(slope).max())
-
-
-def test_values_of_the_shipped_cfas() -> None:
-    """RGGB 138.1, RCCC 28.0, RCCB 28.0, RYYCy 30.9, RYN4Cy 121.8 DN on the chart, computed from its tables."""
-    study = load_study(STUDIES / "stopband.yaml")
-    for name, expected in {"RGGB": 138.1, "RCCC": 28.0, "RCCB": 28.0, "RYYCy": 30.9, "RYN4Cy": 121.8}.items():
-        (space,) = [space for space in study.spaces if space.name == name]
-        setup = study.setup(space, "chart")
-        columns = evaluate(SceneModel(setup), space.curves(space.points(0, 1), study.grid.size))
-        assert columns["chromatic_csd_yellow_red"][0] == pytest.approx(expected, abs=0.1)
-        assert columns["chromatic_csd_yellow_red"][0] <= columns["csd_yellow_red"][0] + 1.0
 
 
 def test_no_filter_exceeds_the_upper_bound() -> None:
@@ -155,28 +124,18 @@ def test_no_answer_exceeds_the_upper_bound_beside_a_worst_case() -> None:
     assert proven[1] < proven[0] - 0.5
 
 
-@pytest.mark.parametrize(
-    ("keys", "expected", "warned"),
-    [
-        ({}, "csd_yellow_red", False),
-        ({"intensity_cd": 200, "exposure": {"kind": "fixed", "exposure_s": 1e-4}}, "chromatic_csd_yellow_red", False),
-    ],
-)
-def test_lamps_of_different_photons_are_judged_without_brightness(
-    tmp_path: Path, keys: dict[str, object], expected: str, warned: bool
-) -> None:
+def test_lamps_of_different_photons_are_judged_without_brightness(tmp_path: Path) -> None:
     text = "study: a\nsensor: ar0820\nlights: tl16\ncfas: [RGGB]\n"
     (tmp_path / "a.yaml").write_text(text)
-    changes = {"scenarios": {"a": keys}}
+    assert load_study(tmp_path / "a.yaml").objective.column == "csd_yellow_red"
+    keys = {"intensity_cd": 200, "exposure": {"kind": "fixed", "exposure_s": 1e-4}}
+    changes: dict[str, object] = {"scenarios": {"a": keys}}
     study = load_study(tmp_path / "a.yaml", changes=changes)
-    assert study.objective.column == expected
-    assert bool(study.warnings) == warned
-    asked = load_study(tmp_path / "a.yaml", changes=changes | {"objective": "csd_yellow_red"})
-    assert bool(asked.warnings) == bool(keys)
+    assert (study.objective.column, study.warnings) == ("chromatic_csd_yellow_red", ())
+    assert load_study(tmp_path / "a.yaml", changes=changes | {"objective": "csd_yellow_red"}).warnings
 
 
 def test_distances_along_one_channel_are_those_of_the_best_brightness() -> None:
-    """Of every pair the nearest point of either ray, by its projection, in any number of channels."""
     rng = np.random.default_rng(7)
     members = {"a": np.array([4, 0]), "b": np.array([1, 5, 2]), "c": np.array([3])}
     for channels in (1, 2, 4, 5):
@@ -189,11 +148,8 @@ def test_distances_along_one_channel_are_those_of_the_best_brightness() -> None:
         response[..., 0] = values
         lit = response - unlit[:, None]
         for a, b in pairs:
-            first, second = lit[:, members[a], None], lit[:, None, members[b]]
-            dot, rays = (first * second).sum(axis=-1), []
-            for point, ray in ((first, second), (second, first)):
-                share = np.maximum(dot / (ray**2).sum(axis=-1), 0.0)
-                rays.append(np.linalg.norm(point - share[..., None] * ray, axis=-1))
-            np.testing.assert_allclose(found[a, b], np.min(rays, axis=(0, 2, 3)), rtol=1e-9, atol=1e-9)
+            both = [(lit[:, i], lit[:, j]) for i in members[a] for j in members[b]]
+            rays = [least_over_brightness(*order) for one, other in both for order in ((one, other), (other, one))]
+            np.testing.assert_allclose(found[a, b], np.min(rays, axis=0), rtol=1e-6, atol=1e-6)
         np.testing.assert_allclose(most_dn, response.max(axis=(1, 2)))
         np.testing.assert_allclose(np.maximum(least_dn, 0), np.maximum(lit.max(axis=2).min(axis=1), 0), atol=1e-9)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import pairwise, product
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,6 @@ from sweep.metrics.evaluate import evaluate
 from sweep.study import load_study
 
 from .. import readout_oracle
-from ..cases import thinned
 from ..hard.scenes import DARK, F2, FAR, scene
 
 ONE, OTHER = np.array([0]), np.array([1])
@@ -105,55 +104,7 @@ def test_errors_of_a_few_pixels_are_exact(seed: int) -> None:
     check(seed)
 
 
-@pytest.mark.slow
-def test_errors_of_many_pixels_and_pairs_are_exact() -> None:
-    for seed in range(1000, 1300):
-        check(seed)
-
-
-COARSE = """
-study: coarse
-seed: 1
-sensor: ar0820
-lights: tl16
-pixel: {{bits: {bits}, well_e: {well}, read_noise_e: 2}}
-scenarios: {{dim: {{noise: true, exposure: {{kind: white_patch, level: {level}}}}}}}
-cfas: [RGGB]
-recognition: {{states: [green, yellow, red]}}
-"""
-
-
-@pytest.mark.parametrize(
-    ("bits", "well", "level"),
-    [
-        (8, 10_000.0, 0.20),
-        *(pytest.param(*own, marks=pytest.mark.slow) for own in ((8, 10_000.0, 0.10), (10, 1e5, 0.05), (8, 1e5, 0.03))),
-    ],
-)
-def test_error_of_coarse_digital_numbers_is_not_below_the_exact_one(
-    tmp_path: Path, bits: int, well: float, level: float
-) -> None:
-    path = tmp_path / "coarse.yaml"
-    path.write_text(COARSE.format(bits=bits, well=well, level=level))
-    study = load_study(path)
-    space = next(iter(study.spaces))
-    imager = SceneModel(study.setup(space, "dim"))
-    curves = np.empty((1, 0, study.grid.size))
-    found = {name: values[0] for name, values in evaluate(imager, curves, ["green", "yellow", "red"]).items()}
-    electrons = imager.pixel_electrons(curves)[0, 0]
-    own = imager.readout.few_pixels
-    assert own is not None
-    # The distances of means do not say which pair is worst: all of them.
-    members = imager.setup.members
-    worst = max(
-        exact([electrons[i, c] for c in own], [electrons[j, c] for c in own], imager.readout.pixel)
-        for i, j in product(members["yellow"], members["red"])
-    )
-    assert worst / _FACTOR <= found["error_yellow_red"] <= _FACTOR * worst + 1e-15
-    assert found["error_bound_yellow_red"] >= worst
-
-
-@pytest.mark.parametrize("pixels", thinned([1, 12, 4]))
+@pytest.mark.parametrize("pixels", [1, 4])
 def test_a_bound_of_many_pixels_holds_where_they_are_few_too(pixels: int) -> None:
     """Bennett's bound, against exact sums: of steps that hardly flicker, of full wells, of a few photons."""
     for seed in range(8):
@@ -205,36 +156,10 @@ def test_nan_of_one_design_leaves_others_unchanged() -> None:
     electrons = np.array([[[5.0], [50.0]], [[np.nan], [50.0]], [[5.0], [np.inf]]])
     found = confusion.errors(electrons, [np.array([0])], Pixel(read_noise_e=2.0), {"a": ONE, "b": OTHER})
     assert np.isnan(found.error["a", "b"]).tolist() == [False, True, False]
-    assert found.error["a", "b"][2] <= 1e-17
 
 
-@pytest.mark.slow
-def test_sums_that_take_too_long_are_left_to_other_rules() -> None:
-    """Pixels over all that a study may say: the sums of those that are affordable stay within what was counted."""
-    rng, affordable = np.random.default_rng(31), 0
-    for _ in range(60):
-        pixel = Pixel(
-            bits=int(rng.integers(1, 25)),
-            well_e=float(10 ** rng.uniform(-3, 7)),
-            gain_dn_per_e=float(10 ** rng.uniform(-6, 9)) if rng.random() < 0.5 else None,
-            read_noise_e=float(10 ** rng.uniform(-3, 4)) if rng.random() < 0.7 else 0.0,
-            prnu=float(rng.choice([0.0, 0.001, 0.02, 0.1])),
-        )
-        if not confusion.affordable(pixel, [ONE, ONE]):
-            continue
-        affordable += 1
-        for electrons in (0.0, 0.5 * pixel.well_e, pixel.well_e, 1.4 * pixel.well_e, 100 * pixel.well_e):
-            _, _, roots, _ = confusion._numbers(np.full((1, 1, 1), electrons), [np.array([0])], pixel)
-            assert roots.size <= confusion._MOST_BINS
-            assert (roots**2).sum() == pytest.approx(1, rel=1e-9)
-    assert 20 < affordable < 55
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(4))
-def test_where_exact_sums_are_too_many_the_noise_is_gaussian(tmp_path: Path, seed: int) -> None:
-    rng = np.random.default_rng([seed, 37])
-    pixel = {"bits": 12, "well_e": 2e6, "prnu": float(rng.uniform(0.04, 0.08)), "read_noise_e": 1e4}
+def test_where_exact_sums_are_too_many_the_noise_is_gaussian(tmp_path: Path) -> None:
+    pixel = {"bits": 12, "well_e": 2e6, "prnu": 0.05, "read_noise_e": 1e4}
     path = tmp_path / "deep.yaml"
     path.write_text(
         "study: deep\nseed: 1\nsensor: ar0820\nlights: tl16\ncfas: [RYYCy]\nrecognition: {states: [yellow, red]}\n"

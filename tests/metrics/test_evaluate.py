@@ -11,8 +11,8 @@ from sweep.camera.camera import Camera
 from sweep.camera.linear import linear_model
 from sweep.camera.model import scene_model
 from sweep.camera.mosaic import Mosaic
-from sweep.camera.pixel import Optics, Pixel
-from sweep.camera.scene import FixedExposure, Scene, WhitePatchExposure
+from sweep.camera.pixel import Pixel
+from sweep.camera.scene import Scene, WhitePatchExposure
 from sweep.camera.sensor import BUILT_IN_SENSORS
 from sweep.camera.sensor_field import SensorField
 from sweep.camera.setup import Setup
@@ -22,8 +22,6 @@ from sweep.metrics.evaluate import designed_quantities, evaluate
 from sweep.metrics.smooth import smooth_response
 from sweep.spectra.builtin.registry import BUILT_IN_LIGHTS
 from sweep.spectra.spectrum import WavelengthGrid
-
-from ..rounding import gamma
 
 GRID = WavelengthGrid()
 SENSOR = BUILT_IN_SENSORS["ar0820"](GRID)
@@ -57,63 +55,16 @@ def test_response_is_the_papers_exposure(level: float, ratio: float | None) -> N
         np.testing.assert_allclose(design, by_hand(qe, level, ratio or LIGHTS.photon_ratio), rtol=1e-12)
 
 
-def test_response_does_not_depend_on_well_pitch_or_optics() -> None:
-    usual = evaluate(scene_model(setup()), FAMILY.curves(X))
-    scenario = Scene(photon_radiance=1e15, optics=Optics(f_number=1.6, transmission=0.7))
-    other = setup(scenario=scenario).with_camera(pixel=Pixel(pitch_um=3.0, well_e=50_000.0))
-    found = evaluate(scene_model(other), FAMILY.curves(X))
-    for name, values in usual.items():
-        if name != "exposure_s":
-            np.testing.assert_allclose(found[name], values, rtol=1e-12)
-
-
-def test_fixed_exposure_counts_photons() -> None:
-    scenario = Scene(photon_radiance=1e18, exposure=FixedExposure(exposure_s=0.004))
-    pixel = Pixel(pitch_um=2.0)
-    found = smooth_response(setup("RGGB", scenario).with_camera(pixel=pixel), np.empty((1, 0, 301)))[:, 0]
-    mean_qe = (LIGHTS.photons * SENSOR.qe["G"]).sum(axis=1)
-    n_e = 1e18 * np.pi / 65 * mean_qe * 4e-12 * 0.004
-    np.testing.assert_allclose(found[0, :, 1], n_e * 4095 / 10_000, rtol=1e-12)
-
-
-def test_csd_is_of_the_quantized_readout() -> None:
-    curves = FAMILY.curves(X)
-    found = evaluate(scene_model(setup()), curves)
-    points = np.floor(smooth_response(setup(), curves)[:, 0] + 0.5)
-    for design in range(2):
-        yellow, red = (points[design, LIGHTS.members[c]] for c in ("yellow", "red"))
-        brute = min(np.linalg.norm(y - r) for y in yellow for r in red)
-        assert found["csd_yellow_red"][design] == pytest.approx(brute, rel=1e-14)
-    assert [n for n in found if n.startswith("csd_")] == [
-        "csd_green_yellow",
-        "csd_green_orange",
-        "csd_green_red",
-        "csd_yellow_orange",
-        "csd_yellow_red",
-        "csd_orange_red",
-    ]
-
-
-def test_sensitivities_of_a_design() -> None:
-    found = evaluate(scene_model(setup()), FAMILY.curves(X))
-    n = FAMILY.curves(X)[:, 0].sum(axis=1)
-    # A quotient of two sums over wavelengths; the second one's are of four channels.
-    np.testing.assert_allclose(found["sensitivity"], n / SENSOR.qe["Y"].sum(), rtol=2 * gamma(301 + 1))
-    total = sum(SENSOR.qe[c].sum() for c in ("R", "Y", "Cy")) + n
-    np.testing.assert_allclose(found["cfa_sensitivity"], total / 4 / SENSOR.qe["C"].sum(), rtol=2 * gamma(301 + 4))
+def test_a_plain_cfa_has_a_sensitivity_and_its_filter_none() -> None:
     plain = evaluate(scene_model(setup("RGGB")), np.empty((1, 0, 301)))
     assert np.isnan(plain["sensitivity"][0])
     rggb = (SENSOR.qe["R"] + 2 * SENSOR.qe["G"] + SENSOR.qe["B"]).sum() / 4 / SENSOR.qe["C"].sum()
-    assert plain["cfa_sensitivity"][0] == pytest.approx(rggb, rel=2 * gamma(301 + 4), abs=0)
+    assert plain["cfa_sensitivity"][0] == pytest.approx(rggb, rel=1e-13, abs=0)
 
 
-@pytest.mark.parametrize("kind", ["white_patch", "white_patch_set_by_n", "fixed"])
-def test_gradients_agree_with_central_differences(kind: str) -> None:
-    scenario = Scene(exposure=FixedExposure(exposure_s=0.005)) if kind == "fixed" else Scene()
-    made, family = setup(scenario=scenario), FAMILY
-    if kind == "white_patch_set_by_n":  # N over the clear pixel is the brightest channel, so it sets the exposure
-        made = setup(base="C")
-        family = Stopband(GRID.nodes_nm, SENSOR.qe["C"], SENSOR.qe["G"])
+def test_gradients_agree_with_central_differences_where_the_filter_sets_the_exposure() -> None:
+    """N over the clear pixel is the brightest channel."""
+    made, family = setup(base="C"), Stopband(GRID.nodes_nm, SENSOR.qe["C"], SENSOR.qe["G"])
     x, step = X[1], 1e-4
     exact = linear_model(made).smooth_with_gradient(family.curves(x[None])[0], family.gradient(x))[1]
     amounts = sensitivities_gradient(made, family.gradient(x))

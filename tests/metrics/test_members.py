@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from dataclasses import replace
 from functools import cache
 
@@ -12,7 +10,6 @@ import pytest
 from scipy.optimize import minimize
 
 from sweep.metrics.members import population_model
-from sweep.spectra.members import Members
 from sweep.spectra.population import Population
 from sweep.study import load_study
 
@@ -107,9 +104,11 @@ def drawn(name: str, n: int) -> tuple[np.ndarray, list[tuple[int, int]], list[tu
 
 @pytest.mark.parametrize("name", thinned(POPULATIONS))
 def test_neither_random_members_nor_a_local_search_are_nearer(name: str) -> None:
+    """And the search comes within 2 % of the worst."""
     found, signals, widths, u = drawn(name, 600)
     assert (found >= worst(name)[:, None] - 1e-9).all()
     for design in range(len(DESIGNS)):
+        nearest = np.inf
         for at in np.argsort(found[design])[:2]:
             start = minimize(
                 lambda v, at=at, design=design: distance(name, signals[at], widths[at], v)[design],
@@ -118,85 +117,5 @@ def test_neither_random_members_nor_a_local_search_are_nearer(name: str) -> None
                 method="Nelder-Mead",
                 options={"xatol": 1e-7, "fatol": 1e-7, "maxiter": 200},
             )
-            assert start.fun >= worst(name)[design] - 1e-9
-
-
-@pytest.mark.slow
-def test_100_000_random_members_are_no_nearer() -> None:
-    name = "bins"
-    rng, members, given = np.random.default_rng(6), STUDY.lights.members, POPULATIONS[name]
-    for _ in range(100):
-        signals = np.stack([rng.choice(members[kind], 1000) for kind in ("yellow", "red")], axis=1)
-        u, widths = rng.random((1000, 4)), rng.choice(np.asarray(given.get("width", [1.0]), dtype=float), (1000, 2))
-        warm = warmths(given, u[:, :2])
-        sides = []
-        for k in range(2):
-            moved = [
-                shifted(STUDY.lights.photons[s], one_shift(given, int(s), w, own), float(width))
-                for s, w, own, width in zip(signals[:, k], warm[:, k], u[:, 2 + k], widths[:, k], strict=True)
-            ]
-            sides.append(responses(np.stack(moved)))
-        assert (np.linalg.norm(sides[0] - sides[1], axis=2).min(axis=1) >= worst(name) - 1e-9).all()
-
-
-@pytest.mark.parametrize("name", POPULATIONS)
-def test_the_nearest_members_are_members_and_so_far_apart(name: str) -> None:
-    """What it says the nearest two are, computed from their shifts."""
-    lights = replace(STUDY.lights, population=population(name))
-    seen = population_model(replace(PROBLEM.setup, lights=lights))
-    response = seen.linear.smooth(PROBLEM.family.curves(DESIGNS))[:, 0]
-    widths = POPULATIONS[name].get("width", [1.0])
-    for design in range(len(DESIGNS)):
-        near = seen.nearest(response[design], ("yellow", "red"))
-        one, other, _ = np.unravel_index(int(near.squared.argmin()), near.squared.shape)
-        assert near.squared.min() == pytest.approx(worst(name)[design] ** 2, rel=1e-12)
-        rows, spectra = (int(near.first[one]), int(near.second[other])), []
-        for side, row in enumerate(rows):
-            signal = seen.members.signal(row)
-            nm = seen.members.shift_nm(int(near.steps[one, other, 0, side]), float(near.shares[one, other, 0, side]))
-            low, high = (one_shift(POPULATIONS[name], signal, warm, own) for warm, own in ends_of(name))
-            assert low - 1e-9 <= nm <= high + 1e-9
-            factor = widths[row // seen.members.n_steps % len(widths)]  # type: ignore[index, arg-type]
-            spectra.append(shifted(STUDY.lights.photons[signal], nm, factor))
-        found = responses(np.stack(spectra))[design]
-        assert np.linalg.norm(found[0] - found[1]) == pytest.approx(worst(name)[design], rel=1e-9)
-
-
-def ends_of(name: str) -> tuple[tuple[float, float], tuple[float, float]]:
-    low, high = warmths(POPULATIONS[name], np.array([0.0, 0.0]))[0], warmths(POPULATIONS[name], np.ones(2))[0]
-    return (float(low), 0.0), (float(high), 1.0)
-
-
-@pytest.mark.parametrize(
-    ("given", "area"),
-    [
-        (STREET, 0.0),
-        ({**STREET, "temperatures": "independent"}, 14.5**2),
-        ({**STREET, "binning_nm": 2}, 16 + 14.5 * 8),  # a line of temperatures widened by a square
-        ({"binning_nm": 0.25}, 0.25),
-        ({}, 0.0),
-    ],
-)
-def test_the_triangles_of_two_lights_fill_their_region(given: dict[str, object], area: float) -> None:
-    members = Members(replace(STUDY.lights, population=Population.model_validate(given)), STUDY.grid)
-    yellow, red = (int(STUDY.lights.members[kind][0]) for kind in ("yellow", "red"))
-    region = members.region(yellow, red)
-    corners = region.cells[:, None] + region.shares
-    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    assert np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]).sum() / 2 == pytest.approx(area, abs=1e-9)
-    assert ((region.shares >= 0) & (region.shares <= 1)).all()
-    assert region.cells.max() + 1 < members.n_steps
-
-
-@pytest.mark.slow
-def test_without_a_population_nothing_of_it_is_imported() -> None:
-    code = (
-        "import sys\n"
-        "import sweep\n"
-        "import sweep.cli.audit, sweep.search.solver\n"
-        f"study = sweep.load_study({str(STUDIES / 'stopband.yaml')!r})\n"
-        "study.evaluate()\n"
-        "own = [name for name in sys.modules if name.startswith('sweep.') and ('member' in name or 'robustness' in name)]\n"
-        "assert own == [], own\n"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True)
+            nearest = min(nearest, start.fun)
+        assert worst(name)[design] - 1e-9 <= nearest <= 1.02 * worst(name)[design]

@@ -4,32 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
-import numpy as np
 import pytest
 
 from sweep.camera.accuracy import STANDARD
 from sweep.camera.model import SceneModel
-from sweep.designs.space import Space
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.separation import csd_name, separations
-from sweep.study.load import load_study
 
 from ..hard.scenes import scene
-
-STUDY = load_study(Path("studies/accuracy.yaml"))
-
-
-@pytest.mark.parametrize("space", STUDY.spaces, ids=lambda space: str(space.name))
-def test_no_moment_of_a_pulse_has_a_smaller_csd(space: Space) -> None:
-    setup = STUDY.setup(space, "pulsed")
-    curves = space.curves(space.points(0, min(space.size, 24)), STUDY.grid.size)
-    columns, model = evaluate(SceneModel(setup), curves), SceneModel(setup)
-    for design in range(len(curves)):
-        response = model.read(curves[design : design + 1], moments=np.linspace(0.0, 1.0, 2001))[0][0]
-        for pair, distances in separations(response, setup.members).items():
-            assert columns[csd_name(pair)][design] <= distances.min() + 0.05
 
 
 @pytest.mark.parametrize("places", [None, 3])

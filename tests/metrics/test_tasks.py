@@ -18,7 +18,6 @@ from scipy.stats import norm
 
 from sweep.camera.linear import linear_model
 from sweep.camera.setup import Setup
-from sweep.designs.block import CurveBlock
 from sweep.metrics.discrimination import detectability, pairwise_error
 from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.quantity import Quantity, RequestedQuantities
@@ -29,7 +28,6 @@ from sweep.metrics.tasks.color import (
     ChannelNoise,
     color_matrix,
     least_illuminance,
-    luminance_noise,
     metamerism_index,
     vora,
 )
@@ -132,20 +130,14 @@ def test_separations_are_those_of_the_nearest_pair(name: str, at: int, case: str
             assert columns()[f"{name}_{what}{end}"][number] == pytest.approx(value, rel=1e-7, abs=1e-300)
 
 
-def test_an_error_is_that_of_draws() -> None:
-    """Of the plane between two points, with a million Gaussian draws of each."""
+def test_an_error_is_that_of_the_plane_between_two_points() -> None:
     a, b = np.array([900.0, 500.0, 300.0]), np.array([905.0, 490.0, 306.0])
     noise = ChannelNoise(np.array([0.25, 0.5, 0.25]), 2.0)
     told = float(pair_errors(margin((a - b)[None], noise.of(a)[None], noise.of(b)[None]))[0])
-    rng = np.random.default_rng(1)
     normal = (a - b) / (noise.of(a) + noise.of(b))
-    spread = [np.sqrt(normal**2 @ noise.of(p)) for p in (a, b)]
-    level = (normal @ a * spread[1] + normal @ b * spread[0]) / sum(spread)
-    drawn = [rng.normal(p, np.sqrt(noise.of(p)), (1_000_000, 3)) @ normal for p in (a, b)]
-    assert np.mean(drawn[0] < level) == pytest.approx(told, rel=0.01)
-    assert np.mean(drawn[1] > level) == pytest.approx(told, rel=0.01)
-    assert 0.05 < told < 0.45
-    assert told == pytest.approx(norm.sf((normal @ (a - b)) / sum(spread)), rel=1e-12)
+    spread = sum(np.sqrt(normal**2 @ noise.of(p)) for p in (a, b))
+    assert told == pytest.approx(norm.sf(normal @ (a - b) / spread), rel=1e-12)
+    assert noise.of(a) == pytest.approx((a + 2.0**2) / [1, 2, 1], rel=1e-12)
 
 
 def test_lab_and_ciede2000_are_those_of_colour_science() -> None:
@@ -170,8 +162,7 @@ def camera() -> np.ndarray:
     return per_photon / per_photon.max() / 2
 
 
-def test_color_of_a_named_camera_is_that_of_colour_science() -> None:
-    """Chart, XYZ, matrix and difference by colour-science and least squares, without noise."""
+def test_color_of_a_chart_is_that_of_colour_science() -> None:
     setup, _ = scene()
     assert setup.tasks is not None
     chart = setup.tasks.by_name["color"].chart
@@ -183,21 +174,8 @@ def test_color_of_a_named_camera_is_that_of_colour_science() -> None:
         light = colour.SDS_ILLUMINANTS[name].copy().align(shape)
         integrated = {"method": "Integration", "cmfs": matching, "illuminant": light}
         xyz = np.array([colour.sd_to_XYZ(sd, **integrated) for sd in patches]) / 100
-        white = colour.sd_to_XYZ(colour.sd_ones(shape), **integrated) / 100
         np.testing.assert_allclose(chart.xyz[at], xyz, rtol=1e-6)
-        electrons = chart.photons[at] @ camera().T * 1e-12
-        ours = color_matrix(electrons[None], chart.xyz[at], chart.white[at], ChannelNoise(np.ones(3), 0.0), 0.0)[0]
-        root = 116 / 3 * chart.xyz[at][:, 1] ** (-2 / 3)
-        theirs = np.linalg.lstsq(
-            electrons * root[:, None], chart.xyz[at] / chart.white[at] * root[:, None], rcond=None
-        )[0]
-        np.testing.assert_allclose(ours, theirs, rtol=1e-6)
-        told = delta_e_2000(lab(electrons @ ours, np.ones(3)), lab(chart.xyz[at], chart.white[at]))
-        labs = [
-            colour.XYZ_to_Lab(v * chart.white[at], colour.XYZ_to_xy(chart.white[at]))
-            for v in (electrons @ theirs, chart.xyz[at] / chart.white[at])
-        ]
-        np.testing.assert_allclose(told, colour.delta_E(*labs, method="CIE 2000"), rtol=1e-6, atol=1e-6)
+        white = colour.sd_to_XYZ(colour.sd_ones(shape), **integrated)
         np.testing.assert_allclose(chart.white[at], white / white[1], rtol=1e-6)
 
 
@@ -240,22 +218,16 @@ def test_the_metamerism_index_has_the_least_mean_difference() -> None:
 
 
 def test_the_matrix_is_the_best_one_under_noise() -> None:
-    """By brute force: a least-squares fit of 400,000 noisy charts, and steps away from the matrix in every direction."""
+    """Steps away from the matrix in every direction."""
     rng = np.random.default_rng(3)
     electrons = np.array([[900.0, 200, 90], [150, 800, 200], [80, 150, 700], [700, 750, 200], [400, 500, 450.0]])
     xyz, white = rng.uniform(0.05, 0.9, (5, 3)), np.array([0.95, 1.0, 1.09])
     noise = ChannelNoise(np.array([0.25, 0.5, 0.25]), 3.0)
     told = color_matrix(electrons[None], xyz, white, noise)[0]
-    weights = (116 / 3 * xyz[:, 1] ** (-2 / 3))[:, None]
-    draws = rng.standard_normal((200_000, 5, 3)) * np.sqrt(noise.of(electrons))
-    charts = np.concatenate([electrons + draws, electrons - draws])  # in pairs, so that their mean is exact
-    wanted = np.tile(xyz / white * weights, (len(charts), 1))
-    fit = np.linalg.lstsq((charts * weights).reshape(-1, 3), wanted, rcond=None)[0]
-    np.testing.assert_allclose(told, fit, atol=0.01 * np.abs(told).max())
 
     def expected(matrix: np.ndarray) -> float:
         seen = ((electrons @ matrix - xyz / white) ** 2).sum(axis=1) + (noise.of(electrons) @ matrix**2).sum(axis=1)
-        return float((weights[:, 0] ** 2 * seen).sum())
+        return float((xyz[:, 1] ** (-4 / 3) * seen).sum())
 
     least = expected(told)
     for step in rng.standard_normal((200, 3, 3)) * 1e-3 * np.abs(told).max():
@@ -263,18 +235,14 @@ def test_the_matrix_is_the_best_one_under_noise() -> None:
     assert expected(color_matrix(electrons[None], xyz, white, noise, 3.0)[0]) > least
 
 
-def test_luminance_snr_is_that_of_a_million_draws() -> None:
-    rng = np.random.default_rng(4)
+def test_the_least_illuminance_has_its_luminance_snr() -> None:
+    """Of four pixels: photons, and two electrons of read noise of each."""
     gray, noise = np.array([[0.6, 1.1, 0.4]]), ChannelNoise(np.array([0.25, 0.5, 0.25]), 2.0)
-    matrix = rng.uniform(-1, 2, (1, 3, 3))
+    matrix = np.random.default_rng(4).uniform(-1, 2, (1, 3, 3))
     lux = least_illuminance(matrix, gray, noise, 10.0)[0]
-    assert luminance_noise(matrix, gray * lux, noise)[0] == pytest.approx(10, rel=1e-12)
-    counts = 4 * noise.shares
-    drawn = np.zeros(1_000_000)
-    for at, count in enumerate(counts.astype(int)):  # each pixel by itself
-        own = rng.poisson(gray[0, at] * lux, (int(count), drawn.size)) + rng.normal(0, 2, (int(count), drawn.size))
-        drawn += matrix[0, at, 1] * own.mean(axis=0)
-    assert drawn.mean() / drawn.std() == pytest.approx(10, rel=0.01)
+    variance = (gray[0] * lux + 4) / [1, 2, 1]
+    row = matrix[0, :, 1]
+    assert row @ gray[0] * lux / np.sqrt(row**2 @ variance) == pytest.approx(10, rel=1e-12)
 
 
 def test_color_figures_are_those_of_their_chart() -> None:
@@ -328,12 +296,3 @@ def test_a_figure_has_the_derivative_of_its_rows(name: str) -> None:
         if quantity.metric in ("task_csd", "task_dprime"):
             allowed = max(allowed, 1e-9)  # under sodium light of one line all is one color, and a distance is rounding
         np.testing.assert_allclose(by_u[:, at], slope, rtol=1e-6, atol=allowed)
-
-
-def test_a_plain_cfa_has_every_figure() -> None:
-    study = study_of_keys({**KEYS, "tasks": "all"}, Path())
-    setup = study.setup_of("RGGB", "chart", {})
-    found = designed_quantities(setup, CurveBlock(np.empty((1, 0, study.grid.size))))
-    wanted = [name for name, quantity in study.quantities.items() if quantity.metric.startswith("task_")]
-    assert len(wanted) == 63
-    assert all(np.isfinite(found[name]).all() for name in wanted)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +14,6 @@ from sweep.camera.model import SceneModel
 from sweep.designs.block import CurveBlock, EdgeBlock, edges_of
 from sweep.metrics import batch, registry
 from sweep.metrics.batch import CaseReadings
-from sweep.metrics.columns import color_separation
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.metric import Metric
 from sweep.metrics.quantity import Columns, Quantity, RequestedQuantities
@@ -65,19 +63,6 @@ def darkest(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     registry.quantities_of.cache_clear()
 
 
-def counted(monkeypatch: pytest.MonkeyPatch, owner: Any, name: str) -> list[int]:
-    """How often a route is taken from now on, a number for each time."""
-    calls: list[int] = []
-    way: Callable[..., Any] = getattr(owner, name)
-
-    def taken(*arguments: Any, **named: Any) -> Any:
-        calls.append(1)
-        return way(*arguments, **named)
-
-    monkeypatch.setattr(owner, name, taken)
-    return calls
-
-
 def by_hand(name: str, block: EdgeBlock) -> dict[str, np.ndarray]:
     """Both metrics from the readout of the designs' curves."""
     response, _ = SceneModel(SCENES[name]).read(block.curves())
@@ -101,15 +86,6 @@ def test_csds_are_those_without_other_metrics_and_these_are_of_the_whole_readout
         np.testing.assert_array_equal(columns[column], values, err_msg=column)
     for column, values in by_hand(name, block).items():
         np.testing.assert_allclose(columns[column], values, atol=1e-9, err_msg=column)
-
-
-@pytest.mark.usefixtures("darkest")
-def test_other_metrics_switch_no_fast_route_off(monkeypatch: pytest.MonkeyPatch) -> None:
-    fast, slow = counted(monkeypatch, color_separation, "separations_along"), counted(monkeypatch, SceneModel, "read")
-    block = edges_of(SPACE, 0, SPACE.size)
-    assert block is not None
-    evaluate(SceneModel(SCENES["rounded"]), block, user_metrics=[BRIGHTEST], metrics=registry.METRICS)
-    assert (len(fast), len(slow)) == (1, 0)
 
 
 def test_a_cfa_without_a_user_metric_is_reported_once() -> None:

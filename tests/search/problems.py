@@ -10,7 +10,7 @@ from sweep.camera.pixel import Pixel
 from sweep.camera.scene import Scene
 from sweep.camera.setup import Setup
 from sweep.designs.families.free_form import FreeForm
-from sweep.designs.families.stopband import MultiStopband
+from sweep.designs.families.stopband import Stopband
 from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.objective import Objective
 from sweep.metrics.separation import separation
@@ -81,15 +81,10 @@ def random_filters(kind: str, count: int, rng: np.random.Generator) -> np.ndarra
     if kind == "free_form":
         family = FreeForm(wave, base, np.arange(540.0, 701.0, 4.0))
         return family.curves(family.start(rng.uniform(size=(count, 3))))
-    bands = 1 if kind == "stopband" else 2
-    target = np.minimum(STUDY.sensor.qe["G"], base) if kind == "stopband" else 0.05 * base
-    family = MultiStopband(wave, base, target, bands)
-    edges = np.sort(rng.uniform(500, 690, (count, 2 * bands)), axis=1)
-    x = np.empty((count, 5 * bands))
-    for band in range(bands):
-        x[:, [5 * band, 5 * band + 2]] = edges[:, [2 * band, 2 * band + 1]]
-        x[:, [5 * band + 1, 5 * band + 3]] = rng.uniform(5, 30, (count, 2))
-        x[:, 5 * band + 4] = rng.uniform(0, 1, count)
+    family = Stopband(wave, base, np.minimum(STUDY.sensor.qe["G"], base))
+    left_nm, right_nm = np.sort(rng.uniform(500, 690, (2, count)), axis=0)
+    left_width_nm, right_width_nm = rng.uniform(5, 30, (2, count))
+    x = np.stack([left_nm, left_width_nm, right_nm, right_width_nm, rng.uniform(0, 1, count)], axis=1)
     return family.curves(x[(family.violation(x) <= 0).all(axis=1)])
 
 

@@ -14,10 +14,8 @@ from sweep.base.errors import SweepError
 from sweep.camera.scene import FixedExposure, Scene
 from sweep.designs.families.stopband import Stopband
 from sweep.designs.tolerance import NONE, Tolerance
-from sweep.metrics.bound import FEASIBLE, Bound, total_violation
-from sweep.metrics.evaluate import designed_quantities
+from sweep.metrics.bound import FEASIBLE, Bound
 from sweep.metrics.objective import Objective
-from sweep.metrics.smooth import smooth_response
 from sweep.report.summary import _limit_line
 from sweep.results.facts import SearchFacts
 from sweep.results.output import Output
@@ -25,10 +23,10 @@ from sweep.search.gradients import Model
 from sweep.search.limit import _relaxed, limit_of, reason_without_bound
 from sweep.search.problem import Problem, SearchRun, starting_points
 from sweep.search.trade_off import check_proof
-from sweep.spectra.lights import Lights
 from sweep.spectra.population import Population
 
 from ..cases import thinned
+from .limit_oracles import check_attained
 from .problems import PROBLEM, STUDY, best_of, csd_of, feasible_filters, noisy_problem, problem_of
 
 LIMIT = limit_of(PROBLEM)
@@ -41,50 +39,11 @@ def constrained(**bounds: Bound) -> Problem:
     return replace(PROBLEM, constraints={**PROBLEM.constraints, **bounds})
 
 
-def test_the_bracket_is_tight_and_attained_by_its_filter() -> None:
-    curves = LIMIT.curve[None, None]
-    assert 0 <= LIMIT.proven - LIMIT.attained <= 2e-3
-    assert ((LIMIT.curve >= 0) & (LIMIT.curve <= BASE)).all()
-    assert total_violation(designed_quantities(SETUP, curves), PROBLEM.constraints, np.zeros(1))[0] <= FEASIBLE
-    assert csd_of(SETUP, curves)[0] == pytest.approx(LIMIT.attained, rel=1e-12)
-
-
-def test_one_pair_of_signals_has_a_closed_form() -> None:
-    """Without a slope bound, light is given up where it helps most per photon: the fractional knapsack's greedy rule."""
-    lights = STUDY.lights
-    keep = [lights.members["yellow"][3], lights.members["red"][5]]
-    two = Lights("two", ("y", "r"), ("yellow", "red"), lights.photons[keep], lights.photon_ratio, "", True)
-    problem = replace(PROBLEM, setup=replace(SETUP, lights=two), constraints={"sensitivity": Bound(min=0.93)})
-    found = limit_of(problem)
-    response = smooth_response(problem.setup, BASE[None, None])[0, 0]
-    channel = problem.setup.camera.modified[0]
-    gain = response[:, channel] / (two.photons @ BASE)
-    per_qe = gain[0] * two.photons[0] - gain[1] * two.photons[1]
-    budget = 0.07 * BASE.sum()
-    taken = np.zeros_like(BASE)
-    for index in np.argsort(per_qe):
-        if per_qe[index] >= 0 or budget <= 0:
-            break
-        taken[index] = min(BASE[index], budget)
-        budget -= taken[index]
-    fixed = np.delete(response, channel, axis=1)
-    exact = np.hypot(np.linalg.norm(fixed[0] - fixed[1]), per_qe @ (BASE - taken))
-    assert found.attained == pytest.approx(exact, abs=2e-3)
-    assert found.proven >= exact - 1e-6
-
-
-@pytest.mark.parametrize("kind", thinned(["free_form", "stopband", "multi_stopband"]))
+@pytest.mark.parametrize("kind", ["free_form", "stopband"])
 def test_no_random_feasible_filter_beats_the_limit(kind: str) -> None:
     curves = feasible_filters(SETUP, kind, 20_000, np.random.default_rng(11))
-    assert len(curves) > 3_334  # 10,000 over the three kinds
+    assert len(curves) > 3_334
     assert csd_of(SETUP, curves).max() <= LIMIT.proven
-
-
-@pytest.mark.slow
-def test_free_form_search_comes_within_one_percent() -> None:
-    problem = problem_of("freeform")
-    assert problem.constraints == PROBLEM.constraints
-    assert 0.99 * LIMIT.proven <= best_of(problem, 4, 300).objective <= LIMIT.proven
 
 
 def test_a_tighter_study_has_a_lower_limit() -> None:
@@ -117,20 +76,6 @@ def test_least_loss_of_sensitivity_is_the_inverse_of_the_largest_separation() ->
     back = limit_of(replace(PROBLEM, constraints={**slope, "sensitivity": Bound(min=found.attained)}))
     assert back.attained == pytest.approx(200, abs=0.05)
     assert 0.9 < best_of(most, 4, 125).objective <= found.proven
-
-
-@pytest.mark.slow
-def test_the_limit_of_the_smallest_of_several_distances() -> None:
-    two = replace(PROBLEM, objective=Objective(minimum={"csd_yellow_red": 1.0, "csd_orange_red": 2.0}))
-    found = limit_of(two)
-    yellow, orange = (csd_of(SETUP, found.curve[None, None], (kind, "red"))[0] for kind in ("yellow", "orange"))
-    assert min(yellow, 2 * orange) == pytest.approx(found.attained, rel=1e-12)
-    assert found.proven <= LIMIT.proven + 1e-3
-    assert best_of(two, 4, 125).objective <= found.proven
-    # A constraint on another distance that binds lowers the limit; one that holds anyway changes nothing.
-    held = constrained(csd_green_red=Bound(min=100.0))
-    assert limit_of(held).proven == pytest.approx(LIMIT.proven, abs=2e-3)
-    assert limit_of(constrained(csd_orange_red=Bound(min=float(orange) * 1.02))).proven < LIMIT.proven
 
 
 def test_upper_bound_leaves_out_constraints_of_edges() -> None:
@@ -198,18 +143,16 @@ def test_report_words_match_the_proof() -> None:
     assert "open" not in words
     cut = _limit_line(output, done.model_copy(update={"limit_open_parts": 3}))
     assert "it may not be the least one: 3 parts are open after 9 linear programs" in cut
-    unknown = _limit_line(output, done.model_copy(update={"limit_attained": None}))
-    assert "N of RYNCy: 100.0 DN (proven); the search's answer is 10.0 % below it" in unknown
-    levels = done.model_copy(update={"front_limits_open": 2})
-    assert "At 2 levels of the front it may not be the least one" in _limit_line(output, levels)
     none = done.model_copy(update={"no_limit": "the objective is a sum", "limit_proven": None})
     assert _limit_line(output, none) == "Upper bound: none computed (the objective is a sum)."
 
 
-@pytest.mark.parametrize("level", [0.8, 0.9, 0.97, 1.0])
-def test_few_linear_programs_close_the_bracket(level: float) -> None:
+@pytest.mark.parametrize("level", [0.8, 0.9, 1.0])
+def test_few_linear_programs_close_the_bracket_and_its_filter_attains_it(level: float) -> None:
     """Halving the range of 700 DN down to 1e-3 DN alone takes twenty, for each choice of 256 sides."""
-    found = limit_of(constrained(sensitivity=Bound(min=level)))
+    problem = constrained(sensitivity=Bound(min=level))
+    found = limit_of(problem)
+    check_attained(problem, found)
     assert found.programs <= 20
     assert found.open_parts == 0
     assert 0 <= found.proven - found.attained <= 1e-3

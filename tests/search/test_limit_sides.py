@@ -10,7 +10,6 @@ import pytest
 
 from sweep.metrics.bound import Bound
 from sweep.metrics.objective import Objective
-from sweep.metrics.smooth import smooth_response
 from sweep.search.limit import limit_of
 from sweep.search.problem import Problem
 from sweep.search.sides import _NEAR
@@ -36,7 +35,7 @@ def test_a_filter_between_two_kinds_of_light_is_within_the_limit(tmp_path: Path)
     assert 0.9 * limit.proven < best_of(problem, 4, 100).objective <= limit.proven
 
 
-@pytest.mark.parametrize("seed", range(0, 10, 2))  # `make slow` takes 200
+@pytest.mark.parametrize("seed", range(6))
 def test_the_limit_is_that_of_a_milp(coarse: Problem, seed: int) -> None:
     problem = random_problem(coarse, seed)
     limit = limit_checked_by_milp(problem)
@@ -44,7 +43,7 @@ def test_the_limit_is_that_of_a_milp(coarse: Problem, seed: int) -> None:
         assert milp_limit(problem, limit.proven) == pytest.approx(limit.proven, abs=1e-3)
 
 
-@pytest.mark.parametrize("seed", [0, 1, 3, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(20, 40))])
+@pytest.mark.parametrize("seed", [0, 1, 3])
 def test_a_proof_bounds_filters_of_other_sensitivities(coarse: Problem, seed: int) -> None:
     problem = random_problem(coarse, seed)
     own = problem.constraints["sensitivity"].min
@@ -57,17 +56,7 @@ def test_a_proof_bounds_filters_of_other_sensitivities(coarse: Problem, seed: in
         assert milp_limit(there, most + 1e-3) < most + 1e-3  # by a MILP of its own, no filter exceeds it
 
 
-@pytest.mark.slow
-@pytest.mark.long
-def test_two_hundred_limits_are_those_of_a_milp(coarse: Problem) -> None:
-    mixed = 0
-    for seed in range(200):
-        problem = random_problem(coarse, seed)
-        mixed += is_mixed(problem, limit_checked_by_milp(problem).curve)
-    assert mixed >= 20
-
-
-@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 6))])
+@pytest.mark.parametrize("seed", [0, 1])
 def test_several_csds_have_sides_of_their_own(coarse: Problem, seed: int) -> None:
     """The smallest of two weighted CSDs, and a third one that is constrained: each with pairs on either side."""
     problem = random_problem(coarse, seed)
@@ -86,18 +75,6 @@ def test_several_csds_have_sides_of_their_own(coarse: Problem, seed: int) -> Non
         assert limit_of(held_apart).proven == -np.inf
     else:
         assert limit_checked_by_milp(held_apart).proven <= free.proven
-
-
-def test_every_place_of_a_light_has_sides_of_its_own(coarse: Problem, tmp_path: Path) -> None:
-    path = write_study(tmp_path, 10)
-    target = "scenarios:\n  far: {target: {distance_m: 150, fov_deg: 60, phase_px: any}, optics: {f_number: 4}}\n"
-    path.write_text(path.read_text() + target)
-    study = load_study(path)
-    problem = study.problem(study.search)
-    limit = limit_checked_by_milp(problem)
-    assert len(smooth_response(problem.setup, problem.setup.camera.base_qe[None])[0]) > 1
-    assert is_mixed(problem, limit.curve)
-    assert limit.proven <= limit_of(coarse).proven * 1.001
 
 
 def test_an_interrupted_proof_returns_its_bound(coarse: Problem) -> None:

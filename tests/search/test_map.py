@@ -21,7 +21,6 @@ from sweep.study import load_study
 
 from ..build import ran
 from ..commanded import commanded
-from ..conftest import FinishedFolder
 
 STUDY = """\
 study: tiny band
@@ -88,7 +87,7 @@ def test_the_report_says_how_wide_a_band_may_be(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("curve", [lambda nm: 300 * np.exp(-nm / 50), lambda nm: 200 - (nm / 4) ** 2])
-@pytest.mark.parametrize("level", [81.0, 100.0, 120.0, 123.0])
+@pytest.mark.parametrize("level", [81.0, 123.0])
 def test_a_width_between_cells_reaches_the_level(curve: Callable[[np.ndarray], np.ndarray], level: float) -> None:
     """Of a convex and a concave objective, on coarse and on fine maps; the fine one is within 0.1 nm of the end."""
     exact = brentq(lambda nm: curve(nm) - level, 10, 80)
@@ -106,21 +105,14 @@ def test_a_width_on_the_edge_of_the_map_is_that_of_a_cell() -> None:
     assert np.isnan(_width_at(widths_nm, np.array([50.0, 40.0, 30.0]), 60.0))
 
 
-@pytest.mark.parametrize("top_nm", [634.0, 637.0, 638.0, 639.7])
-@pytest.mark.parametrize("slopes", [(0.4, 0.6), (1.5, 0.2), (0.2, 1.5)], ids=str)
-def test_the_widest_band_is_no_wider_than_that_of_any_peak(top_nm: float, slopes: tuple[float, float]) -> None:
+@pytest.mark.parametrize("top_nm", [634.0, 637.0, 639.7])
+def test_the_widest_band_is_no_wider_than_that_of_any_peak(top_nm: float) -> None:
     """Of two lines that meet at the top, and of a cubic."""
     peaks_nm = np.arange(620.0, 661.0, 4.0)
-
-    def tent(nm: np.ndarray) -> np.ndarray:
-        return 45 - np.where(nm < top_nm, slopes[0], slopes[1]) * np.abs(nm - top_nm)
-
-    def cubic(nm: np.ndarray) -> np.ndarray:
-        return 45 - slopes[0] * (nm - top_nm) ** 2 / 10 * (1 - slopes[1] * (nm - top_nm) / 100)
-
-    _, fwhm_nm = _widest(peaks_nm, tent(peaks_nm), 80.0)
-    assert tent(peaks_nm).max() <= fwhm_nm <= 45 + 1e-9
-    peak_nm, fwhm_nm = _widest(peaks_nm, cubic(peaks_nm), 80.0)
+    off_nm = peaks_nm - top_nm
+    tent = 45 - np.where(off_nm < 0, 1.5, 0.2) * np.abs(off_nm)
+    assert tent.max() <= _widest(peaks_nm, tent, 80.0)[1] <= 45 + 1e-9
+    peak_nm, fwhm_nm = _widest(peaks_nm, 45 - 0.15 * off_nm**2 * (1 - off_nm / 500), 80.0)
     assert 44.9 <= fwhm_nm <= 45 + 1e-9
     assert peak_nm == pytest.approx(top_nm, abs=0.5)
 
@@ -138,15 +130,6 @@ def test_the_specification_has_amounts_for_every_width(folder: Path, tmp_path: P
     np.testing.assert_allclose(
         table["csd_yellow_red"], cells.groupby("fwhm_nm")["objective"].max().to_numpy(), rtol=1e-9
     )
-
-
-def test_without_a_map_there_is_no_specification(finished: FinishedFolder, tmp_path: Path) -> None:
-    code, _, said = commanded(
-        *("export", finished("stopband"), "--design", "RGGB", "--specification", "--to", tmp_path)
-    )
-    assert code == 2
-    assert "no map of absorption bands" in said
-    assert not list(tmp_path.iterdir())
 
 
 def test_the_width_of_a_colorant_is_that_at_half_height() -> None:

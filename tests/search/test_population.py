@@ -30,11 +30,10 @@ def problem(**given: float) -> Problem:
     return replace(PROBLEM, setup=setup, objective=Objective(minimum={"worst_csd_yellow_red": 1.0}))
 
 
-@pytest.mark.slow
 def test_rows_over_the_population_have_their_derivative() -> None:
     shifted = replace(problem(binning_nm=1), tolerance=Tolerance(2.0, 0.003))
     model, checked = Model(shifted, SearchRun(0), 1000), 0
-    for u in starting_points(shifted, 4, 3):
+    for u in starting_points(shifted, 2, 3):
         here = model.at(u)
         assert np.sqrt(here.terms.values.min()) == pytest.approx(here.evaluation.objective, rel=1e-12)
         rows = np.argsort(here.terms.values)[:20]
@@ -46,7 +45,7 @@ def test_rows_over_the_population_have_their_derivative() -> None:
             ends = [model.at(u + sign * step).terms.values[rows] for sign in (1, -1)]
             np.testing.assert_allclose((ends[0] - ends[1]) / 2e-6, here.terms.by_u[rows, free], rtol=1e-3, atol=1e-2)
             checked += 1
-    assert checked >= 12
+    assert checked >= 6
 
 
 def test_a_point_that_is_no_number_has_as_many_rows_and_is_never_feasible() -> None:
@@ -65,23 +64,9 @@ def limit() -> Limit:
 
 
 @pytest.mark.slow
-def test_the_limit_is_attained_over_all_members() -> None:
-    found = limit()
-    assert 0 <= found.proven - found.attained <= 0.02
-    over = population_model(problem(binning_nm=1).setup).worst(found.curve[None, None])["csd_yellow_red"][0]
-    assert over == pytest.approx(found.attained, rel=1e-9)
-    assert found.open_parts == 0
-
-
-@pytest.mark.slow
-def test_a_larger_population_has_a_lower_limit() -> None:
-    assert limit().proven < limit_of(problem()).proven < limit_of(PROBLEM).proven
-
-
-@pytest.mark.slow
 def test_no_random_filter_beats_the_limit_over_the_population() -> None:
     setup, rng, best = problem(binning_nm=1).setup, np.random.default_rng(3), 0.0
-    for kind in ("stopband", "multi_stopband", "free_form"):
+    for kind in ("stopband", "free_form"):
         worst = population_model(setup).worst(feasible_filters(setup, kind, 3000, rng), [YELLOW_RED])
         best = max(best, float(worst["csd_yellow_red"].max()))
     assert 0.3 * limit().proven < best <= limit().proven

@@ -32,18 +32,15 @@ from .problems import PROBLEM, STUDY, best_of, csd_of
 SETUP, FAMILY, N_FREE = PROBLEM.setup, PROBLEM.family, PROBLEM.free.size
 
 
-@pytest.mark.parametrize(
-    ("designs", "starts"), [(20_000, 4), pytest.param(1_000_000, 16, marks=pytest.mark.slow)], ids=["few", "a million"]
-)
-def test_search_beats_random_designs_of_its_box(designs: int, starts: int) -> None:
+def test_search_beats_random_designs_of_its_box() -> None:
     rng, best_drawn = np.random.default_rng(7), 0.0
-    for _ in range(designs // 4000):
+    for _ in range(5):
         x = PROBLEM.from_unit(rng.uniform(size=(4000, N_FREE)))
         curves = FAMILY.curves(x)
         crossed = np.maximum(FAMILY.violation(x).max(axis=1), 0)
         feasible = total_violation(designed_quantities(SETUP, curves), PROBLEM.constraints, crossed) <= FEASIBLE
         best_drawn = max(best_drawn, csd_of(SETUP, curves[feasible]).max(initial=0.0))
-    assert best_of(PROBLEM, starts, 125).objective >= best_drawn > 200
+    assert best_of(PROBLEM, 4, 125).objective >= best_drawn > 200
 
 
 def test_answer_is_feasible_when_checked_again() -> None:
@@ -54,10 +51,9 @@ def test_answer_is_feasible_when_checked_again() -> None:
     assert (FAMILY.violation(best.x[None]) <= FEASIBLE).all()
 
 
-@pytest.mark.parametrize("budget", [1, 2, 7])
-def test_budget_counts_simulations(budget: int) -> None:
-    run = search_from(PROBLEM, 0, np.full(N_FREE, 0.3), "MMA", budget)
-    assert len(run.log) == budget
+def test_budget_counts_simulations() -> None:
+    run = search_from(PROBLEM, 0, np.full(N_FREE, 0.3), "MMA", 7)
+    assert len(run.log) == 7
     assert run.status == "maxeval_reached"
 
 
@@ -71,18 +67,6 @@ def test_settled_search_misses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
         whole = search_from(PROBLEM, i, u, "SLSQP", 125)
         assert [e.objective for e in whole.log[: len(ended[i].log)]] == [e.objective for e in ended[i].log]
         assert best_feasible(whole.log).objective <= best_feasible(ended[i].log).objective * (1 + 1e-9)
-
-
-def test_a_search_whose_budget_is_spent_says_so_even_where_it_lies_in_one_place() -> None:
-    start = starting_points(PROBLEM, 1, 1)[0]
-    whole = search_from(PROBLEM, 0, start, "COBYLA", 2000)
-    assert whole.status == "xtol_reached"
-    budget = len(whole.log) - 1
-    latest = [PROBLEM.to_unit(evaluation.x) for evaluation in whole.log[budget - 16 : budget]]
-    assert np.ptp(latest, axis=0).max() <= 1e-6
-    run = search_from(PROBLEM, 0, start, "COBYLA", budget)
-    assert len(run.log) == budget
-    assert run.status == "maxeval_reached"
 
 
 def test_a_search_has_not_settled_while_its_objective_moves() -> None:
@@ -109,6 +93,14 @@ def test_a_search_ends_where_its_algorithm_asks_for_no_number() -> None:
     assert len(run.log) == 1
 
 
+def test_a_solver_that_fails_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: object) -> None:
+        raise RuntimeError
+
+    monkeypatch.setattr("nlopt.opt.optimize", fails)
+    assert search_from(PROBLEM, 0, np.full(N_FREE, 0.5), "SLSQP", 10).status == "failed"
+
+
 def test_same_seed_gives_the_same_log() -> None:
     u = starting_points(PROBLEM, 3, 5)
     np.testing.assert_array_equal(u, starting_points(PROBLEM, 3, 5))
@@ -124,20 +116,12 @@ def test_best_of_a_log() -> None:
     assert best_feasible(log[1:2]) is None
 
 
-def test_constraint_on_another_pair_is_met() -> None:
-    bounds = {"sensitivity": Bound(min=0.85), "csd_orange_red": Bound(min=100)}
-    best = best_of(replace(PROBLEM, constraints=PROBLEM.constraints | bounds), 4, 125)
-    assert csd_of(SETUP, FAMILY.curves(best.x[None]), ("orange", "red"))[0] >= 100 * (1 - FEASIBLE)
-
-
 @pytest.mark.parametrize(
     ("algorithm", "share"),
     [
         ("COBYLA", 0.95),
-        pytest.param("MMA", 0.99, marks=pytest.mark.slow),
         pytest.param("ISRES", 0.5, marks=pytest.mark.slow),
         pytest.param("ORIG_DIRECT_L", 0.6, marks=pytest.mark.slow),
-        pytest.param("AGS", 0.5, marks=pytest.mark.slow),
     ],
 )
 def test_every_algorithm_finds_feasible_designs_within_its_budget(algorithm: str, share: float) -> None:
@@ -149,13 +133,6 @@ def test_every_algorithm_finds_feasible_designs_within_its_budget(algorithm: str
     ]
     assert len(log) <= 400
     assert share * optimum <= best_feasible(log).objective <= optimum * (1 + 1e-6)
-
-
-@pytest.mark.parametrize("algorithm", ["ISRES", "COBYLA"])
-def test_direct_algorithms_repeat(algorithm: str) -> None:
-    u = starting_points(PROBLEM, 1, 5)[0]
-    logs = [[e.objective for e in search_from(PROBLEM, 3, u, algorithm, 60, seed=9).log] for _ in range(2)]
-    assert logs[0] == logs[1]
 
 
 def test_a_filter_without_light_does_not_end_the_search() -> None:
@@ -184,17 +161,13 @@ def test_a_constraint_at_the_end_of_a_quantity_is_met(name: str, bound: Bound) -
 
 
 def test_bounds_on_dimensions_are_met() -> None:
-    """Also an edge as wide as the box allows."""
     limits = {"edge_width_nm": Bound(min=25.0), "band_width_nm": Bound(min=40.0), "sensitivity": Bound(min=0.8)}
     left, left_width, right, right_width, _ = best_of(replace(PROBLEM, constraints=limits), 4, 125).x
     assert min(left_width, right_width) >= 25 * (1 - 1e-9)
     assert right - left >= 40 * (1 - 1e-9)
-    widest = {"edge_width_nm": Bound(min=float(PROBLEM.high[1])), "sensitivity": Bound(min=0.9)}
-    best = best_of(replace(PROBLEM, constraints=widest), 4, 100)
-    assert best.x[[1, 3]] == pytest.approx(PROBLEM.high[[1, 3]], rel=1e-8)
 
 
-@pytest.mark.parametrize("bound", [0.0, 1e-12, 1e-6, 0.06, 300.0])
+@pytest.mark.parametrize("bound", [0.0, 1e-6, 300.0])
 def test_rounding_is_no_violation_of_any_bound(bound: float) -> None:
     """A slope of 1e-16 is one of a flat filter; what misses a bound by a thousandth, or by 1e-6, does violate it."""
     for kind in (Bound(max=bound), Bound(min=bound)):
@@ -213,15 +186,8 @@ TINY = stopband_study(
 )
 
 
-@pytest.mark.parametrize(
-    ("tolerance_dn", "where"),
-    [
-        pytest.param(1e-3, "upper bound exceeded (bug): ", marks=pytest.mark.slow),
-        (0.02, "upper bound exceeded (bug) at a sensitivity"),
-    ],
-)
 def test_an_upper_bound_below_the_search_result_stops_the_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tolerance_dn: float, where: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """One line, an exit code of its own, no results; and what was searched is not searched again."""
     (tmp_path / "tiny.yaml").write_text(TINY)
@@ -233,7 +199,7 @@ def test_an_upper_bound_below_the_search_result_stops_the_run(
 
     def planted(problem: Problem, tolerance: float = 1e-3, *rest: int) -> Limit:
         found = limit_of(problem, tolerance, *rest)
-        return replace(found, proven=0.5 * found.proven) if tolerance == tolerance_dn else found
+        return replace(found, proven=0.5 * found.proven) if tolerance == 0.02 else found
 
     def ended() -> object:
         command = ["sweep", "run", str(tmp_path / "tiny.yaml"), "--output", str(tmp_path), "--jobs", "1"]
@@ -248,17 +214,15 @@ def test_an_upper_bound_below_the_search_result_stops_the_run(
         for module in (searching, trade_off):
             wrong.setattr(module, "limit_of", planted)
         assert ended() == UpperBoundExceededError.exit_code == 5
-        said = capsys.readouterr().err.splitlines()
-        assert len(said) == 1
-        assert where in said[0]
+        (said,) = capsys.readouterr().err.splitlines()
+        assert "upper bound exceeded (bug) at a sensitivity" in said
         first = len(searched)
-        assert first >= 2
         assert ended() == 5
         assert len(searched) == first
     assert not (tmp_path / "tiny" / "results.parquet").exists()
     assert ended() == 0  # the wrong limit was not kept, and what was searched was
     assert (tmp_path / "tiny" / "results.parquet").exists()
-    assert searched[first:].count(0) == (3 if tolerance_dn == 1e-3 else 0), searched  # the levels of the front alone
+    assert searched[first:].count(0) == 0
 
 
 CASE = """\

@@ -12,15 +12,12 @@ from sweep.camera.pixel import Pixel
 from sweep.camera.scene import Scene
 from sweep.designs.tolerance import NONE, Tolerance
 from sweep.metrics.bound import Bound
-from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.objective import Objective
 from sweep.metrics.smooth import smooth_csd
 from sweep.search.limit import limit_of, reason_without_bound
 from sweep.search.problem import Problem, starting_points
-from sweep.search.solver import extreme_value
 
-from ..cases import thinned
-from .problems import PROBLEM, best_of, best_random, csd_of, problem_of, rows_at
+from .problems import PROBLEM, best_of, csd_of, problem_of, rows_at
 
 EVERYTHING = {
     "sensitivity": Bound(min=0.9, max=0.99),
@@ -52,7 +49,7 @@ def check_derivatives(problem: Problem, u: np.ndarray, parameters: range) -> Non
 
 
 @pytest.mark.parametrize("objective", OBJECTIVES, ids=str)
-@pytest.mark.parametrize("name", thinned(["stopband", "rccb", "freeform", "producible"]))
+@pytest.mark.parametrize("name", ["stopband", "freeform"])
 def test_derivatives_agree_with_differences(name: str, objective: Objective) -> None:
     problem = problem_of(name)
     own = {n: b for n, b in EVERYTHING.items() if n not in ("edge_width_nm", "band_width_nm") or name != "freeform"}
@@ -96,42 +93,8 @@ def test_worst_case_is_the_smallest_over_the_shifts() -> None:
     best = best_of(problem, 1, 100)
     moved = np.repeat(best.x[None], 401, axis=0)
     moved[:, [0, 2]] += np.linspace(-4, 4, 401)[:, None]
-    curves = problem.family.curves(moved)
-    csd = csd_of(problem.setup, curves)
+    csd = csd_of(problem.setup, problem.family.curves(moved))
     assert best.objective == pytest.approx(csd[::100].min(), rel=1e-12)
     # Between the five shifts that are computed, nothing is much worse.
     assert csd.min() >= best.objective * 0.99
-    assert designed_quantities(problem.setup, curves)["sensitivity"].min() >= 0.9 - 1e-3
     assert best_of(replace(problem, tolerance=NONE), 1, 100).objective > best.objective
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("algorithm", ["SLSQP", "COBYLA"])
-@pytest.mark.parametrize("objective", OBJECTIVES[1:], ids=str)
-def test_combined_objectives_improve_on_random_designs(algorithm: str, objective: Objective) -> None:
-    problem = replace(PROBLEM, objective=objective, tolerance=Tolerance(1.0))
-    assert best_of(problem, 4, 150, algorithm).objective > best_random(problem, 400).objective
-
-
-@pytest.mark.slow
-def test_best_reachable_is_the_extreme_of_a_quantity_alone() -> None:
-    starts = starting_points(PROBLEM, 4, 1)
-    impossible = {
-        "sensitivity": Bound(min=1.01),
-        "slope_per_nm": Bound(max=1e-5),
-        "band_width_nm": Bound(min=1000.0),
-        "csd_yellow_red": Bound(min=4000.0),
-    }
-    problem = replace(PROBLEM, constraints=impossible)
-    found = {name: extreme_value(problem, name, starts, 200) for name in impossible}
-    base = PROBLEM.setup.camera.base_qe
-    u = np.random.default_rng(5).uniform(size=(20_000, problem.free.size))
-    x = problem.from_unit(u)
-    x = x[(problem.family.violation(x) <= 0).all(axis=1)]
-    tried = designed_quantities(problem.setup, problem.family.curves(x))["sensitivity"]
-    assert tried.max() <= found["sensitivity"] < 1
-    # No stopband is flatter than its base where it leaves it alone.
-    assert found["slope_per_nm"] >= np.abs(np.diff(base[0])).max() * (1 - 1e-9)
-    assert found["slope_per_nm"] < 0.06
-    assert found["band_width_nm"] == pytest.approx(problem.high[2] - problem.low[0], rel=1e-6)
-    assert csd_of(problem.setup, problem.family.curves(x)).max() <= found["csd_yellow_red"] < 4000
