@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -57,12 +56,12 @@ class Mosaic:
             )
         return cls.from_rows(name, [tokens[:2], tokens[2:]])
 
-    @cached_property
+    @property
     def indices(self) -> Int[IndexArray, "rows columns"]:
         """Tile of channel indices."""
         return np.asarray(self.tile, dtype=np.intp)
 
-    @cached_property
+    @property
     def counts(self) -> Int[IndexArray, " channels"]:
         """Pixels of each channel per tile."""
         return np.bincount(self.indices.ravel(), minlength=len(self.channels))

@@ -153,9 +153,7 @@ class Readout:
             means[..., at] = pixel_curve(self.pixel, of_elements, noisy=True).mean(full_e[..., at])
         return means
 
-    def _whole_numbers(
-        self, electrons: Float[Array, "captures *batch pixels"], clips: bool
-    ) -> Float[Array, "captures *batch pixels"]:
+    def _whole_numbers(self, electrons: SameShape, clips: bool) -> SameShape:
         """Convert electrons to whole digital numbers without noise, in one pass."""
         from .pixel_kernels import whole_numbers  # noqa: PLC0415  (compiled: kept off the start-up path)
 

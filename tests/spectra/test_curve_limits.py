@@ -211,6 +211,8 @@ def test_a_picture_of_very_many_curves_is_of_an_even_share(monkeypatch: pytest.M
     from sweep.spectra.facts import Curve, Facts
 
     monkeypatch.setattr(picture, "_MOST_DRAWN", 3)
-    axes = picture.draw("many", Facts(tuple(Curve(f"c{i}", WAVE, np.full(WAVE.size, i)) for i in range(8))), {}).axes[0]
+    axes = picture.draw(
+        "many", Facts(tuple(Curve(f"c{i}", WAVE, np.full(WAVE.size, float(i))) for i in range(8))), {}
+    ).axes[0]
     assert axes.get_title() == "many: 3 of 8 curves"
     assert [line.get_ydata()[0] for line in axes.lines if len(line.get_xdata()) == WAVE.size] == [0, 3, 6]
