@@ -18,9 +18,6 @@ from .irradiance import path_factor, scene_irradiance
 from .response import PixelResponse, SplitLight
 from .setup import Setup
 
-_MANY = 50_000
-"""Values from which on a compiled pass saves more time than it takes to load."""
-
 
 class FieldPosition:
     """Light of a scene behind air and lens, and its filters in the cone of rays, at one field position.
@@ -143,9 +140,8 @@ class Electrons:
         """Return expected electrons of that element."""
         fixed, unlit = np.ascontiguousarray(self.fixed[:, :, self.one_element]), self.unlit_along(products)
         electrons = products[:, 1:].reshape(-1, *fixed.shape).copy()
-        if electrons.size < _MANY:
-            return np.asarray(((fixed + electrons) + unlit[..., None]) * time_s)
-        from .pixel_kernels import expose  # noqa: PLC0415  (compiled: kept off the start-up path)
-
-        expose(electrons, fixed, unlit, time_s)
+        # In place: to give memory to an array of all signals takes as long as a sum.
+        electrons += fixed
+        electrons += unlit[..., None]
+        electrons *= time_s
         return electrons

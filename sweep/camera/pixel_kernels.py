@@ -1,8 +1,6 @@
-"""Compiled inner loops of pixels: their light, exposure and readout in whole numbers. They release the GIL."""
+"""Compiled inner loop of the light of pixels. It releases the GIL."""
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 
@@ -34,34 +32,3 @@ def gather(light: FloatArray, shares: FloatArray, place: IndexArray, through: In
                 if lit:
                     for s in range(n_signals):
                         out[design, case, s, unit] += pixel_light[s]
-
-
-@njit(cache=True, nogil=True)
-def expose(rates: FloatArray, fixed: FloatArray, uniform: FloatArray, time_s: float) -> None:
-    """Replace `rates` by (rates + fixed + uniform) time_s.
-
-    `rates`: electrons/s; changed in place; `fixed`: electrons/s of fixed channels; `uniform`: electrons/s of background
-    and dark current.
-    """
-    for d in range(rates.shape[0]):
-        for case in range(rates.shape[1]):
-            for s in range(rates.shape[2]):
-                rates[d, case, s] = ((fixed[case, s] + rates[d, case, s]) + uniform[d, case]) * time_s
-
-
-@njit(cache=True, nogil=True)
-def whole_numbers(
-    electrons: FloatArray, top_e: float, dn_per_e: float, offset_dn: float, full_scale_dn: float, out: FloatArray
-) -> None:
-    """Convert electrons to whole digital numbers; NaN stays NaN.
-
-    `dn_per_e`, `offset_dn`, `full_scale_dn`: gain, pedestal and full scale, DN; `out`: digital numbers, DN.
-    """
-    whole_dn = math.floor(offset_dn)
-    rest = offset_dn - whole_dn
-    for i in range(electrons.size):
-        held = electrons[i]
-        held = top_e if held > top_e else held
-        steps = np.floor((held * dn_per_e + rest) + 0.5) + whole_dn
-        steps = 0.0 if steps < 0.0 else steps
-        out[i] = full_scale_dn if steps > full_scale_dn else steps

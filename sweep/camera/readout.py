@@ -5,7 +5,6 @@ A channel is the mean over the disc, or the demosaicked center.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +19,6 @@ from .setup import Setup
 
 _CERTAIN_DN2 = 1e-9
 _FEW = 16
-_MANY = 50_000
 """Values from which on a compiled pass saves more time than it takes to load."""
 
 
@@ -128,8 +126,6 @@ class Readout:
         clips, rounds = setup.computes("saturation"), setup.computes("quantization")
         if noisy and setup.computes("noise"):
             return (table.mean_rounded if rounds else table.mean_unrounded)(electrons, pixel)
-        if rounds and not noisy and electrons.size > _MANY:
-            return self._whole_numbers(electrons, clips)
         held = np.minimum(electrons, pixel.saturation_e) if clips else electrons
         if not rounds:
             return unquantized(held, pixel)
@@ -152,17 +148,6 @@ class Readout:
         for of_elements, at in others:
             means[..., at] = pixel_curve(self.pixel, of_elements, noisy=True).mean(full_e[..., at])
         return means
-
-    def _whole_numbers(self, electrons: SameShape, clips: bool) -> SameShape:
-        """Convert electrons to whole digital numbers without noise, in one pass."""
-        from .pixel_kernels import whole_numbers  # noqa: PLC0415  (compiled: kept off the start-up path)
-
-        many = np.ascontiguousarray(electrons)
-        numbers = np.empty_like(many)
-        top_e = self.pixel.saturation_e if clips else math.inf
-        line = top_e, self.pixel.dn_per_e, self.pixel.offset_dn, float(self.pixel.full_scale_dn)
-        whole_numbers(many.reshape(-1), *line, numbers.reshape(-1))
-        return numbers
 
     def capture_light_of(self, electrons: Float[Array, "captures ... pixels"]) -> Float[Array, "captures ... pixels"]:
         """Return the relative light of exposures, broadcast to their electrons."""

@@ -85,10 +85,9 @@ def test_a_whole_pedestal_cancels_to_the_last_digit() -> None:
     )
 
 
-@pytest.mark.parametrize("count", [100, 2**21])
-def test_whole_numbers_of_few_and_of_many_pixels(count: int) -> None:
-    """Without noise: clipped at the full well, rounded, cut at the end of the ADC."""
+def test_whole_numbers_without_noise() -> None:
+    """Clipped at the full well, rounded, cut at the end of the ADC."""
     made = scene("one", "RGGB", {}, {"well_e": 9000.0, "gain_dn_per_e": 0.5, "offset_dn": 3.25}).setup
-    electrons = np.linspace(0, 10_000, count)
+    electrons = np.linspace(0, 10_000, 100_001)
     expected = np.minimum(np.floor(np.minimum(electrons, (4095 - 3.25) / 0.5) * 0.5 + 3.25 + 0.5), 4095)
     np.testing.assert_array_equal(SceneModel(made).readout.transfer(electrons), expected)

@@ -21,8 +21,7 @@ def rounded(dn: SameShape, pixel: Pixel) -> SameShape:
     The whole part of the pedestal is added after rounding, so that values with and without a whole pedestal differ by
     exactly that.
 
-    `dn`: without pedestal, DN. The whole part of the pedestal is added after rounding, so that values with and without
-    a whole pedestal differ by exactly that.
+    `dn`: without pedestal, DN.
     """
     whole_dn = math.floor(pixel.offset_dn)
     steps = np.asarray(dn + (pixel.offset_dn - whole_dn), dtype=float)
