@@ -26,8 +26,8 @@ _FINER_MOMENTS, _MOMENT_ROUNDS, _MOMENTS_FINER = 8, 3, 4
 HEIGHT_ROUNDS = 4
 _TOGETHER = 64
 """Designs that are refined side by side."""
-_Values = Float[Array, "values places"]
-_At = Callable[[Sequence[DesignCurves], Sequence[Float[Array, "places axes"]]], list[_Values]]
+_Values = Float[Array, "values _places"]
+_At = Callable[[Sequence[DesignCurves], Sequence[Float[Array, "_places axes"]]], list[_Values]]
 """From designs, and places of each, to their CSDs there."""
 
 
@@ -130,7 +130,7 @@ def _csds(
 def _at_phases(model: SceneModel) -> _At:
     """Return the function of both ends of designs' CSDs at sampling phases, over field positions and moments."""
 
-    def at(curves: Sequence[DesignCurves], places: Sequence[Float[Array, "places axes"]]) -> list[_Values]:
+    def at(curves: Sequence[DesignCurves], places: Sequence[Float[Array, "_places axes"]]) -> list[_Values]:
         centers, which = np.unique(np.concatenate(places), axis=0, return_inverse=True)
         phases, choices = phases_at(model.setup, centers)
         numbers = choices[:, which.ravel()]
@@ -157,7 +157,7 @@ def _at_phases(model: SceneModel) -> _At:
 def _at_heights(model: SceneModel) -> _At:
     """Return the function of both ends of designs' CSDs at field positions, over phases and moments."""
 
-    def at(curves: Sequence[DesignCurves], places: Sequence[Float[Array, "places axes"]]) -> list[_Values]:
+    def at(curves: Sequence[DesignCurves], places: Sequence[Float[Array, "_places axes"]]) -> list[_Values]:
         heights = np.unique(np.concatenate(places))
         of_heights = []
         for height in heights.tolist():
@@ -202,7 +202,7 @@ def _over_pulse(
 ) -> Float[Array, " pairs"]:
     """Return the smallest CSDs of some pairs of one design at any moment of a pulse over some views."""
 
-    def at(_: list[int], moments: list[Float[Array, "places axes"]]) -> list[_Values]:
+    def at(_: list[int], moments: list[Float[Array, "_places axes"]]) -> list[_Values]:
         response = model.read(curves, views, moments[0][:, 0])[0][0]
         csds = [values.reshape(-1, len(moments[0])).min(axis=0) for values in separations(response, members).values()]
         return [np.stack([csds[pair] for pair in pairs])]

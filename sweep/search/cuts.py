@@ -152,7 +152,7 @@ class Heights(Source):
     def nearest(self, name: str, curve: PerWavelength) -> Nearest:
         """Return each two signals at the height at which two of them are nearest."""
 
-        def at(_: list[int], places: list[Float[Array, "places axes"]]) -> list[Float[Array, "values places"]]:
+        def at(_: list[int], places: list[Float[Array, "_places axes"]]) -> list[Float[Array, "values _places"]]:
             responses = [self._at(height).smooth(curve[None, None])[0] for height in places[0][:, 0].tolist()]
             least = [separations(each, self._setup.members)[self._types[name]].min() for each in responses]
             return [np.array([least])]
