@@ -44,9 +44,9 @@ _MOST_RATIO = 1e9
 class LampReadings:
     """Electrons of the lamps of a design in one case, and how they are read.
 
-    `lit_e` and `dark_e`: electrons of the lamps at
-    the brightness of the scene, and without lamps. `light`: of the exposures on the elements, relative to a pixel of
-    full sensitivity. `readout`: that of the case alone. Pixels with the same light are one element: `n_pixels` of them.
+    `lit_e` and `dark_e`: electrons of the lamps at the brightness of the scene, and without lamps. `light`: of the
+    exposures on the elements, relative to a pixel of full sensitivity. `readout`: that of the case alone. Pixels with
+    the same light are one element; `n_pixels` counts all pixels.
     """
 
     lit_e: Float[Array, "captures signals pixels"]

@@ -54,10 +54,10 @@ class Electrons:
 
     def subset(self, which: slice | Int[IndexArray, " subset"]) -> Electrons:
         """Return the electrons at some phases."""
-        some = copy(self)
-        some.response, some.fixed = self.response.subset(which), self.fixed[which]
-        some._fixed_uniform, some._modified_uniform = self._fixed_uniform[which], self._modified_uniform[which]
-        return some
+        subset = copy(self)
+        subset.response, subset.fixed = self.response.subset(which), self.fixed[which]
+        subset._fixed_uniform, subset._modified_uniform = self._fixed_uniform[which], self._modified_uniform[which]
+        return subset
 
     def _add(self, qe: DesignCurves, channels: Sequence[int], out: DesignPixels) -> None:
         """Add sums of light times QE times signals over some channels and all wavelengths in place."""

@@ -300,25 +300,25 @@ class SceneModel:
             return None
         if not which.all():
             of_views = [of_view[which] for of_view in of_views]
-        own, channel = [*zip(columns, of_views, strict=True)], int(columns[0].one_element or 0)
+        rates_of, channel = [*zip(columns, of_views, strict=True)], int(columns[0].one_element or 0)
         readout = views[0].readout
         nothing = np.zeros((1, *setup.camera.base_qe.shape))
         dark = [electrons.unlit(nothing)[0] for electrons in columns]
         rest = [electrons.fixed + unlit[:, None] for electrons, unlit in zip(columns, dark, strict=True)]
-        own_s, dark_e = float(time_s[0]), np.concatenate(dark) * time_s[0]
+        exposure_s, dark_e = float(time_s[0]), np.concatenate(dark) * time_s[0]
 
         def make(part: slice) -> Float[Array, "_designs cases signals"]:
-            electrons = [of.expected_along(rates[part], own_s) for of, rates in own]
-            return readout.transfer(electrons[0] if len(own) == 1 else np.concatenate(electrons, axis=1))
+            electrons = [of.expected_along(rates[part], exposure_s) for of, rates in rates_of]
+            return readout.transfer(electrons[0] if len(rates_of) == 1 else np.concatenate(electrons, axis=1))
 
         def unlit(part: slice) -> Float[Array, "designs cases channels"]:
-            of_channel = np.concatenate([of.unlit_along(rates[part]) for of, rates in own], axis=1)
+            of_channel = np.concatenate([of.unlit_along(rates[part]) for of, rates in rates_of], axis=1)
             electrons = np.repeat(dark_e[None], len(of_channel), axis=0)
-            electrons[..., channel] = of_channel * own_s
+            electrons[..., channel] = of_channel * exposure_s
             return unquantized(electrons, readout.pixel)
 
         fixed = readout.transfer(np.concatenate(rest) * time_s[0])
-        return Changing(fixed, channel, make, own_s, which, unlit)
+        return Changing(fixed, channel, make, exposure_s, which, unlit)
 
     @cached_property
     def _along(self) -> FloatArray | None:

@@ -118,7 +118,7 @@ class Responses:
     def __init__(self, setup: Setup) -> None:
         self._setup = setup
         self._channels: dict[tuple[float, ...], tuple[FloatArray, FloatArray]] = {}
-        self._lattices: Cache[bytes, PixelResponse] = Cache(2)
+        self._lattices: Cache[Hashable, PixelResponse] = Cache(2)
 
     def pixels(self, phases: Phases) -> PixelResponse:
         """Return the response of single pixels, for a nonlinear readout."""
@@ -128,7 +128,7 @@ class Responses:
 
         if len(phases) < _LATTICE:
             return compute()
-        return self._lattices.get(b"".join(map(bytes, (phases.center_px, phases.nearest_px))), compute)
+        return self._lattices.get(tuple(phases.keys), compute)
 
     def channels(self, phases: Phases) -> PixelResponse:
         """Return the response of channels."""

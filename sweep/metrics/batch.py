@@ -128,12 +128,12 @@ class Batch:
             wanted = np.zeros(self.size, dtype=bool) if wanted is None else wanted
             states = class_pairs(list(self.states)) if self.any_brightness else []
             of_pairs, of_states = ({p: np.full(self.size, np.nan) for p in pairs} for pairs in (self.pairs, states))
-            self._over_brightness = found = of_pairs, of_states
+            self._over_brightness = both = of_pairs, of_states
             for design in np.flatnonzero(wanted | bool(states)):
                 curves = self.curves_of(int(design))
                 if np.isfinite(curves).all() and np.isfinite(self.exposure_s[design]):
                     cases = curves_of(scene_model(self.setup.over_brightness).lamps(curves), self.setup)
-                    for noise, distances in enumerate(found):
+                    for noise, distances in enumerate(both):
                         for a, b in distances if noise or wanted[design] else ():
                             members = self.setup.members[a], self.setup.members[b]
                             distances[a, b][design] = chromatic_distance(cases, *members, noise=bool(noise))
@@ -146,7 +146,7 @@ class Batch:
 
     @cached_property
     def changing(self) -> Changing | None:
-        """CaseReadings of the designs that differ in one channel alone."""
+        """Readings of the designs that differ in one channel alone."""
         return None if self.noisy else self.model.changing(self.block)
 
     @cached_property
@@ -173,13 +173,13 @@ class Batch:
         """Yield designs, cases, and their readings, cases first."""
         changing = self.changing
         if changing is not None:
-            own = np.flatnonzero(changing.which)
-            for start in range(0, own.size, _AT_ONCE):
+            designs = np.flatnonzero(changing.which)
+            for start in range(0, designs.size, _AT_ONCE):
                 part = slice(start, start + _AT_ONCE)
                 values, dark = changing.make(part), changing.unlit(part)
                 for case, fixed in enumerate(changing.fixed):
                     of_case = self.setup, self.pairs, dark[:, case], None, fixed, changing.channel, values[:, case]
-                    yield own[part], slice(case, case + 1), CaseReadings(*of_case)
+                    yield designs[part], slice(case, case + 1), CaseReadings(*of_case)
         rest = np.arange(self.size) if changing is None else np.flatnonzero(~changing.which)
         if rest.size:
             yield from self._whole_readings(rest)

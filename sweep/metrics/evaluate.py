@@ -54,12 +54,11 @@ def evaluate(
     needs = {metric.needs for metric in metrics} if states else set()
     wanted = "noise" in needs, "any brightness" in needs
     batch = Batch(model, block, states, tuple(pairs), probabilities, family, points, images, *wanted)
-    own = [metric for metric in metrics if not isinstance(metric, ColorSeparation | UserColumns)]
-    by_case = _by_case(batch, [_CSD, *own, *map(UserColumns, user_metrics)])
+    others = [metric for metric in metrics if not isinstance(metric, ColorSeparation | UserColumns)]
+    by_case = _by_case(batch, [_CSD, *others, *map(UserColumns, user_metrics)])
     batch.columns = over_cases(model, by_case, user_metrics) | {EXPOSURE: batch.exposure_s}
-    for metric in sorted(
-        own, key=lambda metric: metric.needs == "any brightness"
-    ):  # their errors are the larger of two
+    # Last those of any brightness: their errors are at least those of equal brightness.
+    for metric in sorted(others, key=lambda metric: metric.needs == "any brightness"):
         batch.columns |= metric.of_batch(batch)
     return batch.columns | refine(batch, by_case)
 

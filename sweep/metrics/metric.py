@@ -25,45 +25,12 @@ class Metric(ABC):
 
     @abstractmethod
     def quantities(self, requested: RequestedQuantities) -> Sequence[Quantity]:
-        """Return the columns in a study.
-
-        Parameters
-        ----------
-        requested : RequestedQuantities
-            Requested quantities.
-
-        Returns
-        -------
-        sequence of Quantity
-            Columns; none if they are not requested.
-        """
+        """Return the columns in a study; none if they are not requested."""
 
     def of_readings(self, readings: CaseReadings) -> Columns:  # noqa: ARG002
-        """Compute the columns of designs, each in one case.
-
-        Parameters
-        ----------
-        readings : CaseReadings
-            Digital numbers of the designs.
-
-        Returns
-        -------
-        dict of str to ndarray of shape (n_designs,)
-            Column name -> values.
-        """
+        """Compute the columns of designs, each in one case."""
         return {}
 
     def of_batch(self, batch: Batch) -> Columns:  # noqa: ARG002
-        """Compute the columns of designs over all cases.
-
-        Parameters
-        ----------
-        batch : Batch
-            Designs in a scene.
-
-        Returns
-        -------
-        dict of str to ndarray of shape (n_designs,)
-            Column name -> values.
-        """
+        """Compute the columns of designs over all cases."""
         return {}

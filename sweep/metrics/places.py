@@ -55,7 +55,7 @@ def refine(batch: Batch, cases: Columns) -> Columns:
     setup, model = batch.setup, batch.model
     names = [csd_name(pair) for pair in class_pairs(setup.lights.classes)]
     known = np.flatnonzero(np.isfinite(batch.columns[names[0]])) if names else np.empty(0, dtype=np.intp)
-    found = {name: batch.columns[name].copy() for name in (*names, *(BEST_PHASE + name for name in names))}
+    refined = {name: batch.columns[name].copy() for name in (*names, *(BEST_PHASE + name for name in names))}
     fine, pulsed = setup.accuracy.finest_phase_px > 0, _bends_over_pulse(setup)
     if not (pulsed or (fine and (setup.all_phases or setup.all_heights))):
         return {}
@@ -68,29 +68,29 @@ def refine(batch: Batch, cases: Columns) -> Columns:
             extremes = _extremes(lattice, curves, on_lattice, at)
             if pulsed:
                 extremes = [_pulsed(model, *of, len(names)) for of in zip(curves, extremes, strict=True)]
-            _keep(found, names, designs, [least for least, _ in extremes], best=True)
+            _keep(refined, names, designs, [least for least, _ in extremes], best=True)
         elif pulsed and not setup.all_heights:
             views = [*model.own_views()]
             for design, of_design in zip(designs, curves, strict=True):
                 for name, least in zip(names, _over_pulse(model, of_design, views, range(len(names))), strict=True):
                     for column in (name, BEST_PHASE + name) if model.n_cases == 1 else (name,):
-                        found[column][design] = min(found[column][design], least)
+                        refined[column][design] = min(refined[column][design], least)
         if setup.all_heights and fine:
             heights, at = np.array(model.heights), _at_heights(model)
             places = np.stack([cases[name].reshape(heights.size, -1, batch.size).min(axis=1) for name in names], axis=1)
             on_lattice = [_both_ends(places[..., design].T) for design in designs]
             extremes = _extremes(Lattice.along(heights, HEIGHT_ROUNDS), curves, on_lattice, at)
-            at_phases = np.array([[found[name][design] for name in names] for design in designs])
+            at_phases = np.array([[refined[name][design] for name in names] for design in designs])
             least = [
                 np.append(np.minimum(of[: len(names)], own), of[len(names) :])
                 for (of, _), own in zip(extremes, at_phases, strict=True)
             ]
-            _keep(found, names, designs, least, best=model.n_cases == heights.size)
-    return found
+            _keep(refined, names, designs, least, best=model.n_cases == heights.size)
+    return refined
 
 
 def _keep(
-    found: Columns,
+    refined: Columns,
     names: Sequence[str],
     designs: Int[IndexArray, " designs"],
     extremes: Sequence[PerValue],
@@ -100,9 +100,9 @@ def _keep(
     """Put the smallest value of each pair, and the largest, into the columns."""
     for design, both in zip(designs, extremes, strict=True):
         for number, name in enumerate(names):
-            found[name][design] = both[number]
+            refined[name][design] = both[number]
             if best:
-                found[BEST_PHASE + name][design] = -both[number + len(names)]
+                refined[BEST_PHASE + name][design] = -both[number + len(names)]
 
 
 def _both_ends(csds: Float[Array, "pairs places"]) -> _Values:
@@ -135,12 +135,12 @@ def _at_phases(model: SceneModel) -> _At:
         phases, choices = phases_at(model.setup, centers)
         numbers = choices[:, which.ravel()]
         known = [np.empty((0, len(phases)))] * len(curves)
-        own = np.split(numbers, np.cumsum([len(of_design) for of_design in places])[:-1], axis=1)
+        numbers_of = np.split(numbers, np.cumsum([len(of_design) for of_design in places])[:-1], axis=1)
         begin = 0
         for block in [phases] if model.setup.linear else blocks(model.setup, phases):
             views = [*model.views(block)]
             for design, of_design in enumerate(curves):
-                wanted = np.unique(own[design]) - begin
+                wanted = np.unique(numbers_of[design]) - begin
                 wanted = wanted[(wanted >= 0) & (wanted < len(block))]
                 if wanted.size:
                     some = [view.subset(wanted) for view in views]
@@ -149,7 +149,7 @@ def _at_phases(model: SceneModel) -> _At:
                         known[design] = np.full((len(values), len(phases)), np.inf)
                     known[design][:, begin + wanted] = values
             begin += len(block)
-        return [values[:, number].min(axis=1) for values, number in zip(known, own, strict=True)]
+        return [values[:, number].min(axis=1) for values, number in zip(known, numbers_of, strict=True)]
 
     return at
 
@@ -167,8 +167,8 @@ def _at_heights(model: SceneModel) -> _At:
             of_heights.append([_csds(model, c, views, 1).min(axis=(1, 2, 3)) if asks else None for c, asks in asked])
         rows = [np.searchsorted(heights, of_design[:, 0]) for of_design in places]
         return [
-            _both_ends(np.stack([np.asarray(of_heights[row][design]) for row in own], axis=1))
-            for design, own in enumerate(rows)
+            _both_ends(np.stack([np.asarray(of_heights[row][design]) for row in of_design], axis=1))
+            for design, of_design in enumerate(rows)
         ]
 
     return at

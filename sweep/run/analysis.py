@@ -37,8 +37,8 @@ class Analysis:
         """Compute the table of the rows that a report names."""
         keyed = [*self.calls(study, rows)]
         answers = run_with_progress(parallel, [call for _, call in keyed], self.phase, progress)
-        found = [key | row for (key, _), answer in zip(keyed, answers, strict=True) for row in answer]
-        return pa.Table.from_pylist(found, schema=self.schema(study))
+        table_rows = [key | row for (key, _), answer in zip(keyed, answers, strict=True) for row in answer]
+        return pa.Table.from_pylist(table_rows, schema=self.schema(study))
 
 
 @dataclass(frozen=True)

@@ -56,9 +56,8 @@ def _compared(study: Study, space: Space, scenario: str, rows: Sequence[Row]) ->
     points = np.array([[row[name] for name in space.parameters] for row in rows], dtype=float)
     setup = study.setup(space, scenario)
     model = SceneModel(replace(setup.with_all_effects, accuracy=REFERENCE))
-    of_lattice = (
-        setup.all_phases or setup.all_heights or setup.scene.drive is not None
-    )  # chromatic ones are, of it alone
+    # Chromatic distances are the worst of the lattice alone, which differs between settings.
+    of_lattice = setup.all_phases or setup.all_heights or setup.scene.drive is not None
     compared = [of for of in study.quantities.values() if of.metric == CHROMATIC_CSD and not of_lattice]
     compared += [quantity for quantity in study.quantities.values() if quantity.has_error_bound]
     csds = [quantity for quantity in compared if quantity.name in rows[0]]

@@ -70,7 +70,7 @@ class Members(Source):
 
     def _of_ways(self, name: str, curve: PerWavelength, n_ways: int) -> Nearest:
         """Return the nearest members of each two lights and part of their shifts, in each of the first ways."""
-        found, lengths = [], []
+        distances, lengths = [], []
         for way in self._ways[:n_ways]:
             response = self._model.linear.smooth(way.curve(curve)[None, None])[0]
             for case, values in enumerate(response):
@@ -78,9 +78,9 @@ class Members(Source):
                 which = np.isfinite(near.squared)
                 both = self._gain[case], self._others[case]
                 gain, others = (near.of(of, 0)[which] - near.of(of, 1)[which] for of in both)
-                found.append(replace(way.distances(gain), squared=(others**2).sum(axis=1)))
+                distances.append(replace(way.distances(gain), squared=(others**2).sum(axis=1)))
                 lengths.append(np.sqrt(near.squared[which]))
-        return _joined(found), np.concatenate(lengths)
+        return _joined(distances), np.concatenate(lengths)
 
 
 class Brightnesses(Source):

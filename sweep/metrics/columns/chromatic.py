@@ -79,8 +79,9 @@ def _along(readings: CaseReadings) -> tuple[dict[Pair, PerDesign], PerDesign]:
     distances, most_dn, least_dn = chromatic_along(
         readings.fixed, channel, readings.values, dark, setup.members, readings.pairs
     )
-    own, others = dark[:, channel], np.delete(dark[0], channel)
-    darkest_dn, brightest_dn = np.minimum(own, others.min(initial=np.inf)), np.maximum(own, others.max(initial=-np.inf))
+    dark_dn, others_dn = dark[:, channel], np.delete(dark[0], channel)
+    darkest_dn = np.minimum(dark_dn, others_dn.min(initial=np.inf))
+    brightest_dn = np.maximum(dark_dn, others_dn.max(initial=-np.inf))
     return distances, room_of(setup, most_dn, least_dn, darkest_dn, brightest_dn)
 
 
