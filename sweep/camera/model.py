@@ -225,7 +225,7 @@ class SceneModel:
         """
         if self.setup.camera.pixel.captures:
             scales = pwm.exposure_scales(self.setup, exposure_s, moments)
-            return _different_moments(scales) if moments is None else scales
+            return scales[..., np.sort(_different_moments(scales)[0])] if moments is None else scales
         return pwm.scales(self.setup, exposure_s, moments)
 
     def read(
@@ -241,11 +241,16 @@ class SceneModel:
         """
         exposure_s = self.exposure_s(curves)
         scales = self.scales(exposure_s, moments)
+        first, which = _different_moments(scales) if moments is not None else (slice(None), None)
+        scales = scales[..., first]
         parts = []
         for view in self.own_views() if views is None else views:
             dn = [view.readout.folded(view.readout.transfer(e)) for e in self._blocks(view, curves, scales, exposure_s)]
             parts.append(np.concatenate(dn))
-        return np.concatenate(parts, axis=1), exposure_s
+        dn = np.concatenate(parts, axis=1)
+        if which is not None:
+            dn = dn[:, np.arange(dn.shape[1]).reshape(-1, scales.shape[-1])[:, which].ravel()]
+        return dn, exposure_s
 
     def read_with_noise(self, curves: DesignCurves, views: Sequence[View] | None = None) -> NoisyReadout:
         """Read out a batch of designs with the variance of the noise.
@@ -374,10 +379,13 @@ def too_many(model: SceneModel, problem: str) -> SweepError:
     return SweepError(ValidationIssue(problem, value=f"{model.n_cases} phases", allowed=most))
 
 
-def _different_moments(scales: Float[Array, "captures _designs _moments"]) -> Float[Array, "captures designs moments"]:
-    """Return scales, without moments of the same light in all of them."""
+def _different_moments(
+    scales: Float[Array, "... designs moments"],
+) -> tuple[Int[IndexArray, " different"], Int[IndexArray, " moments"]]:
+    """Return the first moment of each light in all designs and exposures, and which of these each moment has."""
     flat = np.round(scales.reshape(-1, scales.shape[-1]), 12)
-    return scales[..., np.sort(np.unique(flat, axis=1, return_index=True)[1])]
+    _, first, which = np.unique(flat, axis=1, return_index=True, return_inverse=True)
+    return first, which.ravel()
 
 
 @lru_cache(maxsize=8)

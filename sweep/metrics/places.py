@@ -72,7 +72,7 @@ def refine(batch: Batch, cases: Columns) -> Columns:
         elif pulsed and not setup.all_heights:
             views = [*model.own_views()]
             for design, of_design in zip(designs, curves, strict=True):
-                for name, least in zip(names, _over_pulse(model, of_design, views, range(len(names))), strict=True):
+                for name, least in zip(names, _over_pulse(model, of_design, views, np.arange(len(names))), strict=True):
                     for column in (name, BEST_PHASE + name) if model.n_cases == 1 else (name,):
                         refined[column][design] = min(refined[column][design], least)
         if setup.all_heights and fine:
@@ -189,23 +189,27 @@ def _pulsed(
     model: SceneModel, curves: DesignCurves, extremes: tuple[PerValue, Float[Array, "values axes"]], n_pairs: int
 ) -> tuple[PerValue, Float[Array, "values axes"]]:
     """Return extremes at the worst moment of a pulse, at the place of each."""
-    least, places = extremes[0].copy(), extremes[1]
-    for number, place in enumerate(places):
+    least = extremes[0].copy()
+    places, which = np.unique(extremes[1], axis=0, return_inverse=True)
+    for at, place in enumerate(places):
         views = [*model.views(phases_at(model.setup, place[None])[0])]
-        there = _over_pulse(model, curves, views, [number % n_pairs])[0]
-        least[number] = min(least[number], there) if number < n_pairs else max(least[number], -there)
-    return least, places
+        numbers = np.flatnonzero(which.ravel() == at)
+        there = _over_pulse(model, curves, views, numbers % n_pairs)
+        least[numbers] = np.where(
+            numbers < n_pairs, np.minimum(least[numbers], there), np.maximum(least[numbers], -there)
+        )
+    return least, extremes[1]
 
 
 def _over_pulse(
-    model: SceneModel, curves: DesignCurves, views: Sequence[View], pairs: Sequence[int]
+    model: SceneModel, curves: DesignCurves, views: Sequence[View], pairs: Int[IndexArray, " pairs"]
 ) -> Float[Array, " pairs"]:
     """Return the smallest CSDs of some pairs of one design at any moment of a pulse over some views."""
 
     def at(_: list[int], moments: list[Float[Array, "_places axes"]]) -> list[_Values]:
         response = model.read(curves, views, moments[0][:, 0])[0][0]
         csds = [values.reshape(-1, len(moments[0])).min(axis=0) for values in separations(response, members).values()]
-        return [np.stack([csds[pair] for pair in pairs])]
+        return [np.stack(csds)[pairs]]
 
     members, finer = model.setup.members, _FINER_MOMENTS * (model.setup.accuracy.pwm_moments - 1)
     first = np.linspace(0.0, 1.0, finer + 1)
