@@ -245,8 +245,8 @@ class SceneModel:
         scales = scales[..., first]
         parts = []
         for view in self.own_views() if views is None else views:
-            dn = [view.readout.folded(view.readout.transfer(e)) for e in self._blocks(view, curves, scales, exposure_s)]
-            parts.append(np.concatenate(dn))
+            electrons = self._blocks(view, curves, scales, exposure_s)
+            parts.append(np.concatenate([view.readout.folded(view.readout.transfer(of_some)) for of_some in electrons]))
         dn = np.concatenate(parts, axis=1)
         if which is not None:
             dn = dn[:, np.arange(dn.shape[1]).reshape(-1, scales.shape[-1])[:, which].ravel()]

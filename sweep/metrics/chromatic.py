@@ -20,9 +20,9 @@ from ..camera.brightness import LampSlopes
 from ..camera.noise.pixel_curve import STEPS_DN2
 from ..spectra.lights import Pair, class_pairs
 from .brightness import BrightnessCurves
+from .complex_step import Smooth
 from .separation import MANY, MOST_CHANNELS, packed_response, pair_blocks, pair_order
 from .smooth import Rows, SmoothDesign
-from .tasks.colorimetry import COMPLEX_STEP, Smooth
 
 _ROUNDED = 1 - 1e-9
 """More than rounding takes off a squared distance, so that which pairs are left out changes no bit of it."""
@@ -172,15 +172,13 @@ def _nearest_rows(
     of_curve = lamps.moments(near.curve, factor)
 
     (mean, variance, by_mean, by_variance), (mean_2, variance_2, by_mean_2, by_variance_2) = of_reading, of_curve
-    difference, spread = mean - mean_2, variance + variance_2
-    by_spread = np.where(spread > 2 * STEPS_DN2, by_variance + by_variance_2, 0.0)
-    spread = np.maximum(spread, 2 * STEPS_DN2)
-    difference_along = difference + 1j * COMPLEX_STEP * (by_mean - by_mean_2)
-    spread_along = spread + 1j * COMPLEX_STEP * by_spread
+    spread = variance + variance_2
+    moves = spread > 2 * STEPS_DN2
+    spread, by_spread = np.maximum(spread, 2 * STEPS_DN2), np.where(moves, by_variance + by_variance_2, 0.0)
     if not noise:
-        spread, spread_along = np.array(2.0), np.array(2.0)
-    along = (2 * difference_along**2 / spread_along).sum(axis=-1)
-    return Rows((2 * difference**2 / spread).sum(axis=-1), along.imag.T / COMPLEX_STEP)
+        spread, by_spread = np.full_like(spread, 2.0), np.zeros_like(by_spread)
+    apart = (mean - mean_2, by_mean - by_mean_2), (spread, by_spread)
+    return Rows.of(lambda difference, spread: (2 * difference**2 / spread).sum(axis=-1), *apart)
 
 
 def _closed_rows(design: SmoothDesign, pairs: Sequence[Pair]) -> Rows:
@@ -200,5 +198,4 @@ def _closed_rows(design: SmoothDesign, pairs: Sequence[Pair]) -> Rows:
                 parts.append(ratio.reshape(*ratio.shape[:-3], -1))
         return np.concatenate(parts, axis=-1)
 
-    response, by_u = design.lamps
-    return Rows(of(response), of(response + 1j * COMPLEX_STEP * by_u).imag.T / COMPLEX_STEP)
+    return Rows.of(of, design.lamps)

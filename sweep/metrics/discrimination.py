@@ -3,6 +3,8 @@
 The channels of a mosaic are read from different pixels, so their noise is independent and a covariance is diagonal. A
 channel without variance separates two signals for certain, unless their means are equal; then it has no effect.
 
+Forms of two signals take the difference of their means, DN, and both variances, DN^2, channels on the last axis.
+
 With a `NoiseShape`, errors are those of Gaussians in the channels with Gaussian noise, or Bennett's bound from all
 channels, whichever is less: leaving channels out is a rule, too; 1e-12 is the least. Without one, all noise is
 Gaussian.
@@ -25,11 +27,11 @@ from ..base.types import (
     Int,
     MemberNumbers,
     PerDesign,
-    SameShape,
 )
 from ..camera.noise.gaussian import share_below
 from ..camera.readout import NoisyReadout
 from ..spectra.lights import Pair, class_pairs
+from .complex_step import Smooth, length, ratio
 from .separation import pair_blocks
 
 _Both = tuple[IndexArray, IndexArray]
@@ -39,39 +41,81 @@ _LEFT_OUT = 1e-12
 """A pixel of up to a thousand goes beyond its reach at most this often; Gaussian tails are trusted down to here."""
 
 
-def contrast_to_noise(
-    mean: DesignSignals, variance: DesignSignals, first: Int[IndexArray, " first"], second: Int[IndexArray, " second"]
-) -> PerDesign:
-    """Return CSD over noise: the standard deviation along the line between the nearest two points.
+def dprime(difference: Smooth, first: Smooth, second: Smooth) -> Smooth:
+    """Return d' = sqrt(D' S^-1 D), S the mean of both variances.
 
-    The noise is sqrt(u' (Sa + Sb) / 2 u) for the unit vector u from one point to the other. Of several pairs at
-    exactly the same distance, the one with the most noise counts.
+    This is d_a of signal detection theory for unequal variances (Simpson and Fitter, 1973), in several channels.
+    """
+    return length(ratio(difference, np.sqrt((first + second) / 2)))
+
+
+def noise_along(difference: Smooth, first: Smooth, second: Smooth) -> Smooth:
+    """Return the noise along the line of two points: sqrt(u' S u) for the unit vector u, S the mean of both variances.
 
     0 for coincident points.
     """
-    ratio = np.empty(len(mean))
+    return length(ratio(difference, length(difference)[..., None]) * np.sqrt((first + second) / 2))
+
+
+def contrast(difference: Smooth, first: Smooth, second: Smooth) -> Smooth:
+    """Return the distance of two points over the noise along their line; 0 for coincident points."""
+    return ratio(length(difference), noise_along(difference, first, second))
+
+
+def margin(difference: Smooth, first: Smooth, second: Smooth) -> Smooth:
+    """Return the standard deviations from both points to the plane between them at which they err equally often.
+
+    With normal S^-1 D, S the mean covariance: D' S^-1 D / (s_a + s_b), with the standard deviation s of each along the
+    normal (Fukunaga, "Introduction to Statistical Pattern Recognition", linear classifiers). 0 for coincident points.
+    """
+    total = first + second
+    z = ratio(difference, np.sqrt(total))
+    distance = length(z)
+    certain = np.isinf(distance)
+    z = np.where(certain[..., None], 0.0, z)
+    ours, theirs = (np.divide(v, total, out=np.full_like(total, 0.5), where=total.real > 0) for v in (first, second))
+    spread = length(z * np.sqrt(ours)) + length(z * np.sqrt(theirs))
+    return np.where(certain, np.inf, distance * ratio(distance, spread))
+
+
+def overlap(difference: Smooth, first: Smooth, second: Smooth) -> Smooth:
+    """Return the Bhattacharyya distance of Gaussians: D'S^-1 D / 8 + ln(S / sqrt(Sa Sb)) / 2.
+
+    Where one variance is 0 the logarithm is left out, since digital numbers are steps; the coefficient is then larger,
+    and still a bound.
+    """
+    z = ratio(difference, np.sqrt(first + second))
+    noisy, less = (first.real > 0) & (second.real > 0), first.real < second.real
+    small, large = np.sqrt(np.where(less, first, second)), np.sqrt(np.where(less, second, first))
+    r = np.divide(small, large, out=np.ones_like(small), where=noisy)
+    # (Sa + Sb) / (2 sqrt(Sa Sb)) - 1 = (1 - r)^2 / (2 r) for r = sqrt(small / large): no digits are lost near 1.
+    with np.errstate(over="ignore"):
+        return np.asarray((z**2 / 4 + np.log1p((1 - r) ** 2 / (2 * r)) / 2).sum(axis=-1))
+
+
+def contrast_to_noise(
+    mean: DesignSignals, variance: DesignSignals, first: Int[IndexArray, " first"], second: Int[IndexArray, " second"]
+) -> PerDesign:
+    """Return CSD over noise: the `contrast` of the nearest two points.
+
+    Of several pairs at exactly the same distance, the one with the most noise counts.
+    """
+    values = np.empty(len(mean))
     for block, _, difference, ours, theirs in _pairs(mean, variance, first, second):
-        distance = _length(difference)
+        distance = length(difference)
         nearest = distance == distance.min(axis=1, keepdims=True)
-        along = np.divide(difference, distance[..., None], out=np.zeros_like(difference), where=distance[..., None] > 0)
-        floor = _length(along * np.sqrt((ours + theirs) / 2))
-        floor = np.where(nearest, floor, -1.0).max(axis=1)
-        contrast = distance.min(axis=1)
-        ratio[block] = _ratio(contrast, floor)
-    return ratio
+        noise = np.where(nearest, noise_along(difference, ours, theirs), -1.0).max(axis=1)
+        values[block] = ratio(distance.min(axis=1), noise)
+    return values
 
 
 def detectability(
     mean: DesignSignals, variance: DesignSignals, first: Int[IndexArray, " first"], second: Int[IndexArray, " second"]
 ) -> PerDesign:
-    """Return d', the smallest over the pairs of two types: sqrt(D' S^-1 D), S the mean covariance of the two points.
-
-    This is d_a of signal detection theory for unequal variances (Simpson and Fitter, 1973), in several channels.
-    """
+    """Return d', the smallest over the pairs of two types."""
     smallest = np.empty(len(mean))
     for block, _, difference, ours, theirs in _pairs(mean, variance, first, second):
-        z = _ratio(difference, np.sqrt((ours + theirs) / 2))
-        smallest[block] = _length(z).min(axis=1)
+        smallest[block] = dprime(difference, ours, theirs).min(axis=1)
     return smallest
 
 
@@ -82,28 +126,17 @@ def pairwise_error(
     second: Int[IndexArray, " second"],
     shape: NoiseShape | None = None,
 ) -> PerDesign:
-    """Return the largest probability that noise moves one point of a pair beyond the other.
-
-    The pair is divided by a plane with normal S^-1 D, S the mean covariance, at which both points err equally often:
-    Q(D' S^-1 D / (s_a + s_b)), with the standard deviation s of each along the normal (Fukunaga, "Introduction to
-    Statistical Pattern Recognition", linear classifiers).
+    """Return the largest probability that noise moves one point of a pair beyond the other: Q of their `margin`.
 
     `shape`: shape of the noise; left out, Gaussian. 0.5 for coincident points.
     """
     errors = np.empty((len(mean), len(first) * len(second)))
     for block, pair, difference, ours, theirs in _pairs(mean, variance, first, second):
         gaussian_difference = difference if shape is None else shape.gaussian_only(block, pair, difference)
-        total = ours + theirs
-        z = _ratio(gaussian_difference, np.sqrt(total))
-        shares = [np.divide(v, total, out=np.full_like(total, 0.5), where=total > 0) for v in (ours, theirs)]
-        length = _length(z)
-        is_finite = ~np.isinf(length)
-        z = np.where(is_finite[..., None], z, 0.0)
-        spread = _length(z * np.sqrt(shares[0])) + _length(z * np.sqrt(shares[1]))
-        error = share_below(-np.where(is_finite, length * _ratio(length, spread), np.inf))
+        error = share_below(-margin(gaussian_difference, ours, theirs))
         if shape is not None:
             error = np.maximum(error, _LEFT_OUT)
-            error = np.minimum(error, shape.bound(block, pair, difference, total))
+            error = np.minimum(error, shape.bound(block, pair, difference, ours + theirs))
         errors[block] = error
     return np.asarray(errors.max(axis=1), dtype=float)
 
@@ -191,56 +224,22 @@ def error_bounds(
         sums = np.zeros(mean.shape[:2])
         for block, signals, difference, ours, theirs in _pairs(mean, variance, first, second):
             if noise is None:
-                overlap = np.exp(-_distance(difference, ours, theirs))
+                coefficient = np.exp(-overlap(difference, ours, theirs))
             else:
                 gaussian_difference = noise.gaussian_only(block, signals, difference)
                 alike = np.broadcast_to(ours, gaussian_difference.shape)
                 gaussian = (
-                    np.exp(-_distance(gaussian_difference, alike, np.where(gaussian_difference > 0, theirs, alike)))
+                    np.exp(-overlap(gaussian_difference, alike, np.where(gaussian_difference > 0, theirs, alike)))
                     + _LEFT_OUT
                 )
                 sides = noise.bound(block, signals, difference, ours + theirs)
-                overlap = np.minimum(gaussian, np.where(sides < 0.5, sides, 1.0))
-            overlap = overlap.reshape(len(difference), len(first), len(second))
-            sums[block, first] += overlap.sum(axis=2)
-            sums[block, second] += overlap.sum(axis=1)
+                coefficient = np.minimum(gaussian, np.where(sides < 0.5, sides, 1.0))
+            coefficient = coefficient.reshape(len(difference), len(first), len(second))
+            sums[block, first] += coefficient.sum(axis=2)
+            sums[block, second] += coefficient.sum(axis=1)
         bounds[pair] = np.minimum(sums.max(axis=1), 1.0)
         state += sums
     return bounds, np.minimum(state.max(axis=1), 1.0)
-
-
-def _distance(
-    difference: Float[Array, "designs pairs channels"],
-    ours: Float[Array, "#designs pairs channels"],
-    theirs: Float[Array, "#designs pairs channels"],
-) -> Float[Array, "designs pairs"]:
-    """Return the Bhattacharyya distance of Gaussians: D'S^-1 D / 8 + ln(S / sqrt(Sa Sb)) / 2.
-
-    Where one variance is 0 the logarithm is left out, since digital numbers are steps; the coefficient is then larger,
-    and still a bound.
-    """
-    z = _ratio(difference, np.sqrt(ours + theirs))
-    noisy = (ours > 0) & (theirs > 0)
-    small, large = np.sqrt(np.minimum(ours, theirs)), np.sqrt(np.maximum(ours, theirs))
-    ratio = np.divide(small, large, out=np.ones_like(small), where=noisy)
-    # (Sa + Sb) / (2 sqrt(Sa Sb)) - 1 = (1 - r)^2 / (2 r) for r = sqrt(small / large): no digits are lost near 1.
-    with np.errstate(over="ignore"):
-        return np.asarray((z**2 / 4 + np.log1p((1 - ratio) ** 2 / (2 * ratio)) / 2).sum(axis=-1), dtype=float)
-
-
-def _ratio(over: SameShape, under: SameShape) -> SameShape:
-    """Return the ratio of non-negative numbers; 0 / 0 is 0, NaN stays NaN."""
-    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        return np.where((over == 0) & (under == 0), 0.0, over / under)
-
-
-def _length(vectors: Float[Array, "*batch channels"]) -> SameShape:
-    """Return the L2 norm over the last axis without squares; NaN where a component is NaN."""
-    length, unknown = np.abs(vectors[..., 0]), np.isnan(vectors[..., 0])
-    for at in range(1, vectors.shape[-1]):  # few, and a reduction over few is slow
-        length = np.hypot(length, vectors[..., at])
-        unknown |= np.isnan(vectors[..., at])
-    return np.where(unknown, np.nan, length)
 
 
 def _pairs(

@@ -9,7 +9,18 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from ..base.types import Array, DesignCases, DesignCurves, Float, IndexArray, Int, PerDesign, PerFree, PerParameter
+from ..base.types import (
+    Array,
+    DesignCases,
+    DesignCurves,
+    Float,
+    FloatArray,
+    IndexArray,
+    Int,
+    PerDesign,
+    PerFree,
+    PerParameter,
+)
 from ..camera.brightness import LampSlopes
 from ..camera.linear import LinearModel, linear_model
 from ..camera.noise.pixel_curve import STEPS_DN2
@@ -18,6 +29,7 @@ from ..designs.family import Family
 from ..spectra.lights import Pair
 from ..vision.section import SeededVision
 from .brightness import BrightnessCurves
+from .complex_step import COMPLEX_STEP, Smooth, moving, root, tail_decades
 from .separation import separation
 
 if TYPE_CHECKING:
@@ -35,6 +47,13 @@ class Rows:
 
     values: Float[Array, "*terms"]
     by_u: Float[Array, "*terms free"]
+
+    @classmethod
+    def of(cls, function: Callable[..., Smooth], *arguments: tuple[FloatArray, FloatArray]) -> Rows:
+        """Return the rows of a smooth function of arrays with their derivatives by the free parameters, these first."""
+        values = function(*(values for values, _ in arguments))
+        along = function(*(moving(values, slopes) for values, slopes in arguments))
+        return cls(values.ravel(), along.imag.reshape(len(along), values.size).T / COMPLEX_STEP)
 
     def scaled(self, factor: float, offset: float = 0.0) -> Rows:
         """Return factor times rows plus offset."""
@@ -68,12 +87,7 @@ class Rows:
 
     def gaussian_decades(self) -> Rows:
         """Return -log10 of the errors Q(d / 2) of Gaussians at squared distances d^2 in units of their noise."""
-        from scipy.special import log_ndtr  # noqa: PLC0415  (slow to import: kept off the start-up path)
-
-        z = self.roots().scaled(0.5)
-        tail = log_ndtr(-z.values)
-        per = np.exp(-(z.values**2) / 2 - tail) / (np.sqrt(2 * np.pi) * np.log(10))
-        return Rows(-tail / np.log(10), per[:, None] * z.by_u)
+        return Rows.of(lambda squared: tail_decades(root(squared) / 2), (self.values, self.by_u.T))
 
     def without_nan(self) -> Rows:
         """Return the rows with zeros for NaN and infinity."""

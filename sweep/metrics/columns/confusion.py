@@ -12,10 +12,18 @@ from ...camera.noise import errors
 from ...camera.readout import NoisyReadout
 from ...spectra.lights import Pair, class_pairs, pair_name
 from ..batch import Batch
-from ..discrimination import NoiseShape, contrast_to_noise, detectability, error_bounds, pairwise_error
+from ..discrimination import (
+    NoiseShape,
+    contrast,
+    contrast_to_noise,
+    detectability,
+    dprime,
+    error_bounds,
+    pairwise_error,
+)
 from ..metric import Metric
 from ..quantity import Columns, Quantity, RequestedQuantities
-from ..smooth_noise import bound_rows, error_decades, pair_rows, squared_contrast, squared_detectability
+from ..smooth_noise import bound_rows, error_decades, pair_rows
 
 CNR, D_PRIME, ERROR, ERROR_BOUND = "cnr", "dprime", "error", "error_bound"
 STATE_ERROR, STATE_ERROR_BOUND = "state_error", "state_error_bound"
@@ -79,8 +87,8 @@ def _quantity(metric: str, name: str, types: tuple[str, ...]) -> Quantity:
     if metric in (ERROR_BOUND, STATE_ERROR_BOUND):
         smooth = partial(bound_rows, types=types)
     else:
-        of = {CNR: squared_contrast, D_PRIME: squared_detectability}.get(metric, error_decades)
-        smooth = partial(pair_rows, of=of, pairs=pairs)
+        of = {CNR: contrast, D_PRIME: dprime}.get(metric, error_decades)
+        smooth = partial(pair_rows, of=of, pairs=pairs, squared=not less)
     return Quantity(
         name=name,
         metric=metric,

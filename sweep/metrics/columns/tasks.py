@@ -57,7 +57,7 @@ class TaskFigures(Metric):
 
 def _rows(design: SmoothDesign, *, task: str, what: str, case: LightName) -> Rows:
     """Return a figure's rows with derivatives; figures of a task share common parts."""
-    from ..tasks.colorimetry import COMPLEX_STEP
+    from ..complex_step import COMPLEX_STEP
 
     rows = design.cached(task, partial(_evaluation, design, task)).rows(what, case)
     return Rows(rows.real[0], rows.imag.T / COMPLEX_STEP)

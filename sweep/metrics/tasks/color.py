@@ -12,7 +12,8 @@ import numpy as np
 from ...base.types import Array, ChannelCurves, Float
 from ...camera.pixel import irradiance_factor
 from ...camera.setup import Setup
-from .colorimetry import COMPLEX_STEP, Smooth, delta_e, lab, lab_slope
+from ..complex_step import Smooth, moving
+from .colorimetry import delta_e, lab, lab_slope
 
 PIXELS = 4.0
 """ChannelNoise is that of so many pixels, shared among the channels as in the tile: of a tile of 2 x 2, all of it."""
@@ -61,7 +62,7 @@ class PatchCamera:
     @classmethod
     def along(cls, setup: Setup, curves: ChannelCurves, by_u: Float[Array, "free modified wavelengths"]) -> PatchCamera:
         """Return one design once per free parameter, with its derivative by that parameter."""
-        return cls(setup, curves + 1j * COMPLEX_STEP * by_u)
+        return cls(setup, moving(curves, by_u))
 
     def electrons(self, photons: Float[Array, "... wavelengths"], exposure_s: float) -> Smooth:
         """Return expected electrons of a pixel of each channel.

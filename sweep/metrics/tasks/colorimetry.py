@@ -1,20 +1,11 @@
-"""CIELAB and CIEDE2000, smooth enough for derivatives by complex steps.
-
-All functions take real arrays, or complex ones whose tiny imaginary part is a derivative: nothing in them conjugates,
-compares or takes a modulus except of real parts.
-"""
+"""CIELAB and CIEDE2000, smooth enough for derivatives by complex steps."""
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
-Smooth = NDArray[Any]
-"""Real values, or values with a derivative as their imaginary part."""
-COMPLEX_STEP = 1e-30
-"""Step of a complex-step derivative: nothing is subtracted, so it may be so small that its square vanishes."""
+from ..complex_step import Smooth, root
+
 _EPSILON, _KAPPA = 216 / 24389, 24389 / 27
 """Constants of CIE 15: where the cube root begins, and the slope of lightness below it."""
 _25_7 = 25.0**7
@@ -68,12 +59,6 @@ def delta_e_2000(first: Smooth, second: Smooth) -> Smooth:
     d_l, d_c = (l_2 - l_1) / s_l, (c_2 - c_1) / s_c
     d_h = 2 * root(c_1 * c_2) * np.sin(turn / 2) / s_h
     return root(d_l**2 + d_c**2 + d_h**2 - rotation * d_c * d_h)
-
-
-def root(square: Smooth) -> Smooth:
-    """Return the square root, with value and slope 0 at 0, so that no NaN arises."""
-    is_positive = square.real > 0
-    return np.where(is_positive, np.where(is_positive, square, 1.0) ** 0.5, 0.0)
 
 
 def _angle(a: Smooth, b: Smooth) -> Smooth:

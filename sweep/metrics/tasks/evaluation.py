@@ -16,11 +16,12 @@ from ...camera.setup import Setup
 from ...designs.block import Block
 from ...spectra.color import color_matching
 from ...spectra.tasks import Chart, Conditions, GriddedTask, LightName
+from ..complex_step import Smooth, root
+from ..discrimination import dprime, margin
 from ..quantity import Columns
-from ..smooth_noise import margin, squared_detectability
 from . import color
 from .color import PatchCamera
-from .colorimetry import Smooth, delta_e_2000, lab, root
+from .colorimetry import delta_e_2000, lab
 from .figures import CSD, D_PRIME, ERROR, LUX, MEAN, MOST, MOST_95, SMI, SNR, SNR_AT_1_LX, VORA, figures_of
 
 LUMINANCE_RATIO = 10.0
@@ -41,7 +42,7 @@ class TaskEvaluation:
         self._made: dict[tuple[str, LightName], Smooth] = {}
         self._rows: dict[str, Callable[[LightName], Smooth]] = {
             CSD: self._csd,
-            D_PRIME: lambda case: root(squared_detectability(*self._apart(case))),
+            D_PRIME: lambda case: dprime(*self._apart(case)),
             ERROR: lambda case: pair_errors(margin(*self._apart(case))),
             MEAN: lambda case: self._color_errors(case).mean(axis=1, keepdims=True),
             MOST_95: lambda case: _percentile(self._color_errors(case), 0.95),
