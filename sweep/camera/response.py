@@ -254,10 +254,8 @@ def _apart(
     """Return the response of single pixels that have a weight in any readout."""
     used = (readout_weights > 0).any(axis=(0, 3))
     rows, columns = np.nonzero(used)
-    taken = [((1 - share), rows, columns)]
-    if share:  # see `with_crosstalk`; a pixel at the border has no weight
-        steps = ((-1, 0), (1, 0), (0, -1), (0, 1))
-        taken += [(share / 4, rows + down, columns + right) for down, right in steps]
+    # A pixel at the border has no weight.
+    taken = [(part, rows + down, columns + right) for part, down, right in sampling.crosstalk_parts(share)]
     n = of_channel.shape[2]
     uniform = np.zeros((len(readout_weights), rows.size, n))
     pixels, channel = np.arange(rows.size), of_channel.argmax(axis=2)

@@ -106,24 +106,27 @@ def center_weights(window: Window, home: Float[Array, "cases 2"], mosaic: Mosaic
     return np.asarray(weights, dtype=float)
 
 
+def crosstalk_parts(share: float) -> tuple[tuple[float, int, int], ...]:
+    """Return the parts of a pixel's light, and how many rows and columns from it each passes a filter."""
+    if not share:
+        return ((1.0, 0, 0),)
+    return ((1 - share, 0, 0), *((share / 4, down, right) for down, right in ((-1, 0), (1, 0), (0, -1), (0, 1))))
+
+
 def with_crosstalk(
     light: Float[Array, "cases rows columns *batch"], share: float, *, periodic: bool = False
 ) -> Float[Array, "cases rows columns *batch"]:
-    """Mix each pixel with its neighbors: (1 - share) of its own light and share / 4 of each neighbor's.
+    """Mix each pixel with its neighbors (see `crosstalk_parts`).
 
     `periodic`: continue the tile of a uniform field at its other side; else nothing lies beyond the border.
     """
-    mixed = (1 - share) * light
-    given = share / 4 * light
-    for axis in (1, 2):
-        if periodic:
-            mixed += np.roll(given, 1, axis=axis)
-            mixed += np.roll(given, -1, axis=axis)
-            continue
-        to, of = np.moveaxis(mixed, axis, 0), np.moveaxis(given, axis, 0)
-        to[1:] += of[:-1]
-        to[:-1] += of[1:]
-    return np.asarray(mixed, dtype=float)
+    rows, columns = light.shape[1:3]
+    border = ((0, 0), (1, 1), (1, 1), *((0, 0),) * (light.ndim - 3))
+    around = np.pad(light, border, mode="wrap" if periodic else "constant")
+    mixed = np.zeros(light.shape)
+    for part, down, right in crosstalk_parts(share):
+        mixed += part * around[:, 1 + down : 1 + down + rows, 1 + right : 1 + right + columns]
+    return mixed
 
 
 def crosstalk_share(setup: Setup) -> float:

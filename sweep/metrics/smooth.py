@@ -178,10 +178,11 @@ class SmoothDesign:
     def squared_distances(self, pair: Pair) -> Rows:
         """Return squared distances of all pairs of signals of two types in every case, DN^2, with derivatives."""
         first, second = (self._model.members[name] for name in pair)
-        response, by_u = self._response
-        differences = (response[:, first, None] - response[:, None, second]).reshape(-1, response.shape[-1])
-        differences_by_u = (by_u[:, :, first, None] - by_u[:, :, None, second]).reshape(len(by_u), *differences.shape)
-        return Rows((differences**2).sum(axis=1), 2 * (differences_by_u * differences).sum(axis=2).T)
+
+        def of(response: Smooth) -> Smooth:
+            return np.asarray(((response[..., first, None, :] - response[..., None, second, :]) ** 2).sum(axis=-1))
+
+        return Rows.of(of, self._response)
 
     def squared_distances_of_members(self, pair: Pair) -> Rows:
         """Return squared distances of the nearest members of each two lights, by case and part of their shifts, DN^2.
