@@ -125,11 +125,8 @@ class SceneModel:
         if setup.scene.target is not None:
             self.phases = different_phases(setup, scene_phases(setup))[0]
         self._positions: dict[tuple[float, int], FieldPosition] = {}
-
-    @property
-    def n_cases(self) -> int:
+        self.n_cases = len(self.heights) * (1 if self.phases is None else len(self.phases))
         """Number of sampling phases times number of field positions."""
-        return len(self.heights) * (1 if self.phases is None else len(self.phases))
 
     @cached_property
     def _white(self) -> tuple[FloatArray, float]:

@@ -91,12 +91,12 @@ class Batch:
         """Scene and camera."""
         return self.model.setup
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Number of designs."""
         return len(self.block)
 
-    @property
+    @cached_property
     def n_cases(self) -> int:
         """Sampling phases times field positions times moments of a pulse."""
         return int(self.model.n_cases * self.model.scales(self.exposure_s).shape[-1])
