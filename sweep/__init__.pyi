@@ -1,7 +1,8 @@
 from .api.evaluate import evaluate
+from .api.finished_run import FinishedRun
 from .api.inline_curves import read_curves
+from .api.loaded_study import LoadedStudy
 from .api.loading import lights, load_study, make_study, read_run, sensor, studies
-from .api.objects import FinishedRun, LoadedStudy
 from .base.errors import SweepError
 from .camera.pixel import Optics, Pixel
 from .camera.scene import Scene, Target

@@ -12,17 +12,23 @@ import numpy as np
 from pydantic import BaseModel
 
 from .. import study as studies_of_files
-from ..base.errors import DataError, ValidationIssue
+from ..base.errors import DataError, StudyError, SweepError, ValidationIssue, nearest
+from ..camera.mosaic import Mosaic
 from ..spectra import LightUnit
 from ..spectra.light_files import lights_file
 from ..spectra.spectrum import Curves
 from ..study.shipped import shipped_names, study_path
 from .channels import sensor_file
+from .finished_run import FinishedRun
 from .inline_curves import CurveLike, table_to_curves, to_curves
-from .objects import FinishedRun, LoadedStudy
+from .loaded_study import LoadedStudy
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+_OF_A_FILTER = ("cfa", "channel", "base", "to", "family", "options", "technology")
+"""Keys of a filter that `make_study` takes beside those of a study."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +133,9 @@ def make_study(
     allow_code : bool
         Permit the code that the study names to run.
     **keys
-        Further keys of a study file. Sections such as ``pixel`` are mappings or objects such as `Pixel`.
+        Further keys of a study file. Sections such as ``pixel`` are mappings or objects such as `Pixel`. `channel`,
+        `base`, `to`, `family` and `options` make a filter of which `evaluate` takes parameters: that channel of `cfa`,
+        or of the only CFA that has it.
 
     Returns
     -------
@@ -145,13 +153,50 @@ def make_study(
     >>> mine = sweep.make_study(cfas=["RGGB", "RYYCy"], pixel=sweep.Pixel(bits=10))
     >>> mine.evaluate().csd_yellow_red.round().tolist()
     [35.0, 8.0]
+    >>> stopband = sweep.make_study(cfas=["RGGB", "RYNCy"], channel="N", base="Y", to="G")
+    >>> stopband.evaluate(left_nm=613, right_nm=651, left_width_nm=6, right_width_nm=6).csd_yellow_red.round().tolist()
+    [235.0]
     """
-    document = {"study": study, "sensor": sensor, "lights": lights, **keys}
+    document = {"study": study, "sensor": sensor, "lights": lights, **_with_filter(keys)}
     curves: dict[str, Curves] = {}
     for source in (sensor, lights):
         curves |= source.curves if isinstance(source, CurveSource) else {}
     plain = {key: _plain(value) for key, value in document.items()}
     return LoadedStudy(studies_of_files.study_of_keys(plain, Path.cwd(), curves, allow_code=allow_code))
+
+
+def _with_filter(keys: Mapping[str, Any]) -> dict[str, Any]:
+    """Return keys of a study in which those of one filter are a box of it."""
+    stated = {key: keys[key] for key in _OF_A_FILTER if key in keys}
+    rest = {key: value for key, value in keys.items() if key not in stated}
+    if not stated:
+        return rest
+    cfas = [str(name) for name in keys.get("cfas", ())]
+    channel = stated.get("channel")
+    if "cfa" not in stated:
+        wanted = {channel} if isinstance(channel, str) else set(channel or ())
+        channels = {cfa: _channels(cfa, keys["cfas"]) for cfa in cfas}
+        having = [cfa for cfa in cfas if wanted and wanted <= set(channels[cfa])]
+        known = list(dict.fromkeys(name for names in channels.values() for name in names))
+        if not having:
+            problem, near = ("unknown channel", nearest(channel, known)) if wanted else ("missing", None)
+            issue = ValidationIssue(problem, key="channel", value=channel, allowed=", ".join(known), nearest=near)
+            raise StudyError(issue)
+        if len(having) > 1:
+            problem = f"several CFAs have the channel {channel}"
+            raise StudyError(ValidationIssue(problem, key="cfa", allowed=", ".join(having)))
+        stated["cfa"] = having[0]
+    boxes = {**rest.pop("boxes", {}), str(stated.get("family", "stopband")): stated}
+    return {**rest, "boxes": boxes}
+
+
+def _channels(name: str, cfas: Any) -> tuple[str, ...]:
+    """Return the channels of a CFA; none where its name or tile is wrong, which the study says."""
+    tile = cfas[name] if isinstance(cfas, Mapping) else None
+    try:
+        return (Mosaic.from_rows(name, tile["tile"]) if tile else Mosaic.from_name(name)).channels
+    except (SweepError, KeyError, TypeError):
+        return ()
 
 
 def sensor(

@@ -13,7 +13,7 @@ from ..base.types import PerWavelength
 from ..report import Output, check_kept, read_output, study_of
 from ..report.parameter_map import specification
 from ..results.atomic import write_bytes
-from ..results.designs import find_design_row, row_curves
+from ..results.designs import channel_curves, find_design_row, row_space
 from ..spectra.filter_files import (
     color_hints,
     csv_text,
@@ -50,11 +50,8 @@ def export_design(
     output = read_output(folder)
     row = find_design_row(output, key)
     study = study_of(output, data, allow_code=allow_code)
-    space, modified = row_curves(study, row)
-    camera = study.setup(space, row["scenario"]).camera
-    qe = camera.qe.copy()
-    qe[list(camera.modified)] = modified[0]
-    wavelength_nm, curves = study.grid.nodes_nm, dict(zip(camera.mosaic.channels, qe, strict=True))
+    space, mosaic = row_space(study, row), study.mosaics[row["cfa"]]
+    wavelength_nm, curves = study.grid.nodes_nm, channel_curves(study, row)
     bases = {} if space.filter is None else dict(space.filter.bases)
     base_qe = {channel: study.sensor.curve(name) for channel, name in bases.items()}
     _verify(output, row, {channel: curves[channel] for channel in bases}, base_qe)
@@ -64,13 +61,13 @@ def export_design(
         for channel, name in bases.items()
     }
     table = curves | {name: values for name, values in transmissions.items() if np.isfinite(values).all()}
-    hints = color_hints(camera.mosaic.channels, bases)
+    hints = color_hints(mosaic.channels, bases)
     path = (folder / "export" if to is None else to) / folder_name(key)
     csv_path, mat_path = (path.with_name(path.name + suffix) for suffix in (".csv", ".mat"))
     comment = _comment(output, row, bases)
     files = {
         csv_path: csv_text(wavelength_nm, table).encode("utf-8"),
-        mat_path: isetcam_mat(wavelength_nm, curves, hints, camera.mosaic.indices, comment),
+        mat_path: isetcam_mat(wavelength_nm, curves, hints, mosaic.indices, comment),
     }
     lines = [
         *_lines(output, row, bases),

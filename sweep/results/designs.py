@@ -48,6 +48,15 @@ def row_curves(study: Study, row: Mapping[Any, Any]) -> tuple[Space, Any]:
     return space, space.curves(point, study.grid.size)
 
 
+def channel_curves(study: Study, row: Mapping[Any, Any]) -> dict[str, PerWavelength]:
+    """Return the QE of each channel of a row's CFA with its filter."""
+    space, modified = row_curves(study, row)
+    camera = study.setup(space, row["scenario"]).camera
+    qe = camera.qe.copy()
+    qe[list(camera.modified)] = modified[0]
+    return dict(zip(camera.mosaic.channels, qe, strict=True))
+
+
 def computed_rows(*tables: pd.DataFrame) -> list[dict[Any, Any]]:
     """Return the rows of tables, each design once, without those that failed."""
     rows: dict[Any, dict[Any, Any]] = {}

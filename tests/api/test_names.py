@@ -52,7 +52,7 @@ def test_nothing_is_loaded_before_a_name_is_used() -> None:
     assert done.stdout.split() == []
 
 
-@pytest.mark.parametrize("name", ["objects", "loading", "inline_curves", "evaluate"])
+@pytest.mark.parametrize("name", ["loaded_study", "finished_run", "loading", "inline_curves", "evaluate"])
 def test_examples_in_the_code_run(name: str) -> None:
     module = __import__(f"sweep.api.{name}", fromlist=[name])
     assert doctest.testmod(module).failed == 0

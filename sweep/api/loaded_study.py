@@ -1,19 +1,19 @@
-"""A study and a finished run as Python objects."""
+"""A checked study as a Python object."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
-from functools import cached_property
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from ..base.errors import OutputError, SweepError, ValidationIssue, nearest
+from ..base.errors import SweepError, ValidationIssue, nearest
 from ..designs.space import Space
+from ..designs.ungridded import PairedDesigns
 from ..metrics.bound import total_violation
-from ..metrics.quantity import Column, Quantity
+from ..metrics.quantity import Quantity
 from ..search.limit import Limit
 from ..study import Study, folder_name
 from .inline_curves import CurveLike, on_grid, wavelength_table
@@ -26,15 +26,17 @@ from .user_filters import (
     upper_bound_or_reason,
     user_filter_setup,
     with_lower_bound,
-    with_units,
 )
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from ..report import Output
-    from ..vision.batches import Batch, Form
+    from .finished_run import FinishedRun
+
+
+OWN = "own"
+"""Name of designs that are no part of the study."""
 
 
 class LoadedStudy:
@@ -122,9 +124,9 @@ class LoadedStudy:
         scenario: str | None = None,
         base: str | None = None,
         relative_to: str | None = None,
-        **channels: CurveLike,
+        **filters: CurveLike | float,
     ) -> pd.DataFrame:
-        """Evaluate filters given by channel, with every effect of the scene.
+        """Evaluate filters, given by curve or by the parameters of the study's family, with every effect of the scene.
 
         Parameters
         ----------
@@ -136,9 +138,11 @@ class LoadedStudy:
             Curve that the filter replaces, where the study does not state it.
         relative_to : str, optional
             The values are transmissions, to be multiplied by this curve of the sensor. Left out, they are QE.
-        **channels : CurveLike
+        **filters : CurveLike or number
             Curve of each modified channel, ``evaluate(N=curve)``, or rows of curves for many filters, ndarray of shape
-            (n_filters, n_wavelengths). Without a channel, the plain CFAs and named designs are evaluated.
+            (n_filters, n_wavelengths). Or parameters of a family that the study has, ``evaluate(left_nm=600,
+            right_nm=[640, 650])``: numbers, or as many of each for a table of designs. Without any, the plain CFAs and
+            named designs are evaluated.
 
         Returns
         -------
@@ -154,8 +158,11 @@ class LoadedStudy:
         """
         study = self.study
         scenarios = [self._scenario(scenario)] if scenario is not None else list(study.scenarios)
-        if not channels:
+        if not filters:
             return self._plain_and_named(cfa, scenarios)
+        if self._of_family(filters):
+            return self._evaluate_spaces([self._own_designs(cfa, filters)], scenarios)
+        channels = {name: cast(CurveLike, curve) for name, curve in filters.items()}
         factor = 1.0 if relative_to is None else study.sensor.curve(relative_to)
         rows = {
             name: on_grid(name, curve, study.grid, "sensor" if relative_to is None else "filter") * factor
@@ -168,14 +175,12 @@ class LoadedStudy:
         bases = replaced_curves(study, chosen, list(channels), base)
         curves = np.stack([*rows.values()], axis=1)
         columns = {s: evaluate_curves(study, user_filter_setup(study, chosen, s, bases), curves) for s in scenarios}
-        return table_of_results(study, [("own", chosen, name, values) for name, values in columns.items()])
+        return table_of_results(study, [(OWN, chosen, name, values) for name, values in columns.items()])
 
     def _plain_and_named(self, cfa: str | None, scenarios: list[str]) -> pd.DataFrame:
         from ..results.tables import NAMED, REFERENCE
-        from ..run.routes import quantities_at
-        from ..run.rows import rules_of
 
-        study, rules = self.study, rules_of(self.study)
+        study = self.study
         spaces = [s for s in study.spaces if s.kind in (REFERENCE, NAMED) and cfa in (None, s.cfa)]
         if not spaces:
             known = list(dict.fromkeys(s.cfa for s in study.spaces if s.kind in (REFERENCE, NAMED)))
@@ -183,7 +188,13 @@ class LoadedStudy:
             raise SweepError(
                 ValidationIssue("no plain CFA or named design", value=cfa, allowed=", ".join(known), nearest=near)
             )
-        rows = []
+        return self._evaluate_spaces(spaces, scenarios)
+
+    def _evaluate_spaces(self, spaces: Sequence[Space], scenarios: Sequence[str]) -> pd.DataFrame:
+        from ..run.routes import quantities_at
+        from ..run.rows import rules_of
+
+        study, rules, rows = self.study, rules_of(self.study), []
         for name in scenarios:
             for space in spaces:
                 points = space.points(0, space.size)
@@ -193,9 +204,49 @@ class LoadedStudy:
                     raise SweepError(ValidationIssue(f"{space.name} in {name}: {text}"))
                 worst = total_violation(values, study.constraints, space.violation(points))
                 unknown = np.full(space.size, np.nan)  # of a lamp that is not pulsed in this scenario
-                columns = {quantity: values.get(quantity, unknown) for quantity in study.quantities}
+                columns = dict(zip(space.parameters, points.T, strict=True)) if space.name == OWN else {}
+                columns |= {quantity: values.get(quantity, unknown) for quantity in study.quantities}
                 rows.append((space.name, space.cfa, name, columns | {"violation": worst}))
         return table_of_results(study, rows)
+
+    def _of_family(self, filters: Mapping[str, object]) -> bool:
+        """Return whether filters are given by parameters of a family; raises SweepError for curves beside them."""
+        parameters = {name for space in self.study.spaces for name in space.parameters}
+        channels = filters.keys() - parameters
+        if len(channels) in (0, len(filters)):
+            numbers = [name for name in channels if isinstance(filters[name], int | float | np.number)]
+            if numbers and parameters:
+                raise SweepError(_unknown("parameter", numbers[0], sorted(parameters)))
+            return not channels
+        raise SweepError(_unknown("parameter", min(channels), sorted(parameters)))
+
+    def _own_designs(self, cfa: str | None, parameters: Mapping[str, Any]) -> Space:
+        """Return designs of a family of the study: that of the search, or the first with these parameters."""
+        searched = [] if self.study.search is None else [self.study.search.space]
+        spaces = [s for s in (*searched, *self.study.spaces) if s.filter is not None and cfa in (None, s.cfa)]
+        space = next((s for s in spaces if parameters.keys() <= set(s.parameters)), None)
+        if space is None or space.filter is None:
+            allowed = "; ".join(dict.fromkeys(f"{s.cfa}: {', '.join(s.parameters)}" for s in spaces)) or "none"
+            problem = f"no filter of the study{f' on {cfa}' if cfa else ''} has these parameters together"
+            raise SweepError(ValidationIssue(problem, value=list(parameters), allowed=allowed))
+        axes = []
+        for parameter in space.filter.family.parameters:
+            stated = parameters.get(parameter.name, parameter.default)
+            if stated is None:
+                allowed = f"{parameter.low:g} to {parameter.high:g}"
+                raise SweepError(ValidationIssue("missing", key=parameter.name, allowed=allowed))
+            values = np.atleast_1d(np.asarray(stated, dtype=float)).ravel()
+            outside = values[~((values >= parameter.low) & (values <= parameter.high))]
+            if outside.size or not values.size:
+                allowed = f"{parameter.low:g} to {parameter.high:g}"
+                value = outside[:1].tolist()
+                raise SweepError(ValidationIssue("out of range", key=parameter.name, value=value, allowed=allowed))
+            axes.append(tuple(values.tolist()))
+        size = max(map(len, axes))
+        if {len(axis) for axis in axes} - {1, size}:
+            counts = {p: len(axis) for p, axis in zip(space.parameters, axes, strict=True)}
+            raise SweepError(ValidationIssue("as many values of each parameter, or one", value=counts))
+        return Space("design", OWN, space.cfa, space.filter, tuple(axes), gridded=False, rows=PairedDesigns(size))
 
     def limit(
         self,
@@ -304,6 +355,7 @@ class LoadedStudy:
         from ..report import make_report, read_output
         from ..results.identity import run_facts
         from ..run import output_folder, run_study
+        from .finished_run import FinishedRun
 
         folder, _ = output_folder(Path(output) / folder_name(self.name), run_facts(self.study))
         run_study(self.study, folder, jobs or os.cpu_count() or 1, _silent, ("sweep", "from Python"))
@@ -340,167 +392,8 @@ class LoadedStudy:
         )
 
 
-class FinishedRun:
-    """Results of a finished run.
-
-    Parameters
-    ----------
-    folder : Path
-        Output folder of the study.
-    data : Path, optional
-        Folder of the study's files.
-    allow_code : bool
-        Permit the code that the run was made with to run.
-
-    Raises
-    ------
-    SweepError
-        If files are missing or differ from those that the run wrote.
-
-    Examples
-    --------
-    >>> import sweep
-    >>> run = sweep.read_run("outputs/stopband")  # doctest: +SKIP
-    >>> run.best.csd_yellow_red  # doctest: +SKIP
-    233.8
-    """
-
-    def __init__(self, folder: Path, data: Path | None = None, *, allow_code: bool = False) -> None:
-        from ..report import read_output
-
-        self.folder, self._data, self._allow_code = folder, data, allow_code
-        self.output: Output = read_output(self.folder)
-
-    def __repr__(self) -> str:
-        return f"<run {self.output.study.study}: {self.output.provenance.filters:,} filters in {self.folder}>"
-
-    @cached_property
-    def table(self) -> pd.DataFrame:
-        """Result table with one row per design and scenario; units and meanings are in ``attrs``."""
-        import pyarrow as pa
-
-        from ..results.manifest import Manifest
-
-        columns: Mapping[str, Column] = self.output.columns
-        return with_units(pa.concat_tables(Manifest(self.folder).batches()).unify_dictionaries().to_pandas(), columns)
-
-    @property
-    def best(self) -> pd.Series:
-        """Best feasible design that was swept or searched; raises SweepError if there is none."""
-        if self.output.best.empty:
-            raise OutputError(
-                ValidationIssue("the run has no feasible design that was swept or searched", str(self.folder))
-            )
-        return self.output.best.iloc[0].dropna()
-
-    @property
-    def curves(self) -> pd.DataFrame:
-        """QE curves of the run over nm; columns are ("sensor", curve) and (design_id, channel)."""
-        stored = self.output.curves
-        columns: dict[tuple[Any, str], np.ndarray] = {("sensor", name): curve for name, curve in stored.sensor.items()}
-        columns |= {(i, channel): curve for i, filters in stored.designs.items() for channel, curve in filters.items()}
-        table = wavelength_table(stored.wavelength_nm, columns)
-        table.columns.names = ["design", "curve"]
-        return table
-
-    @cached_property
-    def study(self) -> LoadedStudy:
-        """Study that was run, with the curves that the run kept."""
-        from ..report import study_of
-
-        return LoadedStudy(study_of(self.output, self._data, allow_code=self._allow_code))
-
-    @property
-    def summary(self) -> str:
-        """Summary of the run as `sweep run` prints it."""
-        from ..report import summary_lines
-
-        return "\n".join(summary_lines(self.output))
-
-    def images(self, split: str = "test", designs: Sequence[str] | None = None, form: Form = "raw") -> Iterator[Batch]:
-        """Yield labeled images of the run's benchmark of vision, up to 1,024 at once, without files.
-
-        Parameters
-        ----------
-        split : {'train', 'check', 'test'}
-            Split. The readers of the run have read those of the test.
-        designs : sequence of str, optional
-            Names of designs, such as "RGGB"; all of them by default.
-        form : {'raw', 'demosaicked', 'isp'}
-            Raw mosaics (uint16 DN, float32 of HDR pixels), every channel at every pixel (float32 DN above the black
-            level), or pictures of a plain ISP (uint8 sRGB).
-
-        Yields
-        ------
-        Batch
-            `images`, ndarray of shape (n, rows, columns) or (n, rows, columns, n_channels), and `labels`, a table with
-            the columns of an exported manifest.
-
-        Raises
-        ------
-        SweepError
-            If the run has no images, or no such design, split or form.
-        """
-        from ..run.image_files import images_of_run
-        from ..vision.batches import FORMS
-        from ..vision.lamps import SPLITS
-
-        names = list(self._images_of_test()["name"].unique())
-        chosen = names if designs is None else list(designs)
-        for value, known in ((split, SPLITS), (form, FORMS), *((name, names) for name in chosen)):
-            if value not in known:
-                allowed, near = ", ".join(known), nearest(value, known)
-                raise SweepError(ValidationIssue("unknown", value=value, allowed=allowed, nearest=near))
-        return images_of_run(self.study.study, self.output.named_rows, split, chosen, form)
-
-    def score(self, predictions: pd.DataFrame) -> pd.DataFrame:
-        """Score a reader's answers to the test images of the run's benchmark of vision.
-
-        Parameters
-        ----------
-        predictions : pandas.DataFrame
-            Columns `image_id`, and `state` (or "unknown") or a probability of each state.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Errors of each design, by order of the lenses, distance and light level, with intervals; differences from
-            the first design and from the ideal observer, paired; calibration.
-
-        Raises
-        ------
-        SweepError
-            If the run has no images, and for other, double or missing images or answers.
-        """
-        from ..run.score import reader_of, scores_of
-        from ..vision.scenes import states_of
-
-        images, vision = self._images_of_test(), self.output.study.vision
-        assert vision is not None
-        table = predictions.reset_index(drop=True)
-        return scores_of(reader_of(table, Path("predictions"), images, states_of(vision)), images, vision.unknown_cost)
-
-    def _images_of_test(self) -> pd.DataFrame:
-        from ..results.tables import VISION
-        from ..run.score import images_of_test
-
-        if self.output.study.vision is None:
-            raise SweepError(ValidationIssue("the study has no `vision`", str(self.folder)))
-        return images_of_test(self.output.vision[VISION])
-
-    def report(self) -> Path:
-        """Draw figures and report again.
-
-        Returns
-        -------
-        Path
-            The report, ``report.html``.
-        """
-        from ..report import make_report
-        from ..results.tables import REPORT
-
-        make_report(self.output)
-        return self.folder / REPORT
-
-
 def _silent(*_: object) -> None: ...
+
+
+def _unknown(what: str, name: str, known: Sequence[str]) -> ValidationIssue:
+    return ValidationIssue(f"unknown {what}", value=name, allowed=", ".join(known), nearest=nearest(name, known))
