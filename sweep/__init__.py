@@ -6,6 +6,8 @@ Three lines of Python evaluate a filter:
 >>> study = sweep.load_study("stopband")
 >>> dn = study.evaluate(N=0.95 * study.curve("Y")).csd_yellow_red
 
+What the commands of `sweep` do, functions of their names do, too: `sweep.run("stopband")` returns what it prints.
+
 Names are loaded at their first use; `__init__.pyi` has their types.
 """
 
@@ -16,12 +18,24 @@ _LOCATIONS = {
     "make_study": "api.loading:make_study",
     "read_run": "api.loading:read_run",
     "studies": "api.loading:studies",
+    "list_studies": "runs.listing:list_studies",
+    "check": "api.check:check",
+    "plan": "api.check:plan",
+    "new_study": "api.new:new_study",
+    "run": "api.run:run",
+    "status": "runs.status:status",
+    "audit": "runs.audit:audit",
+    "compare": "report.compare:compare",
+    "export": "report.export:export",
+    "score": "report.scores:score",
+    "show": "api.run:show",
+    "describe": "report.describe:describe",
     "evaluate": "api.evaluate:evaluate",
     "sensor": "api.loading:sensor",
     "lights": "api.loading:lights",
     "read_curves": "api.inline_curves:read_curves",
-    "LoadedStudy": "api.loaded_study:LoadedStudy",
-    "FinishedRun": "api.finished_run:FinishedRun",
+    "LoadedStudy": "api.objects:LoadedStudy",
+    "FinishedRun": "api.objects:FinishedRun",
     "Pixel": "camera.pixel:Pixel",
     "Optics": "camera.pixel:Optics",
     "Scene": "camera.scene:Scene",
@@ -31,6 +45,7 @@ _LOCATIONS = {
     "MultiStopband": "designs.families.stopband:MultiStopband",
     "Dual": "designs.families.dual:Dual",
     "FreeForm": "designs.families.free_form:FreeForm",
+    "Answer": "base.answer:Answer",
     "Quantity": "metrics.quantity:Quantity",
     "SweepError": "base.errors:SweepError",
 }

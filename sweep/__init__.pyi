@@ -1,8 +1,11 @@
+from .api.check import check, plan
 from .api.evaluate import evaluate
-from .api.finished_run import FinishedRun
 from .api.inline_curves import read_curves
-from .api.loaded_study import LoadedStudy
 from .api.loading import lights, load_study, make_study, read_run, sensor, studies
+from .api.new import new_study
+from .api.objects import FinishedRun, LoadedStudy
+from .api.run import run, show
+from .base.answer import Answer
 from .base.errors import SweepError
 from .camera.pixel import Optics, Pixel
 from .camera.scene import Scene, Target
@@ -10,10 +13,18 @@ from .designs.families.dual import Dual
 from .designs.families.free_form import FreeForm
 from .designs.families.stopband import MultiStopband, Stopband
 from .metrics.quantity import Quantity
+from .report.compare import compare
+from .report.describe import describe
+from .report.export import export
+from .report.scores import score
+from .runs.audit import audit
+from .runs.listing import list_studies
+from .runs.status import status
 from .spectra.spectrum import WavelengthGrid
 
 __version__: str
 __all__ = [
+    "Answer",
     "Dual",
     "FinishedRun",
     "FreeForm",
@@ -28,12 +39,24 @@ __all__ = [
     "Target",
     "WavelengthGrid",
     "__version__",
+    "audit",
+    "check",
+    "compare",
+    "describe",
     "evaluate",
+    "export",
     "lights",
+    "list_studies",
     "load_study",
     "make_study",
+    "new_study",
+    "plan",
     "read_curves",
     "read_run",
+    "run",
+    "score",
     "sensor",
+    "show",
+    "status",
     "studies",
 ]

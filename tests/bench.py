@@ -33,7 +33,7 @@ from sweep.designs.edge import SPAN_PER_WIDTH
 from sweep.designs.space import Space
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.separation import class_pairs, csd_name, separation, separations_along
-from sweep.run import run_study
+from sweep.runs import run_study
 from sweep.study import Study, load_study
 
 ROOT = Path(__file__).parent.parent

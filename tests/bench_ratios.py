@@ -21,9 +21,9 @@ from build import large
 from sweep.camera.model import SceneModel
 from sweep.designs.block import CurveBlock, edges_of
 from sweep.metrics.evaluate import evaluate
-from sweep.run import run_study
-from sweep.run.routes import Wanted
-from sweep.run.rows import rules_of
+from sweep.runs import run_study
+from sweep.runs.routes import Wanted
+from sweep.runs.rows import rules_of
 from sweep.study import load_study
 
 LAST = Path(__file__).parent / "bench_last.json"

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from sweep.api.new import new_study
 from sweep.base.errors import StudyError, SweepError
-from sweep.cli.new import new_study
 from sweep.report.answer import answer_parts
-from sweep.results.output import Output
-from sweep.run import run_study
+from sweep.results.output import Output, read_output
+from sweep.runs import run_study
 from sweep.study import Study, load_study
 
 STUDY = """\
@@ -140,6 +140,12 @@ def load(tmp_path: Path, text: str) -> Study:
     return load_study(path)
 
 
+def output_of(folder: Path, text: str) -> Output:
+    """What a run of a study leaves in `out` of a folder."""
+    ran(load(folder, text), folder / "out", 1)
+    return read_output(folder / "out")
+
+
 def issues(tmp_path: Path, text: str) -> list[str]:
     with pytest.raises(StudyError) as caught:
         load(tmp_path, text)
@@ -158,7 +164,7 @@ def one_line(*said: str, alone: bool = True) -> Iterator[None]:
 
 
 def made(folder: Path, name: str = "mine", qe: Path | None = None, lights: Path | None = None) -> Path:
-    new_study(name, folder / "studies", [qe] if qe else [], [lights] if lights else [])
+    new_study(name, folder=folder / "studies", qe=[qe] if qe else [], lights=[lights] if lights else [])
     return folder / "studies" / f"{name}.yaml"
 
 

@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 
 def phases_of_lights() -> None:
     """Images of a small light at any sampling phase, behind a linear readout and one in whole numbers."""
-    from sweep.run import run_study
+    from sweep.runs import run_study
     from sweep.study import load_study
 
     from .build import STUDY
@@ -38,7 +38,7 @@ def designs_and_metrics() -> None:
 
     from sweep.camera.noise import errors as confusion
     from sweep.camera.pixel import Pixel
-    from sweep.run import run_study
+    from sweep.runs import run_study
     from sweep.study import load_study
     from sweep.vision.images import HeadCamera
     from sweep.vision.lamps import TEST, split_lamps

@@ -175,7 +175,8 @@ def draw_nothing(patch: pytest.MonkeyPatch) -> None:
     patch.setattr("sweep.report.page.pictures_of", lambda _, kinds: {kind: kind.encode() for kind in kinds})
     for module in ("page", "sensors"):
         patch.setattr(f"sweep.report.{module}.inlined", lambda _: "data:image/png;base64,cG5n")
-    patch.setattr("sweep.cli.describe._png", lambda *_: b"sweep describe")
+    patch.setattr("sweep.report.sensors.rendered", lambda _, kind: kind.encode())
+    patch.setattr("sweep.report.describe._png", lambda *_: b"sweep describe")
 
 
 @pytest.fixture

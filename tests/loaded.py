@@ -7,10 +7,10 @@ for name in (
     "matplotlib.backends.backend_svg",
     "scipy.stats",
     "sweep.cli.app",
-    "sweep.cli.audit",
-    "sweep.cli.run",
+    "sweep.runs.audit",
+    "sweep.api.run",
     "sweep.report.trade_off",
-    "sweep.run.sweep",
+    "sweep.runs.sweep",
     "sweep.search.solver",
 ):
     import_module(name)

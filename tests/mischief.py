@@ -9,13 +9,14 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 
 from sweep.designs.families.stopband import MultiStopband
 from sweep.designs.space import Filter
 from sweep.results.dataset import part_paths
 from sweep.results.identity import CHUNK
-from sweep.run import run_study
+from sweep.runs import run_study
 from sweep.study import Study
 
 
@@ -56,6 +57,12 @@ def mischievous(study: Study, file: Path) -> Study:
 
 def rows(folder: Path) -> pd.DataFrame:
     return pd.read_parquet(folder / "results.parquet")
+
+
+def assert_same_tables(one: Path, other: Path, *names: str) -> None:
+    """Tables of two runs are bit for bit the same; without names, their rows."""
+    for name in names or ("results",):
+        assert pq.read_table(one / f"{name}.parquet").equals(pq.read_table(other / f"{name}.parquet")), name
 
 
 class StoppedError(Exception):

@@ -12,7 +12,7 @@ import pytest
 from sweep.base.types import in_turn
 from sweep.report.price import price_table
 from sweep.results.output import read_output
-from sweep.run.search import run_search
+from sweep.runs.search import run_search
 from sweep.study import load_study
 
 from .commanded import commanded

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from sweep.run.provenance import _PACKAGES
+from sweep.runs.provenance import _PACKAGES
 
 PACKAGE = Path(__file__).parent.parent / "sweep"
 LEVELS = [
@@ -24,7 +24,7 @@ LEVELS = [
     "search",
     "study",
     "results",
-    "run",
+    "runs",
     "report",
     "api",
     "cli",
@@ -33,7 +33,7 @@ LEVELS = [
 """Subpackages from the lowest to the highest, and the file that starts the program."""
 ONLY_USER = {
     "nlopt": ["search/solver"],
-    "joblib": ["run/"],
+    "joblib": ["runs/"],
     "moocore": ["metrics/pareto"],
     "jinja2": ["report/"],
     "typer": ["cli/"],

@@ -17,7 +17,7 @@ from ..spectra import LightUnit
 from ..spectra.formats import files_in, read_curves
 from ..spectra.lights import Lights
 from ..spectra.spectrum import Curves, Quantity
-from ..spectra.units import FITTING, Use, used_as
+from ..spectra.units import FITTING, Use, stated_quantity, used_as
 from .channels import NEW, RATIO, Layout, layout_of, sensor_file
 from .filter_evaluation import (
     PLAIN_TILE,
@@ -69,7 +69,7 @@ class EvaluateOptions:
     base: str | None = None
     sensor: str = "ar0820"
     lights: str | None = None
-    quantity: Quantity | Sequence[Quantity] | None = None
+    quantity: str | Sequence[str] | None = None
     relative_to: str | None = None
     transmission: bool = False
     data: Path | str | None = None
@@ -77,7 +77,8 @@ class EvaluateOptions:
 
     def stated(self, *uses: Use) -> Quantity | None:
         """Return the unit that is stated for a use."""
-        stated = [self.quantity] if isinstance(self.quantity, str) else list(self.quantity or ())
+        words = [self.quantity] if isinstance(self.quantity, str) else list(self.quantity or ())
+        stated = [stated_quantity(word) for word in words]
         return next((quantity for quantity in stated if any(quantity in FITTING[use] for use in uses)), None)
 
     @property
@@ -94,7 +95,7 @@ def evaluate(source: Path | str, *, design: str | None = None, **options: Any) -
     source : path-like
         A file with the filter's curve, or the folder of a finished run.
     design : str, optional
-        A design of the run: ``design_id``, name, or ``best`` (default).
+        A design of the run: a `filter_id`, a name (RYN4Cy, RGGB), or ``best`` (default).
     **options
         Fields of `EvaluateOptions`: column, channel, cfa, base, sensor, lights, quantity, relative_to, transmission;
         for a run also data and allow_code.

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from html import escape
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -140,9 +141,33 @@ class FilterEvaluation:
             return None
         return gap_between(self.before_quantization_dn, self.limit)
 
+    problem: ClassVar[None] = None
+    """An evaluation is no problem of the command, however bad the filter."""
+
+    @property
+    def lines(self) -> list[str]:
+        """The text of `sweep evaluate`."""
+        return [*(f"{note}." for note in self.notes), *self._lines()]
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """The same as plain values."""
+        return {
+            "rows": self.table.to_dict("records"),
+            "limit_of": self.goal.name,
+            "limit_dn": self.limit,
+            "before_quantization_dn": self.before_quantization_dn,
+            "gap": self.gap,
+            "no_limit": self.no_limit,
+            "notes": self.notes,
+        }
+
     def __str__(self) -> str:
         """Return the text of `sweep evaluate`."""
-        return "\n".join([*(f"{note}." for note in self.notes), *self._lines()])
+        return "\n".join(self.lines)
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
 
     def _lines(self) -> Iterator[str]:
         scenes = list(dict.fromkeys(scene for scene, *_ in self.rows))

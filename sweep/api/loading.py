@@ -19,9 +19,8 @@ from ..spectra.light_files import lights_file
 from ..spectra.spectrum import Curves
 from ..study.shipped import shipped_names, study_path
 from .channels import sensor_file
-from .finished_run import FinishedRun
 from .inline_curves import CurveLike, table_to_curves, to_curves
-from .loaded_study import LoadedStudy
+from .objects import FinishedRun, LoadedStudy
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from ..base.errors import DataError, ValidationIssue, nearest
+from ..base.errors import DataError, SweepError, ValidationIssue, nearest
 from ..base.types import DesignCurves
 from ..camera.exposure import largest_sensitivity_not_brightest
 from ..camera.model import scene_model
@@ -94,6 +94,24 @@ def replaced_curves(study: Study, cfa: str, channels: Sequence[str], base: str |
         study.sensor.curve(curve)  # raises for an unknown name
         bases[channel] = curve
     return bases
+
+
+def known_scenario(study: Study, name: str) -> str:
+    """Return the name of a scenario; raises SweepError for an unknown one."""
+    known = list(study.scenarios)
+    if name not in known:
+        issue = ValidationIssue("unknown scenario", value=name, allowed=", ".join(known), nearest=nearest(name, known))
+        raise SweepError(issue)
+    return name
+
+
+def known_cfa(study: Study, name: str, channels: Sequence[str]) -> str:
+    """Return the name of a CFA that has some channels; raises SweepError for another one."""
+    known = [cfa for cfa, mosaic in study.mosaics.items() if set(channels) <= set(mosaic.channels)]
+    if name not in known:
+        problem, near = f"no CFA of the study with a channel {' and '.join(channels)}", nearest(name, study.mosaics)
+        raise SweepError(ValidationIssue(problem, value=name, allowed=", ".join(known), nearest=near))
+    return name
 
 
 def user_filter_setup(study: Study, cfa: str, scenario: str, bases: Mapping[str, str]) -> Setup:

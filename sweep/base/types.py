@@ -63,6 +63,10 @@ Parallel = Callable[[Iterable[Call]], Iterator[Any]]
 """Answers of calls, which may be spread over the cores, in their order."""
 
 
+def silent(*_: object) -> None:
+    """Show no progress, and say nothing."""
+
+
 def delayed(function: Callable[..., Any], *arguments: Any) -> Call:
     """Record a call without making it."""
     return function, arguments, {}

@@ -6,11 +6,11 @@ import os
 from enum import StrEnum
 from glob import escape
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from ..base.errors import StudyError, ValidationIssue, nearest
+from ..base.errors import StudyError, ValidationIssue
 
 OF_STUDIES = "Studies"
 OF_RESULTS = "Results"
@@ -18,18 +18,6 @@ OF_CURVES = "Files of curves"
 OF_TOOL = "The tool itself"
 PANELS = (OF_STUDIES, OF_RESULTS, OF_CURVES, OF_TOOL)
 """Groups of commands in the help, in order."""
-
-
-def quantity_of(word: str | None) -> Any:
-    """Return a unit that is stated on the command line. Raises StudyError for an unknown one."""
-    from ..spectra.units import FITTING  # noqa: PLC0415  (heavy imports stay out of --help)
-
-    known = [quantity for of_use in FITTING.values() for quantity in of_use]
-    if word is not None and word not in known:
-        raise StudyError(
-            ValidationIssue("unknown quantity", None, None, "--quantity", word, ", ".join(known), nearest(word, known))
-        )
-    return word
 
 
 def study_files(incomplete: str) -> list[str]:
@@ -55,12 +43,6 @@ def _paths(incomplete: str, patterns: tuple[str, ...]) -> set[str]:
     return {str(path) for pattern in patterns for path in Path(folder).glob(escape(typed) + pattern)}
 
 
-def _study_path(path: Path) -> Path:
-    from ..study.shipped import study_path  # noqa: PLC0415  (help needs no study)
-
-    return study_path(path)
-
-
 def changes_of(texts: list[str] | None) -> dict[str, str]:
     """Parse the values of `--set`.
 
@@ -78,18 +60,8 @@ def changes_of(texts: list[str] | None) -> dict[str, str]:
 
 
 _STUDY = "A study file, YAML, or the name of a study as `sweep list` has it."
-StudyPath = Annotated[
-    Path, typer.Argument(help=_STUDY, show_default=False, autocompletion=study_files, callback=_study_path)
-]
-StudyPaths = Annotated[
-    list[Path],
-    typer.Argument(
-        help=_STUDY,
-        show_default=False,
-        autocompletion=study_files,
-        callback=lambda paths: [_study_path(path) for path in paths],
-    ),
-]
+StudyPath = Annotated[Path, typer.Argument(help=_STUDY, show_default=False, autocompletion=study_files)]
+StudyPaths = Annotated[list[Path], typer.Argument(help=_STUDY, show_default=False, autocompletion=study_files)]
 Changes = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="A key of the study: constraints.sensitivity.min=0.92."),
@@ -103,7 +75,16 @@ AllowCode = Annotated[
 RunFolder = Annotated[
     Path, typer.Argument(help="Output folder of a study.", show_default=False, autocompletion=run_folders)
 ]
-Outputs = Annotated[Path, typer.Option(help="Folder for the results of all studies.")]
+Outputs = Annotated[Path, typer.Option("--output", "-o", help="Folder for the results of all studies.")]
+Jobs = Annotated[int | None, typer.Option("--jobs", "-j", min=1, help="Workers.", show_default="all cores")]
+Force = Annotated[bool, typer.Option("--force", "-f", help="Replace files of other content.")]
+Design = Annotated[
+    str | None, typer.Option("--design", help="A filter_id, a name (RYN4Cy, RGGB), or best.", show_default=False)
+]
+Quantities = Annotated[
+    list[str] | None,
+    typer.Option("--quantity", help="Unit of the files' numbers, where heads do not tell it; may be repeated."),
+]
 DataFolder = Annotated[
     Path | None, typer.Option("--data", help="Folder that the study's files are looked for in first.")
 ]

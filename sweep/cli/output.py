@@ -6,34 +6,60 @@ import json
 import math
 import sys
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
-from typing import Annotated, Any
+from typing import Annotated, Any, Protocol
 
 import typer
 
+from ..base.errors import SweepError
+
 Json = Annotated[bool, typer.Option("--json", help="Say one JSON object on stdout, and everything else on stderr.")]
-Quiet = Annotated[bool, typer.Option("--quiet", help="Print errors alone, a run's folder, and with --json the object.")]
+Quiet = Annotated[
+    bool, typer.Option("--quiet", "-q", help="Print errors alone, a run's folder, and with --json the object.")
+]
 _INTERVAL_S = 10.0
 _LEAST_SHARE, _LEAST_S = 0.01, 60.0
 """The time left is printed from this share of a phase, or this time, on: the first jobs wait for the compiler."""
 
 
-def print_result(lines: Iterable[str], facts: Mapping[str, Any], *, as_json: bool = False, quiet: bool = False) -> None:
-    """Print the result of a command.
+class Answered(Protocol):
+    """What a command found; see `base.answer`."""
 
-    `facts`: JSON object; NaN and infinity become null. With `as_json` one JSON object goes to stdout; everything else
-    goes to stderr.
+    @property
+    def lines(self) -> Sequence[str]:
+        """What it prints."""
+
+    @property
+    def facts(self) -> Mapping[str, Any]:
+        """The same as plain values."""
+
+    @property
+    def problem(self) -> SweepError | None:
+        """Error with which it ends."""
+
+
+def print_answer(answer: Answered, *, as_json: bool = False, quiet: bool = False) -> None:
+    """Print what a command found, and end with its problem.
+
+    With `as_json` one JSON object goes to stdout, in which NaN and infinity are null; everything else goes to stderr.
     """
-    print_lines(lines, as_json=as_json, quiet=quiet)
+    print_lines(answer.lines, as_json=as_json, quiet=quiet)
     if as_json:
-        typer.echo(json.dumps(_plain(facts), allow_nan=False, ensure_ascii=False))
+        print_json(answer.facts)
+    if answer.problem is not None:
+        raise answer.problem
 
 
 def print_lines(lines: Iterable[str], *, as_json: bool, quiet: bool) -> None:
     """Print lines on stdout, or on stderr with `--json`."""
     for line in () if quiet else lines:
         typer.echo(line, err=as_json)
+
+
+def print_json(facts: Mapping[str, Any]) -> None:
+    """Print one JSON object."""
+    typer.echo(json.dumps(_plain(facts), allow_nan=False, ensure_ascii=False))
 
 
 def _plain(value: Any) -> Any:
@@ -71,6 +97,14 @@ class ProgressDisplay(ExitStack):
                 progress.TimeRemainingColumn(),
             )
             self._bars = self.enter_context(progress.Progress(*columns, console=Console(stderr=True)))
+
+    def note(self, text: str) -> None:
+        """Print a remark, above the bar of a terminal; a headline of a part as it is."""
+        remark = text if text.startswith("--") else f"Note: {text}"
+        if self._bars is not None:
+            self._bars.console.print(remark, markup=False, highlight=False, soft_wrap=True)
+        elif not self._quiet:
+            typer.echo(remark, err=True)
 
     def update(self, phase: str, done: int, total: int) -> None:
         """Show the progress of a phase."""

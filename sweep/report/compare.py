@@ -6,12 +6,12 @@ import hashlib
 import os
 import string
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 import pandas as pd
 
+from ..base.answer import Answer
 from ..base.errors import OutputError, SweepError, ValidationIssue
 from ..results.atomic import write_bytes, write_text
 from ..results.output import Output, read_output
@@ -42,29 +42,32 @@ _MOST_SCENARIOS = 4
 """Scenes whose fronts are printed; the page has all."""
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """Result of a comparison: folder of its files, lines, tables, and notes."""
+def compare(folders: Sequence[Path | str], *, output: Path | str | None = None) -> Answer:
+    """Compare finished runs: studies, best designs, fronts, versions; as a page, a picture and a table.
 
-    folder: Path
-    lines: Sequence[str]
-    tables: Mapping[str, pd.DataFrame]
-    notes: Sequence[str]
+    Parameters
+    ----------
+    folders : sequence of path-like
+        Output folders of 2 to 26 studies.
+    output : path-like, optional
+        Folder of the comparison; left out, outputs/compare-A-B.
 
+    Returns
+    -------
+    Answer
+        What the runs say beside each other; ``facts`` has the tables as records.
 
-def compare_runs(folders: Sequence[Path], to: Path | None) -> Comparison:
-    """Compare finished runs, and write `compare.html`, `compare.csv`, `fronts.png` and `fronts.svg`.
-
-    `folders`: output folders of 2 to 26 studies; `to`: folder of the comparison; None: outputs/compare-<a>-<b>. Raises
-    SweepError if there are fewer or more runs. Raises OutputError if a folder holds no finished run, a file of others
-    would be replaced, or the disk refuses.
+    Raises
+    ------
+    SweepError
+        If there are fewer or more runs, a folder holds no finished run, or a file of others would be replaced.
     """
     if not 2 <= len(folders) <= len(_LETTERS):
         allowed = f"2 to {len(_LETTERS)} folders"
         raise SweepError(ValidationIssue("cannot be compared", None, None, "FOLDERS", len(folders), allowed))
-    target = to or Path("outputs") / _folder_of(folders)
+    target = Path("outputs") / _folder_of([Path(folder) for folder in folders]) if output is None else Path(output)
     _refuse_other(target)
-    outputs = [read_output(folder) for folder in folders]
+    outputs = [read_output(Path(folder)) for folder in folders]
     runs = {f"{letter} {' '.join(o.study.study.split())}": o for letter, o in zip(_LETTERS, outputs, strict=False)}
     fronts, figure, notes = compare_fronts(runs)
     answer = ranking(runs)
@@ -108,7 +111,8 @@ def compare_runs(folders: Sequence[Path], to: Path | None) -> Comparison:
     of_all = [table.assign(scene=name) for name, table in fronts.items()]
     tables = {"best": best, "plain": plain}
     tables["fronts"] = pd.concat(of_all, ignore_index=True) if of_all else pd.DataFrame()
-    return Comparison(target, lines, tables, notes)
+    records = {name: table.to_dict("records") for name, table in tables.items()}
+    return Answer(lines, {"folder": str(target), **records, "notes": notes})
 
 
 def compare_fronts(runs: Mapping[str, Output]) -> tuple[dict[str, pd.DataFrame], Drawing | None, list[str]]:

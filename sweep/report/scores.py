@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
+from ..base.answer import Answer
+from ..base.errors import SweepError, ValidationIssue
 from ..results.atomic import atomic, write_text
-from ..results.output import Output
+from ..results.output import Output, read_output
 from ..results.tables import VISION
-from ..run.score import (
+from ..runs.score import (
     Reader,
     check_unique,
     images_of_test,
@@ -22,7 +24,7 @@ from ..run.score import (
     scores_of,
     whole_scores,
 )
-from ..run.score_streets import is_of_streets, labels_of_test, read_detections, street_lines, street_scores
+from ..runs.score_streets import is_of_streets, labels_of_test, read_detections, street_lines, street_scores
 from ..vision.detections import ALL
 from ..vision.scenes import NETWORK, states_of
 from .figures import CURVE_CYCLE, DASHES, canvas, legend_beside, rendered
@@ -34,22 +36,49 @@ if TYPE_CHECKING:
 PAGE, TABLE, STREETS = "scores.html", "scores.parquet", "street_scores.parquet"
 
 
-def score_readers(output: Output, predictions: Sequence[Path], to: Path) -> list[str]:
-    """Score files of predictions and the run's network, and write `scores.parquet` and `scores.html`.
+def score(folder: Path | str, predictions: Sequence[Path | str], *, output: Path | str | None = None) -> Answer:
+    """Score readers of a benchmark's test images: errors of each CFA, differences, distance from the ideal observer.
 
-    Files with positions are detections in streets, whose scores are in `street_scores.parquet`.
+    Parameters
+    ----------
+    folder : path-like
+        Folder of a finished run of a study with `vision`.
+    predictions : sequence of path-like
+        A CSV or Parquet file for each reader: image_id, and state or a probability of each. Files with positions are
+        detections in streets.
+    output : path-like, optional
+        Folder of ``scores.parquet`` and ``scores.html``; left out, FOLDER/scores.
 
-    `predictions`: files, one per reader. Raises SweepError for predictions that are not of the test images, see
-    `read_predictions`.
+    Returns
+    -------
+    Answer
+        The scores; ``facts`` has them as records.
+
+    Raises
+    ------
+    SweepError
+        If the run has no images, or the predictions are not of them.
     """
-    vision = output.study.vision
+    run, to = read_output(Path(folder)), Path(folder) / "scores" if output is None else Path(output)
+    if run.study.vision is None:
+        raise SweepError(ValidationIssue("the study has no `vision`", str(folder)))
+    lines, tables = _score_readers(run, [Path(path) for path in predictions], to)
+    return Answer(lines, {"folder": str(to)} | {name: table.to_dict("records") for name, table in tables.items()})
+
+
+def _score_readers(output: Output, predictions: Sequence[Path], to: Path) -> tuple[list[str], dict[str, pd.DataFrame]]:
+    """Score files of predictions and the run's network, and write the scores; return lines and tables."""
+    vision, tables = output.study.vision, dict[str, pd.DataFrame]()
     assert vision is not None
     check_unique([path.stem for path in predictions] + ([NETWORK] if vision.network else []))
     of_streets = [path for path in predictions if vision.street is not None and is_of_streets(path)]
     predictions = [path for path in predictions if path not in of_streets]
-    lines = _score_streets(output, of_streets, to) if of_streets else []
+    lines = list[str]()
+    if of_streets:
+        tables["streets"] = _score_streets(output, of_streets, to)
+        lines += street_lines(tables["streets"])
     if not predictions:
-        return [*lines, f"Files: {to}/: {STREETS}."]
+        return [*lines, f"Files: {to}/: {STREETS}."], tables
     images = images_of_test(output.vision[VISION])
     readers: list[Reader] = [read_predictions(path, images, states_of(vision)) for path in predictions]
     if vision.network:
@@ -65,10 +94,10 @@ def score_readers(output: Output, predictions: Sequence[Path], to: Path) -> list
     text = page("scores.html.j2", title=name, summary=summary, image=picture, table=rows(shown), folder=folder)
     write_text(text, to / PAGE)
     files = ", ".join([TABLE, PAGE, *([STREETS] if of_streets else [])])
-    return [*lines, f"Files: {to}/: {files}."]
+    return [*lines, f"Files: {to}/: {files}."], {"images": scores, **tables}
 
 
-def _score_streets(output: Output, predictions: Sequence[Path], to: Path) -> list[str]:
+def _score_streets(output: Output, predictions: Sequence[Path], to: Path) -> pd.DataFrame:
     vision = output.study.vision
     assert vision is not None
     labels = labels_of_test(output)
@@ -77,7 +106,7 @@ def _score_streets(output: Output, predictions: Sequence[Path], to: Path) -> lis
     scores = pd.concat(parts, ignore_index=True)
     with atomic(to / STREETS) as hidden:
         scores.to_parquet(hidden, index=False)
-    return [*street_lines(scores)]
+    return scores
 
 
 def summary_table(scores: pd.DataFrame) -> pd.DataFrame:

@@ -20,8 +20,8 @@ from ..results.dataset import part_paths
 from ..results.manifest import Manifest
 from ..results.output import Output, read_output
 from ..results.tables import ALL_SENSORS, REFERENCE, REPORT, RESULTS, SEARCHED, read_table
-from ..run.all_sensors import ALL
-from ..run.uncertainty import REFERENCE_CFA, UNCLIPPED
+from ..runs.all_sensors import ALL
+from ..runs.uncertainty import REFERENCE_CFA, UNCLIPPED
 from ..study import SensorAndLights, folder_name
 from .figures import CURVE_CYCLE, canvas, legend_beside, rendered
 from .pages import inlined, page, rows

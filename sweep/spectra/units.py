@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..base.errors import DataError, ValidationIssue
+from ..base.errors import DataError, ValidationIssue, nearest
 from ..base.types import PerSample, PerWavelength
 from .clean import several
 from .spectrum import LIGHT_M_S, PLANCK_J_S, Curves, Quantity, Unit
@@ -102,6 +102,15 @@ _PERCENT_OF = re.compile(r"(?:\b100\s*)?%\s*([tr])\b|\b([tr])\s*%", re.IGNORECAS
 """`%T`, `T%` and `Baseline 100%T`, as photometers write them."""
 _LEADING = re.compile(r"^\s*(%)\s*(?=[^\W\d_]{2})")
 _TRAILING = re.compile(r"(?:(?:^|[\s_,:/])(od|m?a[/_ ]w(?:\^?-1)?|db|percent|pct)|(%|\u2030))\s*$", re.IGNORECASE)
+
+
+def stated_quantity(word: str | None) -> Quantity | None:
+    """Return a unit that a user states; raises DataError for an unknown one."""
+    known = {str(quantity): quantity for of_use in FITTING.values() for quantity in of_use}
+    if word is not None and word not in known:
+        near = nearest(word, known)
+        raise DataError(ValidationIssue("unknown quantity", None, None, "--quantity", word, ", ".join(known), near))
+    return None if word is None else known[word]
 
 
 def folded(text: str) -> str:

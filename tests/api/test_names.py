@@ -15,7 +15,8 @@ from ..conftest import ROOT
 
 NAMES = {
     *("load_study", "make_study", "read_run", "read_curves", "studies", "sensor", "lights", "evaluate"),
-    *("LoadedStudy", "FinishedRun", "Quantity", "SweepError"),
+    *("check", "plan", "new_study", "list_studies", "run", "status", "show", "audit", "compare", "export", "score"),
+    *("describe", "Answer", "LoadedStudy", "FinishedRun", "Quantity", "SweepError"),
     *("Pixel", "Optics", "Scene", "Target", "WavelengthGrid"),
     *("Stopband", "MultiStopband", "Dual", "FreeForm"),
 }
@@ -52,7 +53,7 @@ def test_nothing_is_loaded_before_a_name_is_used() -> None:
     assert done.stdout.split() == []
 
 
-@pytest.mark.parametrize("name", ["loaded_study", "finished_run", "loading", "inline_curves", "evaluate"])
+@pytest.mark.parametrize("name", ["objects", "loading", "inline_curves", "evaluate"])
 def test_examples_in_the_code_run(name: str) -> None:
     module = __import__(f"sweep.api.{name}", fromlist=[name])
     assert doctest.testmod(module).failed == 0

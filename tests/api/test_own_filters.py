@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -18,22 +17,6 @@ from ..build import one_line, study_file
 @pytest.fixture(scope="module")
 def tiny(tmp_path_factory: pytest.TempPathFactory) -> sweep.LoadedStudy:
     return sweep.load_study(study_file(tmp_path_factory.mktemp("api")))
-
-
-def test_csd_is_the_smallest_distance_of_rounded_digital_numbers() -> None:
-    """By the equations of the white patch, in plain sums: level x full scale x K x light of a channel over the largest."""
-    study = sweep.make_study(
-        cfas=["RYYCy", "RYNCy"], boxes={"any": {"cfa": "RYNCy", "channel": "N", "base": "Y", "to": "G"}}
-    )
-    curve = study.curve("Y") * np.where(study.wavelength_nm > 615, 0.5, 1.0)
-    lights = study.lights
-    qe = np.stack([study.curve(name) for name in "RY"] + [curve, study.curve("Cy")])
-    most = qe[[0, 1, 3]].sum(axis=1).max()  # N is not brighter than Y
-    dn = np.round(0.95 * 4095 * study.study.lights.photon_ratio * 301 * (lights.to_numpy().T @ qe.T) / most)
-    kinds = lights.columns.get_level_values("type")
-    pairs = product(dn[kinds == "yellow"], dn[kinds == "red"])
-    smallest = min(float(np.linalg.norm(a - b)) for a, b in pairs)
-    assert study.evaluate(N=curve).csd_yellow_red[0] == pytest.approx(smallest, abs=1e-9)
 
 
 def test_forms_of_a_curve_are_one(tiny: sweep.LoadedStudy, tmp_path: Path) -> None:

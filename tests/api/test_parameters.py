@@ -64,7 +64,10 @@ def test_what_a_filter_lacks_is_told(changed: dict[str, Any], words: str) -> Non
 
 
 def test_runs_convert_to_other_libraries(tmp_path: Path) -> None:
-    run = sweep.make_study(cfas=["RGGB", "RCCB"], scenarios={"near": {}, "far": {"visibility_m": 100, "target": {"distance_m": 50, "fov_deg": 60}}}).run(tmp_path)
+    run = sweep.make_study(
+        cfas=["RGGB", "RCCB"],
+        scenarios={"near": {}, "far": {"visibility_m": 100, "target": {"distance_m": 50, "fov_deg": 60}}},
+    ).run(tmp_path)
     labeled = run.to_xarray()
     assert labeled.csd_yellow_red.dims == ("design", "scenario")
     assert labeled.csd_yellow_red.attrs["units"] == "DN"

@@ -11,8 +11,8 @@ import pytest
 
 from sweep.base.errors import ErrorBoundExceededError
 from sweep.cli import app as cli
-from sweep.cli.audit import Audit, audit_rows, sampled
-from sweep.run import run_study
+from sweep.runs import run_study
+from sweep.runs.audit import Audit, audit_rows, sampled
 from sweep.study import Study, load_study
 
 from ..build import stopband_study
@@ -67,7 +67,7 @@ def broken_audit() -> Audit:
 def test_an_error_above_the_tolerance_has_an_exit_code_of_its_own(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    monkeypatch.setattr("sweep.cli.audit.audit_output", lambda *_, **__: broken_audit())
+    monkeypatch.setattr("sweep.runs.audit.audit", lambda *_, **__: broken_audit().answer(tmp_path))
     monkeypatch.setattr(sys, "argv", ["sweep", "audit", str(tmp_path)])
     with pytest.raises(SystemExit) as left:
         cli.main()
@@ -79,7 +79,7 @@ def test_an_error_above_the_tolerance_has_an_exit_code_of_its_own(
         "allowed: at most 0.1 DN\n"
     )
     kept = broken_audit().rows.iloc[:1]
-    monkeypatch.setattr("sweep.cli.audit.audit_output", lambda *_, **__: Audit(kept, 1000))
+    monkeypatch.setattr("sweep.runs.audit.audit", lambda *_, **__: Audit(kept, 1000).answer(tmp_path))
     with pytest.raises(SystemExit) as left:
         cli.main()
     assert not left.value.code

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
-import pandas as pd
 import pytest
 
 from sweep.report.pages import script
@@ -14,44 +14,26 @@ from ..commanded import commanded, sweep
 from ..conftest import STUDIES, FinishedFolder
 
 
-@pytest.fixture(scope="module")
-def stopband(finished: FinishedFolder) -> tuple[Path, list[str]]:
-    folder = finished("stopband")
-    return folder, folder.with_name("stopband.said.txt").read_text().splitlines()
-
-
-def test_summary_is_true_and_short(stopband: tuple[Path, list[str]]) -> None:
-    folder, lines = stopband
-    frame = pd.read_parquet(folder / "results.parquet")
-    best = frame[frame["feasible"] & frame["kind"].isin(["sweep", "search"])]["csd_yellow_red"].max()
-    rggb = frame[frame["cfa"] == "RGGB"]["csd_yellow_red"].iloc[0]
-    assert len(lines) <= 15
-    assert f"by {best:.0f} DN" in lines[0]
-    assert f"RGGB ({rggb:.0f} DN)" in lines[0]
-    assert lines[-1] == str(folder)
-
-
-def test_report_stands_alone(stopband: tuple[Path, list[str]]) -> None:
-    page = (stopband[0] / "report.html").read_text()
+def test_report_stands_alone(finished: FinishedFolder) -> None:
+    page = (finished("stopband") / "report.html").read_text()
     assert page.count("data:image/svg+xml;base64,") >= 4
     own = page.replace(str(script("plotly-gl2d.min.js")), "")  # what that may ask for, the page's policy forbids
     assert "default-src 'none'" in own
-    assert "http://" not in own
-    assert "https://" not in own
-    assert "surrogate" in page
-    assert "RYN4Cy" in page
+    assert not re.search("https?://", own)
 
 
 @pytest.mark.slow
 @pytest.mark.long
-def test_report_command_makes_it_again(stopband: tuple[Path, list[str]]) -> None:
-    folder, lines = stopband
+def test_report_command_makes_it_again(finished: FinishedFolder) -> None:
+    folder = finished("stopband")
     page = folder / "report.html"
     before, made_ns = page.read_bytes(), page.stat().st_mtime_ns
     done = sweep("report", str(folder))
     assert done.returncode == 0
-    said = done.stdout.splitlines()
-    assert [line for line in said if not line.startswith("Took ")] == [x for x in lines if not x.startswith("Took ")]
+    before_s, after_s = (
+        re.sub("Took .*\n", "", said) for said in (folder.with_name("stopband.said.txt").read_text(), done.stdout)
+    )
+    assert after_s == before_s
     assert page.stat().st_mtime_ns > made_ns
     assert page.read_bytes() == before
 
@@ -77,29 +59,16 @@ def test_wrong_input_is_one_line_and_exit_2(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def test_check_counts_designs() -> None:
-    code, out, _ = commanded("check", STUDIES / "stopband.yaml")
-    assert code == 0
-    assert "116,286 designs" in out
-
-
 def test_plan_lists_the_effects_of_a_scene(tmp_path: Path) -> None:
     path = tmp_path / "scenes.yaml"
     path.write_text(SCENES.replace("[150, 250]", "[280, 300]"))
     code, out, said = commanded("plan", path, "--tolerance", "50")
     assert code == 0, said
-    lines = out.splitlines()
-    # One plan suits both.
-    assert lines[0].startswith(
-        "road distance_m=280 ... road distance_m=300 (2 scenes): what is left out changes a CSD "
-    )
-    assert lines[0].endswith(" (tolerance 50 DN)")
-    assert lines[1].split() == ["effect", "computed", "bound", "/", "DN", "reason"]
-    for effect in ("noise", "blur", "sampling", "phase", "extinction"):
-        assert sum(line.strip().startswith(f"{effect} ") for line in lines) == 1
-    assert ["extinction", "left", "out", "0", "clear", "air"] in [line.split() for line in lines]
-    assert any(line.split()[:2] == ["blur", "computed"] for line in lines)
-    assert "2 scenes" in lines[-1]
+    lines = [line.split() for line in out.splitlines()]
+    assert "(2 scenes)" in out  # one plan suits both
+    assert {"noise", "blur", "sampling", "phase", "extinction"} <= {line[0] for line in lines if line}
+    assert ["extinction", "left", "out", "0", "clear", "air"] in lines
+    assert any(line[:2] == ["blur", "computed"] for line in lines)
 
 
 def test_an_infeasible_study_names_the_constraint_and_writes_nothing(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 from ruamel.yaml import YAML
 
 import sweep
-from sweep.run import run_study
+from sweep.runs import run_study
 from sweep.study import load_study
 from sweep.study.goals import unreachable_constraints
 from sweep.study.shipped import shipped_folder
@@ -113,6 +113,13 @@ def test_percentages_and_unreachable_constraints_are_reported(tmp_path: Path) ->
     assert not (tmp_path / "out").exists()
 
 
+def assert_refused(folder: Path, text: str, line: str) -> None:
+    path = folder / "a.yaml"
+    path.write_text(text)
+    code, _, err = commanded("check", path)
+    assert (code, err.count("\n"), line in err) == (2, 1, True), err
+
+
 @pytest.mark.parametrize(
     ("old", "new", "line"),
     [
@@ -132,10 +139,7 @@ def test_percentages_and_unreachable_constraints_are_reported(tmp_path: Path) ->
 )
 def test_check_refuses_what_cannot_be_meant(tmp_path: Path, old: str, new: str, line: str) -> None:
     assert old in BASE
-    path = tmp_path / "a.yaml"
-    path.write_text(BASE.replace(old, new))
-    code, _, err = commanded("check", path)
-    assert (code, err.count("\n"), line in err) == (2, 1, True), err
+    assert_refused(tmp_path, BASE.replace(old, new), line)
 
 
 def test_check_refuses_inverted_designs_and_boxes(tmp_path: Path) -> None:
@@ -151,9 +155,7 @@ def test_check_refuses_inverted_designs_and_boxes(tmp_path: Path) -> None:
             "boxes.b: b has no",
         ),
     ):
-        path.write_text(f"{start}{text}\n")
-        code, _, err = commanded("check", path)
-        assert (code, err.count("\n"), line in err) == (2, 1, True), err
+        assert_refused(tmp_path, f"{start}{text}\n", line)
     path.write_text(f"{start}designs: {{d: {{{of}, at: {{{band.format(630, 10, 640)}}}}}}}\n")
     assert commanded("check", path)[0] == 0
 

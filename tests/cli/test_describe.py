@@ -2,54 +2,22 @@
 
 from __future__ import annotations
 
-from itertools import chain
 from pathlib import Path
 
 import colour
 import matplotlib.image
 import numpy as np
 import pytest
-from scipy.io import savemat
 
-from sweep.base.errors import DataError, OutputError
-from sweep.cli.describe import described
-from sweep.cli.new import write_schema
-from sweep.spectra.facts import merge_equal_issues
-from sweep.spectra.formats import scan_curves
+from sweep.api.new import write_schema
+from sweep.base.errors import OutputError
+from sweep.report.describe import describe
 from sweep.spectra.signal_color import VISIBLE, light_color, outline
 from sweep.study.editors import schema_text
 
-from ..cases import thinned
 from ..commanded import commanded
 from ..conftest import MEASURED, SHARED, needs_measured
 from ..curve_texts import WAVE, bell, csv
-
-
-def is_png(path: Path) -> bool:
-    return path.read_bytes().startswith(b"\x89PNG") and len(path.read_bytes()) > 5000
-
-
-def issues(path: Path) -> list[str]:
-    return [str(issue) for issue in merge_equal_issues(list(chain.from_iterable(scan_curves(path).issues)))]
-
-
-def test_qe_is_guessed_and_its_peak_named(tmp_path: Path) -> None:
-    path = csv(tmp_path, "wavelength_nm,R,G", WAVE, 0.6 * bell(600, 50), 0.7 * bell(540, 50))
-    found = described(path, tmp_path)
-    text = "\n".join(found.lines)
-    assert "2 curves: R, G." in text
-    assert "380 to 780 nm, step 10 nm, 41 samples" in text
-    assert "A guess: QE of a sensor" in text
-    assert "G  largest 0.7       at 540 nm" in text
-    assert "xy" not in text
-    assert found.issues == ()
-    assert found.lines[-1] == f"Picture: {tmp_path / 'curves.png'}"
-    assert is_png(tmp_path / "curves.png")
-
-
-def test_percent_is_reported_with_its_scale(tmp_path: Path) -> None:
-    path = csv(tmp_path, "wavelength_nm,G", WAVE, 70 * bell(540, 50))
-    assert any("values up to 70 are assumed to be percent" in line for line in described(path, tmp_path).lines)
 
 
 def test_lights_have_the_chromaticity_that_colour_science_gives(tmp_path: Path) -> None:
@@ -60,7 +28,9 @@ def test_lights_have_the_chromaticity_that_colour_science_gives(tmp_path: Path) 
     for quantity, energy in (("energy", values), ("photons", values / fine)):
         light = colour.SpectralDistribution(energy, fine)
         oracle = colour.XYZ_to_xy(colour.sd_to_XYZ(light, method="Integration"))
-        (line,) = (line for line in described(path, tmp_path, quantity).lines if line.startswith("  led"))
+        (line,) = (
+            line for line in describe(path, output=tmp_path, quantity=quantity).lines if line.startswith("  led")
+        )
         words = line.split("xy ")[1].replace(",", "").split()
         np.testing.assert_allclose([float(words[0]), float(words[1])], oracle, atol=4e-4)
 
@@ -109,33 +79,6 @@ def test_distance_is_to_the_nearest_point_of_a_region() -> None:
     assert color.distance == pytest.approx(brute, abs=1e-5)
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    thinned(
-        [
-            (
-                "wavelength_nm,R\n400,1\n410,x\n420,-1\n430,-2\n440,2\n",
-                ["not a usable number"],
-            ),
-            ("wavelength_nm,R\n420,1\n430,1\n400,1\n400,1\n", []),
-            ("wavelength_km,R\n0.4,1\n0.7,1\n", ["no column wavelength"]),
-            ("wavelength_nm,R,G\n0.4,1,1\n0.7,1,1\n", ["R, G: wavelength unit: looks like um"]),
-            ("wavelength_nm;R\n400;0,5\n700;0.25\n", ["not a usable number (got '0,5')"]),
-            ("wavelength_nm,R,R,\n400,1,1,x\n700,1,1,1\n", ["occurs twice", "no name", "not a usable number"]),
-        ]
-    ),
-)
-def test_every_fault_is_one_line_and_the_rest_is_described(tmp_path: Path, text: str, words: list[str]) -> None:
-    path = tmp_path / "wrong.csv"
-    path.write_text(text, encoding="utf-8")
-    found = issues(path)
-    assert len(found) == len(words)
-    assert all(word in line for word, line in zip(words, found, strict=True)), found
-    lines = described(path, tmp_path / "out").lines
-    assert lines[-1].startswith("Picture: ")
-    assert any("are clean" in line for line in lines) == (not words)
-
-
 def test_the_command_ends_with_the_picture_or_exit_2(tmp_path: Path) -> None:
     path = csv(tmp_path, "wavelength_nm,R", WAVE, bell(600, 50) - 0.1)
     code, out, said = commanded("describe", path, "--output", tmp_path / "out")
@@ -143,13 +86,6 @@ def test_the_command_ends_with_the_picture_or_exit_2(tmp_path: Path) -> None:
     assert out.splitlines()[-1] == f"Picture: {tmp_path / 'out' / 'curves.png'}"
     assert len(said.splitlines()) == 1
     assert "negative value at 380 nm" in said
-
-
-def test_curves_that_are_called_qe_are_read_as_qe(tmp_path: Path) -> None:
-    """Also with a peak of a little more than 100 %, as calibrations have."""
-    (tmp_path / "camera.csv").write_text("nm,red_qe,green_qe\n400,5,10\n500,10,100.097\n600,90,40\n700,60,10\n")
-    found = described(tmp_path / "camera.csv", tmp_path)
-    assert any("By the heads of its columns: QE" in line for line in found.lines)
 
 
 @pytest.mark.parametrize(
@@ -162,29 +98,21 @@ def test_curves_that_are_called_qe_are_read_as_qe(tmp_path: Path) -> None:
     ],
 )
 def test_measured_files_are_recognized(tmp_path: Path, file: Path, guess: str) -> None:
-    found = described(file, tmp_path)
+    found = describe(file, output=tmp_path)
     assert any(f"A guess: {guess}" in line for line in found.lines)
-    assert not found.issues
+    assert found.problem is None
 
 
 def test_a_picture_of_another_stays(tmp_path: Path) -> None:
     path = csv(tmp_path, "wavelength_nm,G", WAVE, 0.5 * bell(540, 50))
-    described(path, tmp_path)
+    describe(path, output=tmp_path)
     picture = tmp_path / "curves.png"
     assert matplotlib.image.imread(picture).shape[2] == 4
-    described(path, tmp_path)
+    describe(path, output=tmp_path)
     picture.write_bytes(b"mine")
     with pytest.raises(OutputError, match="holds something else already"):
-        described(path, tmp_path)
+        describe(path, output=tmp_path)
     assert picture.read_bytes() == b"mine"
-
-
-def test_files_of_other_programs_are_named(tmp_path: Path) -> None:
-    savemat(tmp_path / "c.mat", {"wavelength": WAVE, "data": np.ones((WAVE.size, 1)) * 1j})
-    with pytest.raises(DataError, match="must be real numbers"):
-        scan_curves(tmp_path / "c.mat")
-    (tmp_path / "d.csv").write_text('wavelength_nm,a\n400,"0,01"\n500,0.5\n')
-    assert "a decimal comma? use a point" in issues(tmp_path / "d.csv")[0]
 
 
 def test_a_schema_replaces_only_a_schema(tmp_path: Path) -> None:

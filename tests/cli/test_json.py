@@ -31,7 +31,11 @@ def arguments(base: Path, command: str) -> tuple[object, ...]:
     folder = base / "out" / "scenes"
     return {
         "run": (base / "scenes.yaml", "--output", base / "out"),
+        "check": (base / "scenes.yaml",),
         "plan": (base / "scenes.yaml",),
+        "new": ("mine", "--folder", base / "mine", "--force"),
+        "export": (folder, "--design", "0", "--output", base / "exported"),
+        "report": (folder,),
         "evaluate": (folder,),
         "describe": (next(MEASURED.glob("*.csv")), "--output", base / "pictures"),
         "list": (base, "--output", base / "out"),
@@ -42,12 +46,16 @@ def arguments(base: Path, command: str) -> tuple[object, ...]:
 
 
 @pytest.mark.usefixtures("plain_pictures")
-@pytest.mark.parametrize("command", ["run", "plan", "evaluate", "describe", "list", "status", "compare", "audit"])
+@pytest.mark.parametrize(
+    "command",
+    ["run", "check", "plan", "new", "evaluate", "describe", "list", "status", "compare", "audit", "export", "report"],
+)
 def test_a_command_says_one_documented_object(base: Path, command: str) -> None:
     code, out, _ = commanded(command, *arguments(base, command), "--json")
     assert code == 0
     facts = json.loads(out)
-    assert {f"`{key}`" for key in facts} <= set(re.findall(r"`\w+`", DOCUMENTED[command]))
+    documented = "run" if command == "report" else command
+    assert {f"`{key}`" for key in facts} <= set(re.findall(r"`\w+`", DOCUMENTED[documented]))
     code, out, said = commanded(command, *arguments(base, command), "--json", "--quiet")
     assert (code, said) == (0, "")
     assert json.loads(out).keys() == facts.keys()

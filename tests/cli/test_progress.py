@@ -18,14 +18,3 @@ def test_no_eta_before_the_first_result(monkeypatch: pytest.MonkeyPatch, capsys:
         "designs: 1,000 of 20,000, 45.5/s, 418 s left",
         "designs: 10,000 of 20,000, 303/s, 33 s left",
     ]
-
-
-def test_after_a_minute_a_slow_phase_tells_its_pace(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    clock = iter([0.0, 70.0])
-    monkeypatch.setattr(output.time, "monotonic", lambda: next(clock))
-    display = output.ProgressDisplay()
-    for done in (0, 7):
-        display.update("designs", done, 10_000)
-    assert capsys.readouterr().err == "designs: 7 of 10,000, 0.1/s, 99930 s left\n"

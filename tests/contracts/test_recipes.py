@@ -219,14 +219,8 @@ def with_file(package: str, file: Path, *arguments: object, drawn: bool = False)
 
 @pytest.mark.slow
 def test_a_family_is_one_new_file(tmp_path: Path) -> None:
-    file, study = tmp_path / "more" / "gray.py", tmp_path / "gray.yaml"
-    file.parent.mkdir()
-    file.write_text(GRAY)
-    study.write_text(STUDY)
-    package = "sweep.designs.families"
-    done = with_file(package, file, "run", study, "--output", tmp_path / "out", "--jobs", 1, drawn=True)
-    assert done.returncode == 0, done.stderr
-    rows = pd.read_parquet(tmp_path / "out" / "gray" / "results.parquet")
+    folder = run_with(tmp_path, "sweep.designs.families", "gray.py", GRAY, STUDY, drawn=True)
+    rows = pd.read_parquet(folder / "results.parquet")
     swept = rows[rows["kind"] == "sweep"]
     assert set(rows["status"]) == {"ok"}
     assert swept["sensitivity"].tolist() == pytest.approx(swept["share"].tolist())
@@ -234,8 +228,8 @@ def test_a_family_is_one_new_file(tmp_path: Path) -> None:
     best, front = rows[rows["kind"] == "search"].iloc[0], swept[swept["feasible"]]
     assert best["family"] == "gray"
     assert best["csd_yellow_red"] >= front["csd_yellow_red"].max() - 1
-    assert (tmp_path / "out" / "gray" / "report.html").is_file()
-    code, _, without = commanded("check", study)
+    assert (folder / "report.html").is_file()
+    code, _, without = commanded("check", tmp_path / "study.yaml")
     assert code == 2
     assert "unknown family (got 'gray')" in without
 
@@ -248,13 +242,14 @@ def test_a_command_is_one_new_file(tmp_path: Path) -> None:
     assert " hello " in with_file("sweep.cli.commands", file, "--help", drawn=True).stdout
 
 
-def run_with(tmp_path: Path, package: str, file: str, program: str, study: str, *more: str) -> Path:
+def run_with(tmp_path: Path, package: str, file: str, program: str, study: str, *, drawn: bool = False) -> Path:
     """The folder of a finished run of a study, with one more file in a package."""
     path = tmp_path / "more" / file
     path.parent.mkdir(exist_ok=True)
     path.write_text(program)
     (tmp_path / "study.yaml").write_text(study)
-    done = with_file(package, path, "run", tmp_path / "study.yaml", "--output", tmp_path / "out", "--jobs", 1, *more)
+    command = "run", tmp_path / "study.yaml", "--output", tmp_path / "out", "--jobs", 1
+    done = with_file(package, path, *command, drawn=drawn)
     assert done.returncode == 0, done.stderr
     (folder,) = (tmp_path / "out").iterdir()
     return folder

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from sweep.base.errors import SweepError
-from sweep.base.types import Section
 from sweep.designs.families.dual import Dual
 from sweep.designs.families.free_form import FreeForm
 from sweep.designs.families.mixture import AbsorptionBands, Mixture
@@ -51,17 +50,10 @@ def test_every_family_is_tested() -> None:
 @pytest.mark.parametrize("name", list(FAMILIES))
 def test_shapes_and_names(name: str) -> None:
     family, x = FAMILIES[name]
-    n = len(family.parameters)
     assert family.kind == name
-    assert x.shape == (n,)
-    assert len({p.name for p in family.parameters}) == n
+    assert len({p.name for p in family.parameters}) == x.size
     assert family.n_modified == REGISTERED[name].n_modified
-    block = np.stack([x, x, x])
-    assert family.curves(block).shape == (3, family.n_modified, 301)
-    assert family.gradient(x).shape == (n, family.n_modified, 301)
-    conditions = family.violation(block)
-    assert family.violation_gradient(x).shape == (conditions.shape[1], n)
-    assert (conditions <= 0).all()
+    assert (family.violation(x[None]) <= 0).all()
 
 
 def exact_edge(wavelength: mp.mpf, center: mp.mpf, width: mp.mpf) -> mp.mpf:
@@ -229,7 +221,7 @@ def test_a_family_refuses_unsuitable_options() -> None:
         ("absorption_bands", None, FamilyOptions(at_most=2)),
         ("mixture", None, FamilyOptions()),
     ):
-        with pytest.raises(SweepError):
+        with pytest.raises(SweepError, match=r"`to`|goes with|needs `colorants`"):
             build_family(name, WAVE, BASE, target, given_options)
 
 
@@ -248,29 +240,9 @@ def test_a_family_is_built_by_its_name(name: str) -> None:
         np.testing.assert_array_equal(made.curves(x[None]), family.curves(x[None]))
 
 
-def test_a_name_in_no_registry_is_refused_and_one_that_is_added_gets_its_own_class(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_name_in_no_registry_is_refused() -> None:
     with pytest.raises(SweepError, match=r"unknown family \(got 'stopbnd'\); allowed: dual, .*did you mean 'stopband'"):
         build_family("stopbnd", WAVE, BASE, TARGET, FamilyOptions())
-
-    class Flat(FreeForm):
-        kind = "flat"
-        Options = Section
-
-        @classmethod
-        def of_study(cls, wavelength_nm, base, target, options):  # type: ignore[no-untyped-def]
-            assert (target, options) == (None, Section())
-            return cls(wavelength_nm, base, np.array([500.0, 600.0]))
-
-    monkeypatch.setitem(REGISTERED, "flat", Flat)
-    assert type(build_family("flat", WAVE, BASE, None, FamilyOptions())) is Flat
-    with pytest.raises(SweepError, match="flat has no `to`"):
-        build_family("flat", WAVE, BASE, TARGET, FamilyOptions())
-    with pytest.raises(SweepError, match="`bands` goes with multi_stopband"):
-        build_family("flat", WAVE, BASE, None, FamilyOptions(bands=2))
-    with pytest.raises(AssertionError):  # and the suite above asks for its tests
-        test_every_family_is_tested()
 
 
 @pytest.mark.parametrize("shift_nm", [0.0, 4.0])

@@ -15,7 +15,7 @@ from sweep.base.errors import InfeasibleError
 from sweep.designs.families.stopband import Stopband
 from sweep.metrics.bound import FEASIBLE, Bound
 from sweep.metrics.objective import Objective
-from sweep.run.search import run_search
+from sweep.runs.search import run_search
 from sweep.search.gradients import BACK_OFF
 from sweep.search.limit import limit_of
 from sweep.search.problem import Problem, starting_points

@@ -17,7 +17,7 @@ from sweep.camera.model import SceneModel
 from sweep.metrics.columns.confusion import STATE_ERROR
 from sweep.metrics.evaluate import evaluate
 from sweep.report import read_output, summary_lines
-from sweep.run import run_study
+from sweep.runs import run_study
 from sweep.spectra.lights import Lights
 from sweep.study import load_study
 

@@ -25,8 +25,8 @@ def opened(browser: Any) -> Iterator[Any]:
     """Opens a report for a test that clicks, or wants to see it from its first moment."""
     pages: list[Opened] = []
 
-    def one(folder: Path, width: int = 1280) -> Opened:
-        pages.append(open_report(browser, folder, width))
+    def one(folder: Path) -> Opened:
+        pages.append(open_report(browser, folder))
         return pages[-1]
 
     yield one
@@ -34,22 +34,20 @@ def opened(browser: Any) -> Iterator[Any]:
         seen.page.close()
 
 
-MOST_STANDING = 4
-"""Pages that stay open at once: a browser has few places for plots drawn by its graphics."""
-
-
 @pytest.fixture(scope="package")
 def standing(browser: Any) -> Iterator[Any]:
-    """A report that is opened once for many tests: at 1440 px for those that only look, or leave all as it was."""
-    pages: dict[tuple[Path, int], Opened] = {}
+    """A report that is opened once for the tests in a row that only look, or leave all as it was."""
+    pages: dict[Path, Opened] = {}
 
-    def one(folder: Path, width: int = 1440) -> Opened:
-        seen = pages.pop((folder, width), None) or open_report(browser, folder, width)
-        pages[folder, width] = seen  # behind those that nobody looked at since
-        if len(pages) > MOST_STANDING:
-            pages.pop(next(iter(pages))).page.close()
-        return seen
+    def one(folder: Path) -> Opened:
+        if folder not in pages:
+            close()
+            pages[folder] = open_report(browser, folder)
+        return pages[folder]
+
+    def close() -> None:
+        while pages:  # a browser has few places for plots drawn by its graphics
+            pages.popitem()[1].page.close()
 
     yield one
-    for seen in pages.values():
-        seen.page.close()
+    close()

@@ -48,8 +48,8 @@ class Opened:
         return dict(pairs)
 
 
-def open_report(browser: Any, folder: Path, width: int) -> Opened:
-    page = browser.new_page(viewport={"width": width, "height": 900})
+def open_report(browser: Any, folder: Path) -> Opened:
+    page = browser.new_page(viewport={"width": 1440, "height": 900})
     seen = Opened(page)
     page.on("console", lambda m: seen.errors.append(m.text) if m.type == "error" else None)
     page.on("pageerror", lambda error: seen.errors.append(str(error)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from shutil import copytree
@@ -11,7 +12,7 @@ import pandas as pd
 import pytest
 
 from sweep.base.errors import OutputError, SweepError
-from sweep.report.compare import compare_runs
+from sweep.report.compare import compare
 from sweep.study import load_study
 
 from ..build import STUDY, ran
@@ -41,8 +42,6 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "brighter": CHART.replace("study: tiny", "study: brighter").replace("white_patch}", "white_patch, level: 0.8}"),
         "plain": PLAIN.replace("study: tiny", "study: plain"),
         "orange": CHART.replace("study: tiny", "study: orange") + "objective: csd_orange_red\n",
-        "combined": CHART.replace("study: tiny", "study: combined")
-        + "objective: {sum: {csd_yellow_red: 1, csd_orange_red: 2}}\n",
         "deep": CHART.replace("study: tiny", "study: deep\npixel: {bits: 20}"),
         "infeasible": CHART.replace("study: tiny", "study: infeasible").replace("min: 0.9", "min: 1.9"),
         "hostile": CHART.replace("study: tiny", "study: '<script>alert(\"$x_1\")</script> 猫'").replace(
@@ -59,7 +58,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 def compared(folders: Sequence[Path], to: Path) -> tuple[str, str]:
     """What is printed, and the page."""
-    return "\n".join(compare_runs(folders, to).lines), (to / "compare.html").read_text(encoding="utf-8")
+    return "\n".join(compare(folders, output=to).lines), (to / "compare.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow
@@ -79,43 +78,24 @@ def test_two_runs_say_who_is_best_and_by_how_much(runs: dict[str, Path], tmp_pat
     assert "Equal in every CSD: RGGB, RYYCy, mine." in said
     table = pd.read_csv(tmp_path / "to" / "compare.csv")
     np.testing.assert_allclose(table["value"], [best["chart"], best["sparse"]], rtol=1e-12)
-    assert {"csd_green_red", "left_nm", "sensitivity", "design_id"} <= set(table.columns)
-    assert {path.name for path in (tmp_path / "to").iterdir()} == {
-        "compare.html",
-        "compare.csv",
-        "fronts.png",
-        "fronts.svg",
-    }
-    assert page.count("data:image/svg+xml;base64,") == 1
-    assert "http://" not in page
-    assert "https://" not in page
+    assert not re.search("https?://", page)
     assert "Best yellow/red CSD under the constraints: A chart" in page
 
 
 @pytest.mark.usefixtures("plain_fronts")
 def test_figures_of_different_scenes_are_not_compared(runs: dict[str, Path], tmp_path: Path) -> None:
-    found = compare_runs([runs["chart"], runs["brighter"]], tmp_path)
+    found = compare([runs["chart"], runs["brighter"]], output=tmp_path)
     said = "\n".join(found.lines)
     assert "Best yellow/red CSD in chart under the constraints: A chart with" in said
     assert "Best yellow/red CSD in chart of B brighter under the constraints: B brighter with" in said
     assert "Runs with different scenes are not ranked against each other." in said
-    assert "less" not in said.split("Best yellow/red CSD", 1)[1]
-    assert "The runs have no equal scene, so no fronts are compared." in found.notes
-    assert found.tables["plain"].empty
-    figures = [line for line in said.splitlines() if line.startswith("yellow/red CSD in chart")]
-    assert len(figures) == 2
-    assert all(line.split().count("-") == 1 for line in figures)
+    assert found.facts["plain"] == []
 
 
 @pytest.mark.usefixtures("plain_fronts")
 def test_equal_scenes_are_compared_whatever_their_names(runs: dict[str, Path], tmp_path: Path) -> None:
-    found = compare_runs([runs["chart"], runs["brighter"], runs["sparse"]], tmp_path)
-    said = "\n".join(found.lines)
-    assert "Fronts in chart, " in said
-    assert set(found.tables["fronts"]["run"]) == {"A chart", "C sparse"}
-    assert any(
-        note.startswith("Fronts are compared in the scenes that two runs or more have: chart.") for note in found.notes
-    )
+    found = compare([runs["chart"], runs["brighter"], runs["sparse"]], output=tmp_path)
+    assert {row["run"] for row in found.facts["fronts"]} == {"A chart", "C sparse"}
 
 
 @pytest.mark.usefixtures("plain_fronts")
@@ -123,7 +103,6 @@ def test_fronts_of_shared_scenes_are_compared(runs: dict[str, Path], tmp_path: P
     said, _ = compared([runs["tiny"], runs["chart"], runs["sparse"]], tmp_path)
     assert "Fronts are compared in the scenes that two runs or more have: chart." in said
     assert "Fronts in dim" not in said
-    assert "traced by the search" in said
     said, _ = compared([runs["tiny"], runs["tiny"]], tmp_path)
     assert "Fronts in dim" in said
 
@@ -151,12 +130,6 @@ def test_other_objectives_and_axes_are_not_mixed(runs: dict[str, Path], tmp_path
 
 
 @pytest.mark.usefixtures("plain_fronts")
-def test_a_combined_objective_has_its_own_words(runs: dict[str, Path], tmp_path: Path) -> None:
-    said, _ = compared([runs["combined"], runs["combined"]], tmp_path)
-    assert "Best csd_yellow_red + 2 csd_orange_red under the constraints: A combined with" in said
-
-
-@pytest.mark.usefixtures("plain_fronts")
 def test_dn_of_other_meaning_are_not_ranked(runs: dict[str, Path], tmp_path: Path) -> None:
     said, _ = compared([runs["chart"], runs["deep"]], tmp_path)
     assert "Best yellow/red CSD in DN of 20 bits under the constraints: B deep with" in said
@@ -164,12 +137,11 @@ def test_dn_of_other_meaning_are_not_ranked(runs: dict[str, Path], tmp_path: Pat
     assert "so none are compared" in said
 
 
-@pytest.mark.parametrize("name", ["compare.html", "compare.csv", "fronts.png", "fronts.svg"])
-def test_files_of_others_stay(runs: dict[str, Path], tmp_path: Path, name: str) -> None:
-    (tmp_path / name).write_bytes(b"mine")
+def test_files_of_others_stay(runs: dict[str, Path], tmp_path: Path) -> None:
+    (tmp_path / "compare.csv").write_bytes(b"mine")
     with pytest.raises(OutputError, match="holds something else already"):
-        compare_runs([runs["plain"], runs["plain"]], tmp_path)
-    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {name: b"mine"}
+        compare([runs["plain"], runs["plain"]], output=tmp_path)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {"compare.csv": b"mine"}
 
 
 @pytest.mark.usefixtures("plain_fronts")
@@ -209,11 +181,11 @@ def test_comparison_reports_different_curves(runs: dict[str, Path], tmp_path: Pa
 def test_invalid_comparison_is_one_line(runs: dict[str, Path], tmp_path: Path) -> None:
     for folders in ([runs["chart"]], [runs["chart"]] * 27, [runs["chart"], tmp_path]):
         with pytest.raises(SweepError) as caught:
-            compare_runs(folders, tmp_path / "to")
+            compare(folders, output=tmp_path / "to")
         assert len(str(caught.value).splitlines()) == 1
         assert caught.value.exit_code == 2
     with pytest.raises(OutputError):
-        compare_runs([runs["chart"]] * 2, runs["chart"] / "manifest.json")
+        compare([runs["chart"]] * 2, output=runs["chart"] / "manifest.json")
     assert not (tmp_path / "to").exists()
     code, _, said = commanded("compare", runs["chart"], tmp_path)
     assert (code, len(said.splitlines())) == (2, 1)

@@ -19,9 +19,3 @@ def test_every_drawing_of_a_report_is_a_plain_value(finished: FinishedFolder, na
     assert len(drawings) > 4
     for file, _, draw in drawings:
         assert pickled_size(draw) < MOST_BYTES, file
-
-
-def test_a_drawing_that_holds_a_run_is_refused(finished: FinishedFolder) -> None:
-    output = read_output(finished("stopband"))
-    with pytest.raises(AssertionError, match="whole run"):
-        pickled_size({"figure": output})

@@ -10,20 +10,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sweep.camera.model import scene_model
-from sweep.metrics.limiting import limiting_lights
-from sweep.report import make_report, read_output
+from sweep.report import read_output
 from sweep.report.answer import headline_numbers
 from sweep.report.leaders import capital, full_name, leaders_of
 from sweep.report.noise import usable_range
 from sweep.report.page_data import payload
 from sweep.report.series import Line, SeriesFigure, lead_sentence
 from sweep.report.trade_off import overview_figure
-from sweep.results.tables import REPORT
-from sweep.study import load_study
 
-from ..build import ran, sentences_of
-from ..conftest import STUDIES, FinishedFolder
+from ..build import output_of, sentences_of
+from ..conftest import FinishedFolder
 from .shipped import EVERY, SEARCHED
 
 
@@ -81,52 +77,6 @@ def test_the_large_numbers_compare_with_the_plain_cfa_that_separates_most(finish
     assert numbers[2][0] == f"{best['limit'] - best['csd_yellow_red']:.0f} DN"
 
 
-def test_the_light_of_a_cfa_is_that_of_its_pixels(finished: FinishedFolder) -> None:
-    study = load_study(STUDIES / "stopband.yaml")
-    qe = {name: curve.sum() for name, curve in study.sensor.qe.items()}
-    table = whole(finished("stopband")).set_index("name")
-    for name, pixels in (("RGGB", "R G G B"), ("RYYCy", "R Y Y Cy")):
-        light = np.mean([qe[pixel] for pixel in pixels.split()]) / qe["C"]
-        assert table.loc[name, "cfa_sensitivity"] == pytest.approx(light, rel=1e-12)
-
-
-def test_the_limiting_lights_are_as_far_apart_as_the_csd(finished: FinishedFolder) -> None:
-    folder = finished("stopband")
-    table, points = whole(folder).set_index("design_id"), pd.read_parquet(folder / "points.parquet")
-    limited = pd.read_parquet(folder / "limited_by.parquet").set_index("design_id")
-    assert set(limited.index) >= set(points["design_id"])
-    for design, rows in points.groupby("design_id"):
-        dn = rows.pivot_table(index="signal", columns="channel", values="dn")
-        types = dict(zip(rows["signal"], rows["signal_type"], strict=True))
-        for pair in ("green_yellow", "yellow_red", "orange_red"):
-            first, second = limited.loc[design, f"limited_by_{pair}"].split(" / ")
-            assert f"{types[first]}_{types[second]}" == pair
-            apart = np.linalg.norm(dn.loc[first] - dn.loc[second])
-            assert apart == pytest.approx(table.loc[design, f"csd_{pair}"], rel=1e-12)
-
-
-def test_who_separates_most_names_its_lights_whatever_the_constraints(finished: FinishedFolder) -> None:
-    folder = finished("stopband")
-    limited, table = pd.read_parquet(folder / "limited_by.parquet").set_index("design_id"), whole(folder)
-    most = table.loc[table["csd_yellow_red"].idxmax()]
-    assert not most["feasible"]
-    said = " ".join(sentences_of(read_output(folder)))
-    lights = limited.loc[most["design_id"], "limited_by_yellow_red"]
-    assert f"Filter {most['filter_id']} of RYNCy separates most of all: {most['csd_yellow_red']:.0f} DN" in said
-    assert f"(limited by {lights}), but its sensitivity is below 0.9 and its slope above 0.06 per nm." in said
-
-
-def test_lights_without_a_distance_limit_nothing() -> None:
-    study = load_study(STUDIES / "stopband.yaml")
-    space = next(space for space in study.spaces if space.filter is not None)
-    setup = study.setup(space, "chart")
-    nothing = np.zeros((1, 1, study.grid.size))
-    response = scene_model(setup).read(nothing)[0]
-    assert set(limiting_lights(setup, response)) == set(study.pairs)
-    assert all(lights[0] is not None for lights in limiting_lights(setup, response).values())
-    assert all(lights[0] is None for lights in limiting_lights(setup, response * np.nan).values())
-
-
 def series(**lines: list[float]) -> SeriesFigure:
     x = np.array([100.0, 200.0, 300.0])
     made = {name: Line(np.array(y), None) for name, y in lines.items()}
@@ -156,46 +106,10 @@ def test_a_series_says_who_leads_from_where_to_where(figure: SeriesFigure, said:
     assert lead_sentence(figure) == said
 
 
-@pytest.mark.slow
-def test_a_study_of_plain_cfas_has_an_answer(tmp_path: Path) -> None:
-    path = tmp_path / "plain.yaml"
-    path.write_text("study: plain\nsensor: ar0820\nlights: tl16\ncfas: [RGGB, RCCC, RYYCy]\n")
-    ran(load_study(path), tmp_path / "out", 1)
-    output = read_output(tmp_path / "out")
-    make_report(output)
-    told = "The best CFA of this study, RGGB, separates yellow from red by 139 DN at 0.352 of a clear sensor's light: 4.48 "
-    assert sentences_of(output)[0].startswith(told)
-    assert (tmp_path / "out" / REPORT).is_file()
-    assert (tmp_path / "out" / "cfas.png").is_file()
-    assert not (tmp_path / "out" / "pareto.png").exists()
-
-
 def test_where_a_line_passes_the_level_is_drawn_among_its_values() -> None:
     line = Line(np.array([1e-6, 1e-2]), None, ((8.0, 1e-3),))
     x, y = line.over(np.array([1.0, 10.0]))
     assert (x.tolist(), y.tolist()) == ([1.0, 8.0, 10.0], [1e-6, 1e-3, 1e-2])
-
-
-BETTER = """\
-study: better
-sensor: ar0820
-lights: tl16
-cfas: [RGGB, RYNCy]
-sweeps:
-  s: {cfa: RYNCy, channel: N, base: Y, to: G, grid: {left_nm: [640, 645], left_width_nm: 20, right_nm: 660, right_width_nm: 20}}
-constraints: {sensitivity: {min: 0.9}}
-"""
-
-
-def test_a_plain_cfa_that_is_better_is_named_first(tmp_path: Path) -> None:
-    path = tmp_path / "better.yaml"
-    path.write_text(BETTER)
-    ran(load_study(path), tmp_path / "out", 1)
-    said = sentences_of(read_output(tmp_path / "out"))
-    ratio = re.search(r"([\d.]+) times the separation of RGGB", said[0])
-    assert ratio is not None
-    assert float(ratio[1]) < 1
-    assert "RGGB separates most of all: 139 DN" in " ".join(said)
 
 
 TWO_TILES = """\
@@ -211,15 +125,13 @@ constraints: {sensitivity: {min: 0.5}}
 
 
 def test_the_best_of_each_other_cfa_is_named(tmp_path: Path) -> None:
-    path = tmp_path / "two.yaml"
-    path.write_text(TWO_TILES)
-    ran(load_study(path), tmp_path / "out", 1)
-    table = whole(tmp_path / "out")
+    output = output_of(tmp_path, TWO_TILES)
+    table = output.table
     made = table[(table["kind"] == "sweep") & table["feasible"]]
     most = made.loc[made.groupby("cfa", observed=True)["csd_yellow_red"].idxmax()].sort_values("csd_yellow_red")
     assert len(most) == 2
     other, best = most.iloc[0], most.iloc[1]
-    said = sentences_of(read_output(tmp_path / "out"))
+    said = sentences_of(output)
     assert re.search(
         rf"filter {best['filter_id']} of {best['cfa']} \(edges at \d+ and \d+ nm\) separates yellow from red by",
         said[0],

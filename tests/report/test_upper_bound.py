@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 
 from sweep.base.errors import UpperBoundExceededError
-from sweep.report import read_output, summary_lines
+from sweep.report import summary_lines
 from sweep.report.answer import headline_numbers
 from sweep.report.leaders import leaders_of, upper_bound_beside
 from sweep.report.page_data import payload
 from sweep.results.output import Output
-from sweep.study import load_study
 
-from ..build import ran, sentences_of
+from ..build import output_of, sentences_of
 
 SHOWN = re.compile(
     r"Upper bound for any filter in (?P<channel>\w+) of (?P<cfa>\w+) under (?:the same constraints|no constraint)"
@@ -52,13 +51,6 @@ sweeps:
 constraints: {{sensitivity: {{min: {least:g}}}}}
 search: {{space: in_{searched}, scenario: {scenario}, starts: 2, max_evaluations: 60}}
 """
-
-
-def finished_output(folder: Path, text: str) -> Output:
-    """Run a study and read what it left."""
-    (folder / "bounded.yaml").write_text(text)
-    ran(load_study(folder / "bounded.yaml"), folder / "out", 1)
-    return read_output(folder / "out")
 
 
 def check_shown_bounds(output: Output) -> int:
@@ -104,7 +96,7 @@ GRID = "{left_nm: [600, 606, 612], left_width_nm: [6, 30], right_nm: [646, 652],
 
 def test_the_bound_of_one_scenario_is_not_shown_beside_the_design_of_another(tmp_path: Path) -> None:
     text = study_text({"day": 2e-4, "night": 5e-3}, ["RYNCy"], {"RYNCy": GRID}, "RYNCy", "day", 0.9)
-    output = finished_output(tmp_path, text)
+    output = output_of(tmp_path, text)
     assert check_shown_bounds(output) == 1
     answer = " ".join(sentences_of(output))
     assert leaders_of(output).scenario == "day"  # the search's
@@ -120,7 +112,7 @@ def test_the_bound_of_one_scenario_is_not_shown_beside_the_design_of_another(tmp
 
 def test_a_value_above_its_own_bound_is_an_error(tmp_path: Path) -> None:
     text = study_text({"chart": 2e-3}, ["RYNCy"], {"RYNCy": GRID}, "RYNCy", "chart", 0.9)
-    output = finished_output(tmp_path, text)
+    output = output_of(tmp_path, text)
     row = output.best.iloc[0].to_dict()
     assert output.provenance.search is not None
     proven = output.provenance.search.limit_proven
@@ -148,4 +140,4 @@ def test_random_studies_show_each_bound_beside_its_own_design(tmp_path: Path, se
         )
     searched, scenario = str(random.choice(cfas)), str(random.choice(names))
     text = study_text(exposures, cfas, grids, searched, scenario, float(random.choice([0.0, 0.6, 0.75])))
-    check_shown_bounds(finished_output(tmp_path, text))
+    check_shown_bounds(output_of(tmp_path, text))

@@ -12,16 +12,16 @@ import pandas as pd
 import pytest
 
 from sweep.base.errors import OutputError
-from sweep.cli.audit import audit_output
-from sweep.cli.status import status_of
 from sweep.report import make_report, read_output
 from sweep.results.answers import ANSWERS
-from sweep.results.dataset import part_name, rows_in
+from sweep.results.dataset import rows_in
 from sweep.results.identity import run_facts
 from sweep.results.lock import LOCK, locked
 from sweep.results.manifest import Manifest
 from sweep.results.tables import RESULTS, is_drawn, is_of_run
-from sweep.run import output_folder, run_study
+from sweep.runs import output_folder, run_study
+from sweep.runs.audit import audit
+from sweep.runs.status import status
 from sweep.study import Study, load_study
 
 from ..build import ran, study_file
@@ -107,25 +107,6 @@ def test_a_lock_that_says_something_else_stays(few: Study, tmp_path: Path) -> No
         ran(few, tmp_path, 1)
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("plain_pictures")
-def test_links_in_the_place_of_files_are_replaced_not_followed(
-    few: Study, expected: pd.DataFrame, tmp_path: Path
-) -> None:
-    target, folder = outside(tmp_path), tmp_path / "out"
-    ran(few, folder, 1)
-    make_report(read_output(folder))
-    for name in (part_name(0), "report.html", "figures/chart.svg"):
-        (folder / name).unlink()
-        (folder / name).symlink_to(target / "precious.txt")
-    ran(few, folder, 1)
-    make_report(read_output(folder), repair=True)
-    assert (target / "precious.txt").read_text() == "precious"
-    assert not any(path.is_symlink() for path in folder.rglob("*"))
-    pd.testing.assert_frame_equal(rows(folder), expected)
-    assert status_of(folder, verify=True).lines[-1].startswith("ok")
-
-
 def test_the_folder_itself_may_be_a_link(few: Study, expected: pd.DataFrame, tmp_path: Path) -> None:
     (tmp_path / "disk").mkdir()
     (tmp_path / "out").symlink_to(tmp_path / "disk")
@@ -148,7 +129,7 @@ def test_a_report_in_use_is_one_line(few: Study, tmp_path: Path) -> None:
     ran(few, tmp_path, 1)
     output = read_output(tmp_path)
     with locked(tmp_path):
-        for write in (lambda: make_report(output), lambda: audit_output(tmp_path, None)):
+        for write in (lambda: make_report(output), lambda: audit(tmp_path, None)):
             with pytest.raises(OutputError, match="in use by another command"):
                 write()
 
@@ -192,7 +173,7 @@ def test_wherever_the_disk_refuses_nothing_finished_is_lost(
         assert counts[:1] in ([], [kept])
         assert not (folder / ANSWERS).exists()
         pd.testing.assert_frame_equal(rows(folder), rows(tmp_path / "expected"))
-        assert status_of(folder, verify=True).lines[-1].startswith("ok")
+        assert status(folder, verify=True).lines[-1].startswith("ok")
 
 
 @pytest.mark.slow
@@ -213,6 +194,6 @@ def test_a_report_that_the_disk_refuses_loses_no_result(
             make_report(read_output(tmp_path), repair=True)
     pd.testing.assert_frame_equal(rows(tmp_path), expected)
     with pytest.raises(OutputError, match=r"report\.html: is missing"):
-        status_of(tmp_path)
+        status(tmp_path)
     make_report(read_output(tmp_path), repair=True)
-    assert status_of(tmp_path, verify=True).lines[-1].startswith("ok")
+    assert status(tmp_path, verify=True).lines[-1].startswith("ok")

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-import pandas as pd
-
 from ..build import BASE
 
 STOPBAND = """\
@@ -63,7 +59,3 @@ def only_n(readings):
 """
 PLAIN = BASE.replace("min: 0.9", "min: 0.8").replace("space: edges", "{space: edges, starts: 4, max_evaluations: 800}")
 OWN_METRIC = PLAIN.replace("constraints:", "metrics: [mine.py:apart, mine.py:Spread]\nobjective: apart\nconstraints:")
-
-
-def rows_of(folder: Path) -> pd.DataFrame:
-    return pd.read_parquet(folder / "results.parquet")

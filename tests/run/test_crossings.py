@@ -10,9 +10,9 @@ import pytest
 
 import sweep
 from sweep.metrics.columns.confusion import STATE_ERROR
-from sweep.run import run_study
-from sweep.run.crossings import crossings_of
-from sweep.study import load_study
+from sweep.runs.crossings import crossings_of
+
+from ..build import output_of
 
 STUDY = """
 study: noisy
@@ -28,11 +28,8 @@ LEVEL = "noise: true, exposure: {kind: white_patch, level: %s}"
 
 
 def crossings(folder: Path, *scenes: str) -> pd.DataFrame:
-    path = folder / "noisy.yaml"
-    path.write_text(STUDY.replace("SCENES", "\n  ".join(scenes)))
-    run_study(load_study(path), folder / "out", 1, lambda *_: None)
-    found = folder / "out" / "crossings.parquet"
-    return pd.read_parquet(found)
+    output = output_of(folder, STUDY.replace("SCENES", "\n  ".join(scenes)))
+    return pd.read_parquet(output.folder / "crossings.parquet")
 
 
 def test_where_an_allowed_error_ends_the_error_is_the_allowed_one(tmp_path: Path) -> None:

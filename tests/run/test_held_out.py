@@ -12,8 +12,8 @@ import pytest
 
 from sweep.base.errors import StudyError
 from sweep.report import make_report, read_output, summary_lines
-from sweep.run import held_out, run_study
-from sweep.run.provenance import resolved_yaml
+from sweep.runs import held_out, run_study
+from sweep.runs.provenance import resolved_yaml
 
 from ..build import issues, load, ran
 from ..mischief import StoppedError
@@ -80,7 +80,6 @@ def test_a_search_without_a_light_finds_no_less(folder: Path, monkeypatch: pytes
     output = read_output(folder / "one")
     make_report(output)
     assert f"Left out of the search, {found.loc[found['fall'].idxmax(), 'signal']}" in "\n".join(summary_lines(output))
-    assert "Lights that the search did not see" in (folder / "one" / "report.html").read_text()
 
 
 def test_another_light_changes_no_reading_of_a_resolved_study(folder: Path) -> None:
@@ -101,8 +100,6 @@ def test_another_light_changes_no_reading_of_a_resolved_study(folder: Path) -> N
             "validate: {leave_one_out: true}\n",
             "validate.leave_one_out: nothing is searched; allowed: a study with `search`",
         ),
-        ("validate: {leav_one_out: true}\n", "did you mean 'leave_one_out'?"),
-        ("validat: {leave_one_out: true}\n", "did you mean 'validate'?"),
         ("validate: {lights: tl16}\n", "validate.lights: unknown key"),
     ],
 )

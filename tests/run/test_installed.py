@@ -13,13 +13,14 @@ from joblib.externals.loky import get_reusable_executor
 
 from sweep.base.errors import StudyError
 from sweep.report import read_output, study_of
-from sweep.run import run_study
+from sweep.runs import run_study
 from sweep.study import Study, load_study
 
 from ..build import one_line
 from ..cases import thinned
 from ..commanded import commanded
-from .own_codes import CODE, OWN_FAMILY, STOPBAND, rows_of
+from ..mischief import rows as rows_in
+from .own_codes import CODE, OWN_FAMILY, STOPBAND
 
 OFFERS = """\
 [sweep.families]
@@ -87,7 +88,7 @@ def test_a_family_and_a_metric_of_a_package_are_like_those_of_files(package: Pat
     )
     run_study(of_files, tmp_path / "files", 1, lambda *_: None)
     pd.testing.assert_frame_equal(
-        rows_of(tmp_path / "named").drop(columns="family"), rows_of(tmp_path / "files").drop(columns="family")
+        rows_in(tmp_path / "named").drop(columns="family"), rows_in(tmp_path / "files").drop(columns="family")
     )
     kept = read_output(tmp_path / "named").provenance.data_sha256
     assert sorted(kept) == [

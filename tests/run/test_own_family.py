@@ -10,7 +10,7 @@ import pytest
 import sweep
 from sweep.base.errors import SweepError
 from sweep.designs.plugin import PluginFamily
-from sweep.run import run_study
+from sweep.runs import run_study
 from sweep.study import Study, load_study
 
 from ..build import one_line, ran

@@ -17,15 +17,16 @@ from sweep.camera.linear import linear_model
 from sweep.metrics.smooth import SmoothDesign
 from sweep.report import read_output
 from sweep.results.dataset import part_paths
-from sweep.run import run_study
+from sweep.runs import run_study
 from sweep.study import Study, load_study
 
 from ..build import one_line, ran
 from ..cases import thinned
 from ..commanded import commanded
 from ..hard.scenes import FAMILY, scene
+from ..mischief import rows as rows_in
 from ..rounding import gamma
-from .own_codes import CODE, OWN_METRIC, PLAIN, rows_of
+from .own_codes import CODE, OWN_METRIC, PLAIN
 
 
 def study(folder: Path, text: str = OWN_METRIC, code: str = CODE, *, allow: bool = True) -> Study:
@@ -39,7 +40,7 @@ def study(folder: Path, text: str = OWN_METRIC, code: str = CODE, *, allow: bool
 def test_a_csd_written_again_has_the_same_numbers_and_the_same_optimum(tmp_path: Path, jobs: int) -> None:
     ran(study(tmp_path), tmp_path / "own", jobs)
     ran(study(tmp_path, PLAIN), tmp_path / "plain", 1)
-    own, plain = rows_of(tmp_path / "own"), rows_of(tmp_path / "plain")
+    own, plain = rows_in(tmp_path / "own"), rows_in(tmp_path / "plain")
     np.testing.assert_allclose(own["apart"], own["csd_yellow_red"], rtol=1e-12)
     swept = own["kind"] != "search"
     # Distances of whole digital numbers are equal by their edges and by their curves; sums over wavelengths are rounded.
@@ -67,7 +68,7 @@ def test_less_is_searched_for_constrained_and_below_zero(tmp_path: Path) -> None
     least = PLAIN.replace("constraints:", f"{spread}objective: {{least: {{red_spread: 1}}}}\nconstraints:")
     made = study(tmp_path, least)
     run_study(made, tmp_path / "least", 1, lambda *_: None)
-    rows = rows_of(tmp_path / "least")
+    rows = rows_in(tmp_path / "least")
     answer = rows[rows["kind"] == "search"].iloc[0]
     assert answer["objective"] == pytest.approx(-np.log10(answer["red_spread"]))
     feasible = rows[rows["feasible"] & (rows["kind"] == "sweep")]
@@ -75,7 +76,7 @@ def test_less_is_searched_for_constrained_and_below_zero(tmp_path: Path) -> None
     bound = f"{answer['red_spread'] + 10:.1f}"
     text = PLAIN.replace("constraints:", f"{spread}objective: below_zero\nconstraints:\n  red_spread: {{max: {bound}}}")
     run_study(study(tmp_path, text), tmp_path / "below", 1, lambda *_: None)
-    both = rows_of(tmp_path / "below")
+    both = rows_in(tmp_path / "below")
     best = both[both["kind"] == "search"].iloc[0]
     np.testing.assert_allclose(both["below_zero"], both["csd_yellow_red"] - 1e4, rtol=1e-12)
     assert best["feasible"] or best["violation"] < 0.02  # rounding to whole DN

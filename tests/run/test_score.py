@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from sweep.base.errors import DataError
-from sweep.run.score import UNKNOWN, images_of_test, read_predictions, score_lines, scores_of
+from sweep.runs.score import UNKNOWN, images_of_test, read_predictions, score_lines, scores_of
 
 STATES = ("off", "red", "yellow")
 

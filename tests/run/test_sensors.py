@@ -189,7 +189,6 @@ def several(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     (folder / "few.yaml").write_text(SEVERAL)
     with pytest.MonkeyPatch.context() as patch:
         draw_nothing(patch)
-        patch.setattr("sweep.report.sensors.rendered", lambda _, kind: kind.encode())
         code, out, err = commanded("run", folder / "few.yaml", "--output", folder / "out", "--jobs", 1)
     assert code == 0, err
     return folder, out
@@ -207,11 +206,6 @@ def test_one_table_has_all_sensors_and_lights(several: tuple[Path, str]) -> None
         found = part[part["kind"] == "search"].iloc[0]
         assert found["cfa"] == ("RGBN" if sensor == "ar0132at" else "RYNCy")
     assert "Note: ar0132at: without RYNCy, RYN4Cy, yellow, whose curves ar0132at does not have." in out
-    assert "Note: ar0132at: the search is of clear." in out
-    assert "Note: opencam: curves from 400 to 660 nm." in out
-    page = (folder / "out" / "few" / "report.html").read_text()
-    assert "Does it hold?" in page
-    assert 'href="opencam_tl16/report.html"' in page
     found = rows[rows["kind"] == "search"].set_index(["sensor", "lights"])["csd_yellow_red"]
     rggb = rows[rows["name"] == "RGGB"].set_index(["sensor", "lights"])["csd_yellow_red"]
     ratio = (found / rggb).loc[["ar0820", "opencam"]]
@@ -300,9 +294,7 @@ def test_other_commands_say_how_to_choose_one(tmp_path: Path) -> None:
     study = load_study(path, changes=chosen)
     assert study.name == "few"
     assert study.grid.stop_nm == 660
-    code, out, _ = commanded("check", path)
-    assert code == 0
-    assert len([line for line in out.splitlines() if "nothing wrong found" in line]) == 6
+    assert commanded("check", path)[0] == 0
     code, _, err = commanded("plan", path)
     assert code == 2
     assert "a study of several sensors or lights" in err

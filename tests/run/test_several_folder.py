@@ -60,17 +60,11 @@ vision:
 pytestmark = pytest.mark.usefixtures("plain_pictures")
 
 
-@pytest.fixture(autouse=True)
-def plain_comparison(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sweep.report.sensors.rendered", lambda _, kind: kind.encode())
-
-
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("several")
     with pytest.MonkeyPatch.context() as patch:
         draw_nothing(patch)
-        patch.setattr("sweep.report.sensors.rendered", lambda _, kind: kind.encode())
         code, out, err = run(folder)
     assert code == 0, err
     assert out.splitlines()[-1] == str(folder / "out" / "few")
@@ -82,7 +76,9 @@ def run(folder: Path, text: str = SEVERAL, *extra: object) -> tuple[int, str, st
     return commanded("run", folder / "few.yaml", "--output", folder / "out", "--jobs", 1, *extra)
 
 
-def copied(whole: Path, tmp_path: Path) -> Path:
+@pytest.fixture
+def folder(whole: Path, tmp_path: Path) -> Path:
+    """A copy of the finished run; the study lies in the test's own folder."""
     shutil.copytree(whole, tmp_path, dirs_exist_ok=True)
     return tmp_path / "out" / "few"
 
@@ -91,8 +87,7 @@ def contents(folder: Path) -> dict[Path, bytes]:
     return {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-def test_a_finished_study_is_verified_and_not_computed_again(whole: Path, tmp_path: Path) -> None:
-    folder = copied(whole, tmp_path)
+def test_a_finished_study_is_verified_and_not_computed_again(folder: Path, tmp_path: Path) -> None:
     code, out, _ = commanded("status", folder, "--verify")
     assert code == 0
     assert "finished: 2 of 2 runs finished." in out
@@ -105,8 +100,7 @@ def test_a_finished_study_is_verified_and_not_computed_again(whole: Path, tmp_pa
 
 
 @pytest.mark.parametrize("name", [ALL_SENSORS, PART, REPORT, PROVENANCE])
-def test_damage_is_noticed_and_repaired(whole: Path, tmp_path: Path, name: str) -> None:
-    folder = copied(whole, tmp_path)
+def test_damage_is_noticed_and_repaired(folder: Path, tmp_path: Path, name: str) -> None:
     before = contents(folder)
     os.truncate(folder / name, (folder / name).stat().st_size // 2)
     code, _, err = commanded("status", folder, "--verify")
@@ -120,8 +114,7 @@ def test_damage_is_noticed_and_repaired(whole: Path, tmp_path: Path, name: str) 
         assert (folder / file).read_bytes() == before[Path(file)]
 
 
-def test_a_changed_study_goes_beside_with_its_own_filters(whole: Path, tmp_path: Path) -> None:
-    folder = copied(whole, tmp_path)
+def test_a_changed_study_goes_beside_with_its_own_filters(folder: Path, tmp_path: Path) -> None:
     before = contents(folder)
     code, _, err = run(tmp_path, SEVERAL.replace("[570, 640]", "[570, 575]"))
     assert (code, "no design" in err, list(folder.parent.iterdir())) == (
@@ -205,8 +198,7 @@ def test_kills_at_random_moments_lose_nothing(tmp_path: Path, text: str) -> None
     assert not left_by(numbers)
 
 
-def test_a_lost_run_is_made_again_alone(whole: Path, tmp_path: Path) -> None:
-    folder = copied(whole, tmp_path)
+def test_a_lost_run_is_made_again_alone(folder: Path, tmp_path: Path) -> None:
     before = contents(folder)
     shutil.rmtree(folder / "opencam_tl16")
     assert "opencam tl16: not run." in commanded("status", folder)[1]

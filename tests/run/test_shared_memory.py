@@ -7,12 +7,12 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pandas as pd
 import pytest
 
-from sweep.run.workers import workers
+from sweep.runs.workers import workers
 
 from ..build import BASE
+from ..mischief import assert_same_tables
 
 WITHOUT = """
 import sys, _multiprocessing
@@ -29,19 +29,17 @@ start()
 def test_without_semaphores_threads_compute_the_same_rows(tmp_path: Path) -> None:
     (tmp_path / "tiny.yaml").write_text(BASE.replace("constraints:\n  sensitivity: {min: 0.9}\n", ""))
     with_processes = "from sweep.cli.start import start\nstart()"
-    tables = []
     for name, code in (("threads", WITHOUT), ("processes", with_processes)):
         arguments = ["run", tmp_path / "tiny.yaml", "--output", tmp_path / name, "--jobs", "2"]
         done = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
         assert ("threads compute the same rows" in done.stderr) == (name == "threads")
-        tables.append(pd.read_parquet(tmp_path / name / "tiny" / "results.parquet"))
-    pd.testing.assert_frame_equal(*tables)
+    assert_same_tables(tmp_path / "threads" / "tiny", tmp_path / "processes" / "tiny")
 
 
 QUIET = """
 from joblib.externals.loky.backend import resource_tracker
-from sweep.run.workers import workers
+from sweep.runs.workers import workers
 if __name__ == "__main__":
     with workers(2) as pool:
         assert list(pool([(abs, (-1,), {})])) == [1]

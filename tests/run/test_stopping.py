@@ -10,18 +10,16 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-import joblib
 import numpy as np
 import psutil
-import pyarrow.parquet as pq
 import pytest
 
 from sweep.results.dataset import rows_in
-from sweep.run.workers import workers
 from sweep.study import load_study
 
 from ..build import STUDY, ran
 from ..commanded import commanded
+from ..mischief import assert_same_tables
 from ..warm import Warm
 
 SLOWED = Path(__file__).parent.parent / "slowed"
@@ -31,7 +29,7 @@ PHASES = {
     "sweep": ("sweep.metrics.evaluate:evaluate", 6),
     "parts": ("sweep.results.dataset:encoded_part", 2),
     "tables": ("sweep.results.tables:write_table", 4),
-    "check": ("sweep.run.check:_checked", 1),
+    "check": ("sweep.runs.check:_checked", 1),
     "report": ("sweep.report.page:make_report", 1),
 }
 WITHIN_S = 15.0
@@ -106,9 +104,8 @@ def assert_continues(folder: Path, undisturbed: Path, jobs: int) -> None:
     """The same command, in this process."""
     code, _, said = commanded(*command(folder, "--jobs", str(jobs))[3:])
     assert code == 0, said
-    for name in ("results", "pareto", "designs", "search", "points", "curves"):
-        tables = [pq.read_table(place / f"{name}.parquet") for place in (folder / "out" / "tiny", undisturbed)]
-        assert tables[0].equals(tables[1]), name
+    names = ("results", "pareto", "designs", "search", "points", "curves")
+    assert_same_tables(folder / "out" / "tiny", undisturbed, *names)
     assert not list((folder / "out").rglob(".tmp-*"))
 
 
@@ -129,20 +126,6 @@ def test_a_stop_ends_every_phase(
     if phase == "sweep" and jobs == 2:
         assert rows_in(tmp_path / "out" / "tiny")[0] > 0
     assert_continues(tmp_path, undisturbed, jobs)
-
-
-def later(seconds: float, number: int) -> int:
-    time.sleep(seconds)
-    return number
-
-
-def test_results_come_as_finished_or_in_order() -> None:
-    with workers(2, "threading") as pool:
-        calls = [joblib.delayed(later)(0.2 if number == 0 else 0.0, number) for number in range(6)]
-        finished = list(pool.unordered(calls))
-        assert sorted(finished) == [(number, number) for number in range(6)]
-        assert finished[0][0] != 0  # the slow one does not hold up what is finished beside it
-        assert list(pool(calls)) == list(range(6))
 
 
 def workers_of(mark: str) -> list[psutil.Process]:
@@ -218,6 +201,6 @@ def test_kills_in_every_phase(tmp_path: Path, undisturbed: Path, whole_s: float,
         said_text = (tmp_path / "said").read_text()
         assert "Traceback" not in said_text.partition("Exception ignored")[0], said_text  # in a library's callback
         if (out / "report.html").exists():
-            assert pq.read_table(out / "results.parquet").equals(pq.read_table(undisturbed / "results.parquet"))
+            assert_same_tables(out, undisturbed)
             emptied(out)
     assert_continues(tmp_path, undisturbed, 2)

@@ -38,7 +38,7 @@ FILES = ("results", "search", "points", "curves")
 RUN = """\
 import sys
 from pathlib import Path
-from sweep.run import run_study
+from sweep.runs import run_study
 from sweep.study import load_study
 run_study(load_study(Path(sys.argv[1])), Path(sys.argv[2]), int(sys.argv[3]), lambda *_: None)
 """

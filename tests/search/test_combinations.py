@@ -12,9 +12,9 @@ import pytest
 import sweep
 from sweep.base.errors import StudyError
 from sweep.base.types import in_turn
-from sweep.cli.audit import audit_rows
 from sweep.designs.families.mixture import Mixture
-from sweep.run import run_study
+from sweep.runs import run_study
+from sweep.runs.audit import audit_rows
 from sweep.search.combinations import Choice, choose, with_members
 from sweep.search.problem import Problem, best_feasible, starting_points
 from sweep.search.solver import search_from

@@ -27,7 +27,7 @@ from sweep.spectra.population import Population
 
 from ..cases import thinned
 from .limit_oracles import check_attained
-from .problems import PROBLEM, STUDY, best_of, csd_of, feasible_filters, noisy_problem, problem_of
+from .problems import PROBLEM, STUDY, best_of, csd_of, noisy_problem, problem_of
 
 LIMIT = limit_of(PROBLEM)
 SETUP = PROBLEM.setup
@@ -37,13 +37,6 @@ BASE = SETUP.camera.base_qe[0]
 def constrained(**bounds: Bound) -> Problem:
     """The search of `stopband` with other or more constraints."""
     return replace(PROBLEM, constraints={**PROBLEM.constraints, **bounds})
-
-
-@pytest.mark.parametrize("kind", ["free_form", "stopband"])
-def test_no_random_feasible_filter_beats_the_limit(kind: str) -> None:
-    curves = feasible_filters(SETUP, kind, 20_000, np.random.default_rng(11))
-    assert len(curves) > 3_334
-    assert csd_of(SETUP, curves).max() <= LIMIT.proven
 
 
 def test_a_tighter_study_has_a_lower_limit() -> None:

@@ -119,7 +119,7 @@ def test_the_widest_band_is_no_wider_than_that_of_any_peak(top_nm: float) -> Non
 
 def test_the_specification_has_amounts_for_every_width(folder: Path, tmp_path: Path) -> None:
     """A = e c l: 0.8 um of a dye of 80,000 l/(mol cm) have an absorbance of 6.4 per mol/l; 400 g/mol in 1,250 g/l."""
-    code, said, _ = commanded(*("export", folder / "out", "--design", "best", "--specification", "--to", tmp_path))
+    code, said, _ = commanded(*("export", folder / "out", "--design", "best", "--specification", "--output", tmp_path))
     assert code == 0
     assert "what an absorption band would have to be" in said
     table = pd.read_csv(tmp_path / "best_specification.csv")

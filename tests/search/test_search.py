@@ -1,9 +1,8 @@
-"""The search: better than any of many designs, feasible when checked again, deterministic, and stopped by a upper bound exceeded (bug)."""
+"""The search: at a known optimum, within its bounds, deterministic, and stopped by an upper bound that it exceeds (bug)."""
 
 from __future__ import annotations
 
 import re
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,14 +11,13 @@ import pandas as pd
 import pytest
 
 from sweep.base.errors import UpperBoundExceededError
-from sweep.cli.app import main
 from sweep.designs.families.free_form import FreeForm
-from sweep.metrics.bound import FEASIBLE, Bound, total_violation
+from sweep.metrics.bound import FEASIBLE, Bound
 from sweep.metrics.evaluate import designed_quantities
 from sweep.report import read_output
 from sweep.report.summary import summary_lines
-from sweep.run import search as searching
-from sweep.run.dry_run import remaining_work, remaining_work_lines
+from sweep.runs import search as searching
+from sweep.runs.dry_run import remaining_work, remaining_work_lines
 from sweep.search import trade_off
 from sweep.search.gradients import Model
 from sweep.search.limit import Limit, limit_of
@@ -27,34 +25,10 @@ from sweep.search.problem import CONVERGED, Evaluation, Problem, SearchRun, best
 from sweep.search.solver import ALGORITHMS, ONE_START, search_from
 
 from ..build import load, ran, stopband_study
-from .problems import PROBLEM, STUDY, best_of, csd_of
+from ..commanded import commanded
+from .problems import PROBLEM, STUDY, best_of
 
 SETUP, FAMILY, N_FREE = PROBLEM.setup, PROBLEM.family, PROBLEM.free.size
-
-
-def test_search_beats_random_designs_of_its_box() -> None:
-    rng, best_drawn = np.random.default_rng(7), 0.0
-    for _ in range(5):
-        x = PROBLEM.from_unit(rng.uniform(size=(4000, N_FREE)))
-        curves = FAMILY.curves(x)
-        crossed = np.maximum(FAMILY.violation(x).max(axis=1), 0)
-        feasible = total_violation(designed_quantities(SETUP, curves), PROBLEM.constraints, crossed) <= FEASIBLE
-        best_drawn = max(best_drawn, csd_of(SETUP, curves[feasible]).max(initial=0.0))
-    assert best_of(PROBLEM, 4, 125).objective >= best_drawn > 200
-
-
-def test_answer_is_feasible_when_checked_again() -> None:
-    best = best_of(PROBLEM, 1, 125)
-    curve = FAMILY.curves(best.x[None])[0, 0]
-    assert curve.sum() / STUDY.sensor.qe["Y"].sum() >= 0.90 * (1 - FEASIBLE)
-    assert ((best.x >= PROBLEM.low) & (best.x <= PROBLEM.high)).all()
-    assert (FAMILY.violation(best.x[None]) <= FEASIBLE).all()
-
-
-def test_budget_counts_simulations() -> None:
-    run = search_from(PROBLEM, 0, np.full(N_FREE, 0.3), "MMA", 7)
-    assert len(run.log) == 7
-    assert run.status == "maxeval_reached"
 
 
 def test_settled_search_misses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -186,9 +160,7 @@ TINY = stopband_study(
 )
 
 
-def test_an_upper_bound_below_the_search_result_stops_the_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_upper_bound_below_the_search_result_stops_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One line, an exit code of its own, no results; and what was searched is not searched again."""
     (tmp_path / "tiny.yaml").write_text(TINY)
     searched: list[int] = []
@@ -201,26 +173,23 @@ def test_an_upper_bound_below_the_search_result_stops_the_run(
         found = limit_of(problem, tolerance, *rest)
         return replace(found, proven=0.5 * found.proven) if tolerance == 0.02 else found
 
-    def ended() -> object:
-        command = ["sweep", "run", str(tmp_path / "tiny.yaml"), "--output", str(tmp_path), "--jobs", "1"]
-        monkeypatch.setattr(sys, "argv", command)
-        with pytest.raises(SystemExit) as stopped:
-            main()
-        return stopped.value.code
+    def ended() -> tuple[int, str, str]:
+        return commanded("run", tmp_path / "tiny.yaml", "--output", tmp_path, "--jobs", 1)
 
     for module in (searching, trade_off):
         monkeypatch.setattr(module, "search_from", counted)
     with monkeypatch.context() as wrong:
         for module in (searching, trade_off):
             wrong.setattr(module, "limit_of", planted)
-        assert ended() == UpperBoundExceededError.exit_code == 5
-        (said,) = capsys.readouterr().err.splitlines()
+        code, _, err = ended()
+        assert code == UpperBoundExceededError.exit_code == 5
+        (said,) = err.splitlines()
         assert "upper bound exceeded (bug) at a sensitivity" in said
         first = len(searched)
-        assert ended() == 5
+        assert ended()[0] == 5
         assert len(searched) == first
     assert not (tmp_path / "tiny" / "results.parquet").exists()
-    assert ended() == 0  # the wrong limit was not kept, and what was searched was
+    assert ended()[0] == 0  # the wrong limit was not kept, and what was searched was
     assert (tmp_path / "tiny" / "results.parquet").exists()
     assert searched[first:].count(0) == 0
 

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sweep.base.errors import StudyError
 from sweep.camera.accuracy import Accuracy
 from sweep.camera.linear import linear_model
 from sweep.camera.model import SceneModel
@@ -31,10 +30,11 @@ from sweep.search.solver import extreme_value
 from sweep.spectra.colorants import modeled_colorants
 from sweep.study import load_study
 
+from ..build import one_line
 from ..conftest import STUDIES
 from ..hard.random_scenes import random_scene
 from ..hard.scenes import FAMILY, GRID, SENSOR
-from .problems import STATES, best_of, best_random, noisy_problem
+from .problems import STATES, best_of, noisy_problem
 
 FAMILIES: tuple[Family, ...] = (
     FAMILY,
@@ -126,19 +126,6 @@ def test_derivatives_agree_with_differences_in_100_scenes() -> None:
     assert {seed: off for seed in seeds if (off := differences_off(seed)) > 1} == {}
 
 
-@pytest.mark.parametrize(
-    "objective",
-    [
-        Objective(minimum={"dprime_yellow_red": 1.0}),
-        Objective(least={"error_yellow_red": 1.0, "error_green_yellow": 100.0}),
-    ],
-    ids=str,
-)
-def test_a_search_finds_better_than_any_random_design(objective: Objective) -> None:
-    problem = noisy_problem("stopband", 30, 0.3, objective)
-    assert best_of(problem, 2, 120).objective > best_random(problem, 100).objective
-
-
 def test_the_objective_is_met_by_the_readout() -> None:
     """Of the design that is found: exact sums over digital numbers, as the result table has them."""
     problem = noisy_problem("stopband", 30, 0.3, Objective(least={"state_error": 1.0}))
@@ -186,9 +173,8 @@ def test_invalid_error_constraint_is_one_line(told: str, issue: str, tmp_path: P
     start = "study: x\nsensor: ar0820\nlights: tl16\ncfas: [RGGB]\nscenarios: {s: {noise: true}}\nrecognition: {}\n"
     file = tmp_path / "x.yaml"
     file.write_text(f"{start}{told}\n")
-    with pytest.raises(StudyError) as error:
+    with one_line(issue):
         load_study(file)
-    assert issue in str(error.value)
 
 
 def test_the_filter_of_the_noise_study_equals_the_search_result() -> None:
@@ -208,9 +194,5 @@ def test_search_refuses_quantities_without_smooth_rows(tmp_path: Path) -> None:
     for name in ("cta_yellow_red", "cta_green_red"):
         constrained = re.sub(r"^constraints:\n", f"constraints:\n  {name}: {{min: 0.9}}\n", text, flags=re.MULTILINE)
         path.write_text(constrained.replace("level: 0.95}", "level: 0.95}\n    noise: true", 1))
-        with pytest.raises(StudyError) as caught:
+        with one_line(f"constraints.{name}: the search does not know {name}; allowed: a study without `search`"):
             load_study(path)
-        (issue,) = caught.value.issues
-        assert str(issue).endswith(
-            f"constraints.{name}: the search does not know {name}; allowed: a study without `search`"
-        )

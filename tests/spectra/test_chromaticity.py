@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from colour.colorimetry import dominant_wavelength, excitation_purity
 
-from sweep.spectra.builtin.led import led_photons
 from sweep.spectra.builtin.registry import BUILT_IN_LIGHTS
-from sweep.spectra.color import REGIONS, chromaticity, color_matching, display_colors, luminance_per_photon_radiance
+from sweep.spectra.color import REGIONS, color_matching, display_colors, luminance_per_photon_radiance
 from sweep.spectra.signal_color import EQUAL_ENERGY, VISIBLE, light_color, spectral_locus
 from sweep.spectra.spectrum import WavelengthGrid
 
@@ -22,12 +21,6 @@ def by_colour_science(photons: np.ndarray) -> np.ndarray:
     energy = np.pad(photons / GRID.nodes_nm, (40, 80))
     xyz = colour.sd_to_XYZ(colour.SpectralDistribution(energy, wave), method="Integration")
     return np.asarray(colour.XYZ_to_xy(xyz))
-
-
-@pytest.mark.parametrize("peak_nm", [505, 592, 607, 635])
-def test_chromaticity_agrees_with_colour_science(peak_nm: float) -> None:
-    photons = led_photons(GRID.nodes_nm, peak_nm, 8.0, 7.0)
-    np.testing.assert_allclose(chromaticity(GRID, photons[None])[0], by_colour_science(photons), atol=1e-6)
 
 
 def test_the_observer_is_that_of_colour_science_at_every_wavelength() -> None:

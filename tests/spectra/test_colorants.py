@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sweep.base.errors import DataError
-from sweep.spectra.colorants import measured_films, modeled_colorants, read_colorants
+from sweep.spectra.colorants import measured_films, read_colorants
 from sweep.spectra.spectrum import WavelengthGrid
 
 GRID = WavelengthGrid()
@@ -24,16 +24,6 @@ def written(path: Path, values: np.ndarray, nm: np.ndarray = NM) -> Path:
     rows = "\n".join(f"{a:.2f}\t{b:.6f}" for a, b in zip(nm, values, strict=True))
     path.write_text(f"Wavelength (nm)\tCoefficient\n{rows}\n")
     return path
-
-
-def test_modeled_bands_have_their_peak_and_width() -> None:
-    catalog = modeled_colorants(GRID)
-    assert len(catalog) == 45
-    assert all(name.startswith("modeled band") for name in catalog.names)
-    band = catalog.absorbance[catalog.numbers["modeled band 630 nm, FWHM 40 nm"] - 1]
-    assert GRID.nodes_nm[band.argmax()] == 630
-    above = GRID.nodes_nm[band >= 0.5]
-    assert above[-1] - above[0] == pytest.approx(40, abs=2)
 
 
 def test_measured_films_absorb_where_their_dyes_do() -> None:

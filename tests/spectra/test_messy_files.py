@@ -44,14 +44,10 @@ def text(
     return before + "\n".join(lines) + "\n"
 
 
-_OCEAN = (
-    "Data from R_1.txt Node\n\nDate: Tue\nUser: me\nIntegration Time (sec): 1,0E-1\n>>>>>Begin Spectral Data<<<<<\n"
-)
 _NUMBERS = text("\t").split("\n", 1)[1]
 _COLUMNS = [*zip(*[line.split(",") for line in text().splitlines()], strict=True)]
 
 VARIANTS: dict[str, tuple[str, str, str]] = {
-    "semicolons": ("a.csv", text(";"), "separated by semicolons"),
     "decimal comma": ("a.csv", text(";", decimal=","), "decimal commas"),
     "lambda": ("a.csv", text(head="lambda"), "taken for nm by their size"),
     "micrometers": ("a.csv", text(head="wavelength_um", wave=WAVE / 1000), "in um were brought to nm"),
@@ -72,11 +68,6 @@ VARIANTS: dict[str, tuple[str, str, str]] = {
         "a.csv",
         "\n".join(f"{'' if i == 0 else i - 1},{x}" for i, x in enumerate(text().splitlines())),
         "counts the rows",
-    ),
-    "Ocean spectrometer": (
-        "a.txt",
-        _OCEAN + _NUMBERS + ">>>>>End Spectral Data<<<<<\n",
-        "lines of the head of a file of Ocean",
     ),
     "Thorlabs spectrometer": (
         "a.txt",
@@ -119,7 +110,7 @@ def test_a_file_variant_is_read_or_refused_with_advice(tmp_path: Path, name: str
     values = np.stack([*found.values.values()], axis=1)
     np.testing.assert_allclose(values, right, rtol=1e-5, atol=0.03 if rounded else 1e-12)
     code, _, err = commanded("new", "mine", "--qe", path, "--folder", tmp_path / "studies")
-    if name in ("Ocean spectrometer", "Thorlabs spectrometer", "numbers alone"):  # their curves have no names
+    if name in ("Thorlabs spectrometer", "numbers alone"):  # their curves have no names
         assert code == 2
         assert "no column names a channel (got 'curve_1, curve_2, curve_3')" in err
         return
@@ -127,24 +118,6 @@ def test_a_file_variant_is_read_or_refused_with_advice(tmp_path: Path, name: str
     assert all(said in "".join(study.warnings) for said in found.notes)
     if name == "a row of units":
         assert study.section.sensor.files[0].scale == 0.01
-
-
-@pytest.mark.parametrize(
-    ("file", "content", "said"),
-    [
-        ("a.csv", text().replace("0.6", "0,6", 1), "wrong number of columns"),
-        ("a.csv", text(";").replace("0.6", "0,6", 1), "not a usable number (got '0,6')"),
-        ("a.csv", text(head="wavelength_nm", wave=WAVE / 1000), "looks like um"),
-        ("a.csv", text(head="frequency"), "no column wavelength (got 'frequency')"),
-        ("a.xlsx", "x", "not a readable spreadsheet"),
-        ("a.spectrum", "x", "unknown kind of curve file"),
-    ],
-)
-def test_ambiguous_numbers_are_refused(tmp_path: Path, file: str, content: str, said: str) -> None:
-    path = tmp_path / file
-    path.write_text(content)
-    with one_line(said):
-        read_curves(path)
 
 
 def zipped() -> bytes:

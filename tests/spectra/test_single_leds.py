@@ -7,8 +7,7 @@ import pytest
 from colour import MSDS_CMFS
 
 from sweep.spectra.color import SIGNAL_REGIONS
-from sweep.spectra.single_leds import Norm, RegionMap, SingleLeds, all_leds
-from sweep.spectra.spectrum import WavelengthGrid
+from sweep.spectra.single_leds import Norm, RegionMap, all_leds
 
 SAE_J578 = {
     "red": ((0.665, 0.335), (0.645, 0.335), (0.721, 0.259), (0.735, 0.265)),
@@ -53,13 +52,3 @@ def test_norm_allows_colors_within_its_boundaries(norm: Norm, kind: str) -> None
             seen = (photons / wave) @ functions.values
             x, y = seen[:2] / seen.sum()
             assert ((peak, fwhm) in allowed) == CONDITIONS[norm, kind](x, y), (peak, fwhm, x, y)
-
-
-def test_leds_are_as_wide_as_they_say_and_have_one_photon() -> None:
-    grid = WavelengthGrid(step_nm=0.1)
-    photons = SingleLeds(np.array([590.0, 630.0]), np.array([10.0, 30.0])).photons(grid)
-    np.testing.assert_allclose(grid.integrate(photons), 1.0)
-    for spectrum, width, peak in zip(photons, (10.0, 30.0), (590.0, 630.0), strict=True):
-        above = grid.nodes_nm[spectrum >= spectrum.max() / 2]
-        assert above[-1] - above[0] == pytest.approx(width, abs=0.2)
-        assert grid.nodes_nm[spectrum.argmax()] == pytest.approx(peak)

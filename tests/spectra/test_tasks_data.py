@@ -44,13 +44,6 @@ def test_every_set_has_the_digest_that_its_card_was_written_with() -> None:
     assert spectra.numbers_digest(changed[:-1]) != cards["colorchecker"].sha256
 
 
-def test_measured_reflectances_are_shares() -> None:
-    for name in spectra.cards()[0].groups:
-        values = task_sets.spectra_of_group(GRID, name)
-        assert (values >= 0).all()
-        assert (values <= 1).all()
-
-
 @pytest.mark.parametrize("group", list(surrogate_spectra.SURROGATES))
 def test_a_surrogate_lies_inside_its_color_region(group: str) -> None:
     light = task_sets.illuminant(GRID, "d65") if surrogate_spectra.is_sheeting(group) else 1.0

@@ -14,11 +14,10 @@ from sweep.report.compare_tables import curve_notes
 from sweep.report.summary import summary_lines
 from sweep.report.trade_off import around_designs
 from sweep.results.output import Output, read_output
-from sweep.run import run_study
-from sweep.study import load_study
 
-from ..build import sentences_of
+from ..build import load, ran, sentences_of
 from ..commanded import commanded
+from ..curve_texts import csv
 
 NM = np.arange(390.0, 711, 5)
 CURVES = {name: 0.5 * np.exp(-(((NM - nm) / 40) ** 2)) for name, nm in (("R", 610), ("G", 540), ("B", 460))}
@@ -33,16 +32,13 @@ designs:
 
 
 def qe_file(folder: Path) -> Path:
-    rows = [",".join(map(str, row)) for row in zip(NM, *CURVES.values(), strict=True)]
-    (folder / "qe.csv").write_text("\n".join([",".join(["wavelength_nm", *CURVES]), *rows]))
-    return folder / "qe.csv"
+    return csv(folder, "wavelength_nm,R,G,B", NM, *CURVES.values(), name="qe.csv")
 
 
 def output_of(folder: Path, more: str = "") -> Output:
     folder.mkdir()
     qe_file(folder)
-    (folder / "tiny.yaml").write_text(STUDY.replace("MORE", more))
-    run_study(load_study(folder / "tiny.yaml"), folder / "out", 1, lambda *_: None)
+    ran(load(folder, STUDY.replace("MORE", more)), folder / "out", 1)
     return read_output(folder / "out")
 
 

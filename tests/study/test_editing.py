@@ -13,8 +13,8 @@ from typing import Any
 import jsonschema
 import pytest
 
-from sweep.cli.listing import list_lines, studies_of
 from sweep.cli.options import run_folders, study_files
+from sweep.runs.listing import list_studies
 from sweep.study.document import Document
 from sweep.study.editors import SCHEMA_FILE, schema_text, study_schema
 
@@ -92,7 +92,7 @@ def test_studies_are_listed_with_the_broken_ones(tmp_path: Path) -> None:
     study_file(tmp_path)
     (tmp_path / "broken.yaml").write_text("study: broken\nsensr: ar0820\nlights: tl16\ncfas: [RGGB]\n")
     (tmp_path / "worse.yml").write_text("[")
-    lines = list_lines(tmp_path, studies_of(tmp_path, tmp_path / "out"))
+    lines = list_studies(tmp_path, output=tmp_path / "out").lines
     assert [line.split()[0] for line in lines] == ["broken", "tiny", "worse", "3"]
     assert "cannot be loaded" in lines[0]
     assert "sensr: unknown key" in lines[0]
@@ -103,7 +103,7 @@ def test_studies_are_listed_with_the_broken_ones(tmp_path: Path) -> None:
 
 def test_a_missing_or_empty_folder_is_reported(tmp_path: Path) -> None:
     assert commanded("list", tmp_path / "none")[0] == 2
-    assert "No studies" in list_lines(tmp_path, studies_of(tmp_path, tmp_path))[0]
+    assert "No studies" in list_studies(tmp_path, output=tmp_path).lines[0]
 
 
 def test_an_interrupted_and_a_changed_run_are_reported(tmp_path: Path) -> None:
@@ -113,13 +113,9 @@ def test_an_interrupted_and_a_changed_run_are_reported(tmp_path: Path) -> None:
 
     path = study_file(tmp_path)
     begin(tmp_path / "out" / "tiny", run_facts(load_study(path)))
-    assert "interrupted" in list_lines(tmp_path, studies_of(tmp_path, tmp_path / "out"))[0]
-    path.write_text(
-        path.read_text() + "seed: 77\n"
-        if "seed" not in path.read_text()
-        else path.read_text().replace("seed: 1", "seed: 77")
-    )
-    assert "changed since it was run" in list_lines(tmp_path, studies_of(tmp_path, tmp_path / "out"))[0]
+    assert "interrupted" in list_studies(tmp_path, output=tmp_path / "out").lines[0]
+    path.write_text(path.read_text() + "seed: 77\n")
+    assert "changed since it was run" in list_studies(tmp_path, output=tmp_path / "out").lines[0]
 
 
 def test_the_shell_completes_studies_and_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,7 +10,6 @@ from sweep.base.errors import StudyError
 from sweep.study import Study, load_study
 
 from ..build import BASE, issues, one_line
-from ..commanded import commanded
 from ..conftest import STUDIES
 
 MEANING = BASE.replace("    cfa: RYNCy", "    cfa: RYNX").replace("sensitivity:", "sensitivty:")
@@ -123,9 +122,6 @@ def test_faults_of_the_file_beside_those_of_an_option_have_their_lines(tmp_path:
         ("--set cfas.0=RGB", None, "cfas.RGB"),
         ("--set search.space=edgs", None, "search.space"),
     ]
-    code, _, err = commanded("check", path, "--set", "scenarios.chart.noise=yes")
-    assert code == 2
-    assert "--set scenarios.chart.noise=yes: scenarios.chart.noise: true or false expected: write true" in err
 
 
 def test_published_names_are_checked(tmp_path: Path) -> None:

@@ -15,11 +15,10 @@ import pytest
 from ruamel.yaml import YAML
 
 from sweep.base.errors import StudyError
-from sweep.run.rows import Job, Rows, rows_of, rules_of
-from sweep.spectra.color import chromaticity, color_matching, display_colors
+from sweep.runs.rows import Job, Rows, rows_of, rules_of
+from sweep.spectra.color import chromaticity, display_colors
 from sweep.spectra.spectrum import WavelengthGrid
 from sweep.study import Study, load_study
-from sweep.study.editors import study_schema
 
 from ..build import one_line
 from ..mutations import at
@@ -140,59 +139,17 @@ def test_whatever_is_no_number_of_this_world_is_one_line(tmp_path: Path) -> None
             check_refused(tmp_path, path, value)
 
 
-LIMITS: dict[str, tuple[float, float]] = {
-    **{"pitch_um": (1e-3, 1e5), "fill_factor": (1e-9, 1), "well_e": (1e-3, 1e7), "gain_dn_per_e": (1e-6, 1e9)},
-    **{"bits": (1, 24), "crosstalk": (0, 0.999999), "read_noise_e": (0, 1e4), "dark_e_per_s": (0, 1e15)},
-    **{"tolerance_dn": (1e-12, 1e12), "photon_radiance": (1, 1e40), "off_axis_deg": (0, 89.999999), "level": (1e-9, 1)},
-    **{
-        "photon_ratio": (1e-30, 1e30),
-        "f_number": (0.01, 1e6),
-        "cra_deg": (0, 60),
-        "transmission": (1e-9, 1),
-        "intensity_cd": (1e-12, 1e15),
-    },
-    **{"exposure_s": (1e-15, 1e9), "visibility_m": (1e-4, 1e9), "background_cd_m2": (0, 1e15)},
-    **{"duty": (1e-9, 1), "frequency_hz": (1e-6, 1e12)},
-}
-
-
-def test_each_limit_is_where_the_schema_has_it() -> None:
-    schema = study_schema()
-    for key, ends in LIMITS.items():
-        sections = [s["properties"][key] for s in [schema, *schema["$defs"].values()] if key in s.get("properties", {})]
-        parts = [
-            part
-            for prop in sections
-            for part in [prop, *prop.get("anyOf", [])]
-            if "maximum" in part or "minimum" in part
-        ]
-        assert parts, key
-        for part in parts:
-            assert part.get("minimum", ends[0]) == ends[0], (key, part)
-            assert part.get("maximum", ends[1]) == ends[1], (key, part)
-
-
-def test_negative_zero_is_zero(tmp_path: Path) -> None:
-    tree = whole()
-    tree["pixel"]["offset_dn"] = -0.0
-    assert np.copysign(1, loaded(tmp_path, tree).pixel.offset_dn) == 1
-
-
 @pytest.mark.parametrize(
     ("more", "said"),
     [
         ("wavelengths: {step_nm: 5.0e-324}", "step_nm 4.94066e-324 is too fine: at most 20000 steps"),
-        ("wavelengths: {step_nm: 1.0e-4}", "too fine"),
         ("wavelengths: {start_nm: 1.0e-300, stop_nm: 1.0e-299}", "between 200 and 2000"),
         ("cfas: {X: {tile: [" + ", ".join(["[" + ", ".join("R" * 65) + "]"] * 2) + "]}}", "at most 64 items"),
         ("cfas: {X: {tile: [" + ", ".join(["[R]"] * 65) + "]}}", "at most 64 items"),
-        ("cfas: {X: {tile: [" + ", ".join(["[" + ",".join("R" * 1500) + "]"]) + "]}}", "at most 64 items"),
         ("sweeps: {e: {cfa: RGGB, channel: G, base: R, to: B, grid: {left_nm: {min: 1.0, max: 2.0, count: 1000000000}}}}", "1000000"),
         ("scenarios: {a: {each: {off_axis_deg: {min: 0.0, max: 1.0, count: 1000000}}}}", "more than 2000 scenarios"),
         ("scenarios: {a: {each: {x: {min: -1.0e+308, max: 1.0e+308, count: 3}}}}", "a number, a list of numbers"),
-        ("scenarios: {a: {each: {off_axis_deg: [1, 2], x: [true]}}}", "a number, a list of numbers"),
         ("scenarios: {" + ", ".join(f"s{i}: {{}}" for i in range(2001)) + "}", "more than 2000 scenarios"),
-        ("scenarios: {a: {target: {distance_m: 9, fov_deg: 9, phase_px: [true, 1]}}}", "a sampling phase is `any`"),
         ("scenarios: {a: {target: {distance_m: 9, fov_deg: 9, phase_px: [1.0e+10, 1]}}}", "a sampling phase is `any`"),
         ("constraints: {sensitivity: {min: 5.0e-324}}", "too near to 0"),
         ("recognition: {states: [" + ", ".join(f"s{i}" for i in range(41)) + "]}", "at most 40 items"),
@@ -251,10 +208,8 @@ INFRARED = "wavelength_nm,x,y\n800,0,0\n880,1,0\n940,0,1\n1000,0,0\n"
 )
 def test_candelas_of_infrared_are_one_line(tmp_path: Path, scene: str, said: str) -> None:
     path = study_of(tmp_path, INFRARED, f"scenarios: {{a: {{{scene}, exposure: {{kind: fixed, exposure_s: 0.01}}}}}}\n")
-    with pytest.raises(StudyError) as caught:
+    with one_line(said, "allowed: photons between 360 and 830 nm"):
         load_study(path)
-    assert said in str(caught.value)
-    assert str(caught.value).endswith("allowed: photons between 360 and 830 nm")
 
 
 def test_infrared_lights_are_computed_and_drawn_gray(tmp_path: Path) -> None:
@@ -267,25 +222,8 @@ def test_infrared_lights_are_computed_and_drawn_gray(tmp_path: Path) -> None:
         colors = display_colors(mixed, np.eye(mixed.size)[[30, 290]])
     assert colors[0, 0] == pytest.approx(1)  # 630 nm: red
     np.testing.assert_array_equal(colors[1], 0.5)
-    assert not color_matching(mixed)[:, 231:].any()  # beyond 830 nm
     with np.errstate(invalid="ignore"):
         assert np.isnan(chromaticity(mixed, np.eye(mixed.size)[[290]])).all()
-
-
-@pytest.mark.parametrize(
-    ("leds", "said"),
-    [
-        ("wavelength_nm,x,y\n850,5e-324,1\n1000,5e-324,1\n", "led.csv: x: the largest value is too small"),
-        (
-            "wavelength_nm,x,y\n850,1e308,1\n1000,1,1\n",
-            "led.csv:2: x: value too large (got '1e308'); allowed: 0 to 1e+100",
-        ),
-        ("wavelength_nm,x,y\n400,1,1\n850,5e-324,1\n1000,0,1\n", "a light has no photons on the wavelength grid"),
-    ],
-)
-def test_lights_of_extreme_power_are_one_line(tmp_path: Path, leds: str, said: str) -> None:
-    with one_line(said):
-        load_study(study_of(tmp_path, leds))
 
 
 def test_lights_of_any_sensible_power_are_the_same_lights(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from sweep.base.errors import MOST_ISSUES, SweepError
 from sweep.study import load_study
 
 from ..conftest import STUDIES
+from ..curve_texts import WAVE, bell, csv
 from ..mutations import changed, one_of, written
 from ..watchdog import within
 
@@ -23,27 +24,14 @@ HANG_S = 120.0
 SHIPPED = sorted(path for path in STUDIES.glob("*.yaml") if path.stem != "measured")
 CURVES = "sensor:\n  files:\n    - {file: qe.csv, columns: {R: r, G: g, Y: y, N: g}}\n"
 LIGHTS = "lights:\n  files:\n    - {file: led.csv, quantity: energy, outside: zero, signals: {red: [r], yellow: [y]}}\n"
-WAVE = np.arange(390, 711, 10.0)
-
-
-def bell(center_nm: float, width_nm: float) -> np.ndarray:
-    return np.exp(-(((WAVE - center_nm) / width_nm) ** 2))
-
-
-def table(**columns: np.ndarray) -> bytes:
-    rows = [["wavelength_nm", *columns], *np.stack([WAVE, *columns.values()], axis=1).tolist()]
-    return "".join(",".join(map(str, row)) + "\n" for row in rows).encode()
-
-
-QE = table(r=0.8 * bell(620, 60), g=0.8 * bell(530, 60), y=0.4 + 0.5 * bell(600, 90))
-LEDS = table(r=bell(635, 12), y=bell(590, 12))
 
 
 @pytest.fixture
 def studies(tmp_path: Path) -> list[dict[str, Any]]:
     """The project's own studies, with few of their scenes, and one with files, as mappings."""
-    (tmp_path / "qe.csv").write_bytes(QE)
-    (tmp_path / "led.csv").write_bytes(LEDS)
+    qe = 0.8 * bell(620, 40), 0.8 * bell(530, 40), 0.4 + 0.5 * bell(600, 60)
+    csv(tmp_path, "wavelength_nm,r,g,y", WAVE, *qe, name="qe.csv")
+    csv(tmp_path, "wavelength_nm,r,y", WAVE, bell(635, 8), bell(590, 8), name="led.csv")
     texts = [path.read_text() for path in SHIPPED]
     texts.append(f"study: own\n{CURVES}{LIGHTS}cfas: [RGYN, RYGG]\nobjective: csd_red_yellow\n")
     return [YAML(typ="safe", pure=True).load(text) for text in texts]

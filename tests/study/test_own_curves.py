@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sweep.study import load_study
 from sweep.study.model import Study
 
-from ..build import issues
+from ..build import issues, load, one_line
+from ..curve_texts import csv
 
 STUDY = """\
 study: tiny
@@ -22,11 +22,8 @@ NM = np.arange(390.0, 711, 10)
 
 
 def own(folder: Path, columns: str, rest: str = "", **curves: np.ndarray) -> Study:
-    rows = [",".join(map(str, row)) for row in zip(NM, *curves.values(), strict=True)]
-    (folder / "own.csv").write_text("\n".join([",".join(["wavelength_nm", *curves]), *rows]))
-    path = folder / "tiny.yaml"
-    path.write_text(STUDY.replace("COLUMNS", columns).replace("REST", rest))
-    return load_study(path)
+    csv(folder, ",".join(["wavelength_nm", *curves]), NM, *curves.values(), name="own.csv")
+    return load(folder, STUDY.replace("COLUMNS", columns).replace("REST", rest))
 
 
 def test_a_qe_stands_beside_the_built_in_ones(tmp_path: Path) -> None:
@@ -61,10 +58,8 @@ def test_a_user_curve_replaces_the_built_in_one_in_every_cfa(tmp_path: Path) -> 
 )
 def test_faults_name_the_place(tmp_path: Path, columns: str, rest: str, said: str) -> None:
     (tmp_path / "own.csv").write_text("wavelength_nm,mine\n390,40\n710,40\n")
-    found = issues(tmp_path, STUDY.replace("COLUMNS", columns).replace("REST", rest))
-    assert len(found) == 1
-    assert found[0].startswith("tiny.yaml:2: sensor.files[0]")
-    assert said in found[0]
+    with one_line("tiny.yaml:2: sensor.files[0]", said):
+        load(tmp_path, STUDY.replace("COLUMNS", columns).replace("REST", rest))
 
 
 def test_a_built_in_sensor_alone_has_its_own_name(tmp_path: Path) -> None:

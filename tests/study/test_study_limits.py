@@ -7,18 +7,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
 from sweep.base.errors import MOST_ISSUES, StudyError, SweepError, ValidationIssue, nearest
-from sweep.cli.listing import list_lines, studies_of
-from sweep.spectra.read_table import MOST_CURVES, MOST_SAMPLES, MOST_VALUES
-from sweep.spectra.read_text import MOST_BYTES
 from sweep.study import load_study
 from sweep.study.document import MOST_DEPTH, Document, Tree
 from sweep.study.editors import study_schema
 
-from ..commanded import commanded
 from ..watchdog import within
 
 SMALL = "study: a\nsensor: ar0820\nlights: tl16\ncfas: [RGGB]\n"
@@ -41,17 +36,11 @@ def merged_bomb() -> str:
 TOO_MUCH: dict[str, tuple[Callable[[], str | bytes], str]] = {
     "aliases of aliases": (bomb, "a4: more keys and values than a study has; allowed: at most 50,000"),
     "merges of merges": (merged_bomb, "nested too deep"),
-    "a root in itself": (lambda: "&a {study: *a}", "nested too deep"),
     "a list in itself": (lambda: SMALL + "x: &x [1, *x]", "5: x: nested too deep"),
     "an alias of nothing": (lambda: SMALL + "x: *y\n", "5: not valid YAML: found undefined alias 'y'"),
-    "an ordered map": (lambda: "!!omap [study: a]", "1: a tag"),
-    "a set": (lambda: SMALL + "designs: !!set {a, b}\n", "5: designs: a tag (got 'tag:yaml.org,2002:set')"),
     "a Python object": (lambda: SMALL + "question: !!python/object/apply:os.getcwd []\n", "5: question: a tag"),
-    "bytes": (lambda: SMALL + "question: !!binary aGVsbG8=\n", "5: question: a tag"),
     "a tag of its own": (lambda: SMALL + "question: !mine x\n", "5: question: a tag (got '!mine')"),
     "a long number": (lambda: SMALL + f"seed: {'9' * 60_000}\n", "5: seed: a number of 60,000 letters"),
-    "10^400": (lambda: SMALL + f"tolerance_dn: 1{'0' * 400}\n", "5: tolerance_dn: a number of 401 letters"),
-    "a long hexadecimal": (lambda: SMALL + f"seed: 0x{'f' * 5000}\n", "5: seed: a number of 5,002 letters"),
     "a long fraction": (
         lambda: SMALL + f"tolerance_dn: 0.{'1' * 5000}\n",
         "5: tolerance_dn: a number of 5,002 letters",
@@ -61,20 +50,13 @@ TOO_MUCH: dict[str, tuple[Callable[[], str | bytes], str]] = {
         lambda: SMALL + "x: " + "[" * 5000 + "]" * 5000,
         f"nested too deep; allowed: at most {MOST_DEPTH}",
     ),
-    "braces": (lambda: SMALL + "x: " + "{a: " * 5000 + "}" * 5000, "nested too deep"),
-    "dashes": (lambda: SMALL + "x:\n" + "- " * 5000 + "1", "nested too deep"),
-    "question marks": (lambda: SMALL + "? " * 5000, "nested too deep"),
     "indents": (lambda: "\n".join(" " * i + f"k{i}:" for i in range(800)), "nested too deep"),
     "a long comment": (lambda: SMALL + "#" + "x" * 10_000_000, "the file is too large (got '10,000,051 bytes')"),
-    "many keys": (lambda: SMALL + "".join(f"k{i}: 1\n" for i in range(300_000)), "the file is too large"),
-    "fewer unknown keys": (lambda: SMALL + "".join(f"k{i}: 1\n" for i in range(2_000)), "k0: unknown key"),
-    "a long list": (lambda: SMALL + f"x: [{'590.0, ' * 200_000}1]", "the file is too large"),
-    "a shorter list": (lambda: SMALL + f"x: [{'1,' * 60_000}1]", "5: x: more keys and values than a study has"),
+    "many unknown keys": (lambda: SMALL + "".join(f"k{i}: 1\n" for i in range(2_000)), "k0: unknown key"),
     "two documents": (
         lambda: SMALL + "---\nstudy: b\n",
         "5: not valid YAML: expected a single document in the stream, but found another",
     ),
-    "many documents": (lambda: "---\n" * 100_000, "found another document"),
     "YAML 1.1": (lambda: "%YAML 1.1\n---\n" + SMALL, "another version of YAML (got '%YAML 1.1')"),
     "a key that is a list": (lambda: SMALL + "[1, 2]: 3\n", "5: a key that is no word"),
     "UTF-16": (
@@ -97,10 +79,6 @@ TOO_MUCH: dict[str, tuple[Callable[[], str | bytes], str]] = {
 }
 
 
-LONGER = ("a shorter list", "an endless quote")
-"""Texts that are read for a second or more, for the long tests."""
-
-
 def refused(path: Path) -> list[str]:
     with pytest.raises(StudyError) as caught, within(HANG_S):
         load_study(path)
@@ -109,7 +87,7 @@ def refused(path: Path) -> list[str]:
 
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(name, marks=pytest.mark.slow if name in LONGER else ()) for name in TOO_MUCH],
+    [pytest.param(name, marks=pytest.mark.slow if name == "an endless quote" else ()) for name in TOO_MUCH],
 )
 def test_too_much_is_one_line(tmp_path: Path, name: str) -> None:
     made, expected = TOO_MUCH[name]
@@ -123,13 +101,7 @@ def test_too_much_is_one_line(tmp_path: Path, name: str) -> None:
     assert all(len(line) < 10_000 and line.isprintable() for line in found)
 
 
-@pytest.mark.slow
-def test_many_faults_say_how_many_more(tmp_path: Path) -> None:
-    path = tmp_path / "a.yaml"
-    path.write_text(SMALL + "".join(f"k{i}: 1\n" for i in range(20_000)))
-    found = refused(path)
-    assert len(found) == MOST_ISSUES
-    assert "more errors" in found[-1]
+def test_many_faults_say_how_many_more() -> None:
     assert str(SweepError([ValidationIssue(f"f{i}") for i in range(1000)])).endswith(
         f"and {1000 - MOST_ISSUES + 1} more errors"
     )
@@ -187,13 +159,6 @@ def test_lines_are_those_of_keys_and_entries(tmp_path: Path) -> None:
     assert {key: document.place(key) for key in lines} == lines
 
 
-words = st.text(st.characters(exclude_categories=("Cc", "Cs")), max_size=8)
-scalars = st.none() | st.booleans() | st.integers(-(10**20), 10**20) | st.floats(allow_nan=False) | words
-values = st.recursive(
-    scalars, lambda one: st.lists(one, max_size=4) | st.dictionaries(words, one, max_size=4), max_leaves=20
-)
-
-
 def test_aliases_may_be_used_up_to_the_limit(tmp_path: Path) -> None:
     path = tmp_path / "a.yaml"
     path.write_text("a: &a [1, 2, 3]\nb: [*a, *a]\n")
@@ -227,29 +192,12 @@ def test_only_files_are_read(tmp_path: Path) -> None:
 
 def test_the_schema_says_the_limits(tmp_path: Path) -> None:
     """What it says is what holds."""
-    said = " ".join(study_schema()["description"].split())
-    assert "500,000 bytes, 50,000 keys and values" in said
-    assert f"{MOST_DEPTH} levels of nesting" in said
+    assert "500,000 bytes, 50,000 keys and values" in " ".join(study_schema()["description"].split())
     path, padded = tmp_path / "a.yaml", SMALL + "#" + "x" * (500_000 - len(SMALL) - 1)
     path.write_text(padded)
     load_study(path)
     path.write_text(padded + "x")
     assert "the file is too large" in refused(path)[0]
-    limits = (
-        f"{MOST_BYTES // 10**6} MB, {MOST_CURVES:,} curves, {MOST_SAMPLES:,} samples of each and {MOST_VALUES:,} values"
-    )
-    assert limits in study_schema()["$defs"]["CurveFile"]["properties"]["file"]["description"]
-
-
-def test_a_list_of_studies_goes_on_after_one_that_cannot_be_read(tmp_path: Path) -> None:
-    (tmp_path / "a.yaml").write_text(bomb())
-    os.mkfifo(tmp_path / "b.yaml")
-    (tmp_path / "c.yaml").write_text(SMALL)
-    with within(HANG_S):
-        lines = list_lines(tmp_path, studies_of(tmp_path, tmp_path / "out"))
-    assert ["cannot be loaded" in line for line in lines] == [True, True, False, False]
-    with pytest.raises(StudyError, match="no such folder"):
-        list_lines(tmp_path / ("n" * 300), studies_of(tmp_path / ("n" * 300), tmp_path))
 
 
 def test_a_data_folder_that_cannot_be_is_one_line(tmp_path: Path) -> None:
@@ -257,12 +205,3 @@ def test_a_data_folder_that_cannot_be_is_one_line(tmp_path: Path) -> None:
     for name in ("n" * 300, "absent", "a\0b"):
         with pytest.raises(StudyError, match="no such folder"):
             load_study(tmp_path / "a.yaml", tmp_path / name)
-
-
-def test_a_bomb_ends_the_command_with_one_line(tmp_path: Path) -> None:
-    (tmp_path / "a.yaml").write_text(bomb())
-    with within(HANG_S):
-        code, out, said = commanded("check", tmp_path / "a.yaml")
-    assert (code, out) == (2, "")
-    assert said.startswith(f"sweep: {tmp_path}/a.yaml:5: a4: more keys and values than a study has")
-    assert len(said.splitlines()) == 1

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from sweep.results.output import read_output
-from sweep.run.vision import vision_designs
+from sweep.runs.vision import vision_designs
 from sweep.study import load_study
 from sweep.vision.images import HeadCamera
 from sweep.vision.isp import isp_of
@@ -61,6 +61,11 @@ def exported(run: Path, to: Path, *options: str) -> pd.DataFrame:
     code, _, err = commanded("export", run, "--images", to, "--jobs", 1, *options)
     assert code == 0, err
     return pd.read_parquet(to / "manifest.parquet")
+
+
+def refused(said: str, *arguments: object) -> None:
+    code, _, err = commanded(*arguments)
+    assert (code, said in err) == (2, True), err
 
 
 def image(folder: Path, row: pd.Series) -> np.ndarray:
@@ -130,16 +135,12 @@ def test_an_interrupted_export_goes_on_and_another_is_refused(run: Path, tmp_pat
     pd.testing.assert_frame_equal(exported(run, torn), first)
     for path in whole.rglob("*.npz"):
         assert path.read_bytes() == (torn / path.relative_to(whole)).read_bytes()
-    code, _, err = commanded("export", run, "--images", whole, "--form", "isp")
-    assert (code, "holds other images" in err) == (2, True)
+    refused("holds other images", "export", run, "--images", whole, "--form", "isp")
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "notes.txt").write_text("x")
-    code, _, err = commanded("export", run, "--images", tmp_path / "mine")
-    assert (code, "holds other files" in err) == (2, True)
-    code, _, err = commanded("export", run)
-    assert (code, "one of --design and --images" in err) == (2, True)
-    code, _, err = commanded("export", run, "--images", tmp_path / "d", "--png", "--form", "demosaicked")
-    assert (code, "of more than three channels" in err) == (2, True)
+    refused("holds other files", "export", run, "--images", tmp_path / "mine")
+    refused("one of --design and --images", "export", run)
+    refused("of more than three channels", "export", run, "--images", tmp_path / "d", "--png", "--form", "demosaicked")
     assert not (tmp_path / "d").exists()
 
 
@@ -177,8 +178,7 @@ def test_coco_boxes_hold_the_lenses(run: Path, tmp_path: Path) -> None:
     assert (len(streets["images"]), len(streets["annotations"])) == (40, 80)
     first = streets["images"][0]
     assert Image.open(tmp_path / "coco" / first["file_name"]).size == (first["width"], first["height"]) == (108, 72)
-    code, _, err = commanded("export", run, "--images", tmp_path / "d", "--coco")
-    assert (code, "with --png" in err) == (2, True)
+    refused("with --png", "export", run, "--images", tmp_path / "d", "--coco")
 
 
 def test_detections_in_streets_are_scored(run: Path, tmp_path: Path) -> None:
@@ -200,8 +200,7 @@ def test_detections_in_streets_are_scored(run: Path, tmp_path: Path) -> None:
         ({"score": "much"}, "no number"),
     ):
         lit.assign(**change).to_csv(tmp_path / "wrong.csv", index=False)
-        code, _, err = commanded("score", run, tmp_path / "wrong.csv", "--output", tmp_path / "scores")
-        assert (code, line in err) == (2, True), err
+        refused(line, "score", run, tmp_path / "wrong.csv", "--output", tmp_path / "scores")
 
 
 @pytest.mark.parametrize("cfa", ["RGGB", "RYYCy"])

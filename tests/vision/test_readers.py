@@ -214,7 +214,7 @@ def test_invalid_vision_section_is_refused(tmp_path: Path) -> None:
 def test_a_study_without_vision_loads_nothing_of_it(tmp_path: Path) -> None:
     (tmp_path / "tiny.yaml").write_text("study: tiny\nsensor: ar0820\nlights: tl16\ncfas: [RGGB]\n")
     code = (
-        "import sys; from pathlib import Path; from sweep.run import run_study; from sweep.study import load_study;"
+        "import sys; from pathlib import Path; from sweep.runs import run_study; from sweep.study import load_study;"
         "from sweep.report import make_report, read_output;"
         "study = load_study(Path('tiny.yaml')); run_study(study, Path('out'), 1, lambda *_: None);"
         "make_report(read_output(Path('out')));"

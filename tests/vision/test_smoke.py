@@ -17,7 +17,7 @@ from sweep.report.vision_report import vision_sentences
 from sweep.results.manifest import Manifest
 from sweep.results.output import Output, read_output
 from sweep.results.tables import VISION, VISION_TABLES
-from sweep.run.vision import vision_designs
+from sweep.runs.vision import vision_designs
 from sweep.vision.batches import Batch
 from sweep.vision.network_reader import NetworkReader
 from sweep.vision.scenes import ORDERS, UNSEEN

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from ...base.errors import DataError
-from ..options import OF_CURVES, AllowCode, DataFolder, quantity_of
-from ..output import Json, Quiet, print_result
+from ..options import OF_CURVES, AllowCode, DataFolder, Design, Quantities
+from ..output import Json, Quiet, print_answer
 
 PANEL = OF_CURVES
 
 
 def describe(
     file: Annotated[Path, typer.Argument(help="A file or folder of curves.", show_default=False)],
-    output: Annotated[Path, typer.Option(help="Folder for the picture.")] = Path("outputs/describe"),
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the picture.")] = Path("outputs/describe"),
     quantity: Annotated[
         str | None,
         typer.Option(help="Unit of the numbers; without it, what the heads say, or a guess.", show_default=False),
@@ -25,14 +24,9 @@ def describe(
     quiet: Quiet = False,
 ) -> None:
     """Plot and check a file of curves: contents, issues, colors of its lights."""
-    facts: dict[str, Any] = {"file": str(file)}
-    from ..describe import described
+    from ...report.describe import describe as described
 
-    description = described(file, output, quantity_of(quantity))
-    facts |= {**description.facts, "faults": [str(issue) for issue in description.issues]}
-    print_result(description.lines, facts, as_json=as_json, quiet=quiet)
-    if description.issues:
-        raise DataError(description.issues)
+    print_answer(described(file, output=output, quantity=quantity), as_json=as_json, quiet=quiet)
 
 
 def evaluate_(
@@ -58,10 +52,7 @@ def evaluate_(
     lights: Annotated[
         str | None, typer.Option(help="tl16, or a file of spectra.", show_default="tl16, or the run's")
     ] = None,
-    quantity: Annotated[
-        list[str] | None,
-        typer.Option(help="Unit of the filter's numbers, or of the lights', where their heads do not tell it."),
-    ] = None,
+    quantity: Quantities = None,
     transmission: Annotated[
         bool,
         typer.Option(
@@ -71,7 +62,7 @@ def evaluate_(
     relative_to: Annotated[
         str | None, typer.Option(help="The values are a transmission times this curve.", show_default=False)
     ] = None,
-    design: Annotated[str | None, typer.Option(help="Of a run: design_id, name or best.", show_default="best")] = None,
+    design: Design = None,
     data: DataFolder = None,
     allow_code: AllowCode = False,
     as_json: Json = False,
@@ -89,20 +80,10 @@ def evaluate_(
         column=column,
         sensor=sensor,
         lights=lights,
-        quantity=[quantity_of(word) for word in quantity or ()],
+        quantity=quantity,
         transmission=transmission,
         relative_to=relative_to,
         data=data,
         allow_code=allow_code,
     )
-    facts = {
-        "source": str(source),
-        "rows": evaluation.table.to_dict("records") if as_json else [],
-        "limit_of": evaluation.goal.name,
-        "limit_dn": evaluation.limit,
-        "before_quantization_dn": evaluation.before_quantization_dn,
-        "gap": evaluation.gap,
-        "no_limit": evaluation.no_limit,
-        "notes": evaluation.notes,
-    }
-    print_result([str(evaluation)], facts, as_json=as_json, quiet=quiet)
+    print_answer(evaluation, as_json=as_json, quiet=quiet)

@@ -7,9 +7,20 @@ from typing import Annotated
 
 import typer
 
-from ...base.errors import ErrorBoundExceededError, OutputError, SweepError, ValidationIssue
-from ..options import OF_RESULTS, AllowCode, DataFolder, ImageForm, ImageSplit, RunFolder, run_folders
-from ..output import Json, ProgressDisplay, Quiet, print_result
+from ...base.errors import SweepError, ValidationIssue
+from ..options import (
+    OF_RESULTS,
+    AllowCode,
+    DataFolder,
+    Design,
+    Force,
+    ImageForm,
+    ImageSplit,
+    Jobs,
+    RunFolder,
+    run_folders,
+)
+from ..output import Json, ProgressDisplay, Quiet, print_answer
 
 PANEL = OF_RESULTS
 
@@ -25,15 +36,11 @@ def audit(
 
     Exit code 5 says that an error is larger than the study's tolerance allows.
     """
-    from ...results.tables import AUDIT
-    from ..audit import audit_output
+    from ...runs.audit import audit as audited
 
     with ProgressDisplay(quiet=quiet) as display:
-        result = audit_output(folder, data, display.update, allow_code=allow_code)
-    facts = {"folder": str(folder), "designs": result.n_designs, "rows": result.rows.to_dict("records")}
-    print_result([*result.lines, f"Files: {folder}/: {AUDIT}."], facts, as_json=as_json, quiet=quiet)
-    if result.issues:
-        raise ErrorBoundExceededError(result.issues)
+        answer = audited(folder, data, allow_code=allow_code, progress=display.update)
+    print_answer(answer, as_json=as_json, quiet=quiet)
 
 
 def compare(
@@ -42,25 +49,21 @@ def compare(
         typer.Argument(help="Output folders of two or more studies.", show_default=False, autocompletion=run_folders),
     ],
     output: Annotated[
-        Path | None, typer.Option(help="Folder for the comparison.", show_default="outputs/compare-A-B")
+        Path | None,
+        typer.Option("--output", "-o", help="Folder for the comparison.", show_default="outputs/compare-A-B"),
     ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
     """Compare finished runs: studies, best designs, fronts, versions."""
-    from ...report.compare import compare_runs
+    from ...report.compare import compare as compared
 
-    compared = compare_runs(folders, output)
-    tables = {name: table.to_dict("records") for name, table in compared.tables.items()} if as_json else {}
-    facts = {"folder": str(compared.folder), **tables, "notes": compared.notes}
-    print_result(compared.lines, facts, as_json=as_json, quiet=quiet)
+    print_answer(compared(folders, output=output), as_json=as_json, quiet=quiet)
 
 
 def export(
     folder: RunFolder,
-    design: Annotated[
-        str | None, typer.Option(help="A design_id, a name (RYN4Cy, RGGB), or best.", show_default=False)
-    ] = None,
+    design: Design = None,
     images: Annotated[
         Path | None,
         typer.Option(help="Folder for the images of a study with `vision`, with labels.", show_default=False),
@@ -74,35 +77,53 @@ def export(
         list[ImageSplit] | None, typer.Option(help="Images of this split; may be repeated.", show_default="all")
     ] = None,
     coco: Annotated[bool, typer.Option("--coco", help="Boxes in COCO's format beside PNGs.")] = False,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Workers for images.", show_default="all cores")] = None,
+    jobs: Jobs = None,
     data: Annotated[
         Path | None, typer.Option(help="Folder with the run's curve files, which are then read again and compared.")
     ] = None,
     specification: Annotated[
         bool, typer.Option("--specification", help="Also what an absorption band of the study's map would have to be.")
     ] = False,
-    to: Annotated[Path | None, typer.Option(help="Folder for the files.", show_default="FOLDER/export")] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Folder for the files.", show_default="FOLDER/export")
+    ] = None,
     allow_code: AllowCode = False,
+    force: Force = False,
+    as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
     """Write a filter of a finished run as CSV and as ISETCam color filters (.mat), or the images of a benchmark."""
     if (design is None) == (images is None):
         raise SweepError(ValidationIssue("one of --design and --images", allowed="--design best, or --images FOLDER"))
     if design is not None:
-        from ..export import export_design
+        from ...report.export import export as exported
 
-        lines = export_design(folder, design, data, to, with_specification=specification, allow_code=allow_code)
+        answer = exported(
+            folder,
+            design,
+            data,
+            output=output,
+            specification=specification,
+            allow_code=allow_code,
+            force=force,
+        )
     else:
-        from ...run.image_files import ImageFiles
-        from ..export_images import export_images
+        from ...report.export_images import export_images
+        from ...runs.image_files import ImageFiles
 
         assert images is not None
         with ProgressDisplay(quiet=quiet) as display:
             splits = tuple(name.value for name in split or ImageSplit)
             files = ImageFiles(images, form.value, png, splits, coco)
-            lines = export_images(folder, files, data, jobs, display.update, allow_code=allow_code)
-    for line in [] if quiet else lines:
-        typer.echo(line)
+            answer = export_images(folder, files, data, jobs, display.update, allow_code=allow_code)
+    print_answer(answer, as_json=as_json, quiet=quiet)
+
+
+def open_(folder: RunFolder, as_json: Json = False, quiet: Quiet = False) -> None:
+    """Open the report of a finished run in the browser."""
+    from ...api.run import show
+
+    print_answer(show(folder), as_json=as_json, quiet=quiet)
 
 
 def score(
@@ -111,40 +132,23 @@ def score(
         list[Path],
         typer.Argument(help="CSV or Parquet: image_id, and state or a probability of each.", show_default=False),
     ],
-    output: Annotated[Path | None, typer.Option(help="Folder of the scores.", show_default="FOLDER/scores")] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Folder of the scores.", show_default="FOLDER/scores")
+    ] = None,
+    as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
     """Score readers of a benchmark's test images: errors of each CFA, differences, distance from the ideal observer."""
-    from ...report import read_output
-    from ...report.scores import score_readers
+    from ...report.scores import score as scored
 
-    run = read_output(folder)
-    if run.study.vision is None:
-        raise SweepError(ValidationIssue("the study has no `vision`", str(folder)))
-    lines = score_readers(run, predictions, folder / "scores" if output is None else output)
-    for line in [] if quiet else lines:
-        typer.echo(line)
+    print_answer(scored(folder, predictions, output=output), as_json=as_json, quiet=quiet)
 
 
-def report(context: typer.Context, folder: RunFolder) -> None:
+def report(context: typer.Context, folder: RunFolder, as_json: Json = False, quiet: Quiet = False) -> None:
     """Draw figures and report of a finished run again."""
-    from ...report.sensors import report_sensors, runs_in
-    from ...results.lock import locked
-    from ...results.manifest import Manifest
-    from ..run import finish
+    from ...api.run import report as drawn
 
-    began_s = context.find_root().obj
-    if not Manifest(folder).runs:
-        finish(folder, began_s)
-        return
-    with locked(folder):
-        runs = runs_in(folder)
-        if not runs:
-            raise OutputError(ValidationIssue("no finished run here", str(folder), allowed="`sweep run` of its study"))
-        for run in runs:
-            finish(run.folder, began_s, quiet=True)
-        for line in report_sensors(Manifest(folder), runs):
-            typer.echo(line)
+    print_answer(drawn(folder, began_s=context.find_root().obj), as_json=as_json, quiet=quiet)
 
 
 def status(
@@ -154,7 +158,6 @@ def status(
     quiet: Quiet = False,
 ) -> None:
     """Say how far a run is, from another terminal; of a finished one, which of its files are missing or damaged."""
-    from ..status import status_of
+    from ...runs.status import status as status_of
 
-    status = status_of(folder, verify=verify)
-    print_result(status.lines, status.facts, as_json=as_json, quiet=quiet)
+    print_answer(status_of(folder, verify=verify), as_json=as_json, quiet=quiet)

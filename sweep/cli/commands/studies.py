@@ -2,56 +2,54 @@
 
 from __future__ import annotations
 
-import math
 import time
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
-from ...base.errors import InterruptedRunError, StudyError, SweepError
+from ...base.errors import InterruptedRunError, SweepError
 from ..endings import print_issues
 from ..options import (
     OF_STUDIES,
     AllowCode,
     Changes,
     DataFolder,
+    Force,
+    Jobs,
     Outputs,
+    Quantities,
     StudyPath,
     StudyPaths,
     changes_of,
-    quantity_of,
 )
-from ..output import Json, Quiet, print_result
-
-if TYPE_CHECKING:
-    from ...study import SensorAndLights
+from ..output import Json, ProgressDisplay, Quiet, print_answer, print_json, print_lines
 
 PANEL = OF_STUDIES
 
 
-def check(study: StudyPath, data: DataFolder = None, changes: Changes = None, allow_code: AllowCode = False) -> None:
+def check(
+    study: StudyPath,
+    data: DataFolder = None,
+    changes: Changes = None,
+    allow_code: AllowCode = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
     """Check a study file and count its designs, without running it."""
-    from ...study import load_study, sensor_studies_in
-    from ...study.goals import refuse_unreachable
+    from ...api.check import check as checked
 
-    changed = changes_of(changes)
-    several = sensor_studies_in(study, changed)
-    members: tuple[SensorAndLights | None, ...] = (None,) if several is None else several.members
-    for member in members:
-        loaded = load_study(study, data, changes=changed, allow_code=allow_code, member=member)
-        which = "" if member is None else f"{member.name}: "
-        refuse_unreachable(loaded)
-        typer.echo(f"{study}: {which}{loaded.n_designs:,} designs on {', '.join(loaded.mosaics)}; nothing wrong found.")
-        for warning in loaded.warnings:
-            typer.echo(f"Note: {warning}.")
+    print_answer(checked(study, data, changes=changes_of(changes), allow_code=allow_code), as_json=as_json, quiet=quiet)
 
 
 def list_(
     folder: Annotated[
-        str, typer.Argument(help="Folder of the studies; `data` lists the spectra of the package instead.")
-    ] = "studies",
+        str | None,
+        typer.Argument(
+            help="Folder of the studies; `data` lists the spectra of the package instead.",
+            show_default="studies, or those of the package",
+        ),
+    ] = None,
     data: DataFolder = None,
     output: Outputs = Path("outputs"),
     as_json: Json = False,
@@ -61,13 +59,10 @@ def list_(
 
     `sweep list data` lists the spectra that the package ships; a folder of that name is `./data`.
     """
-    from ..listing import data_facts, data_lines, list_facts, list_lines, studies_of
+    from ...runs.listing import list_data, list_studies
 
-    if folder == "data":
-        print_result(data_lines(), data_facts(), as_json=as_json, quiet=quiet)
-    else:
-        studies = studies_of(Path(folder), output, data)
-        print_result(list_lines(Path(folder), studies), list_facts(studies), as_json=as_json, quiet=quiet)
+    answer = list_data() if folder == "data" else list_studies(folder, data, output=output)
+    print_answer(answer, as_json=as_json, quiet=quiet)
 
 
 def new(
@@ -80,16 +75,17 @@ def new(
         list[Path] | None,
         typer.Option(help="A file or folder of spectra of lights; may be repeated.", show_default=False),
     ] = None,
-    quantity: Annotated[
-        list[str] | None, typer.Option(help="Unit of the curves' or the lights' numbers, where heads do not tell it.")
-    ] = None,
+    quantity: Quantities = None,
     folder: Annotated[Path, typer.Option(help="Folder of the studies.")] = Path("studies"),
+    force: Force = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
     """Write a commented study that runs as it is, for the built-in curves or for files of your own."""
-    from ..new import new_study
+    from ...api.new import new_study
 
-    for line in new_study(name, folder, qe or [], lights or [], [quantity_of(word) for word in quantity or ()]):
-        typer.echo(line)
+    answer = new_study(name, qe=qe or (), lights=lights or (), quantity=quantity or (), folder=folder, force=force)
+    print_answer(answer, as_json=as_json, quiet=quiet)
 
 
 def plan(
@@ -102,15 +98,10 @@ def plan(
     quiet: Quiet = False,
 ) -> None:
     """Say which effects each scene calls for, and why, without running it."""
-    from ...report.scenes import plan_facts, plan_lines
-    from ...study import load_study
+    from ...api.check import plan as planned
 
-    if tolerance is not None and not 0 < tolerance < math.inf:
-        raise StudyError(f"--tolerance {tolerance:g}: must be above 0 DN, and finite")
-    loaded = load_study(study, data, changes=changes_of(changes), allow_code=allow_code)
-    planned = loaded.with_plans(tolerance)
-    notes = [f"Note: {warning}." for warning in loaded.warnings]
-    print_result([*notes, *plan_lines(planned)], plan_facts(planned), as_json=as_json, quiet=quiet)
+    answer = planned(study, data, tolerance=tolerance, changes=changes_of(changes), allow_code=allow_code)
+    print_answer(answer, as_json=as_json, quiet=quiet)
 
 
 def run(
@@ -118,7 +109,7 @@ def run(
     studies: StudyPaths,
     data: DataFolder = None,
     output: Outputs = Path("outputs"),
-    jobs: Annotated[int | None, typer.Option(min=1, help="Workers.", show_default="all cores")] = None,
+    jobs: Jobs = None,
     backend: Annotated[
         str | None,
         typer.Option(help="loky (processes), threading, or dask (a cluster); by default what is faster."),
@@ -141,48 +132,47 @@ def run(
     Other files in the folder are kept; manifest.json lists those of the run.
     If one study cannot be run, the others are.
     """
-    from ...run import RunOptions
-    from ...study import load_study, sensor_studies_in
-    from ..run import SensorsOptions, changed_name, run_one, run_sensors
+    from ...api.run import run as run_study
 
-    changed = changes_of(changes)
-    with_options = partial(
-        run_one,
-        data=data,
-        output=output,
-        jobs=jobs,
-        backend=backend,
-        scheduler=scheduler,
-        dry_run=dry_run,
-        options=RunOptions(fail_fast, retry_failed),
-        changes=changed,
-        allow_code=allow_code,
-        opens=opens,
-        as_json=as_json,
-        quiet=quiet,
-    )
-    began_s, code = context.find_root().obj, 0
+    changed, began_s, code = changes_of(changes), context.find_root().obj, 0
     runs: list[dict[str, Any]] = []
-    for path in studies:
+    for study in studies:
         if len(studies) > 1 and not quiet:
-            typer.echo(f"== {path} ==", err=as_json)
+            typer.echo(f"== {study} ==", err=as_json)
+        facts: dict[str, Any] = {}
         try:
-            several = sensor_studies_in(path, changed)
-            run_it = partial(with_options, path, began_s=began_s)
-            if several is None:
-                facts = run_it()
-            else:
-                load = partial(load_study, path, data, changes=changed, allow_code=allow_code)
-                how = SensorsOptions(output, changed_name(changed), jobs, dry_run, as_json, quiet, opens)
-                facts = run_sensors(several, run_it, load, how)
+            with ProgressDisplay(quiet=quiet) as display:
+                answer = run_study(
+                    study,
+                    data,
+                    output=output,
+                    jobs=jobs,
+                    backend=backend,
+                    scheduler=scheduler,
+                    dry_run=dry_run,
+                    fail_fast=fail_fast,
+                    retry_failed=retry_failed,
+                    changes=changed,
+                    allow_code=allow_code,
+                    opens=opens,
+                    progress=display.update,
+                    note=display.note,
+                    began_s=began_s,
+                )
+            facts |= answer.facts
+            if quiet and not as_json and not dry_run:
+                typer.echo(answer.facts["folder"])
+            print_lines(answer.lines, as_json=as_json, quiet=quiet)
+            if answer.problem is not None:
+                raise answer.problem
         except InterruptedRunError:
             raise
         except SweepError as error:  # the others are run all the same
             print_issues(error.issues)
             code = max(code, error.exit_code)
-            facts = {"faults": [str(issue) for issue in error.issues], "exit_code": error.exit_code}
-        runs.append({"study": str(path), "exit_code": 0} | facts)
+            facts |= {"faults": [str(issue) for issue in error.issues], "exit_code": error.exit_code}
+        runs.append({"study": str(study), "exit_code": 0} | facts)
         began_s = time.monotonic()
     if as_json:
-        print_result((), {"runs": runs}, as_json=True)
+        print_json({"runs": runs})
     return code

@@ -8,30 +8,37 @@ from typing import Annotated
 import typer
 
 from ..options import OF_TOOL, DataFolder, Outputs, StudyPath
-from ..output import ProgressDisplay
+from ..output import Json, ProgressDisplay, Quiet, print_answer
 
 PANEL = OF_TOOL
 
 
-def accuracy(study: StudyPath, data: DataFolder = None, output: Outputs = Path("outputs")) -> None:
+def accuracy(
+    study: StudyPath,
+    data: DataFolder = None,
+    output: Outputs = Path("outputs"),
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
     """Measure what accuracy costs: error and time of each preset, in each scene of a study."""
+    from ...report.accuracy import measure_accuracy
     from ...study import folder_name, load_study
-    from ..accuracy import measure_accuracy
+    from ...study.shipped import study_path
 
-    loaded = load_study(study, data)
-    folder = output / folder_name(loaded.name)
-    with ProgressDisplay() as display:
-        lines = measure_accuracy(loaded, folder, display.update)
-    for line in lines:
-        typer.echo(line)
+    loaded = load_study(study_path(study), data)
+    with ProgressDisplay(quiet=quiet) as display:
+        answer = measure_accuracy(loaded, output / folder_name(loaded.name), display.update)
+    print_answer(answer, as_json=as_json, quiet=quiet)
 
 
 def schema(
-    output: Annotated[Path | None, typer.Option(help="File to write.", show_default="the terminal")] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="File to write.", show_default="the terminal")
+    ] = None,
 ) -> None:
     """Make the JSON Schema of study files, with which editors complete and check them."""
+    from ...api.new import write_schema
     from ...study.editors import schema_text
-    from ..new import write_schema
 
     if output is None:
         typer.echo(schema_text(), nl=False)

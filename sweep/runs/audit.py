@@ -11,14 +11,16 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
-from ..base.errors import ValidationIssue
-from ..base.types import Progress
-from ..report import read_output, study_of
+from ..base.answer import Answer
+from ..base.errors import ErrorBoundExceededError, ValidationIssue
+from ..base.types import Progress, silent
+from ..results.designs import study_of
 from ..results.lock import locked
 from ..results.manifest import Manifest
+from ..results.output import read_output
 from ..results.tables import AUDIT
-from ..run.check import compared_rows
 from ..study import Study
+from .check import compared_rows
 
 _SHARE = 0.01
 """Share of the rows that are audited beside the front, plain CFAs and named designs."""
@@ -67,6 +69,12 @@ class Audit:
             for row in worst.to_dict("records")
         ]
 
+    def answer(self, folder: Path) -> Answer:
+        """Return the result of the audit of a run in a folder."""
+        facts = {"folder": str(folder), "designs": self.n_designs, "rows": self.rows.to_dict("records")}
+        problem = ErrorBoundExceededError(self.issues) if self.issues else None
+        return Answer([*self.lines, f"Files: {folder}/: {AUDIT}."], facts, problem)
+
 
 def sampled(table: pd.DataFrame, on_front: Collection[int]) -> pd.DataFrame:
     """Select the rows to audit.
@@ -81,7 +89,7 @@ def sampled(table: pd.DataFrame, on_front: Collection[int]) -> pd.DataFrame:
 
 
 def audit_rows(
-    study: Study, tables: Iterable[pd.DataFrame], on_front: Collection[int], progress: Progress = lambda *_: None
+    study: Study, tables: Iterable[pd.DataFrame], on_front: Collection[int], progress: Progress = silent
 ) -> Audit:
     """Compute the selected rows again at the reference settings."""
     samples, n_designs = [], 0
@@ -98,25 +106,44 @@ def audit_rows(
     return Audit(pd.DataFrame(rows, columns=list(_COLUMNS)), n_designs)
 
 
-def audit_output(
-    folder: Path, data: Path | None, progress: Progress = lambda *_: None, *, allow_code: bool = False
-) -> Audit:
-    """Audit a finished run and write the audited rows to its folder.
+def audit(
+    folder: Path | str, data: Path | str | None = None, *, allow_code: bool = False, progress: Progress = silent
+) -> Answer:
+    """Compute the front and 1 % of a run's rows again at the reference settings, and compare.
 
-    Raises OutputError if the run is not finished or damaged, or the rows cannot be written. Raises StudyError if the
-    study of the run cannot be loaded.
+    Parameters
+    ----------
+    folder : path-like
+        Folder of a finished run, which keeps the audited rows.
+    data : path-like, optional
+        Folder of the study's files.
+    allow_code : bool
+        Permit the code that the run was made with to run.
+    progress : callable, optional
+        Called with a phase, how much of it is done, and how much there is.
+
+    Returns
+    -------
+    Answer
+        Errors of each scenario; a problem if one is larger than the study's tolerance allows.
+
+    Raises
+    ------
+    SweepError
+        If the run is not finished or damaged, or its study cannot be loaded.
     """
+    folder = Path(folder)
     output = read_output(folder, audited=False)
-    study = study_of(output, data, allow_code=allow_code)
+    study = study_of(output, None if data is None else Path(data), allow_code=allow_code)
     front = set(output.front_ids)
     result = audit_rows(study, (table.to_pandas() for table in Manifest(folder).batches()), front, progress)
     with locked(folder):
         Manifest(folder).write_table(AUDIT, pa.Table.from_pandas(result.rows, preserve_index=False))
-    return result
+    return result.answer(folder)
 
 
 def audit_again(folder: Path, data: Path | None) -> None:
     """Repeat the audit of a run whose audited rows are missing or damaged."""
     manifest = Manifest(folder)
     if AUDIT in manifest.files and manifest.wrong([AUDIT]):
-        audit_output(folder, data)
+        audit(folder, data)

@@ -5,13 +5,15 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from ..base.answer import Answer
 from ..base.errors import SweepError, ValidationIssue
 from ..base.types import Progress
-from ..report import read_output, study_of
+from ..results.designs import study_of
 from ..results.manifest import Manifest
-from ..run.image_files import MANIFEST, STREET_MANIFEST, ImageFiles, write_images
-from ..run.vision import vision_designs
-from ..run.workers import workers
+from ..results.output import read_output
+from ..runs.image_files import MANIFEST, STREET_MANIFEST, ImageFiles, write_images
+from ..runs.vision import vision_designs
+from ..runs.workers import workers
 
 
 def export_images(
@@ -22,7 +24,7 @@ def export_images(
     progress: Progress,
     *,
     allow_code: bool = False,
-) -> list[str]:
+) -> Answer:
     """Write the images of a run's benchmark with labels, and say what they are.
 
     `data`: folder of the study's files; without it, the curves that the run kept are taken; `allow_code`: True to run
@@ -50,7 +52,8 @@ def export_images(
     counts = ", ".join(f"{part['counts']:,} to {part['values']}" for part in splits)
     street = f"{STREET_MANIFEST} (streets), " if vision.street else ""
     boxes = ", coco-*.json" if files.coco else ""
-    return [
+    lines = [
         f"{len(manifest):,} images of {names}: {counts}; the same scenes, lamps and photons for every design.",
         f"Files: {files.folder}/: {MANIFEST}, {street}images/{boxes}.",
     ]
+    return Answer(lines, {"folder": str(files.folder), "images": len(manifest), "designs": names.split(", ")})

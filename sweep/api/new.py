@@ -10,18 +10,18 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-from ..api.channels import sensor_file
+from ..base.answer import Answer
 from ..base.disk import read_input
 from ..base.errors import DataError, OutputError, StudyError, SweepError, ValidationIssue
 from ..results.atomic import atomic, write_text
 from ..spectra import LightUnit
 from ..spectra.light_files import lights_file
 from ..spectra.read_text import MOST_BYTES
-from ..spectra.spectrum import Quantity
-from ..spectra.units import FITTING
+from ..spectra.units import FITTING, stated_quantity
 from ..study import Study, folder_name, load_study
 from ..study.editors import SCHEMA_FILE, TITLE, schema_text
 from ..study.schema import StudySection
+from .channels import sensor_file
 from .study_text import Sources, one_line, study_text
 
 _MOST_LETTERS = 100
@@ -29,26 +29,50 @@ _MOST_LETTERS = 100
 
 def new_study(
     name: str,
-    folder: Path,
-    qe: Sequence[Path],
-    lights: Sequence[Path],
-    quantities: Sequence[Quantity] = (),
-) -> list[str]:
-    """Write `folder`/<name>.yaml, and the schema that editors complete it with where the folder has none.
+    *,
+    qe: Sequence[Path | str] = (),
+    lights: Sequence[Path | str] = (),
+    quantity: Sequence[str] = (),
+    folder: Path | str = "studies",
+    force: bool = False,
+) -> Answer:
+    """Write a commented study that runs as it is, and the schema that editors complete it with.
 
-    Raises StudyError for a bad name. Raises OutputError where the file exists or cannot be written. Raises DataError
-    for curves that a study cannot use.
+    Parameters
+    ----------
+    name : str
+        Name of the study and of its file.
+    qe, lights : sequence of path-like
+        Files or folders of QE curves of a sensor, and of spectra of lights; left out, the built-in ones.
+    quantity : sequence of str
+        Units of their numbers, where heads do not tell them.
+    folder : path-like
+        Folder of the studies.
+    force : bool
+        Replace a file of that name.
+
+    Returns
+    -------
+    Answer
+        What was written, and from where.
+
+    Raises
+    ------
+    SweepError
+        For a bad name, where the file exists or cannot be written, and for curves that a study cannot use.
     """
-    path = _new_path(name, folder)
+    folder, quantities = Path(folder), [stated_quantity(word) for word in quantity]
+    of_sensor, of_lights = [Path(file) for file in qe], [Path(file) for file in lights]
+    path = _new_path(name, folder, force=force)
     sources = Sources()
     sources = replace(sources, path_in_study=lambda file: _path_in_study(file, folder))
-    if qe:
+    if of_sensor:
         stated = next((quantity for quantity in FITTING["sensor"] if quantity in quantities), None)
-        sources = replace(sources, sensor=sensor_file(qe, stated))
-    if lights:
+        sources = replace(sources, sensor=sensor_file(of_sensor, stated))
+    if of_lights:
         start_nm, stop_nm = (400, 700) if sources.sensor is None else sources.sensor.range_nm
         unit: LightUnit | None = "photons" if "photons" in quantities else "energy" if "energy" in quantities else None
-        sources = replace(sources, lights=lights_file(lights, unit, start_nm, stop_nm))
+        sources = replace(sources, lights=lights_file(of_lights, unit, start_nm, stop_nm))
     new_folders = [place for place in (folder, *folder.parents) if not os.path.lexists(place)]
     try:
         study = _write(path, name, sources)
@@ -57,12 +81,13 @@ def new_study(
             for place in new_folders:
                 place.rmdir()
         raise
-    return [
+    lines = [
         f"{path}: {study.n_designs:,} designs on {', '.join(study.mosaics)}; objective {study.objective}.",
         *_source_lines(sources),
         *(f"Note: {warning}." for warning in study.warnings),
         f"Next: sweep run {shlex.quote(str(path))}",
     ]
+    return Answer(lines, {"file": str(path), "designs": study.n_designs, "warnings": study.warnings})
 
 
 def _write(path: Path, name: str, sources: Sources) -> Study:
@@ -80,7 +105,7 @@ def _write(path: Path, name: str, sources: Sources) -> Study:
     return study
 
 
-def _new_path(name: str, folder: Path) -> Path:
+def _new_path(name: str, folder: Path, *, force: bool) -> Path:
     """Path of a new study; raises StudyError for a name that no file can have, OutputError where the file exists."""
     stem = name.removesuffix(".yaml").removesuffix(".yml")
     if not (name and name == folder_name(name) == stem and name[0].isalnum() and len(name) <= _MOST_LETTERS):
@@ -88,8 +113,9 @@ def _new_path(name: str, folder: Path) -> Path:
         allowed = f"up to {_MOST_LETTERS} letters, digits, -, _ and ., with a letter or digit first, without .yaml"
         raise StudyError(ValidationIssue("not the name of a study", None, None, "NAME", name, allowed, better or None))
     path = folder / f"{name}.yaml"
-    if os.path.lexists(path):
-        raise OutputError(ValidationIssue("is there already, and stays as it is", str(path), allowed="another name"))
+    if os.path.lexists(path) and not force:
+        allowed = "another name, or --force"
+        raise OutputError(ValidationIssue("is there already, and stays as it is", str(path), allowed=allowed))
     return path
 
 

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from ..base.answer import Answer
 from ..base.errors import OutputError, SweepError, ValidationIssue
 from ..base.types import PerWavelength
-from ..report import Output, check_kept, read_output, study_of
-from ..report.parameter_map import specification
 from ..results.atomic import write_bytes
-from ..results.designs import channel_curves, find_design_row, row_space
+from ..results.designs import BEST, channel_curves, check_kept, find_design_row, row_space, study_of
+from ..results.output import Output, read_output
 from ..spectra.filter_files import (
     color_hints,
     csv_text,
@@ -22,39 +22,64 @@ from ..spectra.filter_files import (
     unique_names,
 )
 from ..study import folder_name
+from .parameter_map import specification as specification_of
 
 _ROUNDING = 1e-9
 _MOST_SHOWN = 10
 Row = Mapping[Any, Any]
 
 
-def export_design(
-    folder: Path,
-    key: str,
-    data: Path | None,
-    to: Path | None,
+def export(
+    folder: Path | str,
+    design: str = BEST,
+    data: Path | str | None = None,
     *,
-    with_specification: bool = False,
+    output: Path | str | None = None,
+    specification: bool = False,
     allow_code: bool = False,
-) -> list[str]:
-    """Write `<key>.csv` and `<key>.mat` of a design of a finished run, and say what it is.
+    force: bool = False,
+) -> Answer:
+    """Write a filter of a finished run as CSV and as ISETCam color filters (.mat), and say what it is.
 
     The filter is computed again and compared with what the run kept of it.
 
-    `data`: folder of the study's files; without it, the curves that the run kept are taken; `to`: folder of the new
-    files, FOLDER/export without it; `with_specification`: True to write what an absorption band would have to be beside
-    them; `allow_code`: True to run the code that the study names. Raises SweepError for an unknown key, a design that
-    failed, and a specification without a map of absorption bands. Raises OutputError for a folder without a finished
-    run, for curves that are not those of the run, and where a file of other content would be overwritten.
+    Parameters
+    ----------
+    folder : path-like
+        Folder of a finished run.
+    design : str
+        A `filter_id`, a name (RYN4Cy, RGGB), or best.
+    data : path-like, optional
+        Folder of the study's files; left out, the curves that the run kept are taken.
+    output : path-like, optional
+        Folder of the new files; left out, FOLDER/export.
+    specification : bool
+        Also write what an absorption band of the study's map would have to be.
+    allow_code : bool
+        Permit the code that the study names to run.
+    force : bool
+        Replace files of other content.
+
+    Returns
+    -------
+    Answer
+        Parameters, separations and files of the design.
+
+    Raises
+    ------
+    SweepError
+        For an unknown design or one that failed, a folder without a finished run, curves that are not those of the
+        run, a specification without a map, and where a file of other content would be overwritten.
     """
-    output = read_output(folder)
-    row = find_design_row(output, key)
-    study = study_of(output, data, allow_code=allow_code)
+    folder = Path(folder)
+    run = read_output(folder)
+    row = find_design_row(run, design)
+    study = study_of(run, None if data is None else Path(data), allow_code=allow_code)
     space, mosaic = row_space(study, row), study.mosaics[row["cfa"]]
     wavelength_nm, curves = study.grid.nodes_nm, channel_curves(study, row)
     bases = {} if space.filter is None else dict(space.filter.bases)
     base_qe = {channel: study.sensor.curve(name) for channel, name in bases.items()}
-    _verify(output, row, {channel: curves[channel] for channel in bases}, base_qe)
+    _verify(run, row, {channel: curves[channel] for channel in bases}, base_qe)
 
     transmissions = {
         f"{channel}_over_{name}": relative_transmission(curves[channel], base_qe[channel])
@@ -62,22 +87,22 @@ def export_design(
     }
     table = curves | {name: values for name, values in transmissions.items() if np.isfinite(values).all()}
     hints = color_hints(mosaic.channels, bases)
-    path = (folder / "export" if to is None else to) / folder_name(key)
+    path = (folder / "export" if output is None else Path(output)) / folder_name(design)
     csv_path, mat_path = (path.with_name(path.name + suffix) for suffix in (".csv", ".mat"))
-    comment = _comment(output, row, bases)
+    comment = _comment(run, row, bases)
     files = {
         csv_path: csv_text(wavelength_nm, table).encode("utf-8"),
         mat_path: isetcam_mat(wavelength_nm, curves, hints, mosaic.indices, comment),
     }
     lines = [
-        *_lines(output, row, bases),
+        *_lines(run, row, bases),
         *_remarks(wavelength_nm, bases, transmissions),
         f"Files: {csv_path} ({', '.join(unique_names(table))}),",
         f"       {mat_path} ({', '.join(filter_names(hints, curves))}: QE, so set the pixel's spectral QE to 1 in "
         "ISETCam).",
     ]
-    if with_specification:
-        specified, specified_table = path.with_name(f"{path.name}_specification.csv"), specification(output)
+    if specification:
+        specified, specified_table = path.with_name(f"{path.name}_specification.csv"), specification_of(run)
         if specified_table is None:
             problem, allowed = (
                 "no map of absorption bands",
@@ -86,11 +111,12 @@ def export_design(
             raise SweepError(ValidationIssue(problem, str(folder), None, "--specification", None, allowed))
         files[specified] = specified_table.to_csv(index=False).encode("utf-8")
         lines.append(f"       {specified} (what an absorption band would have to be)")
-    for file, content in files.items():
+    for file, content in () if force else files.items():
         _refuse_other(file, content)
     for file, content in files.items():
         write_bytes(content, file)
-    return lines
+    facts = {key: row[key] for key in ("design_id", "filter_id", "name", "cfa", "family", "scenario")}
+    return Answer(lines, facts | {"parameters": _parameters(run, row), "files": [str(file) for file in files]})
 
 
 def relative_transmission(modified: PerWavelength, base: PerWavelength) -> PerWavelength:
@@ -122,7 +148,7 @@ def _refuse_other(path: Path, content: bytes) -> None:
         raise OutputError(ValidationIssue(f"cannot be read: {error.strerror or error}", str(path))) from None
     if held != content:
         raise OutputError(
-            ValidationIssue("holds something else already", str(path), allowed="another --to, or delete it")
+            ValidationIssue("holds something else already", str(path), allowed="another --output, or --force")
         )
 
 

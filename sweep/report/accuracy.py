@@ -17,6 +17,7 @@ import pandas as pd
 import pyarrow as pa
 from threadpoolctl import threadpool_limits
 
+from ..base.answer import Answer
 from ..base.errors import SweepError, ValidationIssue
 from ..base.types import Array, DesignNumbers, Float, Progress
 from ..camera.accuracy import PRESETS, Accuracy
@@ -27,13 +28,13 @@ from ..designs.space import Space
 from ..metrics.evaluate import evaluate
 from ..metrics.quantity import BEST_PHASE, Columns
 from ..metrics.separation import csd_name
-from ..report.accuracy_figure import draw_accuracy
-from ..report.figures import pictures_of
-from ..report.pages import aligned
 from ..results.atomic import write_bytes
 from ..results.tables import write_table
 from ..spectra.lights import class_pairs
 from ..study import Study
+from .accuracy_figure import draw_accuracy
+from .figures import pictures_of
+from .pages import aligned
 
 _MOST_DESIGNS = 17
 _WARM = Accuracy(phases_per_px=1, finest_phase_px=0.25, field_positions=2, pwm_moments=2)
@@ -54,8 +55,8 @@ class Measured:
 
 def measure_accuracy(
     study: Study, output: Path, progress: Progress, *, presets: Sequence[str] = tuple(PRESETS)
-) -> list[str]:
-    """Measure error and time of presets in each scene; write a table and a figure, and return lines to print.
+) -> Answer:
+    """Measure error and time of presets in each scene; write a table and a figure.
 
     Every effect is computed. The error is the largest difference of any CSD from the preset `reference`, over up to 17
     designs spread over the study's largest space. Each measurement is made in a process of its own, one after the
@@ -73,7 +74,8 @@ def measure_accuracy(
     write_table(pa.Table.from_pandas(table, preserve_index=False), output / "accuracy.parquet")
     for kind, content in pictures_of(lambda: draw_accuracy(table, study.name), ("png", "svg")).items():
         write_bytes(content, output / f"accuracy.{kind}")
-    return [*aligned(_in_words(table)), f"Files: {output}/: accuracy.parquet, accuracy.png, accuracy.svg."]
+    lines = [*aligned(_in_words(table)), f"Files: {output}/: accuracy.parquet, accuracy.png, accuracy.svg."]
+    return Answer(lines, {"folder": str(output), "measured": table.to_dict("records")})
 
 
 def _rows(of_all: dict[tuple[str, str], Measured], n_designs: int) -> Iterator[dict[str, Any]]:

@@ -1,42 +1,46 @@
-"""A checked study as a Python object."""
+"""A study and a finished run as Python objects."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from ..base.errors import SweepError, ValidationIssue, nearest
+from ..base.errors import OutputError, SweepError, ValidationIssue, nearest
+from ..base.types import silent
 from ..designs.space import Space
-from ..designs.ungridded import PairedDesigns
-from ..metrics.bound import total_violation
-from ..metrics.quantity import Quantity
+from ..metrics.quantity import Column, Quantity
 from ..search.limit import Limit
 from ..study import Study, folder_name
 from .inline_curves import CurveLike, on_grid, wavelength_table
+from .parameters import OWN, are_parameters, evaluate_spaces, own_designs, plain_and_named
 from .user_filters import (
     any_filter_problem,
     evaluate_curves,
     find_cfa,
+    known_cfa,
+    known_scenario,
     replaced_curves,
     table_of_results,
     upper_bound_or_reason,
     user_filter_setup,
     with_lower_bound,
+    with_units,
 )
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray
+    from colour import MultiSpectralDistributions
     from matplotlib.figure import Figure
 
-    from .finished_run import FinishedRun
-
-
-OWN = "own"
-"""Name of designs that are no part of the study."""
+    from ..report import Output
+    from ..vision.batches import Batch, Form
 
 
 class LoadedStudy:
@@ -61,6 +65,9 @@ class LoadedStudy:
 
     def __repr__(self) -> str:
         return f"<study {self.name}: {self.study.n_designs:,} designs on {', '.join(self.cfas)}>"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(repr(self))}\n{escape(self.study.section.question)}</pre>"
 
     @property
     def name(self) -> str:
@@ -157,11 +164,11 @@ class LoadedStudy:
             If a curve is not clean, a name is unknown, or a QE exceeds 1.
         """
         study = self.study
-        scenarios = [self._scenario(scenario)] if scenario is not None else list(study.scenarios)
+        scenarios = [known_scenario(study, scenario)] if scenario is not None else list(study.scenarios)
         if not filters:
-            return self._plain_and_named(cfa, scenarios)
-        if self._of_family(filters):
-            return self._evaluate_spaces([self._own_designs(cfa, filters)], scenarios)
+            return evaluate_spaces(study, plain_and_named(study, cfa), scenarios)
+        if are_parameters(study, filters):
+            return evaluate_spaces(study, [own_designs(study, cfa, filters)], scenarios)
         channels = {name: cast(CurveLike, curve) for name, curve in filters.items()}
         factor = 1.0 if relative_to is None else study.sensor.curve(relative_to)
         rows = {
@@ -171,82 +178,11 @@ class LoadedStudy:
         if len({len(curves) for curves in rows.values()}) > 1:
             counts = {name: len(curves) for name, curves in rows.items()}
             raise SweepError(ValidationIssue("different numbers of filters", value=counts))
-        chosen = find_cfa(study, list(channels)) if cfa is None else self._cfa(cfa, list(channels))
+        chosen = find_cfa(study, list(channels)) if cfa is None else known_cfa(study, cfa, list(channels))
         bases = replaced_curves(study, chosen, list(channels), base)
         curves = np.stack([*rows.values()], axis=1)
         columns = {s: evaluate_curves(study, user_filter_setup(study, chosen, s, bases), curves) for s in scenarios}
         return table_of_results(study, [(OWN, chosen, name, values) for name, values in columns.items()])
-
-    def _plain_and_named(self, cfa: str | None, scenarios: list[str]) -> pd.DataFrame:
-        from ..results.tables import NAMED, REFERENCE
-
-        study = self.study
-        spaces = [s for s in study.spaces if s.kind in (REFERENCE, NAMED) and cfa in (None, s.cfa)]
-        if not spaces:
-            known = list(dict.fromkeys(s.cfa for s in study.spaces if s.kind in (REFERENCE, NAMED)))
-            near = None if cfa is None else nearest(cfa, known)
-            raise SweepError(
-                ValidationIssue("no plain CFA or named design", value=cfa, allowed=", ".join(known), nearest=near)
-            )
-        return self._evaluate_spaces(spaces, scenarios)
-
-    def _evaluate_spaces(self, spaces: Sequence[Space], scenarios: Sequence[str]) -> pd.DataFrame:
-        from ..run.routes import quantities_at
-        from ..run.rows import rules_of
-
-        study, rules, rows = self.study, rules_of(self.study), []
-        for name in scenarios:
-            for space in spaces:
-                points = space.points(0, space.size)
-                numbers, setup = np.arange(space.size), study.setup(space, name)
-                values, issues = quantities_at(space, numbers, setup, rules, rules.wanted)
-                for text in issues.values():
-                    raise SweepError(ValidationIssue(f"{space.name} in {name}: {text}"))
-                worst = total_violation(values, study.constraints, space.violation(points))
-                unknown = np.full(space.size, np.nan)  # of a lamp that is not pulsed in this scenario
-                columns = dict(zip(space.parameters, points.T, strict=True)) if space.name == OWN else {}
-                columns |= {quantity: values.get(quantity, unknown) for quantity in study.quantities}
-                rows.append((space.name, space.cfa, name, columns | {"violation": worst}))
-        return table_of_results(study, rows)
-
-    def _of_family(self, filters: Mapping[str, object]) -> bool:
-        """Return whether filters are given by parameters of a family; raises SweepError for curves beside them."""
-        parameters = {name for space in self.study.spaces for name in space.parameters}
-        channels = filters.keys() - parameters
-        if len(channels) in (0, len(filters)):
-            numbers = [name for name in channels if isinstance(filters[name], int | float | np.number)]
-            if numbers and parameters:
-                raise SweepError(_unknown("parameter", numbers[0], sorted(parameters)))
-            return not channels
-        raise SweepError(_unknown("parameter", min(channels), sorted(parameters)))
-
-    def _own_designs(self, cfa: str | None, parameters: Mapping[str, Any]) -> Space:
-        """Return designs of a family of the study: that of the search, or the first with these parameters."""
-        searched = [] if self.study.search is None else [self.study.search.space]
-        spaces = [s for s in (*searched, *self.study.spaces) if s.filter is not None and cfa in (None, s.cfa)]
-        space = next((s for s in spaces if parameters.keys() <= set(s.parameters)), None)
-        if space is None or space.filter is None:
-            allowed = "; ".join(dict.fromkeys(f"{s.cfa}: {', '.join(s.parameters)}" for s in spaces)) or "none"
-            problem = f"no filter of the study{f' on {cfa}' if cfa else ''} has these parameters together"
-            raise SweepError(ValidationIssue(problem, value=list(parameters), allowed=allowed))
-        axes = []
-        for parameter in space.filter.family.parameters:
-            stated = parameters.get(parameter.name, parameter.default)
-            if stated is None:
-                allowed = f"{parameter.low:g} to {parameter.high:g}"
-                raise SweepError(ValidationIssue("missing", key=parameter.name, allowed=allowed))
-            values = np.atleast_1d(np.asarray(stated, dtype=float)).ravel()
-            outside = values[~((values >= parameter.low) & (values <= parameter.high))]
-            if outside.size or not values.size:
-                allowed = f"{parameter.low:g} to {parameter.high:g}"
-                value = outside[:1].tolist()
-                raise SweepError(ValidationIssue("out of range", key=parameter.name, value=value, allowed=allowed))
-            axes.append(tuple(values.tolist()))
-        size = max(map(len, axes))
-        if {len(axis) for axis in axes} - {1, size}:
-            counts = {p: len(axis) for p, axis in zip(space.parameters, axes, strict=True)}
-            raise SweepError(ValidationIssue("as many values of each parameter, or one", value=counts))
-        return Space("design", OWN, space.cfa, space.filter, tuple(axes), gridded=False, rows=PairedDesigns(size))
 
     def limit(
         self,
@@ -283,7 +219,7 @@ class LoadedStudy:
         """
         space = self._modified(cfa, channel)
         assert space.filter is not None
-        scene = next(iter(self.study.scenarios)) if scenario is None else self._scenario(scenario)
+        scene = next(iter(self.study.scenarios)) if scenario is None else known_scenario(self.study, scenario)
         problem = any_filter_problem(self.study, self.study.setup(space, scene))
         if sensitivity is not None:
             problem = with_lower_bound(problem, "sensitivity", sensitivity)
@@ -354,30 +290,12 @@ class LoadedStudy:
         """
         from ..report import make_report, read_output
         from ..results.identity import run_facts
-        from ..run import output_folder, run_study
-        from .finished_run import FinishedRun
+        from ..runs import output_folder, run_study
 
         folder, _ = output_folder(Path(output) / folder_name(self.name), run_facts(self.study))
-        run_study(self.study, folder, jobs or os.cpu_count() or 1, _silent, ("sweep", "from Python"))
+        run_study(self.study, folder, jobs or os.cpu_count() or 1, silent, ("sweep", "from Python"))
         make_report(read_output(folder), repair=True)
         return FinishedRun(folder)
-
-    def _scenario(self, name: str) -> str:
-        known = list(self.study.scenarios)
-        if name not in known:
-            raise SweepError(
-                ValidationIssue("unknown scenario", value=name, allowed=", ".join(known), nearest=nearest(name, known))
-            )
-        return name
-
-    def _cfa(self, name: str, channels: list[str]) -> str:
-        known = [cfa for cfa, mosaic in self.study.mosaics.items() if set(channels) <= set(mosaic.channels)]
-        if name not in known:
-            problem = f"no CFA of the study with a channel {' and '.join(channels)}"
-            raise SweepError(
-                ValidationIssue(problem, value=name, allowed=", ".join(known), nearest=nearest(name, self.cfas))
-            )
-        return name
 
     def _modified(self, cfa: str | None, channel: str | None) -> Space:
         """Return the design space of the search, or the first that has the CFA and channel."""
@@ -392,8 +310,202 @@ class LoadedStudy:
         )
 
 
-def _silent(*_: object) -> None: ...
+class FinishedRun:
+    """Results of a finished run.
 
+    Parameters
+    ----------
+    folder : Path
+        Output folder of the study.
+    data : Path, optional
+        Folder of the study's files.
+    allow_code : bool
+        Permit the code that the run was made with to run.
 
-def _unknown(what: str, name: str, known: Sequence[str]) -> ValidationIssue:
-    return ValidationIssue(f"unknown {what}", value=name, allowed=", ".join(known), nearest=nearest(name, known))
+    Raises
+    ------
+    SweepError
+        If files are missing or differ from those that the run wrote.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> run = sweep.read_run("outputs/stopband")  # doctest: +SKIP
+    >>> run.best.csd_yellow_red  # doctest: +SKIP
+    233.8
+    """
+
+    def __init__(self, folder: Path, data: Path | None = None, *, allow_code: bool = False) -> None:
+        from ..report import read_output
+
+        self.folder, self._data, self._allow_code = folder, data, allow_code
+        self.output: Output = read_output(self.folder)
+
+    def __repr__(self) -> str:
+        return f"<run {self.output.study.study}: {self.output.provenance.filters:,} filters in {self.folder}>"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(self.summary)}</pre>"
+
+    @cached_property
+    def table(self) -> pd.DataFrame:
+        """Result table with one row per design and scenario; units and meanings are in ``attrs``."""
+        import pyarrow as pa
+
+        from ..results.manifest import Manifest
+
+        columns: Mapping[str, Column] = self.output.columns
+        return with_units(pa.concat_tables(Manifest(self.folder).batches()).unify_dictionaries().to_pandas(), columns)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the quantities of all designs over design and scenario, with units and meanings.
+
+        Returns
+        -------
+        xarray.Dataset
+            A variable per quantity over ``design`` (its `filter_id`) and ``scenario``; parameters, names, families and
+            CFAs are coordinates along ``design``. Needs the package xarray (``pip install cfa-sweep[xarray]``).
+        """
+        from .conversions import to_xarray
+
+        return to_xarray(self.table, self.output)
+
+    def to_multispectral(self, design: str = "best") -> MultiSpectralDistributions:
+        """Return the QE of a design's channels as colour-science has it.
+
+        Parameters
+        ----------
+        design : str
+            A `filter_id`, a name (RYN4Cy, RGGB), or best.
+
+        Returns
+        -------
+        colour.MultiSpectralDistributions
+            A column per channel over nm.
+
+        Raises
+        ------
+        SweepError
+            If there is no such design.
+        """
+        from .conversions import to_multispectral
+
+        return to_multispectral(self.output, self.study.study, design)
+
+    @property
+    def best(self) -> pd.Series:
+        """Best feasible design that was swept or searched; raises SweepError if there is none."""
+        if self.output.best.empty:
+            raise OutputError(
+                ValidationIssue("the run has no feasible design that was swept or searched", str(self.folder))
+            )
+        return self.output.best.iloc[0].dropna()
+
+    @property
+    def curves(self) -> pd.DataFrame:
+        """QE curves of the run over nm; columns are ("sensor", curve) and (design_id, channel)."""
+        stored = self.output.curves
+        columns: dict[tuple[Any, str], np.ndarray] = {("sensor", name): curve for name, curve in stored.sensor.items()}
+        columns |= {(i, channel): curve for i, filters in stored.designs.items() for channel, curve in filters.items()}
+        table = wavelength_table(stored.wavelength_nm, columns)
+        table.columns.names = ["design", "curve"]
+        return table
+
+    @cached_property
+    def study(self) -> LoadedStudy:
+        """Study that was run, with the curves that the run kept."""
+        from ..report import study_of
+
+        return LoadedStudy(study_of(self.output, self._data, allow_code=self._allow_code))
+
+    @property
+    def summary(self) -> str:
+        """Summary of the run as `sweep run` prints it."""
+        from ..report import summary_lines
+
+        return "\n".join(summary_lines(self.output))
+
+    def images(self, split: str = "test", designs: Sequence[str] | None = None, form: Form = "raw") -> Iterator[Batch]:
+        """Yield labeled images of the run's benchmark of vision, up to 1,024 at once, without files.
+
+        Parameters
+        ----------
+        split : {'train', 'check', 'test'}
+            Split. The readers of the run have read those of the test.
+        designs : sequence of str, optional
+            Names of designs, such as "RGGB"; all of them by default.
+        form : {'raw', 'demosaicked', 'isp'}
+            Raw mosaics (uint16 DN, float32 of HDR pixels), every channel at every pixel (float32 DN above the black
+            level), or pictures of a plain ISP (uint8 sRGB).
+
+        Yields
+        ------
+        Batch
+            `images`, ndarray of shape (n, rows, columns) or (n, rows, columns, n_channels), and `labels`, a table with
+            the columns of an exported manifest.
+
+        Raises
+        ------
+        SweepError
+            If the run has no images, or no such design, split or form.
+        """
+        from ..runs.image_files import images_of_run
+        from ..vision.batches import FORMS
+        from ..vision.lamps import SPLITS
+
+        names = list(self._images_of_test()["name"].unique())
+        chosen = names if designs is None else list(designs)
+        for value, known in ((split, SPLITS), (form, FORMS), *((name, names) for name in chosen)):
+            if value not in known:
+                allowed, near = ", ".join(known), nearest(value, known)
+                raise SweepError(ValidationIssue("unknown", value=value, allowed=allowed, nearest=near))
+        return images_of_run(self.study.study, self.output.named_rows, split, chosen, form)
+
+    def score(self, predictions: pd.DataFrame) -> pd.DataFrame:
+        """Score a reader's answers to the test images of the run's benchmark of vision.
+
+        Parameters
+        ----------
+        predictions : pandas.DataFrame
+            Columns `image_id`, and `state` (or "unknown") or a probability of each state.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Errors of each design, by order of the lenses, distance and light level, with intervals; differences from
+            the first design and from the ideal observer, paired; calibration.
+
+        Raises
+        ------
+        SweepError
+            If the run has no images, and for other, double or missing images or answers.
+        """
+        from ..runs.score import reader_of, scores_of
+        from ..vision.scenes import states_of
+
+        images, vision = self._images_of_test(), self.output.study.vision
+        assert vision is not None
+        table = predictions.reset_index(drop=True)
+        return scores_of(reader_of(table, Path("predictions"), images, states_of(vision)), images, vision.unknown_cost)
+
+    def _images_of_test(self) -> pd.DataFrame:
+        from ..results.tables import VISION
+        from ..runs.score import images_of_test
+
+        if self.output.study.vision is None:
+            raise SweepError(ValidationIssue("the study has no `vision`", str(self.folder)))
+        return images_of_test(self.output.vision[VISION])
+
+    def report(self) -> Path:
+        """Draw figures and report again.
+
+        Returns
+        -------
+        Path
+            The report, ``report.html``.
+        """
+        from ..report import make_report
+        from ..results.tables import REPORT
+
+        make_report(self.output)
+        return self.folder / REPORT

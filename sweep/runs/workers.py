@@ -29,7 +29,7 @@ from ..base.errors import InterruptedRunError, SweepError, ValidationIssue
 from ..base.types import Call, Parallel, Progress
 
 BACKENDS = ("loky", "threading", "dask")
-_LIBRARIES = ("numba", "matplotlib.figure", "sweep.run.search")
+_LIBRARIES = ("numba", "matplotlib.figure", "sweep.runs.search")
 """What calls of workers load."""
 STOPPING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 """Signals that stop a run; Windows has no SIGHUP."""

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
+from ..base.answer import Answer
 from ..base.disk import is_folder, read_facts
 from ..base.errors import StudyError, SweepError, ValidationIssue
 from ..camera.sensor import BUILT_IN_SENSORS
@@ -13,14 +14,16 @@ from ..results.folder import run_in
 from ..results.identity import run_facts, several_facts
 from ..results.lock import in_use
 from ..results.tables import PROVENANCE
-from ..run import output_folder
 from ..spectra.builtin.measured_sets import LUXEON, SENSORS, MeasuredSet
 from ..spectra.builtin.registry import BUILT_IN_LIGHTS
 from ..spectra.builtin.spectra import cards
 from ..spectra.builtin.surrogate_spectra import surrogate_cards
 from ..study import SensorAndLights, Study, folder_name, load_study, sensor_studies_in
+from ..study.shipped import shipped_folder
+from . import output_folder
 
 _QUESTION_LETTERS = 70
+_STUDIES = Path("studies")
 
 
 @dataclass(frozen=True)
@@ -33,26 +36,50 @@ class StudyListing:
     question: str
 
 
-def studies_of(folder: Path, outputs: Path, data: Path | None = None) -> list[StudyListing]:
-    """List the studies of a folder and the states of their runs.
+def list_studies(
+    folder: Path | str | None = None, data: Path | str | None = None, *, output: Path | str = "outputs"
+) -> Answer:
+    """List studies: question, number of designs, and whether they have been run.
 
-    Raises StudyError if the folder does not exist.
+    Parameters
+    ----------
+    folder : path-like, optional
+        Folder of study files; left out, ``studies``, or the studies of the package where there is no such folder.
+    data : path-like, optional
+        Folder in which the studies' files are looked for first.
+    output : path-like
+        Folder of the results of all studies.
+
+    Returns
+    -------
+    Answer
+        A line for each study.
+
+    Raises
+    ------
+    SweepError
+        If there is no such folder.
     """
-    if not is_folder(folder):
-        raise StudyError(ValidationIssue("no such folder", str(folder), allowed="a folder of study files"))
+    shipped = shipped_folder() if folder is None and not is_folder(_STUDIES) else None
+    place = shipped or Path(folder or _STUDIES)
+    if not is_folder(place):
+        raise StudyError(ValidationIssue("no such folder", str(place), allowed="a folder of study files"))
     try:
         files = sorted(
-            path for path in folder.iterdir() if path.suffix in (".yaml", ".yml") and not path.name.startswith(".")
+            path for path in place.iterdir() if path.suffix in (".yaml", ".yml") and not path.name.startswith(".")
         )
     except OSError as error:
-        raise StudyError(ValidationIssue(f"cannot be read: {error.strerror or error}", str(folder))) from None
-    return [_listed(path, outputs, data) for path in files]
+        raise StudyError(ValidationIssue(f"cannot be read: {error.strerror or error}", str(place))) from None
+    studies = [_listed(path, Path(output), None if data is None else Path(data)) for path in files]
+    how = "sweep run NAME" if shipped else f"sweep run {place}/NAME.yaml"
+    lines = (
+        _lines(studies, how) if studies else [f"No studies in {place}. `sweep new NAME --folder {place}` writes one."]
+    )
+    return Answer(lines, {"folder": str(place), "studies": [asdict(study) for study in studies]})
 
 
-def list_lines(folder: Path, studies: list[StudyListing]) -> list[str]:
+def _lines(studies: Sequence[StudyListing], how: str) -> list[str]:
     """Format studies as a table: name, designs, state, question."""
-    if not studies:
-        return [f"No studies in {folder}. `sweep new NAME --folder {folder}` writes one."]
     counts = ["" if x.designs is None else f"{x.designs:,} designs" for x in studies]
     name_width, count_width = max(len(x.name) for x in studies), max(map(len, counts))
     state_width = max(len(x.state) for x in studies)
@@ -62,12 +89,7 @@ def list_lines(folder: Path, studies: list[StudyListing]) -> list[str]:
     ]
     finished = sum(x.state.startswith("finished") for x in studies)
     count = f"{len(studies)} {'study' if len(studies) == 1 else 'studies'}"
-    return [*lines, f"{count}, {finished} finished. Run one: sweep run {folder}/NAME.yaml"]
-
-
-def list_facts(studies: list[StudyListing]) -> dict[str, Any]:
-    """Format studies as a JSON object."""
-    return {"studies": [asdict(study) for study in studies]}
+    return [*lines, f"{count}, {finished} finished. Run one: {how}"]
 
 
 def _listed(path: Path, outputs: Path, data: Path | None) -> StudyListing:
@@ -107,7 +129,7 @@ def _state(study: Study, outputs: Path) -> str:
     return "finished" if best is None else f"finished, search found {goal.amount(best)}"
 
 
-def data_lines() -> list[str]:
+def list_data() -> Answer:
     """Return for each set of spectra its data card: kind, range, license, groups, source, credit and digest."""
     lines, total = [], 0
     sets = [*cards(), *surrogate_cards()]
@@ -130,23 +152,18 @@ def data_lines() -> list[str]:
             f"  credit: {card.credit}",
             f"  sha256: {card.sha256}",
         ]
-    return [
-        *lines,
+    lines += [
         f"Sensors: {', '.join(BUILT_IN_SENSORS)}; lights: {', '.join(BUILT_IN_LIGHTS)} (ar0820, tl16: surrogates).",
         f"{total} spectra in {len(sets)} sets. A study's tasks name their groups: tasks: {{own: ...}}.",
     ]
+    facts = [
+        {"name": name, "kind": kind, "what": measured.what, "license": measured.license, "source": measured.source}
+        | {"range_nm": measured.range_nm, "curves": measured.names, "sha256": measured.digests}
+        for kind, name, measured in _measured()
+    ]
+    return Answer(lines, {"sets": [asdict(card) for card in sets], "measured": facts})
 
 
 def _measured() -> list[tuple[str, str, MeasuredSet]]:
     """Return kind, name and set of the measured sensors and lights."""
     return [*(("sensor", name, measured) for name, measured in SENSORS.items()), ("lights", "luxeon", LUXEON)]
-
-
-def data_facts() -> dict[str, Any]:
-    """Return the same as plain values."""
-    measured = [
-        {"name": name, "kind": kind, "what": curves.what, "license": curves.license, "source": curves.source}
-        | {"range_nm": curves.range_nm, "curves": curves.names, "sha256": curves.digests}
-        for kind, name, curves in _measured()
-    ]
-    return {"sets": [asdict(card) for card in (*cards(), *surrogate_cards())], "measured": measured}

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from io import BytesIO
 from itertools import chain
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..base.answer import Answer
 from ..base.disk import read_input
 from ..base.errors import DataError, OutputError, ValidationIssue
 from ..results.atomic import write_bytes
@@ -20,7 +20,7 @@ from ..spectra.facts import Curve, Facts, facts_of, merge_equal_issues, notes
 from ..spectra.formats import curves_from, scan_curves
 from ..spectra.signal_color import LightColor
 from ..spectra.spectrum import Quantity
-from ..spectra.units import FITTING, Use, used_as
+from ..spectra.units import FITTING, Use, stated_quantity, used_as
 from .describe_picture import draw
 
 _MOST_NAMES = 12
@@ -31,29 +31,46 @@ _SOFTWARE = "sweep describe"
 """Software that a picture names in its first bytes: by this it is known to be a description's."""
 
 
-@dataclass(frozen=True)
-class Description:
-    """A described file: lines to print, issues for which studies refuse it, and the same as plain values."""
+def describe(file: Path | str, *, output: Path | str = "outputs/describe", quantity: str | None = None) -> Answer:
+    """Plot and check a file of curves: contents, issues, colors of its lights.
 
-    lines: tuple[str, ...]
-    issues: tuple[ValidationIssue, ...]
-    facts: Mapping[str, Any]
+    Parameters
+    ----------
+    file : path-like
+        A file or folder of curves.
+    output : path-like
+        Folder of the picture, ``<stem of the file>.png``.
+    quantity : str, optional
+        Unit of the numbers, such as qe or energy; left out, what the heads say, else lights (in energy) or QE are
+        guessed.
 
+    Returns
+    -------
+    Answer
+        What the file holds; a problem with the issues for which studies refuse it.
 
-def described(path: Path, folder: Path, quantity: Quantity | None = None) -> Description:
-    """Describe a file or folder of curves and plot it as `<folder>/<stem>.png`.
-
-    `quantity`: unit of the numbers; left out, what the heads say, else lights (in energy) or QE are guessed. Raises
-    DataError if nothing can be read. Raises OutputError if the picture cannot be written, or a file of that name is no
-    picture of a description.
+    Raises
+    ------
+    SweepError
+        If nothing can be read, or the picture cannot be written.
     """
+    path, folder, stated = Path(file), Path(output), stated_quantity(quantity)
+    lines, issues, facts = _described(path, folder, stated)
+    values = {"file": str(file), **facts, "faults": [str(issue) for issue in issues]}
+    return Answer(lines, values, DataError(issues) if issues else None)
+
+
+def _described(
+    path: Path, folder: Path, quantity: Quantity | None
+) -> tuple[list[str], Sequence[ValidationIssue], dict[str, Any]]:
+    """Return lines to print, issues for which studies refuse a file, and plain values."""
     scan = scan_curves(path)
-    issues = tuple(merge_equal_issues(list(chain.from_iterable(scan.issues))))
+    issues: Sequence[ValidationIssue] = merge_equal_issues(list(chain.from_iterable(scan.issues)))
     facts = facts_of(scan)
     names = [curve.name for curve in facts.curves]
     lines = [f"{path}: {len(names)} curve{'' if len(names) == 1 else 's'}{': ' if names else ''}{_shown(names)}."]
     if not any(curve.values.size for curve in facts.curves):
-        return Description((*lines, "Nothing in it can be drawn."), issues, {"curves": []})
+        return [*lines, "Nothing in it can be drawn."], issues, {"curves": []}
     lines += [f"Read: {note}." for note in scan.notes]
     kind = _kind(facts, quantity)
     colors: dict[str, LightColor | None] = {}
@@ -89,7 +106,7 @@ def described(path: Path, folder: Path, quantity: Quantity | None = None) -> Des
         "picture": str(picture),
         "curves": [_curve_facts(curve, colors.get(curve.name)) for curve in facts.curves],
     }
-    return Description((*lines, f"Picture: {picture}"), issues, values)
+    return [*lines, f"Picture: {picture}"], issues, values
 
 
 def _png(title: str, facts: Facts, colors: Mapping[str, LightColor | None]) -> bytes:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from ..base.answer import Answer
 from ..base.disk import read_facts
 from ..base.errors import OutputError
 from ..metrics.share import format_share
@@ -19,19 +19,27 @@ from ..results.tables import PROVENANCE, REPORT, RESULTS
 from ..study import folder_name
 
 
-@dataclass(frozen=True)
-class Status:
-    """State of a run: lines for people, and plain values."""
-
-    lines: Sequence[str]
-    facts: Mapping[str, Any]
-
-
-def status_of(folder: Path, *, verify: bool = False) -> Status:
+def status(folder: Path | str, *, verify: bool = False) -> Answer:
     """Return state, progress and files of a run.
 
-    Raises OutputError if there is no run, or files of a finished run are missing or damaged.
+    Parameters
+    ----------
+    folder : path-like
+        Folder of a run, also of one that goes on.
+    verify : bool
+        Compare the digests of all its files.
+
+    Returns
+    -------
+    Answer
+        How far it is.
+
+    Raises
+    ------
+    SweepError
+        If there is no run, or files of a finished run are missing or damaged.
     """
+    folder = Path(folder)
     manifest = Manifest(folder)
     manifest.require_run()
     running = in_use(folder)
@@ -62,10 +70,10 @@ def status_of(folder: Path, *, verify: bool = False) -> Status:
         lines.append(f"Finished parts: {folder / RESULTS}, which pandas.read_parquet reads.")
     if verify and not running:
         lines.append(f"ok: its {len(manifest.files)} files are as the run wrote them.")
-    return Status(lines, {"folder": str(folder), "state": state, "verified": verify, **values})
+    return Answer(lines, {"folder": str(folder), "state": state, "verified": verify, **values})
 
 
-def _status_of_several(manifest: Manifest, *, verify: bool, running: bool) -> Status:
+def _status_of_several(manifest: Manifest, *, verify: bool, running: bool) -> Answer:
     """Return the state of a study of several sensors or lights: a line for each of them."""
     folder, lines, states = manifest.folder, [], {}
     if not running and (wrong := manifest.wrong(quick=not verify)):
@@ -76,9 +84,9 @@ def _status_of_several(manifest: Manifest, *, verify: bool, running: bool) -> St
             states[member.name] = "not run"
             lines.append(f"{member.name}: not run.")
             continue
-        status = status_of(inner, verify=verify)
-        states[member.name] = str(status.facts["state"])
-        lines.append(f"{member.name}: {status.lines[0]}")
+        of_member = status(inner, verify=verify)
+        states[member.name] = str(of_member.facts["state"])
+        lines.append(f"{member.name}: {of_member.lines[0]}")
     count = sum(state == "finished" for state in states.values())
     is_complete = count == len(states) and PROVENANCE in manifest.files
     state = "running" if running else "finished" if is_complete else "interrupted"
@@ -90,7 +98,7 @@ def _status_of_several(manifest: Manifest, *, verify: bool, running: bool) -> St
         lines.append(f"Files: {folder}/: {RESULTS}, {REPORT}.")
     if verify and not running:
         lines.append(f"ok: its {len(manifest.files)} files are as the run wrote them.")
-    return Status(lines, {"folder": str(folder), "state": state, "verified": verify, "runs": states})
+    return Answer(lines, {"folder": str(folder), "state": state, "verified": verify, "runs": states})
 
 
 def _number(facts: Mapping[str, Any], key: str) -> float:

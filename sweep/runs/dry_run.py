@@ -1,0 +1,150 @@
+"""Dry run: filters, scenarios, rows, their time and size from a sample, evaluations at most, and computed effects."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from threadpoolctl import threadpool_limits
+
+from ..results.dataset import encoded_part, part_name
+from ..results.folder import run_in
+from ..results.identity import run_facts
+from ..results.tables import REFERENCE
+from ..search.solver import refinement_of
+from ..search.trade_off import most_searches
+from ..study import Study
+from .held_out import most_evaluations_left_out
+from .rows import Job, parts_of, rules_of, run_job
+
+_GOLDEN = 0.6180339887498949
+_SAMPLED_S = 1.0
+"""Time for which rows are computed as a sample, s."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Rows that were computed to see how long they take, s, and the size of their file, bytes."""
+
+    rows: int
+    seconds: float
+    size: int
+
+
+@dataclass(frozen=True)
+class RemainingWork:
+    """Remaining work of a study; `sample`: None if no row is left."""
+
+    study: Study
+    finished: int
+    chunks: int
+    searches: bool
+    workers: int
+    sample: Sample | None
+
+    @property
+    def rows(self) -> int:
+        """Rows to compute."""
+        return self.study.n_designs - self.finished
+
+    @property
+    def seconds(self) -> float:
+        """Time that the rows take, s."""
+        return 0.0 if self.sample is None else self.rows * self.sample.seconds / self.sample.rows / self.workers
+
+    @property
+    def megabytes(self) -> float:
+        """Size of the rows."""
+        return 0.0 if self.sample is None else self.rows * self.sample.size / self.sample.rows / 1e6
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """The same as plain values."""
+        counts = {"designs": self.study.n_designs, "finished_designs": self.finished, "parts": self.chunks}
+        return {**counts, "searches": self.searches, "seconds": self.seconds, "megabytes": self.megabytes}
+
+
+def remaining_work(study: Study, output: Path, n_workers: int = 1) -> RemainingWork:
+    """Plan a study, read which parts are kept, and compute a sample of the rows; nothing is written."""
+    held, parts = run_in(output), parts_of(study)
+    is_finished = held is not None and held.is_of(run_facts(study)) and held.finished
+    todo = [part for part in parts if not is_finished and not (output / part_name(part.number)).is_file()]
+    rows = sum(part.size for part in todo)
+    searches = study.search is not None and not is_finished
+    planned = study.with_plans()
+    sample = _sampled(planned, [job for part in todo for job in part.jobs])
+    return RemainingWork(planned, study.n_designs - rows, len(todo), searches, n_workers, sample)
+
+
+def _sampled(study: Study, jobs: Sequence[Job]) -> Sample | None:
+    """Compute jobs that are spread over all of them, until the time is over; the first once before, to load code."""
+    rules, tables, seconds = rules_of(study), list[pa.Table](), 0.0
+    order = np.argsort(np.arange(len(jobs)) * _GOLDEN % 1.0, kind="stable")
+    for at in (*order[:1], *order):
+        begun = time.perf_counter()
+        with threadpool_limits(1):  # as in a worker
+            table = run_job(jobs[at], study, rules)
+        if not tables:
+            tables.append(table.slice(0, 0))
+            continue
+        seconds += time.perf_counter() - begun
+        tables.append(table)
+        if seconds > _SAMPLED_S:
+            break
+    whole = pa.concat_tables(tables).unify_dictionaries() if tables else None
+    return None if whole is None else Sample(len(whole), max(seconds, 1e-9), len(encoded_part(whole, "")))
+
+
+def remaining_work_lines(todo: RemainingWork, output: Path) -> Iterator[str]:
+    """Yield lines that describe the remaining work."""
+    study, search = todo.study, todo.study.search
+    plain = sum(space.size for space in study.spaces if space.kind == REFERENCE)
+    yield (
+        f"{_count(study.n_filters - plain, 'filter')} and {_count(plain, 'plain CFA')} "
+        f"in {_count(len(study.scenarios), 'scenario')}, {_count(study.n_designs, 'row')}: "
+        f"{todo.finished:,} finished, {todo.rows:,} in {_count(todo.chunks, 'chunk')} to compute."
+    )
+    if todo.sample is not None:
+        yield (
+            f"About {_duration(todo.seconds)} with {_count(todo.workers, 'worker')} and {todo.megabytes:.2g} MB, by a "
+            f"sample of {_count(todo.sample.rows, 'row')} here; search, check and report come on top."
+        )
+    if search is not None and not todo.searches:
+        yield "The search is finished."
+    elif search is not None:
+        starts = min(search.starts, search.max_evaluations)
+        per_start = search.max_evaluations // starts
+        refinement = refinement_of(study.problem(search), search.algorithm)
+        refined = refinement is not None
+        then = f", then {refinement}" if refined else ""
+        most = (starts + refined) * per_start
+        yield f"Search: {_count(starts, 'start')}{then}, {_count(most, 'evaluation')} at most."
+        if search.levels:
+            most = most_searches(len(search.levels), starts, refined=refined) * per_start
+            yield f"Its front: {_count(len(search.levels), 'level')}, {_count(most, 'evaluation')} at most."
+        if study.leaves_one_out:
+            most = most_evaluations_left_out(study, search)
+            yield f"Without one light after the other: {_count(most, 'evaluation')} at most."
+    groups: dict[tuple[str, ...], list[str]] = {}
+    for name, plan in study.plans.items():
+        groups.setdefault(plan.computed, []).append(name)
+    for effects, names in groups.items():
+        scenes = names[0] if len(names) == 1 else f"{names[0]} ... {names[-1]} ({len(names)} scenarios)"
+        yield f"Effects computed in {scenes}: {', '.join(effects) or 'none'}."
+    yield f"Results go to {output}/; nothing was written."
+
+
+def _duration(seconds: float) -> str:
+    """Return a time as people say it."""
+    if seconds < 90:
+        return f"{max(seconds, 1):.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.2g} h"
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number:,} {what}{'' if number == 1 else 's'}"
