@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from ..camera.exposure import largest_sensitivity_not_brightest
 from ..camera.model import scene_model
 from ..camera.setup import Setup
 from ..designs.families.stopband import Stopband
-from ..designs.family import Family
 from ..metrics.bound import FEASIBLE, Bound, total_violation
 from ..metrics.columns.sensitivity import SENSITIVITY
 from ..metrics.evaluate import evaluate
@@ -280,7 +279,7 @@ def any_filter_problem(study: Study, setup: Setup) -> Problem:
     """
     base = setup.camera.base_qe[0]
     # The upper bound uses only the range of a family's filters.
-    family = cast(Family, Stopband(study.grid.nodes_nm, base, np.zeros_like(base)))
+    family = Stopband(study.grid.nodes_nm, base, np.zeros_like(base))
     low, high = (np.array([getattr(p, end) for p in family.parameters], dtype=float) for end in ("low", "high"))
     return Problem(
         setup,

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base.types import Array, DesignParameters, Float, ParameterWeights, PerParameter, PerWavelength
 from .edge import SPAN_PER_WIDTH, edge, edge_gradient, per_span
-from .family import Parameter
+from .family import Family, Parameter
 from .products import row_products
 from .tolerance import ProductionError
 
@@ -154,18 +154,12 @@ class Bands:
         return np.stack(rows)
 
 
-class Banded:
-    """Base class of families with bands as parameters; methods as in `Family`."""
-
-    start_dimensions: int | None = None
+class Banded(Family):
+    """Base class of families with bands as parameters: edges, widths and depth of each."""
 
     def __init__(self, wavelength_nm: PerWavelength, bands: int) -> None:
         self._bands = Bands(wavelength_nm, bands)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Edges, widths and depth of each band."""
-        return self._bands.parameters
+        self.parameters = self._bands.parameters
 
     @property
     def dimensions(self) -> Mapping[str, ParameterWeights]:
@@ -177,10 +171,6 @@ class Banded:
         family = copy(self)
         family._bands = self._bands.perturbed(production_error)
         return family
-
-    def start(self, points: Float[Array, "starts start_dimensions"]) -> Float[Array, "starts parameters"]:
-        """Return the points: a search starts anywhere in the box."""
-        return points
 
     def violation(self, x: DesignParameters) -> Float[Array, "designs _conditions"]:
         """Return edges out of order, nm; see `Bands.violation`."""

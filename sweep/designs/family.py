@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Protocol, Self, runtime_checkable
+from typing import ClassVar, Protocol, runtime_checkable
 
+import numpy as np
+
+from ..base.errors import SweepError, ValidationIssue
 from ..base.types import (
     Array,
     ChannelCurves,
@@ -21,6 +25,9 @@ from ..base.types import (
     Section,
 )
 from .tolerance import ProductionError
+
+_STEP = 1e-5
+"""Half of a central difference, in units of a parameter's range."""
 
 
 @dataclass(frozen=True)
@@ -43,17 +50,24 @@ class Parameter:
     default: float | None = None
 
 
-class Family(Protocol):
+class Family(ABC):
     """Filter as a function of its parameters, for batches of designs.
 
-    `kind` names the family, `n_modified` is the number of channels that it replaces, `needs_target` states whether it
-    needs a target curve, and `Options` is the schema of its options in a study.
+    `parameters` and `curves` suffice; what else a family may know has defaults. `kind` names it, `n_modified` is the
+    number of channels that it replaces, `needs_target` states whether it needs a target curve, and `Options` is the
+    schema of its options in a study. `start_dimensions` are those of the unit cube that `start` takes; None if any
+    point of the box is a good start.
     """
 
     kind: ClassVar[str]
-    n_modified: ClassVar[int]
-    needs_target: ClassVar[bool]
-    Options: ClassVar[type[Section]]
+    n_modified: ClassVar[int] = 1
+    needs_target: ClassVar[bool] = False
+    start_dimensions: int | None = None
+    parameters: Sequence[Parameter]
+    """In the order of the columns of `x`."""
+
+    class Options(Section):
+        """No options."""
 
     @classmethod
     def of_study(
@@ -63,12 +77,8 @@ class Family(Protocol):
 
         Parameters
         ----------
-        wavelength_nm : ndarray of shape (n_wavelengths,)
-            Wavelengths, nm.
-        base : ndarray of shape (n_wavelengths,)
-            QE of the replaced curve.
-        target : ndarray of shape (n_wavelengths,) or None
-            QE that the filter takes inside its band.
+        wavelength_nm, base, target : ndarray of shape (n_wavelengths,)
+            Wavelengths, nm; QE of the replaced curve; and QE that the filter takes inside its band, or None.
         options : Section
             Options of the family.
 
@@ -82,15 +92,9 @@ class Family(Protocol):
         SweepError
             If curves and options do not fit together.
         """
+        raise NotImplementedError
 
-    @property
-    def start_dimensions(self) -> int | None:
-        """Dimensions of the unit cube that `start` takes; None if any point of the box is a good start."""
-
-    @property
-    def parameters(self) -> Sequence[Parameter]:
-        """Parameters in the order of the columns of `x`."""
-
+    @abstractmethod
     def curves(self, x: DesignParameters) -> DesignCurves:
         """Return the QE of the modified channels.
 
@@ -106,95 +110,38 @@ class Family(Protocol):
         """
 
     def upper(self, low: PerParameter, high: PerParameter) -> ChannelCurves:
-        """Return an upper bound on all well-formed filters of a box.
-
-        Parameters
-        ----------
-        low, high : ndarray of shape (n_parameters,)
-            Ends of the box of parameters.
-
-        Returns
-        -------
-        ndarray of shape (n_modified, n_wavelengths)
-            Upper bound on the QE.
-        """
+        """Return an upper bound on all well-formed filters of a box: by default 1."""
+        return np.ones_like(self.curves(np.stack([low, high]))[0])
 
     def lower(self, low: PerParameter, high: PerParameter) -> ChannelCurves:
-        """Return a lower bound on all well-formed filters of a box.
-
-        Parameters
-        ----------
-        low, high : ndarray of shape (n_parameters,)
-            Ends of the box of parameters.
-
-        Returns
-        -------
-        ndarray of shape (n_modified, n_wavelengths)
-            Lower bound on the QE.
-        """
+        """Return a lower bound on all well-formed filters of a box: by default 0."""
+        return np.zeros_like(self.curves(np.stack([low, high]))[0])
 
     def hull(self, low: PerParameter, high: PerParameter) -> tuple[ChannelCurves, ChannelCurves]:
-        """Return bounds on all filters of a box, well formed or not.
-
-        Parameters
-        ----------
-        low, high : ndarray of shape (n_parameters,)
-            Ends of the box of parameters.
-
-        Returns
-        -------
-        low, high : ndarray of shape (n_modified, n_wavelengths)
-            Bounds on the QE.
-        """
+        """Return bounds on all filters of a box, well formed or not: by default 0 and 1."""
+        return Family.lower(self, low, high), Family.upper(self, low, high)
 
     def gradient(self, x: PerParameter) -> CurvesGradient:
-        """Return the derivative of `curves` at one design.
-
-        Parameters
-        ----------
-        x : ndarray of shape (n_parameters,)
-            Parameters of one design.
-
-        Returns
-        -------
-        ndarray of shape (n_parameters, n_modified, n_wavelengths)
-            QE per unit of parameter.
-        """
+        """Return the derivative of `curves` at one design per unit of parameter: by default differences."""
+        return self._differences(x, self.curves)
 
     @property
     def dimensions(self) -> Mapping[str, ParameterWeights]:
-        """Lengths in production by name: rows r; a length is min(r @ x), nm."""
+        """Lengths in production by name: rows r; a length is min(r @ x), nm; by default none."""
+        return {}
 
-    def perturbed(self, production_error: ProductionError) -> Self:
-        """Return the family as production makes it.
-
-        Parameters
-        ----------
-        off : ProductionError
-            Production error.
-
-        Returns
-        -------
-        Family
-            Family with this production error.
-        """
+    def perturbed(self, production_error: ProductionError) -> Family:
+        """Return the family as production makes it; by default it has no edges that could shift."""
+        if any(production_error):
+            raise SweepError(ValidationIssue(f"{self.kind} has no edges that production could shift"))
+        return self
 
     def start(self, points: Float[Array, "starts start_dimensions"]) -> Float[Array, "starts parameters"]:
-        """Return well-formed designs to start a search from.
+        """Return well-formed designs to start a search from, of points of a unit cube: by default these."""
+        return points
 
-        Parameters
-        ----------
-        points : ndarray of shape (n, start_dimensions)
-            Points of the unit cube.
-
-        Returns
-        -------
-        ndarray of shape (n, n_parameters)
-            Starting designs.
-        """
-
-    def violation(self, x: DesignParameters) -> Float[Array, "designs conditions"]:
-        """Return the conditions of a well-formed design.
+    def violation(self, x: DesignParameters) -> Float[Array, "designs _conditions"]:
+        """Return the conditions of a well-formed design, met where <= 0: by default one that always is.
 
         Parameters
         ----------
@@ -204,22 +151,24 @@ class Family(Protocol):
         Returns
         -------
         ndarray of shape (n_designs, n_conditions)
-            Values of the conditions, met where <= 0.
+            Values of the conditions.
         """
+        return np.zeros((len(x), 1))
 
-    def violation_gradient(self, x: PerParameter) -> Float[Array, "conditions parameters"]:
-        """Return the derivative of `violation` at one design.
+    def violation_gradient(self, x: PerParameter) -> ParameterWeights:
+        """Return the derivative of `violation` at one design: by default differences."""
+        return self._differences(x, self.violation).T
 
-        Parameters
-        ----------
-        x : ndarray of shape (n_parameters,)
-            Parameters of one design.
-
-        Returns
-        -------
-        ndarray of shape (n_conditions, n_parameters)
-            Derivatives of the conditions.
-        """
+    def _differences(
+        self, x: PerParameter, function: Callable[[Float[Array, "_points parameters"]], Float[Array, "_points ..."]]
+    ) -> Float[Array, "parameters ..."]:
+        """Return central differences, one-sided at the ends of a parameter."""
+        low, high = (np.array([getattr(p, end) for p in self.parameters], dtype=float) for end in ("low", "high"))
+        step = np.diag(_STEP * (high - low))
+        above, below = np.minimum(x + step, high), np.maximum(x - step, low)
+        values = function(np.concatenate([above, below]))
+        span = (above - below).diagonal().reshape(-1, *[1] * (values.ndim - 1))
+        return np.asarray((values[: x.size] - values[x.size :]) / span, dtype=float)
 
 
 @runtime_checkable

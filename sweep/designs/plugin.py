@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -11,24 +10,19 @@ from ..base.errors import SweepError, ValidationIssue
 from ..base.types import (
     Array,
     ChannelCurves,
-    CurvesGradient,
     DesignCurves,
     DesignParameters,
     Float,
-    ParameterWeights,
     PerParameter,
     PerWavelength,
 )
 from ..base.user_code import UserCode
-from .family import Parameter
-from .tolerance import ProductionError
+from .family import Family, Parameter
 
-_STEP = 1e-5
-"""Half of a central difference, in units of a parameter's range."""
 _SLACK = 1e-9
 
 
-class PluginFamily:
+class PluginFamily(Family):
     """Family by a class of user code: FILE.py:CLASS, or the name by which an installed package offers it.
 
     Methods as in `Family`. The class has `parameters`, a list of (name, low, high) or (name, low, high, default), is
@@ -40,11 +34,8 @@ class PluginFamily:
     Worker processes get the text of a file; an installed package must be installed there.
     """
 
-    n_modified = 1
-    start_dimensions: int | None = None
-
     def __init__(self, code: UserCode, wavelength_nm: PerWavelength, base: PerWavelength, target: PerWavelength | None):
-        self.kind = code.name
+        self.kind = code.name  # type: ignore[misc]
         self._given = code, wavelength_nm, base, target
         self._base = base
         own_family = code.called(code.loaded, wavelength_nm, base, target)
@@ -89,51 +80,9 @@ class PluginFamily:
         assert low.shape == high.shape
         return np.asarray((self._base if self.below_base else np.ones_like(self._base))[None], dtype=float)
 
-    def lower(self, low: PerParameter, high: PerParameter) -> ChannelCurves:
-        """Return 0."""
-        assert low.shape == high.shape
-        return np.zeros((1, self._base.size))
-
-    def hull(self, low: PerParameter, high: PerParameter) -> tuple[ChannelCurves, ChannelCurves]:
-        """Return 0 and 1, to which all curves are clipped."""
-        return self.lower(low, high), np.ones((1, self._base.size))
-
-    def gradient(self, x: PerParameter) -> CurvesGradient:
-        """Return central differences, one-sided at the ends of a parameter."""
-        return self._differences(x, self.curves)
-
     def violation(self, x: DesignParameters) -> Float[Array, "designs _conditions"]:
         """Return the conditions of the class; a condition that is always met if it has none."""
-        return self._array("violation", x, None) if hasattr(self._own, "violation") else np.zeros((len(x), 1))
-
-    def violation_gradient(self, x: PerParameter) -> ParameterWeights:
-        """Return differences of the conditions."""
-        return self._differences(x, self.violation).T
-
-    def _differences(
-        self, x: PerParameter, function: Callable[[Float[Array, "_points parameters"]], Float[Array, "_points ..."]]
-    ) -> Float[Array, "parameters ..."]:
-        low, high = (np.array([getattr(p, end) for p in self.parameters]) for end in ("low", "high"))
-        step = np.diag(_STEP * (high - low))
-        above, below = np.minimum(x + step, high), np.maximum(x - step, low)
-        values = function(np.concatenate([above, below]))
-        span = (above - below).diagonal().reshape(-1, *[1] * (values.ndim - 1))
-        return np.asarray((values[: x.size] - values[x.size :]) / span, dtype=float)
-
-    @property
-    def dimensions(self) -> Mapping[str, ParameterWeights]:
-        """None, since the edges are unknown."""
-        return {}
-
-    def perturbed(self, production_error: ProductionError) -> PluginFamily:
-        """Return the same family; a study with production tolerances refuses it."""
-        if any(production_error):
-            raise SweepError(ValidationIssue(f"{self.kind} has no edges that production could shift"))
-        return self
-
-    def start(self, points: Float[Array, "starts start_dimensions"]) -> Float[Array, "starts parameters"]:
-        """Return the points: a search starts anywhere in the box."""
-        return points
+        return self._array("violation", x, None) if hasattr(self._own, "violation") else super().violation(x)
 
 
 def _parameters(kind: str, stated: Any) -> tuple[Parameter, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from typing import Any
 
 from pydantic import create_model
 
@@ -83,5 +83,5 @@ def build_family(
         raise SweepError(ValidationIssue("mixture needs `colorants`, the catalog that it chooses from"))
     if kind == Mixture.kind:
         assert colorants is not None
-        return cast(Family, Mixture(wavelength_nm, base, colorants, Mixture.Options(**given).at_most))
+        return Mixture(wavelength_nm, base, colorants, Mixture.Options(**given).at_most)
     return family.of_study(wavelength_nm, base, target, family.Options(**given))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 
@@ -207,7 +206,7 @@ class SpaceBuilder:
         )
         if note not in self.sources.warnings:
             self.sources.warnings.append(note)
-        return cast(Family, plugin)
+        return plugin
 
     def _axes(
         self, axes: Mapping[str, tuple[float, ...]], path: KeyPath, parameters: Sequence[Parameter]

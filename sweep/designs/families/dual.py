@@ -36,7 +36,6 @@ class Dual(Banded):
     kind = "dual"
     n_modified = 2
     needs_target = True
-    Options = Section
 
     def __init__(self, wavelength_nm: PerWavelength, base: PerWavelength, ceiling: PerWavelength) -> None:
         super().__init__(wavelength_nm, 1)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from pydantic import model_validator
 
@@ -15,14 +13,13 @@ from ...base.types import (
     DesignCurves,
     DesignParameters,
     Float,
-    ParameterWeights,
     PerParameter,
     PerWavelength,
     Positive,
     Section,
 )
 from ...spectra.spectrum import linear_basis
-from ..family import Parameter
+from ..family import Family, Parameter
 from ..products import row_products
 from ..tolerance import AS_DESIGNED, ProductionError
 
@@ -49,8 +46,8 @@ class Nodes(Section):
         return self
 
 
-class FreeForm:
-    """Filter with a free transmission at each node; methods as in `Family`.
+class FreeForm(Family):
+    """Filter with a free transmission at each node.
 
     Notes
     -----
@@ -70,9 +67,7 @@ class FreeForm:
     """
 
     kind = "free_form"
-    n_modified = 1
-    needs_target = False
-    start_dimensions: int | None = 3
+    start_dimensions = 3
 
     class Options(Section):
         """Options: nodes of the transmission."""
@@ -90,6 +85,7 @@ class FreeForm:
         if nodes_nm.size < 2:
             raise SweepError(ValidationIssue("a free-form filter needs two nodes or more", value=nodes_nm.tolist()))
         self.nodes_nm = nodes_nm
+        self.parameters = tuple(Parameter(f"transmission_{node:g}_nm", 0, 1, default=None) for node in nodes_nm)
         self._made_of = wavelength_nm, base
         nominal_nm = production_error.nominal_nm(wavelength_nm)
         inside = (nominal_nm >= nodes_nm[0]) & (nominal_nm <= nodes_nm[-1])
@@ -113,11 +109,6 @@ class FreeForm:
             raise SweepError(ValidationIssue("nodes outside the wavelength grid", value=nodes_range, allowed=allowed))
         count = round((nodes.stop_nm - nodes.start_nm) / nodes.step_nm) + 1
         return FreeForm(wavelength_nm, base, nodes.start_nm + nodes.step_nm * np.arange(count, dtype=float))
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Transmission at each node."""
-        return tuple(Parameter(f"transmission_{node:g}_nm", 0, 1, default=None) for node in self.nodes_nm)
 
     def curves(self, x: DesignParameters) -> DesignCurves:
         """Return the QE of the modified channel."""
@@ -143,11 +134,6 @@ class FreeForm:
         assert x.shape == self.nodes_nm.shape
         return np.asarray(self._linear_basis[:, None, :], dtype=float)
 
-    @property
-    def dimensions(self) -> Mapping[str, ParameterWeights]:
-        """None, since it has no bands."""
-        return {}
-
     def perturbed(self, production_error: ProductionError) -> FreeForm:
         """Return the family with its transmission moved."""
         return FreeForm(*self._made_of, self.nodes_nm, production_error)
@@ -164,11 +150,3 @@ class FreeForm:
         center = self.nodes_nm[0] + span * points[:, :1]
         breadth = span * (0.05 + 0.35 * points[:, 1:2])
         return np.asarray(1 - points[:, 2:] * np.exp(-0.5 * ((self.nodes_nm - center) / breadth) ** 2), dtype=float)
-
-    def violation(self, x: DesignParameters) -> Float[Array, "designs _conditions"]:
-        """Return zeros: every transmission from 0 to 1 is well formed."""
-        return np.zeros((len(x), 1))
-
-    def violation_gradient(self, x: PerParameter) -> ParameterWeights:
-        """Return zeros."""
-        return np.zeros((1, x.size))

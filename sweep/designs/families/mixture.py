@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from abc import abstractmethod
 from copy import copy
-from typing import ClassVar, Literal, Self
+from typing import Literal, Self
 
 import numpy as np
 from pydantic import Field
@@ -20,13 +19,12 @@ from ...base.types import (
     Float,
     IndexArray,
     Int,
-    ParameterWeights,
     PerParameter,
     PerWavelength,
     Section,
 )
 from ...spectra.colorants import GAUSSIAN
-from ..family import Parameter
+from ..family import Family, Parameter
 from ..tolerance import ProductionError
 
 GaussianIn = Literal["wavenumber", "wavelength"]
@@ -42,13 +40,8 @@ _BANDS: tuple[Parameter, ...] = (
 )
 
 
-class Absorbing(ABC):
-    """Filter that is the base times 10 to the minus absorbance; methods as in `Family`."""
-
-    n_modified: ClassVar[int] = 1
-    needs_target: ClassVar[bool] = False
-    start_dimensions: int | None = None
-    parameters: tuple[Parameter, ...]
+class Absorbing(Family):
+    """Filter that is the base times 10 to the minus absorbance."""
 
     def __init__(self, wavelength_nm: PerWavelength, base: PerWavelength) -> None:
         self._wavelength_nm, self._base = wavelength_nm, base
@@ -95,11 +88,6 @@ class Absorbing(ABC):
     def absorbance_range(self, low: PerParameter, high: PerParameter) -> tuple[PerWavelength, PerWavelength]:
         """Return bounds on the absorbance in a box."""
 
-    @property
-    def dimensions(self) -> Mapping[str, ParameterWeights]:
-        """None, since it has no edges."""
-        return {}
-
     def perturbed(self, production_error: ProductionError) -> Self:
         """Return the family with bands that are moved and broader, in films that are too thick, which moves nothing."""
         family = copy(self)
@@ -115,21 +103,9 @@ class Absorbing(ABC):
         """Zero, and the base: the transmission moves with the bands; see `MovedFamily`."""
         return np.zeros_like(self._base), self._base
 
-    def start(self, points: Float[Array, "starts start_dimensions"]) -> Float[Array, "starts parameters"]:
-        """Return the points: a search starts anywhere in the box."""
-        return points
-
-    def violation(self, x: DesignParameters) -> Float[Array, "designs _conditions"]:
-        """Return zeros: every absorbance is well formed."""
-        return np.zeros((len(x), 1))
-
-    def violation_gradient(self, x: PerParameter) -> ParameterWeights:
-        """Return zeros."""
-        return np.zeros((1, x.size))
-
 
 class AbsorptionBands(Absorbing):
-    """Modeled absorption bands, and an absorbance at all wavelengths; methods as in `Family`."""
+    """Modeled absorption bands, and an absorbance at all wavelengths."""
 
     kind = "absorption_bands"
 
@@ -219,7 +195,7 @@ class AbsorptionBands(Absorbing):
 
 
 class Mixture(Absorbing):
-    """Colorants of a catalog in one film; methods as in `Family`.
+    """Colorants of a catalog in one film.
 
     `spectra`: absorbances with a peak of 1; `numbers`: ascending numbers of the spectra; left out, from 1 on.
     """
