@@ -19,7 +19,7 @@ from ..spectra.builtin.registry import BUILT_IN_LIGHTS
 from ..spectra.builtin.spectra import cards
 from ..spectra.builtin.surrogate_spectra import surrogate_cards
 from ..study import SensorAndLights, Study, folder_name, load_study, sensor_studies_in
-from ..study.shipped import shipped_folder
+from ..study.shipped import shipped_folder, shipped_names
 from . import output_folder
 
 _QUESTION_LETTERS = 70
