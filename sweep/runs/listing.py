@@ -72,9 +72,12 @@ def list_studies(
         raise StudyError(ValidationIssue(f"cannot be read: {error.strerror or error}", str(place))) from None
     studies = [_listed(path, Path(output), None if data is None else Path(data)) for path in files]
     how = "sweep run NAME" if shipped else f"sweep run {place}/NAME.yaml"
-    lines = (
-        _lines(studies, how) if studies else [f"No studies in {place}. `sweep new NAME --folder {place}` writes one."]
-    )
+    lines = [f"No studies in {place}. `sweep new NAME --folder {place}` writes one."]
+    if studies:
+        lines = _lines(studies, how)
+    others = [name for name in shipped_names() if folder is None and name not in [path.stem for path in files]]
+    if others and not shipped:
+        lines.append(f"Of the package, by name: {', '.join(others)}.")
     return Answer(lines, {"folder": str(place), "studies": [asdict(study) for study in studies]})
 
 
