@@ -24,7 +24,7 @@ from ..spectra.lights import Pair, class_pairs
 from ..study import Study
 from .loading import CurveSource, make_study
 from .user_filters import (
-    any_filter_problem,
+    any_filter_search,
     evaluate_curves,
     table_of_results,
     upper_bound_or_reason,
@@ -297,7 +297,7 @@ def _upper_bound(
         if _is_below(curve, ceiling):
             qe = setup.camera.qe.copy()
             qe[setup.camera.modified[0]] = ceiling
-            with_ceiling = any_filter_problem(study, setup.with_camera(qe=qe))
+            with_ceiling = any_filter_search(study, setup.with_camera(qe=qe))
             problem = with_lower_bound(with_ceiling, CFA_SENSITIVITY, light)
             if exposed and may_be_brightest(problem.setup, float(curve.sum() / ceiling.sum())):
                 return None, None, "", "the filter is the brightest on white, and sets the exposure"

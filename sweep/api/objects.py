@@ -20,7 +20,7 @@ from ..study import Study, folder_name
 from .inline_curves import CurveLike, on_grid, wavelength_table
 from .parameters import OWN, are_parameters, evaluate_spaces, own_designs, plain_and_named
 from .user_filters import (
-    any_filter_problem,
+    any_filter_search,
     evaluate_curves,
     find_cfa,
     known_cfa,
@@ -220,7 +220,7 @@ class LoadedStudy:
         space = self._modified(cfa, channel)
         assert space.filter is not None
         scene = next(iter(self.study.scenarios)) if scenario is None else known_scenario(self.study, scenario)
-        problem = any_filter_problem(self.study, self.study.setup(space, scene))
+        problem = any_filter_search(self.study, self.study.setup(space, scene))
         if sensitivity is not None:
             problem = with_lower_bound(problem, "sensitivity", sensitivity)
         limit, reason = upper_bound_or_reason(problem)

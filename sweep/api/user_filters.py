@@ -262,7 +262,7 @@ def table_of_results(study: Study, rows: Sequence[tuple[str, str, str, Columns]]
     return with_units(pd.concat(parts, ignore_index=True), study.quantities)
 
 
-def any_filter_problem(study: Study, setup: Setup) -> Problem:
+def any_filter_search(study: Study, setup: Setup) -> Problem:
     """Return the problem of the best filter of any shape below the curve that it replaces.
 
     Parameters

@@ -64,6 +64,48 @@ class ValidationIssue:
         return "".join(c if c.isprintable() else repr(c)[1:-1] for c in " ".join(text.split()))
 
 
+class Fault(ValueError):  # noqa: N818  (it is collected more often than raised)
+    """What is wrong with a study, where it is found: in a validator of a section, or in a check of several.
+
+    `path`: keys from there to the place; `known`: names of which the nearest is told.
+    """
+
+    def __init__(
+        self,
+        path: Sequence[str | int],
+        problem: str,
+        value: object = None,
+        allowed: str | None = None,
+        nearest: str | None = None,
+        *,
+        known: Sequence[str] = (),
+    ) -> None:
+        super().__init__(problem)
+        self.path, self.problem, self.value, self.allowed = tuple(path), problem, value, allowed
+        self.nearest, self.known = nearest, known
+
+    def under(self, *path: str | int) -> Fault:
+        """Return the fault as seen from further up."""
+        whole = (*path, *self.path)
+        return Fault(whole, self.problem, self.value, self.allowed, self.nearest, known=self.known)
+
+
+def unknown(
+    path: Sequence[str | int], what: str, value: str, known: Iterable[str], others: Iterable[str] = ()
+) -> Fault:
+    """Return the fault of an unknown name; `others`: names that are near, but not allowed here."""
+    known = list(known)
+    return Fault(path, f"unknown {what}", value, ", ".join(known), known=[*known, *others])
+
+
+def faults_of(path: Sequence[str | int], error: SweepError) -> list[Fault]:
+    """Return the issues of an error as faults of a key."""
+    return [
+        Fault(path, f"{of.file}: {of.problem}" if of.file else of.problem, of.value, of.allowed, of.nearest)
+        for of in error.issues
+    ]
+
+
 EXIT_CODES = {
     0: "done",
     2: "an error of the input, the machine or the command line: a line says which",

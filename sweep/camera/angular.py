@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.cache import Cache
+from ..base.errors import Fault
 from ..base.types import (
     Array,
     Float,
@@ -198,18 +199,15 @@ def cone_of(scene: Scene) -> Cone:
     return Cone(half_angle_rad(scene.optics.f_number), math.radians(scene.optics.cra_deg))
 
 
-def grazing_ray_issue(scene: Scene) -> tuple[tuple[str, ...], str, str, str] | None:
-    """Return the issue of a scene whose rays graze an interference filter.
-
-    None if there is no issue.
-    """
+def grazing_fault(scene: Scene) -> Fault | None:
+    """Return the fault of a scene whose rays graze an interference filter; None if they do not."""
     chief_deg = scene.optics.cra_deg if scene.field is None else scene.field.steepest_deg
     steepest = cone_of(scene).half_rad + math.radians(chief_deg)
     if steepest <= _STEEPEST_RAD:
         return None
     problem = "the steepest ray grazes a filter whose technology is interference"
     allowed = f"at most {math.degrees(_STEEPEST_RAD):g} degrees from f_number and cra_deg together"
-    return ("optics",), problem, f"{math.degrees(steepest):.3g} degrees", allowed
+    return Fault(("optics",), problem, f"{math.degrees(steepest):.3g} degrees", allowed)
 
 
 class AngularResponse:

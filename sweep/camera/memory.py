@@ -6,6 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from ..base.errors import Fault
 from .field import field_heights
 from .phases import MOST_PHASES, Phases, n_phases
 from .sampling import reach_px
@@ -44,7 +45,7 @@ def blocks(setup: Setup, phases: Phases) -> list[Phases]:
     return [phases.subset(slice(at, at + step)) for at in range(0, len(phases), step)]
 
 
-def memory_problem(setup: Setup) -> tuple[str, str, str] | None:
+def memory_fault(setup: Setup) -> Fault | None:
     """Return the reason why a target's response is not computed.
 
     None if it is computed.
@@ -54,13 +55,13 @@ def memory_problem(setup: Setup) -> tuple[str, str, str] | None:
     channels = f"{len(setup.camera.mosaic.channels)} channels and {setup.camera.grid.size} wavelengths"
     if (needed_bytes := bytes_per_phase(setup, by_pixel=True)) > MOST_BYTES:
         problem = f"{pixels_per_phase(setup):,} pixels around the light, of {channels}, take too much memory"
-        return problem, f"{needed_bytes / 2**30:.1f} GiB", f"at most {MOST_BYTES / 2**30:g} GiB"
+        return Fault(("target",), problem, f"{needed_bytes / 2**30:.1f} GiB", f"at most {MOST_BYTES / 2**30:g} GiB")
     phases = n_phases(setup)
     if phases > MOST_PHASES:
         problem = f"any sampling phase on a tile of {setup.camera.mosaic.indices.size:,} pixels: too many phases"
         allowed = f"at most {MOST_PHASES:,} (a tile of {MOST_PHASES // 16} pixels), or a named phase"
-        return problem, f"{phases:,}", allowed
+        return Fault(("target",), problem, f"{phases:,}", allowed)
     if (total := phases * bytes_per_phase(setup, by_pixel=False)) > MOST_BYTES:
         problem = f"{phases:,} sampling phases, of {channels}, take too much memory"
-        return problem, f"{total / 2**30:.1f} GiB", f"at most {MOST_BYTES / 2**30:g} GiB"
+        return Fault(("target",), problem, f"{total / 2**30:.1f} GiB", f"at most {MOST_BYTES / 2**30:g} GiB")
     return None

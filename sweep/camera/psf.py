@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.cache import Cache
+from ..base.errors import Fault
 from ..base.types import Array, Float, PerKnot, PerWavelength, SameShape
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from .scene import Scene
 
 _SHORTEST_UM = 0.4
-"""Wavelength of whose finest detail `psf_problem` counts the periods."""
+"""Wavelength of whose finest detail `image_fault` counts the periods."""
 _MOST_PX = 128.0
 _MOST_PERIODS = 400.0
 _PANEL_NODES = 32
@@ -72,7 +73,7 @@ def defocus_um(scenario: Scene, pitch_um: float) -> float:
     return abs(target_image_um - focus_image_um) / (8 * scenario.optics.f_number**2)
 
 
-def psf_problem(scenario: Scene, pixel: Pixel) -> tuple[tuple[str, ...], str, str, str] | None:
+def image_fault(scenario: Scene, pixel: Pixel) -> Fault | None:
     """Return the reason why a target's image is not computed.
 
     None if it is computed.
@@ -83,20 +84,21 @@ def psf_problem(scenario: Scene, pixel: Pixel) -> tuple[tuple[str, ...], str, st
     across_px = target.object_resolution_px
     if across_px > _MOST_PX:
         uniform = f"at most {_MOST_PX:g} px (a larger light fills the field: leave out `target`)"
-        return ("target",), "the light is too large", f"{across_px:.6g} px", uniform
+        return Fault(("target",), "the light is too large", f"{across_px:.6g} px", uniform)
     focal_m = target.focal_length_um(pixel.pitch_um) * 1e-6
     for key, distance_m in ((("target", "distance_m"), target.distance_m), (("optics", "focus_m"), optics.focus_m)):
         if distance_m is not None and distance_m <= 2 * focal_m:
             allowed = f"more than {2 * focal_m:.4g} m, twice its focal length"
-            return key, "too near for this lens", f"{distance_m:g} m", allowed
+            return Fault(key, "too near for this lens", f"{distance_m:g} m", allowed)
     # The image shift over the f-number is the diameter of the blur circle.
     circle_px = defocus_um(scenario, pixel.pitch_um) * 8 * optics.f_number / pixel.pitch_um
     if circle_px > _MOST_PX:
-        return ("optics", "focus_m"), "too far out of focus", f"{circle_px:.4g} px of blur", f"at most {_MOST_PX:g} px"
+        blur, most = f"{circle_px:.4g} px of blur", f"at most {_MOST_PX:g} px"
+        return Fault(("optics", "focus_m"), "too far out of focus", blur, most)
     periods = (across_px + 4) * pixel.pitch_um / (_SHORTEST_UM * optics.f_number)
     if periods > _MOST_PERIODS:
         allowed = f"at most {_MOST_PERIODS:g} periods of the finest detail across the light"
-        return ("optics", "f_number"), "the image is too fine", f"{periods:.4g} periods", allowed
+        return Fault(("optics", "f_number"), "the image is too fine", f"{periods:.4g} periods", allowed)
     return None
 
 

@@ -21,7 +21,7 @@ from ruamel.yaml.nodes import Node, ScalarNode, SequenceNode
 from ruamel.yaml.reader import ReaderError
 
 from ..base.disk import NO_UTF_16, not_utf8, read_input
-from ..base.errors import MOST_ISSUES, StudyError, ValidationIssue, nearest
+from ..base.errors import MOST_ISSUES, Fault, StudyError, ValidationIssue, nearest
 
 MOST_DEPTH = 20
 """Levels of nesting; a study needs seven."""
@@ -309,6 +309,9 @@ class Document:
         if kind == "extra_forbidden":
             known = _known_keys(schema, path[:-1], self.data)
             return self.issue(path, "unknown key", None, ", ".join(known), nearest(path[-1], known))
+        if isinstance(fault := context.get("error"), Fault):
+            near = nearest(fault.value, fault.known) if fault.known else fault.nearest
+            return self.issue((*path, *fault.path), fault.problem, fault.value, fault.allowed, near)
         if kind in ("missing", "value_error", "union_tag_not_found"):
             place = (*path, tag) if kind == "union_tag_not_found" else path
             return self.issue(place, str(context["error"]) if kind == "value_error" else "missing")

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..base.errors import InfeasibleError, ValidationIssue
+from ..base.errors import Fault, InfeasibleError, ValidationIssue, unknown
 from ..base.user_code import kind_in_words
 from ..camera.scene import WhitePatchExposure
 from ..designs.family import ChoosingFamily
@@ -35,84 +35,84 @@ _LEAST_ERROR = 1e-12
 """Smallest error that is stated where errors are no exact sums."""
 
 
-def check_goals(section: StudySection, sources: Sources, requested: RequestedQuantities) -> None:
-    """Check that objective and constraints name quantities the study has."""
-    known, rule = quantities_of(requested), section.objective.rule
+def brightness_counts(section: StudySection, requested: RequestedQuantities) -> str | None:
+    """Return a note where the objective counts how bright a lamp is, and lamps differ in photons."""
+    known = quantities_of(requested)
     counted = [name for name in section.objective.weights if name in known and known[name].role == "separation"]
-    if counted and not all(scene.equal_photons for scene in section.scenarios.values()):
-        sources.warnings.append(
-            f"{counted[0]} counts how bright a lamp is, where signals differ in photons (`intensity_cd`, `drive`): "
-            f"chromatic_{counted[0].removeprefix('worst_')} does not"
-        )
-    stated = sources.document.data.get("objective")
+    if not counted or all(scene.equal_photons for scene in section.scenarios.values()):
+        return None
+    return (
+        f"{counted[0]} counts how bright a lamp is, where signals differ in photons (`intensity_cd`, `drive`): "
+        f"chromatic_{counted[0].removeprefix('worst_')} does not"
+    )
+
+
+def check_goals(section: StudySection, requested: RequestedQuantities, *, written_out: bool) -> Iterator[Fault]:
+    """Check that objective and constraints name quantities the study has; `written_out`: with its rule as a key."""
+    known, rule = quantities_of(requested), section.objective.rule
     for name in section.objective.weights:
-        path: KeyPath = ("objective", rule.name, name) if isinstance(stated, dict) else ("objective",)
-        if not _is_known(path, "objective", name, section, sources, requested):
+        path: KeyPath = ("objective", rule.name, name) if written_out else ("objective",)
+        if (fault := _unknown(path, "objective", name, section, requested)) is not None:
+            yield fault
             continue
-        _check_slopes(path, known[name], section, sources)
+        yield from _check_slopes(path, known[name], section)
         if known[name].direction != rule.direction:
             right = f"`{{least: {{{name}: 1}}}}`" if rule.direction == "more" else "`minimum` or `sum`"
-            sources.add(path, f"{known[name].direction} of {name} is better", None, right)
+            yield Fault(path, f"{known[name].direction} of {name} is better", None, right)
     for name, bound in section.constraints.items():
         path = ("constraints", name)
-        if not _is_known(path, "quantity", name, section, sources, requested):
+        if (fault := _unknown(path, "quantity", name, section, requested)) is not None:
+            yield fault
             continue
         if known[name].smooth is None and section.search is not None:
-            sources.add(path, f"the search does not know {name}", None, "a study without `search`")
-        _check_slopes(path, known[name], section, sources)
+            yield Fault(path, f"the search does not know {name}", None, "a study without `search`")
+        yield from _check_slopes(path, known[name], section)
         for end in ("min", "max"):
             value, ends = getattr(bound, end), known[name].ends
             if end not in ends and value is not None:
                 right = " or ".join(f"`{other}`" for other in ends)
-                sources.add((*path, end), f"{name} has no `{end}`", value, right)
+                yield Fault((*path, end), f"{name} has no `{end}`", value, right)
             elif value is not None:
-                _check_range((*path, end), known[name], value, sources)
+                yield from _check_range((*path, end), known[name], value)
         if known[name].scale == "log10" and bound.max is not None and not _LEAST_ERROR <= bound.max <= 1:
-            sources.add((*path, "max"), "no such error is computed", bound.max, f"{_LEAST_ERROR:g} to 1")
+            yield Fault((*path, "max"), "no such error is computed", bound.max, f"{_LEAST_ERROR:g} to 1")
 
 
-def _check_range(path: KeyPath, quantity: Quantity, value: float, sources: Sources) -> None:
+def _check_range(path: KeyPath, quantity: Quantity, value: float) -> Iterator[Fault]:
     """Check that a bound is one that the quantity can have."""
     low = -math.inf if quantity.signed else 0.0
     high = _MOST_LIGHT if quantity.role == "light" else quantity.most if path[-1] == "min" else math.inf
     if not low <= value <= high:
         percent = f"; {value:g} % are {value / 100:g}" if quantity.role == "light" and value <= 100 else ""
-        sources.add(
-            path,
-            f"{quantity.name} has no such values",
-            value,
-            (f"{low:g} or more" if high == math.inf else f"{low:g} to {high:g}") + percent,
-        )
+        allowed = f"{low:g} or more" if high == math.inf else f"{low:g} to {high:g}"
+        yield Fault(path, f"{quantity.name} has no such values", value, allowed + percent)
 
 
-def _check_slopes(path: KeyPath, quantity: Quantity, section: StudySection, sources: Sources) -> None:
+def _check_slopes(path: KeyPath, quantity: Quantity, section: StudySection) -> Iterator[Fault]:
     """Check that a search by gradients has those of all that it looks at."""
     if section.search is not None and section.search.algorithm in GRADIENT and not quantity.slopes:
         allowed = f"`search: {{algorithm: ...}}`: {', '.join(DIRECT)}"
-        sources.add(path, f"{quantity.name} has no derivatives, which {section.search.algorithm} needs", None, allowed)
+        yield Fault(path, f"{quantity.name} has no derivatives, which {section.search.algorithm} needs", None, allowed)
 
 
-def _is_known(
-    path: KeyPath, what: str, name: str, section: StudySection, sources: Sources, requested: RequestedQuantities
-) -> bool:
-    """Return whether there is such a quantity; else add an issue with the missing key."""
+def _unknown(
+    path: KeyPath, what: str, name: str, section: StudySection, requested: RequestedQuantities
+) -> Fault | None:
+    """Return the fault of a quantity that there is not, with the missing key; None if there is."""
     known = _names(what, requested)
     if name in known:
-        return True
+        return None
     shifted = quantities_of(replace(requested, edge_shift=True)).get(name)
     if shifted is not None and shifted.extreme == WORST_CASE and not section.production.tolerance:
         needed = "`production.edge_shift_nm`" + (" or `population`" if shifted.distance_kind == DN else "")
-        sources.add(path, f"{name} needs {needed}", None, "a shift above 0")
-    elif name in {n for n, q in quantities_of(replace(requested, wanted_yield=1.0)).items() if q.extreme == OF_A_SHARE}:
-        sources.add(path, f"{name} needs `population.wanted_yield`", None, "a share, such as 0.99")
-    elif not requested.states and name in {*quantities_of(replace(requested, states=requested.classes))} - {
-        *quantities_of(requested)
-    }:
-        sources.add(path, f"{name} needs `recognition`", None, "`recognition: {}`, and noise in every scenario")
-    else:
-        more = replace(requested, states=requested.classes, edge_shift=True, wanted_yield=1.0)
-        sources.unknown(path, what, name, known, _names(what, more))
-    return False
+        return Fault(path, f"{name} needs {needed}", None, "a shift above 0")
+    if name in {n for n, q in quantities_of(replace(requested, wanted_yield=1.0)).items() if q.extreme == OF_A_SHARE}:
+        return Fault(path, f"{name} needs `population.wanted_yield`", None, "a share, such as 0.99")
+    of_states = quantities_of(replace(requested, states=requested.classes))
+    if not requested.states and name in of_states and name not in quantities_of(requested):
+        return Fault(path, f"{name} needs `recognition`", None, "`recognition: {}`, and noise in every scenario")
+    more = replace(requested, states=requested.classes, edge_shift=True, wanted_yield=1.0)
+    return unknown(path, what, name, known, _names(what, more))
 
 
 def _names(what: str, requested: RequestedQuantities) -> list[str]:
@@ -134,36 +134,40 @@ def search_of(section: StudySection, spaces: Sequence[Space], sources: Sources) 
     chosen = requested.space or (names[0] if len(names) == 1 else None)
     if chosen is None:
         problem = "missing: the search needs one sweep or box"
-        sources.add(("search", "space"), problem, None, ", ".join(names) or "a sweep")
+        sources.refuse(Fault(("search", "space"), problem, None, ", ".join(names) or "a sweep"))
     elif chosen not in names:
-        sources.unknown(("search", "space"), "sweep or box", chosen, names)
+        sources.refuse(unknown(("search", "space"), "sweep or box", chosen, names))
     elif chosen in boxes and not _free(boxes[chosen], requested.map or {}):
-        sources.add(("search", "space"), "every parameter is fixed", chosen, "one free parameter or more")
+        sources.refuse(Fault(("search", "space"), "every parameter is fixed", chosen, "one free parameter or more"))
     bases = {name: _NUMBERS.sub("", name) for name in scenarios}
     scenario_name = requested.scenario or scenarios[0]
     searched = (
         [scenario_name] if scenario_name in bases else [name for name, base in bases.items() if base == scenario_name]
     )
     if not searched:
-        sources.unknown(("search", "scenario"), "scenario", scenario_name, dict.fromkeys([*bases, *bases.values()]))
+        sources.refuse(
+            unknown(("search", "scenario"), "scenario", scenario_name, dict.fromkeys([*bases, *bases.values()]))
+        )
     if requested.algorithm not in ALGORITHMS:
         what = "algorithm (it must take inequality constraints)"
-        sources.unknown(("search", "algorithm"), what, requested.algorithm, list(ALGORITHMS))
+        sources.refuse(unknown(("search", "algorithm"), what, requested.algorithm, list(ALGORITHMS)))
     if chosen not in boxes or requested.algorithm not in ALGORITHMS or not searched:
         return None
     if len(searched) > 1:
-        _check_series(section, sources)
+        sources.refuse(*_check_series(section))
     levels: tuple[float, ...] = ()
     if requested.front is not None:
         levels = Axis(min=requested.front.min, max=requested.front.max, count=requested.front.count).points()
     for scene in (section.scenarios[name] for name in searched):
         if scene.drive is not None and isinstance(scene.exposure, WhitePatchExposure):
-            sources.add(("search", "scenario"), "a search under a pulsed light needs a fixed exposure", scenario_name)
+            sources.refuse(
+                Fault(("search", "scenario"), "a search under a pulsed light needs a fixed exposure", scenario_name)
+            )
             break
     space, others = boxes[chosen], {space.name for space in spaces if space.kind in ("reference", "design")}
     assert space.filter is not None
     if requested.name in others:
-        sources.add(("search", "name"), "a CFA or design has that name", requested.name, "another name")
+        sources.refuse(Fault(("search", "name"), "a CFA or design has that name", requested.name, "another name"))
     name = requested.name or f"best {kind_in_words(space.filter.family.kind)}"
     name += " (search)" if name in others else ""
     starts = 1 if requested.algorithm in ONE_START else requested.starts
@@ -173,15 +177,15 @@ def search_of(section: StudySection, spaces: Sequence[Space], sources: Sources) 
     )
 
 
-def _check_series(section: StudySection, sources: Sources) -> None:
+def _check_series(section: StudySection) -> Iterator[Fault]:
     """Check that a search over several scenarios has an objective with a worst one, and neither front nor map."""
     assert section.search is not None
     for key in ("front", "map"):
         if getattr(section.search, key) is not None:
-            sources.add(("search", key), "of one scenario, and the search is over several", None, "one `scenario`")
+            yield Fault(("search", key), "of one scenario, and the search is over several", None, "one `scenario`")
     if not section.objective.rule.smallest:
         problem = f"the worst of several scenarios is not known of a {section.objective.rule.name}"
-        sources.add(("objective",), problem, None, "`minimum` or `least`")
+        yield Fault(("objective",), problem, None, "`minimum` or `least`")
 
 
 def _free(space: Space, held: Iterable[str]) -> list[str]:
@@ -203,20 +207,20 @@ def _map_of(requested: Mapping[str, Axis], space: Space, sources: Sources) -> di
     for name, axis in requested.items():
         path: KeyPath = ("search", "map", name)
         if name not in ends:
-            sources.unknown(path, "parameter", name, ends)
+            sources.refuse(unknown(path, "parameter", name, ends))
         elif chosen:
-            sources.add(path, "a map has no choice from a catalog", space.name, "a box of another family")
+            sources.refuse(Fault(path, "a map has no choice from a catalog", space.name, "a box of another family"))
         elif axis.size > _MOST_OF_AXIS:
-            sources.add(path, "too many values", axis.size, f"at most {_MOST_OF_AXIS}")
+            sources.refuse(Fault(path, "too many values", axis.size, f"at most {_MOST_OF_AXIS}"))
         elif min(axis.points()) < ends[name][0] or max(axis.points()) > ends[name][1]:
             shown = f"{min(axis.points()):g} to {max(axis.points()):g}"
-            sources.add(path, "outside the box", shown, "{:g} to {:g}".format(*ends[name]))
+            sources.refuse(Fault(path, "outside the box", shown, "{:g} to {:g}".format(*ends[name])))
         else:
             values[name] = axis.points()
     return values
 
 
-def check_searched(section: StudySection, space: Space, known: Mapping[str, Quantity], sources: Sources) -> None:
+def check_searched(section: StudySection, space: Space, known: Mapping[str, Quantity]) -> Iterator[Fault]:
     """Check that the searched family has the constrained quantities and suits the objective."""
     assert space.filter is not None
     assert section.search is not None
@@ -224,24 +228,24 @@ def check_searched(section: StudySection, space: Space, known: Mapping[str, Quan
     for name in section.constraints:
         if name in known and known[name].needs == "family" and name not in dimensions:
             problem = f"{space.filter.family.kind} has no {name}"
-            sources.add(("constraints", name), problem, None, ", ".join(dimensions) or "none")
+            yield Fault(("constraints", name), problem, None, ", ".join(dimensions) or "none")
     if section.pixel.captures and any(known[name].states for name in (*goals, *section.constraints) if name in known):
-        _check_merged(section, sources)
+        yield from _check_merged(section)
     if section.search.front is not None and any(known[name].role == "light" for name in goals if name in known):
         problem = "the front is searched at levels of sensitivity, which is in the objective"
-        sources.add(("search", "front"), problem, None, "an objective of CSDs")
+        yield Fault(("search", "front"), problem, None, "an objective of CSDs")
 
 
-def _check_merged(section: StudySection, sources: Sources) -> None:
+def _check_merged(section: StudySection) -> Iterator[Fault]:
     """Check that the captures of an HDR pixel that is searched under noise see the same light."""
     for number, capture in enumerate(section.pixel.captures):
         if capture.crosstalk is not None:
             path: KeyPath = ("pixel", "captures", number, "crosstalk")
-            sources.add(path, "a search under noise has captures of one crosstalk", None, "that of the pixel")
+            yield Fault(path, "a search under noise has captures of one crosstalk", None, "that of the pixel")
     for name, scene in section.scenarios.items():
         if scene.drive is not None:
             problem = "a search under the noise of merged captures needs steady light"
-            sources.add(("scenarios", name, "drive"), problem, None, "no `drive`")
+            yield Fault(("scenarios", name, "drive"), problem, None, "no `drive`")
 
 
 def refuse_unreachable(study: Study) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..base.disk import is_folder
-from ..base.errors import DataError, ValidationIssue
+from ..base.errors import DataError, Fault, ValidationIssue, unknown
 from ..base.types import FloatArray
 from ..camera.pixel import unquantized
 from ..spectra.builtin.registry import BUILT_IN_LIGHTS
@@ -81,7 +81,9 @@ def _built_in(section: LightsSection, sources: Sources, at: KeyPath) -> Lights |
     assert section.builtin is not None
     excess = sorted(section.model_fields_set - {"builtin", "files", "outside"})
     for key in excess:
-        sources.add((*at, key), "a built-in data set has its own", getattr(section, key), "this key beside `files`")
+        sources.refuse(
+            Fault((*at, key), "a built-in data set has its own", getattr(section, key), "this key beside `files`")
+        )
     known, anywhere = BUILT_IN_LIGHTS, section.outside == "zero"
     if anywhere:
         known = {name: partial(_padded, make) for name, make in BUILT_IN_LIGHTS.items()}
@@ -121,10 +123,10 @@ def lights_of(section: LightsSection, sources: Sources, at: KeyPath = ("lights",
     if len(sources.issues) > before:
         return None
     if len(by_type) < 2:
-        sources.add(files, "only one signal type", list(by_type), "two or more")
+        sources.refuse(Fault(files, "only one signal type", list(by_type), "two or more"))
         return None
     if len(by_type) > MOST_TYPES:
-        sources.add(files, "too many signal types", len(by_type), f"at most {MOST_TYPES}")
+        sources.refuse(Fault(files, "too many signal types", len(by_type), f"at most {MOST_TYPES}"))
         return None
     signals = [signal for group in by_type.values() for signal in group]
     source = ", ".join(entry.file for entry in section.files)
@@ -141,37 +143,37 @@ def with_population(lights: Lights, section: StudySection, sources: Sources) -> 
     known = [*lights.classes, *lights.names]
     for key, names in population.names.items():
         for name in sorted(names - set(known)):
-            sources.unknown((*at, key, name), "signal type or signal", name, known)
+            sources.refuse(unknown((*at, key, name), "signal type or signal", name, known))
     for kind, name in zip(lights.types, lights.names, strict=True):
         if population.drift(kind, name) is None:
             allowed = f"nm/K of {kind}; known are {', '.join(DRIFT_NM_PER_K)}"
-            sources.add((*at, "drift_nm_per_k"), f"no drift is known for signals of type {kind}", None, allowed)
+            sources.refuse(
+                Fault((*at, "drift_nm_per_k"), f"no drift is known for signals of type {kind}", None, allowed)
+            )
             return lights
     for name, scene in section.scenarios.items():
         if scene.intensity_cd is not None:
             problem = "lights of a population have their photons, not their luminous intensity, in common"
-            sources.add(("scenarios", name, "intensity_cd"), problem, scene.intensity_cd, "photon_radiance")
+            sources.refuse(Fault(("scenarios", name, "intensity_cd"), problem, scene.intensity_cd, "photon_radiance"))
         if scene.target is not None and scene.target.phase_px == "any":
             problem = "worst cases over a population need a named sampling phase"
-            sources.add(("scenarios", name, "target", "phase_px"), problem, "any", "[column, row]")
+            sources.refuse(Fault(("scenarios", name, "target", "phase_px"), problem, "any", "[column, row]"))
         if scene.field is not None and scene.field.everywhere:
             problem = "worst cases over a population need a number of field positions"
-            sources.add(("scenarios", name, "field", "places"), problem, "any", "a number, 2 to 100")
+            sources.refuse(Fault(("scenarios", name, "field", "places"), problem, "any", "a number, 2 to 100"))
     ends = [end for span in spans_nm(lights, population) for end in span]
     steps = (max(ends) - min(ends)) / section.wavelengths.step_nm
     spectra = len(lights.names) * len(population.width) * (steps + 2)
     if spectra > _MOST_SPECTRA:
         value = f"{spectra:,.0f} spectra, {len(lights.names)} signals at every step of the grid"
-        sources.add(at, "the population has too many members", value, f"at most {_MOST_SPECTRA:,}")
+        sources.refuse(Fault(at, "the population has too many members", value, f"at most {_MOST_SPECTRA:,}"))
     return replace(lights, population=population)
 
 
-def check_range(study: Study, sources: Sources) -> None:
+def check_range(study: Study) -> Iterator[Fault]:
     """Check that no lamp of the population saturates at readout.
 
     Worst cases over a population are computed for a response without saturation.
-
-    Raises StudyError if a lamp saturates.
     """
     if study.lights.population is None:
         return
@@ -185,11 +187,11 @@ def check_range(study: Study, sources: Sources) -> None:
             top_dn = float(unquantized(np.array(box.setup.camera.pixel.saturation_e), box.setup.camera.pixel))
             if brightest_dn > top_dn:
                 problem = f"lights of the population exceed the full well or the range of the ADC (CFA {space.cfa})"
-                sources.add(("scenarios", name), problem, f"{brightest_dn:,.0f} DN", f"up to {top_dn:,.0f} DN")
-                raise sources.error
+                yield Fault(("scenarios", name), problem, f"{brightest_dn:,.0f} DN", f"up to {top_dn:,.0f} DN")
+                return
 
 
-def check_luminances(section: StudySection, lights: Lights, sources: Sources) -> None:
+def check_luminances(section: StudySection, lights: Lights) -> Iterator[Fault]:
     """Check that luminances are given only for visible lights and backgrounds."""
     nodes = section.wavelengths.nodes_nm
     visible = (nodes >= VISIBLE_NM[0]) & (nodes <= VISIBLE_NM[1])
@@ -199,7 +201,7 @@ def check_luminances(section: StudySection, lights: Lights, sources: Sources) ->
     for name, scene in section.scenarios.items():
         if scene.intensity_cd is not None and dark:
             problem = f"a light that the eye does not see has no luminous intensity: {dark[0]}"
-            sources.add(("scenarios", name, "intensity_cd"), problem, scene.intensity_cd, allowed)
+            yield Fault(("scenarios", name, "intensity_cd"), problem, scene.intensity_cd, allowed)
         if scene.background_cd_m2 and not visible.any():
             problem = "a background on wavelengths that the eye does not see has no luminance"
-            sources.add(("scenarios", name, "background_cd_m2"), problem, scene.background_cd_m2, allowed)
+            yield Fault(("scenarios", name, "background_cd_m2"), problem, scene.background_cd_m2, allowed)

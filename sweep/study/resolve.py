@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-from ..base.errors import StudyError, SweepError
+from ..base.errors import Fault, StudyError, SweepError, faults_of
 from ..camera.mosaic import Mosaic
+from ..designs.space import Space
+from ..metrics.quantity import RequestedQuantities
 from ..metrics.registry import quantities_of
+from ..metrics.user_metrics import UserMetric
 from . import checks
-from .goals import check_goals, check_searched, search_of
+from .goals import brightness_counts, check_goals, check_searched, search_of
 from .lights import check_luminances, check_range, lights_of, with_light_files, with_population
-from .model import Study, requested_quantities
+from .model import Search, Study, requested_quantities
 from .schema import CfaSection, StudySection
 from .sensors import check_lenses, check_uncertainty, sensor_of, with_chief_rays, with_technologies
 from .sources import Sources
@@ -52,25 +55,23 @@ def resolve(section: StudySection, sources: Sources) -> Study:
         tasks = tasks_of(section.tasks, sources)
     metrics = attempt(lambda: user_metrics(section, sources))
     effects = attempt(lambda: user_effects(section, sources))
-    check_cfas(section, sources)
+    sources.refuse(*check_cfas(section))
     if sensor is not None:
         colorants = None if section.colorants is None else sources.colorants(section.colorants)
         spaces = SpaceBuilder(section, sources, sensor, mosaics, colorants).spaces()
-        check_lenses(section, sensor, spaces, sources)
-        check_uncertainty(section, sensor, spaces, sources)
+        sources.refuse(*check_lenses(section, sensor, spaces), *check_uncertainty(section, sensor, spaces))
+        if section.uncertainty is not None and section.uncertainty.ir_cut_nm and sensor.ir_cut is None:
+            note = f"{sensor.name}: no IR cut is known apart, and `uncertainty.ir_cut_nm` has no effect"
+            sources.warnings.append(note)
         if tasks is not None:
-            check_tasks_in_scenes(tasks, section, sensor, spaces, sources)
-    checks.check_scenes(section, sources)
+            sources.refuse(*check_tasks_in_scenes(tasks, section, sensor, spaces))
+    sources.refuse(*checks.check_scenes(section))
     search = search_of(section, spaces, sources)
     if lights is not None:
         requested = requested_quantities(section, lights, tasks, metrics or ())
-        checks.check_lights(section, lights, mosaics, requested, sources)
-        check_luminances(section, lights, sources)
-        is_whole = metrics is not None and (tasks is not None or section.tasks is None)
-        if is_whole and check_names(metrics or (), requested, spaces, sources):
-            check_goals(section, sources, requested)
-            if search is not None:
-                check_searched(section, search.space, quantities_of(requested), sources)
+        sources.refuse(*checks.check_lights(section, lights, mosaics, requested), *check_luminances(section, lights))
+        if metrics is not None and (tasks is not None or section.tasks is None):
+            sources.refuse(*_goal_faults(section, metrics, requested, spaces, search, sources))
     if sources.issues or sensor is None or lights is None:
         raise sources.error
     study = Study(
@@ -95,13 +96,35 @@ def resolve(section: StudySection, sources: Sources) -> Study:
         colorants=colorants,
     )
     for check in (checks.check_size, try_effects, try_metrics, check_range, checks.check_count):
-        check(study, sources)
+        sources.refuse(*check(study))
+        if sources.issues:
+            raise sources.error
     return study
+
+
+def _goal_faults(
+    section: StudySection,
+    metrics: Sequence[UserMetric],
+    requested: RequestedQuantities,
+    spaces: Sequence[Space],
+    search: Search | None,
+    sources: Sources,
+) -> list[Fault]:
+    """Return what is wrong with objective and constraints; those of metrics with doubtful names are not looked at."""
+    if named := [*check_names(metrics, requested, spaces)]:
+        return named
+    if (note := brightness_counts(section, requested)) is not None:
+        sources.warnings.append(note)
+    written_out = isinstance(sources.document.data.get("objective"), dict)
+    faults = [*check_goals(section, requested, written_out=written_out)]
+    if search is not None:
+        faults += check_searched(section, search.space, quantities_of(requested))
+    return faults
 
 
 def _mosaic(name: str, cfa: CfaSection, sources: Sources) -> Mosaic | None:
     try:
         return Mosaic.from_name(name) if cfa.tile is None else Mosaic.from_rows(name, cfa.tile)
     except SweepError as error:
-        sources.add_error(("cfas", name), error)
+        sources.refuse(*faults_of(("cfas", name), error))
         return None

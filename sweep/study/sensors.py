@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from ..base.errors import DataError
+from ..base.errors import DataError, Fault, unknown
 from ..base.types import Array, Float, FloatArray, PerWavelength
-from ..camera.angular import grazing_ray_issue
+from ..camera.angular import grazing_fault
 from ..camera.sensor import BUILT_IN_SENSORS, SensorCurves, make_sensor
 from ..camera.sensor_field import PLACES, SensorField
 from ..designs.space import Space
@@ -42,7 +42,9 @@ def sensor_of(section: SensorSection, sources: Sources) -> SensorCurves | None:
     if curves is None:
         return None
     if len(curves.values) > 1:
-        sources.add(("sensor", "ir_cut"), "a file of several curves", ", ".join(curves.values), "a file of one curve")
+        sources.refuse(
+            Fault(("sensor", "ir_cut"), "a file of several curves", ", ".join(curves.values), "a file of one curve")
+        )
         return None
     (column,) = curves.values
     cut = sources.used(("sensor", "ir_cut"), entry, "filter", [column])
@@ -76,7 +78,7 @@ def _sensor(section: SensorSection, sources: Sources) -> SensorCurves | None:
             index = next((i for i, entry in enumerate(section.files) if issue.key in entry.columns), None)
             place = ("sensor",) if index is None else ("sensor", "files", index, "columns", issue.key or "")
             path = ("sensor", "clear") if issue.key is None else place
-            sources.add(path, issue.problem, issue.value, issue.allowed, issue.nearest)
+            sources.refuse(Fault(path, issue.problem, issue.value, issue.allowed, issue.nearest))
         return None
     if built_in is None:
         return sensor
@@ -97,12 +99,12 @@ def _curves_of_files(
     for index, entry in files:
         path: KeyPath = ("sensor", "files", index)
         if entry.relative_to is not None and entry.relative_to not in all_known:
-            sources.unknown((*path, "relative_to"), "curve", entry.relative_to, all_known)
+            sources.refuse(unknown((*path, "relative_to"), "curve", entry.relative_to, all_known))
             continue
         factor = entry.scale if entry.relative_to is None else entry.scale * all_known[entry.relative_to]
         for name, values in _columns(sources, path, entry, factor).items():
             if name in curves:
-                sources.add((*path, "columns", name), "the curve is defined twice", name)
+                sources.refuse(Fault((*path, "columns", name), "the curve is defined twice", name))
             curves[name] = values
             if entry.relative_to is None:
                 all_known[name] = values
@@ -183,21 +185,21 @@ def with_technologies(sensor: SensorCurves, section: StudySection, sources: Sour
     for curve in section.sensor.technology:
         path: KeyPath = ("sensor", "technology", curve)
         if curve not in sensor.qe:
-            sources.unknown(path, "curve", curve, sensor.qe)
+            sources.refuse(unknown(path, "curve", curve, sensor.qe))
         elif _moves(stated, curve) and (sensor.qe[curve] > clear * (1 + _ROUNDING)).any():
             problem = f"an interference filter lets through a share of the {kind} curve, {sensor.clear}"
-            sources.add(path, problem, f"{curve} is above it", "pigment")
+            sources.refuse(Fault(path, problem, f"{curve} is above it", "pigment"))
     return stated
 
 
-def check_filter(space: Space, path: KeyPath, sensor: SensorCurves, sources: Sources) -> None:
+def check_filter(space: Space, path: KeyPath, sensor: SensorCurves) -> Iterator[Fault]:
     """Check that the base of a filter is no interference filter and that no filter exceeds its base."""
     candidate = space.filter
     assert candidate is not None
     for base in dict.fromkeys(candidate.bases.values()):
         if _moves(sensor, base):
             problem = f"the base curve {base} is an interference filter itself"
-            sources.add((*path, "base"), problem, base, "a base of pigment")
+            yield Fault((*path, "base"), problem, base, "a base of pigment")
     if candidate.technology is None or candidate.technology.interference is None:
         return
     low, high = (np.array([end(axis) for axis in space.axes], dtype=float) for end in (min, max))
@@ -205,27 +207,24 @@ def check_filter(space: Space, path: KeyPath, sensor: SensorCurves, sources: Sou
     if (candidate.family.upper(low, high) > bases * (1 + _ROUNDING)).any():
         problem = "an interference filter lets through a share of its base"
         exceeded = f"filters that exceed {' and '.join(dict.fromkeys(candidate.bases.values()))}"
-        sources.add((*path, "technology"), problem, exceeded, "a filter below it, or pigment")
+        yield Fault((*path, "technology"), problem, exceeded, "a filter below it, or pigment")
 
 
-def check_lenses(section: StudySection, sensor: SensorCurves, spaces: Sequence[Space], sources: Sources) -> None:
+def check_lenses(section: StudySection, sensor: SensorCurves, spaces: Sequence[Space]) -> Iterator[Fault]:
     """Check that no ray reaches interference filters at grazing angles."""
     filters = [space.filter.technology for space in spaces if space.filter is not None]
     if all(t is None or t.interference is None for t in (*filters, *sensor.technologies.values())):
         return
     for name, scenario in section.scenarios.items():
-        if (refused := grazing_ray_issue(scenario)) is not None:
-            key, problem, value, allowed = refused
-            sources.add(("scenarios", name, *key), problem, value, allowed)
+        if (fault := grazing_fault(scenario)) is not None:
+            yield fault.under("scenarios", name)
 
 
-def check_uncertainty(section: StudySection, sensor: SensorCurves, spaces: Sequence[Space], sources: Sources) -> None:
-    """Check that uncertain curves are of filters that do not move, and say where an IR cut is not known."""
+def check_uncertainty(section: StudySection, sensor: SensorCurves, spaces: Sequence[Space]) -> Iterator[Fault]:
+    """Check that uncertain curves are of filters that do not move."""
     if section.uncertainty is None:
         return
     filters = [space.filter.technology for space in spaces if space.filter is not None]
     if any(t is not None and t.interference is not None for t in (*filters, *sensor.technologies.values())):
         problem = "of filters that do not move with the angle of the light; thin layers do"
-        sources.add(("uncertainty",), problem, None, "no `interference`")
-    if section.uncertainty.ir_cut_nm and sensor.ir_cut is None:
-        sources.warnings.append(f"{sensor.name}: no IR cut is known apart, and `uncertainty.ir_cut_nm` has no effect")
+        yield Fault(("uncertainty",), problem, None, "no `interference`")

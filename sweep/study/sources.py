@@ -12,7 +12,7 @@ from typing import TypeVar
 import numpy as np
 
 from ..base.disk import is_file, is_folder
-from ..base.errors import MOST_ISSUES, DataError, StudyError, SweepError, ValidationIssue, nearest
+from ..base.errors import MOST_ISSUES, DataError, Fault, StudyError, ValidationIssue, faults_of, nearest, unknown
 from ..base.types import PerWavelength
 from ..camera.sensor import SensorCurves
 from ..spectra.builtin.surrogate import BUILT_IN_RANGE_NM
@@ -76,29 +76,21 @@ class Sources:
         """All issues, in the order of their lines."""
         return StudyError(by_line(self.issues))
 
-    def add(
-        self, path: KeyPath, problem: str, value: object = None, allowed: str | None = None, near: str | None = None
-    ) -> None:
-        """Add an issue."""
-        self.issues.append(self.document.issue(path, problem, value, allowed, near))
-
-    def add_error(self, path: KeyPath, error: SweepError) -> None:
-        """Add the issues of an error."""
-        for issue in error.issues:
-            problem = f"{issue.file}: {issue.problem}" if issue.file else issue.problem
-            self.add(path, problem, issue.value, issue.allowed, issue.nearest)
-
-    def unknown(self, path: KeyPath, what: str, value: str, known: Iterable[str], others: Iterable[str] = ()) -> None:
-        """Add an issue for an unknown name."""
-        known = list(known)
-        near = nearest(value, [*known, *others]) if len(self.issues) < MOST_ISSUES else None
-        self.add(path, f"unknown {what}", value, ", ".join(known), near)
+    def refuse(self, *faults: Fault) -> None:
+        """Collect faults."""
+        for fault in faults:
+            near = fault.nearest
+            if fault.known and len(self.issues) < MOST_ISSUES:
+                near = nearest(fault.value, fault.known)
+            self.issues.append(self.document.issue(fault.path, fault.problem, fault.value, fault.allowed, near))
 
     def fits(self, path: KeyPath, what: str, count: int) -> bool:
         """Return True if curves on the wavelength grid fit into memory; add an issue otherwise."""
         most = _MOST_VALUES // self.grid.size
         if count > most:
-            self.add(path, f"too many {what} for a grid of {self.grid.size:,} wavelengths", count, f"at most {most:,}")
+            self.refuse(
+                Fault(path, f"too many {what} for a grid of {self.grid.size:,} wavelengths", count, f"at most {most:,}")
+            )
         return count <= most
 
     def built_in(
@@ -112,13 +104,15 @@ class Sources:
         """Return a built-in sensor or lights on the study's wavelengths, also beyond theirs; None after issues."""
         if name not in known:
             allowed = f"{', '.join(known)}, or a mapping with `files`"
-            self.add(at, f"unknown built-in {at[-1]}", name, allowed, nearest(name, known))
+            self.refuse(Fault(at, f"unknown built-in {at[-1]}", name, allowed, nearest(name, known)))
             return None
         try:
             return known[name](self.grid) if anywhere or self.in_built_in_range("the built-in curves") else None
         except DataError as error:
             (first, *_) = error.issues
-            self.add(("wavelengths",), f"{name} has curves from {first.value}", None, "wavelengths within them")
+            self.refuse(
+                Fault(("wavelengths",), f"{name} has curves from {first.value}", None, "wavelengths within them")
+            )
             return None
 
     def in_built_in_range(self, what: str) -> bool:
@@ -150,7 +144,7 @@ class Sources:
         if not values.any():
             between = f", but between its nodes, {step_nm:g} nm apart" if inside > 0 else ""
             finer = "a finer `wavelengths: {step_nm: ...}`, or `resampling: mean`" if inside > 0 else None
-            self.add(path, f"the light has no photons on the wavelength grid{between}", column, finer)
+            self.refuse(Fault(path, f"the light has no photons on the wavelength grid{between}", column, finer))
             return None
         total = integral_between(wave, raw, wave[0], wave[-1])
         outside = 1 - inside / total
@@ -172,13 +166,13 @@ class Sources:
         if curves is None:
             return None
         if column not in curves.values:
-            self.unknown(path, f"column of {entry.file}", column, curves.values)
+            self.refuse(unknown(path, f"column of {entry.file}", column, curves.values))
             return None
         try:
             return curves.on(self.grid, column, entry.resampling, entry.outside)
         except DataError as error:
             for issue in error.issues:
-                self.add(path, f"{entry.file}, column {column}: {issue.problem}", issue.value, issue.allowed)
+                self.refuse(Fault(path, f"{entry.file}, column {column}: {issue.problem}", issue.value, issue.allowed))
             return None
 
     def stored_curve(self, path: KeyPath, curves: Mapping[_Key, PerWavelength], name: _Key) -> PerWavelength | None:
@@ -187,7 +181,7 @@ class Sources:
         None after adding an issue.
         """
         if name not in curves:
-            self.add(path, "the run kept no such curve", name)
+            self.refuse(Fault(path, "the run kept no such curve", name))
         return curves.get(name)
 
     def curves(self, path: KeyPath, entry: _Entry) -> Curves | None:
@@ -224,7 +218,9 @@ class Sources:
             used = used_as(curves, known, use, stated, scaled=scaled)
         except DataError as error:
             for issue in error.issues:
-                self.add(path, f"{entry.file}, column {issue.key}: {issue.problem}", issue.value, issue.allowed)
+                self.refuse(
+                    Fault(path, f"{entry.file}, column {issue.key}: {issue.problem}", issue.value, issue.allowed)
+                )
             return None
         if entry.file not in self.given and stated is None:
             self.warnings += [f"{entry.file}: {note}" for note in used.notes[len(curves.notes) :]]
@@ -238,7 +234,7 @@ class Sources:
             return Colorants(tuple(stored), np.stack(list(stored.values())), np.ones(len(stored)))
         for name in BUILTIN_COLORANTS.keys() & set(section.catalog):
             if len(section.catalog) > 1:
-                self.add(path, f"the built-in catalog `{name}` goes with no other", section.catalog)
+                self.refuse(Fault(path, f"the built-in catalog `{name}` goes with no other", section.catalog))
                 return None
             return BUILTIN_COLORANTS[name](self.grid)
         places = []
@@ -252,7 +248,7 @@ class Sources:
         try:
             found = read_colorants(places, self.grid)
         except DataError as error:
-            self.add_error(path, error)
+            self.refuse(*faults_of(path, error))
             return None
         content = hashlib.sha256("".join(found.names).encode() + found.absorbance.tobytes() + found.peaks.tobytes())
         self.digests[f"colorants: {', '.join(section.catalog)}"] = content.hexdigest()
@@ -295,7 +291,7 @@ class Sources:
             for folder in self.folders:
                 with suppress(OSError):
                     names += [item.name for item in folder.iterdir()]
-            self.add(path, "no such file", file, f"a path relative to {self.searched}", nearest(file, names))
+            self.refuse(Fault(path, "no such file", file, f"a path relative to {self.searched}", nearest(file, names)))
         return place
 
     @property

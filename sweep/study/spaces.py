@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.errors import SweepError, nearest
+from ..base.errors import Fault, SweepError, faults_of, nearest, unknown
 from ..base.types import PerWavelength
 from ..base.user_code import Offered, is_in_file, offers
 from ..camera.mosaic import Mosaic
@@ -32,12 +32,12 @@ _MOST_DRAWN = 10_000_000
 _FAMILIES: Offered = "sweep.families"
 
 
-def check_cfas(section: StudySection, sources: Sources) -> None:
+def check_cfas(section: StudySection) -> Iterator[Fault]:
     """Check that filters belong to CFAs of the study."""
     for kind, entries in (("designs", section.designs), ("sweeps", section.sweeps), ("boxes", section.boxes)):
         for name, entry in entries.items():
             if entry.cfa not in section.cfas:
-                sources.unknown((kind, name, "cfa"), "CFA", entry.cfa, section.cfas)
+                yield unknown((kind, name, "cfa"), "CFA", entry.cfa, section.cfas)
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class SpaceBuilder:
         entries = (*section.designs.values(), *section.sweeps.values(), *section.boxes.values())
         if section.production.broadening and not any(entry.family in PIGMENTS for entry in entries):
             problem = f"no filter of the study has bands of colorants ({', '.join(PIGMENTS)})"
-            self.sources.add(("production", "broadening"), problem)
+            self.sources.refuse(Fault(("production", "broadening"), problem))
         changed = {(entry.cfa, channel) for entry in entries for channel in entry.channel}
         spaces = []
         for name, mosaic in self.mosaics.items():
@@ -67,10 +67,10 @@ class SpaceBuilder:
             missing = {channel: curve for channel, curve in curves.items() if curve not in self.sensor.qe}
             for channel, curve in missing.items():
                 if (name, channel) not in changed:
-                    self.sources.unknown(("cfas", name), f"curve of channel {channel!r}", curve, self.sensor.qe)
+                    self.sources.refuse(unknown(("cfas", name), f"curve of channel {channel!r}", curve, self.sensor.qe))
             for channel in stated:
                 if channel not in mosaic.channels:
-                    self.sources.unknown(("cfas", name, "curves", channel), "channel", channel, mosaic.channels)
+                    self.sources.refuse(unknown(("cfas", name, "curves", channel), "channel", channel, mosaic.channels))
             if not missing:
                 spaces.append(Space("reference", name, name))
         for name, design in section.designs.items():
@@ -91,7 +91,7 @@ class SpaceBuilder:
         total = sum(axis.size for axes in stated for axis in axes.values())
         if total > _MOST_POINTS:
             allowed = f"at most {_MOST_POINTS:,} in all axes together"
-            self.sources.add(("sweeps",), "too many values of parameters", f"{total:,}", allowed)
+            self.sources.refuse(Fault(("sweeps",), "too many values of parameters", f"{total:,}", allowed))
         return total <= _MOST_POINTS
 
     def _at(self, name: str, design: DesignSection) -> Mapping[str, float]:
@@ -100,11 +100,11 @@ class SpaceBuilder:
             numbers = {} if self.colorants is None else self.colorants.numbers
             for key, value in design.at.items():
                 if isinstance(value, str) and value not in numbers:
-                    self.sources.unknown(("designs", name, "at", key), "colorant", value, numbers)
+                    self.sources.refuse(unknown(("designs", name, "at", key), "colorant", value, numbers))
             return {key: numbers.get(value, 1) if isinstance(value, str) else value for key, value in design.at.items()}
         known = surrogate_parameters().stopbands
         if design.at not in known:
-            self.sources.unknown(("designs", name, "at"), "built-in filter", design.at, known)
+            self.sources.refuse(unknown(("designs", name, "at"), "built-in filter", design.at, known))
             return {}
         return known[design.at].model_dump()
 
@@ -112,30 +112,36 @@ class SpaceBuilder:
         """Check that a family replaces channels of the CFA, as many as it wants, each once."""
         for key, value in (("channel", entry.channel), ("base", entry.base)):
             if not value:
-                self.sources.add((*path, key), "missing")
+                self.sources.refuse(Fault((*path, key), "missing"))
         stated = entry.technology
         absorbs = entry.family in PIGMENTS
         if self.section.production.thickness and not absorbs and stated is not None and stated.interference is None:
             problem = "a pigment has no films that come out too thick (`production.thickness`)"
-            self.sources.add((*path, "technology"), problem, PIGMENT, "interference, or nothing stated")
+            self.sources.refuse(Fault((*path, "technology"), problem, PIGMENT, "interference, or nothing stated"))
         for channel in entry.channel:
             if mosaic is not None and channel not in mosaic.channels:
-                self.sources.unknown((*path, "channel"), f"channel of {entry.cfa}", channel, mosaic.channels)
+                self.sources.refuse(unknown((*path, "channel"), f"channel of {entry.cfa}", channel, mosaic.channels))
         external = is_from_outside(entry.family, _FAMILIES, FAMILIES)
         if external and not allowed(self.sources, (*path, "family"), entry.family):
             return
         if absorbs and stated is not None and stated.interference is not None:
-            self.sources.add((*path, "technology"), f"{entry.family} is of colorants", stated.description, PIGMENT)
+            self.sources.refuse(
+                Fault((*path, "technology"), f"{entry.family} is of colorants", stated.description, PIGMENT)
+            )
         if external and self.section.production.tolerance:
-            self.sources.add((*path, "family"), "a family of one's own has no edges that production could shift")
+            self.sources.refuse(
+                Fault((*path, "family"), "a family of one's own has no edges that production could shift")
+            )
         elif not external and entry.family not in FAMILIES:
-            self.sources.unknown((*path, "family"), "family", entry.family, [*FAMILIES, *offers(_FAMILIES)])
+            self.sources.refuse(unknown((*path, "family"), "family", entry.family, [*FAMILIES, *offers(_FAMILIES)]))
         elif entry.channel and len(entry.channel) != (
             n_modified := 1 if external else FAMILIES[entry.family].n_modified
         ):
-            self.sources.add((*path, "channel"), f"{entry.family} replaces {n_modified} channel(s)", entry.channel)
+            self.sources.refuse(
+                Fault((*path, "channel"), f"{entry.family} replaces {n_modified} channel(s)", entry.channel)
+            )
         elif len(set(entry.channel)) < len(entry.channel):
-            self.sources.add((*path, "channel"), "a channel is named twice", entry.channel)
+            self.sources.refuse(Fault((*path, "channel"), "a channel is named twice", entry.channel))
 
     def _filtered(
         self,
@@ -151,7 +157,7 @@ class SpaceBuilder:
         mosaic = self.mosaics.get(entry.cfa)
         for key, curve in (("base", entry.base), ("to", entry.to)):
             if isinstance(curve, str) and curve not in self.sensor.qe:
-                self.sources.unknown((*path, key), "curve", curve, self.sensor.qe)
+                self.sources.refuse(unknown((*path, key), "curve", curve, self.sensor.qe))
         self._check_channels(path, entry, mosaic)
         unread = self.section.colorants is not None and self.colorants is None
         if len(self.sources.issues) > before or mosaic is None or unread:  # these have issues of their own
@@ -164,12 +170,12 @@ class SpaceBuilder:
         try:
             family = self._family(entry, base, target)
         except SweepError as error:
-            self.sources.add_error((*path, "family"), error)
+            self.sources.refuse(*faults_of((*path, "family"), error))
             return []
         ordered = self._axes(axes, axes_path, family.parameters)
         if rows is not None and rows.size * len(ordered) > _MOST_DRAWN:
             allowed = f"at most {_MOST_DRAWN // len(ordered):,} designs of {len(ordered)} parameters"
-            self.sources.add(path, "too many designs that are no grid", f"{rows.size:,}", allowed)
+            self.sources.refuse(Fault(path, "too many designs that are no grid", f"{rows.size:,}", allowed))
         if isinstance(family, ChoosingFamily):
             self._check_numbers(family, ordered, rows, axes_path)
         if len(self.sources.issues) > before:
@@ -177,8 +183,7 @@ class SpaceBuilder:
         target_name = "" if entry.to is None else str(entry.to)
         candidate = Filter(family, dict.fromkeys(entry.channel, entry.base), target_name, entry.technology)
         space = Space(kind, name, entry.cfa, candidate, tuple(ordered), kind != "search" and rows is None, rows)
-        check_filter(space, path, self.sensor, self.sources)
-        _check_formed(space, axes_path, self.sources)
+        self.sources.refuse(*check_filter(space, path, self.sensor), *_check_formed(space, axes_path))
         return [space]
 
     def _check_numbers(
@@ -187,9 +192,13 @@ class SpaceBuilder:
         """Check that numbers of a catalog are whole, and in a box from one range for all."""
         numbers = [axes[number] for number, _ in family.slots]
         if isinstance(rows, SampledDesigns) or any(value != round(value) for axis in numbers for value in axis):
-            self.sources.add((*path, "colorant_1"), "colorants have whole numbers", None, "a list of them, or a grid")
+            self.sources.refuse(
+                Fault((*path, "colorant_1"), "colorants have whole numbers", None, "a list of them, or a grid")
+            )
         if path[-1] == "box" and len({(min(axis), max(axis)) for axis in numbers if axis}) > 1:
-            self.sources.add((*path, "colorant_2"), "the range is not that of `colorant_1`", None, "one range for all")
+            self.sources.refuse(
+                Fault((*path, "colorant_2"), "the range is not that of `colorant_1`", None, "one range for all")
+            )
 
     def _family(self, entry: Modification, base: PerWavelength, target: PerWavelength | None) -> Family:
         """Return the family over its curves; raises SweepError."""
@@ -215,7 +224,7 @@ class SpaceBuilder:
         known = [parameter.name for parameter in parameters]
         misspelled = [name for name in axes if name not in known]
         for name in misspelled:
-            self.sources.unknown((*path, name), "parameter", name, known)
+            self.sources.refuse(unknown((*path, name), "parameter", name, known))
         meant = {nearest(name, known) for name in misspelled}
         ordered = []
         for parameter in parameters:
@@ -224,21 +233,21 @@ class SpaceBuilder:
                 usual = (parameter.low, parameter.high)
             values = axes.get(parameter.name, usual)
             if not values and parameter.name not in meant:
-                self.sources.add((*path, parameter.name), "missing")
+                self.sources.refuse(Fault((*path, parameter.name), "missing"))
             for value in (min(values), max(values)) if values else ():
                 if not parameter.low <= value <= parameter.high:
                     allowed = f"{parameter.low:g} to {parameter.high:g}"
-                    self.sources.add((*path, parameter.name), "out of range", value, allowed)
+                    self.sources.refuse(Fault((*path, parameter.name), "out of range", value, allowed))
                     break
             ordered.append(values)
         return ordered
 
 
-def _check_formed(space: Space, path: KeyPath, sources: Sources) -> None:
+def _check_formed(space: Space, path: KeyPath) -> Iterator[Fault]:
     """Check that a grid names each value once, and that some filter is well-formed: its edges are in order."""
     twice = {name for name, axis in zip(space.parameters, space.axes, strict=True) if len({*axis}) < len(axis)}
     for name in sorted(twice) if path[-1] == "grid" else ():
-        sources.add((*path, name), "a value twice", None, "different values")
+        yield Fault((*path, name), "a value twice", None, "different values")
     if space.filter is None or isinstance(space.filter.family, PluginFamily):
         return
     if isinstance(space.rows, PairedDesigns):
@@ -251,7 +260,7 @@ def _check_formed(space: Space, path: KeyPath, sources: Sources) -> None:
     if beyond > _OUT_OF_ORDER_NM:
         which = "is inverted" if space.kind == "design" else "has no filter whose edges are in order"
         problem = f"{space.name} {which}: one edge lies {beyond:.6g} nm behind the next, or more"
-        sources.add(path[:-1], problem, None, "left edges before right ones, at both ends of the edges")
+        yield Fault(path[:-1], problem, None, "left edges before right ones, at both ends of the edges")
 
 
 def _sweep_axes(sweep: SweepSection, seed: int) -> tuple[str, dict[str, tuple[float, ...]], ListedDesigns | None]:

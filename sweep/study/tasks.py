@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from ..base.errors import Fault, unknown
 from ..base.types import FloatArray, PerWavelength
 from ..camera.pixel import Pixel, irradiance_factor
 from ..camera.scene import Scene
@@ -35,7 +36,7 @@ def tasks_of(section: TasksSection, sources: Sources) -> StudyTasks | None:
         sources.in_built_in_range("the spectra of the tasks")
     for name in section.shipped:
         if name not in SHIPPED:
-            sources.unknown((*_AT, "shipped"), "task", name, SHIPPED)
+            sources.refuse(unknown((*_AT, "shipped"), "task", name, SHIPPED))
     if len(sources.issues) > before:
         return None
     from_files: dict[tuple[str, str], FloatArray] = {}
@@ -57,10 +58,10 @@ def _user_task(
     before, at = len(sources.issues), (*_AT, "own", name)
     for light in task.under:
         if light not in ILLUMINANTS:
-            sources.unknown((*at, "under"), "light", light, ILLUMINANTS)
+            sources.refuse(unknown((*at, "under"), "light", light, ILLUMINANTS))
     if len(set(task.under)) < len(task.under):
-        sources.add((*at, "under"), "a light is named twice", task.under)
-    _check_names(name, task, at, sources)
+        sources.refuse(Fault((*at, "under"), "a light is named twice", task.under))
+    sources.refuse(*_check_names(name, task, at))
     if len(sources.issues) > before:
         return None
     classes: dict[str, FloatArray] = {}
@@ -72,7 +73,7 @@ def _user_task(
             if isinstance(entry, str):
                 spectra += list(spectra_of_group(sources.grid, entry))
             elif entry.file in files:
-                sources.add((*path, "file"), "the class has this file already", entry.file)
+                sources.refuse(Fault((*path, "file"), "the class has this file already", entry.file))
             else:
                 files.add(entry.file)
                 owner = f"{name} {kind}"
@@ -84,15 +85,15 @@ def _user_task(
     pairs = (sum(sizes) ** 2 - sum(size**2 for size in sizes)) // 2
     if len(sources.issues) == before and pairs > _MOST_PAIRS:
         allowed = f"at most {_MOST_PAIRS:,}: fewer spectra"
-        sources.add((*at, "classes"), "too many pairs of spectra", pairs, allowed)
+        sources.refuse(Fault((*at, "classes"), "too many pairs of spectra", pairs, allowed))
     return separation_task(sources.grid, name, classes, task.under) if len(sources.issues) == before else None
 
 
-def _check_names(name: str, task: UserTask, path: KeyPath, sources: Sources) -> None:
+def _check_names(name: str, task: UserTask, path: KeyPath) -> Iterator[Fault]:
     """Check that its groups and lights are known, and that its classes are all lamps, or all surfaces."""
     known = task_groups()
     if name in SHIPPED:
-        sources.add(path, "a task of the package has this name", name, "another name")
+        yield Fault(path, "a task of the package has this name", name, "another name")
     surfaces = set()
     for kind, entries in task.classes.items():
         for entry in entries:
@@ -102,15 +103,15 @@ def _check_names(name: str, task: UserTask, path: KeyPath, sources: Sources) -> 
                 surfaces.add(is_surface(entry))
             elif is_curve_file(entry):
                 allowed = f"{{file: {entry}, quantity: reflectance}}, or energy, or photons"
-                sources.add((*path, "classes", kind), "the unit of its numbers is missing", entry, allowed)
+                yield Fault((*path, "classes", kind), "the unit of its numbers is missing", entry, allowed)
             else:
-                sources.unknown((*path, "classes", kind), "group of spectra", entry, known)
+                yield unknown((*path, "classes", kind), "group of spectra", entry, known)
     if len(surfaces) > 1:
-        sources.add((*path, "classes"), "a task is of lamps, or of surfaces", list(task.classes), "one of both")
+        yield Fault((*path, "classes"), "a task is of lamps, or of surfaces", list(task.classes), "one of both")
     elif surfaces == {True} and not task.under:
-        sources.add((*path, "under"), "surfaces need light", None, ", ".join(ILLUMINANTS))
+        yield Fault((*path, "under"), "surfaces need light", None, ", ".join(ILLUMINANTS))
     elif surfaces == {False} and task.under:
-        sources.add((*path, "under"), "lamps are seen by their own light", task.under, "leave it out")
+        yield Fault((*path, "under"), "lamps are seen by their own light", task.under, "leave it out")
 
 
 def _kept(owner: str, path: KeyPath, entry: TaskFile, sources: Sources) -> dict[str, PerWavelength]:
@@ -123,7 +124,7 @@ def _kept(owner: str, path: KeyPath, entry: TaskFile, sources: Sources) -> dict[
         if of == owner and name.startswith(start)
     }
     if not spectra or not set(entry.columns or ()) <= spectra.keys():
-        sources.add(path, "the run kept no such curve", entry.file)
+        sources.refuse(Fault(path, "the run kept no such curve", entry.file))
     return spectra
 
 
@@ -135,7 +136,7 @@ def _read(path: KeyPath, entry: TaskFile, sources: Sources) -> dict[str, PerWave
         return {}
     names = list(curves.values) if entry.columns is None else entry.columns
     if len(set(names)) < len(names):
-        sources.add((*path, "columns"), "a column is named twice", names)
+        sources.refuse(Fault((*path, "columns"), "a column is named twice", names))
     if not sources.fits(path, "spectra", len(names)):
         return {}
     spectra = {}
@@ -143,7 +144,7 @@ def _read(path: KeyPath, entry: TaskFile, sources: Sources) -> dict[str, PerWave
         if entry.quantity == "reflectance":
             values = sources.column(path, curves, name, entry)
             if values is not None and not values.any():
-                sources.add(path, f"{entry.file}: the surface reflects nothing on the wavelength grid", name)
+                sources.refuse(Fault(path, f"{entry.file}: the surface reflects nothing on the wavelength grid", name))
         else:
             values = sources.photons(path, curves, name, entry)
         if values is not None:
@@ -152,12 +153,12 @@ def _read(path: KeyPath, entry: TaskFile, sources: Sources) -> dict[str, PerWave
 
 
 def check_tasks_in_scenes(
-    tasks: StudyTasks, section: StudySection, sensor: SensorCurves, spaces: Sequence[Space], sources: Sources
-) -> None:
-    """Add issues for a task whose filter depends on the angle, or whose patches saturate a pixel."""
+    tasks: StudyTasks, section: StudySection, sensor: SensorCurves, spaces: Sequence[Space]
+) -> Iterator[Fault]:
+    """Find a task whose filter depends on the angle, or whose patches saturate a pixel."""
     filters = [space.filter.technology for space in spaces if space.filter is not None]
     if any(t is not None and t.interference is not None for t in (*filters, *sensor.technologies.values())):
-        sources.add(
+        yield Fault(
             _AT, "tasks see filters that do not move with the angle of the light", None, "no interference filter"
         )
     for name, scene in section.scenarios.items():
@@ -165,7 +166,7 @@ def check_tasks_in_scenes(
         most = min(section.pixel.well_e, section.pixel.full_scale_dn / section.pixel.dn_per_e)
         if electrons > most:
             value = f"{electrons:.3g} electrons in scenario {name}"
-            sources.add((*_AT, "exposure_s"), "a patch of a task fills the well", value, f"at most {most:.3g}")
+            yield Fault((*_AT, "exposure_s"), "a patch of a task fills the well", value, f"at most {most:.3g}")
 
 
 def _most_electrons(

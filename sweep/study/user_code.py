@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from ..base.disk import is_file
-from ..base.errors import SweepError, ValidationIssue
+from ..base.errors import Fault, SweepError, ValidationIssue, faults_of, unknown
 from ..base.user_code import CODE_OF, Installed, Offered, UserCode, file_of, installed, is_in_file, offers, read_code
 from ..camera.irradiance import scene_irradiance
 from ..camera.scene import Scene
@@ -53,7 +53,7 @@ def allowed(sources: Sources, path: KeyPath, name: str) -> bool:
     if not sources.allow_code:
         whose = "a Python file" if is_in_file(name) else "a plugin of an installed package"
         problem = f"the study names {whose}, whose code would run"
-        sources.add(path, problem, name, "--allow-code, if you trust it")
+        sources.refuse(Fault(path, problem, name, "--allow-code, if you trust it"))
     return bool(sources.allow_code)
 
 
@@ -109,10 +109,10 @@ def offered_curves(sources: Sources, at: KeyPath, section: _Curves, group: Offer
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
-        sources.add(at, f"the plugin gives no such section: {where}: {first['msg']}", name)
+        sources.refuse(Fault(at, f"the plugin gives no such section: {where}: {first['msg']}", name))
         raise sources.error from None
     except SweepError as error:
-        sources.add_error(at, error)
+        sources.refuse(*faults_of(at, error))
         raise sources.error from None
     package: Installed | None = installed(group, name)
     sources.folders = [*([] if package is None else package.folders), *sources.folders]
@@ -158,38 +158,35 @@ def _read_user_code(
     for index, name in enumerate(names):
         path: KeyPath = (key, index) if is_list else (key,)
         if not is_from_outside(name, group, ()):
-            sources.unknown(path, key.removesuffix("s"), name, offers(group) or ["FILE.py:NAME"])
+            sources.refuse(unknown(path, key.removesuffix("s"), name, offers(group) or ["FILE.py:NAME"]))
         elif allowed(sources, path, name):
             try:
                 loaded.append(make(code_of(sources, name, group)))
             except SweepError as error:
                 if str(error) not in failed:  # several names may be of one file
-                    sources.add_error(path, error)
+                    sources.refuse(*faults_of(path, error))
                 failed.add(str(error))
     if len(loaded) < len(names):
         raise sources.error
     return tuple(loaded)
 
 
-def try_effects(study: Study, sources: Sources) -> None:
-    """Apply the user's effects in every scenario.
-
-    Raises StudyError if one fails.
-    """
+def try_effects(study: Study) -> Iterator[Fault]:
+    """Apply the user's effects in every scenario, up to the first that fails."""
     for name in study.scenarios if study.user_effects else ():
         try:
             scene_irradiance(study.setup(study.spaces[0], name))
         except SweepError as error:
-            sources.add_error(("effects",), error)
-            raise sources.error from None
+            yield from faults_of(("effects",), error)
+            return
 
 
 def check_names(
-    user_metrics: Sequence[UserMetric], requested: RequestedQuantities, spaces: Sequence[Space], sources: Sources
-) -> bool:
-    """Return True if every column has a single meaning; add an issue otherwise."""
+    user_metrics: Sequence[UserMetric], requested: RequestedQuantities, spaces: Sequence[Space]
+) -> Iterator[Fault]:
+    """Check that every column has a single meaning."""
     if not user_metrics:
-        return True
+        return
     widest = replace(
         requested, user_metrics=(), states=requested.classes, any_place=True, edge_shift=True, population=True
     )
@@ -198,36 +195,27 @@ def check_names(
     for metric in user_metrics:
         if metric.name in taken:
             problem = "another column has this name; the metric can say `name`"
-            sources.add(("metrics",), problem, metric.name, "another name")
-            return False
+            yield Fault(("metrics",), problem, metric.name, "another name")
+            return
         taken.add(metric.name)
-    return True
 
 
-def try_metrics(study: Study, sources: Sources) -> None:
-    """Compute the user's metrics of every CFA, for a light that fills the field.
-
-    Raises StudyError if one fails.
-    """
-    setups = (
-        {space.cfa: study.setup(space, next(iter(study.scenarios))) for space in study.spaces}
-        if study.user_metrics
-        else {}
-    )
+def try_metrics(study: Study) -> Iterator[Fault]:
+    """Compute the user's metrics of every CFA, for a light that fills the field."""
+    if not study.user_metrics:
+        return
+    setups = {space.cfa: study.setup(space, next(iter(study.scenarios))) for space in study.spaces}
     searched = None if study.search is None else study.search.space.cfa
     requested = {*study.objective.weights, *study.constraints}
-    without_metric: dict[str, list[str]] = {metric.name: [] for metric in study.user_metrics}
     for metric in study.user_metrics:
-        for cfa, setup in setups.items():
-            try:
-                without_metric[metric.name] += [] if _tried(metric, setup) else [cfa]
-            except SweepError as error:
-                sources.add_error(("metrics",), error)
-                break  # it fails on the others, too
-        if searched in without_metric[metric.name] and {metric.name, WORST + metric.name} & requested:
-            sources.add(("metrics",), f"{metric.code.name} gives None for {searched}, which is searched", metric.name)
-    if sources.issues:
-        raise sources.error
+        without: list[str] = []
+        try:
+            without = [cfa for cfa, setup in setups.items() if not _tried(metric, setup)]
+        except SweepError as error:
+            yield from faults_of(("metrics",), error)  # it fails on the other CFAs, too
+        if searched in without and {metric.name, WORST + metric.name} & requested:
+            problem = f"{metric.code.name} gives None for {searched}, which is searched"
+            yield Fault(("metrics",), problem, metric.name)
 
 
 def _tried(metric: UserMetric, setup: Setup) -> bool:

@@ -104,8 +104,8 @@ def test_an_image_that_is_too_much_is_named(
     distance_m: float, diameter_m: float, optics: Optics, place: tuple[str, ...] | None
 ) -> None:
     target = Target(distance_m=distance_m, diameter_m=diameter_m, fov_deg=60.0)
-    result = psf.psf_problem(Scene(target=target, optics=optics), Pixel())
-    assert (result if place is None else result and result[0]) == place
+    result = psf.image_fault(Scene(target=target, optics=optics), Pixel())
+    assert (None if result is None else result.path) == place
 
 
 def test_pixels_of_a_lattice_are_computed_once(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,7 @@ from sweep.camera import sampling
 from sweep.camera.disc_image import covered, light_on_pixels
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
-from sweep.camera.psf import DiscProfile, otf, psf_problem
+from sweep.camera.psf import DiscProfile, otf, image_fault
 from sweep.camera.scene import Scene
 from sweep.metrics.smooth import smooth_response
 
@@ -248,8 +248,8 @@ def size_limit() -> Result:
 
     def refusal(across_px: float, f_number: float) -> str | None:
         scenario = Scene.model_validate(disc_scene(across_px) | {"optics": {"f_number": f_number}})
-        found = psf_problem(scenario, Pixel())
-        return None if found is None else found[1]
+        found = image_fault(scenario, Pixel())
+        return None if found is None else found.problem
 
     sizes = [refusal(across, 4.0) for across in (1e-3, 127.99, 128.01, 1000.0)]
     numbers = [refusal(30.0, f_number) for f_number in (0.4, 0.5, 1000.0)]
