@@ -68,7 +68,9 @@ def build_family(
             ValidationIssue("unknown family", value=kind, allowed=allowed, nearest=nearest(kind, FAMILIES))
         )
     if (target is not None) != family.needs_target:
-        raise SweepError(ValidationIssue(f"{kind} {'needs' if family.needs_target else 'has no'} `to`"))
+        allowed = "to: a curve, or a share of the base from 0 to 1" if family.needs_target else "no `to`"
+        problem = f"{kind} {'needs' if family.needs_target else 'has no'} `to`"
+        raise SweepError(ValidationIssue(problem, allowed=allowed))
     given = {name: value for name in FamilyOptions.model_fields if (value := getattr(options, name)) is not None}
     known_options = family.Options.model_fields
     needed = {name for name, field in known_options.items() if field.is_required()}

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
+from ..base.errors import Fault
 from ..base.types import Number, Section
 from ..camera.scene import Scene
 from .schema_curves import Name
@@ -106,24 +107,24 @@ def expanded(value: Any) -> Any:
             continue
         each = entry["each"]
         if not isinstance(each, dict) or not each:
-            raise ValueError(f"{name}: `each` maps keys such as target.distance_m to values")
-        axes = [_numbers(f"{name}: each.{key}", axis) for key, axis in each.items()]
+            raise Fault((name, "each"), "no mapping of keys", each, "{target.distance_m: [20, 50]}")
+        axes = [_numbers((name, "each", key), axis) for key, axis in each.items()]
         count = math.prod(map(len, axes))
         if count + len(scenarios) > _MOST_SCENARIOS:
-            raise ValueError(f"{name}: more than {_MOST_SCENARIOS} scenarios")
+            raise Fault((name, "each"), "too many scenarios", f"{count:,}", f"at most {_MOST_SCENARIOS:,} in a study")
         if count * _size(entry) > _MOST_KEYS:
-            raise ValueError(f"{name}: more than {_MOST_KEYS:,} keys in all that `each` makes of it")
+            raise Fault((name, "each"), "too many keys in all scenarios that it makes", None, f"at most {_MOST_KEYS:,}")
         for point in product(*axes):
             scenario = deepcopy({key: inner for key, inner in entry.items() if key != "each"})
             full = str(name)
             for key, number in zip(map(str, each), point, strict=True):
-                _set(scenario, key.split("."), number)
+                _set(scenario, str(name), key, number)
                 full += f" {key.rsplit('.', 1)[-1]}={number:.12g}"
             if full in scenarios:
-                raise ValueError(f"{name}: two scenarios are named {full!r}")
+                raise Fault((name,), "two scenarios have one name", full, "other names, or other values")
             scenarios[full] = scenario
     if len(scenarios) > _MOST_SCENARIOS:
-        raise ValueError(f"more than {_MOST_SCENARIOS} scenarios")
+        raise Fault((), "too many scenarios", len(scenarios), f"at most {_MOST_SCENARIOS:,}")
     return scenarios
 
 
@@ -133,25 +134,28 @@ def _size(value: Any) -> int:
     return 1 + sum(map(_size, inner))
 
 
-def _numbers(where: str, axis: Any) -> tuple[float, ...]:
+def _numbers(path: tuple[str, ...], axis: Any) -> tuple[float, ...]:
     """Values of one key of `each`; whole numbers of a list stay whole."""
     try:
         checked = Axis.model_validate(_axis(axis))
     except ValidationError:
-        raise ValueError(f"{where}: {FORMS}") from None
+        texts = [value for value in axis if isinstance(value, str)] if isinstance(axis, list) else []
+        value = texts[0] if texts else axis if isinstance(axis, str | bool) else None
+        raise Fault(path, "not a number" if texts else "no values", value, FORMS) from None
     if checked.size > _MOST_SCENARIOS:
-        raise ValueError(f"{where}: more than {_MOST_SCENARIOS} scenarios")
+        raise Fault(path, "too many values", f"{checked.size:,}", f"at most {_MOST_SCENARIOS:,}")
     return tuple(axis) if isinstance(axis, list) else checked.points()
 
 
-def _set(mapping: dict[str, Any], path: list[str], number: float) -> None:
-    """Put a number at a dotted path."""
+def _set(mapping: dict[str, Any], name: str, dotted: str, number: float) -> None:
+    """Put a number at a dotted path of a scenario."""
+    path = dotted.split(".")
     for key in path[:-1]:
         if mapping.get(key) is True:  # switched on, with its defaults
             mapping[key] = {}
         mapping = mapping.setdefault(key, {})
         if not isinstance(mapping, dict):
-            raise ValueError(f"each: {key} is no mapping")
+            raise Fault((name, "each", dotted), f"{key} is no mapping in this scenario", None, "a key of a mapping")
     mapping[path[-1]] = number
 
 

@@ -43,6 +43,21 @@ _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?|[-+]?\
 _LOOKS_LIKE_A_NUMBER = re.compile(r"[-+.]*[0-9][-+.0-9xo_a-fA-F]*")
 _SURROGATE = re.compile("[\ud800-\udfff]")
 """Half of a character: `\\ud800`. No file takes it."""
+_NOT_ALLOWED = "not allowed"
+_YAML_FAULTS: tuple[tuple[str, str, bool], ...] = (
+    ("found character '\\t'", "a tab begins a value; allowed: spaces", False),
+    ("found '<block mapping start>'", "the line is indented otherwise than the one before it", False),
+    ("found '<block sequence start>'", "the line is indented otherwise than the one before it", False),
+    (
+        "mapping values are not allowed here",
+        "a second colon, or the line is indented otherwise than the one before it",
+        False,
+    ),
+    ("could not find expected ':'", "no `key: value`; after a colon comes a space", True),
+    ("expected ',' or '}'", "a `{` that begins here is not closed, or a comma is missing", True),
+    ("expected ',' or ']'", "a `[` that begins here is not closed, or a comma is missing", True),
+)
+"""What a part of ruamel's message means, and whether its place is where the part of the text begins."""
 _YAML_1_1_BOOLEANS = {"yes": "true", "on": "true", "y": "true", "no": "false", "off": "false", "n": "false"}
 
 Key = str | int
@@ -70,9 +85,10 @@ class Tree:
         try:
             root = yaml.compose(StringIO(text))
         except MarkedYAMLError as error:
-            line = None if error.problem_mark is None else error.problem_mark.line + 1
-            problem = ", ".join(part for part in (error.context, error.problem) if part)
-            raise self._error(f"not valid YAML: {problem}", line) from None
+            said = ", ".join(part for part in (error.context, error.problem) if part)
+            words, begins = next((told for part, *told in _YAML_FAULTS if part in said), (said, False))
+            mark = (begins and error.context_mark) or error.problem_mark
+            raise self._error(f"not valid YAML: {words}", None if mark is None else mark.line + 1) from None
         except ReaderError as error:
             line = text.count("\n", 0, int(error.position)) + 1
             raise self._error(f"not valid YAML: the character {error.character!r}", line) from None
@@ -245,12 +261,13 @@ class Document:
         """
         node: Any = self.data
         place: Place = 1
-        for part in path:
+        for at, part in enumerate(path):
             key = _written(node, part)
             if isinstance(node, list) and isinstance(part, str) and part in node:
                 key = node.index(part)  # a list of names, which is read as a mapping
             if not _has(node, key):
-                return place
+                each, rest = _child(node, "each"), ".".join(map(str, path[at:]))
+                return (self._tree.place(each, rest) or place) if _has(each, rest) else place
             place = self._tree.place(node, key) or place
             node = node[key]
         keys = node if isinstance(node, dict) else range(len(node)) if isinstance(node, list) else ()
@@ -277,18 +294,24 @@ class Document:
         schema = model.model_json_schema() if any(item["type"] == "extra_forbidden" for item in items) else {}
         meant = set()
         for item in islice(items, _MOST_LOOKED_AT):
-            path = self._path(item["loc"])
+            path = self._path(item["loc"], missing=item["type"] in ("missing", "extra_forbidden"))
             issue = self._issue(path, item, schema)
             issues.setdefault((path, issue.problem), issue)
             if item["type"] == "extra_forbidden":
                 meant.add((*path[:-1], issue.nearest))
-        # A misspelled key is one issue, not a second one because the right key is missing.
-        shown = [issue for (path, problem), issue in issues.items() if problem != "missing" or path not in meant]
+        # A misspelled key is one issue, not a second one because the right key is missing; and a fault inside a value
+        # is no second one because another form of the value would not fit either.
+        above = {path[:end] for path, _ in issues for end in range(len(path))}
+        shown = [
+            issue
+            for (path, problem), issue in issues.items()
+            if not (problem == "missing" and path in meant) and not (problem == _NOT_ALLOWED and path in above)
+        ]
         more = len(items) - _MOST_LOOKED_AT
         return by_line(shown) + ([ValidationIssue(f"and about {more:,} more errors", self.file)] if more > 0 else [])
 
-    def _path(self, loc: Sequence[Key]) -> KeyPath:
-        """Return `loc` without the tags that pydantic adds for unions, and with a missing last key kept."""
+    def _path(self, loc: Sequence[Key], *, missing: bool) -> KeyPath:
+        """Return `loc` without the tags that pydantic adds for unions; with its last key if that is `missing`."""
         node: Any = self.data
         path: list[Key] = []
         varied: set[Key] = set()
@@ -299,12 +322,12 @@ class Document:
             if _has(node, key):
                 path.append(key)
                 node = node[key]
-            elif key in varied or (isinstance(node, dict) and position == len(loc) - 1):
+            elif key in varied or (isinstance(node, dict) and position == len(loc) - 1 and missing):
                 path.append(key)
         return tuple(path)
 
     def _issue(self, path: KeyPath, item: Any, schema: dict[str, Any]) -> ValidationIssue:
-        kind, value, context = item["type"], item["input"], item.get("ctx", {})
+        kind, context = item["type"], item.get("ctx", {})
         tag = str(context.get("discriminator")).strip("'")
         if kind == "extra_forbidden":
             known = _known_keys(schema, path[:-1], self.data)
@@ -315,15 +338,26 @@ class Document:
         if kind in ("missing", "value_error", "union_tag_not_found"):
             place = (*path, tag) if kind == "union_tag_not_found" else path
             return self.issue(place, str(context["error"]) if kind == "value_error" else "missing")
-        if kind == "union_tag_invalid":
-            got = value.get(tag) if isinstance(value, dict) else value
-            return self.issue((*path, tag), "unknown kind", got, context.get("expected_tags", ""))
-        shown = value if not isinstance(value, dict | list) else type(value).__name__
-        if kind == "bool_type" and (meant := _YAML_1_1_BOOLEANS.get(str(value).casefold())):
-            return self.issue(path, f"true or false expected: write {meant}", shown)
-        allowed = item["msg"].removeprefix("Input should be ").removeprefix("a valid ")
-        allowed = "mapping" if allowed.startswith("dictionary") else allowed
-        return self.issue(path, "not allowed", shown, "true or false" if allowed == "boolean" else allowed)
+        return self.issue(*_of_value(path, item))
+
+
+def _of_value(path: KeyPath, item: Any) -> tuple[KeyPath, str, object, str | None, str | None]:
+    """Return place, problem, value, what is allowed and the nearest name of a value that pydantic refuses."""
+    kind, value, context = item["type"], item["input"], item.get("ctx", {})
+    if kind == "union_tag_invalid":
+        tag, known = str(context["discriminator"]).strip("'"), str(context["expected_tags"]).replace("'", "")
+        got = value.get(tag) if isinstance(value, dict) else value
+        return (*path, tag), "unknown kind", got, known, nearest(got, known.split(", "))
+    if kind == "too_short":
+        return path, "too few entries", context["actual_length"], f"{context['min_length']} or more", None
+    if kind == "too_long":
+        return path, "too many entries", context["actual_length"], f"at most {context['max_length']:,}", None
+    shown = "a mapping" if isinstance(value, dict) else "a list" if isinstance(value, list) else value
+    if kind == "bool_type" and (meant := _YAML_1_1_BOOLEANS.get(str(value).casefold())):
+        return path, f"true or false expected: write {meant}", shown, None, None
+    allowed = item["msg"].removeprefix("Input should be ").removeprefix("a valid ")
+    allowed = {"boolean": "true or false", "tuple": "list"}.get(allowed, allowed)
+    return path, _NOT_ALLOWED, shown, "mapping" if allowed.startswith("dictionary") else allowed, None
 
 
 def _known_keys(schema: dict[str, Any], path: Sequence[Key], data: Any) -> list[str]:

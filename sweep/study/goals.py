@@ -83,7 +83,7 @@ def _check_range(path: KeyPath, quantity: Quantity, value: float) -> Iterator[Fa
     low = -math.inf if quantity.signed else 0.0
     high = _MOST_LIGHT if quantity.role == "light" else quantity.most if path[-1] == "min" else math.inf
     if not low <= value <= high:
-        percent = f"; {value:g} % are {value / 100:g}" if quantity.role == "light" and value <= 100 else ""
+        percent = f"; {value:g} % are {value / 100:g}" if quantity.role == "light" and 1 < value <= 100 else ""
         allowed = f"{low:g} or more" if high == math.inf else f"{low:g} to {high:g}"
         yield Fault(path, f"{quantity.name} has no such values", value, allowed + percent)
 
@@ -271,6 +271,8 @@ def unreachable_constraints(study: Study, space: Space, scenario: str) -> list[V
         if bound.min is not None and plain in most and bound.min > most[plain] * (1 + _SLACK):
             largest = math.ceil(most[plain] * 1e4) / 1e4
             problem = f"out of reach: {name} {bound}; no filter of {space.name} has more than {largest:g}"
+            if study.quantities[name].role == "light" and 1 < bound.min <= 100:
+                problem += f" ({bound.min:g} % are {bound.min / 100:g})"
             issues.append(ValidationIssue(problem, key=f"constraints.{name}"))
     return issues
 

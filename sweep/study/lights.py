@@ -41,7 +41,8 @@ def with_light_files(section: StudySection, sources: Sources) -> StudySection:
 
     def read(lights: LightsSection, path: KeyPath) -> LightsSection:
         name = lights.builtin
-        folder = name is not None and any(is_folder(where / name) for where in sources.folders)
+        named = name is not None and name.strip("./ ") != ""
+        folder = named and any(is_folder(where / str(name)) for where in sources.folders)
         if name is None or name in BUILT_IN_LIGHTS or not (folder or is_curve_file(name)):
             return lights
         place = sources.file(path, name)

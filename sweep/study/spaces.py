@@ -60,22 +60,33 @@ class SpaceBuilder:
             problem = f"no filter of the study has bands of colorants ({', '.join(PIGMENTS)})"
             self.sources.refuse(Fault(("production", "broadening"), problem))
         changed = {(entry.cfa, channel) for entry in entries for channel in entry.channel}
+        misnamed = (
+            {cfa for cfa, channel in changed if channel not in self.mosaics[cfa].channels}
+            if ({cfa for cfa, _ in changed} <= self.mosaics.keys())
+            else {*self.mosaics}
+        )  # these have faults of their own
         spaces = []
         for name, mosaic in self.mosaics.items():
             stated = section.cfas[name].curves
             curves = {c: stated.get(c, self.sensor.curve_name(name, c)) for c in mosaic.channels}
             missing = {channel: curve for channel, curve in curves.items() if curve not in self.sensor.qe}
-            for channel, curve in missing.items():
-                if (name, channel) not in changed:
-                    self.sources.refuse(unknown(("cfas", name), f"curve of channel {channel!r}", curve, self.sensor.qe))
+            for channel in missing:
+                if (name, channel) not in changed and name not in misnamed:
+                    allowed = (
+                        f"a design, sweep or box with `channel: {channel}`; or `curves: {{{channel}: ...}}` of "
+                        f"{', '.join(self.sensor.qe)}"
+                    )
+                    self.sources.refuse(Fault(("cfas", name), f"no curve for channel {channel!r}", None, allowed))
             for channel in stated:
                 if channel not in mosaic.channels:
                     self.sources.refuse(unknown(("cfas", name, "curves", channel), "channel", channel, mosaic.channels))
             if not missing:
                 spaces.append(Space("reference", name, name))
         for name, design in section.designs.items():
-            axes: dict[str, tuple[float, ...]] = {key: (value,) for key, value in self._at(name, design).items()}
-            spaces += self._filtered("design", name, design, axes, ("designs", name, "at"))
+            before, at = len(self.sources.issues), self._at(name, design)
+            if len(self.sources.issues) == before:
+                axes: dict[str, tuple[float, ...]] = {key: (value,) for key, value in at.items()}
+                spaces += self._filtered("design", name, design, axes, ("designs", name, "at"))
         for name, sweep in section.sweeps.items():
             way, axes, rows = _sweep_axes(sweep, section.seed)
             spaces += self._filtered("sweep", name, sweep, axes, ("sweeps", name, way), rows)
@@ -99,7 +110,10 @@ class SpaceBuilder:
         if not isinstance(design.at, str):
             numbers = {} if self.colorants is None else self.colorants.numbers
             for key, value in design.at.items():
-                if isinstance(value, str) and value not in numbers:
+                if isinstance(value, str) and not key.startswith("colorant_"):
+                    problem, allowed = "not a number", "a number, without quotes"
+                    self.sources.refuse(Fault(("designs", name, "at", key), problem, value, allowed))
+                elif isinstance(value, str) and value not in numbers:
                     self.sources.refuse(unknown(("designs", name, "at", key), "colorant", value, numbers))
             return {key: numbers.get(value, 1) if isinstance(value, str) else value for key, value in design.at.items()}
         known = surrogate_parameters().stopbands
@@ -110,9 +124,10 @@ class SpaceBuilder:
 
     def _check_channels(self, path: KeyPath, entry: Modification, mosaic: Mosaic | None) -> None:
         """Check that a family replaces channels of the CFA, as many as it wants, each once."""
-        for key, value in (("channel", entry.channel), ("base", entry.base)):
+        channels = [] if mosaic is None else mosaic.channels
+        for key, value, known in (("channel", entry.channel, channels), ("base", entry.base, self.sensor.qe)):
             if not value:
-                self.sources.refuse(Fault((*path, key), "missing"))
+                self.sources.refuse(Fault((*path, key), "missing", None, ", ".join(known) or None))
         stated = entry.technology
         absorbs = entry.family in PIGMENTS
         if self.section.production.thickness and not absorbs and stated is not None and stated.interference is None:
@@ -260,7 +275,7 @@ def _check_formed(space: Space, path: KeyPath) -> Iterator[Fault]:
     if beyond > _OUT_OF_ORDER_NM:
         which = "is inverted" if space.kind == "design" else "has no filter whose edges are in order"
         problem = f"{space.name} {which}: one edge lies {beyond:.6g} nm behind the next, or more"
-        yield Fault(path[:-1], problem, None, "left edges before right ones, at both ends of the edges")
+        yield Fault(path, problem, None, "left edges before right ones, at both ends of the edges")
 
 
 def _sweep_axes(sweep: SweepSection, seed: int) -> tuple[str, dict[str, tuple[float, ...]], ListedDesigns | None]:

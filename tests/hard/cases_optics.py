@@ -12,7 +12,7 @@ from sweep.camera import sampling
 from sweep.camera.disc_image import covered, light_on_pixels
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
-from sweep.camera.psf import DiscProfile, otf, image_fault
+from sweep.camera.psf import DiscProfile, image_fault, otf
 from sweep.camera.scene import Scene
 from sweep.metrics.smooth import smooth_response
 

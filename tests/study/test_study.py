@@ -74,8 +74,8 @@ def test_the_measured_study_loads() -> None:
         (
             "[RGGB, RYNCy]",
             "[RGXB, RYNCy]",
-            "tiny.yaml:4: cfas.RGXB: unknown curve of channel 'X' (got 'X'); allowed: C, R, G, B, Y, Cy, Rx; "
-            "did you mean 'Rx'?",
+            "tiny.yaml:4: cfas.RGXB: no curve for channel 'X'; allowed: a design, sweep or box with `channel: X`; or "
+            "`curves: {X: ...}` of C, R, G, B, Y, Cy, Rx",
         ),
         (
             "sensor: ar0820",

@@ -19,7 +19,10 @@ from ..build import BASE, load, one_line
             "far: {target: {fov_deg: 60}, each: {target.distance_km: [1], target.distance_m: [9]}}",
             "tiny.yaml:5: scenarios.far.target.distance_km: unknown key; allowed: distance_m",
         ),
-        ("far: {each: [1]}", "tiny.yaml:4: scenarios: far: `each` maps keys such as target.distance_m to values"),
+        (
+            "far: {each: [1]}",
+            "tiny.yaml:5: scenarios.far.each: no mapping of keys (got [1]); allowed: {target.distance_m: [20, 50]}",
+        ),
         (
             "a: {target: {distance_m: 1, fov_deg: 60}}",
             "tiny.yaml:5: scenarios.a.target: the light is too large (got '730.956 px'); allowed: at most 128 px",
@@ -34,11 +37,11 @@ from ..build import BASE, load, one_line
         ),
         (
             "a: {each: {off_axis_deg: [1, 2, 1]}}",
-            "tiny.yaml:4: scenarios: a: two scenarios are named 'a off_axis_deg=1'",
+            "tiny.yaml:5: scenarios.a: two scenarios have one name (got 'a off_axis_deg=1'); allowed: other names",
         ),
         (
             "a: {each: {off_axis_deg: [mean]}}",
-            "tiny.yaml:4: scenarios: a: each.off_axis_deg: a number, a list of numbers, `min`, `max` and `count`, or `geometric: [min, max, count]`",
+            "tiny.yaml:5: scenarios.a.each.off_axis_deg: not a number (got 'mean'); allowed: a number, a list of numbers, `min`, `max` and `count`, or `geometric: [min, max, count]`",
         ),
         (
             "a: {intensity_cd: 200}",
@@ -51,7 +54,8 @@ from ..build import BASE, load, one_line
         ),
         (
             "night: {exposure: {kind: fixd, exposure_s: 1}}",
-            "tiny.yaml:5: scenarios.night.exposure.kind: unknown kind (got 'fixd'); allowed: 'white_patch', 'fixed'",
+            "tiny.yaml:5: scenarios.night.exposure.kind: unknown kind (got 'fixd'); allowed: white_patch, fixed; "
+            "did you mean 'fixed'?",
         ),
         (
             "night: {exposure: {kind: fixed, exposure_ms: 1, exposure_s: 1}}",
