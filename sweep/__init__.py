@@ -6,7 +6,8 @@ Three lines of Python evaluate a filter:
 >>> study = sweep.load_study("stopband")
 >>> dn = study.evaluate(N=0.95 * study.curve("Y")).csd_yellow_red
 
-What the commands of `sweep` do, functions of their names do, too: `sweep.run("stopband")` returns what it prints.
+What the commands of `sweep` do, functions of their names do, too: `sweep.run("stopband")` returns what it prints. `new`
+is `new_study`, `list` is `list_studies`, `open` is `show`; `read_run(...).report()` draws a report again.
 
 Names are loaded at their first use; `__init__.pyi` has their types.
 """

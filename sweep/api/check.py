@@ -63,7 +63,7 @@ def plan(
     study: Path | str,
     data: Path | str | None = None,
     *,
-    tolerance: float | None = None,
+    tolerance_dn: float | None = None,
     changes: Changes = None,
     allow_code: bool = False,
 ) -> Answer:
@@ -73,13 +73,13 @@ def plan(
     ----------
     study, data, changes, allow_code
         As for `check`.
-    tolerance : float, optional
+    tolerance_dn : float, optional
         Tolerance of a CSD, DN; left out, that of the study.
 
     Returns
     -------
     Answer
-        Each effect of each scene: whether it is computed, and a bound on what it changes.
+        Each effect of each scene: whether it is computed, and a bound on what it changes; as a mapping in ``facts``.
 
     Raises
     ------
@@ -88,10 +88,10 @@ def plan(
     """
     from ..report.scenes import plan_facts, plan_lines  # noqa: PLC0415  (tables of pandas: few need them)
 
-    if tolerance is not None and not 0 < tolerance < math.inf:
-        raise StudyError(ValidationIssue("no tolerance", None, None, "--tolerance", tolerance, "above 0 DN, finite"))
+    if tolerance_dn is not None and not 0 < tolerance_dn < math.inf:
+        raise StudyError(ValidationIssue("no tolerance", None, None, "--tolerance", tolerance_dn, "above 0 DN, finite"))
     folder = None if data is None else Path(data)
     loaded = load_study(study_path(Path(study)), folder, changes=changes or {}, allow_code=allow_code)
-    planned = loaded.with_plans(tolerance)
+    planned = loaded.with_plans(tolerance_dn)
     notes = [f"Note: {warning}." for warning in loaded.warnings]
     return Answer([*notes, *plan_lines(planned)], plan_facts(planned))

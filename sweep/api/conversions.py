@@ -36,7 +36,7 @@ def to_xarray(table: pd.DataFrame, output: Output) -> xarray.Dataset:
     return values
 
 
-def to_multispectral(output: Output, study: Study, design: str) -> MultiSpectralDistributions:
+def to_multispectral(output: Output, study: Study, design: str | int) -> MultiSpectralDistributions:
     """Return the QE of a design's channels."""
     curves = channel_curves(study, find_design_row(output, design))
     table, name = np.stack([*curves.values()], axis=1), f"{output.study.study}, {design}"

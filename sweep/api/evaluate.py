@@ -87,14 +87,14 @@ class EvaluateOptions:
         return "photons" if (stated := self.stated("light")) == "photons" else stated and "energy"
 
 
-def evaluate(source: Path | str, *, design: str | None = None, **options: Any) -> FilterEvaluation:
+def evaluate(source: Path | str, *, design: str | int | None = None, **options: Any) -> FilterEvaluation:
     """Evaluate one filter beside RGGB, the CFA that it changes, and its upper bound.
 
     Parameters
     ----------
     source : path-like
         A file with the filter's curve, or the folder of a finished run.
-    design : str, optional
+    design : str or int, optional
         A design of the run: a `filter_id`, a name (RYN4Cy, RGGB), or ``best`` (default).
     **options
         Fields of `EvaluateOptions`: column, channel, cfa, base, sensor, lights, quantity, relative_to, transmission;
@@ -202,7 +202,7 @@ def _use_of(curves: Curves, column: str, options: EvaluateOptions) -> tuple[Use,
     return "filter", stated
 
 
-def filter_of_run(folder: Path, design: str | None, options: EvaluateOptions) -> FilterUnderTest:
+def filter_of_run(folder: Path, design: str | int | None, options: EvaluateOptions) -> FilterUnderTest:
     """Take a design of a finished run, in the scene of its row, with the run's lights or others.
 
     Parameters

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeGuard
 
@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import BaseModel
 
 from .. import study as studies_of_files
-from ..base.errors import DataError, StudyError, SweepError, ValidationIssue, nearest
+from ..base.errors import DataError, StudyError, ValidationIssue, nearest
 from ..camera.mosaic import Mosaic
 from ..spectra import LightUnit
 from ..spectra.light_files import lights_file
@@ -98,7 +98,9 @@ def read_run(folder: Path | str, data: Path | str | None = None, *, allow_code: 
     >>> sweep.read_run("outputs/stopband").best.cfa  # doctest: +SKIP
     'RYNCy'
     """
-    return FinishedRun(Path(folder), None if data is None else Path(data), allow_code=allow_code)
+    from ..results.folder import run_folder  # noqa: PLC0415  (slow to import, and a study needs none)
+
+    return FinishedRun(run_folder(folder), None if data is None else Path(data), allow_code=allow_code)
 
 
 def studies() -> list[str]:
@@ -161,7 +163,10 @@ def make_study(
     for source in (sensor, lights):
         curves |= source.curves if isinstance(source, CurveSource) else {}
     plain = {key: _plain(value) for key, value in document.items()}
-    return LoadedStudy(studies_of_files.study_of_keys(plain, Path.cwd(), curves, allow_code=allow_code))
+    try:
+        return LoadedStudy(studies_of_files.study_of_keys(plain, Path.cwd(), curves, allow_code=allow_code))
+    except StudyError as error:
+        raise StudyError([_as_given(issue, keys) for issue in error.issues]) from None
 
 
 def _with_filter(keys: Mapping[str, Any]) -> dict[str, Any]:
@@ -190,12 +195,22 @@ def _with_filter(keys: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _channels(name: str, cfas: Any) -> tuple[str, ...]:
-    """Return the channels of a CFA; none where its name or tile is wrong, which the study says."""
+    """Return the channels of a CFA; raises SweepError for a name that is none."""
     tile = cfas[name] if isinstance(cfas, Mapping) else None
-    try:
-        return (Mosaic.from_rows(name, tile["tile"]) if tile else Mosaic.from_name(name)).channels
-    except (SweepError, KeyError, TypeError):
-        return ()
+    if not isinstance(tile, Mapping):
+        return Mosaic.from_name(name).channels
+    return Mosaic.from_rows(name, tile.get("tile", ())).channels
+
+
+def _as_given(issue: ValidationIssue, keys: Mapping[str, Any]) -> ValidationIssue:
+    """Return an issue in terms of the arguments of `make_study`, some of which are of one filter."""
+    start = f"boxes.{keys.get('family', 'stopband')}."
+    if keys.keys() & set(_OF_A_FILTER) and issue.key is not None and issue.key.startswith(start):
+        return replace(issue, key=issue.key.removeprefix(start))
+    if issue.problem == "unknown key" and issue.key is not None and issue.allowed and "." not in issue.key:
+        known = [*issue.allowed.split(", "), *_OF_A_FILTER]
+        return replace(issue, allowed=", ".join(known), nearest=nearest(issue.key, known))
+    return issue
 
 
 def sensor(

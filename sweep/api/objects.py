@@ -13,6 +13,7 @@ import numpy as np
 
 from ..base.errors import OutputError, SweepError, ValidationIssue, nearest
 from ..base.types import silent
+from ..camera.plan import Plan
 from ..designs.space import Space
 from ..metrics.quantity import Column, Quantity
 from ..search.limit import Limit
@@ -263,10 +264,15 @@ class LoadedStudy:
         Returns
         -------
         LoadedStudy
-            Its `evaluate` computes only the effects that the tolerance calls for; ``study.plans`` states what is left
-            out and why.
+            Its `evaluate` computes only the effects that the tolerance calls for; its `plans` state what is left out
+            and why.
         """
         return LoadedStudy(self.study.with_plans(tolerance_dn))
+
+    @property
+    def plans(self) -> Mapping[str, Plan]:
+        """What is left out of each scenario, and why; empty before `plan`."""
+        return self.study.plans
 
     def run(self, output: Path | str = "outputs", jobs: int | None = None) -> FinishedRun:
         """Run the study and draw its report; finished work of an earlier run is kept.
@@ -305,8 +311,11 @@ class LoadedStudy:
             assert space.filter is not None
             if cfa in (None, space.cfa) and (channel is None or channel in space.filter.channels):
                 return space
+        known = sorted({name for s in spaces if s.filter is not None for name in s.filter.channels})
+        near = None if channel is None else nearest(channel, known)
+        allowed = ", ".join(known) or "a study with a design, sweep or box"
         raise SweepError(
-            ValidationIssue("the study modifies no such channel", value=channel, allowed="a design, sweep or box")
+            ValidationIssue("the study modifies no such channel", value=channel, allowed=allowed, nearest=near)
         )
 
 
@@ -332,7 +341,7 @@ class FinishedRun:
     >>> import sweep
     >>> run = sweep.read_run("outputs/stopband")  # doctest: +SKIP
     >>> run.best.csd_yellow_red  # doctest: +SKIP
-    233.8
+    234.1
     """
 
     def __init__(self, folder: Path, data: Path | None = None, *, allow_code: bool = False) -> None:
@@ -340,6 +349,9 @@ class FinishedRun:
 
         self.folder, self._data, self._allow_code = folder, data, allow_code
         self.output: Output = read_output(self.folder)
+
+    def __fspath__(self) -> str:
+        return str(self.folder)
 
     def __repr__(self) -> str:
         return f"<run {self.output.study.study}: {self.output.provenance.filters:,} filters in {self.folder}>"
@@ -370,12 +382,12 @@ class FinishedRun:
 
         return to_xarray(self.table, self.output)
 
-    def to_multispectral(self, design: str = "best") -> MultiSpectralDistributions:
+    def to_multispectral(self, design: str | int = "best") -> MultiSpectralDistributions:
         """Return the QE of a design's channels as colour-science has it.
 
         Parameters
         ----------
-        design : str
+        design : str or int
             A `filter_id`, a name (RYN4Cy, RGGB), or best.
 
         Returns
@@ -399,7 +411,8 @@ class FinishedRun:
             raise OutputError(
                 ValidationIssue("the run has no feasible design that was swept or searched", str(self.folder))
             )
-        return self.output.best.iloc[0].dropna()
+        best = self.output.best.iloc[0].dropna()
+        return best.rename(best["design_id"])
 
     @property
     def curves(self) -> pd.DataFrame:

@@ -20,7 +20,7 @@ from ..base.errors import ErrorBoundExceededError, InterruptedRunError, OutputEr
 from ..base.types import Progress, in_turn, silent
 from ..results.answers import Answers
 from ..results.dataset import encoded_part, part_name
-from ..results.folder import begin
+from ..results.folder import begin, run_folder
 from ..results.identity import run_facts, several_facts
 from ..results.lock import locked
 from ..results.manifest import Manifest
@@ -160,7 +160,7 @@ def show(folder: Path | str) -> Answer:
     SweepError
         If there is no report, or no browser.
     """
-    page = Path(folder, REPORT)
+    page = run_folder(folder) / REPORT
     if not page.is_file():
         raise OutputError(ValidationIssue("no report here", str(folder), allowed="the folder of a finished run"))
     if not webbrowser.open(page.absolute().as_uri()):
@@ -301,7 +301,7 @@ def report(folder: Path | str, *, began_s: float | None = None) -> Answer:
     """
     from ..report.sensors import report_sensors, runs_in  # noqa: PLC0415  (few studies have several sensors)
 
-    folder, began_s = Path(folder), time.monotonic() if began_s is None else began_s
+    folder, began_s = run_folder(folder), time.monotonic() if began_s is None else began_s
     if not Manifest(folder).runs:
         return _finish(folder, began_s)
     with locked(folder):

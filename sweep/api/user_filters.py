@@ -251,15 +251,23 @@ def table_of_results(study: Study, rows: Sequence[tuple[str, str, str, Columns]]
     Returns
     -------
     pandas.DataFrame
-        Quantities, labels and ``feasible``. A design with an unknown constrained quantity is not feasible.
+        Quantities, labels, ``feasible``, and the constraints that are ``violated``. A design with an unknown
+        constrained quantity is not feasible.
     """
     import pandas as pd  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
     parts = []
     for name, cfa, scenario, columns in rows:
         labels: dict[str, Any] = {"name": name, "cfa": cfa, "scenario": scenario}
-        parts.append(pd.DataFrame(labels | columns | {"feasible": columns["violation"] <= FEASIBLE}))
+        feasible = {"feasible": columns["violation"] <= FEASIBLE}
+        parts.append(pd.DataFrame(labels | columns | feasible | {"violated": _violated(study, columns)}))
     return with_units(pd.concat(parts, ignore_index=True), study.quantities)
+
+
+def _violated(study: Study, columns: Columns) -> list[str]:
+    """Return the names of the constraints that each design does not meet, or of which it is not known."""
+    beyond = {name: ~(bound.violation(columns[name]) <= FEASIBLE) for name, bound in study.constraints.items()}
+    return [", ".join(name for name, of in beyond.items() if of[at]) for at in range(len(columns["violation"]))]
 
 
 def any_filter_search(study: Study, setup: Setup) -> Problem:

@@ -35,5 +35,13 @@ class Answer:
     def __repr__(self) -> str:
         return str(self)
 
+    def __getitem__(self, key: str) -> Any:
+        """Return one of the facts."""
+        return self.facts[key]
+
+    def __fspath__(self) -> str:
+        """Return the folder of what it tells of, so that it stands for it."""
+        return str(self.facts["folder"])
+
     def _repr_html_(self) -> str:
         return f"<pre>{escape(str(self))}</pre>"

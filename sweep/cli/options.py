@@ -76,10 +76,16 @@ RunFolder = Annotated[
     Path, typer.Argument(help="Output folder of a study.", show_default=False, autocompletion=run_folders)
 ]
 Outputs = Annotated[Path, typer.Option("--output", "-o", help="Folder for the results of all studies.")]
-Jobs = Annotated[int | None, typer.Option("--jobs", "-j", min=1, help="Workers.", show_default="all cores")]
+Jobs = Annotated[
+    int | None, typer.Option("--jobs", "-j", min=1, help="Workers: processes at once.", show_default="all cores")
+]
 Force = Annotated[bool, typer.Option("--force", "-f", help="Replace files of other content.")]
 Design = Annotated[
     str | None, typer.Option("--design", help="A filter_id, a name (RYN4Cy, RGGB), or best.", show_default=False)
+]
+Designs = Annotated[
+    list[str] | None,
+    typer.Option("--design", help="A filter_id, a name (RYN4Cy, RGGB), or best; may be repeated.", show_default=False),
 ]
 Quantities = Annotated[
     list[str] | None,

@@ -14,6 +14,7 @@ import pandas as pd
 from ..base.answer import Answer
 from ..base.errors import OutputError, SweepError, ValidationIssue
 from ..results.atomic import write_bytes, write_text
+from ..results.folder import run_folder
 from ..results.output import Output, read_output
 from ..results.tables import write_csv
 from ..study import folder_name
@@ -42,13 +43,13 @@ _MOST_SCENARIOS = 4
 """Scenes whose fronts are printed; the page has all."""
 
 
-def compare(folders: Sequence[Path | str], *, output: Path | str | None = None) -> Answer:
+def compare(*folders: Path | str | Sequence[Path | str], output: Path | str | None = None) -> Answer:
     """Compare finished runs: studies, best designs, fronts, versions; as a page, a picture and a table.
 
     Parameters
     ----------
-    folders : sequence of path-like
-        Output folders of 2 to 26 studies.
+    *folders : path-like, or one sequence of them
+        Output folders of 2 to 26 studies, or their names.
     output : path-like, optional
         Folder of the comparison; left out, outputs/compare-A-B.
 
@@ -62,12 +63,14 @@ def compare(folders: Sequence[Path | str], *, output: Path | str | None = None) 
     SweepError
         If there are fewer or more runs, a folder holds no finished run, or a file of others would be replaced.
     """
-    if not 2 <= len(folders) <= len(_LETTERS):
+    given = [place for of in folders for place in ([of] if isinstance(of, str | os.PathLike) else of)]
+    places = [run_folder(place) for place in given]
+    if not 2 <= len(places) <= len(_LETTERS):
         allowed = f"2 to {len(_LETTERS)} folders"
-        raise SweepError(ValidationIssue("cannot be compared", None, None, "FOLDERS", len(folders), allowed))
-    target = Path("outputs") / _folder_of([Path(folder) for folder in folders]) if output is None else Path(output)
+        raise SweepError(ValidationIssue("cannot be compared", None, None, "FOLDERS", len(places), allowed))
+    target = Path("outputs") / _folder_of(places) if output is None else Path(output)
     _refuse_other(target)
-    outputs = [read_output(Path(folder)) for folder in folders]
+    outputs = [read_output(place) for place in places]
     runs = {f"{letter} {' '.join(o.study.study.split())}": o for letter, o in zip(_LETTERS, outputs, strict=False)}
     fronts, figure, notes = compare_fronts(runs)
     answer = ranking(runs)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from ..base.errors import OutputError, SweepError, ValidationIssue
 from ..base.types import PerWavelength
 from ..results.atomic import write_bytes
 from ..results.designs import BEST, channel_curves, check_kept, find_design_row, row_space, study_of
+from ..results.folder import run_folder
 from ..results.output import Output, read_output
 from ..spectra.filter_files import (
     color_hints,
@@ -31,7 +32,7 @@ Row = Mapping[Any, Any]
 
 def export(
     folder: Path | str,
-    design: str = BEST,
+    design: str | int | Sequence[str | int] = BEST,
     data: Path | str | None = None,
     *,
     output: Path | str | None = None,
@@ -47,7 +48,7 @@ def export(
     ----------
     folder : path-like
         Folder of a finished run.
-    design : str
+    design : str or int, or several
         A `filter_id`, a name (RYN4Cy, RGGB), or best.
     data : path-like, optional
         Folder of the study's files; left out, the curves that the run kept are taken.
@@ -71,7 +72,13 @@ def export(
         For an unknown design or one that failed, a folder without a finished run, curves that are not those of the
         run, a specification without a map, and where a file of other content would be overwritten.
     """
-    folder = Path(folder)
+    if not isinstance(design, str | int):
+        of_each = {"output": output, "specification": specification, "allow_code": allow_code, "force": force}
+        answers = [export(folder, one, data, **of_each) for one in design]  # type: ignore[arg-type]
+        return Answer(
+            [line for answer in answers for line in answer.lines], {"designs": [answer.facts for answer in answers]}
+        )
+    folder = run_folder(folder)
     run = read_output(folder)
     row = find_design_row(run, design)
     study = study_of(run, None if data is None else Path(data), allow_code=allow_code)
@@ -87,7 +94,7 @@ def export(
     }
     table = curves | {name: values for name, values in transmissions.items() if np.isfinite(values).all()}
     hints = color_hints(mosaic.channels, bases)
-    path = (folder / "export" if output is None else Path(output)) / folder_name(design)
+    path = (folder / "export" if output is None else Path(output)) / folder_name(str(design))
     csv_path, mat_path = (path.with_name(path.name + suffix) for suffix in (".csv", ".mat"))
     comment = _comment(run, row, bases)
     files = {

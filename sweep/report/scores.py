@@ -11,6 +11,7 @@ import pandas as pd
 from ..base.answer import Answer
 from ..base.errors import SweepError, ValidationIssue
 from ..results.atomic import atomic, write_text
+from ..results.folder import run_folder
 from ..results.output import Output, read_output
 from ..results.tables import VISION
 from ..runs.score import (
@@ -59,7 +60,8 @@ def score(folder: Path | str, predictions: Sequence[Path | str], *, output: Path
     SweepError
         If the run has no images, or the predictions are not of them.
     """
-    run, to = read_output(Path(folder)), Path(folder) / "scores" if output is None else Path(output)
+    folder = run_folder(folder)
+    run, to = read_output(folder), folder / "scores" if output is None else Path(output)
     if run.study.vision is None:
         raise SweepError(ValidationIssue("the study has no `vision`", str(folder)))
     lines, tables = _score_readers(run, [Path(path) for path in predictions], to)

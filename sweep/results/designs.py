@@ -88,12 +88,12 @@ def rows_of_series(
                 yield series, key, scenarios, first, curves, space
 
 
-def find_design_row(output: Output, key: str) -> Mapping[Any, Any]:
+def find_design_row(output: Output, design: str | int) -> Mapping[Any, Any]:
     """Return the row of a run's design by name, design_id or `best`.
 
     Raises SweepError if there is no such design, with the nearest name, or if it failed.
     """
-    table = output.table
+    key, table = str(design), output.table
     named = table[table["name"] == key]
     if key == BEST:
         if output.best.empty:
@@ -116,9 +116,9 @@ def find_design_row(output: Output, key: str) -> Mapping[Any, Any]:
         shown = [*names[:_MOST_SHOWN], *(["..."] if len(names) > _MOST_SHOWN else [])]
         allowed = f"{BEST}, a name ({', '.join(shown)}), or a filter_id from 0 to {output.provenance.filters - 1:,}"
         near = nearest(key, [*names, BEST])
-        raise SweepError(ValidationIssue("no such design", str(output.folder), None, "--design", key, allowed, near))
+        raise SweepError(ValidationIssue("no such design", str(output.folder), None, "design", key, allowed, near))
     if row["status"] != "ok":
-        raise SweepError(ValidationIssue("the design failed", str(output.folder), None, "--design", row["status"]))
+        raise SweepError(ValidationIssue("the design failed", str(output.folder), None, "design", row["status"]))
     return row
 
 

@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterator, Mapping
 from itertools import count
 from pathlib import Path
 from typing import Any
 
+from ..base.disk import is_folder
 from ..base.errors import OutputError, ValidationIssue
 from .manifest import Manifest
 
 _MOST_SHOWN = 3
+
+
+def run_folder(given: Path | str | os.PathLike[str]) -> Path:
+    """Return the folder of a run, which may be given by the name of its study in `outputs`."""
+    folder = Path(given)
+    named = Path("outputs") / folder
+    return named if not is_folder(folder) and len(folder.parts) == 1 and run_in(named) is not None else folder
 
 
 def run_in(folder: Path) -> Manifest | None:

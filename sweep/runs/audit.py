@@ -15,6 +15,7 @@ from ..base.answer import Answer
 from ..base.errors import ErrorBoundExceededError, ValidationIssue
 from ..base.types import Progress, silent
 from ..results.designs import study_of
+from ..results.folder import run_folder
 from ..results.lock import locked
 from ..results.manifest import Manifest
 from ..results.output import read_output
@@ -132,7 +133,7 @@ def audit(
     SweepError
         If the run is not finished or damaged, or its study cannot be loaded.
     """
-    folder = Path(folder)
+    folder = run_folder(folder)
     output = read_output(folder, audited=False)
     study = study_of(output, None if data is None else Path(data), allow_code=allow_code)
     front = set(output.front_ids)

@@ -29,11 +29,12 @@ _SAMPLED_S = 1.0
 
 @dataclass(frozen=True)
 class Sample:
-    """Rows that were computed to see how long they take, s, and the size of their file, bytes."""
+    """Rows that were computed to see how long they take, s, and the size of each, and of a file without rows, bytes."""
 
     rows: int
     seconds: float
-    size: int
+    row_size: float
+    empty_size: int
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,9 @@ class RemainingWork:
     @property
     def megabytes(self) -> float:
         """Size of the rows."""
-        return 0.0 if self.sample is None else self.rows * self.sample.size / self.sample.rows / 1e6
+        if self.sample is None:
+            return 0.0
+        return (self.rows * self.sample.row_size + self.chunks * self.sample.empty_size) / 1e6
 
     @property
     def facts(self) -> dict[str, Any]:
@@ -96,8 +99,11 @@ def _sampled(study: Study, jobs: Sequence[Job]) -> Sample | None:
         tables.append(table)
         if seconds > _SAMPLED_S:
             break
-    whole = pa.concat_tables(tables).unify_dictionaries() if tables else None
-    return None if whole is None else Sample(len(whole), max(seconds, 1e-9), len(encoded_part(whole, "")))
+    if not tables:
+        return None
+    whole, empty_size = pa.concat_tables(tables).unify_dictionaries(), len(encoded_part(tables[0], ""))
+    row_size = (len(encoded_part(whole, "")) - empty_size) / len(whole)
+    return Sample(len(whole), max(seconds, 1e-9), row_size, empty_size)
 
 
 def remaining_work_lines(todo: RemainingWork, output: Path) -> Iterator[str]:
@@ -110,10 +116,9 @@ def remaining_work_lines(todo: RemainingWork, output: Path) -> Iterator[str]:
         f"{todo.finished:,} finished, {todo.rows:,} in {_count(todo.chunks, 'chunk')} to compute."
     )
     if todo.sample is not None:
-        yield (
-            f"About {_duration(todo.seconds)} with {_count(todo.workers, 'worker')} and {todo.megabytes:.2g} MB, by a "
-            f"sample of {_count(todo.sample.rows, 'row')} here; search, check and report come on top."
-        )
+        time_and_size = f"{_duration(todo.seconds)} with {_count(todo.workers, 'worker')} and {todo.megabytes:.2g} MB"
+        sampled = f"by a sample of {_count(todo.sample.rows, 'row')} here"
+        yield f"Rows take about {time_and_size}, {sampled}; search, check and report come on top."
     if search is not None and not todo.searches:
         yield "The search is finished."
     elif search is not None:

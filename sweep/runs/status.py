@@ -12,7 +12,7 @@ from ..base.errors import OutputError
 from ..metrics.share import format_share
 from ..results.answers import Answers
 from ..results.dataset import rows_in
-from ..results.folder import run_in
+from ..results.folder import run_folder, run_in
 from ..results.lock import in_use
 from ..results.manifest import Manifest, issues_of
 from ..results.tables import PROVENANCE, REPORT, RESULTS
@@ -39,7 +39,7 @@ def status(folder: Path | str, *, verify: bool = False) -> Answer:
     SweepError
         If there is no run, or files of a finished run are missing or damaged.
     """
-    folder = Path(folder)
+    folder = run_folder(folder)
     manifest = Manifest(folder)
     manifest.require_run()
     running = in_use(folder)

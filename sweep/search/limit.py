@@ -12,7 +12,7 @@ bands) are left out, and so are other worst cases: with more filters the upper e
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -63,7 +63,7 @@ class Limit:
 
     attained: float
     proven: float
-    curve: PerWavelength | None
+    curve: PerWavelength | None = field(repr=False)
     left_out: tuple[str, ...] = ()
     programs: int = 0
     open_parts: int = 0

@@ -50,7 +50,7 @@ def test_wrong_parameters_are_told(study: sweep.LoadedStudy, filters: dict[str, 
 @pytest.mark.parametrize(
     ("changed", "words"),
     [
-        ({"base": None}, "boxes.stopband.base: missing"),
+        ({"base": None}, "^base: missing; allowed: C, R"),
         ({"to": None}, "stopband needs `to`"),
         ({"channel": None}, "channel: missing; allowed: R, G, B, Y, N, Cy"),
         ({"channel": "Q"}, "channel: unknown channel .got 'Q'.; allowed: R, G, B, Y, N, Cy"),

@@ -115,7 +115,7 @@ def test_dry_run_lists_the_work_and_runs_nothing(tmp_path: Path, monkeypatch: py
     study = load_study(path)
     found = remaining_work(study, tmp_path / "out")
     _, about, search, front, *effects, _ = remaining_work_lines(found, tmp_path / "out")
-    assert re.fullmatch(r"About 1 s with 1 worker and 0\.0\d+ MB, by a sample of \d+ rows here; .*", about)
+    assert re.fullmatch(r"Rows take about 1 s with 1 worker and 0\.\d+ MB, by a sample of \d+ rows here; .*", about)
     assert search == "Search: 4 starts, 40 evaluations at most."
     assert front == "Its front: 3 levels, 100 evaluations at most."  # two starts each, and one from each neighbor
     told = {line.partition(": ")[2] for line in effects}

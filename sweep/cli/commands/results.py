@@ -12,7 +12,7 @@ from ..options import (
     OF_RESULTS,
     AllowCode,
     DataFolder,
-    Design,
+    Designs,
     Force,
     ImageForm,
     ImageSplit,
@@ -63,7 +63,7 @@ def compare(
 
 def export(
     folder: RunFolder,
-    design: Design = None,
+    design: Designs = None,
     images: Annotated[
         Path | None,
         typer.Option(help="Folder for the images of a study with `vision`, with labels.", show_default=False),
@@ -93,14 +93,14 @@ def export(
     quiet: Quiet = False,
 ) -> None:
     """Write a filter of a finished run as CSV and as ISETCam color filters (.mat), or the images of a benchmark."""
-    if (design is None) == (images is None):
+    if (not design) == (images is None):
         raise SweepError(ValidationIssue("one of --design and --images", allowed="--design best, or --images FOLDER"))
-    if design is not None:
+    if design:
         from ...report.export import export as exported
 
         answer = exported(
             folder,
-            design,
+            design[0] if len(design) == 1 else design,
             data,
             output=output,
             specification=specification,

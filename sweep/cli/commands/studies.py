@@ -100,7 +100,7 @@ def plan(
     """Say which effects each scene calls for, and why, without running it."""
     from ...api.check import plan as planned
 
-    answer = planned(study, data, tolerance=tolerance, changes=changes_of(changes), allow_code=allow_code)
+    answer = planned(study, data, tolerance_dn=tolerance, changes=changes_of(changes), allow_code=allow_code)
     print_answer(answer, as_json=as_json, quiet=quiet)
 
 

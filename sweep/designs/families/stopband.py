@@ -95,6 +95,9 @@ class MultiStopband(Banded):
 class Stopband(MultiStopband):
     """Filter with one stopband: the paper's N_x with base Y and target G.
 
+    Its parameters, the columns of `x`: left_nm, left_width_nm, right_nm, right_width_nm and depth, by default 1.
+    `LoadedStudy.evaluate` takes them by name.
+
     Parameters
     ----------
     wavelength_nm : ndarray of shape (n_wavelengths,)
