@@ -230,18 +230,7 @@ class LoadedStudy:
         return limit
 
     def plot(self, **channels: CurveLike) -> Figure:
-        """Draw the sensor's QE over the spectra of the lights.
-
-        Parameters
-        ----------
-        **channels : CurveLike
-            Further curves to draw, by name.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            The figure.
-        """
+        """Draw the sensor's QE over the spectra of the lights, and further curves by name, as a Matplotlib figure."""
         from ..report.figures import CurvesFigure, draw_curves
 
         study = self.study
@@ -463,10 +452,11 @@ class FinishedRun:
             If the run has no images, or no such design, split or form.
         """
         from ..runs.image_files import images_of_run
+        from ..runs.score import unseen_images
         from ..vision.batches import FORMS
         from ..vision.lamps import SPLITS
 
-        names = list(self._images_of_test()["name"].unique())
+        names = list(unseen_images(self.output)["name"].unique())
         chosen = names if designs is None else list(designs)
         for value, known in ((split, SPLITS), (form, FORMS), *((name, names) for name in chosen)):
             if value not in known:
@@ -493,21 +483,9 @@ class FinishedRun:
         SweepError
             If the run has no images, and for other, double or missing images or answers.
         """
-        from ..runs.score import reader_of, scores_of
-        from ..vision.scenes import states_of
+        from ..runs.score import scores_of_table
 
-        images, vision = self._images_of_test(), self.output.study.vision
-        assert vision is not None
-        table = predictions.reset_index(drop=True)
-        return scores_of(reader_of(table, Path("predictions"), images, states_of(vision)), images, vision.unknown_cost)
-
-    def _images_of_test(self) -> pd.DataFrame:
-        from ..results.tables import VISION
-        from ..runs.score import images_of_test
-
-        if self.output.study.vision is None:
-            raise SweepError(ValidationIssue("the study has no `vision`", str(self.folder)))
-        return images_of_test(self.output.vision[VISION])
+        return scores_of_table(self.output, predictions)
 
     def report(self) -> Path:
         """Draw figures and report again.

@@ -12,6 +12,7 @@ from ..results.designs import study_of
 from ..results.manifest import Manifest
 from ..results.output import read_output
 from ..runs.image_files import MANIFEST, STREET_MANIFEST, ImageFiles, write_images
+from ..runs.score import vision_of
 from ..runs.vision import vision_designs
 from ..runs.workers import workers
 
@@ -32,9 +33,7 @@ def export_images(
     COCO's boxes are. Raises OutputError as `read_output` and `write_images`.
     """
     output = read_output(folder)
-    vision = output.study.vision
-    if vision is None:
-        raise SweepError(ValidationIssue("the study has no `vision`", str(folder), key="--images"))
+    vision = vision_of(output)
     if files.coco and not files.png:
         raise SweepError(ValidationIssue("boxes are of one file for each image", key="--coco", allowed="with --png"))
     if files.png and files.form == "demosaicked":

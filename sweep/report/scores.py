@@ -9,20 +9,19 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from ..base.answer import Answer
-from ..base.errors import SweepError, ValidationIssue
 from ..results.atomic import atomic, write_text
 from ..results.folder import run_folder
 from ..results.output import Output, read_output
-from ..results.tables import VISION
 from ..runs.score import (
     Reader,
     check_unique,
-    images_of_test,
     in_any_order,
     network_of,
     read_predictions,
     score_lines,
     scores_of,
+    unseen_images,
+    vision_of,
     whole_scores,
 )
 from ..runs.score_streets import is_of_streets, labels_of_test, read_detections, street_lines, street_scores
@@ -62,16 +61,13 @@ def score(folder: Path | str, predictions: Sequence[Path | str], *, output: Path
     """
     folder = run_folder(folder)
     run, to = read_output(folder), folder / "scores" if output is None else Path(output)
-    if run.study.vision is None:
-        raise SweepError(ValidationIssue("the study has no `vision`", str(folder)))
     lines, tables = _score_readers(run, [Path(path) for path in predictions], to)
     return Answer(lines, {"folder": str(to)} | {name: table.to_dict("records") for name, table in tables.items()})
 
 
 def _score_readers(output: Output, predictions: Sequence[Path], to: Path) -> tuple[list[str], dict[str, pd.DataFrame]]:
     """Score files of predictions and the run's network, and write the scores; return lines and tables."""
-    vision, tables = output.study.vision, dict[str, pd.DataFrame]()
-    assert vision is not None
+    vision, tables = vision_of(output), dict[str, pd.DataFrame]()
     check_unique([path.stem for path in predictions] + ([NETWORK] if vision.network else []))
     of_streets = [path for path in predictions if vision.street is not None and is_of_streets(path)]
     predictions = [path for path in predictions if path not in of_streets]
@@ -81,7 +77,7 @@ def _score_readers(output: Output, predictions: Sequence[Path], to: Path) -> tup
         lines += street_lines(tables["streets"])
     if not predictions:
         return [*lines, f"Files: {to}/: {STREETS}."], tables
-    images = images_of_test(output.vision[VISION])
+    images = unseen_images(output)
     readers: list[Reader] = [read_predictions(path, images, states_of(vision)) for path in predictions]
     if vision.network:
         readers.append(network_of(images))

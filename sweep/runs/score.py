@@ -19,11 +19,14 @@ from pyarrow import parquet as pq
 from ..base.disk import read_input
 from ..base.errors import DataError, SweepError, ValidationIssue, nearest
 from ..base.types import Array, Float
+from ..results.output import Output
+from ..results.tables import VISION
 from ..vision.batches import image_id
 from ..vision.detections import ALL
 from ..vision.lamps import TEST
-from ..vision.scenes import NETWORK, SHUFFLED, UNSEEN
+from ..vision.scenes import NETWORK, SHUFFLED, UNSEEN, states_of
 from ..vision.scores import Interval, interval_of_seeds
+from ..vision.section import Vision
 
 UNKNOWN = "unknown"
 _ID, _STATE = "image_id", "state"
@@ -48,14 +51,31 @@ class Reader:
     answers: pd.DataFrame
 
 
-def images_of_test(images: pd.DataFrame) -> pd.DataFrame:
-    """Return the images of a run that predictions are of, with their names.
+def vision_of(output: Output) -> Vision:
+    """Return the benchmark of vision of a run; raises SweepError if it has none."""
+    if output.study.vision is None:
+        raise SweepError(ValidationIssue("the study has no `vision`", str(output.folder)))
+    return output.study.vision
 
-    They are of lamps that no network has seen, with `image_id`.
-    """
+
+def unseen_images(output: Output) -> pd.DataFrame:
+    """Return the images of a run that predictions are of, with their names."""
+    vision_of(output)
+    return images_of_test(output.vision[VISION])
+
+
+def images_of_test(images: pd.DataFrame) -> pd.DataFrame:
+    """Return the images of lamps that no network has seen, with `image_id`."""
     unseen = images[images["lamps"] == UNSEEN]
     keys = zip(unseen["design_id"], unseen["seed"], unseen["order"], unseen["image"], strict=True)
     return unseen.assign(**{_ID: [image_id(d, seed, order, TEST, at) for d, seed, order, at in keys]})
+
+
+def scores_of_table(output: Output, predictions: pd.DataFrame) -> pd.DataFrame:
+    """Return the scores of a table of predictions."""
+    images, vision = unseen_images(output), vision_of(output)
+    reader = reader_of(predictions.reset_index(drop=True), Path("predictions"), images, states_of(vision))
+    return scores_of(reader, images, vision.unknown_cost)
 
 
 def network_of(images: pd.DataFrame) -> Reader:
