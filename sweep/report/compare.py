@@ -19,13 +19,14 @@ from ..results.output import Output, read_output
 from ..results.tables import write_csv
 from ..study import folder_name
 from .answer import largest_separation_elsewhere
-from .compare_fronts import draw_fronts, front_table, fronts_in, on_the_same_axes, scene_names
+from .compare_fronts import draw_fronts, front_table, front_words, fronts_in, on_the_same_axes, scene_names
 from .compare_tables import (
     best_of_runs,
     curve_notes,
     plain_differences,
     ranking,
     side_by_side,
+    with_units_in_cells,
 )
 from .figures import Drawing, pictures_of
 from .pages import aligned, inlined, page, rows
@@ -79,6 +80,7 @@ def compare(*folders: Path | str | Sequence[Path | str], output: Path | str | No
     best = best_of_runs(runs)
     shown, left_out = side_by_side(best, runs)
     plain, same = plain_differences(runs)
+    plain_words, words_of = with_units_in_cells(plain), {name: front_words(table) for name, table in fronts.items()}
     drawn = {} if figure is None else pictures_of(figure, _KINDS)
     html = page(
         "compare.html.j2",
@@ -89,8 +91,8 @@ def compare(*folders: Path | str | Sequence[Path | str], output: Path | str | No
         left_out=left_out,
         of_fronts=OF_FRONTS,
         picture=inlined(drawn["svg"]) if drawn else None,
-        fronts=[(name, rows(table)) for name, table in fronts.items()],
-        plain=rows(plain),
+        fronts=[(name, rows(table)) for name, table in words_of.items()],
+        plain=rows(plain_words),
         same=same or "The runs share no plain CFA and no named design.",
     )
     write_text(html, target / PAGE)
@@ -100,9 +102,9 @@ def compare(*folders: Path | str | Sequence[Path | str], output: Path | str | No
     lines = [f"{run}: {output.folder}" for run, output in runs.items()]
     lines += _section("Best designs", shown, "none")
     lines += [f"({left_out} more parameters in {TABLE}.)"] if left_out else []
-    lines += _section("Plain CFAs and named designs", plain, same or "none in common")
+    lines += _section("Plain CFAs and named designs", plain_words, same or "none in common")
     for name in list(fronts)[:_MOST_SCENARIOS]:
-        lines += _section(f"Fronts in {name}, {OF_FRONTS}", fronts[name], "none")
+        lines += _section(f"Fronts in {name}, {OF_FRONTS}", words_of[name], "none")
     if len(fronts) > _MOST_SCENARIOS:
         lines.append(f"({len(fronts) - _MOST_SCENARIOS} more scenes in {PAGE}.)")
     lines += [

@@ -120,11 +120,21 @@ def front_table(fronts: Sequence[ComparedFront]) -> pd.DataFrame:
                 "CFA": front.cfa,
                 "front": "traced by the search" if front.traced else "designs",
                 "points": len(front.points),
-                "separation / DN": f"{low[0]:.1f} to {high[0]:.1f}",
-                "sensitivity": f"{low[1]:.4f} to {high[1]:.4f}",
+                "separation_dn": [low[0], high[0]],
+                "sensitivity": [low[1], high[1]],
             }
         )
     return pd.DataFrame(rows)
+
+
+def front_words(fronts: pd.DataFrame) -> pd.DataFrame:
+    """Return the ends of fronts as a person reads them."""
+    ends = {"separation / DN": ("separation_dn", 1), "sensitivity": ("sensitivity", 4)}
+    words = {
+        title: [f"{low:.{digits}f} to {high:.{digits}f}" for low, high in fronts[name]]
+        for title, (name, digits) in ends.items()
+    }
+    return fronts.drop(columns=["separation_dn", "sensitivity"]).assign(**words)
 
 
 def draw_fronts(

@@ -76,7 +76,7 @@ def _cell(name: str, row: Mapping[Any, Any], columns: Mapping[str, Column]) -> s
 
 
 def plain_differences(runs: Mapping[str, Output]) -> tuple[pd.DataFrame, str]:
-    """Return CSDs of plain CFAs and named designs that differ between runs, and a sentence on the others."""
+    """Return CSDs of plain CFAs and named designs that differ between runs, DN, and a sentence on the others."""
     parts, keys = [], ["name", "scene", "CSD"]
     for run, scenes in scene_names(runs).items():
         named = runs[run].named[["name", "scenario", *runs[run].distances]].astype({"name": str, "scenario": str})
@@ -90,8 +90,16 @@ def plain_differences(runs: Mapping[str, Output]) -> tuple[pd.DataFrame, str]:
     same, single = [n for n in of_shared if n not in of_differing], [n for n in names if n not in of_shared]
     sentences = [f"Equal in every CSD: {', '.join(same)}."] if same else []
     sentences += [f"Not in the same scene of two runs: {', '.join(single)}."] if single else []
-    shown = differing.map(lambda value: "-" if np.isnan(value) else f"{value:.1f} DN")
-    return shown.reset_index(), " ".join(sentences)
+    return differing.reset_index(), " ".join(sentences)
+
+
+def with_units_in_cells(differing: pd.DataFrame) -> pd.DataFrame:
+    """Return the numbers of `plain_differences` as a person reads them."""
+    return differing.map(lambda value: value if isinstance(value, str) else _dn(value))
+
+
+def _dn(value: float) -> str:
+    return "-" if np.isnan(value) else f"{value:.1f} DN"
 
 
 def ranking(runs: Mapping[str, Output]) -> list[str]:
