@@ -19,7 +19,7 @@ from ..metrics.quantity import Column, Quantity
 from ..search.limit import Limit
 from ..study import Study, folder_name
 from .inline_curves import CurveLike, on_grid, wavelength_table
-from .parameters import OWN, are_parameters, evaluate_spaces, own_designs, plain_and_named
+from .parameters import OWN, are_parameters, designs_of_parameters, evaluate_spaces, plain_and_named
 from .user_filters import (
     any_filter_search,
     evaluate_curves,
@@ -169,7 +169,7 @@ class LoadedStudy:
         if not filters:
             return evaluate_spaces(study, plain_and_named(study, cfa), scenarios)
         if are_parameters(study, filters):
-            return evaluate_spaces(study, [own_designs(study, cfa, filters)], scenarios)
+            return evaluate_spaces(study, [designs_of_parameters(study, cfa, filters)], scenarios)
         channels = {name: cast(CurveLike, curve) for name, curve in filters.items()}
         factor = 1.0 if relative_to is None else study.sensor.curve(relative_to)
         rows = {

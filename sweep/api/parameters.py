@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.errors import SweepError, ValidationIssue, nearest
+from ..designs.family import Parameter
 from ..designs.space import Space
 from ..designs.ungridded import PairedDesigns
 from ..metrics.bound import total_violation
@@ -68,7 +69,7 @@ def are_parameters(study: Study, filters: Mapping[str, object]) -> bool:
     return True
 
 
-def own_designs(study: Study, cfa: str | None, parameters: Mapping[str, Any]) -> Space:
+def designs_of_parameters(study: Study, cfa: str | None, parameters: Mapping[str, Any]) -> Space:
     """Return designs of a family of the study: that of the search, or the first with these parameters."""
     searched = [] if study.search is None else [study.search.space]
     spaces = [s for s in (*searched, *study.spaces) if s.filter is not None and cfa in (None, s.cfa)]
@@ -77,24 +78,29 @@ def own_designs(study: Study, cfa: str | None, parameters: Mapping[str, Any]) ->
         allowed = "; ".join(dict.fromkeys(f"{s.cfa}: {', '.join(s.parameters)}" for s in spaces)) or "none"
         problem = f"no filter of the study{f' on {cfa}' if cfa else ''} has these parameters together"
         raise SweepError(ValidationIssue(problem, value=list(parameters), allowed=allowed))
-    axes = []
-    for parameter in space.filter.family.parameters:
-        stated = parameters.get(parameter.name, parameter.default)
-        if stated is None:
-            allowed = f"{parameter.low:g} to {parameter.high:g}"
-            raise SweepError(ValidationIssue("missing", key=parameter.name, allowed=allowed))
-        values = np.atleast_1d(np.asarray(stated, dtype=float)).ravel()
-        outside = values[~((values >= parameter.low) & (values <= parameter.high))]
-        if outside.size or not values.size:
-            allowed = f"{parameter.low:g} to {parameter.high:g}"
-            value = outside[:1].tolist()
-            raise SweepError(ValidationIssue("out of range", key=parameter.name, value=value, allowed=allowed))
-        axes.append(tuple(values.tolist()))
+    axes = [_values(parameter, parameters.get(parameter.name)) for parameter in space.filter.family.parameters]
     size = max(map(len, axes))
     if {len(axis) for axis in axes} - {1, size}:
         counts = {p: len(axis) for p, axis in zip(space.parameters, axes, strict=True)}
         raise SweepError(ValidationIssue("as many values of each parameter, or one", value=counts))
     return Space("design", OWN, space.cfa, space.filter, tuple(axes), gridded=False, rows=PairedDesigns(size))
+
+
+def _values(parameter: Parameter, stated: Any) -> tuple[float, ...]:
+    """Return the values of a parameter, its default where none is stated."""
+    allowed, stated = f"{parameter.low:g} to {parameter.high:g}", parameter.default if stated is None else stated
+    if stated is None:
+        raise SweepError(ValidationIssue("missing", key=parameter.name, allowed=allowed))
+    try:
+        values = np.asarray(stated, dtype=float).ravel()
+    except (TypeError, ValueError):
+        issue = ValidationIssue("not a number, nor several", key=parameter.name, value=stated, allowed=allowed)
+        raise SweepError(issue) from None
+    outside = values[~((values >= parameter.low) & (values <= parameter.high))]
+    if outside.size or not values.size:
+        value = outside[:1].tolist()
+        raise SweepError(ValidationIssue("out of range", key=parameter.name, value=value, allowed=allowed))
+    return tuple(values.tolist())
 
 
 def _unknown(what: str, name: str, known: Sequence[str]) -> ValidationIssue:

@@ -266,8 +266,8 @@ def table_of_results(study: Study, rows: Sequence[tuple[str, str, str, Columns]]
 
 def _violated(study: Study, columns: Columns) -> list[str]:
     """Return the names of the constraints that each design does not meet, or of which it is not known."""
-    beyond = {name: ~(bound.violation(columns[name]) <= FEASIBLE) for name, bound in study.constraints.items()}
-    return [", ".join(name for name, of in beyond.items() if of[at]) for at in range(len(columns["violation"]))]
+    unmet = {name: ~(bound.violation(columns[name]) <= FEASIBLE) for name, bound in study.constraints.items()}
+    return [", ".join(name for name in unmet if unmet[name][row]) for row in range(len(columns["violation"]))]
 
 
 def any_filter_search(study: Study, setup: Setup) -> Problem:

@@ -101,8 +101,14 @@ def unknown(
 def faults_of(path: Sequence[str | int], error: SweepError) -> list[Fault]:
     """Return the issues of an error as faults of a key."""
     return [
-        Fault(path, f"{of.file}: {of.problem}" if of.file else of.problem, of.value, of.allowed, of.nearest)
-        for of in error.issues
+        Fault(
+            path,
+            f"{issue.file}: {issue.problem}" if issue.file else issue.problem,
+            issue.value,
+            issue.allowed,
+            issue.nearest,
+        )
+        for issue in error.issues
     ]
 
 

@@ -64,8 +64,8 @@ def compare(*folders: Path | str | Sequence[Path | str], output: Path | str | No
     SweepError
         If there are fewer or more runs, a folder holds no finished run, or a file of others would be replaced.
     """
-    given = [place for of in folders for place in ([of] if isinstance(of, str | os.PathLike) else of)]
-    places = [run_folder(place) for place in given]
+    groups = [[group] if isinstance(group, str | os.PathLike) else group for group in folders]
+    places = [run_folder(place) for group in groups for place in group]
     if not 2 <= len(places) <= len(_LETTERS):
         allowed = f"2 to {len(_LETTERS)} folders"
         raise SweepError(ValidationIssue("cannot be compared", None, None, "FOLDERS", len(places), allowed))
