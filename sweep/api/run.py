@@ -232,7 +232,7 @@ def _run_sensors(path: Path, several: SensorStudies, how: _How) -> Answer:
                 failed.append(problem)
         facts_of = {member: answer.facts for member, answer in answers.items()}
         if how.dry_run:
-            lines = [line for answer in answers.values() for line in answer.lines]
+            lines = [f"{member.name}: {line}" for member, answer in answers.items() for line in answer.lines]
         elif not facts_of:
             discard(manifest)
         else:
