@@ -41,7 +41,7 @@ slow: $(VENV)/.compiled
 	UNCHECKED_TYPES=1 $(TESTS) -m slow $(ARGS)
 
 oldest: $(OLDEST)/.oldest
-	@$(MAKE) --no-print-directory test VENV=$(OLDEST)
+	@UNCHECKED_TYPES=1 $(MAKE) --no-print-directory test VENV=$(OLDEST)
 
 accuracy: $(VENV)/.ready-dev
 	$(BIN)/python -m pytest tests/hard/test_hard_cases.py -m "slow or not slow" --hard-cases outputs/accuracy/hard_cases.json
