@@ -5,7 +5,7 @@
 # make oldest                run the tests with the oldest versions that pyproject.toml allows, in .venv-oldest
 # make check                 ruff, mypy --strict
 # make accuracy              run the hard cases, measure what accuracy costs in time, outputs/accuracy/accuracy.png
-# make tables              print the tables of studies/guide/reference.md and outputs/README.md anew
+# make tables              print the tables of studies/guide/reference.md and outputs/README.md, and the schema, anew
 # make gallery              run every study, draw studies/figures and studies/guide/gallery.md anew, and compare the
 #                            figures in the text with their runs (20 minutes)
 # make docs                  build guide and API reference as HTML, outputs/docs/studies/guide/index.html

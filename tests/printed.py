@@ -8,6 +8,7 @@ from pathlib import Path
 
 from sweep.base.errors import EXIT_CODES
 from sweep.results.dictionary import columns_table, files_table
+from sweep.study.editors import SCHEMA_FILE, schema_text
 
 from .study_reference import study_reference
 
@@ -39,3 +40,4 @@ def with_printed(text: str, parts: dict[str, Callable[[], list[str]]]) -> str:
 if __name__ == "__main__":
     for file, parts in PRINTED.items():
         (ROOT / file).write_text(with_printed((ROOT / file).read_text(), parts))
+    (ROOT / "studies" / SCHEMA_FILE).write_text(schema_text(), encoding="utf-8")
