@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from html import escape
 from typing import Any
 
-from .errors import SweepError
+from .errors import SweepError, ValidationIssue
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,8 @@ class Answer:
 
     def __fspath__(self) -> str:
         """Return the folder of what it tells of, so that it stands for it."""
+        if "folder" not in self.facts:
+            raise SweepError(ValidationIssue("this answer is of no folder", value=list(self.facts)))
         return str(self.facts["folder"])
 
     def _repr_html_(self) -> str:

@@ -357,6 +357,8 @@ def _of_value(path: KeyPath, item: Any) -> tuple[KeyPath, str, object, str | Non
         return path, f"true or false expected: write {meant}", shown, None, None
     allowed = item["msg"].removeprefix("Input should be ").removeprefix("a valid ")
     allowed = {"boolean": "true or false", "tuple": "list"}.get(allowed, allowed)
+    if allowed in ("number", "integer") and isinstance(value, str) and _LOOKS_LIKE_A_NUMBER.fullmatch(value):
+        allowed += ", without quotes"
     return path, _NOT_ALLOWED, shown, "mapping" if allowed.startswith("dictionary") else allowed, None
 
 
