@@ -6,7 +6,7 @@ import hashlib
 import sys
 from dataclasses import dataclass
 from functools import lru_cache
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
@@ -146,9 +146,13 @@ def read_code(path: Path) -> tuple[str, str]:
 
 @dataclass(frozen=True)
 class Installed:
-    """An offer of an installed package under a name."""
+    """An offer of an installed package under a name.
 
-    entry: EntryPoint
+    `entry`: an entry point of Python's, or of the package importlib_metadata, which takes Python's place once some
+    library has loaded it.
+    """
+
+    entry: Any
 
     @property
     def description(self) -> str:
@@ -159,7 +163,7 @@ class Installed:
     @property
     def package(self) -> str:
         """The name by which Python imports it."""
-        return self.entry.module.partition(".")[0]
+        return str(self.entry.module).partition(".")[0]
 
     @property
     def folders(self) -> list[Path]:
