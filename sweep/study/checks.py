@@ -14,7 +14,6 @@ from ..metrics.quantity import Quantity, RequestedQuantities
 from ..metrics.registry import listed, quantities_of
 from ..spectra.lights import Lights
 from ..spectra.single_leds import RegionMap
-from ..vision.faults import vision_faults
 from .model import Study
 from .schema import StudySection
 
@@ -48,6 +47,8 @@ def check_lights(
     if section.validation is not None and section.validation.leave_one_out and section.search is None:
         yield Fault(("validate", "leave_one_out"), "nothing is searched", None, "a study with `search`")
     if section.vision is not None:
+        from ..vision.faults import vision_faults  # noqa: PLC0415  (few studies have images)
+
         of_images = section.pixel, section.scenarios, lights, mosaics, section.wavelengths
         yield from vision_faults(section.vision, *of_images)
     yield from _check_published(section, lights, mosaics)
