@@ -44,6 +44,12 @@ _LOOKS_LIKE_A_NUMBER = re.compile(r"[-+.]*[0-9][-+.0-9xo_a-fA-F]*")
 _SURROGATE = re.compile("[\ud800-\udfff]")
 """Half of a character: `\\ud800`. No file takes it."""
 _NOT_ALLOWED = "not allowed"
+_GONE = {
+    "recognition.patches": "no such key: errors are exact without patches",
+    "validate.lights": "`lights: [A, B]`, which runs the study on both",
+    "accuracy.single_precision": "no such key: all is computed in double precision",
+}
+"""Keys that a study had in earlier versions, and what to write instead."""
 _YAML_FAULTS: tuple[tuple[str, str, bool], ...] = (
     ("found character '\\t'", "a tab begins a value; allowed: spaces", False),
     ("found '<block mapping start>'", "the line is indented otherwise than the one before it", False),
@@ -329,6 +335,8 @@ class Document:
     def _issue(self, path: KeyPath, item: Any, schema: dict[str, Any]) -> ValidationIssue:
         kind, context = item["type"], item.get("ctx", {})
         tag = str(context.get("discriminator")).strip("'")
+        if kind == "extra_forbidden" and (instead := _GONE.get(dotted(path))):
+            return self.issue(path, "a key of earlier versions", None, instead)
         if kind == "extra_forbidden":
             known = _known_keys(schema, path[:-1], self.data)
             return self.issue(path, "unknown key", None, ", ".join(known), nearest(path[-1], known))
