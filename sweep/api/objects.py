@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from html import escape
@@ -12,12 +11,11 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from ..base.errors import OutputError, SweepError, ValidationIssue, nearest
-from ..base.types import silent
 from ..camera.plan import Plan
 from ..designs.space import Space
 from ..metrics.quantity import Column, Quantity
 from ..search.limit import Limit
-from ..study import Study, folder_name
+from ..study import Study
 from .inline_curves import CurveLike, on_grid, wavelength_table
 from .parameters import OWN, are_parameters, designs_of_parameters, evaluate_spaces, plain_and_named
 from .user_filters import (
@@ -283,14 +281,9 @@ class LoadedStudy:
         SweepError
             As `sweep run` reports it.
         """
-        from ..report import make_report, read_output
-        from ..results.identity import run_facts
-        from ..runs import output_folder, run_study
+        from .run import run_loaded
 
-        folder, _ = output_folder(Path(output) / folder_name(self.name), run_facts(self.study))
-        run_study(self.study, folder, jobs or os.cpu_count() or 1, silent, ("sweep", "from Python"))
-        make_report(read_output(folder), repair=True)
-        return FinishedRun(folder)
+        return FinishedRun(Path(run_loaded(self.study, Path(output), jobs)))
 
     def _modified(self, cfa: str | None, channel: str | None) -> Space:
         """Return the design space of the search, or the first that has the CFA and channel."""

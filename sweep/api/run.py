@@ -8,9 +8,9 @@ import re
 import sys
 import time
 import webbrowser
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -44,18 +44,19 @@ _LONGEST_NAME = 120
 class _How:
     """Arguments of `run`, and the time by the monotonic clock at which its user began to wait, s."""
 
-    data: Path | None
     output: Path
-    jobs: int | None
-    backend: str | None
-    scheduler: str | None
-    dry_run: bool
-    options: runner.RunOptions
-    changes: Mapping[str, Any]
-    allow_code: bool
-    progress: Progress
-    note: Callable[[str], object]
     began_s: float
+    data: Path | None = None
+    jobs: int | None = None
+    backend: str | None = None
+    scheduler: str | None = None
+    dry_run: bool = False
+    options: runner.RunOptions = field(default_factory=runner.RunOptions)
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    allow_code: bool = False
+    progress: Progress = silent
+    note: Callable[[str], object] = silent
+    command: Sequence[str] = field(default_factory=lambda: sys.argv)
 
     def load(self, path: Path, member: SensorAndLights | None = None) -> Study:
         """Load a study, one of a sensor and light set where it has several."""
@@ -135,7 +136,7 @@ def run(
         began_s=time.monotonic() if began_s is None else began_s,
     )
     several = sensor_studies_in(path, how.changes)
-    answer = _run_one(path, how) if several is None else _run_sensors(path, several, how)
+    answer = _run_one(how.load(path), how) if several is None else _run_sensors(path, several, how)
     page = Path(answer.facts["folder"], REPORT)
     if opens and page.is_file() and not webbrowser.open(page.absolute().as_uri()):
         note(f"no browser was found for {page}.")
@@ -168,9 +169,13 @@ def show(folder: Path | str) -> Answer:
     return Answer([f"Opened: {page}"], {"page": str(page)})
 
 
-def _run_one(path: Path, how: _How, member: SensorAndLights | None = None) -> Answer:
-    """Run a study, or one of several of a file, and draw its report."""
-    study = how.load(path, member)
+def run_loaded(study: Study, output: Path, jobs: int | None) -> Answer:
+    """Run a study that Python holds."""
+    return _run_one(study, _How(output, time.monotonic(), jobs=jobs, command=("sweep", "from Python")))
+
+
+def _run_one(study: Study, how: _How, member: SensorAndLights | None = None) -> Answer:
+    """Run a study, which may be a member of several, and draw its report."""
     wanted = how.backend or runner.usual_backend(study)
     if (backend := backend_here(wanted)) != wanted:
         how.note("no shared memory for processes here (/dev/shm): threads compute the same rows.")
@@ -184,7 +189,7 @@ def _run_one(path: Path, how: _How, member: SensorAndLights | None = None) -> An
         return Answer([*runner.remaining_work_lines(left, folder)], {"folder": str(folder), **left.facts})
     with runner.stopped_by_signals(), workers(n_workers, backend, how.scheduler) as pool:
         computed = runner.run_study(
-            study, folder, n_workers, how.progress, sys.argv, scheduler=how.scheduler, options=how.options, pool=pool
+            study, folder, n_workers, how.progress, how.command, scheduler=how.scheduler, options=how.options, pool=pool
         )
         if not computed:
             how.note(f"{folder} holds this very study, finished; nothing was computed.")
@@ -222,7 +227,8 @@ def _run_sensors(path: Path, several: SensorStudies, how: _How) -> Answer:
         for member in several.members:
             how.note(f"-- {member.name} --")
             try:
-                answers[member] = _run_one(path, replace(how, output=folder, began_s=time.monotonic()), member)
+                in_folder = replace(how, output=folder, began_s=time.monotonic())
+                answers[member] = _run_one(studies[member], in_folder, member)
             except InterruptedRunError:
                 raise
             except SweepError as error:  # the others are run all the same
@@ -270,7 +276,7 @@ def _join(
         facts = {
             "fingerprint": manifest.fingerprint,
             "runs": manifest.facts["runs"],
-            "command": sys.argv,
+            "command": how.command,
             "designs": sum(run_facts["designs"] for run_facts in facts_of.values()),
             "failed": sum(run_facts["failed"] for run_facts in facts_of.values()),
             "duration_s": round(time.monotonic() - began_s, 3),

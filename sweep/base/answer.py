@@ -35,10 +35,6 @@ class Answer:
     def __repr__(self) -> str:
         return str(self)
 
-    def __getitem__(self, key: str) -> Any:
-        """Return one of the facts."""
-        return self.facts[key]
-
     def __fspath__(self) -> str:
         """Return the folder of what it tells of, so that it stands for it."""
         if "folder" not in self.facts:

@@ -86,8 +86,8 @@ class Fault(ValueError):  # noqa: N818  (it is collected more often than raised)
 
     def under(self, *path: str | int) -> Fault:
         """Return the fault as seen from further up."""
-        whole = (*path, *self.path)
-        return Fault(whole, self.problem, self.value, self.allowed, self.nearest, known=self.known)
+        from_above = (*path, *self.path)
+        return Fault(from_above, self.problem, self.value, self.allowed, self.nearest, known=self.known)
 
 
 def unknown(

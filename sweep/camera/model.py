@@ -238,16 +238,14 @@ class SceneModel:
         """
         exposure_s = self.exposure_s(curves)
         scales = self.scales(exposure_s, moments)
-        first, which = _different_moments(scales) if moments is not None else (slice(None), None)
+        first, which = _different_moments(scales)
         scales = scales[..., first]
         parts = []
         for view in self.own_views() if views is None else views:
             electrons = self._blocks(view, curves, scales, exposure_s)
             parts.append(np.concatenate([view.readout.folded(view.readout.transfer(of_some)) for of_some in electrons]))
         dn = np.concatenate(parts, axis=1)
-        if which is not None:
-            dn = dn[:, np.arange(dn.shape[1]).reshape(-1, scales.shape[-1])[:, which].ravel()]
-        return dn, exposure_s
+        return dn[:, np.arange(dn.shape[1]).reshape(-1, first.size)[:, which].ravel()], exposure_s
 
     def read_with_noise(self, curves: DesignCurves, views: Sequence[View] | None = None) -> NoisyReadout:
         """Read out a batch of designs with the variance of the noise.

@@ -24,7 +24,7 @@ _LEAST_SHARE, _LEAST_S = 0.01, 60.0
 
 
 class Answered(Protocol):
-    """What a command found; see `base.answer`."""
+    """What a command found: an `Answer`, or an evaluation, which makes its table only when asked for facts."""
 
     @property
     def lines(self) -> Sequence[str]:

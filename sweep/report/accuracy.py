@@ -30,6 +30,7 @@ from ..metrics.quantity import BEST_PHASE, Columns
 from ..metrics.separation import csd_name
 from ..results.atomic import write_bytes
 from ..results.tables import write_table
+from ..runs.dry_run import spread
 from ..spectra.lights import class_pairs
 from ..study import Study
 from .accuracy_figure import draw_accuracy
@@ -98,12 +99,6 @@ def _in_words(table: pd.DataFrame) -> pd.DataFrame:
     for name, title in (("first_s", "first design / ms"), ("following_s", "each following / ms")):
         shown[title] = (1e3 * table[name]).map("{:.3g}".format)
     return shown
-
-
-def spread(n: int) -> DesignNumbers:
-    """Return 0 to n - 1 in an order whose every prefix covers the range evenly; 0 first."""
-    golden = (math.sqrt(5) - 1) / 2
-    return np.argsort(np.arange(n) * golden % 1.0, kind="stable")
 
 
 def _in_new_process(setup: Setup, space: Space, numbers: DesignNumbers) -> Measured:

@@ -22,7 +22,7 @@ from ..spectra.filter_files import (
     isetcam_mat,
     unique_names,
 )
-from ..study import folder_name
+from ..study import Study, folder_name
 from .parameter_map import specification as specification_of
 
 _ROUNDING = 1e-9
@@ -72,16 +72,28 @@ def export(
         For an unknown design or one that failed, a folder without a finished run, curves that are not those of the
         run, a specification without a map, and where a file of other content would be overwritten.
     """
-    if not isinstance(design, str | int):
-        of_each = {"output": output, "specification": specification, "allow_code": allow_code, "force": force}
-        answers = [export(folder, one, data, **of_each) for one in design]  # type: ignore[arg-type]
-        return Answer(
-            [line for answer in answers for line in answer.lines], {"designs": [answer.facts for answer in answers]}
-        )
     folder = run_folder(folder)
-    run = read_output(folder)
-    row = find_design_row(run, design)
+    run, to = read_output(folder), folder / "export" if output is None else Path(output)
     study = study_of(run, None if data is None else Path(data), allow_code=allow_code)
+    contents, lines, facts = dict[Path, bytes](), list[str](), list[dict[str, Any]]()
+    for key in [design] if isinstance(design, str | int) else design:
+        row = find_design_row(run, key)
+        files, text = _design_files(run, study, row, to / folder_name(str(key)), specification=specification)
+        contents |= files
+        lines += text
+        labels = {name: row[name] for name in ("design_id", "filter_id", "name", "cfa", "family", "scenario")}
+        facts.append(labels | {"parameters": _parameters(run, row), "files": [str(file) for file in files]})
+    for file, content in () if force else contents.items():
+        _refuse_other(file, content)
+    for file, content in contents.items():
+        write_bytes(content, file)
+    return Answer(lines, {"folder": str(folder), "designs": facts})
+
+
+def _design_files(
+    run: Output, study: Study, row: Row, path: Path, *, specification: bool
+) -> tuple[dict[Path, bytes], list[str]]:
+    """Return the files of a design, under the stem of `path`, and what to say of them."""
     space, mosaic = row_space(study, row), study.mosaics[row["cfa"]]
     wavelength_nm, curves = study.grid.nodes_nm, channel_curves(study, row)
     bases = {} if space.filter is None else dict(space.filter.bases)
@@ -94,7 +106,6 @@ def export(
     }
     table = curves | {name: values for name, values in transmissions.items() if np.isfinite(values).all()}
     hints = color_hints(mosaic.channels, bases)
-    path = (folder / "export" if output is None else Path(output)) / folder_name(str(design))
     csv_path, mat_path = (path.with_name(path.name + suffix) for suffix in (".csv", ".mat"))
     comment = _comment(run, row, bases)
     files = {
@@ -115,15 +126,10 @@ def export(
                 "no map of absorption bands",
                 "a study with `search: {map: {peak_nm: ..., fwhm_nm: ...}}`",
             )
-            raise SweepError(ValidationIssue(problem, str(folder), None, "--specification", None, allowed))
+            raise SweepError(ValidationIssue(problem, str(run.folder), None, "--specification", None, allowed))
         files[specified] = specified_table.to_csv(index=False).encode("utf-8")
         lines.append(f"       {specified} (what an absorption band would have to be)")
-    for file, content in () if force else files.items():
-        _refuse_other(file, content)
-    for file, content in files.items():
-        write_bytes(content, file)
-    facts = {key: row[key] for key in ("design_id", "filter_id", "name", "cfa", "family", "scenario")}
-    return Answer(lines, facts | {"parameters": _parameters(run, row), "files": [str(file) for file in files]})
+    return files, lines
 
 
 def relative_transmission(modified: PerWavelength, base: PerWavelength) -> PerWavelength:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ import numpy as np
 import pyarrow as pa
 from threadpoolctl import threadpool_limits
 
+from ..base.types import DesignNumbers
 from ..results.dataset import encoded_part, part_name
 from ..results.folder import run_in
 from ..results.identity import run_facts
@@ -22,7 +24,6 @@ from ..study import Study
 from .held_out import most_evaluations_left_out
 from .rows import Job, parts_of, rules_of, run_job
 
-_GOLDEN = 0.6180339887498949
 _SAMPLED_S = 1.0
 """Time for which rows are computed as a sample, s."""
 
@@ -87,7 +88,7 @@ def remaining_work(study: Study, output: Path, n_workers: int = 1) -> RemainingW
 def _sampled(study: Study, jobs: Sequence[Job]) -> Sample | None:
     """Compute jobs that are spread over all of them, until the time is over; the first once before, to load code."""
     rules, tables, seconds = rules_of(study), list[pa.Table](), 0.0
-    order = np.argsort(np.arange(len(jobs)) * _GOLDEN % 1.0, kind="stable")
+    order = spread(len(jobs))
     for at in (*order[:1], *order):
         begun = time.perf_counter()
         with threadpool_limits(1):  # as in a worker
@@ -101,9 +102,15 @@ def _sampled(study: Study, jobs: Sequence[Job]) -> Sample | None:
             break
     if not tables:
         return None
-    whole, empty_size = pa.concat_tables(tables).unify_dictionaries(), len(encoded_part(tables[0], ""))
-    row_size = (len(encoded_part(whole, "")) - empty_size) / len(whole)
-    return Sample(len(whole), max(seconds, 1e-9), row_size, empty_size)
+    table, empty_size = pa.concat_tables(tables).unify_dictionaries(), len(encoded_part(tables[0], ""))
+    row_size = (len(encoded_part(table, "")) - empty_size) / len(table)
+    return Sample(len(table), max(seconds, 1e-9), row_size, empty_size)
+
+
+def spread(n: int) -> DesignNumbers:
+    """Return 0 to n - 1 in an order whose every prefix covers the range evenly; 0 first."""
+    golden = (math.sqrt(5) - 1) / 2
+    return np.argsort(np.arange(n) * golden % 1.0, kind="stable")
 
 
 def remaining_work_lines(todo: RemainingWork, output: Path) -> Iterator[str]:

@@ -272,8 +272,8 @@ class Document:
             if isinstance(node, list) and isinstance(part, str) and part in node:
                 key = node.index(part)  # a list of names, which is read as a mapping
             if not _has(node, key):
-                each, rest = _child(node, "each"), ".".join(map(str, path[at:]))
-                return (self._tree.place(each, rest) or place) if _has(each, rest) else place
+                axes, dotted_key = _child(node, "each"), ".".join(map(str, path[at:]))
+                return (self._tree.place(axes, dotted_key) or place) if _has(axes, dotted_key) else place
             place = self._tree.place(node, key) or place
             node = node[key]
         keys = node if isinstance(node, dict) else range(len(node)) if isinstance(node, list) else ()

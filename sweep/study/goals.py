@@ -35,7 +35,7 @@ _LEAST_ERROR = 1e-12
 """Smallest error that is stated where errors are no exact sums."""
 
 
-def brightness_counts(section: StudySection, requested: RequestedQuantities) -> str | None:
+def brightness_note(section: StudySection, requested: RequestedQuantities) -> str | None:
     """Return a note where the objective counts how bright a lamp is, and lamps differ in photons."""
     known = quantities_of(requested)
     counted = [name for name in section.objective.weights if name in known and known[name].role == "separation"]

@@ -12,7 +12,7 @@ from ..metrics.quantity import RequestedQuantities
 from ..metrics.registry import quantities_of
 from ..metrics.user_metrics import UserMetric
 from . import checks
-from .goals import brightness_counts, check_goals, check_searched, search_of
+from .goals import brightness_note, check_goals, check_searched, search_of
 from .lights import check_luminances, check_range, lights_of, with_light_files, with_population
 from .model import Search, Study, requested_quantities
 from .schema import CfaSection, StudySection
@@ -113,7 +113,7 @@ def _goal_faults(
     """Return what is wrong with objective and constraints; those of metrics with doubtful names are not looked at."""
     if named := [*check_names(metrics, requested, spaces)]:
         return named
-    if (note := brightness_counts(section, requested)) is not None:
+    if (note := brightness_note(section, requested)) is not None:
         sources.warnings.append(note)
     written_out = isinstance(sources.document.data.get("objective"), dict)
     faults = [*check_goals(section, requested, written_out=written_out)]

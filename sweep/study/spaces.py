@@ -60,18 +60,15 @@ class SpaceBuilder:
             problem = f"no filter of the study has bands of colorants ({', '.join(PIGMENTS)})"
             self.sources.refuse(Fault(("production", "broadening"), problem))
         changed = {(entry.cfa, channel) for entry in entries for channel in entry.channel}
-        misnamed = (
-            {cfa for cfa, channel in changed if channel not in self.mosaics[cfa].channels}
-            if ({cfa for cfa, _ in changed} <= self.mosaics.keys())
-            else {*self.mosaics}
-        )  # these have faults of their own
+        # A filter of a wrong CFA or channel has a fault of its own; what it leaves without a curve is none.
+        named = all(cfa in self.mosaics and channel in self.mosaics[cfa].channels for cfa, channel in changed)
         spaces = []
         for name, mosaic in self.mosaics.items():
             stated = section.cfas[name].curves
             curves = {c: stated.get(c, self.sensor.curve_name(name, c)) for c in mosaic.channels}
             missing = {channel: curve for channel, curve in curves.items() if curve not in self.sensor.qe}
             for channel in missing:
-                if (name, channel) not in changed and name not in misnamed:
+                if named and (name, channel) not in changed:
                     allowed = (
                         f"a design, sweep or box with `channel: {channel}`; or `curves: {{{channel}: ...}}` of "
                         f"{', '.join(self.sensor.qe)}"

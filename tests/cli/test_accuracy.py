@@ -8,7 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sweep.report.accuracy import measure_accuracy, spread
+from sweep.report.accuracy import measure_accuracy
+from sweep.runs.dry_run import spread
 from sweep.study import load_study
 
 from ..build import stopband_study

@@ -100,7 +100,7 @@ def export(
 
         answer = exported(
             folder,
-            design[0] if len(design) == 1 else design,
+            design,
             data,
             output=output,
             specification=specification,
