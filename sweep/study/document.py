@@ -336,7 +336,7 @@ class Document:
         kind, context = item["type"], item.get("ctx", {})
         tag = str(context.get("discriminator")).strip("'")
         if kind == "extra_forbidden" and (instead := _GONE.get(dotted(path))):
-            return self.issue(path, "a key of earlier versions", None, instead)
+            return self.issue(path, "unknown key, one of earlier versions", None, instead)
         if kind == "extra_forbidden":
             known = _known_keys(schema, path[:-1], self.data)
             return self.issue(path, "unknown key", None, ", ".join(known), nearest(path[-1], known))

@@ -100,7 +100,11 @@ def test_yaml_1_1_booleans_are_reported_as_written(tmp_path: Path, said: str, me
         ("sweeps.edges.cfa", "RYNX", "sweeps.edges.cfa: unknown CFA (got 'RYNX')"),
         ("cfas.0", "RGB", "cfas.RGB: not the name of a 2x2 CFA"),
         ("search.space", "edgs", "search.space: unknown sweep or box"),
-        ("accuracy.single_precision", "true", "accuracy.single_precision: a key of earlier versions; allowed: no such"),
+        (
+            "accuracy.single_precision",
+            "true",
+            "accuracy.single_precision: unknown key, one of earlier versions; allowed: no such",
+        ),
         ("scenarios.chart.each", "{off_axis_deg: ['1']}", "scenarios.chart.each.off_axis_deg: not a number (got '1')"),
         ("pixel.bits", "'12'", "pixel.bits: not allowed (got '12'); allowed: integer, without quotes"),
         ("cfas", "[]", "cfas: too few entries (got 0); allowed: 1 or more"),
