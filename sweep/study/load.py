@@ -41,7 +41,8 @@ def load_study(
     if member is None and len(members) > 1:
         names = ", ".join(known_member.name for known_member in members)
         problem = f"a study of several sensors or lights ({names}): `sweep run` runs all"
-        raise StudyError(ValidationIssue(problem, str(path), allowed=f"one of each here: {way_to_one(document)}"))
+        key = "sensors" if "sensors" in document.data else "lights"
+        raise StudyError(document.issue((key,), problem, None, f"one of each here: {way_to_one(document)}"))
     chosen, notes = member or members[0], list[str]()
     choose(document, chosen)
     section = _checked(document)

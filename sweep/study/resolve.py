@@ -124,7 +124,7 @@ def _goal_faults(
 
 def _mosaic(name: str, cfa: CfaSection, sources: Sources) -> Mosaic | None:
     try:
-        return Mosaic.from_name(name) if cfa.tile is None else Mosaic.from_rows(name, cfa.tile)
+        return cfa.mosaic(name)
     except SweepError as error:
         sources.refuse(*faults_of(("cfas", name), error))
         return None

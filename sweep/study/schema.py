@@ -10,6 +10,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from ..base.types import Number, Section
 from ..camera.accuracy import STANDARD, AccuracySection
 from ..camera.curve_errors import CurveErrors
+from ..camera.mosaic import Mosaic
 from ..camera.pixel import Pixel
 from ..camera.scene import Geometry, Scene
 from ..camera.sensor import BUILT_IN_SENSORS
@@ -54,6 +55,10 @@ class CfaSection(Section):
     """Channels of the tile, row by row; at most 64 x 64 pixels."""
     curves: dict[Name, Name] = {}
     """Channel -> curve of the sensor, where the names differ."""
+
+    def mosaic(self, name: str) -> Mosaic:
+        """Return the CFA; raises SweepError for a name or a tile that is none."""
+        return Mosaic.from_name(name) if self.tile is None else Mosaic.from_rows(name, self.tile)
 
 
 class Modification(Section):

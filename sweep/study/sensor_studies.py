@@ -6,8 +6,7 @@ import math
 from itertools import product
 from typing import Any, NamedTuple
 
-from ..base.errors import StudyError
-from ..camera.mosaic import Mosaic
+from ..base.errors import StudyError, SweepError
 from ..camera.sensor import BUILT_IN_SENSORS, own_red
 from ..spectra.builtin.measured_sets import LUXEON, SENSORS
 from .document import Document
@@ -157,8 +156,11 @@ def _buildable(section: StudySection, names: set[str]) -> dict[str, Any]:
     modified = {(e.cfa, channel) for entries in filters.values() for e in entries.values() for channel in e.channel}
     cfas = {}
     for name, cfa in section.cfas.items():
-        mosaic = Mosaic.from_name(name) if cfa.tile is None else Mosaic.from_rows(name, cfa.tile)
-        curves = {c: cfa.curves.get(c, variants.get(name, {}).get(c, c)) for c in mosaic.channels}
+        try:
+            channels = cfa.mosaic(name).channels
+        except SweepError:  # stays for its error
+            channels = ()
+        curves = {c: cfa.curves.get(c, variants.get(name, {}).get(c, c)) for c in channels}
         if all(curve not in others or (name, channel) in modified for channel, curve in curves.items()):
             cfas[name] = cfa
     filters = {

@@ -64,11 +64,9 @@ class SpaceBuilder:
         named = all(cfa in self.mosaics and channel in self.mosaics[cfa].channels for cfa, channel in changed)
         spaces = []
         for name, mosaic in self.mosaics.items():
-            stated = section.cfas[name].curves
-            curves = {c: stated.get(c, self.sensor.curve_name(name, c)) for c in mosaic.channels}
-            missing = {channel: curve for channel, curve in curves.items() if curve not in self.sensor.qe}
+            stated, missing = section.cfas[name].curves, self._without_curve(mosaic)
             for channel in missing:
-                if named and (name, channel) not in changed:
+                if named and name not in {cfa for cfa, _ in changed}:  # else the filter has a fault
                     allowed = (
                         f"a design, sweep or box with `channel: {channel}`; or `curves: {{{channel}: ...}}` of "
                         f"{', '.join(self.sensor.qe)}"
@@ -91,6 +89,12 @@ class SpaceBuilder:
             axes = {key: axis.points() for key, axis in box.box.items()}
             spaces += self._filtered("search", name, box, axes, ("boxes", name, "box"))
         return spaces
+
+    def _without_curve(self, mosaic: Mosaic) -> list[str]:
+        """Return the channels of a CFA whose curves the sensor does not have."""
+        stated = self.section.cfas[mosaic.name].curves
+        curves = {c: stated.get(c, self.sensor.curve_name(mosaic.name, c)) for c in mosaic.channels}
+        return [channel for channel, curve in curves.items() if curve not in self.sensor.qe]
 
     def _fits(self) -> bool:
         """Return whether the axes of all grids and boxes can be written out; else add an issue."""
@@ -130,9 +134,17 @@ class SpaceBuilder:
         if self.section.production.thickness and not absorbs and stated is not None and stated.interference is None:
             problem = "a pigment has no films that come out too thick (`production.thickness`)"
             self.sources.refuse(Fault((*path, "technology"), problem, PIGMENT, "interference, or nothing stated"))
-        for channel in entry.channel:
-            if mosaic is not None and channel not in mosaic.channels:
-                self.sources.refuse(unknown((*path, "channel"), f"channel of {entry.cfa}", channel, mosaic.channels))
+        wrong = [channel for channel in entry.channel if mosaic is not None and channel not in mosaic.channels]
+        for channel in wrong:
+            self.sources.refuse(unknown((*path, "channel"), f"channel of {entry.cfa}", channel, channels))
+        if (
+            mosaic is not None
+            and entry.channel
+            and not wrong
+            and (left := set(self._without_curve(mosaic)) - {*entry.channel})
+        ):
+            problem = f"{entry.cfa} has no curve for {', '.join(sorted(left))}, which this filter leaves"
+            self.sources.refuse(Fault((*path, "channel"), problem, entry.channel, ", ".join(sorted(left))))
         external = is_from_outside(entry.family, _FAMILIES, FAMILIES)
         if external and not allowed(self.sources, (*path, "family"), entry.family):
             return

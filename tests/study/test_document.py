@@ -1,4 +1,4 @@
-"""Study files that would take all memory or all time: one line each, or quick."""
+"""YAML as a study reads it: as the library does, with lines, and up to limits; else one line each, or quick."""
 
 from __future__ import annotations
 

@@ -1,0 +1,74 @@
+"""Lights and sensors beyond what an eye sees, and spectra of any power."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sweep.runs.rows import Job, Rows, rows_of, rules_of
+from sweep.spectra.color import chromaticity, display_colors
+from sweep.spectra.spectrum import WavelengthGrid
+from sweep.study import load_study
+
+from ..build import one_line
+
+QE = "wavelength_nm,a,b\n300,0.5,0.1\n1200,0.5,0.6\n"
+
+
+def study_of(tmp_path: Path, leds: str, more: str = "") -> Path:
+    (tmp_path / "qe.csv").write_text(QE)
+    (tmp_path / "led.csv").write_text(leds)
+    (tmp_path / "a.yaml").write_text(
+        "study: a\nsensor: {files: [{file: qe.csv, columns: {A: a, B: b}}]}\n"
+        "lights: {files: [{file: led.csv, quantity: photons, outside: zero, signals: {one: [x], two: [y]}}]}\n"
+        "wavelengths: {start_nm: 850, stop_nm: 1000, step_nm: 5}\ncfas: [AABB]\nobjective: csd_one_two\n" + more
+    )
+    return tmp_path / "a.yaml"
+
+
+INFRARED = "wavelength_nm,x,y\n800,0,0\n880,1,0\n940,0,1\n1000,0,0\n"
+
+
+@pytest.mark.parametrize(
+    ("scene", "said"),
+    [
+        ("intensity_cd: 200", "a light that the eye does not see has no luminous intensity: led:x (got 200"),
+        ("background_cd_m2: 3", "a background on wavelengths that the eye does not see has no luminance (got 3"),
+    ],
+)
+def test_candelas_of_infrared_are_one_line(tmp_path: Path, scene: str, said: str) -> None:
+    path = study_of(tmp_path, INFRARED, f"scenarios: {{a: {{{scene}, exposure: {{kind: fixed, exposure_s: 0.01}}}}}}\n")
+    with one_line(said, "allowed: photons between 360 and 830 nm"):
+        load_study(path)
+
+
+def test_infrared_lights_are_computed_and_drawn_gray(tmp_path: Path) -> None:
+    study = load_study(study_of(tmp_path, INFRARED))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        planned = study.with_plans()
+        rules, space = rules_of(planned), planned.spaces[0]
+        made = rows_of(
+            Rows.of(Job(0, "chart", 0, 1, 0, 0), planned), planned.setup(space, "chart"), rules, rules.wanted
+        )
+        assert made["status"].to_pylist() == ["ok"]
+        np.testing.assert_array_equal(display_colors(study.grid, study.lights.photons), 0.5)
+        mixed = WavelengthGrid(start_nm=600, stop_nm=900, step_nm=1)
+        colors = display_colors(mixed, np.eye(mixed.size)[[30, 290]])
+    assert colors[0, 0] == pytest.approx(1)  # 630 nm: red
+    np.testing.assert_array_equal(colors[1], 0.5)
+    with np.errstate(invalid="ignore"):
+        assert np.isnan(chromaticity(mixed, np.eye(mixed.size)[[290]])).all()
+
+
+def test_lights_of_any_sensible_power_are_the_same_lights(tmp_path: Path) -> None:
+    rows = [(850, 0.0, 1.0), (900, 3.0, 2.0), (1000, 1.0, 0.0)]
+    found = []
+    for scale in (1e-99, 1.0, 1e99):
+        leds = "wavelength_nm,x,y\n" + "".join(f"{w},{x * scale!r},{y * scale!r}\n" for w, x, y in rows)
+        found.append(load_study(study_of(tmp_path, leds)).lights.photons)
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-12)
+    np.testing.assert_allclose(found[2], found[1], rtol=1e-12)
