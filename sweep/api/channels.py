@@ -74,18 +74,10 @@ class Layout:
 
 
 def channel_of(column: str) -> str | None:
-    """Return the channel that the name of a column states.
+    """Return the channel that the name of a column states; None for none, and for N, the modified channel.
 
-    Parameters
-    ----------
-    column : str
-        The name of a channel (`R`), one after ISETCam's hint letter (`wC`, `cCy`), or a name with a color word or
-        letter (`red`, `QE_R`).
-
-    Returns
-    -------
-    str or None
-        The channel; None if the name states none, and for N, the modified channel.
+    A name is a channel (`R`), one after ISETCam's hint letter (`wC`, `cCy`), or has a color word or letter (`red`,
+    `QE_R`).
     """
     column = name_of(column)
     name = column[1:] if column[:1] in tuple(HINTS) and column[1:] in (*_ORDER, NEW) else column
@@ -100,18 +92,7 @@ def channel_of(column: str) -> str | None:
 
 
 def channels_of(curves: Mapping[str, Curve]) -> Channels:
-    """Assign columns to channels by their names.
-
-    Parameters
-    ----------
-    curves : mapping of str to Curve
-        Curves by column name.
-
-    Returns
-    -------
-    Channels
-        Column of each channel, and the columns that are left out.
-    """
+    """Assign columns to channels by their names."""
     lit = {column: curve for column, curve in curves.items() if curve.width_nm > 0}
     left_out = {column: "0 from 400 to 700 nm" for column in curves if column not in lit}
     left_out |= {column: reason for column in lit if (reason := _no_channel(column))}
@@ -143,16 +124,7 @@ def layout_of(channels: Mapping[str, float]) -> Layout:
 
     A yellow pixel beside red and cyan, or red and blue; else a clear pixel beside R, G and B; else RGGB; else all
     channels around the most sensitive one. The last CFA that fits gets the channel N.
-
-    Parameters
-    ----------
-    channels : mapping of str to float
-        Sum of the QE of each channel.
-
-    Returns
-    -------
-    Layout
-        CFAs, modified CFA, base and target curve.
+    `channels`: sum of the QE of each.
     """
     clear = next((name for name in ("W", "C") if name in channels), "")
     known = [("G", ["R", "G", "G", "B"])]

@@ -135,25 +135,7 @@ def _holds_curves(folder: Path) -> bool:
 
 
 def filter_of_file(path: Path, options: EvaluateOptions) -> FilterUnderTest:
-    """Read a filter from a file, with the CFA and lights to evaluate it with.
-
-    Parameters
-    ----------
-    path : Path
-        A file of curves.
-    options : EvaluateOptions
-        Channel, sensor and lights.
-
-    Returns
-    -------
-    FilterUnderTest
-        Input of `evaluate_filter`.
-
-    Raises
-    ------
-    SweepError
-        If the file is not clean, or a name is unknown or missing.
-    """
+    """Read a filter from a file, with the CFA and lights to evaluate it with."""
     sensor = sensor_source(options.sensor, {})
     keys: dict[str, Any] = {}
     if os.path.lexists(options.sensor):
@@ -203,27 +185,7 @@ def _use_of(curves: Curves, column: str, options: EvaluateOptions) -> tuple[Use,
 
 
 def filter_of_run(folder: Path, design: str | int | None, options: EvaluateOptions) -> FilterUnderTest:
-    """Take a design of a finished run, in the scene of its row, with the run's lights or others.
-
-    Parameters
-    ----------
-    folder : Path
-        Output folder of a study.
-    design : str, optional
-        ``design_id``, name, or ``best`` (default).
-    options : EvaluateOptions
-        Lights; data and allow_code for runs made with user code.
-
-    Returns
-    -------
-    FilterUnderTest
-        Input of `evaluate_filter`.
-
-    Raises
-    ------
-    SweepError
-        If the design is unknown or a plain CFA, or the folder holds no finished run.
-    """
+    """Take a design of a finished run, in the scene of its row, with the run's lights or others."""
     from ..results.designs import BEST, find_design_row, row_curves, study_of
     from ..results.output import read_output
 

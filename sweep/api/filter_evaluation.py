@@ -14,6 +14,7 @@ from ..base.errors import DataError, ValidationIssue
 from ..base.types import DesignCurves, PerWavelength
 from ..camera.exposure import may_be_brightest
 from ..camera.mosaic import Mosaic
+from ..designs.space import Space
 from ..designs.technology import Technology
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY, reference_of
 from ..metrics.quantity import Column, Columns
@@ -23,9 +24,9 @@ from ..search.limit import gap_between
 from ..spectra.lights import Pair, class_pairs
 from ..study import Study
 from .loading import CurveSource, make_study
+from .own_designs import columns_of, space_of_curves
 from .user_filters import (
     any_filter_search,
-    evaluate_curves,
     table_of_results,
     upper_bound_or_reason,
     with_exposure_unchanged,
@@ -46,26 +47,9 @@ _SAME = 1e-9
 class FilterUnderTest:
     """A filter for channels of a CFA, with sensor and lights to evaluate it.
 
-    Parameters
-    ----------
-    mosaic : Mosaic
-        CFA with the modified channels.
-    bases : mapping of str to str
-        Modified channel to the curve that it replaces.
-    sensor : CurveSource
-        Curves; those of the filter are named ``own <channel>``.
-    lights : CurveSource
-        Traffic lights.
-    types : tuple of str
-        Signal types of the lights.
-    curve_names : mapping of str to str
-        Curves of other channels that are named differently from the channel.
-    keys : mapping
-        Further keys of the study that evaluates the filter.
-    notes : tuple of str
-        Notes on the way files were read.
-    technology : Technology, optional
-        Physical principle of the filter.
+    `bases`: modified channel -> curve that it replaces. Curves of the filter in `sensor` are named ``own <channel>``.
+    `types`: signal types of the lights. `curve_names`: curves of other channels whose names differ. `keys`: further
+    keys of the study. `notes`: how files were read.
     """
 
     mosaic: Mosaic
@@ -203,43 +187,14 @@ def _aligned(rows: Mapping[str, Columns], columns: Sequence[Column], corner: str
 
 
 def with_base(mosaic: Mosaic, bases: Mapping[str, str]) -> Mosaic:
-    """Return the CFA that a filter changes.
-
-    Parameters
-    ----------
-    mosaic : Mosaic
-        CFA with the modified channels.
-    bases : mapping of str to str
-        Modified channel to the curve that it replaces.
-
-    Returns
-    -------
-    Mosaic
-        The CFA in which each modified channel is named like the curve that it replaces.
-    """
+    """Return the CFA that a filter changes: each modified channel is named like the curve that it replaces."""
     channels = [bases.get(channel, channel) for channel in mosaic.channels]
     rows = [[channels[at] for at in row] for row in mosaic.tile]
     return Mosaic.from_rows("".join(name for row in rows for name in row), rows)
 
 
 def evaluate_filter(filter_: FilterUnderTest) -> FilterEvaluation:
-    """Evaluate a filter in every scenario, with every effect that the scene calls for.
-
-    Parameters
-    ----------
-    filter_ : FilterUnderTest
-        Filter, sensor and lights.
-
-    Returns
-    -------
-    FilterEvaluation
-        Quantities of RGGB, the changed CFA and the filter, and the upper bound.
-
-    Raises
-    ------
-    SweepError
-        If curves and names do not fit together.
-    """
+    """Evaluate a filter in every scenario, with every effect that the scene calls for."""
     base = with_base(filter_.mosaic, filter_.bases)
     changed = filter_.mosaic.name if filter_.mosaic.name != base.name else USER_CURVE + base.name
     known = {*"RGB"} if "builtin" in filter_.sensor.keys else set()
@@ -251,12 +206,9 @@ def evaluate_filter(filter_: FilterUnderTest) -> FilterEvaluation:
     keys = {"objective": csd_name(filter_.pair), **filter_.keys}
     study = make_study("evaluate", sensor=filter_.sensor, lights=filter_.lights, cfas=cfas, **keys).study
     curves = np.stack([study.sensor.curve(USER_CURVE + channel) for channel in filter_.bases])[None]
-    unmodified = np.empty((1, 0, study.grid.size))
-    rows = []
-    for scene in study.scenarios:
-        for cfa in study.mosaics:
-            bases, qe = (filter_.bases, curves) if cfa == changed else ({}, unmodified)
-            rows.append((scene, cfa, evaluate_curves(study, study.setup_of(cfa, scene, bases, filter_.technology), qe)))
+    spaces = {cfa: Space("reference", cfa, cfa) for cfa in study.mosaics}
+    spaces[changed] = space_of_curves(changed, filter_.bases, curves, filter_.technology)
+    rows = [(scene, cfa, columns_of(study, space, scene)) for scene in study.scenarios for cfa, space in spaces.items()]
     first = next(columns for _, cfa, columns in rows if cfa == changed)
     light = float(first[CFA_SENSITIVITY][0])
     csd_dn, limit, below, reason = _upper_bound(study, changed, filter_, curves, light)
@@ -313,27 +265,7 @@ def _is_below(curve: PerWavelength, ceiling: PerWavelength) -> bool:
 
 
 def diagonal_curve(mosaic: Mosaic, channel: str, curves: Mapping[str, DesignCurves]) -> str:
-    """Return the curve that a channel of a 2 x 2 tile replaces: that of the pixel diagonal to it.
-
-    Parameters
-    ----------
-    mosaic : Mosaic
-        CFA with the channel.
-    channel : str
-        Modified channel.
-    curves : mapping of str to ndarray
-        Curves of the sensor.
-
-    Returns
-    -------
-    str
-        Name of a curve.
-
-    Raises
-    ------
-    DataError
-        If the diagonal pixel has no curve.
-    """
+    """Return the curve that a channel of a 2 x 2 tile replaces: that of the pixel diagonal to it."""
     rows = _rows(mosaic)
     at = [(r, c) for r, row in enumerate(rows) for c, name in enumerate(row) if name == channel]
     if len(rows) == len(rows[0]) == 2 and len(at) == 1:

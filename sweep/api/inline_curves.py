@@ -57,45 +57,14 @@ def read_curves(file: Path | str) -> pd.DataFrame:
 
 
 def wavelength_table(wavelength_nm: PerWavelength, columns: Mapping[Any, PerWavelength]) -> pd.DataFrame:
-    """Return a table with one column per curve over wavelength.
-
-    Parameters
-    ----------
-    wavelength_nm : ndarray of shape (n_wavelengths,)
-        Wavelengths, nm; they become the index.
-    columns : mapping of name to ndarray of shape (n_wavelengths,)
-        Values of each curve.
-
-    Returns
-    -------
-    pandas.DataFrame
-        The table; its index is named ``wavelength_nm``.
-    """
+    """Return a table with one column per curve over wavelength."""
     import pandas as pd  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
     return pd.DataFrame(dict(columns), index=pd.Index(wavelength_nm, name="wavelength_nm"))
 
 
 def to_curves(name: str, curve: CurveLike) -> Curves:
-    """Convert one curve to samples over its own wavelengths.
-
-    Parameters
-    ----------
-    name : str
-        Name of the curve in the result and in error messages.
-    curve : CurveLike
-        A Series over nm, a pair (nm, values), or a file with one curve.
-
-    Returns
-    -------
-    Curves
-        Wavelengths, nm, and values of this curve.
-
-    Raises
-    ------
-    DataError
-        If this is no curve, or if its samples are not clean.
-    """
+    """Convert one curve to samples over its own wavelengths."""
     if isinstance(curve, Path | str):
         return _curve_in_file(name, Path(curve))
     if isinstance(curve, tuple) and len(curve) == 2:
@@ -115,23 +84,7 @@ def to_curves(name: str, curve: CurveLike) -> Curves:
 
 
 def table_to_curves(table: pd.DataFrame) -> Curves:
-    """Return the columns of a table, indexed by nm, as `Curves`.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        One column per curve; the index is the wavelength, nm.
-
-    Returns
-    -------
-    Curves
-        Wavelengths, nm, and values of all columns.
-
-    Raises
-    ------
-    DataError
-        If the table has no column, or if samples are not clean.
-    """
+    """Return the columns of a table, indexed by nm, as `Curves`."""
     columns = {str(name): to_curves(str(name), column) for name, column in table.items()}
     if not columns:
         raise DataError(ValidationIssue("a table without curves", allowed="a column per curve, nm as the index"))
@@ -142,30 +95,7 @@ def table_to_curves(table: pd.DataFrame) -> Curves:
 def on_grid(
     name: str, curve: CurveLike, grid: WavelengthGrid, use: Use = "sensor"
 ) -> Float[Array, "curves wavelengths"]:
-    """Bring one or more curves to a study's wavelength grid.
-
-    Parameters
-    ----------
-    name : str
-        Name of the curve in error messages.
-    curve : CurveLike
-        An array has its values on the grid already: one curve, or one row per curve. Other curves are resampled
-        linearly.
-    grid : WavelengthGrid
-        Wavelengths of the study.
-    use : {'sensor', 'filter'}
-        Whether a file's numbers become QE or transmissions.
-
-    Returns
-    -------
-    ndarray of shape (n_curves, n_wavelengths)
-        Values on the grid.
-
-    Raises
-    ------
-    DataError
-        If this is no curve, if samples are not clean, or if the curve does not cover the grid.
-    """
+    """Bring one or more curves to a study's wavelength grid."""
     if isinstance(curve, np.ndarray):
         rows = np.atleast_2d(np.asarray(curve, dtype=float))
         if rows.ndim != 2 or rows.shape[1] != grid.size:

@@ -274,27 +274,7 @@ def sensor_source(
     name: str | None = None,
     clear: str | None = None,
 ) -> CurveSource:
-    """Describe a sensor whose channels are in a mapping.
-
-    Parameters
-    ----------
-    source : path-like, optional
-        A built-in sensor or a file of QE curves.
-    channels : mapping of str to CurveLike
-        Further curves by name.
-    relative_to, name, clear : str, optional
-        As for `sensor`.
-
-    Returns
-    -------
-    CurveSource
-        For the argument `sensor` of `make_study`.
-
-    Raises
-    ------
-    DataError
-        If a curve cannot be used.
-    """
+    """Describe a sensor whose channels are in a mapping."""
     keys: dict[str, Any] = {"files": []}
     if source is not None and os.path.lexists(source):
         keys = sensor_file(Path(source)).keys(lambda path: str(path.absolute()))

@@ -17,17 +17,14 @@ from ..metrics.quantity import Column, Quantity
 from ..search.limit import Limit
 from ..study import Study
 from .inline_curves import CurveLike, on_grid, wavelength_table
-from .parameters import OWN, are_parameters, designs_of_parameters, evaluate_spaces, plain_and_named
+from .own_designs import are_parameters, designs_of_curves, designs_of_parameters, evaluate_spaces, plain_and_named
 from .user_filters import (
     any_filter_search,
-    evaluate_curves,
     find_cfa,
     known_cfa,
     known_scenario,
     replaced_curves,
-    table_of_results,
     upper_bound_or_reason,
-    user_filter_setup,
     with_lower_bound,
     with_units,
 )
@@ -180,8 +177,7 @@ class LoadedStudy:
         chosen = find_cfa(study, list(channels)) if cfa is None else known_cfa(study, cfa, list(channels))
         bases = replaced_curves(study, chosen, list(channels), base)
         curves = np.stack([*rows.values()], axis=1)
-        columns = {s: evaluate_curves(study, user_filter_setup(study, chosen, s, bases), curves) for s in scenarios}
-        return table_of_results(study, [(OWN, chosen, name, values) for name, values in columns.items()])
+        return evaluate_spaces(study, [designs_of_curves(study, chosen, bases, curves)], scenarios)
 
     def limit(
         self,

@@ -123,8 +123,8 @@ def loaded_by(*requested: object) -> tuple[str, set[str]]:
 
 
 def test_evaluate_loads_no_unneeded_modules(own: Path, tmp_path: Path) -> None:
-    """Most of the time that the command takes is that of loading; tables, figures, workers and compiled code are not for
-    it, and linear programs only where there is a limit.
+    """Most of the time that the command takes is that of loading; figures, workers and compiled code are not for it,
+    and linear programs only where there is a limit.
     """
     leds = csv(tmp_path, "wavelength_nm,a,b,c", WAVE, *(bell(c, 12) for c in (505, 592, 636)), name="leds.csv")
     said, loaded = loaded_by("evaluate", own, "--relative-to", "Y")
@@ -138,7 +138,6 @@ def test_evaluate_loads_no_unneeded_modules(own: Path, tmp_path: Path) -> None:
         "scipy.interpolate",
         "scipy.stats",
         "pandas",
-        "pyarrow",
         "matplotlib",
         "colour",
         "sklearn",

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from sweep.api.user_filters import evaluate_curves
+from sweep.api.own_designs import columns_of, space_of_curves
 from sweep.designs.tolerance import ProductionError, Tolerance
 from sweep.metrics.members import population_model
 from sweep.metrics.objective import Objective
@@ -100,6 +100,9 @@ def test_a_filter_of_ones_own_has_its_worst_case_where_no_edges_shift() -> None:
     study = load_study(STUDIES / "robust.yaml", changes={"production.edge_shift_nm": "0"})
     setup = study.setup(study.spaces[3], "f/2")
     curves = 0.9 * setup.camera.base_qe[None]
-    found = evaluate_curves(study, setup, curves)["worst_csd_yellow_red"]
+    space = study.spaces[3]
+    assert space.filter is not None
+    given = space_of_curves(space.cfa, space.filter.bases, curves, space.filter.technology)
+    found = columns_of(study, given, "f/2")["worst_csd_yellow_red"]
     assert found == population_model(setup).worst(curves)["csd_yellow_red"]
     assert 0 < found[0] < smooth_csd(setup, curves, YELLOW_RED)[0]

@@ -1,4 +1,4 @@
-"""Designs by the parameters of a family of a study."""
+"""Designs that are no part of a study: by the parameters of one of its families, or by their curves."""
 
 from __future__ import annotations
 
@@ -8,10 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.errors import SweepError, ValidationIssue, nearest
-from ..designs.family import Parameter
-from ..designs.space import Space
+from ..base.types import DesignCurves, DesignParameters
+from ..designs.family import Family, Parameter
+from ..designs.space import Filter, Space
+from ..designs.technology import Technology
 from ..designs.ungridded import PairedDesigns
 from ..metrics.bound import total_violation
+from ..metrics.objective import COMBINED
+from ..metrics.quantity import Columns
 from ..study import Study
 from .user_filters import table_of_results
 
@@ -20,6 +24,7 @@ if TYPE_CHECKING:
 
 OWN = "own"
 """Name of designs that are no part of the study."""
+_MOST_QE = 1 + 1e-9
 
 
 def plain_and_named(study: Study, cfa: str | None) -> list[Space]:
@@ -38,23 +43,70 @@ def plain_and_named(study: Study, cfa: str | None) -> list[Space]:
 
 def evaluate_spaces(study: Study, spaces: Sequence[Space], scenarios: Sequence[str]) -> pd.DataFrame:
     """Return a row per design and scenario of some spaces of a study."""
-    from ..runs.routes import quantities_at
+    return table_of_results(
+        study, [(space.name, space.cfa, name, columns_of(study, space, name)) for name in scenarios for space in spaces]
+    )
+
+
+def columns_of(study: Study, space: Space, scenario: str) -> Columns:
+    """Return parameters, every quantity and the violation of the designs of a space; NaN where one is unknown.
+
+    Raises SweepError for a design that fails.
+    """
+    from ..runs.routes import Wanted, quantities_at
     from ..runs.rows import rules_of
 
-    rules, rows = rules_of(study), []
-    for name in scenarios:
-        for space in spaces:
-            points = space.points(0, space.size)
-            numbers, setup = np.arange(space.size), study.setup(space, name)
-            values, issues = quantities_at(space, numbers, setup, rules, rules.wanted)
-            for text in issues.values():
-                raise SweepError(ValidationIssue(f"{space.name} in {name}: {text}"))
-            worst = total_violation(values, study.constraints, space.violation(points))
-            unknown = np.full(space.size, np.nan)  # of a lamp that is not pulsed in this scenario
-            columns = dict(zip(space.parameters, points.T, strict=True)) if space.name == OWN else {}
-            columns |= {quantity: values.get(quantity, unknown) for quantity in study.quantities}
-            rows.append((space.name, space.cfa, name, columns | {"violation": worst}))
-    return table_of_results(study, rows)
+    rules, points = rules_of(study), space.points(0, space.size)
+    given = space.filter is not None and isinstance(space.filter.family, GivenCurves)
+    wanted = rules.wanted
+    if given and study.tolerance:  # what production makes of edges that are not known
+        known = {name: quantity for name, quantity in rules.quantities.items() if not quantity.extreme}
+        if not study.objective.weights.keys() <= known.keys():
+            known.pop(COMBINED, None)
+        wanted = Wanted.of(known, rules.requested, rules.shown)
+    values, issues = quantities_at(space, np.arange(space.size), study.setup(space, scenario), rules, wanted)
+    for text in issues.values():
+        raise SweepError(ValidationIssue(f"{space.name} in {scenario}: {text}"))
+    unknown = np.full(space.size, np.nan)  # of a lamp that is not pulsed in this scenario, of a width of no edges
+    columns = dict(zip(space.parameters, points.T, strict=True)) if space.name == OWN and not given else {}
+    columns |= {quantity: values.get(quantity, unknown) for quantity in study.quantities}
+    return columns | {"violation": total_violation(columns, study.constraints, space.violation(points))}
+
+
+class GivenCurves(Family):
+    """Filters by their curves, one after another."""
+
+    kind = "curves"
+
+    def __init__(self, curves: DesignCurves) -> None:
+        if not curves.max(initial=0.0) <= _MOST_QE:
+            allowed = "0 to 1; a transmission is relative to a curve (`relative_to`), percent are divided by 100"
+            raise SweepError(ValidationIssue("a QE above 1", value=round(float(curves.max()), 6), allowed=allowed))
+        self._curves, self.parameters = curves, (Parameter("number", 0, len(curves) - 1),)
+
+    def curves(self, x: DesignParameters) -> DesignCurves:
+        """Return those of these numbers."""
+        return self._curves[x[:, 0].astype(np.intp)]
+
+
+def designs_of_curves(study: Study, cfa: str, bases: Mapping[str, str], curves: DesignCurves) -> Space:
+    """Return designs by their QE in channels of a CFA, with the technology that the study states for these.
+
+    `bases`: modified channel -> curve that it replaces.
+    """
+    filters = [s.filter for s in study.spaces if s.filter is not None and s.cfa == cfa]
+    stated = {repr(f.technology): f.technology for f in filters if bases.keys() & set(f.channels)}
+    if len(stated) > 1:
+        several = ", ".join("none" if technology is None else technology.description for technology in stated.values())
+        problem = f"several technologies are stated for {' and '.join(bases)} of {cfa}"
+        raise SweepError(ValidationIssue(problem, value=several))
+    return space_of_curves(cfa, bases, curves, next(iter(stated.values()), None))
+
+
+def space_of_curves(cfa: str, bases: Mapping[str, str], curves: DesignCurves, technology: Technology | None) -> Space:
+    """Return designs by their QE in channels of a CFA."""
+    filter_ = Filter(GivenCurves(curves), bases, "", technology)
+    return Space("design", OWN, cfa, filter_, (tuple(map(float, range(len(curves)))),))
 
 
 def are_parameters(study: Study, filters: Mapping[str, object]) -> bool:
