@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-
 def with_units(table: pd.DataFrame, columns: Mapping[str, Column]) -> pd.DataFrame:
     """Add units and meanings of the quantities to the attributes of a table."""
     present = {name: column for name, column in columns.items() if name in table}

@@ -71,6 +71,11 @@ class Candidate:
         return float(csds[at]), errors[at]
 
 
+def _pair(study: Study) -> Pair | None:
+    """Return the two signal types of the Pareto front where the study has a population of lights; else None."""
+    return None if study.lights.population is None else study.quantities[study.trade_off[0]].pair
+
+
 def _calls(study: Study, rows: pd.DataFrame) -> Calls:
     """Compute robustness and yield of designs.
 
@@ -78,7 +83,7 @@ def _calls(study: Study, rows: pd.DataFrame) -> Calls:
     CFA that has most at 1 (null if it does not up to 3, in steps of 0.25), with CSD, lights, shifts and temperature
     there; `yield` is the share of lamps and cameras with the wanted CSD, with its 95 % interval (Wilson, 1927).
     """
-    pair = study.pair_over_population
+    pair = _pair(study)
     assert pair is not None
     designs = [*named_designs(study, rows)]
     for design in designs:
@@ -168,6 +173,4 @@ def drawn_dn(design: Candidate, pair: Pair, seed: int) -> Float[Array, " draws"]
     return dn
 
 
-ROBUST = Analysis(
-    "robustness", lambda study: study.pair_over_population is not None, lambda _: _SCHEMA, _calls, is_kept=True
-)
+ROBUST = Analysis("robustness", lambda study: _pair(study) is not None, lambda _: _SCHEMA, _calls, is_kept=True)

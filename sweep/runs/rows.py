@@ -16,12 +16,16 @@ from ..camera.setup import Setup
 from ..designs.block import by_edges
 from ..designs.space import Space
 from ..metrics.bound import FEASIBLE, total_violation
+from ..metrics.columns.chromatic import CHROMATIC_CSD
+from ..metrics.columns.exposure import EXPOSURE
+from ..metrics.columns.tasks import PREFIX
 from ..metrics.pareto import non_dominated
-from ..metrics.quantity import Columns
+from ..metrics.quantity import Columns, Quantity
 from ..results.dictionary import described
 from ..results.identity import CHUNK
 from ..results.shown import Selection
 from ..results.tables import ON_FRONT, SWEPT, result_schema, word_mask
+from ..spectra.lights import pair_name
 from ..study import Study
 from .routes import Rules, Wanted, quantities_at
 
@@ -101,14 +105,34 @@ def _job_size(study: Study, space: Space) -> int:
     """Return the number of designs of a job, independent of the workers; several chunks for fast designs."""
     if study.requested.wanted_yield:
         return _DRAWN_DESIGNS
-    if not by_edges(space) or any(quantity.states for quantity in study.swept_quantities.values()):
+    if not by_edges(space) or any(quantity.states for quantity in swept_quantities(study).values()):
         return CHUNK
     return CHUNK * min(max(1, space.size // (CHUNK * _LEAST_JOBS)), _MOST_CHUNKS)
 
 
+def swept_quantities(study: Study) -> Mapping[str, Quantity]:
+    """Return the quantities of the rows of swept designs: those that the study asks for, or all."""
+    quantities = study.quantities
+    if study.section.columns == "all" or not any(space.kind == "sweep" for space in study.spaces):
+        return quantities
+    pair = quantities[study.trade_off[0]].pair
+    asked = {*study.constraints, *study.objective.weights, study.objective.column, *study.trade_off, EXPOSURE}
+    asked |= {quantities[name].of for name in asked}
+    asked |= {metric.name for metric in study.user_metrics}
+    if study.has_swept_tasks:
+        asked |= {name for name, quantity in quantities.items() if quantity.metric.startswith(PREFIX)}
+    return {
+        name: quantity
+        for name, quantity in quantities.items()
+        if name in asked
+        or (quantity.role and quantity.extreme in ("", "best place"))
+        or name == (pair and pair_name(CHROMATIC_CSD, pair))
+    }
+
+
 def rules_of(study: Study) -> Rules:
     """Return the rules of a study."""
-    section, quantities, swept = study.section, study.quantities, study.swept_quantities
+    section, quantities, swept = study.section, study.quantities, swept_quantities(study)
     of_rows = {"searched": study.search is not None}
     return Rules(
         schema=described(result_schema(study.parameters, list(swept), **of_rows), quantities),

@@ -317,7 +317,9 @@ class _Run:
             facts["search"] = search_facts(study, answer)
             if not any(run.status in CONVERGED for run in answer.runs):
                 warnings.append("no start of the search converged: more `max_evaluations` may find a better design")
-            if "saturation" in study.plans[answer.scenario].computed and not study.searches_merged:
+            noisy = any(study.quantities[name].states for name in study.objective.weights)
+            knows = noisy and study.pixel.captures  # merged readings, in which a search sees saturation
+            if "saturation" in study.plans[answer.scenario].computed and not knows:
                 warnings.append("pixels may saturate: the search sees them before clipping, its row after")
         duration_s = round(time.monotonic() - self.started, 3)
         seconds = max(_CHECK_S, _CHECK_SHARE * duration_s)

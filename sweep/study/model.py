@@ -22,8 +22,6 @@ from ..designs.space import Space
 from ..designs.technology import Technology
 from ..designs.tolerance import Tolerance
 from ..metrics.bound import Bound
-from ..metrics.columns.chromatic import CHROMATIC_CSD
-from ..metrics.columns.exposure import EXPOSURE
 from ..metrics.columns.tasks import PREFIX
 from ..metrics.objective import Objective, columns_of
 from ..metrics.quantity import Quantity, RequestedQuantities
@@ -31,7 +29,7 @@ from ..metrics.separation import csd_name
 from ..metrics.user_metrics import UserMetric
 from ..search.problem import Problem
 from ..spectra.colorants import Colorants
-from ..spectra.lights import Lights, Pair, class_pairs, pair_name
+from ..spectra.lights import Lights, Pair, class_pairs
 from ..spectra.spectrum import WavelengthGrid
 from ..spectra.tasks import StudyTasks
 from ..vision.section import SeededVision
@@ -98,11 +96,6 @@ class Study:
         return requested is not None and requested.leave_one_out and self.search is not None
 
     @property
-    def pair_over_population(self) -> Pair | None:
-        """The two signal types of the Pareto front where the study has a population of lights; else None."""
-        return None if self.lights.population is None else self.quantities[self.trade_off[0]].pair
-
-    @property
     def tolerance(self) -> Tolerance:
         """Production tolerance of filters."""
         return self.section.production.tolerance
@@ -111,26 +104,6 @@ class Study:
     def quantities(self) -> Mapping[str, Quantity]:
         """Quantities of the result table: those of a design, worst cases, a combined objective."""
         return columns_of(self.requested, self.objective)
-
-    @property
-    def swept_quantities(self) -> Mapping[str, Quantity]:
-        """Quantities of the rows of swept designs: those that the study asks for, or all."""
-        quantities = self.quantities
-        if self.section.columns == "all" or not any(space.kind == "sweep" for space in self.spaces):
-            return quantities
-        pair = quantities[self.trade_off[0]].pair
-        asked = {*self.constraints, *self.objective.weights, self.objective.column, *self.trade_off, EXPOSURE}
-        asked |= {quantities[name].of for name in asked}
-        asked |= {metric.name for metric in self.user_metrics}
-        if self.has_swept_tasks:
-            asked |= {name for name, quantity in quantities.items() if quantity.metric.startswith(PREFIX)}
-        return {
-            name: quantity
-            for name, quantity in quantities.items()
-            if name in asked
-            or (quantity.role and quantity.extreme in ("", "best place"))
-            or name == (pair and pair_name(CHROMATIC_CSD, pair))
-        }
 
     @property
     def requested(self) -> RequestedQuantities:
@@ -301,12 +274,6 @@ class Study:
             vision=self.images,
             others=tuple((self.setup(search.space, name), search.space.filter.family) for name in search.scenarios[1:]),
         )
-
-    @property
-    def searches_merged(self) -> bool:
-        """True if the objective has the noise of an HDR pixel, of whose saturation the search knows."""
-        noisy = any(self.quantities[name].states for name in self.objective.weights)
-        return noisy and bool(self.pixel.captures)
 
     @property
     def images(self) -> SeededVision | None:
