@@ -10,7 +10,7 @@ import pytest
 
 from sweep.api.new import new_study
 from sweep.base.errors import StudyError, SweepError
-from sweep.report.answer import answer_parts
+from sweep.report.page import answer_of, limits_of, plain, sections_of
 from sweep.results.output import Output, read_output
 from sweep.runs import run_study
 from sweep.study import Study, load_study
@@ -170,5 +170,9 @@ def made(folder: Path, name: str = "mine", qe: Path | None = None, lights: Path 
 
 def sentences_of(output: Output) -> list[str]:
     """The answer of a run, and what else was found."""
-    answer, further = answer_parts(output)
-    return answer + further
+    lead, others = sections_of(output)
+    further = [line for section in others for line in (*section.answer, *section.limits)]
+    return [
+        plain(line)
+        for line in (*answer_of(output), *([] if lead is None else lead.limits), *limits_of(output), *further)
+    ]

@@ -13,9 +13,10 @@ from sweep.cli.app import main
 UNDRAWN = """\
 import signal
 signal.signal(signal.SIGINT, signal.SIG_DFL)  # while it is loaded, a stop ends it without a word, as `start` has it
-import sweep.report.page
+import sweep.report.panels
 from sweep.cli.app import main
-sweep.report.page._drawings = lambda _: ()
+sweep.report.panels.Picture.svgs = lambda *_: ("", "")
+sweep.report.panels.Picture.files = lambda *_: {}
 signal.signal(signal.SIGINT, signal.default_int_handler)
 try:
     main()

@@ -135,9 +135,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Finish
                 study.write_text(text)
                 with pytest.MonkeyPatch.context() as patch:
                     if name not in LOOKED_AT:
-                        patch.setattr("sweep.report.figures.rendered", lambda _, kind: kind.encode())
-                        for module in ("page", "sensors"):
-                            patch.setattr(f"sweep.report.{module}.inlined", lambda _: "data:image/png;base64,cG5n")
+                        without_pictures(patch)
                     code, out, err = commanded("run", study, "--output", outputs, "--jobs", 1)
                 assert code == 0, err
                 said.write_text(out)
@@ -168,14 +166,15 @@ def whole(plain: Study, tmp_path_factory: pytest.TempPathFactory) -> pd.DataFram
     return pd.read_parquet(folder / "results.parquet")
 
 
+def without_pictures(patch: pytest.MonkeyPatch) -> None:
+    """Pages whose pictures are empty."""
+    patch.setattr("sweep.report.panels.Picture.svgs", lambda *_: ("<svg></svg>", "<svg></svg>"))
+    patch.setattr("sweep.report.panels.Picture.files", lambda _, name: {f"{name}.svg": b"svg", f"{name}.png": b"png"})
+
+
 def draw_nothing(patch: pytest.MonkeyPatch) -> None:
     """Reports and descriptions whose pictures take no time: for tests of the files and of the text."""
-    names = ("pareto", "sensor", "signals", "chart")
-    patch.setattr("sweep.report.page._drawings", lambda _: ((name, name, None) for name in names))
-    patch.setattr("sweep.report.page.pictures_of", lambda _, kinds: {kind: kind.encode() for kind in kinds})
-    for module in ("page", "sensors"):
-        patch.setattr(f"sweep.report.{module}.inlined", lambda _: "data:image/png;base64,cG5n")
-    patch.setattr("sweep.report.sensors.rendered", lambda _, kind: kind.encode())
+    without_pictures(patch)
     patch.setattr("sweep.report.describe._png", lambda *_: b"sweep describe")
 
 

@@ -12,69 +12,74 @@ from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import pandas as pd
 from PIL import Image
 
 from sweep.report import read_output
-from sweep.report.figures import rendered
-from sweep.report.page import drawings
-from sweep.report.vision_report import street_drawing
-from sweep.results.tables import VISION_STREETS
+from sweep.report.hold import holds_for
+from sweep.report.page import answer_of as answer_of_run
+from sweep.report.page import limits_of, sections_of
+from sweep.report.sections.price import Price
 
 STUDIES = Path(__file__).parent.parent / "studies"
 
-PICTURES = {
-    "stopband": "cfas",
-    "chromatic": "cfas",
-    "freeform": "cfas",
-    "producible": "cfas",
-    "robust": "figures/regions-1",
-    "angle": "figures/places-1",
-    "dye": "cfas",
-    "band": "figures/map",
-    "dual": "cfas",
-    "rccb": "pareto",
-    "balanced": "figures/scorecard",
-    "measured": "cfas",
-    "sensors": "sensors",
-    "paper": "cfas",
-    "scorecard": "figures/scorecard",
-    "distance": "figures/series-1",
-    "exposure": "figures/series-1",
-    "fog": "figures/series-1",
-    "night": "figures/series-1",
-    "hdr": "figures/series-1",
-    "hdr_filter": "figures/series-4",
-    "flicker": "figures/series-1",
-    "noise": "figures/series-1",
-    "vision": "figures/vision-ranks",
-}
-"""Study -> picture of its run."""
-OTHERS = {
-    "tiles": ("stopband", "figures/tiles"),
-    "night-scene": ("scorecard", "figures/rendered-2"),
-    "captures": ("hdr", "figures/captures-1"),
-}
-"""Further picture of the documentation -> study, and picture of its run."""
-ANSWERED = (STUDIES.parent / "README.md", STUDIES / "README.md", STUDIES / "guide" / "11-hdr-and-flicker.md")
+PICTURES = (
+    "stopband",
+    "chromatic",
+    "freeform",
+    "producible",
+    "robust",
+    "angle",
+    "dye",
+    "band",
+    "dual",
+    "rccb",
+    "balanced",
+    "measured",
+    "sensors",
+    "paper",
+    "scorecard",
+    "distance",
+    "exposure",
+    "fog",
+    "night",
+    "hdr",
+    "hdr_filter",
+    "flicker",
+    "noise",
+    "vision",
+)
+"""Studies of which the documents show the first picture of their report."""
+README = STUDIES.parent / "README.md"
+ANSWERED = (STUDIES / "README.md", STUDIES / "guide" / "11-hdr-and-flicker.md")
 """Documents with the answers of studies."""
-STREETS = ("RGGB", "RYYCy", "best stopband")
-"""Designs of the picture of streets."""
-STREETS_SHOWN = "\n![The same streets through RGGB, RYYCy and the best stopband](../figures/streets.jpg)"
 ROW = re.compile(r"^\| `(\w+)` \| (.*) \| !\[(.*)\]\(figures/(\w+)\.png\) \| (.*) \|$", re.MULTILINE)
 
 
 def answer_of(said: str) -> str:
-    """The answer that a run prints: what stands before its camera, the first line if there is none, and its warnings."""
+    """The answer that a run prints: what stands before the effects that were left out."""
     lines = said.splitlines()
-    stated = next((at for at, line in enumerate(lines) if line.startswith("Camera: ")), 1)
-    return " ".join([*lines[:stated], *(line for line in lines[stated:] if line.startswith("Warning: "))])
+    ends = ("Left out: ", "Others: ", "Of the best ", "Note: ", "Files: ")
+    return " ".join(lines[: next((at for at, line in enumerate(lines) if line.startswith(ends)), 1)])
 
 
 def with_answer(text: str, study: str, answer: str) -> str:
     """A document with the answer of a study in the last cell of its row, or in its item of a list."""
     text = re.sub(rf"^(\| `{study}` \|.*\|) [^|]* \|$", lambda row: f"{row[1]} {answer} |", text, flags=re.MULTILINE)
     return re.sub(rf"^- `{study}`: .*$", lambda _: f"- `{study}`: {answer}", text, flags=re.MULTILINE)
+
+
+def with_run(text: str, folder: Path) -> str:
+    """The README with the answer, limits and price of a run."""
+    output = read_output(folder)
+    (price,) = Price.of(output)
+    assert price.table is not None
+    table = [price.table.head, ["---"] * len(price.table.head), *price.table.rows]
+    lines = [" ".join(answer_of_run(output)), "", *(f"- {line}" for line in limits_of(output)), ""]
+    lines += [f"| {' | '.join(cells)} |" for cells in table]
+    lines += ["", price.table.note, "", f"{holds_for(output)}"]
+    body = "\n".join(lines).replace("\u00a0", " ")
+    block = re.compile(rf"(<!-- run: {output.study.study} -->\n).*?(<!-- end -->)", re.DOTALL)
+    return block.sub(lambda found: f"{found[1]}\n{body}\n\n{found[2]}", text)
 
 
 def gallery(rows: str) -> str:
@@ -95,16 +100,20 @@ def gallery(rows: str) -> str:
             f"![{caption}](../figures/{picture}.png)",
             "",
             finding,
-            *([STREETS_SHOWN] if study == "vision" else []),
         ]
     return "\n".join(parts) + "\n"
 
 
-def copy_picture(folder: Path, name: str, target: Path) -> None:
-    """Draw a picture of a run, at most 1,200 pixels wide and in 256 colors, a third of its size."""
-    output = read_output(folder)
-    drawn = next(drawing for drawn_name, _, drawing in drawings(output) if drawn_name == name)
-    with Image.open(BytesIO(rendered(drawn(), "png"))) as picture:
+def copy_picture(folder: Path, target: Path) -> None:
+    """Draw the first picture of a run's report, at most 1,200 pixels wide and in 256 colors, a third of its size."""
+    if (folder / "sensors.png").is_file():
+        content = (folder / "sensors.png").read_bytes()
+    else:
+        lead, _ = sections_of(read_output(folder))
+        assert lead is not None
+        assert lead.picture is not None
+        content = lead.picture.files("picture")["picture.png"]
+    with Image.open(BytesIO(content)) as picture:
         small = picture.convert("RGB")
         small.thumbnail((1200, 1200), Image.Resampling.LANCZOS)
         small.quantize(256, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(target, optimize=True)
@@ -113,7 +122,6 @@ def copy_picture(folder: Path, name: str, target: Path) -> None:
 def main() -> None:
     """Run the studies that are named, or all, and copy their pictures."""
     wanted = sys.argv[1:] or list(PICTURES)
-    pictures = {study: (study, picture) for study, picture in PICTURES.items()} | OTHERS
     with TemporaryDirectory() as folder:
         for study in wanted:
             command = [Path(sys.executable).with_name("sweep"), "run", STUDIES / f"{study}.yaml", "--output", folder]
@@ -121,18 +129,9 @@ def main() -> None:
             answer = answer_of(said)
             for document in ANSWERED:
                 document.write_text(with_answer(document.read_text(encoding="utf-8"), study, answer), encoding="utf-8")
-        for name, (study, picture) in pictures.items():
-            if study in wanted:
-                copy_picture(
-                    Path(folder) / study, picture.removeprefix("figures/"), STUDIES / "figures" / f"{name}.png"
-                )
-        if "vision" in wanted:
-            pictures_of = pd.read_parquet(Path(folder) / "vision" / VISION_STREETS)
-            drawn = street_drawing(pictures_of[pictures_of["name"].isin(STREETS)])
-            with Image.open(BytesIO(rendered(drawn(), "png"))) as picture:
-                small = picture.convert("RGB")
-                small.thumbnail((1200, 1200), Image.Resampling.LANCZOS)
-                small.save(STUDIES / "figures" / "streets.jpg", quality=85, subsampling=0)
+            if study == "stopband":
+                README.write_text(with_run(README.read_text(encoding="utf-8"), Path(folder) / study), encoding="utf-8")
+            copy_picture(Path(folder) / study, STUDIES / "figures" / f"{study}.png")
     text = gallery((STUDIES / "README.md").read_text(encoding="utf-8"))
     (STUDIES / "guide" / "gallery.md").write_text(text, encoding="utf-8")
 

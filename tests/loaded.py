@@ -9,7 +9,7 @@ for name in (
     "sweep.cli.app",
     "sweep.runs.audit",
     "sweep.api.run",
-    "sweep.report.trade_off",
+    "sweep.report.page",
     "sweep.runs.sweep",
     "sweep.search.solver",
 ):

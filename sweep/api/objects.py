@@ -225,16 +225,17 @@ class LoadedStudy:
 
     def plot(self, **channels: CurveLike) -> Figure:
         """Draw the sensor's QE over the spectra of the lights, and further curves by name, as a Matplotlib figure."""
-        from ..report.figures import CurvesFigure, draw_curves
+        from ..report.look import CHANNELS, DIM, GAIN
+        from ..report.panels import Curves, Picture
 
         study = self.study
-        user = {name: on_grid(name, curve, study.grid) for name, curve in channels.items()}
-        members = study.lights.members
+        user = {f"{name} (own)": on_grid(name, curve, study.grid)[0] for name, curve in channels.items()}
         peak_one = study.lights.photons / study.lights.photons.max(axis=1, keepdims=True)
-        shades = {kind: peak_one[at].max(axis=0) for kind, at in members.items()}
-        curves = {**study.sensor.qe, **{f"{name} (own)": rows for name, rows in user.items()}}
+        lamps = {kind: peak_one[at].max(axis=0) for kind, at in study.lights.members.items()}
+        colors = {name: CHANNELS.get(name, DIM) for name in study.sensor.qe} | dict.fromkeys(user, GAIN)
         title = f"Quantum efficiency, {study.sensor.name}"
-        return draw_curves(CurvesFigure(title, "QE", study.grid.nodes_nm, curves, shades=shades))
+        panel = Curves(title, study.grid.nodes_nm, {**study.sensor.qe, **user}, lamps, colors, tuple(user))
+        return Picture((panel,), title).figure()
 
     def plan(self, tolerance_dn: float | None = None) -> LoadedStudy:
         """Return the study with a plan of effects for each scenario.

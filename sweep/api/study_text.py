@@ -49,6 +49,7 @@ def study_text(name: str, sources: Sources, photon_ratio: float | None) -> str:
 # yaml-language-server: $schema=study.schema.json
 # Check it with `sweep check`, see the work with `sweep run ... --dry-run`.
 study: {scalar(name)}
+title: Where should the edges of a stopband lie to separate {pair[0]} from {pair[1]}?
 question: >-
   One {layout.base} pixel of {layout.plain[-1]} gets a stopband. Where should its edges lie, so that {pair[0]} and
   {pair[1]} lights separate best while the pixel keeps 90 % of its sensitivity?

@@ -173,7 +173,7 @@ class LampReadings:
         by_mean, by_variance = (slopes * lit_e for slopes in self.by_electrons(signals, factors))
         return mean, variance, by_mean @ self.readout.weights[0], by_variance @ self.readout.spread_weights[0]
 
-    def means_of_exposures(self, factors: Float[Array, "signals factors"]) -> Float[Array, "factors _ 4"]:
+    def means_of_exposures(self, factors: Float[Array, "signals factors"]) -> Float[Array, "factors _ channels"]:
         """Return the means of all lamps, each exposure with its own share of their light.
 
         `factors`: light of each exposure relative to that of the scene.

@@ -10,8 +10,7 @@ from ..base.modules import lazy_import
 if TYPE_CHECKING:
     from ..results.designs import check_kept, study_of
     from ..results.output import Output, read_output
-    from .page import make_report
-    from .summary import summary_lines
+    from .page import make_report, summary_lines
 
 __all__ = [
     "Output",
@@ -29,6 +28,6 @@ __getattr__ = lazy_import(
         "make_report": ".page",
         "read_output": "..results.output",
         "study_of": "..results.designs",
-        "summary_lines": ".summary",
+        "summary_lines": ".page",
     },
 )

@@ -6,7 +6,6 @@ import hashlib
 import os
 import string
 from collections.abc import Mapping, Sequence
-from functools import partial
 from pathlib import Path
 
 import pandas as pd
@@ -18,8 +17,7 @@ from ..results.folder import run_folder
 from ..results.output import Output, read_output
 from ..results.tables import write_csv
 from ..study import folder_name
-from .answer import largest_separation_elsewhere
-from .compare_fronts import draw_fronts, front_table, front_words, fronts_in, on_the_same_axes, scene_names
+from .compare_fronts import Fronts, front_table, front_words, fronts_in, on_the_same_axes, scene_names
 from .compare_tables import (
     best_of_runs,
     curve_notes,
@@ -28,8 +26,11 @@ from .compare_tables import (
     side_by_side,
     with_units_in_cells,
 )
-from .figures import Drawing, pictures_of
-from .pages import aligned, inlined, page, rows
+from .page import page_of
+from .pages import aligned
+from .panels import Picture
+from .section import Told, table_of
+from .sections.trade_off import TradeOff
 from .terms import format_constraint
 
 PAGE, PICTURE, TABLE = "compare.html", "fronts", "compare.csv"
@@ -75,30 +76,43 @@ def compare(*folders: Path | str | Sequence[Path | str], output: Path | str | No
     runs = {f"{letter} {' '.join(o.study.study.split())}": o for letter, o in zip(_LETTERS, outputs, strict=False)}
     fronts, figure, notes = compare_fronts(runs)
     answer = ranking(runs)
-    answer += [f"{run}: {line}" for run, output in runs.items() for line in largest_separation_elsewhere(output)]
+    answer += [
+        f"{run}: {line}"
+        for run, output in runs.items()
+        for trade_off in TradeOff.of(output)
+        for line in trade_off.limits
+        if "separates more" in line
+    ]
     notes = [*_same_folders(runs), *curve_notes(runs), *_constraint_note(runs), *notes]
     best = best_of_runs(runs)
     shown, left_out = side_by_side(best, runs)
     plain, same = plain_differences(runs)
     plain_words, words_of = with_units_in_cells(plain), {name: front_words(table) for name, table in fronts.items()}
-    drawn = {} if figure is None else pictures_of(figure, _KINDS)
-    html = page(
-        "compare.html.j2",
-        runs={run: str(output.folder) for run, output in runs.items()},
-        answer=answer,
-        notes=notes,
-        best=rows(shown),
-        left_out=left_out,
-        of_fronts=OF_FRONTS,
-        picture=inlined(drawn["svg"]) if drawn else None,
-        fronts=[(name, rows(table)) for name, table in words_of.items()],
-        plain=rows(plain_words),
-        same=same or "The runs share no plain CFA and no named design.",
+    sections = [
+        Told("Fronts", (f"In {name}, {OF_FRONTS}.",), None, table_of(table)) for name, table in words_of.items()
+    ]
+    if not words_of:
+        sections.append(Told("Fronts", ("There are no fronts to compare.",)))
+    sections.append(
+        Told(
+            "Plain CFAs and named designs",
+            () if len(plain) else (same or "The runs share none.",),
+            None,
+            table_of(plain_words),
+        )
     )
+    note = f"{left_out} more parameters in {TABLE}." if left_out else ""
+    lead = Told("Best designs", (), figure, table_of(shown, note, len(shown)))
+    drawn = {} if figure is None else figure.files(PICTURE)
+    of_runs = "; ".join(f"{run}: {output.folder}" for run, output in runs.items())
+    html = page_of(
+        "compare", f"Comparison of {', '.join(runs)}", answer, of_runs, lead, sections, kind="comparison of runs",
+        limits=notes, files=[TABLE, *drawn], mark=_MARK.decode(),
+    )  # fmt: skip
     write_text(html, target / PAGE)
     write_csv(best, target / TABLE)
     for kind in _KINDS:
-        _write_or_remove(drawn.get(kind), target / f"{PICTURE}.{kind}")
+        _write_or_remove(drawn.get(f"{PICTURE}.{kind}"), target / f"{PICTURE}.{kind}")
     lines = [f"{run}: {output.folder}" for run, output in runs.items()]
     lines += _section("Best designs", shown, "none")
     lines += [f"({left_out} more parameters in {TABLE}.)"] if left_out else []
@@ -112,7 +126,7 @@ def compare(*folders: Path | str | Sequence[Path | str], output: Path | str | No
         *answer,
         *(f"Note: {note}" for note in notes),
     ]
-    lines.append(f"Files: {target}/: {', '.join([PAGE, TABLE, *(f'{PICTURE}.{kind}' for kind in drawn)])}.")
+    lines.append(f"Files: {target}/: {', '.join([PAGE, TABLE, *drawn])}.")
     of_all = [table.assign(scene=name) for name, table in fronts.items()]
     tables = {"best": best, "plain": plain}
     tables["fronts"] = pd.concat(of_all, ignore_index=True) if of_all else pd.DataFrame()
@@ -120,7 +134,7 @@ def compare(*folders: Path | str | Sequence[Path | str], output: Path | str | No
     return Answer(lines, {"folder": str(target), **records, "notes": notes})
 
 
-def compare_fronts(runs: Mapping[str, Output]) -> tuple[dict[str, pd.DataFrame], Drawing | None, list[str]]:
+def compare_fronts(runs: Mapping[str, Output]) -> tuple[dict[str, pd.DataFrame], Picture | None, list[str]]:
     """Compare the fronts of runs with the same axes, in equal scenes."""
     group, notes = on_the_same_axes(runs)
     places: dict[str, dict[str, tuple[Output, str]]] = {}
@@ -147,7 +161,15 @@ def compare_fronts(runs: Mapping[str, Output]) -> tuple[dict[str, pd.DataFrame],
     of = ", ".join(places[scene]) if len(places[scene]) <= 3 else f"{len(places[scene])} runs"
     labels = sensitivity.words, separation.axis
     tables = {scene: front_table(those) for scene, those in fronts.items()}
-    return tables, partial(draw_fronts, f"{of}: fronts in {scene}", labels, list(runs), shown, marks), notes
+    return (
+        tables,
+        Picture(
+            (Fronts(f"{labels[1]}: fronts in {scene}", labels, tuple(runs), tuple(shown), tuple(marks)),),
+            f"Fronts of {of}.",
+            "Stars: the best design of each run.",
+        ),
+        notes,
+    )
 
 
 def _same_folders(runs: Mapping[str, Output]) -> list[str]:

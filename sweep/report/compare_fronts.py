@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -15,10 +15,11 @@ from ..metrics.objective import COMBINED
 from ..metrics.quantity import DN, WORST_CASE
 from ..results.output import Output
 from ..results.tables import SEARCHED
-from .figures import CURVE_CYCLE, DASHES, canvas, legend_beside
+from .look import INK, font, label_ends, styles_of, words_at
+from .panels import right_of
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
 
 _MARKERS = "osD^vPX<>hp"
 _MARKS_PER_LINE = 12
@@ -137,41 +138,50 @@ def front_words(fronts: pd.DataFrame) -> pd.DataFrame:
     return fronts.drop(columns=["separation_dn", "sensitivity"]).assign(**words)
 
 
-def draw_fronts(
-    title: str,
-    labels: tuple[str, str],
-    order: Sequence[str],
-    fronts: Sequence[ComparedFront],
-    best: Sequence[tuple[str, float, float]],
-) -> Figure:
-    """Draw the fronts: a color and a dash per run, a marker per front, so that they differ in gray, too.
+@dataclass(frozen=True)
+class Fronts:
+    """Fronts of runs: a color and a dash per run, a marker per front; stars are the best designs.
 
     A front of designs is a staircase: between two designs there is none. Between the levels of the search, nothing is
-    known.
+    known. `best`: run, light and separation.
     """
-    drawn, axes = canvas(9.0, 5.0)
-    for front, marker in zip(fronts, itertools.cycle(_MARKERS)):
-        run = order.index(front.run)
-        color = CURVE_CYCLE[run % len(CURVE_CYCLE)]
-        marked = np.unique(np.linspace(0, len(front.points) - 1, _MARKS_PER_LINE).round()).astype(int)
-        axes.plot(
-            front.points[:, 1],
-            front.points[:, 0],
-            color=color,
-            linestyle="none" if front.traced else DASHES[run % len(DASHES)],
-            linewidth=1.4,
-            marker=marker,
-            markersize=6,
-            markerfacecolor="white" if front.traced else color,
-            markevery=1 if front.traced else marked.tolist(),
-            drawstyle="steps-pre",
-            label=f"{front.run}, {front.cfa}{', traced by the search' if front.traced else ''}",
-        )
-    style: dict[str, Any] = {"marker": "*", "s": 220, "edgecolors": "black", "linewidths": 0.8, "zorder": 6}
-    for name, x, y in best:
-        axes.scatter([x], [y], color=CURVE_CYCLE[order.index(name) % len(CURVE_CYCLE)], **style)
-        letter = name.partition(" ")[0]
-        axes.annotate(letter, (x, y), textcoords="offset points", xytext=(8, 6), fontsize=9, zorder=7)
-    axes.set(xlabel=labels[0], ylabel=labels[1], title=title)
-    legend_beside(axes, "stars: best design of each run")
-    return drawn
+
+    title: str
+    labels: tuple[str, str]
+    order: tuple[str, ...]
+    fronts: tuple[ComparedFront, ...]
+    best: tuple[tuple[str, float, float], ...]
+
+    def room(self, *, wide: bool) -> tuple[float, float]:
+        """Numbers on the left, names on the right."""
+        return 70, right_of((self._name(front) for front in self.fronts), wide=wide)
+
+    def tall(self, *, wide: bool) -> float:
+        """Height of the axes, px."""
+        return 340 if wide else 240
+
+    @staticmethod
+    def _name(front: ComparedFront) -> str:
+        return f"{front.run}, {front.cfa}{', by the search' if front.traced else ''}"
+
+    def draw(self, axes: Axes) -> None:
+        """Draw fronts, best designs and names."""
+        styles = [*styles_of(self.order).values()]
+        ends = {}
+        for front, marker in zip(self.fronts, itertools.cycle(_MARKERS)):
+            style = styles[self.order.index(front.run)]
+            marked = np.unique(np.linspace(0, len(front.points) - 1, _MARKS_PER_LINE).round()).astype(int)
+            axes.plot(
+                front.points[:, 1], front.points[:, 0], color=style.color,
+                linestyle="none" if front.traced else style.dash, linewidth=1.7, marker=marker, markersize=6,
+                markerfacecolor="white" if front.traced else style.color,
+                markevery=1 if front.traced else marked.tolist(), drawstyle="steps-pre",
+            )  # fmt: skip
+            ends[self._name(front)] = float(front.points[-1, 0]), style, False
+        for name, x, y in self.best:
+            style = styles[self.order.index(name)]
+            axes.plot([x], [y], "*", color=style.color, markersize=15, markeredgecolor=INK, zorder=6)
+            words_at(axes, f"  {name.partition(' ')[0]}", x, y, va="bottom", zorder=7)
+        axes.margins(0.05)
+        label_ends(axes, ends, axes.get_ylim())
+        axes.set_xlabel(self.labels[0], fontsize=font(axes.figure), color=INK)  # type: ignore[arg-type]

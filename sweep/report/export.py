@@ -23,7 +23,7 @@ from ..spectra.filter_files import (
     unique_names,
 )
 from ..study import Study, folder_name
-from .parameter_map import specification as specification_of
+from .bands import specification as specification_of
 
 _ROUNDING = 1e-9
 _MOST_SHOWN = 10

@@ -1,30 +1,17 @@
-"""Figures in two steps: a figure's data as a plain value, then the drawing (matplotlib, PNG and SVG)."""
+"""Figures of files, of comparisons and of accuracy: canvas, axes, and files of a drawing (PNG and SVG)."""
 
 from __future__ import annotations
 
 import io
 import re
 import warnings
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
-
-from ..base.types import Array, Float, PerWavelength
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLORS = {
-    "infeasible": "#b8b8b8",
-    "feasible": "#56b4e9",
-    "front": "#0072b2",
-    "best": "#d55e00",
-    "named": "#000000",
-    "reference": "#7a7a7a",
-    "limit": "#009e73",
-}
-"""Okabe and Ito's palette, distinguishable by color-blind readers; every group has a marker of its own, too."""
 CURVE_COLORS = {
     "R": "#d62728",
     "Rx": "#8c2d04",
@@ -35,8 +22,6 @@ CURVE_COLORS = {
     "C": "#555555",
     "W": "#999999",
 }
-BOUND_FILTER_NAME = "filter at the upper bound"
-"""Legend entry: the curve of the filter that attains the bound of the search."""
 TYPE_COLORS = {"green": "#009e73", "yellow": "#c9a800", "orange": "#e66100", "red": "#b2182b"}
 CURVE_CYCLE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 DASHES = ("-", (0, (6, 2)), (0, (1, 1.5)), (0, (6, 2, 1, 2)))
@@ -47,48 +32,6 @@ _COMPRESSION = 3
 _CLIP_PATH = re.compile(rb"\bp[0-9a-f]{10}\b")
 Drawing = Callable[[], "Figure"]
 """A delayed drawing: a process that draws nothing does not load matplotlib."""
-
-
-@dataclass(frozen=True)
-class CurvesFigure:
-    """Curves over wavelength.
-
-    `colors`: colors, instead of the usual ones; `shades`: spectra of lights with a peak of 1 by signal type, behind the
-    curves.
-    """
-
-    title: str
-    y_label: str
-    wavelength_nm: PerWavelength
-    curves: Mapping[str, Float[Array, "... wavelengths"]]
-    dashed: Sequence[str] = ()
-    colors: Mapping[str, str] = field(default_factory=dict)
-    shades: Mapping[str, PerWavelength] = field(default_factory=dict)
-
-
-def draw_curves(figure: CurvesFigure) -> Figure:
-    """Draw curves over wavelength."""
-    figure_, axes = canvas(8.0, 4.0)
-    top = max((float(values.max(initial=0.0)) for values in figure.curves.values()), default=1.0)
-    for name, shade in figure.shades.items():
-        axes.fill_between(
-            figure.wavelength_nm, top * shade, color=TYPE_COLORS.get(name, "#777777"), alpha=0.12, linewidth=0
-        )
-    spare = iter(CURVE_CYCLE * (1 + len(figure.curves) // len(CURVE_CYCLE)))
-    for name, values in figure.curves.items():
-        color = figure.colors.get(name) or CURVE_COLORS.get(name) or next(spare)
-        style = "--" if name in figure.dashed else "-"
-        lines = values.reshape(-1, figure.wavelength_nm.size)
-        width = 1.6 if len(lines) == 1 else 0.7
-        labels = [name] + [None] * (len(lines) - 1)
-        axes.plot(figure.wavelength_nm, lines.T, style, color=color, linewidth=width, label=labels)
-    axes.set_xlabel("wavelength / nm")
-    axes.set_ylabel(figure.y_label)
-    axes.set_ylim(bottom=0)
-    axes.margins(x=0)
-    axes.set_title(figure.title)
-    legend_beside(axes)
-    return figure_
 
 
 def legend_beside(axes: Axes, title: str | None = None) -> None:

@@ -14,10 +14,12 @@ from ..metrics.quantity import DN
 from ..results.facts import SearchFacts
 from ..results.output import Output
 from ..results.tables import NAMED, REFERENCE, SEARCHED, SWEPT
+from ..study.schema import Modification
 
 if TYPE_CHECKING:
     import pandas as pd
 
+RGGB = "RGGB"
 Row = Mapping[Any, Any]
 
 
@@ -81,19 +83,6 @@ def label(row: Row) -> str:
     return str(row["name"]) if isinstance(row["name"], str) else f"filter {row['filter_id']}"
 
 
-def full_name(row: Row) -> str:
-    """Return a design's name for a sentence, with its CFA if the study does not name it."""
-    name = label(row)
-    if row["kind"] in (REFERENCE, NAMED) or (row["kind"] == SEARCHED and not name.startswith("best ")):
-        return name
-    return f"{'the ' if row['kind'] == SEARCHED else ''}{name} of {row['cfa']}"
-
-
-def capital(text: str) -> str:
-    """Return a sentence that begins with an upper-case letter."""
-    return text[:1].upper() + text[1:]
-
-
 def upper_bound(output: Output) -> SearchFacts | None:
     """Return the search that proved an upper bound on the separation of the trade-off.
 
@@ -138,3 +127,37 @@ def bounds_figure(output: Output, scenario: str, cfa: str) -> bool:
     rows = output.kind(SWEPT, NAMED)
     rows = rows[rows["cfa"] == cfa]
     return {f"{kind} {space}" for kind, space in zip(rows["kind"], rows["space"], strict=True)} <= {*search.bounded}
+
+
+def answering(output: Output) -> Row | None:
+    """Return the design that a page is about: the best one, or where that is a plain CFA, the best named design."""
+    leaders = leaders_of(output)
+    chosen = leaders.chosen
+    if chosen is not None and chosen["kind"] != REFERENCE:
+        return chosen
+    rows = output.kind(NAMED)
+    rows = rows[(rows["scenario"] == leaders.scenario) & (rows["status"] == "ok")]
+    return _most(rows, output.trade_off[0].name)
+
+
+def reference_of(output: Output, scenario: str) -> Row | None:
+    """Return the plain CFA to compare with: RGGB, else the one that separates most."""
+    rows = output.kind(REFERENCE)
+    rows = rows[(rows["scenario"] == scenario) & (rows["status"] == "ok")]
+    rggb = rows[rows["name"] == RGGB]
+    return _first(rggb) if len(rggb) else _most(rows, output.trade_off[0].name)
+
+
+def own_tile(output: Output, row: Row) -> Row | None:
+    """Return the plain CFA whose pixel a design modifies, where the study has it."""
+    bases = {entry.cfa: dict.fromkeys(entry.channel, entry.base) for entry in modifications(output)}.get(row["cfa"], {})
+    mosaic = output.mosaic(row["cfa"])
+    name = "".join(bases.get(mosaic.channels[at]) or mosaic.channels[at] for line in mosaic.tile for at in line)
+    rows = output.kind(REFERENCE)
+    return _first(rows[(rows["scenario"] == row["scenario"]) & (rows["name"] == name)])
+
+
+def modifications(output: Output) -> list[Modification]:
+    """Return the study's named designs, sweeps and boxes."""
+    study = output.study
+    return [*study.designs.values(), *study.sweeps.values(), *study.boxes.values()]

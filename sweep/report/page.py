@@ -1,193 +1,268 @@
-"""Draw the figures and write the HTML report of a finished run."""
+"""Make the page of a finished run from its sections, and its answer for the terminal."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from functools import partial
-from itertools import chain, islice
+import re
+import textwrap
+from collections.abc import Iterable, Sequence
+from itertools import chain
 from typing import Any
 
-import pandas as pd
 import pyarrow as pa
+from markupsafe import Markup, escape
 
 from ..base.types import Parallel, delayed, in_turn
-from ..metrics.objective import COMBINED
 from ..results.lock import locked
 from ..results.manifest import Manifest
 from ..results.output import Output
-from ..results.tables import FIGURES, REPORT, VISION_FIGURES, csv_of, encoded, is_drawn
-from . import signal_figures as signals
-from . import tables
-from . import values as content
-from .answer import answer_parts, headline_numbers
-from .captures import capture_drawings
-from .colors import color_drawings
-from .figures import Drawing, draw_curves, pictures_of
-from .lamps import lamp_drawings, lamp_table
-from .leaders import leaders_of
-from .noise import all_series, recognition_table
-from .over_series import searched_series
-from .page_data import payload
-from .pages import inlined, page, rows, script
-from .parameter_map import map_drawing
-from .price import price_table
-from .scenes import scene_groups, scene_table
-from .scorecard import draw_scorecard, scorecard
-from .sensor_map import map_drawings
-from .series import draw_series, scene_in_words
-from .stated import stated_lines
-from .summary import counts_line
-from .tables import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
-from .terms import format_constraints, term_definitions
-from .trade_off import draw_trade_off, overview_figure, pareto_figure, traded_cfas
+from ..results.tables import MANIFEST, REPORT, RESULTS, SEARCHED, SWEPT, csv_of, encoded, is_drawn
+from .explorer import explorer_data
+from .hold import holds_for, saturation_limits
+from .pages import page, script
+from .panels import Picture
+from .published import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
+from .section import Section
+from .sections.colors import Colors
+from .sections.curves import SensorCurves
+from .sections.edges import Edges
+from .sections.field import Field
+from .sections.flicker import Flicker
+from .sections.lamps import Lamps
+from .sections.left_out import LeftOut
+from .sections.method import Method
+from .sections.noise import Noise
+from .sections.price import Price
+from .sections.published import Published
+from .sections.scenes import Scenes
+from .sections.series import Series
+from .sections.tasks import Tasks
+from .sections.trade_off import TradeOff
+from .sections.uncertain import Uncertain
+from .sections.vision import Vision
+from .terms import format_constraints, unknown_lines
+from .words import scaled
 
-_MOST_SERIES = 3
-"""Figures over scenarios that the page shows unfolded."""
-_RASTERED = ("cfas", "pareto")
-"""Pictures that are also PNG, for slides."""
-_SHOWN = {
-    "images": ("tiles", "sensor", "signals", "chart"),
-    "lamp_images": ("regions",),
-    "vision_images": (VISION_FIGURES,),
-    "score_images": ("scorecard", "color-noise", "rendered"),
-    "map_images": ("places-",),
-    "parameter_images": ("map",),
-}
-"""Places of the page -> how the names of the pictures there begin; the page draws all other figures itself."""
+ORDER: tuple[type[Section], ...] = (
+    *(
+        Vision,
+        Flicker,
+        Noise,
+        Lamps,
+        Field,
+        Series,
+        TradeOff,
+        Scenes,
+        Edges,
+        Tasks,
+        Colors,
+        Uncertain,
+        LeftOut,
+        Published,
+        SensorCurves,
+    ),
+)
+"""Sections of a page. The first that a study calls for and that `leads` answers it; a search answers before series."""
+_OF_SERIES = (Flicker, Noise, Series)
+MOST_PICTURES = 6
+_MOST_ANSWERS, _MOST_LIMITS, _MOST_FURTHER = 3, 5, 2
+_LINES, _LETTERS = 8, 120
+PARETO_PICTURE = "pareto"
+"""Name of the picture of the trade-off, as files for slides."""
+
+
+def sections_of(output: Output) -> tuple[Section | None, list[Section]]:
+    """Return the section that answers the study's question, and the others in order."""
+    found = list(chain.from_iterable(kind.of(output) for kind in ORDER))
+    candidates = [section for section in found if section.leads and section.answer]
+    search = output.provenance.search
+    if not output.best.empty and (search is None or search.scenarios < 2):
+        candidates = sorted(candidates, key=lambda section: isinstance(section, (*_OF_SERIES, Tasks)))
+    elif not output.best.empty:
+        candidates = sorted(candidates, key=lambda section: not (isinstance(section, Series) and section.searched))
+    elif output.study.tasks is not None and len(output.scenarios) == 1:
+        candidates = sorted(candidates, key=lambda section: not isinstance(section, Tasks))
+    lead = next(iter(candidates), None)
+    return lead, [section for section in found if section is not lead]
+
+
+def answer_of(output: Output) -> list[str]:
+    """Return the answer to the study's question, a sentence each; `**` around the numbers that decide."""
+    searched = output.kind(SWEPT, SEARCHED)
+    if len(searched) and output.best.empty:
+        failed = searched[searched["status"] != "ok"]
+        if len(failed) == len(searched):
+            return [f"Every design failed: {failed['status'].iloc[0]}."]
+        under = format_constraints(output)
+        return [f"No design meets every constraint{f': {under}' if under else ''}.", *unknown_lines(output)]
+    lead, _ = sections_of(output)
+    sentences = [] if lead is None else lead.answer
+    first, *rest = sentences[:_MOST_ANSWERS] or ["No CFA or design of this study could be computed."]
+    return (
+        [scaled(output, first), *rest]
+        if " DN" in first or "\u00a0DN" in first
+        else [first, *(scaled(output, line) if at == 0 else line for at, line in enumerate(rest))]
+    )
+
+
+def limits_of(output: Output) -> list[str]:
+    """Return what limits the answer, a sentence each."""
+    lead, _ = sections_of(output)
+    return [*failed_lines(output), *([] if lead is None else lead.limits[:_MOST_LIMITS]), *saturation_limits(output)]
+
+
+def failed_lines(output: Output) -> list[str]:
+    """Return how many rows failed; nothing without any."""
+    failed = output.counts.failed
+    rows = "1 row, whose values are" if failed == 1 else f"{failed:,} rows, whose values are"
+    return [f"Failed: {rows} unknown here; status in {RESULTS} says why."] if failed else []
 
 
 def make_report(output: Output, *, repair: bool = False, parallel: Parallel = in_turn) -> None:
-    """Write `pareto.png`/`.svg`, `figures/*`, the comparison with published figures and `report.html`.
+    """Write the page, the picture of the trade-off, and published figures beside ours; with `repair` only damaged ones.
 
-    Raises OutputError if a file of others has one of the names, or the disk refuses.
+    Raises OutputError if a file of others has its name, or the disk refuses.
     """
     with locked(output.folder):
         manifest = Manifest(output.folder)
         listed = [name for name in manifest.files if is_drawn(name)]
-        wrong = manifest.wrong({REPORT, *listed})
-        if repair and not wrong:
+        if repair and not manifest.wrong({REPORT, *listed}):
             return
-        names = wrong if repair and REPORT not in wrong else None
-        contents = _contents(output, names, parallel)
-        manifest.write({n: content for n, content in contents.items() if not repair or n in wrong or n not in listed})
-        manifest.remove(n for n in listed if n not in contents and (names is None or n in names))
+        contents = {REPORT: report_page(output, sorted(manifest.files), parallel).encode("utf-8"), **_published(output)}
+        for trade_off in TradeOff.of(output):
+            contents |= {} if trade_off.picture is None else trade_off.picture.files(PARETO_PICTURE)
+        manifest.write(contents)
+        manifest.remove(name for name in listed if name not in contents)
 
 
-def _contents(output: Output, shown_names: Iterable[str] | None, parallel: Parallel) -> dict[str, bytes]:
-    """Return the files of the report with their content: some of them, or all, since the page holds every picture."""
-    contents, drawn = dict[str, bytes](), []
-    images: dict[str, list[tuple[str, str]]] = {place: [] for place in _SHOWN}
-    for name, caption, figure in drawings(output):
-        where = name if name.startswith(("cfas", "pareto")) else f"{FIGURES}/{name}"
-        kinds = ("png", "svg") if name in _RASTERED else ("svg",)
-        if shown_names is None or {f"{where}.{kind}" for kind in kinds} & {*shown_names}:
-            drawn.append((name, caption, where, figure, kinds))
-    pictures = parallel(delayed(pictures_of, figure, kinds) for *_, figure, kinds in drawn)
-    begun = [*islice(pictures, 1)]  # workers make the others while the page is written
-    published = comparison_with_published(output)
-    parts = _parts(output, published) if shown_names is None else {}
-    for (name, caption, where, *_), by_kind in zip(drawn, chain(begun, pictures), strict=True):
-        contents |= {f"{where}.{kind}": content for kind, content in by_kind.items()}
-        for place, names in _SHOWN.items():
-            if name.startswith(names):
-                images[place].append((caption, inlined(by_kind["svg"])))
-    if len(published):
-        contents[PUBLISHED_CSV] = csv_of(published).encode("utf-8")
-        contents[PUBLISHED_PARQUET] = encoded(pa.Table.from_pandas(published, preserve_index=False))
-    if shown_names is None:
-        contents[REPORT] = page("report.html.j2", **parts, **images).encode("utf-8")
-    return contents
-
-
-def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
-    """Return the content of the page without its pictures."""
-    drawn = payload(output)
-    answer, further = answer_parts(output)
-    over_all = len(output.scenarios) == 1 or searched_series(output) is not None
-    series_first = bool(drawn["series"]) and output.best.empty
+def _published(output: Output) -> dict[str, bytes]:
+    """Return the files of the comparison with published figures."""
+    table = comparison_with_published(output)
+    if not len(table):
+        return {}
     return {
-        "output": output,
-        "study": output.study,
-        "card": scorecard(output),
-        "card_first": output.best.empty and not series_first and output.study.tasks is not None,
-        "objective": _objective(output),
-        "numbers_in": "" if over_all else f"in {scene_in_words(leaders_of(output).scenario)}",
-        "series_first": series_first,
-        "most_series": _MOST_SERIES,
-        "terms_first": series_first and drawn["series"][0]["y_label"] == output.trade_off[0].axis,
-        "answer": answer,
-        "stated": stated_lines(output),
-        "further": further,
-        "numbers": headline_numbers(output),
-        "price": rows(price_table(output)),
-        "counts": counts_line(output),
-        "interactive": drawn,
-        "plotly": script("plotly-gl2d.min.js"),
-        "script": script("report.js"),
-        "scenes": rows(scene_table(scene_groups(output))),
-        "lamps": rows(lamp_table(output)),
-        "vision": _vision(output),
-        "comparison": rows(tables.comparison_table(output)),
-        "best": rows(tables.best_table(output)),
-        "recognition": rows(recognition_table(output)),
-        "left_out": rows(tables.costliest_omission(output)),
-        "geometry": rows(tables.geometry_table(output)),
-        "published": rows(published),
-        "constraints": format_constraints(output),
-        "terms": term_definitions(output),
-        "provenance": output.provenance.model_dump(mode="json"),
+        PUBLISHED_CSV: csv_of(table).encode("utf-8"),
+        PUBLISHED_PARQUET: encoded(pa.Table.from_pandas(table, preserve_index=False)),
     }
 
 
-def _vision(output: Output) -> list[tuple[str, list[list[str]]]]:
-    """Return title and rows of each table of the benchmark of vision; none if the study has none."""
-    if output.study.vision is None:
-        return []
-    from .vision_report import vision_parts  # noqa: PLC0415  (only where a study asks for images)
+def report_page(output: Output, files: Iterable[str], parallel: Parallel = in_turn) -> str:
+    """Return the page of a run."""
+    lead, others = sections_of(output)
+    price = next(iter(Price.of(output)), None) if not isinstance(lead, (*_OF_SERIES, Vision)) else None
+    shown = [
+        section for section in others if section.answer or section.picture is not None or section.table is not None
+    ]
+    pictured = [section for section in shown if section.picture is not None][: MOST_PICTURES - 1]
+    study = output.study
+    return page_of(
+        study.study,
+        study.title or study.question or study.study,
+        answer_of(output),
+        holds_for(output),
+        lead,
+        [section for section in shown if section.picture is None or section in pictured],
+        price=price,
+        limits=limits_of(output),
+        method=next(iter(Method.of(output))).limits,
+        files=[
+            RESULTS,
+            *(name for name in files if not name.startswith((RESULTS, REPORT)) and not is_drawn(name)),
+            MANIFEST,
+        ],
+        explorer=explorer_data(output),
+        parallel=parallel,
+    )
 
-    return [(title, rows(table)) for title, table in vision_parts(output).items()]
+
+def page_of(
+    name: str,
+    title: str,
+    answer: Sequence[str],
+    holds: str,
+    lead: Section | None,
+    sections: Sequence[Section],
+    *,
+    kind: str = "report of a sweep",
+    price: Section | None = None,
+    limits: Sequence[str] = (),
+    method: Sequence[str] = (),
+    files: Sequence[str] = (),
+    explorer: dict[str, Any] | None = None,
+    mark: str = "",
+    parallel: Parallel = in_turn,
+) -> str:
+    """Return a page: question, answer, what it holds for, the section that answers, price, limits, further ones."""
+    pictures = pictures_of([section.picture for section in [*([] if lead is None else [lead]), *sections]], parallel)
+    first = {} if lead is None else part(lead, pictures.pop(0)) | {"table": lead.table}
+    return page(
+        "page.html.j2",
+        mark=Markup(mark),
+        style=script("page.css"),
+        name=name,
+        kind=kind,
+        title=title,
+        answer=marked(" ".join(answer)),
+        holds=holds,
+        lead={"title": "", "picture": None, "table": None, **first},
+        price=None if price is None else part(price, None),
+        limits=limits,
+        sections=[part(section, picture) for section, picture in zip(sections, pictures, strict=True)],
+        explorer=explorer,
+        script=script("explorer.js"),
+        method=method,
+        files=files,
+    )
 
 
-def drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
-    """Yield name, caption and drawing of all pictures."""
-    yield from _drawings(output)
-    yield from _vision_drawings(output)
+def pictures_of(pictures: Sequence[Picture | None], parallel: Parallel = in_turn) -> list[dict[str, Any] | None]:
+    """Draw pictures for a wide and for a narrow screen."""
+    svgs = iter(
+        [*parallel(delayed(picture.svgs, f"p{at}") for at, picture in enumerate(pictures) if picture is not None)]
+    )
+    return [
+        None
+        if picture is None
+        else dict(zip(("wide", "narrow"), map(Markup, next(svgs)), strict=True)) | {"caption": picture.caption}
+        for picture in pictures
+    ]
 
 
-def _vision_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
-    """Yield drawings of the benchmark of vision; none if the study has none."""
-    if output.study.vision is not None:
-        from .vision_report import vision_drawings  # noqa: PLC0415  (only where a study asks for images)
-
-        yield from vision_drawings(output)
-
-
-def _objective(output: Output) -> str:
-    """Return the objective in words, and its column if it is one."""
-    name = output.goal.name
-    words = str(output.objective) if output.goal.words == name else f"the {output.goal.words}"
-    return words if name in (words, COMBINED) else f"{words} ({name} in the files)"
+def part(section: Section, picture: dict[str, Any] | None) -> dict[str, Any]:
+    """Return a section for a template."""
+    return {
+        "title": section.title,
+        "text": marked(section.short),
+        "picture": picture,
+        "table": section.table if picture is None else None,
+        "limits": section.limits[:_MOST_FURTHER] if section.picture is None else [],
+    }
 
 
-def _drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
-    """Yield all drawings, the slowest first, so that no core waits for it."""
-    scenario = output.scenarios[0]
-    yield "cfas", "All CFAs", partial(draw_trade_off, overview_figure(output, scenario))
-    for number, cfa in enumerate(traded_cfas(output), 1):
-        figure = partial(draw_trade_off, pareto_figure(output, scenario, cfa))
-        yield ("pareto" if number == 1 else f"pareto-{number}"), f"Trade-off of {cfa}", figure
-    for number, series in enumerate(all_series(output), 1):
-        yield f"series-{number}", series.title, partial(draw_series, series)
-    yield from capture_drawings(output)
-    card = scorecard(output)
-    if card is not None:
-        yield "scorecard", f"Every figure relative to {card.names[0]}", partial(draw_scorecard, card)
-    yield from map_drawings(output)
-    yield from map_drawing(output)
-    yield from color_drawings(output)
-    yield from lamp_drawings(output)
-    tiles = partial(signals.draw_tiles, signals.first_mosaics(output), signals.replaced_channels(output))
-    yield "tiles", "Tiles of the CFAs; a hatched pixel is modified", tiles
-    yield "sensor", "Quantum efficiency of the sensor", partial(draw_curves, content.sensor_figure(output))
-    yield "signals", "Spectra of the signals", partial(draw_curves, content.lights_figure(output))
-    yield "chart", "The color checker chart", partial(signals.draw_chart, signals.chart_patches(output))
+def marked(text: str) -> Markup:
+    """Return a text whose numbers between `**` are bold."""
+    return Markup(re.sub(r"\*\*(.+?)\*\*", r"<b>\1</b>", str(escape(text))))
+
+
+def plain(text: str) -> str:
+    """Return a text for a terminal."""
+    return text.replace("**", "").replace("\u00a0", " ")
+
+
+def summary_lines(output: Output, took_s: float | None = None) -> list[str]:
+    """Return answer, limits, what was left out, check and files in eight lines; the last one is the folder."""
+    method = next(iter(Method.of(output))).limits
+    tail = [*failed_lines(output), *(line for line in method if line.startswith(("Left out", "Checked")))]
+    took = f"Took {took_s:.1f} s; f" if took_s is not None else "F"
+    tail.append(f"{took}iles: {REPORT}, {RESULTS}, provenance.json in")
+    body = textwrap.wrap(plain(" ".join(answer_of(output))), _LETTERS)
+    room = _LINES - 1 - len(tail)
+    for line in [line for line in limits_of(output) if line not in tail]:
+        wrapped = textwrap.wrap(plain(line), _LETTERS)
+        if len(body) + len(wrapped) <= room:
+            body += wrapped
+    if len(body) > room:
+        body = [
+            *body[: room - 1],
+            textwrap.shorten(" ".join(body[room - 1 :]), _LETTERS, placeholder=" ... (more in the report)"),
+        ]
+    return [*body, *(textwrap.shorten(plain(line), _LETTERS, placeholder=" ...") for line in tail), str(output.folder)]

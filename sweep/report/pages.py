@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import math
 from importlib import resources
 from typing import Any
@@ -26,11 +25,6 @@ def script(name: str) -> Markup:
     """Return a script beside the templates for the page."""
     text = resources.files("sweep.report").joinpath("templates", name).read_text(encoding="utf-8")
     return Markup(text.replace("</script", "<\\/script"))
-
-
-def inlined(svg: bytes) -> str:
-    """Return a picture for the page."""
-    return "data:image/svg+xml;base64," + base64.b64encode(svg).decode("ascii")
 
 
 def rows(table: pd.DataFrame) -> list[list[str]]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pandas as pd
 
@@ -27,11 +26,10 @@ from ..runs.score import (
 from ..runs.score_streets import is_of_streets, labels_of_test, read_detections, street_lines, street_scores
 from ..vision.detections import ALL
 from ..vision.scenes import NETWORK, states_of
-from .figures import CURVE_CYCLE, DASHES, canvas, legend_beside, rendered
-from .pages import inlined, page, rows
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .hold import holds_for
+from .page import page_of
+from .panels import Line, Lines, Picture
+from .section import Told, table_of
 
 PAGE, TABLE, STREETS = "scores.html", "scores.parquet", "street_scores.parquet"
 
@@ -85,11 +83,19 @@ def _score_readers(output: Output, predictions: Sequence[Path], to: Path) -> tup
     with atomic(to / TABLE) as hidden:
         scores.to_parquet(hidden, index=False)
     lines += score_lines(scores)
-    picture = inlined(rendered(draw_scores(scores), "svg"))
     shown = scores.drop(columns=["design_id"]).round(4)
-    name, folder = output.study.study, output.folder.name
-    summary = rows(summary_table(scores))
-    text = page("scores.html.j2", title=name, summary=summary, image=picture, table=rows(shown), folder=folder)
+    lead = Told("Errors", (), picture_of(scores), table_of(summary_table(scores)))
+    further = Told("By distance and light", (), None, table_of(shown, f"{TABLE} has all."))
+    text = page_of(
+        output.study.study,
+        "How often do readers err?",
+        lines,
+        holds_for(output),
+        lead,
+        [further],
+        kind="scores of readers",
+        files=[TABLE],
+    )
     write_text(text, to / PAGE)
     files = ", ".join([TABLE, PAGE, *([STREETS] if of_streets else [])])
     return [*lines, f"Files: {to}/: {files}."], {"images": scores, **tables}
@@ -124,21 +130,21 @@ def summary_table(scores: pd.DataFrame) -> pd.DataFrame:
     return table
 
 
-def draw_scores(scores: pd.DataFrame) -> Figure:
-    """Draw errors over distance, a line per reader and design, and the ideal observer's as thin lines."""
+def picture_of(scores: pd.DataFrame) -> Picture:
+    """Return errors over distance, a panel for each reader, with bands down to the ideal observer."""
     shown = in_any_order(scores)
     by_distance = shown[(shown["level"] == ALL) & (shown["distance_m"] != ALL)]
-    figure, axes = canvas(9.0, 5.0)
-    names, readers = [*dict.fromkeys(by_distance["name"])], [*dict.fromkeys(by_distance["reader"])]
-    for name, color in zip(names, CURVE_CYCLE * 4, strict=False):
-        for reader, dash in zip(readers, DASHES * 7, strict=False):
-            part = by_distance[(by_distance["name"] == name) & (by_distance["reader"] == reader)]
-            part = part.assign(x=part["distance_m"].astype(float)).sort_values("x")
-            x, label = part["x"], f"{name}, {reader}"
-            axes.plot(x, part["error"], "o", linestyle=dash, color=color, label=label, markersize=3.5)
-            axes.fill_between(x, part["error_low"], part["error_high"], color=color, alpha=0.12, linewidth=0)
-        axes.plot(part["x"], part["observer_error"], color=color, linewidth=0.8, alpha=0.8)
-    axes.set(xlabel="distance / m", ylabel="share of wrong answers", title="Thin lines: the ideal observer")
-    axes.set_ylim(bottom=0)
-    legend_beside(axes)
-    return figure
+    panels = []
+    for reader, rows_of in by_distance.groupby("reader", sort=False):
+        lines = {}
+        for name, own in rows_of.groupby("name", sort=False):
+            ordered = own.assign(x=own["distance_m"].astype(float)).sort_values("x")
+            x, error, least = (ordered[key].to_numpy(dtype=float) for key in ("x", "error", "observer_error"))
+            lines[str(name)] = Line(x, 100 * error, 100 * least)
+        panels.append(Lines(f"{reader}: wrong / %", "distance / m", lines, height=260))
+    return Picture(
+        tuple(panels),
+        "Errors of readers over distance.",
+        "Bands go down to the ideal observer.",
+        columns=min(2, len(panels)),
+    )

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from ..base.types import Array, Float
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.quantity import Column
 from ..results.dataset import part_paths
@@ -23,18 +21,14 @@ from ..results.tables import ALL_SENSORS, REFERENCE, REPORT, RESULTS, SEARCHED, 
 from ..runs.all_sensors import ALL
 from ..runs.uncertainty import REFERENCE_CFA, UNCLIPPED
 from ..study import SensorAndLights, folder_name
-from .figures import CURVE_CYCLE, canvas, legend_beside, rendered
-from .pages import inlined, page, rows
-from .stated import camera_and_scene
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .hold import holds_for
+from .page import page_of
+from .panels import Picture, Ratio, Ratios
+from .section import Told, table_of
+from .words import quantity
 
 PICTURE = "sensors"
 _KEYS = ("sensor", "lights")
-_MARKERS = "osD^vPX*<>"
-_NINE_TENTHS = math.sqrt(-2 * math.log(0.1))
-"""Semiaxis of the ellipse that holds 90 % of a Gaussian in two dimensions, in deviations."""
 
 
 @dataclass(frozen=True)
@@ -74,33 +68,33 @@ def report_sensors(manifest: Manifest, runs: Sequence[SensorRun]) -> list[str]:
     manifest.require({ALL_SENSORS} & manifest.files.keys())
     outputs = [(run.member, read_output(run.folder)) for run in runs]
     figures = pd.DataFrame([row for member, output in outputs for row in _figures(member, output)])
-    drawn = draw_sensors(figures, outputs[0][1].trade_off[0].words)
-    images = {kind: rendered(drawn, kind) for kind in ("png", "svg")}
-    words, summary = outputs[0][1].trade_off[0].words, _summary(figures)
+    column = outputs[0][1].trade_off[0]
+    words, summary = quantity(column), _summary(figures)
     n_found = figures.loc[figures["kind"] == SEARCHED, "cfa"].nunique()
     lines = [*_answer(summary, n_found, str(figures["reference"].iloc[0]), words)]
-    answer, stated = lines[: max(n_found, 1)], f"{camera_and_scene(outputs[0][1])}."
+    answer, stated = lines[: max(n_found, 1)], holds_for(outputs[0][1])
     known = ALL_SENSORS in manifest.files
     together = read_table(folder / ALL_SENSORS).to_pandas() if known else pd.DataFrame()
+    further = lines[len(answer) :]
     if len(together):
-        lines += _together(together, outputs[0][1].goal)
-    lines += _notes(outputs)
-    links = [(run.member.name, f"{run.folder.name}/{REPORT}") for run in runs]
-    text = page(
-        "sensors.html.j2",
-        title=folder.name,
-        question=outputs[0][1].study.question,
-        answer=answer,
-        stated=stated,
-        further=lines[len(answer) :],
-        summary=rows(summary),
-        image=inlined(images["svg"]),
-        table=rows(_shown(figures)),
-        together=rows(together) if len(together) else [],
-        links=links,
-    )
-    manifest.write({f"{PICTURE}.{kind}": image for kind, image in images.items()} | {REPORT: text.encode("utf-8")})
-    lines.insert(len(answer), stated)
+        further += _together(together, outputs[0][1].goal)
+    notes = [*_notes(outputs)]
+    picture = picture_of(figures, words)
+    sections = [Told("On each sensor", (), None, table_of(_shown(figures), f"{RESULTS} has all rows."))]
+    if len(together):
+        sections.append(
+            Told("Filters for several sensors", (), None, table_of(together.round(3), f"{ALL_SENSORS} has all."))
+        )
+    links = [f"{run.folder.name}/{REPORT}" for run in runs]
+    study = outputs[0][1].study
+    lead = Told("By design", (), picture, table_of(summary))
+    text = page_of(
+        folder.name, study.title or study.question or folder.name, answer, stated, lead, sections,
+        kind="report of a sweep over sensors", limits=[*further, *notes], files=[RESULTS, *links],
+    )  # fmt: skip
+    lines = [*answer, *further, *notes]
+    images = picture.files(PICTURE)
+    manifest.write(images | {REPORT: text.encode("utf-8")})
     files = f"Files: {RESULTS}, {REPORT}, {PICTURE}.png, and a folder for each run, in the folder"
     return [*lines, files, str(folder)]
 
@@ -235,46 +229,17 @@ def _shown(figures: pd.DataFrame) -> pd.DataFrame:
     return shown
 
 
-def draw_sensors(figures: pd.DataFrame, words: str) -> Figure:
-    """Draw the ratio of separations against that of light: a color per design, a marker per sensor and lights.
-
-    Ellipses hold 90 % of the random sensors.
-    """
-    from matplotlib.patches import Polygon  # noqa: PLC0415  (slow to import)
-
-    drawn, axes = canvas(9.0, 5.6)
+def picture_of(figures: pd.DataFrame, words: str) -> Picture:
+    """Return ratios of separation and of light of each design on each sensor, with bars from 5 to 95 %."""
     figures = figures[figures["name"] != figures["reference"]]
-    names = [*dict.fromkeys(figures["design"])]
-    pairs = [*dict.fromkeys(zip(figures["sensor"], figures["lights"], strict=True))]
-    for row in figures.to_dict("records"):
-        color = CURVE_CYCLE[names.index(row["design"]) % len(CURVE_CYCLE)]
-        marker = _MARKERS[pairs.index((row["sensor"], row["lights"])) % len(_MARKERS)]
-        axes.plot(row["light_ratio"], row["ratio"], marker, color=color, markersize=6, markeredgecolor="white")
-        if row.get("ratio_sd", 0) > 0:
-            axes.add_patch(Polygon(_ellipse(row), closed=True, facecolor=color, alpha=0.15, edgecolor="none"))
-    for name in names:
-        axes.plot([], [], "o", color=CURVE_CYCLE[names.index(name) % len(CURVE_CYCLE)], label=name)
-    for (sensor, lights), marker in zip(pairs, _MARKERS * 3, strict=False):
-        axes.plot([], [], marker, color="#666666", label=f"{sensor}, {lights}")
     reference = figures["reference"].iloc[0] if len(figures) else REFERENCE_CFA
-    for line in (axes.axhline, axes.axvline):
-        line(1.0, color="#666666", linestyle="--", linewidth=1.0)
-    axes.set_yscale("log")
-    axes.yaxis.set_major_formatter("{x:g}")
-    axes.yaxis.set_minor_formatter("{x:g}")
-    axes.set(xlabel=f"light, times that of {reference}", ylabel=f"{words}, times that of {reference}")
-    axes.set_title("Above and to the right of the dashed lines: more separation at more light")
-    legend_beside(axes)
-    return drawn
-
-
-def _ellipse(row: Mapping[Any, Any]) -> Float[Array, "points 2"]:
-    """Return the outline of the ellipse that holds 90 % of the random sensors."""
-    angle = np.linspace(0, 2 * np.pi, 73)
-    x, y = np.cos(angle), np.sin(angle)
-    along = row["correlation"] * x + np.sqrt(max(1 - row["correlation"] ** 2, 0.0)) * y
-    outline = [
-        row["light_ratio"] + _NINE_TENTHS * row["light_ratio_sd"] * x,
-        np.maximum(row["ratio"] + _NINE_TENTHS * row["ratio_sd"] * along, 1e-3),
-    ]
-    return np.stack(outline, axis=1)
+    panels = []
+    for of, title in (("ratio", words), ("light_ratio", "light of the whole CFA")):
+        ratios = []
+        for row in figures.to_dict("records"):
+            low, high = (float(row.get(f"{of}_{end}", np.nan)) for end in (5, 95))
+            ends = (low, high) if np.isfinite([low, high]).all() else (None, None)
+            ratios.append(Ratio(f"{row['sensor']}, {row['lights']}", str(row["design"]), float(row[of]), *ends))
+        panels.append(Ratios(f"{title} / that of {reference}", "times", tuple(ratios)))
+    caption = f"Right of the line: more than {reference}. Bars: 5 to 95 % of random sensors."
+    return Picture(tuple(panels), f"{words} and light on each sensor, against {reference}.", caption)

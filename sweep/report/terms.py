@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
-from ..camera.scene import Scene
+import numpy as np
+
 from ..designs.technology import Technology
 from ..metrics.bound import FEASIBLE, Bound
-from ..metrics.quantity import DN, Column
+from ..metrics.quantity import Column
 from ..results.output import Output
 from ..results.tables import NAMED, REFERENCE, SEARCHED, SWEPT
-from .leaders import Row, capital
-from .values import modifications
+from .leaders import Row
+from .words import joined
 
-_NO_TECHNOLOGY = "Filters without a stated technology are evaluated at normal incidence."
-"""Note on filters without a technology, whose transmission is that at normal incidence."""
+QE = "quantum efficiency"
+_RELATIVE = 0.99
+_NO_DEPTH = 1e-3
 
 
 def format_constraint(output: Output, name: str, bound: Bound) -> str:
@@ -28,6 +30,12 @@ def format_constraint(output: Output, name: str, bound: Bound) -> str:
     if bound.min == bound.max:
         return f"{words} of {_with_unit(column, bound.min)}"
     return f"{words} from {bound.min:g} to {_with_unit(column, bound.max)}"
+
+
+def format_bounded(column: Column, bound: Bound) -> str:
+    """Format the limits of a quantity that is already named: `at most 0.06 per nm`."""
+    words = {"at least": bound.min, "at most": bound.max}
+    return " and ".join(f"{word} {_with_unit(column, limit)}" for word, limit in words.items() if limit is not None)
 
 
 def _with_unit(column: Column | None, limit: float | None) -> str:
@@ -73,30 +81,6 @@ def unknown_lines(output: Output) -> Iterator[str]:
             yield f"Designs of {families} have no {output.words(name)}: unknown is not feasible."
 
 
-def term_definitions(output: Output) -> list[str]:
-    """Define the separation, the constrained quantities, and the modified channels of each CFA.
-
-    Returns one sentence per term, then one per CFA with modified channels.
-    """
-    names = (output.trade_off[0].name, *output.constraints)
-    columns = [output.columns[name] for name in names if name in output.columns]
-    lines = []
-    # A worst case is explained by the quantity that it is of; duplicates are dropped.
-    for name in dict.fromkeys(column.of if column.extreme else column.name for column in columns):
-        column = output.columns[name]
-        unit = ", in digital numbers (DN)" if column.unit == DN else ""
-        lines.append(f"{capital(column.words)}: {column.meaning}{unit}.")
-    base_filters = {(entry.cfa, *entry.channel): entry.base for entry in modifications(output) if entry.channel}
-    for (cfa, *channels), base in base_filters.items():
-        if not base:
-            continue
-        if len(channels) > 1:
-            lines.append(f"In {cfa}, {' and '.join(channels)} are {base} pixels whose filters change.")
-        else:
-            lines.append(f"In {cfa}, {channels[0]} is a {base} pixel whose filter changes.")
-    return lines
-
-
 def _technologies(output: Output, row: Row) -> list[Technology | None]:
     """Return the possible technologies of a row's filter: several for swept rows, none for a plain CFA."""
     study, search = output.study, output.provenance.search
@@ -119,20 +103,6 @@ def technology_of(output: Output, row: Row) -> Technology | None:
     return candidates[0] if len(candidates) == 1 else None
 
 
-def angle_note(output: Output, row: Row) -> str:
-    """Return a sentence on the angle dependence of a row's filter.
-
-    Empty if no technology is stated or it is not unique.
-    """
-    technology = technology_of(output, row)
-    if technology is None:
-        return ""
-    if technology.interference is None:
-        return "The transmission of a pigment filter does not depend on the angle of incidence."
-    incidence = _format_incidence(output.study.scenarios[row["scenario"]])
-    return f"The band of an interference filter shifts with the angle of incidence; the values are {incidence}."
-
-
 def is_angle_dependent(output: Output, row: Row) -> bool:
     """Return whether the transmission of a row's filter may depend on the angle of incidence.
 
@@ -141,28 +111,36 @@ def is_angle_dependent(output: Output, row: Row) -> bool:
     return any(t is not None and t.interference is not None for t in _technologies(output, row))
 
 
-def _format_incidence(scene: Scene) -> str:
-    """Format the f-number and the chief ray angles, in degrees, under which light reaches the pixels."""
-    lens = f"behind f/{scene.optics.f_number:g}"
-    if scene.field is None:
-        return f"{lens} at a chief ray angle of {scene.optics.cra_deg:g} degrees"
-    angles_deg = scene.field.knots[1]
-    angle_range = f"{min(angles_deg):g} to {max(angles_deg):g}"
-    positions = "all" if scene.field.everywhere else f"{len(scene.field.counted_heights)}"
-    return f"{lens} at chief ray angles of {angle_range} degrees, the worst of {positions} field positions"
+def colorants_of(output: Output, best: Row) -> Iterator[str]:
+    """Yield the colorants of a filter with their absorbances, or the peak and width of its only modeled band."""
+    names = list(output.curves.colorants)
+    for slot in [name.removeprefix("colorant_") for name in output.parameters if name.startswith("colorant_")]:
+        number, absorbance = float(best[f"colorant_{slot}"]), float(best[f"absorbance_{slot}"])
+        if math.isfinite(number) and absorbance > 0:
+            yield f"{names[round(number) - 1]} with an absorbance of {absorbance:.2f}"
+    peak_nm, fwhm_nm = (float(best.get(name, math.nan)) for name in ("peak_nm", "fwhm_nm"))
+    if math.isfinite(peak_nm) and math.isfinite(fwhm_nm):
+        yield f"a band at {peak_nm:.0f} nm of {fwhm_nm:.0f} nm FWHM with an absorbance of {best['absorbance']:.2f}"
 
 
-def assumptions_line(output: Output) -> str:
-    """Return a note on what the run assumes: surrogate curves, and filters without a stated technology.
+def response_of(curves: Mapping[str, np.ndarray]) -> str:
+    """Return what a sensor's curves are: quantum efficiencies, or relative responses, whose largest is about 1."""
+    top = max(float(curve.max()) for curve in curves.values())
+    return "relative response" if top > _RELATIVE else QE
 
-    Empty if neither applies.
-    """
-    notes = []
-    modeled = [origin.name for origin in (output.provenance.sensor, output.provenance.lights) if origin.surrogate]
-    if len(modeled) == 2:
-        notes.append("Built-in curves are surrogates, modeled from stated parameters, not measured.")
-    elif modeled:
-        notes.append(f"The curves of {modeled[0]} are surrogates, modeled from stated parameters, not measured.")
-    if any(modification.technology is None for modification in modifications(output)):
-        notes.append(_NO_TECHNOLOGY)
-    return f"Note: {' '.join(notes)}" if notes else ""
+
+def edges_in_words(row: Row) -> str:
+    """Return the edges of a stopband, or of each of several that is not without effect; empty without any."""
+    parts = []
+    for number in ("", *map(str, range(1, 10))):
+        left, right = (float(row.get(f"{side}{number}_nm", math.nan)) for side in ("left", "right"))
+        if math.isfinite(left) and math.isfinite(right) and row.get(f"depth{number}", 1) > _NO_DEPTH:
+            parts.append(f"{left:.0f} and {right:.0f} nm")
+    return f"edges at {' and at '.join(parts)}" if parts else ""
+
+
+def bound_conditions(output: Output) -> str:
+    """Return the constraints under which a search's upper bound holds, in words."""
+    search = output.provenance.search
+    left_out = [] if search is None else [output.words(name) for name in search.limit_left_out]
+    return f"under the same constraints{f' except {joined(left_out)}' if left_out else ''}"

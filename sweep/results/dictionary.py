@@ -159,7 +159,6 @@ FILES = {
     "-inf: at all",
     files.TRADED: "where a study has the task `color`: mean color error against luminance SNR, a row per design, "
     "light and regularization of the color matrix",
-    files.RENDERED: "there, too: colors (XYZ over white) and noise of the areas of two rendered pictures",
     files.VISION: "a row per image of the benchmark of vision: design_id, name, cfa, seed, order (of the lenses), "
     "lamps (seen in training or unseen), image, state, lamp, intensity_cd, background, phantom, distance_m, level, "
     "and what each reader says with its probability: observer, network",
@@ -167,8 +166,6 @@ FILES = {
     "smallest or the largest over the pairs of lenses",
     files.VISION_STREET: "of streets: average_precision of the simplest detector for each design, seed, light level "
     "and signal type (`state`), of `lit` lit lenses",
-    files.VISION_STREETS: "the first street of each light level through each design, sRGB: bytes of rows x columns x 3 "
-    "in `pixels`",
     files.ALL_SENSORS: "of a study of several sensors, one filter for all of them and one for all but each: "
     "`designed_on`, space, sensor, lights, `judged` (it was not designed on this one), objective, sensitivities, "
     "violation, `own_best` (objective of the best filter of this one alone) and parameters",
@@ -176,9 +173,7 @@ FILES = {
     files.RESOLVED: "the study with every default written out; a study file itself",
     files.PROVENANCE: "versions, seed, command, machine, plans of the scenes, meanings of the columns",
     files.REPORT: "the report: one file that you can send, without the network",
-    "cfas.png": "all CFAs: separation against the light of the whole CFA; also `.svg`",
-    "pareto.png": "the trade-off in one modified pixel, where there is one; also `.svg`",
-    f"{files.FIGURES}/": "all other figures as SVG",
+    "pareto.png": "the filter over the lamps, and separation against the light of all CFAs; also `.svg`",
     "paper_comparison.csv": "published figures beside ours, where a study gives some; also `.parquet`",
     files.MANIFEST: "owner of the folder, the fingerprint of the study and its inputs, and the SHA-256 of each file",
 }

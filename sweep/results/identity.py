@@ -23,7 +23,7 @@ def identity(study: Study) -> dict[str, Any]:
     curves, lights = hashlib.sha256(), hashlib.sha256()
     for name, curve in sorted(study.sensor.qe.items()):
         curves.update(name.encode() + curve.tobytes())
-    section = study.section.model_dump(mode="json", by_alias=True, exclude={"question"})
+    section = study.section.model_dump(mode="json", by_alias=True, exclude={"title", "question"})
     if study.section.lights.builtin is None:
         section["lights"]["photon_ratio"] = study.lights.photon_ratio  # stated, or from the spectra: the same study
     lights.update(study.lights.photons.tobytes() + repr((study.lights.types, study.lights.photon_ratio)).encode())

@@ -44,7 +44,7 @@ _DIGEST, _FILES = "digest", "files"
 class Manifest:
     """The files of a run's folder, empty where there is no run.
 
-    `files`: name (`figures/chart.svg`) -> SHA-256 of the file; `facts`: `fingerprint` and `identity` of the study, and
+    `files`: name (`report.html`) -> SHA-256 of the file; `facts`: `fingerprint` and `identity` of the study, and
     its number of designs; `damaged`: the manifest is there, but not as the run wrote it.
     """
 

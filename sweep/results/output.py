@@ -65,7 +65,7 @@ class Output:
 
     `study`: the study that was run, and `resolved` its file. `audited`: rows of `sweep audit`; `left_out`: a row per
     light that was left out of a search; `regions`:
-    cells of the maps of color regions. `error_against_noise`: color error against noise, `rendered`: areas of pictures;
+    cells of the maps of color regions. `error_against_noise`: color error against noise;
     `places`: separations over the sensor; `map`: the best objective over two parameters; `handovers`: where captures of
     an HDR pixel are full; `worst`: worst values over series; `saturated`: signals that fill a pixel; `uncertainty`:
     quantiles over random sensors; `vision`: tables of the benchmark of vision by their files' names.
@@ -85,7 +85,6 @@ class Output:
     left_out: pd.DataFrame | None
     regions: pd.DataFrame | None
     error_against_noise: pd.DataFrame | None
-    rendered: pd.DataFrame | None
     places: pd.DataFrame | None
     map: pd.DataFrame | None
     handovers: pd.DataFrame | None
@@ -274,7 +273,6 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         left_out=more.get(files.LEFT_OUT),
         regions=more.get(files.REGIONS_MAP),
         error_against_noise=more.get(files.TRADED),
-        rendered=more.get(files.RENDERED),
         places=more.get(files.SENSOR_MAP),
         map=more.get(files.MAP),
         handovers=more.get(files.HANDOVERS),

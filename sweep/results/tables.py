@@ -32,15 +32,13 @@ ROBUSTNESS = "robustness.parquet"
 UNCERTAINTY = "uncertainty.parquet"
 REGIONS_MAP = "regions.parquet"
 SENSOR_MAP = "sensor_map.parquet"
-TRADED, RENDERED = "color_noise.parquet", "rendered.parquet"
-CHART, NIGHT = "chart", "night"
-"""Pictures of which `rendered.parquet` has the areas."""
+TRADED = "color_noise.parquet"
 COMBINATIONS, MAP = "combinations.parquet", "map.parquet"
 HANDOVERS, WORST, SATURATED = "handovers.parquet", "worst.parquet", "saturated.parquet"
 LEFT_OUT = "leave_one_out.parquet"
 VISION, VISION_CONDITIONS = "vision.parquet", "vision_conditions.parquet"
-VISION_STREET, VISION_STREETS = "vision_street.parquet", "vision_street_pictures.parquet"
-VISION_TABLES = (VISION, VISION_CONDITIONS, VISION_STREET, VISION_STREETS)
+VISION_STREET = "vision_street.parquet"
+VISION_TABLES = (VISION, VISION_CONDITIONS, VISION_STREET)
 """Tables of the benchmark of vision: a row per image, per distance and level, per picture that was read wrongly, per
 light level and state of detections in streets, and per picture of a street."""
 AUDIT, ALL_SENSORS = "audit.parquet", "all_sensors.parquet"
@@ -51,7 +49,7 @@ REPORT, FIGURES, VISION_FIGURES = "report.html", "figures", "vision-"
 MADE_BY_RUN = frozenset(
     (
         *(DESIGNS, PARETO, SEARCH_LOG, FRONT, CURVES, POINTS, CROSSINGS, LIMITED_BY, ROBUSTNESS, REGIONS_MAP),
-        *(SENSOR_MAP, TRADED, RENDERED, LEFT_OUT, COMBINATIONS, MAP, HANDOVERS, WORST, SATURATED),
+        *(SENSOR_MAP, TRADED, LEFT_OUT, COMBINATIONS, MAP, HANDOVERS, WORST, SATURATED),
         UNCERTAINTY,
         *(*VISION_TABLES, ALL_SENSORS, PROVENANCE, RESOLVED),
     )

@@ -19,7 +19,6 @@ from ..results.tables import (
     LIMITED_BY,
     POINTS,
     REGIONS_MAP,
-    RENDERED,
     ROBUSTNESS,
     SATURATED,
     SEARCHED,
@@ -32,7 +31,7 @@ from ..search.limit import Limit
 from ..study import Study
 from .allowed_lamps import ALLOWED_LAMPS
 from .analysis import Analysis
-from .colors import error_against_noise_table, rendered_table
+from .colors import error_against_noise_table
 from .crossings import USABLE_RANGES
 from .details import OVER_SENSOR, Details, limited_by_table
 from .handovers import CAPTURES_FULL
@@ -107,7 +106,6 @@ def row_tables(study: Study) -> dict[str, Callable[[DerivedInput], pa.Table]]:
         tables[UNCERTAINTY] = lambda s: uncertainty_table(s.study, s.rows, s.parallel, s.progress)
     if study.tasks is not None and "color" in study.tasks.by_name:
         tables[TRADED] = lambda s: error_against_noise_table(s.study, s.rows)
-        tables[RENDERED] = lambda s: rendered_table(s.study, s.rows)
     return tables
 
 

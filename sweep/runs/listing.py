@@ -112,7 +112,7 @@ def _listed(path: Path, outputs: Path, data: Path | None) -> StudyListing:
         more = f" (and {len(error.issues) - 1} more)" if error.issues[1:] else ""
         return StudyListing(path.stem, None, "cannot be loaded", f"{error.issues[0]}{more}")
     name = path.stem if stated == path.stem else f"{path.stem} ({stated})"
-    question = " ".join(studies[0].section.question.split())
+    question = studies[0].section.title or " ".join(studies[0].section.question.split())
     if len(question) > _QUESTION_LETTERS:
         question = question[: _QUESTION_LETTERS - 3].rstrip() + "..."
     return StudyListing(" ".join(name.split()), sum(study.n_designs for study in studies), state, question)

@@ -40,7 +40,6 @@ from ..results.tables import (
     SEARCHED,
     SWEPT,
     VISION_STREET,
-    VISION_STREETS,
     VISION_TABLES,
     json_of,
     read_table,
@@ -85,8 +84,8 @@ _CHECK_S, _CHECK_SHARE = 0.5, 0.05
 
 def files_of(study: Study) -> set[str]:
     """Return the names of the files that a run makes."""
-    vision, of_streets = study.section.vision, (VISION_STREET, VISION_STREETS)
-    of_vision = [name for name in VISION_TABLES if vision and (vision.street or name not in of_streets)]
+    vision = study.section.vision
+    of_vision = [name for name in VISION_TABLES if vision and (vision.street or name != VISION_STREET)]
     return {RESOLVED, *_whole(study), *row_tables(study), *of_vision}
 
 

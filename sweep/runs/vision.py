@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 
 from ..base.types import ChannelCurves, DesignParameters, Parallel, Progress, delayed
 from ..camera.model import SceneModel
@@ -18,7 +17,7 @@ from ..metrics.columns.confusion import D_PRIME, STATE_ERROR
 from ..metrics.evaluate import evaluate
 from ..metrics.separation import csd_name
 from ..results.designs import named_rows, row_curves
-from ..results.tables import SEARCHED, VISION, VISION_CONDITIONS, VISION_STREET, VISION_STREETS
+from ..results.tables import SEARCHED, VISION, VISION_CONDITIONS, VISION_STREET
 from ..spectra.lights import class_pairs, pair_name
 from ..study import Study
 from ..vision.images import setup_at
@@ -46,11 +45,9 @@ _CONDITIONS = pa.schema(
     [*_DESIGN, ("distance_m", _NUMBER), ("level", _TEXT)]
     + [(name, _NUMBER) for name in ("csd", "dprime", "pair_error")]
 )
-_PIXELS = [("rows", _COUNT), ("columns", _COUNT), ("pixels", pa.binary())]
 _STREET = pa.schema(
     [*_DESIGN, ("seed", _COUNT), ("level", _TEXT), ("state", _TEXT), ("lit", _COUNT), ("average_precision", _NUMBER)]
 )
-_STREETS = pa.schema([*_DESIGN, ("level", _TEXT), *_PIXELS])
 
 
 def vision_tables(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: Progress) -> dict[str, pa.Table]:
@@ -68,16 +65,11 @@ def vision_tables(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
     calls = [delayed(read_images, *setups[at], vision, (study.section.seed, seed)) for at, seed in pairs]
     images: list[dict[str, Any]] = []
     detected: list[dict[str, Any]] = []
-    streets: list[dict[str, Any]] = []
     readings = run_with_progress(parallel, calls, "images read (designs x seeds)", progress)
     for (at, seed), reading in zip(pairs, readings, strict=True):
         design = {name: designs[at][name] for name, _ in _DESIGN}
         images += _image_rows(study, vision, design | {"seed": seed}, reading)
         detected += _street_rows(design | {"seed": seed}, vision, reading)
-        if seed == 0:
-            streets += [
-                design | {"level": level} | _pixels(p) for level, p in zip(vision.levels, reading.streets, strict=False)
-            ]
     conditions: list[dict[str, Any]] = []
     known = parallel([delayed(predictors, *setup, vision) for setup in setups])
     for row, figures in zip(designs, known, strict=True):
@@ -90,10 +82,7 @@ def vision_tables(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
         VISION_CONDITIONS: pa.Table.from_pylist(conditions, schema=_CONDITIONS),
     }
     if vision.street is not None:
-        tables |= {
-            VISION_STREET: pa.Table.from_pylist(detected, schema=_STREET),
-            VISION_STREETS: pa.Table.from_pylist(streets, schema=_STREETS),
-        }
+        tables[VISION_STREET] = pa.Table.from_pylist(detected, schema=_STREET)
     return tables
 
 
@@ -141,10 +130,6 @@ def _street_rows(key: dict[str, Any], vision: Vision, reading: SeedReading) -> I
         for state, precision, count in zip(vision.lenses, precisions, lit, strict=True):
             row = {"level": level, "state": state, "lit": int(count), "average_precision": float(precision)}
             yield key | row
-
-
-def _pixels(picture: NDArray[np.uint8]) -> dict[str, Any]:
-    return {"rows": len(picture), "columns": picture.shape[1], "pixels": picture.tobytes()}
 
 
 def predictors(setup: Setup, curves: ChannelCurves, vision: Vision) -> list[tuple[float, float, float]]:

@@ -40,6 +40,7 @@ from .schema_curves import (
 )
 
 _MOST_ROWS = 64
+_MOST_LETTERS = 100
 _MOST_DRAWN = 1_000_000
 _MOST_OWN = 50
 MOST_TYPES = 40
@@ -253,8 +254,10 @@ class StudySection(Section):
 
     study: Annotated[str, Field(min_length=1, max_length=100)]
     """The name of the study, and of the folder of its results."""
+    title: Annotated[str, Field(max_length=_MOST_LETTERS)] = ""
+    """The question in one line of at most 100 letters; heads its report."""
     question: str = ""
-    """Question of the study; heads its report."""
+    """Question of the study in full."""
     seed: int = Field(default=1, ge=0, lt=2**32)
     """Of every random draw."""
     wavelengths: WavelengthGrid = WavelengthGrid()

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..base.types import Array, ChannelCurves, Float, FloatArray, IndexArray, Int
 from ..camera.setup import Setup
@@ -44,14 +43,13 @@ class SeedReading:
     """Answers of one seed by order of the lenses, on lamps that the network has not seen, and on those it has.
 
     `precision` is that of a detector in streets and `lit` the number of lit lenses, by level
-    and lens; `streets` the first street of each light level. Without streets they are empty.
+    and lens. Without streets they are empty.
     """
 
     unseen: dict[str, Answers]
     seen: dict[str, Answers]
     precision: Float[Array, "streets lenses"]
     lit: Int[IndexArray, "streets lenses"]
-    streets: NDArray[np.uint8]
 
 
 def read_images(setup: Setup, curves: ChannelCurves, vision: Vision, seed: tuple[int, int]) -> SeedReading:
@@ -79,22 +77,20 @@ def read_images(setup: Setup, curves: ChannelCurves, vision: Vision, seed: tuple
 
 def _streets(
     camera: HeadCamera, lamps: dict[str, Lamps], seed: tuple[int, int]
-) -> tuple[Float[Array, "images lenses"], Int[IndexArray, "images lenses"], NDArray[np.uint8]]:
-    """Return the precision of the simplest detector, the number of lit lenses, and pictures."""
+) -> tuple[Float[Array, "images lenses"], Int[IndexArray, "images lenses"]]:
+    """Return the precision of the simplest detector, and the number of lit lenses."""
     vision, design = camera.vision, camera.setup.camera
     if vision.street is None:
-        return np.empty((0, 0)), np.empty((0, 0), dtype=np.intp), np.empty((0, 0, 0, 3), dtype=np.uint8)
+        return np.empty((0, 0)), np.empty((0, 0), dtype=np.intp)
     streets, key = StreetCamera(camera, vision.street), _KEY | {"seed": seed[1]}
     learned, test = (draw_streets(vision, vision.street, split, seed) for split in (TRAIN, TEST))
     detector = Detector(design.mosaic, camera.pixel, vision.lenses)
     detector.learn(streets.batches(learned, lamps[TRAIN], key, TRAIN, "raw"))
     detections = detector.detect(streets.batches(test, lamps[TEST], key, TEST, "raw"))
-    first = test.subset(slice(0, len(camera.levels)))  # levels take turns
-    pictures = next(streets.batches(first, lamps[TEST], key, TEST, "isp")).images
     labels, shape = street_labels(vision, design.mosaic, test, key, TEST), (-1, len(vision.lenses))
     table = precisions(labels, detections, vision.lenses)
     precision, lit = table["average_precision"].to_numpy(dtype=float), table["lit"].to_numpy(dtype=np.intp)
-    return precision.reshape(shape), lit.reshape(shape), pictures
+    return precision.reshape(shape), lit.reshape(shape)
 
 
 def observer_error(setup: Setup, curves: ChannelCurves, vision: Vision, seed: tuple[int, int]) -> float:

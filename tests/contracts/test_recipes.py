@@ -207,7 +207,9 @@ room.__path__.append(sys.argv.pop(1))
 from sweep.cli.app import main
 main()
 """
-NO_DRAWINGS = "import sweep.report.page; sweep.report.page._drawings = lambda _: ()"
+NO_DRAWINGS = (
+    "from sweep.report.panels import Picture; Picture.svgs = lambda *_: ('', ''); Picture.files = lambda *_: {}"
+)
 
 
 def with_file(package: str, file: Path, *arguments: object, drawn: bool = False) -> subprocess.CompletedProcess[str]:

@@ -15,7 +15,7 @@ from sweep.camera.noise.merge import merged
 from sweep.camera.pixel import Pixel
 from sweep.metrics.columns.sensitivity import CFA_SENSITIVITY
 from sweep.metrics.quantity import Column
-from sweep.report.price import _row
+from sweep.report.words import effect
 from sweep.results.answers import Answers
 from sweep.runs.kept import CachedCalls
 from sweep.runs.workers import Workers
@@ -90,12 +90,18 @@ def test_a_bound_keeps_to_the_light_that_is_allowed_at_most() -> None:
 
 
 @pytest.mark.parametrize(
-    ("direction", "best", "effect"),
-    [("more", 2.0, "gain"), ("more", 0.5, "loss"), ("less", 2.0, "loss"), ("less", 0.5, "gain"), ("less", 1.0, "same")],
+    ("direction", "best", "said"),
+    [
+        ("more", 2.0, "▲ gain"),
+        ("more", 0.5, "▼ loss"),
+        ("less", 2.0, "▼ loss"),
+        ("less", 0.5, "▲ gain"),
+        ("less", 1.0, "same"),
+    ],
 )
-def test_a_gain_is_more_of_what_is_wanted_and_less_of_what_is_not(direction: Any, best: float, effect: str) -> None:
+def test_a_gain_is_more_of_what_is_wanted_and_less_of_what_is_not(direction: Any, best: float, said: str) -> None:
     column = Column(name="x", metric="x", meaning="x", unit="", direction=direction)
-    assert _row(column, 1.0, best)[-1] == effect
+    assert effect(column, best, 1.0) == said
 
 
 def answer_of(number: int) -> int:

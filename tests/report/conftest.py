@@ -32,22 +32,3 @@ def opened(browser: Any) -> Iterator[Any]:
     yield one
     for seen in pages:
         seen.page.close()
-
-
-@pytest.fixture(scope="package")
-def standing(browser: Any) -> Iterator[Any]:
-    """A report that is opened once for the tests in a row that only look, or leave all as it was."""
-    pages: dict[Path, Opened] = {}
-
-    def one(folder: Path) -> Opened:
-        if folder not in pages:
-            close()
-            pages[folder] = open_report(browser, folder)
-        return pages[folder]
-
-    def close() -> None:
-        while pages:  # a browser has few places for plots drawn by its graphics
-            pages.popitem()[1].page.close()
-
-    yield one
-    close()

@@ -15,7 +15,8 @@ import pytest
 from sweep.base.errors import OutputError
 from sweep.metrics.pareto import knee
 from sweep.report import make_report, read_output, summary_lines
-from sweep.report.page_data import payload
+from sweep.report.explorer import explorer_data
+from sweep.report.sections.method import Method
 from sweep.results.facts import CheckFacts
 from sweep.study import load_study
 
@@ -36,32 +37,30 @@ def test_the_knee_is_farthest_from_the_line_between_the_ends() -> None:
     assert knee(np.array([[0.0, 2.0], [np.nan, 1.0], [2.0, 0.0]])) is None
 
 
-def test_report_states_the_largest_difference_of_the_check(finished: FinishedFolder) -> None:
+def test_the_method_states_the_largest_difference_of_the_check(finished: FinishedFolder) -> None:
     output = read_output(finished("stopband"))
     kept = output.provenance.plans["chart"]
-    assert any(
-        line.startswith("Simulated: quantization; no other effect changes a CSD.") for line in summary_lines(output)
-    )
+    (method,) = Method.of(output)
+    assert any(line.startswith("Left out: ") and "none of which changes a separation" in line for line in method.limits)
     check = CheckFacts(rows=3, design_id=7, scenario="far", quantity="csd_yellow_red", largest_dn=0.3, allowed_dn=0.1)
     plans = {"near": kept, "far": kept.model_copy(update={"error_bound_dn": 0.04})}
     facts = output.provenance.model_copy(update={"plans": plans, "check": check})
-    line = next(line for line in summary_lines(replace(output, provenance=facts)) if line.startswith("Simulated"))
-    assert "; the other effects change a CSD by at most 0.04 DN. " in line
-    assert line.endswith(
-        "Checked: 3 rows differ from the reference settings by at most 0.3 DN (csd_yellow_red of design 7 in far; "
-        "allowed 0.1 DN)."
-    )
+    (method,) = Method.of(replace(output, provenance=facts))
+    assert any("change a separation by at most 0.0400 DN" in line for line in method.limits)
+    said = "Checked: 3 rows computed again at reference settings differ by at most 0.300 DN; 0.1 DN is allowed."
+    assert said in method.limits
     assert not check.passed
 
 
 def test_a_dollar_in_a_name_is_no_formula() -> None:
-    from sweep.report.figures import CurvesFigure, draw_curves, rendered
+    from sweep.report.panels import Line, Lines, Picture
 
-    wave = np.linspace(400, 700, 4)
+    x = np.linspace(400, 700, 4)
     for name in (r"$\nonsense{", "a$b$c"):
-        figure = draw_curves(CurvesFigure(name, "QE", wave, {name: np.ones(4)}))
-        assert rendered(figure, "svg").startswith(b"<?xml")
-        assert not figure.axes[0].title.get_parse_math()
+        wide, narrow = Picture((Lines(name, "x", {name: Line(x, x)}),), name).svgs("p")
+        assert wide.startswith("<svg")
+        assert f">{name}<" in wide
+        assert "<svg" in narrow
 
 
 def test_a_csv_has_every_digit_whatever_numpy_prints(tmp_path: Path) -> None:
@@ -112,7 +111,7 @@ def test_a_study_whose_designs_all_failed_says_why(tmp_path: Path) -> None:
     output = read_output(folder)
     make_report(output)
     assert summary_lines(output)[0] == "Every design failed: error: no light."
-    assert payload(output)["front"]["rows"] == []
+    assert explorer_data(output) is None or all(one["kind"] != "sweep" for one in explorer_data(output)["designs"])  # type: ignore[index]
 
 
 @pytest.mark.usefixtures("plain_pictures")
@@ -124,5 +123,4 @@ def test_a_single_design_has_a_report(tmp_path: Path) -> None:
     )
     output = output_of(tmp_path, text)
     make_report(output)
-    assert payload(output)["views"] == []  # one design trades nothing off
     assert len(output.best) == 1

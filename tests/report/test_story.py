@@ -1,26 +1,34 @@
-"""The first screen says the truth: who leads, what limits it, and what holds over scenarios."""
+"""What reports say, against the rows on the disk: the best of all, who has more, who leads where, ranges of use."""
 
 from __future__ import annotations
 
-import base64
-import re
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as some
 
+from sweep.metrics.quantity import Column
 from sweep.report import read_output
-from sweep.report.answer import headline_numbers
-from sweep.report.leaders import capital, full_name, leaders_of
-from sweep.report.noise import usable_range
-from sweep.report.page_data import payload
-from sweep.report.series import Line, SeriesFigure, lead_sentence
-from sweep.report.trade_off import overview_figure
+from sweep.report.leaders import leaders_of
+from sweep.report.sections.edges import Edges
+from sweep.report.sections.field import Field
+from sweep.report.sections.lamps import Lamps
+from sweep.report.sections.noise import Noise, ranges_in_words, usable_ranges
+from sweep.report.sections.price import Price
+from sweep.report.sections.series import Series
+from sweep.report.sections.tasks import Tasks
+from sweep.report.sections.trade_off import TradeOff
+from sweep.report.series import Numbers
+from sweep.report.words import of_column, quoted
 
 from ..build import output_of, sentences_of
 from ..conftest import FinishedFolder
-from .shipped import EVERY, SEARCHED
+from .shipped import EVERY
+
+OF_SERIES = ("noise", "fog", "exposure", "night", "distance")
 
 
 def whole(folder: Path) -> pd.DataFrame:
@@ -30,7 +38,7 @@ def whole(folder: Path) -> pd.DataFrame:
 
 
 @pytest.mark.parametrize("name", EVERY)
-def test_the_headline_names_the_best_of_all_rows(finished: FinishedFolder, name: str) -> None:
+def test_the_answer_names_the_best_of_all_rows(finished: FinishedFolder, name: str) -> None:
     folder = finished(name)
     output, table = read_output(folder), whole(folder)
     leaders, separation = leaders_of(output), output.trade_off[0].name
@@ -41,18 +49,18 @@ def test_the_headline_names_the_best_of_all_rows(finished: FinishedFolder, name:
     assert leaders.chosen[output.goal.name] == allowed[output.goal.name].max()
     assert leaders.separates is not None
     assert leaders.separates[separation] == rows[separation].max()
-    text = " ".join(sentences_of(output))
-    if " leads" not in text:
-        assert output.trade_off[0].formatted(leaders.chosen[separation]) in text
+    if name not in OF_SERIES:
+        text = " ".join(sentences_of(output))
+        assert of_column(output.trade_off[0], leaders.chosen[separation]).replace("\u00a0", " ") in text
 
 
 @pytest.mark.parametrize("name", EVERY)
 def test_designs_beyond_the_best_one_are_named(finished: FinishedFolder, name: str) -> None:
-    """Every plain CFA or named design that separates more than the best one is beaten by one that the answer names."""
+    """Every design that separates more than the best one is beaten by one that the answer or its limits name."""
     folder = finished(name)
     output, table = read_output(folder), whole(folder)
     text, leaders, separation = " ".join(sentences_of(output)), leaders_of(output), output.trade_off[0].name
-    if " leads" in text:
+    if name in OF_SERIES:
         return  # a series has its own test
     assert leaders.chosen is not None
     rows = table[(table["scenario"] == leaders.scenario) & (table[separation] > leaders.chosen[separation])]
@@ -62,54 +70,178 @@ def test_designs_beyond_the_best_one_are_named(finished: FinishedFolder, name: s
         assert any(name in text for name in names)
 
 
-def test_the_large_numbers_compare_with_the_plain_cfa_that_separates_most(finished: FinishedFolder) -> None:
+def test_the_price_is_that_of_the_rows(finished: FinishedFolder) -> None:
     folder = finished("stopband")
-    table = whole(folder)
-    best = table[table["kind"] == "search"].iloc[0]
-    plain = table[table["kind"] == "reference"].sort_values("csd_yellow_red").iloc[-1]
-    numbers = headline_numbers(read_output(folder))
-    assert [value for value, *_ in numbers[:2]] == [
-        f"{best['csd_yellow_red']:.0f} DN",
-        f"{best['cfa_sensitivity']:.3f}",
-    ]
-    for (*_, comparison), column in zip(numbers, ("csd_yellow_red", "cfa_sensitivity"), strict=False):
-        assert comparison.startswith(f"{best[column] / plain[column]:.2f} times {plain['name']}")
-    assert numbers[2][0] == f"{best['limit'] - best['csd_yellow_red']:.0f} DN"
+    table = pd.read_parquet(folder / "designs.parquet").set_index("name")
+    (price,) = Price.of(read_output(folder))
+    assert price.names == ("RGGB", "RYYCy", "best stopband")
+    for column, values in zip(price.columns, price.values, strict=True):
+        assert values == tuple(table.loc[name, column.name] for name in price.names)
+    assert price.table is not None
+    for column, row in zip(price.columns, price.table.rows, strict=True):
+        more = table.loc["best stopband", column.name] > table.loc["RGGB", column.name]
+        expected = "▲ gain" if more == (column.direction == "more") else "▼ loss"
+        assert row[-1] == expected
+    assert price.table.note.startswith("Why light is a gain and lux a loss")
 
 
-def series(**lines: list[float]) -> SeriesFigure:
-    x = np.array([100.0, 200.0, 300.0])
-    made = {name: Line(np.array(y), None) for name, y in lines.items()}
-    return SeriesFigure("t", "distance_m", "yellow/red CSD / DN", x, made, "")
+def test_the_map_of_edges_has_the_most_of_all_widths(finished: FinishedFolder) -> None:
+    folder = finished("stopband")
+    rows = whole(folder)
+    swept = rows[(rows["kind"] == "sweep") & rows["feasible"]]
+    (edges,) = Edges.of(read_output(folder))
+    for at, left in enumerate(edges.x):
+        for row, right in enumerate(edges.y):
+            there = swept[(swept["left_nm"] == left) & (swept["right_nm"] == right)]["csd_yellow_red"]
+            assert edges.most[row, at] == (there.max() if len(there) else pytest.approx(np.nan, nan_ok=True))
+    above = swept[swept["csd_yellow_red"] > edges.levels[0][1]]
+    low, high = above["left_nm"].min(), above["left_nm"].max()
+    assert f"a left edge from {low:g} to {high:.0f} nm" in edges.answer[0].replace("\u00a0", " ")
+
+
+DN = Column(name="csd_yellow_red", metric="csd", meaning="x", unit="DN", label="yellow/red CSD", direction="more", pair=("yellow", "red"))  # fmt: skip
+SOME = some.lists(some.sampled_from([0.0, 0.4, 1.0, 2.0, 35.0, 35.0, 139.0, 1e5]), min_size=4, max_size=4)
+
+
+def series_of(lines: dict[str, list[float]], x: tuple[float, ...]) -> Series:
+    values = {name: np.array(y, dtype=float) for name, y in lines.items()}
+    return Series(DN, Numbers("road", "distance_m", x), "", values, {}, dict.fromkeys(lines, 0.5), next(iter(lines)))
+
+
+@settings(deadline=None, derandomize=True)
+@given(some.dictionaries(some.sampled_from(["RGGB", "RYYCy", "mine", "yours"]), SOME, min_size=1))
+def test_who_leads_has_the_most_at_each_number_of_its_range(lines: dict[str, list[float]]) -> None:
+    series = series_of(lines, (20.0, 100.0, 250.0, 300.0))
+    leads = series.leads_of
+    assert [start for _, start, _ in leads] == [0, *(stop + 1 for _, _, stop in leads[:-1])]
+    assert leads[-1][2] == 3
+    for leader, start, stop in leads:
+        for at in range(start, stop + 1):
+            most = max(y[at] for y in lines.values())
+            assert most < 1 if leader is None else lines[leader][at] == most >= 1
+    mine, rggb = lines[series.hero], lines.get("RGGB")
+    lost = [] if rggb is None else [at for at in range(4) if mine[at] < rggb[at] and max(mine[at], rggb[at]) >= 1]
+    said = [line for line in series.limits if "has less than RGGB" in line]
+    assert len(said) == bool(lost)
+    assert series.picture is not None
+    assert series.table is not None
+    assert len(series.table.rows) == len(lines)
 
 
 @pytest.mark.parametrize(
-    ("figure", "said"),
+    ("lines", "said"),
     [
         (
-            series(A=[90, 81, 61], B=[80, 77, 68]),
-            "Yellow/red CSD over distance: A leads up to 200 m (81 DN at 200 m, B 77 DN); "
-            "B leads at 300 m (68 DN, A 61 DN).",
+            {"A": [90, 81, 61], "B": [80, 77, 68]},
+            "Over distance, **A** separates yellow from red lamps most up to 200 m (81.0 DN at 200 m; B 77.0 DN); **B** at 300 m "
+            "(68.0 DN; A 61.0 DN).",
         ),
         (
-            series(A=[90, 81, 70], B=[80, 77, 68]),
-            "Yellow/red CSD over distance: A leads everywhere (70 DN at 300 m, B 68 DN).",
+            {"A": [0.2, 9, 8], "B": [0.1, 2, 8]},
+            "Over distance, no CFA separates 1 DN at 100 m; **A** separates yellow from red lamps most from 200 m on (8.00 DN at 300 m; "
+            "B 8.00 DN).",
         ),
         (
-            series(A=[0.2, 9, 8], B=[0.1, 2, 8]),
-            "Yellow/red CSD over distance: no CFA reaches 1 DN at 100 m; A leads from 200 m on (8.0 DN at 300 m, B 8.0 DN).",
+            {"A": [5, 5, 5]},
+            "Over distance, **A** separates yellow from red lamps most at every distance from 100 m to 300 m (5.00 DN at 300 m).",
         ),
-        (series(A=[5, 5, 5]), "Yellow/red CSD over distance: A leads everywhere (5.0 DN at 300 m)."),
     ],
 )
-def test_a_series_says_who_leads_from_where_to_where(figure: SeriesFigure, said: str) -> None:
-    assert lead_sentence(figure) == said
+def test_a_series_says_who_leads_from_where_to_where(lines: dict[str, list[float]], said: str) -> None:
+    *_, sentence = series_of(lines, (100.0, 200.0, 300.0)).answer
+    assert sentence.replace("\u00a0", " ") == said
 
 
-def test_where_a_line_passes_the_level_is_drawn_among_its_values() -> None:
-    line = Line(np.array([1e-6, 1e-2]), None, ((8.0, 1e-3),))
-    x, y = line.over(np.array([1.0, 10.0]))
-    assert (x.tolist(), y.tolist()) == ([1.0, 8.0, 10.0], [1e-6, 1e-3, 1e-2])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", OF_SERIES)
+def test_a_series_is_of_the_rows_on_the_disk(finished: FinishedFolder, name: str) -> None:
+    folder = finished(name)
+    output, table = read_output(folder), whole(folder)
+    for section in Series.of(output):
+        assert isinstance(section, Series)
+        for design, values in section.values.items():
+            for number, value in zip(section.numbers.x, values, strict=True):
+                scenes = [
+                    s
+                    for s in output.scenarios
+                    if s.startswith(f"{section.numbers.base} ") and s.endswith(f"={number:.12g}")
+                ]
+                row = table[(table["name"] == design) & table["scenario"].isin(scenes)]
+                assert row[section.column.name].tolist() == [value]
+
+
+@pytest.mark.slow
+@pytest.mark.long
+def test_ranges_of_use_end_where_the_error_is_the_allowed_one(finished: FinishedFolder) -> None:
+    folder = finished("noise")
+    crossings = pd.read_parquet(folder / "crossings.parquet")
+    sections = [section for section in Noise.of(read_output(folder)) if isinstance(section, Noise)]
+    assert {section.numbers.base for section in sections} == {"read noise", "exposure", "distance"}
+    for section in sections:
+        for design, ranges in section.ranges.items():
+            known = crossings[(crossings["series"] == section.numbers.base) & (crossings["name"] == design)]
+            known = known[known["quantity"] == "chromatic_error"]
+            ends = sorted(end for low_high in ranges for end in low_high if np.isfinite(end))
+            assert ends == sorted(known["at"])
+            for number, error in zip(section.numbers.x, section.errors[design], strict=True):
+                inside = any(low <= number <= high for low, high in ranges)
+                assert inside == (error <= section.allowed)
+
+
+@pytest.mark.parametrize(
+    ("ends", "said"),
+    [((69.14, 130.4), "69.2 to 130 cd"), ((123.6, 124.3), "near 124 cd"), ((123.2, 123.8), "near 124 cd")],
+)
+def test_a_range_that_three_digits_do_not_tell_apart_is_one_number(ends: tuple[float, float], said: str) -> None:
+    intensities = (1.0, 100.0, 1000.0)
+    ranges = usable_ranges(np.array(intensities), np.zeros(3, dtype=bool), np.array(ends))
+    assert ranges_in_words(Numbers("lamp", "intensity_cd", intensities), ranges).replace("\u00a0", " ") == said
+
+
+@pytest.mark.slow
+@pytest.mark.long
+def test_over_the_field_a_filter_is_said_to_fall_where_it_does(finished: FinishedFolder) -> None:
+    folder = finished("angle")
+    places = pd.read_parquet(folder / "sensor_map.parquet")
+    output = read_output(folder)
+    (field,) = Field.of(output)
+    assert isinstance(field, Field)
+    names = output.named_rows.set_index("design_id")["name"]
+    for name, values in field.values.items():
+        own = places[places["design_id"].map(names) == name].sort_values("height")
+        assert own["csd_yellow_red"].tolist() == values.tolist()
+        assert field.worst[name] <= values.min() + 1e-9
+    fallen = {name for name in field.values if f"{quoted(name)} (" in " ".join(field.answer[1:])}
+    expected = {
+        n
+        for n, y in field.values.items()
+        if n != field.hero and y[0] > field.values["RGGB"][0] and (y < field.values["RGGB"]).any()
+    }
+    assert fallen == expected
+
+
+@pytest.mark.slow
+@pytest.mark.long
+def test_a_worst_case_stands_beside_the_nominal_one(finished: FinishedFolder) -> None:
+    folder = finished("robust")
+    table = whole(folder).set_index("name")
+    lamps = next(section for section in Lamps.of(read_output(folder)) if isinstance(section, Lamps))
+    for one in lamps.designs:
+        assert (one.worst, one.nominal) == tuple(table.loc[one.name, ["worst_csd_yellow_red", "csd_yellow_red"]])
+    assert [one.worst for one in lamps.designs] == sorted((one.worst for one in lamps.designs), reverse=True)
+    assert lamps.picture is not None
+
+
+@pytest.mark.slow
+def test_gains_and_losses_are_those_of_the_rows(finished: FinishedFolder) -> None:
+    folder = finished("scorecard")
+    table = pd.read_parquet(folder / "designs.parquet").set_index("name")
+    (tasks,) = Tasks.of(read_output(folder))
+    assert isinstance(tasks, Tasks)
+    for at, column in enumerate(tasks.columns):
+        for name, factors in tasks.factors.items():
+            ratio = table.loc[name, column.name] / table.loc["RGGB", column.name]
+            assert factors[at] == pytest.approx(ratio if column.direction == "more" else 1 / ratio)
 
 
 TWO_TILES = """\
@@ -124,42 +256,16 @@ constraints: {sensitivity: {min: 0.5}}
 """
 
 
-def test_the_best_of_each_other_cfa_is_named(tmp_path: Path) -> None:
+def test_the_best_of_another_cfa_is_named(tmp_path: Path) -> None:
     output = output_of(tmp_path, TWO_TILES)
     table = output.table
     made = table[(table["kind"] == "sweep") & table["feasible"]]
     most = made.loc[made.groupby("cfa", observed=True)["csd_yellow_red"].idxmax()].sort_values("csd_yellow_red")
-    assert len(most) == 2
     other, best = most.iloc[0], most.iloc[1]
-    said = sentences_of(output)
-    assert re.search(
-        rf"filter {best['filter_id']} of {best['cfa']} \(edges at \d+ and \d+ nm\) separates yellow from red by",
-        said[0],
-    )
-    told = f"The best of {other['cfa']} that meets the same, filter {other['filter_id']}, separates yellow from red by "
-    assert [line for line in said if line.startswith(f"{told}{other['csd_yellow_red']:.0f} DN at ")]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", SEARCHED)
-def test_headline_star_and_details_name_one_filter(finished: FinishedFolder, name: str) -> None:
-    """The star is of the search's answer; the page opens with the details of the best design."""
-    output = read_output(finished(name))
-    best, data = leaders_of(output).chosen, payload(output)
-    assert best is not None
-    sentence = sentences_of(output)[0]
-    assert full_name(best) in sentence or sentence.startswith(capital(full_name(best)))
-    star = overview_figure(output, output.scenario).groups["best"].labels
-    at = data["chosen"][output.scenario]
-    design_id = np.frombuffer(base64.b64decode(data["design_id"]["bdata"]), "<u4")[at]
-    assert design_id == best["design_id"]
-    assert [text.rpartition(" ")[0].rpartition(" ")[0] for text in star] == [best["name"]]
-
-
-@pytest.mark.parametrize(
-    ("ends", "said"),
-    [((69.14, 130.4), "from 69.2 to 130 cd"), ((123.6, 124.3), "near 124 cd"), ((123.2, 123.8), "near 124 cd")],
-)
-def test_a_range_that_three_digits_do_not_tell_apart_is_one_number(ends: tuple[float, float], said: str) -> None:
-    intensities = np.array([1.0, 100.0, 1000.0])
-    assert usable_range(intensities, np.zeros(3, dtype=bool), "cd", np.array(ends)) == said
+    (trade_off,) = TradeOff.of(output)
+    assert isinstance(trade_off, TradeOff)
+    assert trade_off.best.name == f"filter {best['filter_id']}"
+    (side,) = trade_off.others
+    said = f"a filter with edges at {other['left_nm']:.0f} and {other['right_nm']:.0f} nm (filter {other['filter_id']})"
+    assert side.name == said
+    assert any(line.startswith(f"In another tile, {said} has ") for line in trade_off.limits)

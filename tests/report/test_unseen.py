@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sweep.report.answer import generalization_gap
+from sweep.report.sections.left_out import generalization_gap
 
 
 def test_the_interval_of_the_gap_holds_the_mean_as_often_as_it_says() -> None:

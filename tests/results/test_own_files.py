@@ -31,7 +31,7 @@ from ..mischief import rows
 
 NAMES = (
     *("results.parquet", "curves.parquet", "provenance.json", "designs.parquet", "study.resolved.yaml"),
-    *("report.html", "pareto.png", "figures/sensor.svg", "audit.parquet", "paper_comparison.csv", "search.parquet"),
+    *("report.html", "pareto.png", "pareto.svg", "audit.parquet", "paper_comparison.csv", "search.parquet"),
 )
 
 
@@ -79,7 +79,7 @@ def outside(tmp_path: Path) -> Path:
 
 
 @pytest.mark.usefixtures("plain_pictures")
-@pytest.mark.parametrize("name", [LOCK, ANSWERS, RESULTS, "figures"])
+@pytest.mark.parametrize("name", [LOCK, ANSWERS, RESULTS])
 def test_a_link_in_the_place_of_a_run_folder_is_reported(few: Study, tmp_path: Path, name: str) -> None:
     target, folder = outside(tmp_path), tmp_path / "out"
     folder.mkdir()
@@ -119,7 +119,7 @@ def test_names_that_reports_give_are_known(finished: FinishedFolder, study: str)
     """A picture of a new name is to be added to the names of a run's files."""
     folder = finished(study)
     drawn = [path for path in folder.rglob("*") if path.suffix in (".png", ".svg", ".html")]
-    assert len(drawn) > 8
+    assert {path.name for path in drawn} >= {"report.html"}
     assert all(is_drawn(path.relative_to(folder).as_posix()) for path in drawn)
     assert all(map(is_of_run, Manifest(folder).files))
 

@@ -65,7 +65,7 @@ def test_a_region_map_is_described_and_drawn(tmp_path: Path) -> None:
     share = own["separated"].sum() / own["pairs"].sum()
     assert 0 < share < 1
     assert f"{share:.1%}" in "\n".join(summary_lines(output))
-    assert (output.folder / "figures" / "regions-1.svg").exists()
+    assert "Lamps that" in (output.folder / "report.html").read_text()
 
 
 @pytest.mark.parametrize(

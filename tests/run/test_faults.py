@@ -12,7 +12,7 @@ import pytest
 
 from sweep.base.errors import FailedDesignError, InterruptedRunError, OutputError, SweepError
 from sweep.report import read_output
-from sweep.report.summary import counts_line
+from sweep.report.page import limits_of, summary_lines
 from sweep.results.answers import ANSWERS
 from sweep.results.identity import CHUNK, run_facts
 from sweep.results.lock import locked
@@ -80,7 +80,10 @@ def test_failing_designs_stop_a_run_or_are_tried_again(fewer: Study, unharmed: p
         run_study(study, folder, 1, lambda *_: None, options=RunOptions(fail_fast=True))
     assert run_study(study, folder, 1, lambda *_: None)
     failed = (rows(folder)["status"] != "ok").sum()
-    assert f", {failed} failed" in counts_line(read_output(folder))
+    output = read_output(folder)
+    told = f"Failed: {failed} rows, whose values are unknown here; status in results.parquet says why."
+    assert limits_of(output)[0] == told
+    assert told in summary_lines(output)
     assert failed == 2 * 2 * 6 * 2  # in both scenes, every design of this edge
     assert not run_study(study, folder, 1, lambda *_: None)
     wish.unlink()

@@ -209,7 +209,7 @@ def test_one_table_has_all_sensors_and_lights(several: tuple[Path, str]) -> None
     found = rows[rows["kind"] == "search"].set_index(["sensor", "lights"])["csd_yellow_red"]
     rggb = rows[rows["name"] == "RGGB"].set_index(["sensor", "lights"])["csd_yellow_red"]
     ratio = (found / rggb).loc[["ar0820", "opencam"]]
-    assert f"has {ratio.min():.2f} to {ratio.max():.2f} times the yellow/red CSD of RGGB" in out.splitlines()[0]
+    assert f"has {ratio.min():.2f} to {ratio.max():.2f} times the yellow/red separation of RGGB" in out.splitlines()[0]
 
 
 def test_filters_for_several_sensors_are_the_worst_on_them(several: tuple[Path, str]) -> None:

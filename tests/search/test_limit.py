@@ -16,7 +16,7 @@ from sweep.designs.families.stopband import Stopband
 from sweep.designs.tolerance import NONE, Tolerance
 from sweep.metrics.bound import FEASIBLE, Bound
 from sweep.metrics.objective import Objective
-from sweep.report.summary import _limit_line
+from sweep.report.sections.method import limit_line
 from sweep.results.facts import SearchFacts
 from sweep.results.output import Output
 from sweep.search.gradients import Model
@@ -129,15 +129,15 @@ def test_report_words_match_the_proof() -> None:
         no_limit=None,
         front_evaluations=0,
     )
-    words = _limit_line(output, done)
+    words = limit_line(output, done)
     bracket = "for any filter in N of RYNCy: 100.0 DN (proven), and one filter comes within 10 DN of it"
     assert f"{bracket}; the search's answer is 10.0 % below it" in words
     assert "under the same constraints but edge_width_nm, before clipping and quantization" in words
     assert "open" not in words
-    cut = _limit_line(output, done.model_copy(update={"limit_open_parts": 3}))
+    cut = limit_line(output, done.model_copy(update={"limit_open_parts": 3}))
     assert "it may not be the least one: 3 parts are open after 9 linear programs" in cut
     none = done.model_copy(update={"no_limit": "the objective is a sum", "limit_proven": None})
-    assert _limit_line(output, none) == "Upper bound: none computed (the objective is a sum)."
+    assert limit_line(output, none) == "Upper bound: none computed (the objective is a sum)."
 
 
 @pytest.mark.parametrize("level", [0.8, 0.9, 1.0])

@@ -13,7 +13,8 @@ from scipy.optimize import brentq
 
 from sweep.base.errors import StudyError
 from sweep.report import read_output
-from sweep.report.parameter_map import _peak_and_width, _widest, _width_at, map_drawing, map_figure, map_lines
+from sweep.report.bands import _widest, _width_at, band_map, map_lines
+from sweep.report.sections.edges import Edges
 from sweep.search.gradients import Model
 from sweep.search.held import fix_parameters, search_held
 from sweep.search.problem import SearchRun
@@ -40,9 +41,7 @@ MAP = "{peak_nm: [628, 636, 644], fwhm_nm: [30, 44, 60]}"
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = tmp_path_factory.mktemp("map")
     (made / "band.yaml").write_text(STUDY.replace("MAP", MAP))
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("sweep.report.page._drawings", lambda _: ())
-        ran(load_study(made / "band.yaml"), made / "out", 1)
+    ran(load_study(made / "band.yaml"), made / "out", 1)
     return made
 
 
@@ -66,13 +65,12 @@ def test_each_cell_is_the_best_of_a_fine_grid_of_amounts(folder: Path) -> None:
 
 def test_the_report_says_how_wide_a_band_may_be(folder: Path) -> None:
     output = read_output(folder / "out")
-    figure = map_figure(output)
+    figure = band_map(output)
     assert figure is not None
     assert figure.best.shape == (3, 3)
     assert [name for name, _ in figure.levels] == ["RGGB"]
-    ((name, _, draw),) = map_drawing(output)
-    assert name == "map"
-    assert [text.get_text() for text in draw().axes[0].get_legend().get_texts()] == ["as RGGB (139)"]
+    (edges,) = Edges.of(output)
+    assert edges.answer == list(map_lines(output))
     (line,) = map_lines(output)
     found = re.search(r"\(139 DN\) is of (\d+) nm FWHM \(rounded down\), near (\d+) nm, with an absorbance of 0", line)
     assert found is not None
@@ -130,12 +128,6 @@ def test_the_specification_has_amounts_for_every_width(folder: Path, tmp_path: P
     np.testing.assert_allclose(
         table["csd_yellow_red"], cells.groupby("fwhm_nm")["objective"].max().to_numpy(), rtol=1e-9
     )
-
-
-def test_the_width_of_a_colorant_is_that_at_half_height() -> None:
-    nm = np.arange(400.0, 701.0)
-    assert _peak_and_width(nm, np.exp(-4 * np.log(2) * ((nm - 600) / 33) ** 2)) == pytest.approx((600, 33), rel=1e-3)
-    assert np.isnan(_peak_and_width(nm, np.exp(-4 * np.log(2) * ((nm - 690) / 33) ** 2))[1])
 
 
 @pytest.mark.parametrize(

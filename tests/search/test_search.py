@@ -15,7 +15,7 @@ from sweep.designs.families.free_form import FreeForm
 from sweep.metrics.bound import FEASIBLE, Bound
 from sweep.metrics.evaluate import designed_quantities
 from sweep.report import read_output
-from sweep.report.summary import summary_lines
+from sweep.report.sections.method import Method
 from sweep.runs import search as searching
 from sweep.runs.dry_run import remaining_work, remaining_work_lines
 from sweep.search import trade_off
@@ -24,7 +24,7 @@ from sweep.search.limit import Limit, limit_of
 from sweep.search.problem import CONVERGED, Evaluation, Problem, SearchRun, best_feasible, starting_points
 from sweep.search.solver import ALGORITHMS, ONE_START, search_from
 
-from ..build import load, ran, stopband_study
+from ..build import load, ran, sentences_of, stopband_study
 from ..commanded import commanded
 from .problems import PROBLEM, STUDY, best_of
 
@@ -225,18 +225,20 @@ def test_a_global_search_takes_one_start_and_ends_at_the_optimum_of_gradients(tm
     assert facts.evaluations <= int(most)
     front = pd.read_parquet(tmp_path / "out" / "front.parquet").set_index("sensitivity_min")
     assert front.loc[0.9, "objective"] == pytest.approx(facts.best_smooth_objective, rel=1e-6)
-    lines = "\n".join(summary_lines(output))
-    assert "separates yellow from red by 234 DN" in lines
-    assert f"Search: ORIG_DIRECT_L and SLSQP, 1 start, {facts.evaluations} evaluations: 234.9 DN" in lines
+    lines = "\n".join([*sentences_of(output), *next(iter(Method.of(output))).limits])
+    assert "separates yellow from red lamps by 234 DN" in lines
+    assert f"Searched: ORIG_DIRECT_L and SLSQP, 1 start, {facts.evaluations} evaluations; seed" in lines
     assert "converged" not in lines
 
 
 def test_a_search_that_has_not_converged_says_so(tmp_path: Path) -> None:
     study = load(tmp_path, re.sub("search: .*", "search: {starts: 2, max_evaluations: 10}", TINY))
     ran(study, tmp_path / "out", 1)
-    lines = summary_lines(read_output(tmp_path / "out"))
-    assert "; best found; no start converged) separates yellow from red" in lines[0]
-    assert any(line.startswith("Note: no start of the search converged") for line in lines)
+    output = read_output(tmp_path / "out")
+    assert "(best found; no start converged)" in sentences_of(output)[0]
+    assert any(
+        line.startswith("Note: no start of the search converged") for line in next(iter(Method.of(output))).limits
+    )
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)

@@ -14,7 +14,7 @@ from sweep.runs import run_study
 from sweep.spectra.builtin.surrogate import SurrogateParameters, parameter_tree, surrogate_parameters
 from sweep.study import load_study
 
-from ..conftest import STUDIES
+from ..conftest import STUDIES, without_pictures
 
 STUDY = load_study(STUDIES / "paper.yaml")
 SCRIPT = SimpleNamespace(**runpy.run_path(str(STUDIES / "notebooks" / "calibrate.py"), run_name="calibrate"))
@@ -33,13 +33,10 @@ def comparison(paper: Path) -> pd.DataFrame:
     from sweep.report import make_report, read_output
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sweep.report.figures.rendered", lambda _, kind: kind.encode())
-        patch.setattr("sweep.report.page.inlined", lambda _: "data:image/png;base64,cG5n")
+        without_pictures(patch)
         make_report(read_output(paper))
     found = pd.read_parquet(paper / "paper_comparison.parquet")
     pd.testing.assert_frame_equal(found, pd.read_csv(paper / "paper_comparison.csv"), check_dtype=False)
-    drawn = {"sensor.svg", "signals.svg", "chart.svg", "tiles.svg"}
-    assert {path.name for path in (paper / "figures").iterdir()} == drawn
     return found
 
 

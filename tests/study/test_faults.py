@@ -72,7 +72,7 @@ def test_no_fault_follows_from_another(tmp_path: Path, old: str, new: str, expec
         (
             "search:\n",
             "serach:\n",
-            "tiny.yaml:20: serach: unknown key; allowed: study, question, seed, wavelengths, sensor, sensors, camera, pixel, lights, "
+            "tiny.yaml:20: serach: unknown key; allowed: study, title, question, seed, wavelengths, sensor, sensors, camera, pixel, lights, "
             "scenarios, columns, tolerance_dn, accuracy, geometry, cfas, colorants, designs, sweeps, boxes, production, population, uncertainty, regions, recognition, tasks, vision, metrics, effects, objective, constraints, search, validate, published; did you mean 'search'?",
         ),
         (

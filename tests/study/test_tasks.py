@@ -14,6 +14,7 @@ import pytest
 
 from sweep.base.errors import OutputError, StudyError
 from sweep.report import read_output, study_of
+from sweep.report.words import digits
 from sweep.spectra.builtin import task_sets
 from sweep.spectra.spectrum import Curves, WavelengthGrid
 from sweep.study.load import load_study, study_of_keys
@@ -178,7 +179,7 @@ def test_a_run_keeps_the_spectra_of_user_tasks(tmp_path: Path) -> None:
     assert code == 0, said
     output = read_output(tmp_path / "tasks")
     error = output.table["paint_error_d65"].iloc[0]
-    assert f"Its paint pairwise error D65 is {error:.3g}" in told
+    assert f"a paint pairwise error D65 of {digits(error)}" in told
     assert list(output.curves.tasks) == [("paint mine", "paints.csv:white"), ("paint mine", "paints.csv:yellow")]
     assert output.provenance.data_sha256["paints.csv"] == sha256(PAINTS.encode()).hexdigest()
     first = load_study(tmp_path / "own.yaml").tasks

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...base.types import Array, Float, FloatArray, PerDesign
+from ...base.types import FloatArray, PerDesign
 from ...camera.noise.gaussian import share_below
 from ...camera.setup import Setup
 from ...designs.block import Block
@@ -182,21 +182,3 @@ def error_against_noise(
         points.append((float(errors.mean()), float(color.luminance_noise(matrix, gray, noise)[0])))
     delta_e, snr = np.array(points).T
     return delta_e, snr
-
-
-def rendered_areas(
-    patch_camera: PatchCamera,
-    chart: Chart,
-    case: int,
-    photons: Float[Array, "areas wavelengths"],
-    conditions: Conditions,
-) -> tuple[Float[Array, "areas 3"], Float[Array, "areas 3 3"]]:
-    """Return the areas of a picture through the noise-optimal matrix, with the noise of four pixels.
-
-    Returns `xyz`: XYZ relative to white.
-    """
-    noise = patch_camera.noise(conditions.read_noise_e)
-    patches = patch_camera.electrons(chart.photons[case] * conditions.illuminance_lx, conditions.exposure_s)
-    matrix = color.color_matrix(patches, chart.xyz[case], chart.white[case], noise)[0]
-    electrons = patch_camera.electrons(photons, conditions.exposure_s)[0]
-    return electrons @ matrix, np.einsum("ck,ac,cj->akj", matrix, noise.of(electrons), matrix)

@@ -1,0 +1,108 @@
+"""What was computed, left out, checked and searched."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from ...results.facts import SearchFacts
+from ...results.output import Output
+from ...results.tables import REFERENCE
+from ..section import Section
+from ..words import digits, number, quantity
+
+_MOST_NOTES = 4
+
+
+@dataclass(frozen=True)
+class Method(Section):
+    """The plan of a run, its check, its search and its notes, in sentences."""
+
+    sentences: tuple[str, ...]
+    notes: tuple[str, ...]
+
+    heading = "Method"
+
+    @classmethod
+    def of(cls, output: Output) -> Iterator[Section]:
+        """Yield it for every run."""
+        facts = output.provenance
+        column = output.trade_off[0]
+        of = output.columns[column.of] if column.extreme else column
+        computed = dict.fromkeys(effect for plan in facts.plans.values() for effect in plan.computed)
+        bound_dn = max(plan.error_bound_dn for plan in facts.plans.values())
+        left_out = {
+            effect.effect for plan in facts.plans.values() for effect in plan.effects if not effect.computed
+        } - computed.keys()
+        several = f" in {len(output.scenarios)} scenes" if len(output.scenarios) > 1 else ""
+        plain = output.kind(REFERENCE)["filter_id"].nunique()
+        lines = [
+            f"{quantity(of)[:1].upper()}{quantity(of)[1:]} ({of.name} in the files): {of.meaning}.",
+            f"Computed: {facts.filters:,} filters, {plain} of them plain CFAs,{several} with {', '.join(computed) or 'no effect but the curves'}.",
+            f"Left out: {len(left_out)} effects, which change a separation by at most {digits(bound_dn)} DN."
+            if bound_dn
+            else f"Left out: {len(left_out)} effects, none of which changes a separation.",
+        ]
+        if facts.check is not None:
+            rows = "1 row" if facts.check.rows == 1 else f"{facts.check.rows:,} rows"
+            differ = "differs" if facts.check.rows == 1 else "differ"
+            lines.append(
+                f"Checked: {rows} computed again at reference settings {differ} by at most {digits(facts.check.largest_dn)} DN; "
+                f"{number(facts.check.allowed_dn)} DN is allowed."
+            )
+        if output.audited is not None:
+            lines.append(
+                f"Audited: all scenes with the reference settings differ by at most {digits(float(output.audited['realized_dn'].max()))} DN."
+            )
+        search = facts.search
+        if search is not None:
+            algorithms = " and ".join(filter(None, (search.algorithm, search.refinement)))
+            lines.append(
+                f"Searched: {algorithms}, {search.starts:,} starts, {search.evaluations:,} evaluations; seed {output.study.seed}."
+            )
+            lines.append(limit_line(output, search))
+        moved = [
+            m
+            for m in (*output.study.designs.values(), *output.study.sweeps.values(), *output.study.boxes.values())
+            if m.technology is None
+        ]
+        if moved:
+            lines.append("Filters without a stated technology are evaluated at normal incidence.")
+        more = len(facts.warnings) - _MOST_NOTES
+        notes = [*facts.warnings[:_MOST_NOTES], *([f"{more} more notes stand in provenance.json"] if more > 0 else [])]
+        yield cls(tuple(lines), tuple(f"Note: {note}." for note in notes))
+
+    @property
+    def limits(self) -> list[str]:
+        """All sentences."""
+        return [*self.sentences, *self.notes]
+
+
+def limit_line(output: Output, search: SearchFacts) -> str:
+    """Return the upper bound with its filters and response."""
+    if search.no_limit is not None or search.limit_proven is None:
+        return f"Upper bound: none computed ({search.no_limit})."
+    proven = output.goal.format_bound(search.limit_proven)
+    gap = "nothing is left to gain"
+    if search.gap is not None:
+        gap = f"the search's answer is {100 * search.gap:.1f} % below it"
+    without = f" but {', '.join(search.limit_left_out)}" if search.limit_left_out else ""
+    proof = f"{proven} (proven)"
+    if search.limit_attained is not None:
+        left = f"{search.limit_proven - search.limit_attained:.2g} {output.goal.unit}".rstrip()
+        proof += f", and one filter comes within {left} of it"
+    if search.limit_open_parts:
+        programs, parts = search.limit_programs, search.limit_open_parts
+        proof += f", but it may not be the least one: {parts} parts are open after {programs} linear programs"
+    levels = search.front_limits_open
+    technology = (output.study.sweeps | output.study.boxes)[search.space].technology
+    moved = "" if technology is None else f", as {technology.description}"
+    if output.goal.extreme and output.study.production.tolerance and "edge shifts" not in search.limit_left_out:
+        moved += ", whose whole shape production moves"
+    where = f"{search.channel} of {search.cfa}{f' in {search.scenario}' if len(output.scenarios) > 1 else ''}"
+    return (
+        f"Upper bound of {output.goal.words} for any filter in {where}: {proof}; {gap}. This is for filters between "
+        f"the least transmission and the curve that they replace{moved}, under the same constraints{without}, before "
+        "clipping and quantization."
+        + (f" At {levels} levels of the front it may not be the least one." if levels else "")
+    )

@@ -1,0 +1,149 @@
+"""Images of traffic lights: how often a reader errs with each CFA, over distance and light."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from ...results.output import Output
+from ...results.tables import VISION_STREET
+from ...vision.detections import ALL, precision_scores
+from ...vision.readers import OBSERVER
+from ...vision.scenes import NETWORK, SHUFFLED
+from ..leaders import answering, label
+from ..panels import Line, Lines, Panel, Picture
+from ..section import MOST_ROWS, Section, Table
+from ..vision import PREDICTORS, READER_NAMES, Benchmark, Ranks, benchmark_of, format_interval, format_percent, ranks_of
+from ..words import joined
+
+_MOST_LEVELS = 3
+_WELL = 0.5
+"""A rank correlation from which on something is said to predict well."""
+
+
+@dataclass(frozen=True)
+class Vision(Section):
+    """The benchmark of a run."""
+
+    benchmark: Benchmark
+    ranks: Ranks
+    hero: str
+    street: tuple[tuple[str, str, str], ...]
+
+    heading = "Images read wrongly"
+    leads = True
+
+    @classmethod
+    def of(cls, output: Output) -> Iterator[Section]:
+        """Yield it where a study asks for images."""
+        if output.study.vision is None:
+            return
+        benchmark, best, street = benchmark_of(output), answering(output), []
+        if VISION_STREET in output.vision:
+            scores = precision_scores(output.vision[VISION_STREET], benchmark.reference)
+            for row in scores[scores["level"] == ALL].to_dict("records"):
+                apart = (
+                    ""
+                    if row["name"] == benchmark.reference
+                    else f"{row['apart']:+.3f} ({row['apart_low']:+.3f} to {row['apart_high']:+.3f})"
+                )
+                street.append((str(row["name"]), f"{row['average_precision']:.3f}", apart))
+        yield cls(benchmark, ranks_of(benchmark), "" if best is None else label(best), tuple(street))
+
+    @property
+    def _who(self) -> str:
+        return READER_NAMES[self.benchmark.main_reader]
+
+    @property
+    def answer(self) -> list[str]:
+        """Who errs less than with the reference, and whether the separation predicts it."""
+        benchmark, groups = self.benchmark, dict[str, list[str]]()
+        for design in benchmark.designs:
+            if design != benchmark.reference:
+                difference = benchmark.difference(design, SHUFFLED)
+                sure = difference.excludes_zero
+                word = "not separated from it" if not sure else "less often" if difference.value < 0 else "more often"
+                groups.setdefault(word, []).append(f"{design} {100 * difference.value:+.1f}" if sure else design)
+        parts = [
+            f"{word}{' with' if 'often' in word else ':'} **{', '.join(names)}**" for word, names in groups.items()
+        ]
+        lines = [f"Against {benchmark.reference}, the {self._who} errs (percent of the images) {'; '.join(parts)}."]
+        csd = self.ranks.between.get("csd")
+        if csd is not None:
+            how = "does not predict" if not csd.low > 0 else "predicts" if csd.value >= _WELL else "predicts badly"
+            lines.append(
+                f"The color separation **{how}** which CFA is read best at the same distance and light (rank correlation {format_interval(csd)})."
+            )
+        return lines
+
+    @property
+    def limits(self) -> list[str]:
+        """The ideal observer's errors, predictors, streets."""
+        benchmark, lines = self.benchmark, list[str]()
+        if benchmark.main_reader == NETWORK:
+            pairs = [
+                (d, benchmark.error(d, NETWORK, SHUFFLED), benchmark.error(d, OBSERVER, SHUFFLED))
+                for d in benchmark.designs
+            ]
+            errors = [f"{design} {100 * ours.value:.1f} and {100 * least.value:.1f}" for design, ours, least in pairs]
+            lines.append(
+                f"Percent read wrongly by the network and by the ideal observer (unseen lamps, lenses in any order): {', '.join(errors)}."
+            )
+        others = [f"{PREDICTORS[n]} {format_interval(v)}" for n, v in self.ranks.between.items() if n != "csd"]
+        if others:
+            lines.append(f"Rank correlations of other predictors: {', '.join(others)}.")
+        if self.street:
+            lines.append(
+                f"Streets, average precision of the simplest detector: {', '.join(f'{name} {score}' for name, score, _ in self.street)}."
+            )
+        return lines
+
+    @property
+    def picture(self) -> Picture | None:
+        """Errors over distance, a panel for each light."""
+        rows, panels = self.ranks.conditions, list[Panel]()
+        levels = list(self.benchmark.vision.levels.items())[:_MOST_LEVELS]
+        for level, of in levels:
+            here, lines = rows[rows["level"] == level].sort_values("distance_m"), dict[str, Line]()
+            for design, line in here.groupby("design", sort=False):
+                least = 100 * line[OBSERVER].to_numpy(dtype=float) if OBSERVER in line else None
+                lines[str(design)] = Line(
+                    line["distance_m"].to_numpy(dtype=float), 100 * line["error"].to_numpy(dtype=float), least
+                )
+            panels.append(
+                Lines(f"{level}, {of.illuminance_lx:g} lx: wrong / %", "distance / m", lines, self.hero, height=260)
+            )
+        caption = (
+            f"Lines: the {self._who}. Bands go down to the ideal observer, which knows how images come about."
+            if OBSERVER in rows
+            else f"Lines: the {self._who}."
+        )
+        return Picture(
+            tuple(panels),
+            f"Images read wrongly over distance in {joined([level for level, _ in levels])}.",
+            caption,
+            columns=min(2, len(panels)),
+        )
+
+    @property
+    def table(self) -> Table | None:
+        """Errors of each design with their intervals."""
+        rows = []
+        for design in self.benchmark.designs[:MOST_ROWS]:
+            cells = [
+                format_percent(self.benchmark.error(design, reader, SHUFFLED)) for reader in self.benchmark.readers
+            ]
+            apart = (
+                ""
+                if design == self.benchmark.reference
+                else format_percent(self.benchmark.difference(design, SHUFFLED))
+            )
+            rows.append((design, *cells, apart))
+        return Table(
+            (
+                "wrong / %",
+                *(READER_NAMES[reader] for reader in self.benchmark.readers),
+                f"less that of {self.benchmark.reference}",
+            ),
+            tuple(rows),
+        )

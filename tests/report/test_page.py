@@ -1,0 +1,71 @@
+"""Reports as a person opens them: in a browser without a network, on a desk and on a phone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from ..conftest import FinishedFolder
+from .pages import needs_browser
+
+pytestmark = needs_browser
+NAMES = ["stopband", *(pytest.param(name, marks=pytest.mark.slow) for name in ("noise", "fog", "paper", "distance"))]
+MOST_WORDS, MOST_FIGURES, MOST_HEIGHT, MOST_BYTES = 1_200, 6, 7_000, 1_500_000
+
+
+def counted(page: Any) -> tuple[int, int, int]:
+    """Words that are seen but those in pictures, pictures, and the height of the page."""
+    text = "[...document.querySelectorAll('h1,h2,p,li,td,th,figcaption')].map(e => e.innerText).join(' ')"
+    words = page.evaluate(f"({text}).split(/\\s+/).filter(w => w).length")
+    return words, page.locator("figure").count(), page.evaluate("document.documentElement.scrollHeight")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_report_is_read_in_minutes(finished: FinishedFolder, opened: Any, name: str) -> None:
+    seen = opened(finished(name))
+    words, figures, height = counted(seen.page)
+    assert words <= MOST_WORDS
+    assert 1 <= figures <= MOST_FIGURES
+    assert height <= MOST_HEIGHT
+    page = finished(name) / "report.html"
+    assert page.stat().st_size <= MOST_BYTES
+    assert seen.errors == []
+    assert seen.requests == [page.as_uri()]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_nothing_is_cut_on_a_phone(finished: FinishedFolder, opened: Any, name: str) -> None:
+    seen = opened(finished(name))
+    seen.page.set_viewport_size({"width": 400, "height": 800})
+    assert seen.page.evaluate("document.documentElement.scrollWidth") <= 400
+    small = "[...document.querySelectorAll('figure svg text')].filter(t => t.getClientRects().length)"
+    heights = seen.page.evaluate(
+        f"{small}.map(t => parseFloat(getComputedStyle(t).fontSize) * Math.hypot(t.getScreenCTM().a, t.getScreenCTM().b))"
+    )
+    assert min(heights) >= 9.5
+
+
+def test_the_explorer_links_its_views(finished: FinishedFolder, opened: Any) -> None:
+    """A click takes the nearest design, sorting and ranges change the rows, and each number is that of the table."""
+    seen = opened(finished("stopband"))
+    page, rows = seen.page, pd.read_parquet(finished("stopband") / "results.parquet")
+    assert page.locator("#explorer .shown").inner_text().startswith("best stopband: ")
+    first = page.locator("#explorer tbody tr").first
+    page.locator("#explorer tbody tr").nth(3).click()
+    shown = page.locator("#explorer .shown").inner_text()
+    name = shown.partition(":")[0]
+    row = rows[rows["filter_id"] == int(name.removeprefix("filter "))].iloc[0]
+    assert f"separation {row['csd_yellow_red']:.3g} DN" in shown
+    assert page.locator("#explorer tr.on th").inner_text() == name
+    page.locator("#explorer th[data-by='0']").click(position={"x": 60, "y": 5})
+    assert page.locator("#explorer th[data-by='0']").inner_text().split("\n")[0].endswith("▲")
+    assert first.inner_text() != ""
+    page.locator("#explorer th[data-by='0'] input").first.fill("200")
+    page.locator("#explorer th[data-by='0'] input").first.press("Enter")
+    kept = [float(text) for text in page.locator("#explorer tbody td:nth-child(2)").all_inner_texts()]
+    assert min(kept) >= 200
+    box = page.locator("#explorer svg circle").first.bounding_box()
+    page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    assert seen.errors == []
