@@ -58,7 +58,7 @@ class Method(Section):
         if search is not None:
             algorithms = " and ".join(filter(None, (search.algorithm, search.refinement)))
             lines.append(
-                f"Searched: {algorithms}, {search.starts:,} starts, {search.evaluations:,} evaluations; seed {output.study.seed}."
+                f"Searched: {algorithms}, {search.starts:,} start{'s' * (search.starts != 1)}, {search.evaluations:,} evaluations; seed {output.study.seed}."
             )
             lines.append(limit_line(output, search))
         moved = [
