@@ -168,7 +168,11 @@ def whole(plain: Study, tmp_path_factory: pytest.TempPathFactory) -> pd.DataFram
 
 def without_pictures(patch: pytest.MonkeyPatch) -> None:
     """Pages whose pictures are empty."""
-    patch.setattr("sweep.report.panels.Picture.svgs", lambda *_: ("<svg></svg>", "<svg></svg>"))
+
+    def svgs(*_: object) -> tuple[str, str]:  # of its name, by which other processes know it
+        return "<svg></svg>", "<svg></svg>"
+
+    patch.setattr("sweep.report.panels.Picture.svgs", svgs)
     patch.setattr("sweep.report.panels.Picture.files", lambda _, name: {f"{name}.svg": b"svg", f"{name}.png": b"png"})
 
 

@@ -38,13 +38,11 @@ from .sections.series import Series
 from .sections.tasks import Tasks
 from .sections.trade_off import TradeOff
 from .sections.uncertain import Uncertain
-from .sections.vision import Vision
 from .terms import format_constraints, unknown_lines
 from .words import scaled
 
 ORDER: tuple[type[Section], ...] = (
     *(
-        Vision,
         Flicker,
         Noise,
         Lamps,
@@ -70,9 +68,18 @@ PARETO_PICTURE = "pareto"
 """Name of the picture of the trade-off, as files for slides."""
 
 
+def _kinds(output: Output) -> tuple[type[Section], ...]:
+    """Return the kinds of sections that a study may call for."""
+    if output.study.vision is None:
+        return ORDER
+    from .sections.vision import Vision  # noqa: PLC0415  (few studies have images)
+
+    return Vision, *ORDER
+
+
 def sections_of(output: Output) -> tuple[Section | None, list[Section]]:
     """Return the section that answers the study's question, and the others in order."""
-    found = list(chain.from_iterable(kind.of(output) for kind in ORDER))
+    found = list(chain.from_iterable(kind.of(output) for kind in _kinds(output)))
     candidates = [section for section in found if section.leads and section.answer]
     search = output.provenance.search
     if not output.best.empty and (search is None or search.scenarios < 2):
@@ -148,7 +155,9 @@ def _published(output: Output) -> dict[str, bytes]:
 def report_page(output: Output, files: Iterable[str], parallel: Parallel = in_turn) -> str:
     """Return the page of a run."""
     lead, others = sections_of(output)
-    price = next(iter(Price.of(output)), None) if not isinstance(lead, (*_OF_SERIES, Vision)) else None
+    price = (
+        next(iter(Price.of(output)), None) if output.study.vision is None and not isinstance(lead, _OF_SERIES) else None
+    )
     shown = [
         section for section in others if section.answer or section.picture is not None or section.table is not None
     ]

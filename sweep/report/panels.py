@@ -268,7 +268,8 @@ class Curves:
                       linestyle=(0, (5, 2)) if name in self.dashed else "-")  # fmt: skip
             others = [other for known, other in self.curves.items() if known != name]
             apart = np.min([np.abs(curve - other) for other in others], axis=0) if others else curve
-            at = int(np.argmax(np.where(curve > 0.25 * top, apart, -1.0)[8:-8])) + 8
+            margin = min(8, (nm.size - 1) // 4)
+            at = int(np.argmax(np.where(curve > 0.25 * top, apart, -1.0)[margin : nm.size - margin])) + margin
             words_at(axes, name, float(nm[at]), float(curve[at]), color=self.colors[name], ha="center",
                      fontweight="bold" if bold else "normal", va="bottom", zorder=5)  # fmt: skip
         for edge in self.edges:

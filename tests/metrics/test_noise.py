@@ -16,7 +16,8 @@ from sweep.base.errors import StudyError
 from sweep.camera.model import SceneModel
 from sweep.metrics.columns.confusion import STATE_ERROR
 from sweep.metrics.evaluate import evaluate
-from sweep.report import read_output, summary_lines
+from sweep.report import read_output
+from sweep.report.sections.noise import Noise
 from sweep.runs import run_study
 from sweep.spectra.lights import Lights
 from sweep.study import load_study
@@ -133,11 +134,12 @@ def test_the_summary_of_a_noisy_study(tmp_path: Path) -> None:
     assert (results["error_yellow_red"] <= results["error_bound_yellow_red"]).all()
     assert results.loc[results["scenario"] == "dim level=0.02", STATE_ERROR].min() > 1e-3
     output = read_output(tmp_path / "out")
-    said = "\n".join(summary_lines(output))
-    told = re.search(r"of equal brightness, .*: RGGB from ([\d.]+) of full scale", said)
+    (section,) = Noise.of(output)
+    assert isinstance(section, Noise)
+    told = re.fullmatch(r"from ([\d.]+)\s%", section.steady["RGGB"])
     assert told is not None
     # Computed again there, a little brighter and a little dimmer.
-    brighter, dimmer = (_worst_error(path, float(told[1]) * share) for share in (1.005, 0.985))
+    brighter, dimmer = (_worst_error(path, float(told[1]) / 100 * share) for share in (1.005, 0.985))
     assert brighter < 1e-3 < dimmer
     # The plan keeps what the metrics need.
     assert {"noise", "quantization", "saturation"} <= {*output.provenance.plans["dim level=0.5"].computed}

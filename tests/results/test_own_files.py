@@ -184,7 +184,7 @@ def test_a_report_that_the_disk_refuses_loses_no_result(
     ran(few, tmp_path, 1)
     make_report(read_output(tmp_path))
     with monkeypatch.context() as patch:
-        refusing(patch, 4, errno.ENOSPC)
+        refusing(patch, 2, errno.ENOSPC)
         with pytest.raises(OutputError, match="cannot be written: No space left"):
             make_report(read_output(tmp_path))
     (tmp_path / "report.html").unlink()

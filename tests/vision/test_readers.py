@@ -225,7 +225,7 @@ def test_a_study_without_vision_loads_nothing_of_it(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == "['sweep.vision.installed', 'sweep.vision.section']"
     assert not list((tmp_path / "out").glob("vision*"))
-    assert "Images of traffic lights" not in (tmp_path / "out" / "report.html").read_text()
+    assert "Images read wrongly" not in (tmp_path / "out" / "report.html").read_text()
 
 
 @pytest.mark.parametrize(
