@@ -35,7 +35,11 @@ def _command(
     from sweep.report.panels import Picture
 
     if not drawn:
-        Picture.svgs = lambda *_: ("", "")
+
+        def svgs(*_: object) -> tuple[str, str]:  # of its name, by which other processes know it
+            return "", ""
+
+        Picture.svgs = svgs
         Picture.files = lambda *_: {}
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
