@@ -34,7 +34,7 @@ from ..runs.dry_run import spread
 from ..spectra.lights import class_pairs
 from ..study import Study
 from .accuracy_figure import draw_accuracy
-from .figures import pictures_of
+from .look import png_of, svg_of
 from .pages import aligned
 
 _MOST_DESIGNS = 17
@@ -73,8 +73,9 @@ def measure_accuracy(
     progress("measurements", len(jobs), len(jobs))
     table = pd.DataFrame(_rows(measured, numbers.size))
     write_table(pa.Table.from_pandas(table, preserve_index=False), output / "accuracy.parquet")
-    for kind, content in pictures_of(lambda: draw_accuracy(table, study.name), ("png", "svg")).items():
-        write_bytes(content, output / f"accuracy.{kind}")
+    figure = draw_accuracy(table, study.name)
+    write_bytes(png_of(figure), output / "accuracy.png")
+    write_bytes(svg_of(figure, "accuracy", "Error over time of each preset.").encode(), output / "accuracy.svg")
     lines = [*aligned(_in_words(table)), f"Files: {output}/: accuracy.parquet, accuracy.png, accuracy.svg."]
     return Answer(lines, {"folder": str(output), "measured": table.to_dict("records")})
 

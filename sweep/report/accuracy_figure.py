@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .figures import CURVE_CYCLE, decorate, panel_grid
+from .figures import CURVE_CYCLE, panel_grid
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -18,9 +18,9 @@ def draw_accuracy(table: pd.DataFrame, name: str) -> Figure:
     """Draw the error of presets, DN, against the time of the measured designs; errors below 1e-6 DN lie there."""
     scenes = list(table.groupby("scenario", sort=False))
     columns, designs = min(_COLUMNS, len(scenes)), int(table["designs"].iloc[0])
-    figure, panels = panel_grid(len(scenes), columns, (3.4, 3.1), (0.4, 0.6))
+    width_in, height_in = 3.4 * columns + 0.4, 3.1 * -(-len(scenes) // columns) + 0.6
+    figure, panels = panel_grid(len(scenes), columns, width_in, height_in)
     for at, (axes, (scenario, presets)) in enumerate(zip(panels, scenes, strict=True)):
-        decorate(axes)
         error_dn = presets["error_dn"].clip(lower=_LEAST_DN)
         axes.plot(presets["total_s"], error_dn, "o-", color=CURVE_CYCLE[0], linewidth=0.8, markersize=5)
         places: dict[tuple[float, float], list[str]] = {}

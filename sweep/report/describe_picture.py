@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.types import PerValue
-from ..report.figures import CURVE_COLORS, CURVE_CYCLE, TYPE_COLORS, canvas_grid
 from ..spectra.color import REGIONS, display_colors
 from ..spectra.facts import Curve, Facts
 from ..spectra.signal_color import VISIBLE, LightColor, outline, spectral_locus
+from .figures import CURVE_CYCLE, TYPE_COLORS, panel_grid
+from .look import CHANNELS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,7 +43,7 @@ def draw(title: str, facts: Facts, colors: Mapping[str, LightColor | None]) -> F
         title = f"{title}: {len(facts.curves[::step])} of {len(facts.curves):,} curves"
         facts = replace(facts, curves=facts.curves[::step])
         colors = {curve.name: colors[curve.name] for curve in facts.curves} if lights else {}
-    figure, panels = canvas_grid(1, 2 if lights else 1, 13.0 if lights else 8.0, 5.0 if lights else 4.2)
+    figure, panels = panel_grid(1 + lights, 1 + lights, 13.0 if lights else 8.0, 5.0 if lights else 4.2)
     paints = {curve.name: _paint(curve, at, lights=lights) for at, curve in enumerate(facts.curves)}
     _draw_curves(panels[0], facts, paints)
     panels[0].set_title(title, parse_math=False)
@@ -60,7 +61,7 @@ def _paint(curve: Curve, at: int, *, lights: bool) -> Paint:
     if lights and curve.on(VISIBLE).any():
         rgb = display_colors(VISIBLE, curve.on(VISIBLE)[None])[0]
         return tuple(0.85 * float(channel) for channel in rgb)  # darker, to be seen on white
-    return CURVE_COLORS.get(curve.name) or CURVE_CYCLE[at % len(CURVE_CYCLE)]
+    return CHANNELS.get(curve.name) or CURVE_CYCLE[at % len(CURVE_CYCLE)]
 
 
 def _draw_curves(axes: Axes, facts: Facts, paints: Mapping[str, Paint]) -> None:

@@ -23,7 +23,16 @@ INK, DIM, GRID = "#1d1d1f", "#5c6066", "#e7e8ea"
 GAIN, LOSS, FORBIDDEN = "#0b5fa5", "#b3400e", "#fbeee8"
 LAMPS = {"green": "#7cc4a4", "yellow": "#f0cf5b", "orange": "#f0a860", "red": "#e58a84"}
 """Areas of the lamps of each signal type."""
-CHANNELS = {"R": "#c0392b", "Rx": "#8c2d04", "G": "#2e8b57", "B": "#2c6fbb", "Y": "#b07a00", "Cy": "#17a2a2"}
+CHANNELS = {
+    "R": "#c0392b",
+    "Rx": "#8c2d04",
+    "G": "#2e8b57",
+    "B": "#2c6fbb",
+    "Y": "#b07a00",
+    "Cy": "#17a2a2",
+    "C": DIM,
+    "W": DIM,
+}
 _FONT, _FONT_NARROW = 14, 12
 _LINE, _BOLD = 1.7, 3.2
 _DIGITS = re.compile(r"(\d+\.\d{2})\d+")
@@ -208,8 +217,12 @@ def _saved(figure: Figure, **how: Any) -> bytes:
     """Return a figure as a file; a name in a script that the font lacks is no warning, and none is a formula."""
     import matplotlib as mpl  # noqa: PLC0415  (slow to import)
 
-    for axes in figure.axes:
-        for text in (axes.title, axes.xaxis.label, axes.yaxis.label, *axes.texts, *axes.get_yticklabels()):
+    for text in figure.texts:
+        text.set_parse_math(False)
+    for axes in figure.axes:  # numbers along a logarithmic axis are formulas
+        legend = axes.get_legend()
+        texts = [axes.title, axes.xaxis.label, axes.yaxis.label, *axes.texts, *(legend.get_texts() if legend else ())]
+        for text in texts:
             text.set_parse_math(False)
     buffer = io.BytesIO()
     with mpl.rc_context({"svg.hashsalt": "cfa-sweep", "svg.fonttype": "none"}), warnings.catch_warnings():

@@ -129,14 +129,19 @@ def response_of(curves: Mapping[str, np.ndarray]) -> str:
     return "relative response" if top > _RELATIVE else QE
 
 
-def edges_in_words(row: Row) -> str:
-    """Return the edges of a stopband, or of each of several that is not without effect; empty without any."""
-    parts = []
+def edges_of(row: Row) -> tuple[tuple[float, float], ...]:
+    """Return the edges of a stopband, nm, or of each of several that is not without effect; empty without any."""
+    found = []
     for number in ("", *map(str, range(1, 10))):
         left, right = (float(row.get(f"{side}{number}_nm", math.nan)) for side in ("left", "right"))
         if math.isfinite(left) and math.isfinite(right) and row.get(f"depth{number}", 1) > _NO_DEPTH:
-            parts.append(f"{left:.0f} and {right:.0f} nm")
-    return f"edges at {' and at '.join(parts)}" if parts else ""
+            found.append((left, right))
+    return tuple(found)
+
+
+def edges_in_words(edges: tuple[tuple[float, float], ...]) -> str:
+    """Return edges as `edges at **613 and 651 nm**`; empty without any."""
+    return f"edges at {' and at '.join(f'**{left:.0f} and {right:.0f} nm**' for left, right in edges)}" if edges else ""
 
 
 def bound_conditions(output: Output) -> str:

@@ -16,7 +16,7 @@ NARROW = "\u00a0"
 _LAMP = re.compile(r"([a-z]+)_0*(\d+)_(green|yellow|orange|red)")
 _PEOPLE = {"germany": "German", "us": "US", "japan": "Japanese", "china": "Chinese", "france": "French"}
 _ERRORS = (CHROMATIC_ERROR, STATE_ERROR, STATE_ERROR_BOUND)
-_SAME = 0.005
+SAME = 0.005
 """Relative difference below which a figure is neither gain nor loss."""
 _TIMES = 3.0
 """From here on a factor is easier to read than percent."""
@@ -81,14 +81,14 @@ def change(value: float, of: float) -> str:
     if not (of > 0 and value > 0):
         return ""
     ratio = value / of
-    if abs(ratio - 1) < _SAME:
+    if abs(ratio - 1) < SAME:
         return "±0 %"
     return f"× {digits(ratio)}" if ratio >= _TIMES else f"{100 * (ratio - 1):+.0f}{NARROW}%".replace("-", "−")
 
 
 def effect(column: Column, value: float, of: float) -> str:
     """Return whether a value is a gain, a loss or the same against another."""
-    if value == of or (of and abs(value / of - 1) < _SAME):
+    if value == of or (of and abs(value / of - 1) < SAME):
         return "same"
     return "▲ gain" if (value > of) == (column.direction == "more") else "▼ loss"
 

@@ -22,7 +22,6 @@ from .street import StreetCamera, draw_streets, street_labels
 if TYPE_CHECKING:
     from .network_reader import NetworkReader
 
-_SHOWN = 12
 """Images that were read wrongly and are kept to look at, of each design."""
 _KNOWN_KEY = 1
 _KEY = {"design_id": 0, "name": "", "cfa": "", "seed": 0}

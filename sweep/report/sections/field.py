@@ -13,7 +13,7 @@ from ...results.output import Output
 from ..leaders import RGGB, answering, label, leaders_of, upper_bound_beside
 from ..panels import Line, Lines, Picture, Ring
 from ..section import MOST_ROWS, Section, Table
-from ..terms import bound_conditions, colorants_of, is_angle_dependent
+from ..terms import bound_conditions, colorants_of, edges_in_words, edges_of, is_angle_dependent
 from ..words import amount, change, joined, of_column, quantity, quoted
 
 Values = Float[Array, " places"]
@@ -28,7 +28,7 @@ class Field(Section):
     values: Mapping[str, Values]
     worst: Mapping[str, float]
     hero: str
-    edges_nm: tuple[float, ...]
+    edges: str
     notes: tuple[str, ...]
     f_number: float
     bound: float | None
@@ -53,7 +53,6 @@ class Field(Section):
                 ordered = places.sort_values("height")
                 values[names[design]] = ordered[column.name].to_numpy(dtype=float)
                 angles = ordered["cra_deg"].to_numpy(dtype=float)
-        edges = tuple(float(best.get(name, np.nan)) for name in ("left_nm", "right_nm"))
         worst = {label(row): float(row[column.name]) for row in rows.to_dict("records")}
         if label(best) in values:
             yield cls(
@@ -62,7 +61,7 @@ class Field(Section):
                 values,
                 worst,
                 label(best),
-                edges if np.isfinite(edges).all() else (),
+                edges_in_words(edges_of(best)),
                 tuple(colorants_of(output, best)),
                 scene.optics.f_number,
                 upper_bound_beside(output, best),
@@ -91,11 +90,7 @@ class Field(Section):
     def answer(self) -> list[str]:
         """What the best one keeps up to the corner, and what becomes of the others."""
         corner = f"{self.angles[-1]:g}{chr(0xA0)}degrees"
-        edges = (
-            f"With edges at **{joined([f'{edge:.0f}' for edge in self.edges_nm])} nm**, {quoted(self.hero)}"
-            if self.edges_nm
-            else quoted(self.hero)
-        )
+        edges = f"With {self.edges}, {quoted(self.hero)}" if self.edges else quoted(self.hero)
         edges += f" ({'; '.join(self.notes)})" if self.notes else ""
         beside = "" if RGGB not in self.worst else f" ({RGGB}: {of_column(self.column, self.worst[RGGB])})"
         lines = [

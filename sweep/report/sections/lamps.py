@@ -18,7 +18,7 @@ from ..leaders import Row, answering, label, leaders_of, reference_of, upper_bou
 from ..panels import Map, Panel, Picture, Rows
 from ..panels import Row as Drawn
 from ..section import MOST_ROWS, Section, Table
-from ..terms import bound_conditions, edges_in_words
+from ..terms import bound_conditions, edges_in_words, edges_of
 from ..words import amount, change, digits, joined, lamp, of_column, quantity, quoted
 
 _MOST_MAPS = 3
@@ -72,7 +72,7 @@ class Lamps(Section):
                 (float(a), float(b)) for a, b in output.front[["sensitivity_min", "objective"]].dropna().to_numpy()
             )  # fmt: skip
             yield cls(
-                column, output.columns[column.of], tuple(judged), label(best), edges_in_words(best),
+                column, output.columns[column.of], tuple(judged), label(best), edges_in_words(edges_of(best)),
                 (float(best[CFA_SENSITIVITY]), np.nan if rggb is None else float(rggb[CFA_SENSITIVITY])),
                 "" if rggb is None else label(rggb), None if population is None else population.wanted_dn,
                 upper_bound_beside(output, best), bound_conditions(output), front,

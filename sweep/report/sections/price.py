@@ -68,8 +68,8 @@ class Price(Section):
         effects = {column.name: row[-1] for column, row in zip(self.columns, rows, strict=True)}
         if "gain" in effects.get(CFA_SENSITIVITY, "") and any("loss" in effects.get(name, "") for name in _TASKS[1:]):
             note = (
-                f"Why light is a gain and lux a loss: the tile collects more light, but the color matrix that makes RGB of {self.names[-1]}'s channels "
-                "multiplies its noise."
+                "Why light is a gain and lux a loss: the tile collects more light, but the color matrix that makes RGB of its channels multiplies "
+                "the noise."
             )
         return Table(
             ("", *self.names, f"against {self.names[0]}", ""),

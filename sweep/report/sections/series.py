@@ -17,7 +17,7 @@ from ..leaders import RGGB, answering, label
 from ..panels import Line, Lines, Picture, Ring
 from ..section import MOST_ROWS, Section, Table
 from ..series import Numbers, over_series
-from ..terms import edges_in_words
+from ..terms import edges_in_words, edges_of
 from ..words import amount, article, change, effect, inward, inward_share, joined, number, of_column, quantity, quoted
 
 Values = Float[Array, " numbers"]
@@ -83,7 +83,7 @@ class Series(Section):
                     search is not None and search.scenarios > 1 and search.scenario in scenarios and hero in worst
                 )
                 missed, dark_s = _missed(output, scenarios)
-                edges = edges_in_words(answers) if searched and answers is not None else ""
+                edges = edges_in_words(edges_of(answers)) if searched and answers is not None else ""
                 pulses = _pulses(output, scenarios)
                 found.append(
                     cls(

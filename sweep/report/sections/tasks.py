@@ -15,22 +15,18 @@ from ...results.tables import REFERENCE
 from ..leaders import answering, label, reference_of
 from ..panels import Picture, Ratio, Ratios
 from ..section import Section
-from ..words import digits, joined, quoted
+from ..words import SAME, digits, joined, quoted
 
 _MOST_FACTOR = 10.0
 _MOST_NAMED = 3
-_SAME = 0.005
 
 
 @dataclass(frozen=True)
 class Tasks(Section):
-    """Factors by which each design is better than RGGB in each figure; below 1 it is worse.
-
-    `equal`: figures in which all have the same.
-    """
+    """Factors by which each design is better than RGGB in each measure; below 1 it is worse."""
 
     columns: tuple[Column, ...]
-    factors: dict[str, Float[Array, " figures"]]
+    factors: dict[str, Float[Array, " measures"]]
     rggb: str
     hero: str
     designs: tuple[str, ...]
@@ -75,11 +71,11 @@ class Tasks(Section):
 
     def _gains(self, name: str) -> list[str]:
         return [
-            column.words for column, factor in zip(self.columns, self.factors[name], strict=True) if factor > 1 + _SAME
+            column.words for column, factor in zip(self.columns, self.factors[name], strict=True) if factor > 1 + SAME
         ]
 
     def _losses(self, name: str) -> int:
-        return int((self.factors[name] < 1 - _SAME).sum())
+        return int((self.factors[name] < 1 - SAME).sum())
 
     @property
     def answer(self) -> list[str]:
@@ -102,12 +98,12 @@ class Tasks(Section):
             least, most = int(np.argmin(factors)), int(np.argmax(factors))
             parts = (
                 [f"loses most in {self.columns[least].words} (**{digits(1 / factors[least])}** times worse)"]
-                if factors[least] < 1 - _SAME
+                if factors[least] < 1 - SAME
                 else []
             )
             parts += (
                 [f"gains most in {self.columns[most].words} (**{digits(factors[most])}** times better)"]
-                if factors[most] > 1 + _SAME
+                if factors[most] > 1 + SAME
                 else []
             )
             lines += [f"{quoted(self.hero)} {joined(parts)}."] if parts else []
@@ -125,15 +121,14 @@ class Tasks(Section):
 
     @property
     def picture(self) -> Picture | None:
-        """A row for each figure, a mark for each design."""
+        """A row for each measure, a mark for each design."""
         ratios = [
             Ratio(column.words, name, float(np.clip(self.factors[name][at], 1 / _MOST_FACTOR, _MOST_FACTOR)))
             for at, column in enumerate(self.columns)
             for name in self.designs
         ]
         panel = Ratios(f"times better than {self.rggb}", "worse (below 1), or better", tuple(ratios), self.hero, 22)
-        caption = (
-            f"Tasks have a camera of their own: patches that fill the field, on axis, all exposed for {1e3 * self.exposure_s:g} ms, with {self.read_noise_e:g} e of read noise. "
-            f"Beyond {_MOST_FACTOR:g} times: at the edge."
-        )
-        return Picture((panel,), f"Gains and losses against {self.rggb} in {len(self.columns)} figures.", caption)
+        caption = f"Tasks have a camera of their own: patches that fill the field, on axis, all exposed for {1e3 * self.exposure_s:g} ms, with {self.read_noise_e:g} e of read noise."
+        if any(np.abs(np.log(values)).max() > np.log(_MOST_FACTOR) for values in self.factors.values()):
+            caption += f" Beyond {_MOST_FACTOR:g} times: at the edge."
+        return Picture((panel,), f"Gains and losses against {self.rggb} in {len(self.columns)} measures.", caption)

@@ -32,6 +32,8 @@ from ..series import scene_in_words
 from ..terms import (
     bound_conditions,
     colorants_of,
+    edges_in_words,
+    edges_of,
     format_bounded,
     format_missed_constraints,
     is_angle_dependent,
@@ -56,7 +58,7 @@ class Side:
 class TradeOff(Section):
     """The best design beside RGGB, and what limits it.
 
-    `found`: how it was found, for a sentence; `edges_nm`: of a stopband; `notes`: colorants and the like; `over`: what
+    `found`: how it was found, for a sentence; `edges`: of stopbands, nm; `notes`: colorants and the like; `over`: what
     its separation is the worst of; `where`: scene, if there are several; `tile`: the plain CFA of its own tile; `kept`: constrained figures beside the lamps; `bound`: of any filter in its pixel, `below`:
     the curve that it replaces, and the constraints that the bound leaves out; `own`: an objective that is to be the least, in its own unit; `more`: a design that separates more, and what it misses.
     """
@@ -65,7 +67,7 @@ class TradeOff(Section):
     best: Side
     cfa: str
     found: str
-    edges_nm: tuple[float, ...]
+    edges: tuple[tuple[float, float], ...]
     notes: tuple[str, ...]
     over: str
     where: str
@@ -123,7 +125,7 @@ class TradeOff(Section):
             best=Side(label(best), float(best[column.name]), float(best[CFA_SENSITIVITY])),
             cfa=str(best["cfa"]),
             found={SEARCHED: "of this search", SWEPT: "of this sweep", NAMED: "of this study's designs"}.get(best["kind"], "of this study's CFAs"),
-            edges_nm=_edges(best),
+            edges=edges_of(best) if best["kind"] in (SWEPT, SEARCHED) else (),
             notes=(*colorants_of(output, best), *_unconverged(output, best)),
             over=_over(output, column),
             where="" if alone else scene_in_words(scenario),
@@ -155,7 +157,7 @@ class TradeOff(Section):
         """What the best design has, beside RGGB."""
         best, rggb = self.best, self.rggb
         value = of_column(self.column, best.separation)
-        edges = f"With edges at **{joined([f'{edge:.0f}' for edge in self.edges_nm])} nm**, " if self.edges_nm else ""
+        edges = f"With {edges_in_words(self.edges)}, " if self.edges else ""
         notes = f" ({'; '.join(self.notes)})" if self.notes else ""
         who = (
             f"the {best.name} {self.found}{notes} in {self.cfa}"
@@ -230,7 +232,7 @@ class TradeOff(Section):
                     colors,
                     bold,
                     self.replaced,
-                    self.edges_nm,
+                    tuple(edge for pair in self.edges for edge in pair),
                 )
             )
         level = None if self.rggb is None else self.rggb.separation
@@ -257,12 +259,8 @@ def lamp_areas(output: Output) -> dict[str, Values]:
 
 
 def _side(column: Column, row: Row) -> Side:
-    edges = _edges(row) if row["kind"] == SWEPT else ()
-    name = (
-        f"a filter with edges at {joined([f'{edge:.0f}' for edge in edges])} nm ({label(row)})"
-        if edges
-        else quoted(label(row))
-    )
+    edges = edges_in_words(edges_of(row)).replace("**", "") if row["kind"] == SWEPT else ""
+    name = f"a filter with {edges} ({label(row)})" if edges else quoted(label(row))
     return Side(name, float(row[column.name]), float(row[CFA_SENSITIVITY]))
 
 
@@ -285,12 +283,6 @@ def _curves(output: Output, best: Row) -> tuple[dict[str, Values], tuple[str, ..
     ends = dict.fromkeys(end for entry in entries for end in (entry.base, entry.to) if isinstance(end, str))
     replaced = {name: output.curves.sensor[name] for name in ends if name in output.curves.sensor}
     return {**replaced, **kept}, tuple(replaced)
-
-
-def _edges(best: Row) -> tuple[float, ...]:
-    """Return the edges of a filter that was swept or found; empty without a left and a right one."""
-    edges = tuple(float(best.get(name, np.nan)) for name in ("left_nm", "right_nm"))
-    return edges if best["kind"] in (SWEPT, SEARCHED) and np.isfinite(edges).all() else ()
 
 
 def _unconverged(output: Output, best: Row) -> Iterator[str]:
