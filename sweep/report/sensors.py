@@ -23,7 +23,8 @@ from ..runs.uncertainty import REFERENCE_CFA, UNCLIPPED
 from ..study import SensorAndLights, folder_name
 from .hold import holds_for
 from .page import page_of
-from .panels import Picture, Ratio, Ratios
+from .panels import Picture
+from .row_panels import Ratio, Ratios
 from .section import Told, table_of
 from .words import quantity
 

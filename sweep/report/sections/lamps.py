@@ -15,8 +15,9 @@ from ...results.output import Output
 from ...results.tables import NAMED, REFERENCE, SEARCHED
 from ...spectra.color import NORM_NAMES
 from ..leaders import Row, answering, label, leaders_of, reference_of, upper_bound_beside
-from ..panels import Map, Panel, Picture, Rows
-from ..panels import Row as Drawn
+from ..panels import Map, Panel, Picture
+from ..row_panels import Row as Drawn
+from ..row_panels import Rows
 from ..section import MOST_ROWS, Section, Table
 from ..terms import bound_conditions, edges_in_words, edges_of
 from ..words import amount, change, digits, joined, lamp, of_column, quantity, quoted

@@ -16,7 +16,8 @@ from ...metrics.columns.sensitivity import CFA_SENSITIVITY
 from ...results.output import Output
 from ...study.axes import series_of
 from ..leaders import RGGB, answering, label
-from ..panels import Bar, Bars, Line, Lines, Picture
+from ..panels import Line, Lines, Picture
+from ..row_panels import Bar, Bars
 from ..section import MOST_ROWS, Section, Table
 from ..series import Numbers, over_series
 from ..words import amount, digits, inward, joined, one_in, quoted

@@ -13,7 +13,8 @@ from ...metrics.quantity import Column
 from ...results.output import Output
 from ...results.tables import REFERENCE
 from ..leaders import answering, label, reference_of
-from ..panels import Picture, Ratio, Ratios
+from ..panels import Picture
+from ..row_panels import Ratio, Ratios
 from ..section import Section
 from ..words import SAME, digits, joined, quoted
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from ...results.output import Output
 from ..leaders import answering, label
-from ..panels import Picture, Row, Rows
+from ..panels import Picture
+from ..row_panels import Row, Rows
 from ..section import Section
 from ..words import of_column
 
