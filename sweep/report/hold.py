@@ -7,13 +7,14 @@ from collections.abc import Iterable, Iterator
 from ..camera.scene import Scene, WhitePatchExposure
 from ..results.output import Output
 from ..study.axes import series_of
-from .leaders import Row, answering
+from .leaders import Row, answering, modifications
 from .series import Numbers, over_series, scene_in_words
 from .terms import QE, format_constraints, response_of, technology_of
 from .words import joined, number, quoted
 
 _FULL = "full_signals"
 _MOST_NAMED = 3
+_PIXELS = {"R": "red", "G": "green", "B": "blue", "Y": "yellow", "Cy": "cyan", "C": "clear", "W": "clear"}
 
 
 def holds_for(output: Output) -> str:
@@ -26,7 +27,22 @@ def holds_for(output: Output) -> str:
         _varied(output),
         _filters(output),
     ]
-    return f"Holds for {'; '.join(part for part in parts if part)}{f'; with {under}' if under else ''}."
+    return (
+        f"Holds for {'; '.join(part for part in parts if part)}{f'; with {under}' if under else ''}.{_letters(output)}"
+    )
+
+
+def _letters(output: Output) -> str:
+    """Return what the letters in names of CFAs are."""
+    bases = {channel: entry.base for entry in modifications(output) for channel in entry.channel}
+    shown = {channel for cfa in output.table["cfa"].unique() for channel in output.mosaic(str(cfa)).channels}
+    parts = [f"{letter} {_PIXELS[letter]}" for letter in _PIXELS if letter in shown]
+    parts += [
+        f"{letter} {_PIXELS.get(base or '', base or 'one')} with a filter"
+        for letter, base in bases.items()
+        if letter in shown and letter not in _PIXELS
+    ]
+    return f" Pixels in names of CFAs: {', '.join(parts)}." if parts else ""
 
 
 def _curves(output: Output) -> str:

@@ -83,7 +83,8 @@ def sections_of(output: Output) -> tuple[Section | None, list[Section]]:
     candidates = [section for section in found if section.leads and section.answer]
     search = output.provenance.search
     if not output.best.empty and (search is None or search.scenarios < 2):
-        candidates = sorted(candidates, key=lambda section: isinstance(section, (*_OF_SERIES, Tasks)))
+        last = (*_OF_SERIES, Tasks, *(() if search is not None or len(output.scenarios) == 1 else (TradeOff,)))
+        candidates = sorted(candidates, key=lambda section: isinstance(section, last))
     elif not output.best.empty:
         candidates = sorted(candidates, key=lambda section: not (isinstance(section, Series) and section.searched))
     elif output.study.tasks is not None and len(output.scenarios) == 1:

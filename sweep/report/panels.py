@@ -17,6 +17,7 @@ from .look import (
     INK,
     LAMPS,
     LOSS,
+    Style,
     font,
     label_ends,
     log_axis,
@@ -126,6 +127,7 @@ class Ring:
     x: float
     y: float
     text: str = ""
+    below: bool = False
 
 
 @dataclass(frozen=True)
@@ -133,7 +135,7 @@ class Lines:
     """A line for each name over a number, with names at their ends.
 
     `bold`: the name that answers; `level`: a height and its words; `zone`: a range of heights that is not allowed, and
-    its words; `beyond`: a number from which on nothing is asked; `ticks`: heights and their words.
+    its words; `band`: a range of numbers, and its words; `ticks`: heights and their words; `most`: the least upper end.
     """
 
     title: str
@@ -150,6 +152,7 @@ class Lines:
     marked: bool = True
     height: float = 320
     left: float = _LEFT
+    most: float = 0.0
 
     def room(self, *, wide: bool) -> tuple[float, float]:
         """Numbers on the left, names on the right."""
@@ -175,7 +178,8 @@ class Lines:
             low, high = low / 1.5, high * 1.7
             log_axis(axes, "y", low, high)
         else:
-            low, high = min(0.0, low) - 0.02 * (high - low), high + 0.08 * (high - min(0.0, low) or 1.0)
+            low, high = min(0.0, low), max(high, self.most)
+            low, high = low - 0.02 * (high - low), high + 0.08 * (high - low or 1.0)
         if self.ticks:
             axes.set_yticks([height for height, _ in self.ticks], [text for _, text in self.ticks])
         if self.zone is not None:
@@ -199,16 +203,22 @@ class Lines:
                 axes.fill_between(line.x, line.y, line.upper, color=style.color, alpha=0.14, linewidth=0)
             axes.plot(line.x, line.y, linestyle=style.dash, color=style.color, linewidth=3.2 if bold else 1.7,
                       marker=style.marker if self.marked else "", markersize=4.5, zorder=4 if bold else 3)  # fmt: skip
+        axes.set_ylim(low, high)
         ends = {name: (_end(line.y), styles[name], name == self.bold) for name, line in self.lines.items()}
-        label_ends(axes, {name: end for name, end in ends.items() if np.isfinite(end[0])}, (low, high))
+        inside = _label_inside(axes, self.lines, styles, self.bold)
+        label_ends(axes, {n: end for n, end in ends.items() if np.isfinite(end[0]) and n not in inside}, (low, high))
         if self.level is not None:
             axes.axhline(self.level[0], color=INK, linestyle=(0, (1, 2)), linewidth=1.2)
-            axes.text(0.01, self.level[0], self.level[1], transform=axes.get_yaxis_transform(), va="bottom", color=INK,
-                      fontsize=font(axes.figure) - 1)  # type: ignore[arg-type]  # fmt: skip
+            far = [np.min([abs(np.log(abs(line.y[end]) / self.level[0])) for line in self.lines.values()
+                           if np.isfinite(line.y[end]) and line.y[end]] or [0.0]) for end in (0, -1)]  # fmt: skip
+            where, side = (0.01, "left") if far[0] > far[1] else (0.99, "right")
+            axes.text(where, self.level[0], self.level[1], transform=axes.get_yaxis_transform(), va="bottom", color=INK,
+                      ha=side, fontsize=font(axes.figure) - 1)  # type: ignore[arg-type]  # fmt: skip
         for ring in self.rings:
             axes.plot(ring.x, ring.y, "o", markersize=9, markerfacecolor="white", markeredgecolor=LOSS,
                       markeredgewidth=2, zorder=6, clip_on=False)  # fmt: skip
-            words_at(axes, f" {ring.text}", ring.x, ring.y, color=LOSS, fontweight="bold", va="bottom", zorder=7)
+            words_at(axes, f" {ring.text}", ring.x, ring.y, color=LOSS, fontweight="bold",
+                     va="top" if ring.below else "bottom", zorder=7)  # fmt: skip
         axes.set_xlabel(self.x_label, fontsize=font(axes.figure), color=INK)  # type: ignore[arg-type]
 
 
@@ -216,6 +226,40 @@ def _end(y: Values) -> float:
     """Return the last height that is known."""
     known = y[np.isfinite(y)]
     return float(known[-1]) if known.size else np.nan
+
+
+def _label_inside(axes: Axes, lines: Mapping[str, Line], styles: Mapping[str, Style], bold: str) -> set[str]:
+    """Write names whose lines end where others end at the place where their lines are farthest from all others."""
+    to_px = axes.transData.transform
+    (left, _), (right, high) = (to_px((axes.get_xlim()[end], axes.get_ylim()[end])) for end in (0, 1))
+    along = np.linspace(left + 0.06 * (right - left), left + 0.85 * (right - left), 60)
+    heights, last = dict[str, Values](), dict[str, float]()
+    for name, line in lines.items():
+        known = np.isfinite(line.y)
+        if known.any():
+            px = to_px(np.column_stack([line.x[known], np.clip(line.y[known], *axes.get_ylim())]))
+            heights[name], last[name] = np.interp(along, px[:, 0], px[:, 1], np.nan, np.nan), float(px[-1, 1])
+    written, size = list[tuple[float, float]](), font(axes.figure)  # type: ignore[arg-type]
+    inside = set[str]()
+    for name, mine in heights.items():
+        others = [height for other, height in heights.items() if other != name]
+        if not others or min(abs(last[name] - end) for other, end in last.items() if other != name) > 0.6 * size:
+            continue
+        near = np.nan_to_num(np.nanmin([np.abs(mine - other) for other in others], axis=0))
+        for there, height in written:
+            near = np.where(np.abs(along - there) < 7 * size, np.minimum(near, np.abs(mine - height)), near)
+        half = 0.3 * size * len(name)
+        near = np.where(np.isfinite(mine) & (along > left + half) & (along < right - half), near, -1.0)
+        at = int(np.argmax(near))
+        if near[at] < 1.4 * size:
+            continue
+        above = high - mine[at] > 2 * size and not any(0 < other[at] - mine[at] < 3 * size for other in others)
+        x, y = axes.transData.inverted().transform((along[at], mine[at] + (0.4 if above else -0.4) * size))
+        words_at(axes, name, float(x), float(y), color=styles[name].ink, ha="center", va="bottom" if above else "top",
+                 fontweight="bold" if name == bold else "normal", zorder=7)  # fmt: skip
+        written.append((float(along[at]), float(mine[at])))
+        inside.add(name)
+    return inside
 
 
 def _inside(axes: Axes, x: float, y: float) -> tuple[float, float]:
@@ -265,8 +309,9 @@ class Curves:
             apart = np.min([np.abs(curve - other) for other in others], axis=0) if others else curve
             margin = min(8, (nm.size - 1) // 4)
             at = int(np.argmax(np.where(curve > 0.25 * top, apart, -1.0)[margin : nm.size - margin])) + margin
+            above = all(curve[at] >= other[at] for other in others) or apart[at] > 0.1 * top
             words_at(axes, name, float(nm[at]), float(curve[at]), color=self.colors[name], ha="center",
-                     fontweight="bold" if bold else "normal", va="bottom", zorder=5)  # fmt: skip
+                     fontweight="bold" if bold else "normal", va="bottom" if above else "top", zorder=5)  # fmt: skip
         for edge in self.edges:
             axes.axvline(edge, color=GAIN, linestyle=(0, (2, 2)), linewidth=1.2)
         for edge, side in zip(self.edges, ("right", "left") * len(self.edges), strict=False):

@@ -236,8 +236,10 @@ class Ratios:
         log_axis(axes, "x", low, high)
         axes.set_xlim(low / 1.1, high * 1.1)
         axes.set_ylim(len(rows) - 0.3, -1.4 if is_wide(axes) else -2.2)
-        axes.axvspan(low / 1.1, 1, color=FORBIDDEN, linewidth=0, zorder=0)
-        axes.axvline(1, color=INK, linewidth=1.2)
+        below, above = axes.get_ylim()
+        share = (below + 0.6) / (below - above)  # the key stands above the rows
+        axes.axvspan(low / 1.1, 1, 0, share, color=FORBIDDEN, linewidth=0, zorder=0)
+        axes.axvline(1, 0, share, color=INK, linewidth=1.2)
         for one in self.ratios:
             style, bold = styles[one.name], one.name == self.bold
             apart = 0.7 * (names.index(one.name) / max(1, len(names) - 1) - 0.5) * (len(names) > 1)

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 _WIDE = 15.0
 """A ratio of numbers from which on an axis is logarithmic."""
+_LOG, _EVEN = 4.0, 1.05
+"""The same of numbers whose factors from one to the next differ by less than this."""
 _LABELS = {
     "distance_m": ("distance", "m"),
     "exposure_s": ("exposure time", "s"),
@@ -70,8 +72,11 @@ class Numbers:
 
     @property
     def log(self) -> bool:
-        """Return whether the numbers span more than a decade."""
-        return min(self.x) > 0 and max(self.x) / min(self.x) > _WIDE
+        """Return whether the numbers span more than a decade, or grow by factors."""
+        if min(self.x) <= 0 or len(self.x) < 2:
+            return False
+        factors = np.divide(self.x[1:], self.x[:-1])
+        return max(self.x) / min(self.x) > (_LOG if factors.max() < _EVEN * factors.min() else _WIDE)
 
     def with_unit(self, number: float) -> str:
         """Return a number with its unit: `5.56 ms`, `10 %`."""
@@ -93,6 +98,21 @@ class Numbers:
         if first:
             return f"up to {self.at(stop)}"
         return f"from {self.at(start)} on" if last else f"from {self.at(start)} to {self.at(stop)}"
+
+    def about(self, number: float) -> str:
+        """Return a number between computed ones, with two digits."""
+        return self.with_unit(float(f"{number:.2g}"))
+
+    def between(self, start: int, stop: int, low: float | None, high: float | None) -> str:
+        """Return a range in words whose ends lie between computed numbers, or at these where a line has no crossing."""
+        if low is None and high is None:
+            return self.span(start, stop)
+        first, last = start == 0, stop == len(self.x) - 1
+        if high is None:
+            return f"from about {self.about(low or 0.0)}{' on' if last else f' to {self.at(stop)}'}"
+        if low is None:
+            return f"{'up' if first else f'from {self.at(start)}'} to about {self.about(high)}"
+        return f"from about {self.about(low)} to {self.about(high)}"
 
     def where(self, mask: Bool[BoolArray, " numbers"]) -> str:
         """Return the computed numbers at which something holds, in words."""

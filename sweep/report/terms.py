@@ -9,11 +9,12 @@ import numpy as np
 
 from ..designs.technology import Technology
 from ..metrics.bound import FEASIBLE, Bound
+from ..metrics.columns.tasks import PREFIX
 from ..metrics.quantity import Column
 from ..results.output import Output
 from ..results.tables import NAMED, REFERENCE, SEARCHED, SWEPT
 from .leaders import Row
-from .words import joined
+from .words import joined, quantity
 
 QE = "quantum efficiency"
 _RELATIVE = 0.99
@@ -22,7 +23,7 @@ _NO_DEPTH = 1e-3
 
 def format_constraint(output: Output, name: str, bound: Bound) -> str:
     """Format a constraint, for example `slope at most 0.06 per nm`."""
-    words, column = output.words(name), output.columns.get(name)
+    words, column = named(output, name), output.columns.get(name)
     if bound.max is None:
         return f"{words} at least {_with_unit(column, bound.min)}"
     if bound.min is None:
@@ -30,6 +31,12 @@ def format_constraint(output: Output, name: str, bound: Bound) -> str:
     if bound.min == bound.max:
         return f"{words} of {_with_unit(column, bound.min)}"
     return f"{words} from {bound.min:g} to {_with_unit(column, bound.max)}"
+
+
+def named(output: Output, name: str) -> str:
+    """Return a constrained quantity in words of people."""
+    column = output.columns.get(name)
+    return quantity(column) if column is not None and column.metric.startswith(PREFIX) else output.words(name)
 
 
 def format_bounded(column: Column, bound: Bound) -> str:
@@ -147,5 +154,5 @@ def edges_in_words(edges: tuple[tuple[float, float], ...]) -> str:
 def bound_conditions(output: Output) -> str:
     """Return the constraints under which a search's upper bound holds, in words."""
     search = output.provenance.search
-    left_out = [] if search is None else [output.words(name) for name in search.limit_left_out]
+    left_out = [] if search is None else [named(output, name) for name in search.limit_left_out]
     return f"under the same constraints{f' except {joined(left_out)}' if left_out else ''}"

@@ -7,6 +7,7 @@ import re
 
 from ..metrics.columns.chromatic import CHROMATIC_ERROR
 from ..metrics.columns.confusion import STATE_ERROR, STATE_ERROR_BOUND
+from ..metrics.columns.tasks import PREFIX as TASK
 from ..metrics.quantity import DN, LOG10, Column
 from ..results.output import Output
 
@@ -23,11 +24,15 @@ _TIMES = 3.0
 _WORDS = {
     "cfa_sensitivity": "light of the whole CFA",
     "exposure_s": "exposure of a white patch",
-    "color_delta_e_mean_d65": "color error in daylight, mean ΔE00",
-    "low_light_lux_led": "illuminance for SNR 10, white LED",
-    "low_light_lux_a": "illuminance for SNR 10, incandescent",
 }
 """Names of quantities for who does not know the columns."""
+_OF_TASKS = {
+    "color mean error": "mean color error ΔE00",
+    "color luminance SNR": "luminance SNR",
+    "color Vora value": "Vora value of colors",
+    "low light illuminance for SNR 10": "illuminance for SNR 10",
+}
+_IN_LIGHT = {"D65": "daylight", "A": "incandescent light", "LED": "white LED light", "HPS": "sodium light"}
 
 
 def digits(value: float) -> str:
@@ -112,6 +117,10 @@ def quantity(column: Column) -> str:
     if column.name in _WORDS:
         return _WORDS[column.name]
     words = column.words.replace("CSD", "separation")
+    if column.metric.startswith(TASK):
+        what, _, light = words.rpartition(" ")
+        what, light = (what, f" under {_IN_LIGHT[light]}") if light in _IN_LIGHT else (words, "")
+        return f"{_OF_TASKS.get(what, what)}{light}"
     return (
         f"{words.replace('chromatic ', '', 1)} of lamps of any brightness"
         if words.startswith("chromatic ") and "separation" in words

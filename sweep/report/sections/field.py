@@ -11,10 +11,12 @@ from ...base.types import Array, Float
 from ...metrics.quantity import Column
 from ...results.output import Output
 from ..leaders import RGGB, answering, label, leaders_of, upper_bound_beside
-from ..panels import Line, Lines, Picture, Ring
+from ..look import styles_of
+from ..panels import Curves, Line, Lines, Picture, Ring
 from ..section import MOST_ROWS, Section, Table
 from ..terms import bound_conditions, colorants_of, edges_in_words, edges_of, is_angle_dependent
-from ..words import amount, change, joined, of_column, quantity, quoted
+from ..words import amount, change, digits, joined, of_column, quantity, quoted
+from .trade_off import filter_curves
 
 Values = Float[Array, " places"]
 
@@ -34,6 +36,8 @@ class Field(Section):
     bound: float | None
     bound_of: str
     moves: bool
+    filters: Curves | None
+    edges_of: Mapping[str, str]
 
     heading = "From the center to the corner"
     leads = True
@@ -67,6 +71,11 @@ class Field(Section):
                 upper_bound_beside(output, best),
                 bound_conditions(output),
                 is_angle_dependent(output, best),
+                filter_curves(output, best, styles_of(values)[label(best)].color, 200),
+                {
+                    label(row): ", ".join(f"{a:.0f} to {b:.0f} nm" for a, b in edges_of(row))
+                    for row in rows.to_dict("records")
+                },
             )
 
     def _falls(self, name: str) -> bool:
@@ -96,8 +105,20 @@ class Field(Section):
         lines = [
             f"{edges} keeps at least **{of_column(self.column, self.worst[self.hero])}** from the center to the corner at {corner}{beside}."
         ]
+        if not self.moves:
+            others = sorted(
+                (name for name in self.values if name != self.hero and name in self.edges_of),
+                key=lambda n: -self.worst[n],
+            )
+            rival = next((name for name in others if name != RGGB), None)
+            beside = (
+                ""
+                if rival is None
+                else f" {quoted(rival)} comes next with {of_column(self.column, self.worst[rival])}."
+            )
+            return [f"{lines[0][:-1]}: it does not move with the angle.{beside}"]
         fallen = [
-            f"{quoted(name)} ({amount(float(y[0]), 'DN')} in the center) at **{at:.0f}°**"
+            f"{quoted(name)} (from {digits(float(y[0]))} to {amount(float(y[-1]), 'DN')}) at **{at:.0f}°**"
             for at, name, y in sorted(
                 ((self._below(name) or 0.0, name, y) for name, y in self.values.items() if self._falls(name)),
                 key=lambda item: item[:2],
@@ -134,20 +155,25 @@ class Field(Section):
             self.hero,
             rings=tuple(rings),
             marked=False,
+            height=320 if self.moves else 240,
         )
         caption = (
             f"Computed at {len(self.angles)} places. Rings: the angle at which a filter falls below RGGB."
             if rings
             else f"Computed at {len(self.angles)} places."
         )
-        return Picture((panel,), "Separation over the chief ray angle.", caption)
+        if self.filters is None or self.moves:
+            return Picture((panel,), "Separation over the chief ray angle.", caption)
+        return Picture(
+            (self.filters, panel), "Where it filters, and separation over the chief ray angle.", caption, columns=1
+        )
 
     @property
     def table(self) -> Table | None:
         """Center, corner and the least of each."""
         rows = [
-            (name, of_column(self.column, float(y[0])), of_column(self.column, float(y[-1])), of_column(self.column, self.worst[name]),
+            (name, self.edges_of.get(name, ""), of_column(self.column, float(y[0])), of_column(self.column, float(y[-1])), of_column(self.column, self.worst[name]),
              "" if name == RGGB or RGGB not in self.worst else change(self.worst[name], self.worst[RGGB]))
             for name, y in list(self.values.items())[:MOST_ROWS]
         ]  # fmt: skip
-        return Table(("", "center", "corner", "least", "least against RGGB"), tuple(rows))
+        return Table(("", "edges of its stopbands", "center", "corner", "least", "least against RGGB"), tuple(rows))

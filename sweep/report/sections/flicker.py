@@ -17,10 +17,9 @@ from ..leaders import RGGB, answering, label, reference_of
 from ..panels import Line, Lines, Panel, Picture
 from ..section import Section, Table
 from ..series import Numbers, over_series
-from ..words import amount, change, digits, joined
+from ..words import amount, change, joined, number, quoted
 
 Values = Float[Array, " numbers"]
-_LEAST_SHARE = 1e-8
 _ALL = 1 - 1e-9
 _MOST_SERIES = 2
 
@@ -36,13 +35,27 @@ class Worst:
 
 @dataclass(frozen=True)
 class OverPulses:
-    """Shares over one number: of lamps missed, swings of brightness, false hue of the yellow/red distance."""
+    """Shares over one number: of lamps missed, swings of brightness, false hue of the yellow/red distance.
+
+    `fixed`: the other number of the pulses, in words; `apart`: least yellow/red distance of each, DN.
+    """
 
     numbers: Numbers
+    fixed: str
     missed: Mapping[str, Values]
     swing: Mapping[str, Values]
     hue: Mapping[str, Values]
+    apart: Mapping[str, float]
     worst: Mapping[str, tuple[Worst, ...]]
+
+    @property
+    def span(self) -> str:
+        """The pulses in words."""
+        low, high = self.numbers.x[0], self.numbers.x[-1]
+        between = f"{number(self.numbers.factor * low)} to {self.numbers.with_unit(high)}"
+        what = {"frequency_hz": f"at {between}", "duty": f"on for {between} of the time"}
+        fixed = f" ({self.fixed})" if self.fixed else ""
+        return f"{what.get(self.numbers.key, f'with {between} of {self.numbers.name}')}{fixed}"
 
 
 @dataclass(frozen=True)
@@ -80,7 +93,9 @@ class Flicker(Section):
             shares = {name: hue[name] / np.where(apart[name] > 0, apart[name], np.nan) for name in hue if name in apart}
             numbers = Numbers(base, key, tuple(scenarios.values()))
             missed = {name: 1 - values for name, values in seen.items()}
-            found.append(OverPulses(numbers, missed, over_series(rows, scenarios, MODULATION), shares, worst))
+            least = {name: float(np.min(values)) for name, values in apart.items()}
+            swing = over_series(rows, scenarios, MODULATION)
+            found.append(OverPulses(numbers, _fixed(output, scenarios), missed, swing, shares, least, worst))
         if found and all(float(np.max([*one.missed.values()])) <= 1 - _ALL for one in found):
             hero, rggb = answering(output), reference_of(output, output.scenarios[0])
             names = "/".join(pair)
@@ -106,21 +121,30 @@ class Flicker(Section):
     def answer(self) -> list[str]:
         """Whether lamps are missed, how they swing, and how far hue moves."""
         swing, over = self._extreme(MODULATION, "swing")
-        swings = f"its brightness swings by up to **±{amount(swing.value, 'share')}** ({swing.name} at {over.numbers.with_unit(swing.at)})"
-        lines = [f"The exposure **misses no lamp** in any phase of the pulses; {swings}."]
-        hues = [(name, one, v) for one in self.series for name, v in one.hue.items() if np.isfinite(v).any()]
+        refined = all(one.worst.get(LAMP_SEEN) for one in self.series)
+        lines = [
+            f"**Never**: the exposure meets a lamp in every phase of pulses {joined([one.span for one in self.series])}"
+            f"{', also between the computed ones' * refined}. Its brightness swings by up to "
+            f"**±{amount(swing.value, 'share')}** ({swing.name} at {over.numbers.with_unit(swing.at)})."
+        ]
+        hues = sorted(((self._hue(name), name) for name in self.series[0].hue), reverse=True)
+        hues = [(share, name) for share, name in hues if np.isfinite(share)]
         if hues:
-            name, one, values = max(hues, key=lambda item: float(np.nanmax(item[2])))
-            number, share = one.numbers.x[int(np.nanargmax(values))], float(np.nanmax(values))
-            dn, _ = (
-                self._extreme(FALSE_HUE, "hue")
-                if any(one.worst.get(FALSE_HUE) for one in self.series)
-                else (None, None)
+            (most, name), *others = hues
+            beside = "".join(f"; {quoted(other)} {amount(share, 'share')}" for share, other in others[:3])
+            lines.append(
+                f"Its hue moves by at most **{amount(most, 'share')}** of the {self.pair} distance ({quoted(name)}{beside})."
             )
-            text = f"Its hue moves by at most **{amount(share, 'share')}** of the {self.pair} distance at the computed pulses ({name} at {one.numbers.with_unit(number)})"
-            text += "" if dn is None else f", and by at most {digits(dn.value)} DN between them, too ({dn.name})"
-            lines.append(f"{text}.")
         return lines
+
+    def _hue(self, name: str) -> float:
+        """Return the largest false hue of a design as a share of its least distance, between the scenes where known."""
+        shares = [most_of([one.hue.get(name)]) for one in self.series]
+        for one in self.series:
+            for known in one.worst.get(FALSE_HUE, ()):
+                if known.name == name and one.apart.get(name, 0.0) > 0:
+                    shares.append(known.value / one.apart[name])
+        return max((share for share in shares if np.isfinite(share)), default=np.nan)
 
     @property
     def limits(self) -> list[str]:
@@ -134,40 +158,27 @@ class Flicker(Section):
     def picture(self) -> Picture | None:
         """Missed lamps and swings above false hue, a column for each series."""
         above, below = list[Panel](), list[Panel]()
+        most_hue = 100 * max(most_of(one.hue.values()) for one in self.series)
+        most_swing = 100 * max(most_of(one.swing.values()) for one in self.series)
         for one in self.series:
-            x = np.array(one.numbers.drawn)
+            x, axis = np.array(one.numbers.drawn), f"{one.numbers.axis}{f' ({one.fixed})' if one.fixed else ''}"
             most = {"missed": np.max([*one.missed.values()], axis=0), "swing": np.max([*one.swing.values()], axis=0)}
             lines = {f"{name}, worst CFA": Line(x, 100 * values) for name, values in most.items()}
+            hue = {name: Line(x, 100 * np.nan_to_num(v)) for name, v in one.hue.items()}
+            log = one.numbers.log
             above.append(
-                Lines(
-                    "lamps missed, and swing of brightness / %",
-                    one.numbers.axis,
-                    lines,
-                    log_x=one.numbers.log,
-                    height=190,
-                )
+                Lines("lamps missed, and swing of brightness / %", axis, lines, log_x=log, height=190, most=most_swing)
             )
-            hue = {name: Line(x, np.maximum(100 * np.nan_to_num(v), 100 * _LEAST_SHARE)) for name, v in one.hue.items()}
             below.append(
                 Lines(
-                    f"false hue / % of the {self.pair} distance",
-                    one.numbers.axis,
-                    hue,
-                    self.hero,
-                    one.numbers.log,
-                    True,
-                    height=190,
+                    f"false hue / % of the {self.pair} distance", axis, hue, self.hero, log, height=190, most=most_hue
                 )
             )
         alone = (
             f"Lamps missed, swing of brightness and false hue over {joined([one.numbers.name for one in self.series])}."
         )
-        return Picture(
-            (*above, *below),
-            alone,
-            f"Worst of all lamps and all moments of the pulses. Under {100 * _LEAST_SHARE:g} % is drawn there.",
-            columns=len(self.series),
-        )
+        caption = "Worst of all lamps and all moments of the pulses, at the computed pulses (dots)."
+        return Picture((*above, *below), alone, caption, columns=len(self.series))
 
     @property
     def table(self) -> Table | None:
@@ -176,8 +187,7 @@ class Flicker(Section):
         for name in self.series[0].missed:
             missed = max(float(np.max(one.missed[name])) for one in self.series)
             swing = max(float(np.max(one.swing[name])) for one in self.series)
-            hue = most_of(one.hue.get(name) for one in self.series)
-            its = most_of(one.hue.get(self.rggb) for one in self.series)
+            hue, its = self._hue(name), self._hue(self.rggb) if self.rggb in self.series[0].hue else np.nan
             rows.append(
                 (
                     name,
@@ -197,6 +207,15 @@ class Flicker(Section):
             ),
             tuple(rows),
         )
+
+
+def _fixed(output: Output, scenarios: Mapping[str, float]) -> str:
+    """Return the frequency or the duty that all scenes of a series share, in words."""
+    drives = [drive for name in scenarios if (drive := output.study.scenarios[name].drive) is not None]
+    frequencies, duties = {drive.frequency_hz for drive in drives}, {drive.duty for drive in drives}
+    parts = [f"at {number(*frequencies)} Hz"] if len(frequencies) == 1 else []
+    parts += [f"on for {number(100 * next(iter(duties)))} % of the time"] if len(duties) == 1 else []
+    return ", ".join(parts)
 
 
 def most_of(series: Iterable[Values | None]) -> float:

@@ -15,12 +15,14 @@ from ...results.output import Output
 from ...results.tables import NAMED, REFERENCE, SEARCHED
 from ...spectra.color import NORM_NAMES
 from ..leaders import Row, answering, label, leaders_of, reference_of, upper_bound_beside
-from ..panels import Map, Panel, Picture
+from ..look import styles_of
+from ..panels import Curves, Map, Panel, Picture
 from ..row_panels import Row as Drawn
 from ..row_panels import Rows
 from ..section import MOST_ROWS, Section, Table
 from ..terms import bound_conditions, edges_in_words, edges_of
 from ..words import amount, change, digits, joined, lamp, of_column, quantity, quoted
+from .trade_off import filter_curves
 
 _MOST_MAPS = 3
 _MODELED = "single LEDs, modeled as hyperbolic secants, all pairs counted equally"
@@ -51,6 +53,7 @@ class Lamps(Section):
     wanted_dn: float | None
     bound: float | None
     bound_of: str
+    filters: Curves | None
     front: tuple[tuple[float, float], ...]
 
     heading = "In the worst case"
@@ -76,7 +79,8 @@ class Lamps(Section):
                 column, output.columns[column.of], tuple(judged), label(best), edges_in_words(edges_of(best)),
                 (float(best[CFA_SENSITIVITY]), np.nan if rggb is None else float(rggb[CFA_SENSITIVITY])),
                 "" if rggb is None else label(rggb), None if population is None else population.wanted_dn,
-                upper_bound_beside(output, best), bound_conditions(output), front,
+                upper_bound_beside(output, best), bound_conditions(output),
+                filter_curves(output, best, styles_of(one.name for one in judged)[label(best)].color, 200), front,
             )  # fmt: skip
         yield from Allowed.of(output)
 
@@ -156,7 +160,8 @@ class Lamps(Section):
             if yields
             else ""
         )
-        return Picture((panel,), "Worst and nominal separation of each CFA and design.", caption)
+        panels = (panel,) if self.filters is None else (self.filters, panel)
+        return Picture(panels, "Worst and nominal separation of each CFA and design.", caption, columns=1)
 
     @property
     def table(self) -> Table | None:

@@ -13,8 +13,10 @@ from ...metrics.columns.sensitivity import CFA_SENSITIVITY
 from ...metrics.quantity import Column
 from ...results.output import Output
 from ...spectra.lights import pair_name
+from ...study.axes import series_of
 from ..leaders import Row, answering, label, own_tile, reference_of
 from ..section import Section, Table
+from ..series import scene_in_words
 from ..words import amount, change, effect, of_column, quantity
 
 _TASKS = ("color_delta_e_mean_d65", "low_light_lux_led", "low_light_lux_a")
@@ -28,6 +30,7 @@ class Price(Section):
     columns: tuple[Column, ...]
     names: tuple[str, ...]
     values: tuple[tuple[float, ...], ...]
+    where: str
 
     heading = "The price"
 
@@ -47,7 +50,12 @@ class Price(Section):
         ]
         values = tuple(tuple(float(row[column.name]) for row in rows) for column in columns[:_MOST])
         if columns:
-            yield cls(tuple(columns[:_MOST]), tuple(label(row) for row in rows), values)
+            yield cls(tuple(columns[:_MOST]), tuple(label(row) for row in rows), values, _where(output, best))
+
+    @property
+    def title(self) -> str:
+        """In which scene."""
+        return f"{self.heading} ({self.where})" if self.where else self.heading
 
     @property
     def table(self) -> Table | None:
@@ -78,6 +86,13 @@ class Price(Section):
             len(self.names),
             2 if len(self.names) > 2 else -1,
         )
+
+
+def _where(output: Output, best: Row) -> str:
+    """Return the scene, where the study has others that are no series."""
+    inner = {name for members in series_of(output.scenarios).values() for name in members}
+    alone = len(output.scenarios) == 1 or inner >= {*output.scenarios}
+    return "" if alone else scene_in_words(str(best["scenario"]))
 
 
 def _names(output: Output) -> list[str]:

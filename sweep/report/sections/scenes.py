@@ -11,9 +11,11 @@ from ...results.output import Output
 from ...results.tables import SEARCHED, SWEPT
 from ...study.axes import series_of
 from ..leaders import label, leaders_of, reference_of
+from ..panels import Picture
+from ..row_panels import Row, Rows
 from ..section import MOST_ROWS, Section, Table
 from ..series import scene_in_words
-from ..words import amount, of_column, quantity
+from ..words import amount, change, of_column, quantity
 
 
 @dataclass(frozen=True)
@@ -23,8 +25,13 @@ class Scenes(Section):
     column: Column
     rows: tuple[tuple[str, ...], ...]
     total: int
+    drawn: tuple[Row, ...]
+    above: tuple[int, int]
+    rggb: str
+    swept: bool
 
-    heading = "In other scenes"
+    heading = "In each scene"
+    leads = True
 
     @classmethod
     def of(cls, output: Output) -> Iterator[Section]:
@@ -33,7 +40,7 @@ class Scenes(Section):
             return
         column = output.trade_off[0]
         inner = {name for members in series_of(output.scenarios).values() for name in list(members)[1:-1]}
-        rows = []
+        rows, drawn, above, rggb_name = list[tuple[str, ...]](), list[Row](), 0, ""
         for scenario in (name for name in output.scenarios if name not in inner):
             best, rggb = leaders_of(output, scenario).chosen, reference_of(output, scenario)
             its = "" if rggb is None else of_column(column, float(rggb[column.name]))
@@ -41,8 +48,42 @@ class Scenes(Section):
                 rows.append((scene_in_words(scenario), "none meets every constraint", "", "", its))
                 continue
             value, light = of_column(column, float(best[column.name])), amount(float(best[CFA_SENSITIVITY]), "share")
+            if rggb is not None and float(rggb[column.name]) > 0:
+                ratio, rggb_name = float(best[column.name]) / float(rggb[column.name]), label(rggb)
+                drawn.append(Row(scene_in_words(scenario), ratio, text=f"{value}; {rggb_name} {its}", lost=ratio < 1))
+                above += ratio > 1
             rows.append((scene_in_words(scenario), f"{label(best)} of {best['cfa']}", value, light, its))
-        yield cls(column, tuple(rows[:MOST_ROWS]), len(rows))
+        shown = tuple(drawn) if len(drawn) == len(rows) <= MOST_ROWS else ()
+        alone = output.provenance.search is None and not series_of(output.scenarios)
+        yield cls(column, tuple(rows[:MOST_ROWS]), len(rows), shown, (above, len(drawn)), rggb_name, alone)
+
+    @property
+    def answer(self) -> list[str]:
+        """In how many scenes the best design of a sweep is above RGGB, and where it is least so."""
+        if not self.swept or not self.drawn:
+            return []
+        above, of = self.above
+        least, most = (pick(self.drawn, key=lambda one: one.value) for pick in (min, max))
+        return [
+            f"In **{above} of {of} scenes** the best filter of this sweep has a larger {quantity(self.column)} than {self.rggb}: "
+            f"from {_against(least)} to {_against(most)}."
+        ]
+
+    @property
+    def picture(self) -> Picture | None:
+        """The ratio to RGGB of each scene."""
+        if not self.swept or not self.drawn:
+            return None
+        axis = f"times the {quantity(self.column)} of {self.rggb}"
+        panel = Rows(
+            "best filter of each scene",
+            axis,
+            self.drawn,
+            level=(1.0, f"as {self.rggb}"),
+            plain=True,
+            right=quantity(self.column),
+        )
+        return Picture((panel,), f"The best filter of each scene against {self.rggb}.")
 
     @property
     def table(self) -> Table | None:
@@ -53,3 +94,8 @@ class Scenes(Section):
             else ""
         )
         return Table(("scene", "best design", quantity(self.column), "light", "RGGB"), self.rows, note)
+
+
+def _against(one: Row) -> str:
+    """Return a scene with its ratio and its values."""
+    return f"**{change(one.value, 1.0)}** in {one.name} ({one.text})"

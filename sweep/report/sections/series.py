@@ -8,13 +8,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...base.types import Array, Float
+from ...metrics.columns.chromatic import CHROMATIC_DPRIME
+from ...metrics.columns.confusion import D_PRIME
 from ...metrics.columns.flicker import LAMP_SEEN
 from ...metrics.columns.sensitivity import CFA_SENSITIVITY
 from ...metrics.quantity import DN, Column
 from ...results.output import Output
 from ...study.axes import series_of
 from ..leaders import RGGB, answering, label
-from ..panels import Line, Lines, Picture, Ring
+from ..panels import Line, Lines, Panel, Picture, Ring
 from ..section import MOST_ROWS, Section, Table
 from ..series import Numbers, over_series
 from ..terms import edges_in_words, edges_of
@@ -25,6 +27,8 @@ _LEAST = 1.0
 """DN; who separates less is not said to lead."""
 _LEAST_DRAWN = 0.3
 _SEEN = 1e-9
+_STEEP = 100.0
+"""Between computed scenes whose values differ by this factor no crossing is told."""
 _MOST_RANGES = 4
 _MOST_COLUMNS = 4
 
@@ -118,13 +122,12 @@ class Series(Section):
         A leader stays one as long as no other design has more.
         """
         known = {name: np.nan_to_num(y, nan=-np.inf) for name, y in self.values.items()}
-        least = _LEAST if self.column.unit == DN else 0.0
         leads: list[tuple[str | None, int, int]] = []
         for at in range(len(self.numbers.x)):
             most = max(y[at] for y in known.values())
             before = leads[-1][0] if leads else None
             leader: str | None = None
-            if most >= least:
+            if most >= self._least:
                 ties = [name for name, y in known.items() if y[at] == most]
                 leader = before if before in ties else ties[0]
             if leads and before == leader:
@@ -135,23 +138,65 @@ class Series(Section):
 
     @property
     def answer(self) -> list[str]:
-        """The leader of each range, with its value and its rival's at the end; of a search its worst value."""
+        """The leader of each range, with its value and its rival's; of a search its worst value."""
         if self.searched:
             return [*self._of_search(), *self._losses()]
-        return [*self._of_pulses(), *self._reached(), self._of_leaders()]
+        return [*self._of_pulses(), *self._reached(), *self._of_leaders()]
+
+    @property
+    def _least(self) -> float:
+        return _LEAST if self.column.unit == DN else 0.0
+
+    def _crossing(self, first: Values, second: Values, at: int) -> tuple[float, float] | None:
+        """Return where two lines of the figure cross after a computed number, and how high, or None."""
+        x = np.array(self.numbers.x)[at : at + 2]
+        mine, its = first[at : at + 2], second[at : at + 2]
+        log = self.column.unit == DN and self._vanishes
+        if not np.isfinite([*mine, *its]).all():
+            return None
+        if log and not all(0 < max(y) < _STEEP * min(y) for y in (mine, its)):
+            return None
+        across = np.log(x) if self.numbers.log else x
+        apart = (np.log(mine) - np.log(its)) if log else mine - its
+        if apart[0] == apart[1] or apart[0] * apart[1] > 0:
+            return None
+        share = float(apart[0] / (apart[0] - apart[1]))
+        number = float(across[0] + share * (across[1] - across[0]))
+        height = float(np.log(its[0]) + share * np.log(its[1] / its[0]) if log else its[0] + share * (its[1] - its[0]))
+        return float(np.exp(number)) if self.numbers.log else number, float(np.exp(height)) if log else height
+
+    def _where(self, mine: Values, its: Values) -> str:
+        """Return in words where one line has at least what another has, between computed numbers by straight lines."""
+        mask, parts = np.nan_to_num(mine, nan=-np.inf) >= np.nan_to_num(its, nan=-np.inf), []
+        for run in np.split(np.arange(mask.size), np.flatnonzero(np.diff(mask)) + 1):
+            start, stop = int(run[0]), int(run[-1])
+            if not mask[start]:
+                continue
+            ends = [None if end in (-1, mask.size - 1) else self._crossing(mine, its, end) for end in (start - 1, stop)]
+            parts.append(self.numbers.between(start, stop, *(None if end is None else end[0] for end in ends)))
+        return joined(parts)
+
+    @property
+    def _vanishes(self) -> bool:
+        return self.column.unit == DN and any((y < _LEAST).any() for y in self.values.values())
 
     def _reached(self) -> Iterator[str]:
-        """Yield where 1 DN is left, where that is not everywhere."""
-        ranges: dict[str, list[str]] = {}
-        masks = {name: y >= _LEAST for name, y in self.values.items() if np.isfinite(y).all()}
-        if self.column.unit != DN or all(mask.all() for mask in masks.values()):
+        """Yield where the filter and RGGB have 1 DN, where that is not everywhere."""
+        if not self._vanishes or (self.missed is not None and (self.missed > _SEEN).any()):
             return
-        for name, mask in masks.items():
-            ranges.setdefault(self.numbers.where(mask) if mask.any() else "nowhere", []).append(quoted(name))
-        parts = [f"**{where}** with {joined(names)}" for where, names in ranges.items()]
+        ranges: dict[str, list[str]] = {}
+        for name in dict.fromkeys((self.hero, RGGB)):
+            if name in self.values:
+                ranges.setdefault(self._from_least(name), []).append(quoted(name))
         kinds = " and ".join(self.column.pair or ())
         kinds += " lamps of any brightness" if self.column.name.startswith("chromatic") else " lamps"
-        yield f"{kinds.capitalize()} are 1 DN or more apart {'; '.join(parts)}."
+        parts = [f"**{where}** with {joined(names)}" for where, names in ranges.items()]
+        if parts:
+            yield f"{kinds.capitalize()} are 1 DN or more apart {'; '.join(parts)}."
+
+    def _from_least(self, name: str) -> str:
+        y = self.values[name]
+        return self._where(y, np.full_like(y, _LEAST)) or "nowhere"
 
     def _of_pulses(self) -> Iterator[str]:
         if self.missed is None or not (self.missed > _SEEN).any():
@@ -174,35 +219,59 @@ class Series(Section):
     @property
     def short(self) -> str:
         """Where the filter loses, or who leads."""
-        return next(iter(self._losses()), self._of_leaders())
+        return next(iter((*self._losses(), *self._of_leaders())), "")
 
     def _of_search(self) -> Iterator[str]:
         def least(name: str) -> str:
             value, number = self.worst[name]
-            return f"{of_column(self.column, inward(value, up=False))} (at {self.numbers.with_unit(number)})"
+            return f"{of_column(self.column, inward(value, up=False))} at {self.numbers.with_unit(number)}"
 
-        text = f"From {self.numbers.at(0)} to {self.numbers.at(len(self.numbers.x) - 1)}, {quoted(self.hero)}{f' ({self.edges})' if self.edges else ''} has {article(quantity(self.column))} of at least **{least(self.hero)}**"
-        others = [f"{quoted(name)} {least(name)}" for name in self.worst if name != self.hero]
-        yield f"{text}; others: {', '.join(others)}." if others else f"{text}."
+        span = f"From {self.numbers.at(0)} to {self.numbers.at(len(self.numbers.x) - 1)}"
+        who = f"{quoted(self.hero)}{f' ({self.edges})' if self.edges else ''}"
+        others = [name for name in self.worst if name not in (self.hero, RGGB)]
+        shown = [*((RGGB,) if RGGB in self.worst else ()), *sorted(others, key=lambda name: -self.worst[name][0])[:1]]
+        beside = f" ({'; '.join(f'{quoted(name)}: {least(name)}' for name in shown)})" if shown else ""
+        if self.column.metric in (D_PRIME, CHROMATIC_DPRIME) and self.column.pair:
+            far = " of any brightness" if self.column.metric == CHROMATIC_DPRIME else ""
+            value, number = self.worst[self.hero]
+            yield (
+                f"{span}, {who} keeps {' and '.join(self.column.pair)} lamps{far} apart by at least "
+                f"**{of_column(self.column, inward(value, up=False))} times their noise** (d', at {self.numbers.with_unit(number)}){beside}."
+            )
+            return
+        yield f"{span}, {who} has {article(quantity(self.column))} of at least **{least(self.hero)}**{beside}."
 
-    def _of_leaders(self) -> str:
-        leads, parts = self.leads_of, []
-        for leader, start, stop in leads[:_MOST_RANGES]:
-            span = self.numbers.span(start, stop)
+    def _of_leaders(self) -> Iterator[str]:
+        parts, told = list[str](), 0
+        pulsed = self.missed is not None and bool((self.missed > _SEEN).any())
+        leads = [lead for lead in self.leads_of if lead[0] is not None or not pulsed]
+        for at, (leader, start, stop) in enumerate(leads[:_MOST_RANGES]):
             if leader is None:
-                parts.append(f"no CFA separates 1 DN {span}")
+                parts.append(f"no CFA separates 1 DN {self.numbers.span(start, stop)}")
                 continue
-            verb = "" if any(" most " in part or " the largest " in part for part in parts) else f" {self._verb}"
+            ends = []
+            for other, end in ((at - 1, start - 1), (at + 1, stop)):
+                name = leads[other][0] if 0 <= other < len(leads) else None
+                crossed = None if name is None else self._crossing(self.values[leader], self.values[name], end)
+                ends.append(None if crossed is None else crossed[0])
+            verb = "" if told else f" {self._verb}"
+            told += 1
+            own = self.values[leader][start : stop + 1]
+            most = start + int(np.nanargmax(own))
             others = sorted(
-                (d for d in self.values if d != leader), key=lambda d: -np.nan_to_num(self.values[d][stop], nan=-np.inf)
+                (d for d in self.values if d != leader),
+                key=lambda d: -np.nan_to_num(self.values[d][most], nan=-np.inf),
             )
             rival = next((name for name in (RGGB, self.hero) if name in others), next(iter(others), None))
-            where = "" if start == stop else f" at {self.numbers.at(stop)}"
-            beside = f"; {quoted(rival)} {self._value(rival, stop)}" if rival else ""
-            parts.append(f"**{quoted(leader)}**{verb} {span} ({self._value(leader, stop)}{where}{beside})")
+            beside = f"; {quoted(rival)} {self._value(rival, most)}" if rival else ""
+            where = self.numbers.between(start, stop, *ends)
+            parts.append(
+                f"**{quoted(leader)}**{verb} {where} ({self._value(leader, most)} at {self.numbers.at(most)}{beside})"
+            )
         more = f"; {len(leads) - _MOST_RANGES} more ranges follow" if len(leads) > _MOST_RANGES else ""
-        among = f" ({self.among})" if self.among else ""
-        return f"Over {self.numbers.name}{among}, {'; '.join(parts)}{more}."
+        among = f" ({self.among})" if self.among and not pulsed else ""
+        if parts:
+            yield f"Over {self.numbers.name}{among}, {'; '.join(parts)}{more}."
 
     @property
     def _verb(self) -> str:
@@ -222,57 +291,84 @@ class Series(Section):
         if mine is None or its is None or self.hero == RGGB:
             return
         below = np.nan_to_num(mine, nan=-np.inf) < np.nan_to_num(its, nan=-np.inf)
-        reached = np.maximum(mine, its) >= (_LEAST if self.column.unit == DN else 0.0)
+        reached = np.maximum(mine, its) >= self._least
         if (below & reached).any():
-            yield f"{quoted(self.hero)} has less than RGGB {self.numbers.where(below & reached)}."
+            where = (
+                self._where(its, mine)
+                if reached.all() and not (mine == its).any()
+                else self.numbers.where(below & reached)
+            )
+            yield f"{quoted(self.hero)} has less than RGGB {where}."
 
     @property
     def picture(self) -> Picture | None:
-        """A line each, with rings where the filter falls below RGGB."""
+        """A line each, with rings where the filter passes RGGB; of lamps that may be dark how often they are, too."""
         x, unit = np.array(self.numbers.drawn), self.column.unit
-        vanish = unit == DN and any((y < _LEAST).any() for y in self.values.values())
+        pulsed = self.missed is not None and self.missed[0] > _SEEN >= self.missed[-1]
+        seen = np.ones(x.size, dtype=bool) if self.missed is None or not pulsed else self.missed <= _SEEN
         lines = {}
         for name, y in self.values.items():
-            drawn = np.maximum(np.nan_to_num(y, nan=_LEAST_DRAWN), _LEAST_DRAWN) if vanish else y
-            lines[name] = Line(x, drawn, self.bests.get(name))
-        rings = self._rings(x, log=vanish)
-        level = (_LEAST, "1 DN") if vanish else None
-        band = None
-        if self.missed is not None and self.missed[0] > _SEEN >= self.missed[-1]:
-            last = float(x[np.flatnonzero(self.missed > _SEEN)[-1]])
+            drawn = np.maximum(np.nan_to_num(y, nan=_LEAST_DRAWN), _LEAST_DRAWN) if self._vanishes else y
+            lines[name] = Line(x, np.where(seen, drawn, np.nan), self.bests.get(name))
+        rings = self._rings()
+        level, band, panels = (_LEAST, "1 DN") if self._vanishes and not pulsed else None, None, list[Panel]()
+        if self.missed is not None and pulsed:
+            last = float(x[np.flatnonzero(~seen)[-1]])
             dark = self.numbers.factor * (self.dark_s or 0.0) if self.numbers.key == "exposure_s" else last
-            band, level = (float(x[0]), max(last, dark), "the lamp\nmay be dark"), None
-        parts = [f"{_LEAST_DRAWN:g} DN or less is drawn at {_LEAST_DRAWN:g} DN."] if vanish else []
+            band = (float(x[0]), max(last, dark), "the lamp\nmay be dark")
+            phases = {"every CFA": Line(x, 100 * self.missed)}
+            panels.append(
+                Lines(
+                    "phases of the pulses that miss the lamp / %",
+                    self.numbers.axis,
+                    phases,
+                    "every CFA",
+                    self.numbers.log,
+                    height=150,
+                )
+            )
+        parts = [f"{_LEAST_DRAWN:g} DN or less is drawn at {_LEAST_DRAWN:g} DN."] if self._vanishes else []
         parts += (
             ["A line is the worst, its band goes up to the best, of all places of a lamp on the pixels."]
             if self.bests
             else []
         )
-        parts += ["Rings: where the filter passes RGGB, between two computed scenes."] if rings else []
+        parts += ["Rings: where the filter passes RGGB, by straight lines between computed scenes."] if rings else []
+        parts += ["Rings with names: the least of the whole range."] if self.searched else []
         words = f"{quantity(self.column)} / {unit}" if unit else quantity(self.column)
-        panel = Lines(
-            words, self.numbers.axis, lines, self.hero, self.numbers.log, vanish, level, band=band, rings=rings
-        )
+        panels.append(
+            Lines(words, self.numbers.axis, lines, self.hero, self.numbers.log, self._vanishes, level, band=band,
+                  rings=(*rings, *self._least_rings()))
+        )  # fmt: skip
         return Picture(
-            (panel,), f"{quantity(self.column)} over {self.numbers.name}: {', '.join(self.values)}.", " ".join(parts)
-        )
+            tuple(panels), f"{quantity(self.column)} over {self.numbers.name}: {', '.join(self.values)}.", " ".join(parts),
+            columns=1,
+        )  # fmt: skip
 
-    def _rings(self, x: Values, *, log: bool) -> tuple[Ring, ...]:
-        """Return where the filter passes RGGB, on straight lines of the figure between computed scenes."""
+    def _rings(self) -> tuple[Ring, ...]:
+        """Return where the filter passes RGGB."""
         mine, its = self.values.get(self.hero), self.values.get(RGGB)
         if mine is None or its is None or self.hero == RGGB:
             return ()
-        across = np.log(x) if self.numbers.log else x
-        heights = [np.log(np.maximum(y, _LEAST_DRAWN)) if log else y for y in (mine, its)]
-        apart, rings = heights[0] - heights[1], []
-        for at in np.flatnonzero(np.sign(apart[:-1]) * np.sign(apart[1:]) < 0):
-            share = apart[at] / (apart[at] - apart[at + 1])
-            number = across[at] + share * (across[at + 1] - across[at])
-            height = heights[1][at] + share * (heights[1][at + 1] - heights[1][at])
-            rings.append(
-                Ring(float(np.exp(number) if self.numbers.log else number), float(np.exp(height) if log else height))
-            )
-        return tuple(rings)
+        found = [self._crossing(mine, its, at) for at in range(len(self.numbers.x) - 1)]
+        text = not self.searched
+        return tuple(
+            Ring(self.numbers.factor * one[0], one[1], self.numbers.about(one[0]) if text else "")
+            for one in found
+            if one is not None and one[1] >= self._least
+        )
+
+    def _least_rings(self) -> Iterator[Ring]:
+        """Yield the worst places of the filter and of RGGB."""
+        for name in (self.hero, RGGB) if self.searched else ():
+            if name in self.worst:
+                value, number = self.worst[name]
+                yield Ring(
+                    self.numbers.factor * number,
+                    value,
+                    f"{name}: {of_column(self.column, inward(value, up=False))}",
+                    below=True,
+                )
 
     @property
     def table(self) -> Table | None:
@@ -283,16 +379,17 @@ class Series(Section):
             places.pop(len(places) // 2)
         compared = RGGB if RGGB in self.values else next(iter(self.values))
         its, rows = self.values[compared], []
-        seen = [at for at in places if its[at] >= (_LEAST if self.column.unit == DN else 0.0)]
+        seen = [at for at in places if its[at] >= self._least]
         for name, y in list(self.values.items())[:MOST_ROWS]:
             cells = [self._value(name, at) for at in places]
             if seen:
                 against = "" if name == compared else change(float(y[seen[-1]]), float(its[seen[-1]]))
                 cells += [against, effect(self.column, float(y[seen[-1]]), float(its[seen[-1]])) if against else ""]
-            rows.append((name, amount(self.light[name], "share"), *cells))
+            first = self._from_least(name) if self._vanishes else amount(self.light[name], "share")
+            rows.append((name, first, *cells))
         head = [
             "",
-            "light of the CFA",
+            "1 DN or more" if self._vanishes else "light of the CFA",
             *(self.numbers.at(at) for at in places),
             *([f"{self.numbers.at(seen[-1])}, against {compared}", ""] if seen else []),
         ]

@@ -16,7 +16,7 @@ from ..leaders import answering, label, reference_of
 from ..panels import Picture
 from ..row_panels import Ratio, Ratios
 from ..section import Section
-from ..words import SAME, digits, joined, quoted
+from ..words import SAME, digits, joined, quantity, quoted
 
 _MOST_FACTOR = 10.0
 _MOST_NAMED = 3
@@ -72,7 +72,9 @@ class Tasks(Section):
 
     def _gains(self, name: str) -> list[str]:
         return [
-            column.words for column, factor in zip(self.columns, self.factors[name], strict=True) if factor > 1 + SAME
+            quantity(column)
+            for column, factor in zip(self.columns, self.factors[name], strict=True)
+            if factor > 1 + SAME
         ]
 
     def _losses(self, name: str) -> int:
@@ -98,12 +100,12 @@ class Tasks(Section):
             factors = self.factors[self.hero]
             least, most = int(np.argmin(factors)), int(np.argmax(factors))
             parts = (
-                [f"loses most in {self.columns[least].words} (**{digits(1 / factors[least])}** times worse)"]
+                [f"loses most in {quantity(self.columns[least])} (**{digits(1 / factors[least])}** times worse)"]
                 if factors[least] < 1 - SAME
                 else []
             )
             parts += (
-                [f"gains most in {self.columns[most].words} (**{digits(factors[most])}** times better)"]
+                [f"gains most in {quantity(self.columns[most])} (**{digits(factors[most])}** times better)"]
                 if factors[most] > 1 + SAME
                 else []
             )
@@ -124,12 +126,14 @@ class Tasks(Section):
     def picture(self) -> Picture | None:
         """A row for each measure, a mark for each design."""
         ratios = [
-            Ratio(column.words, name, float(np.clip(self.factors[name][at], 1 / _MOST_FACTOR, _MOST_FACTOR)))
+            Ratio(quantity(column), name, float(np.clip(self.factors[name][at], 1 / _MOST_FACTOR, _MOST_FACTOR)))
             for at, column in enumerate(self.columns)
             for name in self.designs
         ]
-        panel = Ratios(f"times better than {self.rggb}", "worse (below 1), or better", tuple(ratios), self.hero, 22)
-        caption = f"Tasks have a camera of their own: patches that fill the field, on axis, all exposed for {1e3 * self.exposure_s:g} ms, with {self.read_noise_e:g} e of read noise."
+        panel = Ratios(
+            "other tasks", f"times as good as {self.rggb} (1); left of it worse", tuple(ratios), self.hero, 22
+        )
+        caption = f"d': distance in units of the noise. Tasks have a camera of their own: patches that fill the field, on axis, all exposed for {1e3 * self.exposure_s:g} ms, with {self.read_noise_e:g} e of read noise."
         if any(np.abs(np.log(values)).max() > np.log(_MOST_FACTOR) for values in self.factors.values()):
             caption += f" Beyond {_MOST_FACTOR:g} times: at the edge."
         return Picture((panel,), f"Gains and losses against {self.rggb} in {len(self.columns)} measures.", caption)

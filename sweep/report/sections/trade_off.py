@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,7 +39,7 @@ from ..terms import (
     is_angle_dependent,
     response_of,
 )
-from ..words import amount, article, joined, lamps, of_column, quantity, quoted
+from ..words import amount, article, change, joined, lamps, of_column, quantity, quoted
 
 Values = Float[Array, " wavelengths"]
 _MOST_CLOUD = 400
@@ -81,16 +81,12 @@ class TradeOff(Section):
     bound_of: str
     more: tuple[Side, str] | None
     others: tuple[Side, ...]
-    wavelength_nm: Values
-    curves: Mapping[str, Values]
-    replaced: tuple[str, ...]
-    spectra: Mapping[str, Values]
+    filters: Curves | None
     points: tuple[Point, ...]
     cloud: Pairs | None
     traced: Pairs | None
     bounds: Pairs | None
     light_of: str
-    response: str
     own: tuple[str, ...] = ()
 
     heading = "What it buys"
@@ -108,7 +104,6 @@ class TradeOff(Section):
         rggb = reference_of(output, scenario)
         if rggb is not None and rggb["design_id"] == best["design_id"]:
             rggb = None
-        curves, replaced = _curves(output, best)
         bound = upper_bound_beside(output, best)
         most = leaders.separates
         more = None
@@ -139,16 +134,12 @@ class TradeOff(Section):
             bound_of=bound_conditions(output),
             more=more,
             others=tuple(_side(column, row) for row in leaders.others),
-            wavelength_nm=output.curves.wavelength_nm,
-            curves=curves,
-            replaced=replaced,
-            spectra=lamp_areas(output),
+            filters=filter_curves(output, best, styles_of(point.name for point in points)[label(best)].color),
             points=tuple(points),
             cloud=_cloud(output, scenario, column, best),
             traced=_line(output, scenario, "objective", best),
             bounds=_line(output, scenario, "limit", best) if bounds_figure(output, scenario, str(best["cfa"])) else None,
             own=tuple(_least(output, best, rggb)),
-            response=response_of(output.curves.sensor),
             light_of="a sensor without filters" if sensor.has_clear else f"{sensor.reference} pixels alone",
         )  # fmt: skip
 
@@ -165,13 +156,16 @@ class TradeOff(Section):
             else f"{best.name}{notes}, the best {self.found},"
         )
         text = f"{edges}{who if edges or who.startswith(best.name) else who[:1].upper() + who[1:]}"
-        less = "" if rggb is None or rggb.separation <= best.separation else f", less than {rggb.name}"
+        less = rggb is not None and rggb.separation > best.separation
         plain = [one for one in (rggb, self.tile) if one is not None]
-        beside = (
-            f"{less} ({', '.join(f'{one.name}: {of_column(self.column, one.separation)}' for one in plain)})"
-            if plain
-            else ""
-        )
+        parts = [
+            f"{one.name}: {of_column(self.column, one.separation)}"
+            + (f", {change(best.separation, one.separation)}" if less else "")
+            for one in plain
+        ]
+        beside = f" ({('; ' if less else ', ').join(parts)})" if plain else ""
+        if rggb is not None and less:
+            beside = f", **less than {rggb.name}**{beside}"
         if self.own:
             text += f" has {joined([*self.own])}"
         elif self.column.pair is None or self.column.metric in (D_PRIME, CNR):
@@ -219,22 +213,7 @@ class TradeOff(Section):
     @property
     def picture(self) -> Picture | None:
         """Curves of the best design over the lamps, and separation against light."""
-        styles, panels = styles_of(point.name for point in self.points), list[Panel]()
-        if self.curves:
-            bold = tuple(name for name in self.curves if name not in self.replaced)
-            colors = {n: styles[self.best.name].color if n in bold else CHANNELS.get(n, DIM) for n in self.curves}
-            panels.append(
-                Curves(
-                    f"Where it filters: {self.response}",
-                    self.wavelength_nm,
-                    self.curves,
-                    self.spectra,
-                    colors,
-                    bold,
-                    self.replaced,
-                    tuple(edge for pair in self.edges for edge in pair),
-                )
-            )
+        panels: list[Panel] = [] if self.filters is None else [self.filters]
         level = None if self.rggb is None else self.rggb.separation
         panels.append(
             Scatter(
@@ -246,7 +225,7 @@ class TradeOff(Section):
         parts = ["Solid line: the best of the search at each level of light."] if self.traced is not None else []
         parts += ["Dashed: the upper bound at each level of light."] if self.bounds is not None else []
         parts += ["Small dots: swept designs on the front."] if self.cloud is not None else []
-        parts += ["Areas: the lamps' spectra."] if self.curves else []
+        parts += ["Areas: the lamps' spectra."] if self.filters is not None else []
         return Picture(tuple(panels), alone, " ".join(parts))
 
 
@@ -274,15 +253,27 @@ def _point(column: Column, row: Row) -> Point:
     )
 
 
-def _curves(output: Output, best: Row) -> tuple[dict[str, Values], tuple[str, ...]]:
-    """Return the design's modified channels and the curves that they lie between, and which these are."""
+def filter_curves(output: Output, best: Row, color: str, height: float = 320) -> Curves | None:
+    """Return a design's modified channels beside the curves that they lie between, over the lamps."""
     kept = output.curves.designs.get(int(best["design_id"]))
     if not kept:
-        return {}, ()
+        return None
     entries = [entry for entry in modifications(output) if entry.cfa == best["cfa"]]
     ends = dict.fromkeys(end for entry in entries for end in (entry.base, entry.to) if isinstance(end, str))
     replaced = {name: output.curves.sensor[name] for name in ends if name in output.curves.sensor}
-    return {**replaced, **kept}, tuple(replaced)
+    curves = {**replaced, **kept}
+    edges = edges_of(best) if best["kind"] in (SWEPT, SEARCHED) else ()
+    return Curves(
+        f"Where it filters: {response_of(output.curves.sensor)}",
+        output.curves.wavelength_nm,
+        curves,
+        lamp_areas(output),
+        {name: color if name in kept else CHANNELS.get(name, DIM) for name in curves},
+        tuple(kept),
+        tuple(replaced),
+        tuple(edge for pair in edges for edge in pair),
+        height,
+    )
 
 
 def _unconverged(output: Output, best: Row) -> Iterator[str]:
