@@ -245,7 +245,7 @@ def _label_inside(axes: Axes, lines: Mapping[str, Line], styles: Mapping[str, St
         others = [height for other, height in heights.items() if other != name]
         if not others or min(abs(last[name] - end) for other, end in last.items() if other != name) > 0.6 * size:
             continue
-        near = np.nan_to_num(np.nanmin([np.abs(mine - other) for other in others], axis=0))
+        near = np.nan_to_num(np.fmin.reduce([np.abs(mine - other) for other in others]))
         for there, height in written:
             near = np.where(np.abs(along - there) < 7 * size, np.minimum(near, np.abs(mine - height)), near)
         half = 0.3 * size * len(name)

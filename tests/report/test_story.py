@@ -126,6 +126,10 @@ def test_who_leads_has_the_most_at_each_number_of_its_range(lines: dict[str, lis
     assert series.picture is not None
     assert series.table is not None
     assert len(series.table.rows) == len(lines)
+    for ring in series.picture.panels[-1].rings:  # type: ignore[attr-defined]
+        heights = [np.interp(ring.x, series.numbers.x, lines[name]) for name in (series.hero, "RGGB")]
+        if min(map(min, lines.values())) >= 1:  # of other lines logarithms are drawn
+            assert heights == pytest.approx([ring.y, ring.y])
 
 
 @pytest.mark.parametrize(
@@ -133,17 +137,17 @@ def test_who_leads_has_the_most_at_each_number_of_its_range(lines: dict[str, lis
     [
         (
             {"A": [90, 81, 61], "B": [80, 77, 68]},
-            "Over distance, **A** separates yellow from red lamps most up to 200 m (81.0 DN at 200 m; B 77.0 DN); **B** at 300 m "
-            "(68.0 DN; A 61.0 DN).",
+            "Over distance, **A** separates yellow from red lamps most up to about 240 m (90.0 DN at 100 m; B 80.0 DN); **B** from "
+            "about 240 m on (68.0 DN at 300 m; A 61.0 DN).",
         ),
         (
             {"A": [0.2, 9, 8], "B": [0.1, 2, 8]},
-            "Over distance, no CFA separates 1 DN at 100 m; **A** separates yellow from red lamps most from 200 m on (8.00 DN at 300 m; "
-            "B 8.00 DN).",
+            "Over distance, no CFA separates 1 DN at 100 m; **A** separates yellow from red lamps most from 200 m on (9.00 DN at 200 m; "
+            "B 2.00 DN).",
         ),
         (
             {"A": [5, 5, 5]},
-            "Over distance, **A** separates yellow from red lamps most at every distance from 100 m to 300 m (5.00 DN at 300 m).",
+            "Over distance, **A** separates yellow from red lamps most at every distance from 100 m to 300 m (5.00 DN at 100 m).",
         ),
     ],
 )
