@@ -17,11 +17,11 @@ _MOST_NAMED = 3
 _PIXELS = {"R": "red", "G": "green", "B": "blue", "Y": "yellow", "Cy": "cyan", "C": "clear", "W": "clear"}
 
 
-def holds_for(output: Output) -> str:
-    """Return curves, camera, scene and constraints of a run in one sentence."""
+def holds_for(output: Output, curves: str = "") -> str:
+    """Return curves, camera, scene and constraints of a run in one sentence; `curves`: in place of the run's own."""
     under = format_constraints(output)
     parts = [
-        _curves(output),
+        curves or curves_in_words(output),
         _camera(output),
         _scene(list(output.study.scenarios.values())),
         _varied(output),
@@ -34,18 +34,21 @@ def holds_for(output: Output) -> str:
 
 def _letters(output: Output) -> str:
     """Return what the letters in names of CFAs are."""
-    bases = {channel: entry.base for entry in modifications(output) for channel in entry.channel}
     shown = {channel for cfa in output.table["cfa"].unique() for channel in output.mosaic(str(cfa)).channels}
-    parts = [f"{letter} {_PIXELS[letter]}" for letter in _PIXELS if letter in shown]
+    bases = dict[str, dict[str, None]]()
+    for entry in modifications(output):
+        for channel in entry.channel if entry.cfa in output.study.cfas else ():
+            bases.setdefault(channel, {})[_PIXELS.get(entry.base or "", entry.base or "one")] = None
+    parts = [f"{letter} {color}" for letter, color in _PIXELS.items() if letter in shown]
     parts += [
-        f"{letter} {_PIXELS.get(base or '', base or 'one')} with a filter"
-        for letter, base in bases.items()
+        f"{letter} {' or '.join(colors)} with a filter"
+        for letter, colors in bases.items()
         if letter in shown and letter not in _PIXELS
     ]
     return f" Pixels in names of CFAs: {', '.join(parts)}." if parts else ""
 
 
-def _curves(output: Output) -> str:
+def curves_in_words(output: Output) -> str:
     facts, count = output.provenance, sum(map(len, output.curves.bundles.values()))
     relative = "" if response_of(output.curves.sensor) == QE else " (relative, taken as quantum efficiencies)"
     sensor = (

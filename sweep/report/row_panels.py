@@ -235,7 +235,9 @@ class Ratios:
         low, high = min([0.5, *known]), max([2.0, *known])
         log_axis(axes, "x", low, high)
         axes.set_xlim(low / 1.1, high * 1.1)
-        axes.set_ylim(len(rows) - 0.3, -1.4 if is_wide(axes) else -2.2)
+        width_px = 72 * axes.get_position().width * float(axes.figure.get_size_inches()[0])  # type: ignore[union-attr]
+        columns = max(1, min(len(names), int(width_px / (24 + 0.5 * (size - 2) * max(map(len, names))))))
+        axes.set_ylim(len(rows) - 0.3, -0.9 - 0.5 * -(-len(names) // columns))
         below, above = axes.get_ylim()
         share = (below + 0.6) / (below - above)  # the key stands above the rows
         axes.axvspan(low / 1.1, 1, 0, share, color=FORBIDDEN, linewidth=0, zorder=0)
@@ -257,7 +259,6 @@ class Ratios:
             )
         _name_rows(axes, dict.fromkeys(rows, INK), "")
         axes.grid(visible=True, axis="y", color=GRID, linewidth=0.8)
-        columns = min(len(names), 4 if is_wide(axes) else 2)
         for at, name in enumerate(names):  # a key, mark by mark
             x, y = (at % columns + 0.06) / columns, -0.95 - 0.5 * (at // columns)
             color, marker, along = styles[name].color, styles[name].marker, axes.get_yaxis_transform()

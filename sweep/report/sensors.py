@@ -22,11 +22,11 @@ from ..runs.all_sensors import ALL
 from ..runs.uncertainty import REFERENCE_CFA, UNCLIPPED
 from ..study import SensorAndLights, folder_name
 from .hold import holds_for
-from .page import page_of
+from .page import page_of, plain
 from .panels import Picture
 from .row_panels import Ratio, Ratios
 from .section import Told, table_of
-from .words import quantity
+from .words import joined, quantity
 
 PICTURE = "sensors"
 _KEYS = ("sensor", "lights")
@@ -73,7 +73,7 @@ def report_sensors(manifest: Manifest, runs: Sequence[SensorRun]) -> list[str]:
     words, summary = quantity(column), _summary(figures)
     n_found = figures.loc[figures["kind"] == SEARCHED, "cfa"].nunique()
     lines = [*_answer(summary, n_found, str(figures["reference"].iloc[0]), words)]
-    answer, stated = lines[: max(n_found, 1)], holds_for(outputs[0][1])
+    answer, stated = lines[: max(n_found, 1)], holds_for(outputs[0][1], _curves(outputs))
     known = ALL_SENSORS in manifest.files
     together = read_table(folder / ALL_SENSORS).to_pandas() if known else pd.DataFrame()
     further = lines[len(answer) :]
@@ -93,11 +93,22 @@ def report_sensors(manifest: Manifest, runs: Sequence[SensorRun]) -> list[str]:
         folder.name, study.title or study.question or folder.name, answer, stated, lead, sections,
         kind="report of a sweep over sensors", limits=[*further, *notes], files=[RESULTS, *links],
     )  # fmt: skip
-    lines = [*answer, *further, *notes]
+    lines = [plain(line) for line in (*answer, *further, *notes)]
     images = picture.files(PICTURE)
     manifest.write(images | {REPORT: text.encode("utf-8")})
     files = f"Files: {RESULTS}, {REPORT}, {PICTURE}.png, and a folder for each run, in the folder"
     return [*lines, files, str(folder)]
+
+
+def _curves(outputs: Sequence[tuple[SensorAndLights, Output]]) -> str:
+    """Return all sensors and lights, and which are modeled."""
+    sensors = {output.provenance.sensor.name: output.provenance.sensor.surrogate for _, output in outputs}
+    lights = {output.provenance.lights.name: output.provenance.lights.surrogate for _, output in outputs}
+    parts = [
+        joined([f"{name}{' (modeled, not measured)' * modeled}" for name, modeled in known.items()])
+        for known in (sensors, lights)
+    ]
+    return f"curves of {parts[0]}; lamps of {parts[1]}"
 
 
 def _figures(member: SensorAndLights, output: Output) -> Iterator[dict[str, Any]]:
@@ -143,7 +154,7 @@ def _summary(figures: pd.DataFrame) -> pd.DataFrame:
         more = (of_design["ratio"] > 1) & (of_design["light_ratio"] > 1)
         row = {
             "design": design,
-            "sensors": of_design["sensor"].nunique(),
+            "on": joined([*of_design["sensor"].unique()]),
             "with lights": len(of_design),
             "separation": _span(of_design["ratio"]),
             "light": _span(of_design["light_ratio"]),
@@ -161,15 +172,12 @@ def _answer(summary: pd.DataFrame, n_found: int, reference: str, words: str) -> 
     rows_of = summary.to_dict("records")
     for row in rows_of[:n_found]:
         text = (
-            f"The {row['design']} has {row['separation']} times the {words} of {reference} at {row['light']} times its "
-            f"light, on {row['sensors']} sensor{'s' * (row['sensors'] > 1)} ({row['with lights']} pairs with lights): "
-            f"more of both on {row['more of both']}"
+            f"On {row['on']}, the {row['design']} has **{row['separation']} times** the {words} of {reference} at "
+            f"**{row['light']} times** its light: more of both on {row['more of both']} pairs of sensor and lamps"
         )
-        yield (
-            f"{text}, by the 5 % quantiles of random sensors on {row['by 5 % quantiles']}."
-            if ("by 5 % quantiles" in row)
-            else f"{text}."
-        )
+        sure = row.get("by 5 % quantiles", "")
+        of_random = f"by the 5 % quantiles of random sensors{'' if sure == row['more of both'] else f' on {sure}'}"
+        yield f"{text}, {'also ' * (sure == row['more of both'])}{of_random}." if sure else f"{text}."
     others = [f"{r['design']} {r['separation']} at {r['light']} ({r['more of both']})" for r in rows_of[n_found:]]
     if others:
         yield f"Others: {', '.join(others)}."
