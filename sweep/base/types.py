@@ -23,6 +23,7 @@ else:
 """An array whose numbers the name before the bracket says, and whose shape the text behind it."""
 
 PerWavelength = Float[Array, " wavelengths"]
+PerChannel = Float[Array, " channels"]
 PerDesign = Float[Array, " designs"]
 PerParameter = Float[Array, " parameters"]
 PerSample = Float[Array, " samples"]

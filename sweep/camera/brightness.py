@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.types import Array, Bool, BoolArray, DesignSignals, Float, IndexArray, Int, PerDesign, PerValue
+from ..base.types import Array, Bool, BoolArray, DesignSignals, Float, IndexArray, Int, PerChannel, PerDesign, PerValue
 from .effects import any_filter
 from .noise.merge import merged, without_noise
 from .noise.pixel_curve import PixelCurve, groups_of, pixel_curve, same_electrons
@@ -66,6 +66,11 @@ class LampReadings:
         """True if all exposures have their fixed share of the electrons: no pulse, crosstalk or QE tells them apart."""
         full = [self.lit_e / self.light[:, None], self.dark_e / self.light]
         return all(same_electrons(of_exposure, knees[0]) for knees in full for of_exposure in knees[1:])
+
+    def times(self, factors: PerChannel) -> LampReadings:
+        """Return the lamps with each channel's readings multiplied."""
+        weights, spread = self.readout.weights * factors, self.readout.spread_weights * factors**2
+        return replace(self, readout=replace(self.readout, weights=weights, spread_weights=spread))
 
     def alike(self, other: LampReadings, scale: float) -> bool:
         """Return whether these are the lamps of another case with a scale of their light."""

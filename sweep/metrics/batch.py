@@ -20,6 +20,7 @@ from ..base.types import (
     MemberNumbers,
     PerDesign,
 )
+from ..camera.brightness import LampReadings
 from ..camera.model import Changing, SceneModel, scene_model
 from ..camera.readout import NoisyReadout
 from ..camera.setup import Setup
@@ -29,6 +30,7 @@ from ..spectra.lights import Pair, class_pairs
 from ..vision.section import SeededVision
 from .brightness import chromatic_distance, curves_of
 from .quantity import Columns
+from .separation import pixel_roots
 
 _AT_ONCE = 1024
 """Designs that differ in one channel alone, or readouts of a design in a case, that are looked at at once."""
@@ -130,14 +132,28 @@ class Batch:
             of_pairs, of_states = ({p: np.full(self.size, np.nan) for p in pairs} for pairs in (self.pairs, states))
             self._over_brightness = both = of_pairs, of_states
             for design in np.flatnonzero(wanted | bool(states)):
-                curves = self.curves_of(int(design))
-                if np.isfinite(curves).all() and np.isfinite(self.exposure_s[design]):
-                    cases = curves_of(scene_model(self.setup.over_brightness).lamps(curves), self.setup)
-                    for noise, distances in enumerate(both):
-                        for a, b in distances if noise or wanted[design] else ():
-                            members = self.setup.members[a], self.setup.members[b]
-                            distances[a, b][design] = chromatic_distance(cases, *members, noise=bool(noise))
+                cases = curves_of(self._lamps(int(design)), self.setup)
+                for noise, distances in enumerate(both if cases else ()):
+                    for a, b in distances if noise or wanted[design] else ():
+                        members = self.setup.members[a], self.setup.members[b]
+                        distances[a, b][design] = chromatic_distance(cases, *members, noise=bool(noise))
         return self._over_brightness
+
+    def over_brightness_by_pixel(self, wanted: Bool[BoolArray, " designs"]) -> dict[Pair, PerDesign]:
+        """Return distances of lamps of any brightness of `wanted` designs, with every pixel counted, DN."""
+        roots, distances = pixel_roots(self.setup.camera.mosaic), {p: np.full(self.size, np.nan) for p in self.pairs}
+        for design in np.flatnonzero(wanted):
+            cases = curves_of([lamps.times(roots) for lamps in self._lamps(int(design))], self.setup)
+            for (a, b), of_pair in distances.items() if cases else ():
+                of_pair[design] = chromatic_distance(cases, self.setup.members[a], self.setup.members[b], noise=False)
+        return distances
+
+    def _lamps(self, design: int) -> list[LampReadings]:
+        """Return the lamps of a design over their brightness, in each case; none of one that is not finite."""
+        curves = self.curves_of(design)
+        if not (np.isfinite(curves).all() and np.isfinite(self.exposure_s[design])):
+            return []
+        return [*scene_model(self.setup.over_brightness).lamps(curves)]
 
     @cached_property
     def read_with_noise(self) -> NoisyReadout:

@@ -15,7 +15,7 @@ from functools import partial
 
 import numpy as np
 
-from ..base.types import Array, DesignSignals, Float, IndexArray, Int, MemberNumbers, PerDesign, SameShape
+from ..base.types import Array, DesignSignals, Float, IndexArray, Int, MemberNumbers, PerChannel, PerDesign, SameShape
 from ..camera.brightness import LampSlopes
 from ..camera.noise.pixel_curve import STEPS_DN2
 from ..spectra.lights import Pair, class_pairs
@@ -133,22 +133,25 @@ def _least(first: Float[Array, "pairs channels"], second: Float[Array, "pairs ch
     return squared_distance(first, second) * _ROUNDED
 
 
-def chromatic_rows(design: SmoothDesign, *, pairs: Sequence[Pair], noise: bool, decades: bool = False) -> Rows:
+def chromatic_rows(
+    design: SmoothDesign, *, pairs: Sequence[Pair], noise: bool, decades: bool = False, per_pixel: bool = False
+) -> Rows:
     """Return rows of each two signals, in every case of the scene: squared chromatic distances in both orders.
 
     The smallest row is the squared distance, each smooth. In closed form where readings are linear, by the nearest
     point of the brightness curve elsewhere; that point moves with the design, which adds nothing to the derivative.
 
     `noise`: in units of the noise, otherwise in DN; `decades`: return -log10 of the errors of Gaussians at these
-    distances.
+    distances; `per_pixel`: with every pixel counted.
     """
     if not noise and design.linear_over_brightness:
-        return _closed_rows(design, pairs)
+        return _closed_rows(design, pairs, design.roots if per_pixel else 1.0)
     parts = []
-    for number, (lamps, curves) in enumerate(design.over_brightness):
+    of_cases = design.over_brightness_by_pixel if per_pixel else design.over_brightness
+    for number, (lamps, curves) in enumerate(of_cases):
         for pair in pairs:
             first, second = (design.setup.members[kind] for kind in pair)
-            key = f"{'noise' if noise else 'DN'} of {' and '.join(pair)} in case {number}"
+            key = f"{'noise' if noise else 'pixels' if per_pixel else 'DN'} of {' and '.join(pair)} in case {number}"
             parts.append(design.cached(key, partial(_nearest_rows, lamps, curves, first, second, noise=noise)))
     rows = Rows.joined(parts)
     return rows.gaussian_decades() if decades else rows
@@ -181,12 +184,12 @@ def _nearest_rows(
     return Rows.of(lambda difference, spread: (2 * difference**2 / spread).sum(axis=-1), *apart)
 
 
-def _closed_rows(design: SmoothDesign, pairs: Sequence[Pair]) -> Rows:
+def _closed_rows(design: SmoothDesign, pairs: Sequence[Pair], factors: PerChannel | float) -> Rows:
     """Return both squared orders of the chromatic distance of each two signals: min |y1 - a y2| and min |a y1 - y2|."""
     members = design.setup.members
 
     def of(response: Smooth) -> Smooth:
-        parts = []
+        response, parts = response * factors, []
         for a, b in pairs:
             shape = (*response.shape[:-2], len(members[a]), len(members[b]), response.shape[-1])
             first_signals = np.broadcast_to(response[..., members[a], None, :], shape)

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from ..base.types import Array, Float, FloatArray
+from ..base.types import Array, Float, FloatArray, PerChannel
+from ..camera.mosaic import Mosaic
 from ..camera.setup import Setup
 from ..spectra.lights import Pair
 from ..spectra.tasks import TaskColumns
+from .separation import pixel_roots
 from .smooth import Rows, SmoothDesign
 from .user_metrics import UserMetric
 
@@ -118,6 +120,8 @@ class Quantity(Column):
         Form of its smooth rows.
     distance_kind : {'', 'DN', 'noise', 'chromatic'}
         Smallest distance of two signals: in DN, in units of the noise, or over all brightnesses in DN.
+    per_pixel : bool
+        Every pixel of the tile counts, not each channel once.
     most : float
         Upper bound on any filter.
     share : bool
@@ -141,6 +145,7 @@ class Quantity(Column):
     nominal: bool = False
     scale: Literal["linear", "squared", "log10"] = "linear"
     distance_kind: Literal["", "DN", "noise", "chromatic"] = ""
+    per_pixel: bool = False
     most: float = np.inf
     share: bool = False
     states: tuple[str, ...] = ()
@@ -158,7 +163,7 @@ class Quantity(Column):
     @property
     def has_error_bound(self) -> bool:
         """True for a CSD, also at its best place, which the error bound of a plan covers."""
-        return self.distance_kind == DN or self.extreme == "best place"
+        return (self.distance_kind == DN and not self.per_pixel) or self.extreme == "best place"
 
     @property
     def has_limit(self) -> bool:
@@ -169,6 +174,10 @@ class Quantity(Column):
     def column(self) -> Column:
         """The part that a run keeps."""
         return Column(**{column.name: getattr(self, column.name) for column in fields(Column)})
+
+    def factors(self, mosaic: Mosaic) -> PerChannel:
+        """Return the factors of readings in its distances."""
+        return pixel_roots(mosaic) if self.per_pixel else np.ones(len(mosaic.channels))
 
     def worst(self, over: Sequence[str]) -> Quantity:
         """Return the worst case of the quantity."""

@@ -19,10 +19,12 @@ from ..base.types import (
     IndexArray,
     Int,
     MemberNumbers,
+    PerChannel,
     PerDesign,
     PerWavelength,
     SameShape,
 )
+from ..camera.mosaic import Mosaic
 from ..spectra.lights import Pair, class_pairs, pair_name
 
 _BLOCK_PAIRS = 262_144
@@ -36,6 +38,11 @@ _LARGEST = 1e140
 def csd_name(pair: Pair) -> str:
     """Return the column name of a pair's CSD."""
     return pair_name("csd", pair)
+
+
+def pixel_roots(mosaic: Mosaic) -> PerChannel:
+    """Return the roots of how many of four pixels each channel has: factors of readings in which every pixel counts."""
+    return np.asarray(np.sqrt(4 * mosaic.counts / mosaic.counts.sum()))
 
 
 def separation(

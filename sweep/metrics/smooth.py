@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -17,6 +17,7 @@ from ..base.types import (
     FloatArray,
     IndexArray,
     Int,
+    PerChannel,
     PerDesign,
     PerFree,
     PerParameter,
@@ -30,7 +31,7 @@ from ..spectra.lights import Pair
 from ..vision.section import SeededVision
 from .brightness import BrightnessCurves
 from .complex_step import COMPLEX_STEP, Smooth, moving, root, tail_decades
-from .separation import separation
+from .separation import pixel_roots, separation
 
 if TYPE_CHECKING:
     from .drawn import LampsAndCameras
@@ -167,19 +168,37 @@ class SmoothDesign:
     @cached_property
     def over_brightness(self) -> list[tuple[LampSlopes, BrightnessCurves]]:
         """Readings and brightness curves of the lamps in each case."""
+        return self._over_brightness(self._lamp_slopes)
+
+    @cached_property
+    def over_brightness_by_pixel(self) -> list[tuple[LampSlopes, BrightnessCurves]]:
+        """The same with every pixel counted."""
+        return self._over_brightness([replace(of, lamps=of.lamps.times(self.roots)) for of in self._lamp_slopes])
+
+    @cached_property
+    def _lamp_slopes(self) -> list[LampSlopes]:
+        return [*self._model.lamps_over_brightness(self.curves, self.by_u)]
+
+    def _over_brightness(self, cases: Sequence[LampSlopes]) -> list[tuple[LampSlopes, BrightnessCurves]]:
         limits = self.setup.scene.brightness
-        cases = self._model.lamps_over_brightness(self.curves, self.by_u)
         return [(lamps, BrightnessCurves(lamps.lamps, limits, least_dn2=STEPS_DN2)) for lamps in cases]
+
+    @property
+    def roots(self) -> PerChannel:
+        """Factors of readings in which every pixel counts."""
+        return pixel_roots(self.setup.camera.mosaic)
 
     def linear(self, matrix: Float[Array, "terms parameters"]) -> Rows:
         """Return linear functions of the parameters."""
         return Rows(matrix @ self.x, matrix[:, self._free] * self._span)
 
-    def squared_distances(self, pair: Pair) -> Rows:
+    def squared_distances(self, pair: Pair, *, per_pixel: bool = False) -> Rows:
         """Return squared distances of all pairs of signals of two types in every case, DN^2, with derivatives."""
         first, second = (self._model.members[name] for name in pair)
+        roots = self.roots if per_pixel else 1.0
 
         def of(response: Smooth) -> Smooth:
+            response = response * roots
             return np.asarray(((response[..., first, None, :] - response[..., None, second, :]) ** 2).sum(axis=-1))
 
         return Rows.of(of, self._response)
@@ -241,9 +260,12 @@ def smooth_response(setup: Setup, curves: DesignCurves) -> DesignCases:
     return linear_model(setup).smooth(curves)
 
 
-def smooth_csd(setup: Setup, curves: DesignCurves, pair: Pair) -> PerDesign:
-    """Return the CSD of the smooth response, the smallest over the cases, DN."""
-    response = smooth_response(setup, curves)
+def smooth_csd(setup: Setup, curves: DesignCurves, pair: Pair, factors: PerChannel | float = 1.0) -> PerDesign:
+    """Return the CSD of the smooth response, the smallest over the cases, DN.
+
+    `factors`: of the channels' readings.
+    """
+    response = smooth_response(setup, curves) * factors
     first, second = (setup.members[name] for name in pair)
     over = [separation(response[:, case], first, second) for case in range(response.shape[1])]
     return np.asarray(np.min(over, axis=0), dtype=float)

@@ -18,6 +18,7 @@ from ..designs.space import Space
 from ..designs.tolerance import AS_DESIGNED, NONE, Tolerance
 from ..metrics.bound import Bound
 from ..metrics.columns.chromatic import CHROMATIC_CSD
+from ..metrics.columns.pixel_separation import CHROMATIC_PIXEL_CSD
 from ..metrics.evaluate import evaluate
 from ..metrics.metric import Metric
 from ..metrics.objective import COMBINED, Objective, columns_of
@@ -82,7 +83,8 @@ class Wanted:
     def of(cls, quantities: Mapping[str, Quantity], requested: RequestedQuantities, schema: pa.Schema) -> Wanted:
         """Return the metrics of some quantities."""
         metrics = [m for m in METRICS if quantities.keys() & {q.name for q in m.quantities(requested)}]
-        pairs = [q.pair for q in quantities.values() if q.metric == CHROMATIC_CSD and q.pair and not q.extreme]
+        of_any = (CHROMATIC_CSD, CHROMATIC_PIXEL_CSD)
+        pairs = dict.fromkeys(q.pair for q in quantities.values() if q.metric in of_any and q.pair and not q.extreme)
         user_metrics = [metric for metric in requested.user_metrics if metric.name in quantities]
         return cls(schema, quantities, tuple(metrics), tuple(pairs), tuple(user_metrics))
 

@@ -13,7 +13,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from ..base.types import Array, Float, PerWavelength
+from ..base.types import Array, Float, PerChannel, PerWavelength
 from ..camera.field import field_heights, setup_at
 from ..camera.linear import LinearModel, linear_model
 from ..camera.refine import Lattice, in_lockstep, search
@@ -96,7 +96,12 @@ class Brightnesses(Source):
         setup, base = problem.setup, problem.setup.camera.base_qe
         self.names, self._members = tuple(names), setup.members
         self._types = {name: problem.pairs[name] for name in names}
-        self._gain, self._others = _linear(linear_model(setup), base, lamps_only=True)
+        self._linear = {
+            name: _linear(
+                linear_model(setup), base, problem.quantities[name].factors(setup.camera.mosaic), lamps_only=True
+            )
+            for name in names
+        }
 
     def first(self, name: str, base: PerWavelength) -> Distances:
         return self.nearest(name, base)[0]
@@ -104,8 +109,9 @@ class Brightnesses(Source):
     def nearest(self, name: str, curve: PerWavelength) -> Nearest:
         """Return every pair at its worst brightness."""
         first, second = (self._members[kind] for kind in self._types[name])
-        case, one, other = (at.ravel() for at in np.meshgrid(range(len(self._gain)), first, second, indexing="ij"))
-        response = np.concatenate([self._others, (self._gain @ curve)[:, :, None]], axis=2)
+        own_gain, own_others = self._linear[name]
+        case, one, other = (at.ravel() for at in np.meshgrid(range(len(own_gain)), first, second, indexing="ij"))
+        response = np.concatenate([own_others, (own_gain @ curve)[:, :, None]], axis=2)
         a, b = response[case, one], response[case, other]
         squares, product = np.stack([(a * a).sum(axis=1), (b * b).sum(axis=1)]), (a * b).sum(axis=1)
         brighter = squares.argmax(axis=0)  # the brighter signal is dimmed
@@ -115,7 +121,7 @@ class Brightnesses(Source):
         factors[np.arange(case.size), brighter] = np.clip(ratio, 0.0, 1.0)
         gain, others, whole = (
             factors[:, :1] * values[case, one] - factors[:, 1:] * values[case, other]
-            for values in (self._gain, self._others, response)
+            for values in (own_gain, own_others, response)
         )
         return Distances.of(gain, (others**2).sum(axis=1)), np.sqrt((whole**2).sum(axis=1))
 
@@ -131,6 +137,7 @@ class Heights(Source):
         self.names, self._types = tuple(names), {name: problem.pairs[name] for name in names}
         self._first = sorted({*field.counted_heights, *field.knots[0]})
         self._looked_at = field_heights(self._setup)
+        self._factors = {name: problem.quantities[name].factors(self._setup.camera.mosaic) for name in names}
         self._models: dict[float, LinearModel] = {}
 
     def _at(self, height: float) -> LinearModel:
@@ -140,7 +147,7 @@ class Heights(Source):
 
     def _distances(self, name: str, height: float) -> Distances:
         """Return the distances of each two signals at a height."""
-        gain, others = _linear(self._at(height), self._setup.camera.base_qe)
+        gain, others = _linear(self._at(height), self._setup.camera.base_qe, self._factors[name])
         first, second = (self._setup.members[kind] for kind in self._types[name])
         rows = gain[:, first, None] - gain[:, None, second]
         squared = ((others[:, first, None] - others[:, None, second]) ** 2).sum(axis=-1)
@@ -153,7 +160,8 @@ class Heights(Source):
         """Return each two signals at the height at which two of them are nearest."""
 
         def at(_: list[int], places: list[Float[Array, "_places axes"]]) -> list[Float[Array, "values _places"]]:
-            responses = [self._at(height).smooth(curve[None, None])[0] for height in places[0][:, 0].tolist()]
+            factors = self._factors[name]
+            responses = [self._at(at).smooth(curve[None, None])[0] * factors for at in places[0][:, 0].tolist()]
             least = [separations(each, self._setup.members)[self._types[name]].min() for each in responses]
             return [np.array([least])]
 
@@ -164,12 +172,20 @@ class Heights(Source):
 
 
 def _linear(
-    model: LinearModel, base: Float[Array, "1 wavelengths"], *, lamps_only: bool = False
+    model: LinearModel,
+    base: Float[Array, "1 wavelengths"],
+    factors: PerChannel | float = 1.0,
+    *,
+    lamps_only: bool = False,
 ) -> tuple[Float[Array, "cases spectra wavelengths"], Float[Array, "cases spectra channels"]]:
-    """Return the response per unit of QE of the modified channel, and that of the other channels."""
+    """Return the response per unit of QE of the modified channel, and that of the other channels.
+
+    `factors`: of the channels' readings.
+    """
     channel = model.setup.camera.modified[0]
     response = model.smooth(base[None])[0] - (model.unlit(base[None])[0][:, None] if lamps_only else 0.0)
-    return model.per_qe(0, base, lamps_only=lamps_only)[:, :, channel], np.delete(response, channel, axis=2)
+    gain = np.swapaxes(model.per_qe(0, base, lamps_only=lamps_only), 2, 3) * factors
+    return gain[..., channel], np.delete(response * factors, channel, axis=2)
 
 
 def _joined(parts: Sequence[Distances]) -> Distances:

@@ -116,12 +116,14 @@ class FilterProgram:
         gain = model.per_qe(0, self.base[None])[:, :, channel]
         fixed = np.delete(model.smooth(self.base[None, None])[0], channel, axis=2)
         noise = self._noise(model) if self.noisy else None
+        requested = {*self.problem.objective.weights, *self.problem.constraints}
         for name, (a, b) in self.problem.pairs.items():
-            if self._pool is not None and name in self._pool.names:
+            if name not in requested or (self._pool is not None and name in self._pool.names):
                 continue
             first, second = setup.members[a], setup.members[b]
-            differences = gain[:, first, None] - gain[:, None, second]
-            squares = (fixed[:, first, None] - fixed[:, None, second]) ** 2
+            factors = self.problem.quantities[name].factors(setup.camera.mosaic)
+            differences = factors[channel] * (gain[:, first, None] - gain[:, None, second])
+            squares = (np.delete(factors, channel) * (fixed[:, first, None] - fixed[:, None, second])) ** 2
             if noise is not None and self.problem.quantities[name].distance_kind == "noise":
                 own_noise, others = ((variance[:, first, None] + variance[:, None, second]) / 2 for variance in noise)
                 differences, squares = differences / np.sqrt(own_noise)[..., None], squares / others

@@ -48,10 +48,6 @@ _SHARES = (0.0, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5)
 """How far a solver's filter is moved toward one that is inside, to make up for the solver's tolerance."""
 
 
-_DISTANCES = {DN: smooth_csd, "noise": smooth_detectability}
-"""Smallest distance of the smooth response, by `Quantity.distance_kind`."""
-
-
 @dataclass(frozen=True)
 class Limit:
     """Upper bound, and a filter near it, in the objective's unit.
@@ -323,8 +319,12 @@ def _attained(problem: Problem, curve: PerWavelength, over: Mapping[str, float])
     columns = designed_quantities(problem.setup, curves) | {name: np.array([value]) for name, value in over.items()}
     for name in {*problem.objective.weights, *problem.constraints} & problem.pairs.keys():
         if name not in over:
-            of = _DISTANCES[problem.quantities[name].distance_kind]
-            columns[name] = of(problem.setup, curves, problem.pairs[name])
+            quantity, pair = problem.quantities[name], problem.pairs[name]
+            if quantity.distance_kind == DN:
+                factors = quantity.factors(problem.setup.camera.mosaic)
+                columns[name] = smooth_csd(problem.setup, curves, pair, factors)
+            else:
+                columns[name] = smooth_detectability(problem.setup, curves, pair)
     for name, bound in problem.constraints.items():
         if not bound.violation(columns[name])[0] <= FEASIBLE:
             return -np.inf

@@ -282,7 +282,7 @@ def _most(study: Study, space: Space, scenario: str) -> Iterator[tuple[str, floa
     setup = study.setup(space, scenario)
     for name, quantity in study.quantities.items():
         if quantity.distance_kind == DN and not quantity.extreme:
-            yield name, setup.camera.longest_distance_dn
+            yield name, setup.camera.longest_distance_dn * float(quantity.factors(setup.camera.mosaic).max())
     if space.filter is None:
         return
     low, high = (np.array([end(axis) for axis in space.axes], dtype=float) for end in (min, max))

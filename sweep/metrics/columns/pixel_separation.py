@@ -1,0 +1,110 @@
+"""Separations in which every pixel of the tile counts: RGGB's two greens are two, as noise sees them."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from ...base.types import PerDesign
+from ...camera.brightness import room_dn
+from ...spectra.lights import Pair, class_pairs, pair_name
+from ..batch import Batch, CaseReadings
+from ..chromatic import chromatic_rows, chromatic_separations
+from ..metric import Metric
+from ..quantity import DN, Columns, Quantity, RequestedQuantities
+from ..separation import pixel_roots, separations, separations_along
+from ..smooth import SmoothDesign
+
+PIXEL_CSD, CHROMATIC_PIXEL_CSD = "pixel_csd", "chromatic_pixel_csd"
+_COUNTED = (
+    "with each channel counted as often as it has pixels (per four pixels, those of RGGB's tile), and not once: the "
+    "mean of two pixels has half the variance of one"
+)
+_LATTICE = "where phases, field positions or moments count, the smallest over their lattice"
+
+
+class PixelSeparation(Metric):
+    """CSD and chromatic CSD of each pair of signal types, with every pixel counted."""
+
+    order = 2
+
+    def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
+        return tuple(
+            quantity
+            for pair in class_pairs(requested.classes)
+            for quantity in (
+                Quantity(
+                    name=pair_name(PIXEL_CSD, pair),
+                    metric=PIXEL_CSD,
+                    meaning=f"the CSD {_COUNTED}; {_LATTICE}",
+                    unit=DN,
+                    label=f"{pair[0]}/{pair[1]} CSD by pixel",
+                    digits=1,
+                    direction="more",
+                    goal=True,
+                    nominal=True,
+                    pair=pair,
+                    scale="squared",
+                    distance_kind="DN",
+                    per_pixel=True,
+                    smooth=partial(SmoothDesign.squared_distances, pair=pair, per_pixel=True),
+                ),
+                Quantity(
+                    name=pair_name(CHROMATIC_PIXEL_CSD, pair),
+                    metric=CHROMATIC_PIXEL_CSD,
+                    meaning=f"the chromatic separation {_COUNTED}; {_LATTICE}",
+                    unit=DN,
+                    label=f"chromatic {pair[0]}/{pair[1]} CSD by pixel",
+                    digits=1,
+                    direction="more",
+                    goal=True,
+                    nominal=True,
+                    pair=pair,
+                    scale="squared",
+                    distance_kind="chromatic",
+                    per_pixel=True,
+                    smooth=partial(chromatic_rows, pairs=(pair,), noise=False, per_pixel=True),
+                ),
+            )
+        )
+
+    def of_readings(self, readings: CaseReadings) -> Columns:
+        """Compute the columns in closed form; chromatic ones are NaN where a pixel may fill before."""
+        setup, dark = readings.setup, readings.dark
+        roots, members = pixel_roots(setup.camera.mosaic), setup.members
+        if readings.whole is not None:
+            apart = separations(readings.whole * roots, members)
+        else:
+            assert readings.fixed is not None
+            assert readings.values is not None
+            channel = readings.channel
+            apart = separations_along(readings.fixed * roots, channel, readings.values * roots[channel], members)
+        columns = {pair_name(PIXEL_CSD, pair): distances for pair, distances in apart.items()}
+        if not readings.pairs:
+            return columns
+        room = room_dn(setup, readings.dn, dark) * roots.min()
+        distances = dict.fromkeys(readings.pairs, np.full(len(dark), np.nan))
+        if (room > 0).any():
+            distances = chromatic_separations((readings.dn - dark[:, None]) * roots, members)
+        return columns | {
+            pair_name(CHROMATIC_PIXEL_CSD, pair): np.where(distances[pair] <= room, distances[pair], np.nan)
+            for pair in readings.pairs
+        }
+
+    def of_batch(self, batch: Batch) -> Columns:
+        """Compute columns that have no closed form from brightness curves."""
+        closed = {pair: batch.columns[pair_name(CHROMATIC_PIXEL_CSD, pair)] for pair in batch.pairs}
+        return {
+            pair_name(CHROMATIC_PIXEL_CSD, pair): np.where(np.isnan(values), walked[pair], values)
+            for walked in [_walked(batch, closed)]
+            for pair, values in closed.items()
+        }
+
+
+def _walked(batch: Batch, closed: dict[Pair, PerDesign]) -> dict[Pair, PerDesign]:
+    """Return the distances of the designs for which one is missing."""
+    if not closed:
+        return {}
+    missing = np.any([np.isnan(values) for values in closed.values()], axis=0)
+    return batch.over_brightness_by_pixel(missing)
