@@ -177,7 +177,7 @@ def _linear(
     factors: PerChannel | float = 1.0,
     *,
     lamps_only: bool = False,
-) -> tuple[Float[Array, "cases spectra wavelengths"], Float[Array, "cases spectra channels"]]:
+) -> tuple[Float[Array, "cases spectra wavelengths"], Float[Array, "cases spectra others"]]:
     """Return the response per unit of QE of the modified channel, and that of the other channels.
 
     `factors`: of the channels' readings.
