@@ -23,7 +23,7 @@ def holds_for(output: Output, curves: str = "") -> str:
     parts = [
         curves or curves_in_words(output),
         _camera(output),
-        _scene(list(output.study.scenarios.values())),
+        scene_conditions(list(output.study.scenarios.values())),
         _varied(output),
         _filters(output),
     ]
@@ -52,7 +52,7 @@ def curves_in_words(output: Output) -> str:
     facts, count = output.provenance, sum(map(len, output.curves.bundles.values()))
     relative = "" if response_of(output.curves.sensor) == QE else " (relative, taken as quantum efficiencies)"
     sensor = (
-        f"surrogate curves of {facts.sensor.name} (modeled, not measured)"
+        f"surrogate curves of {facts.sensor.name} (**modeled, not measured**)"
         if facts.sensor.surrogate
         else f"curves of {facts.sensor.name}{relative}"
     )
@@ -80,7 +80,7 @@ def _camera(output: Output) -> str:
     return f"f/{lens}, a pixel of {pixel.pitch_um:g} µm and {wells:,.0f} e, {readings}"
 
 
-def _scene(scenes: list[Scene]) -> str:
+def scene_conditions(scenes: list[Scene]) -> str:
     """Return distance, brightness, exposure and the like, over all scenes."""
     far = [scene.target.distance_m for scene in scenes if scene.target is not None]
     parts = [f"lamps {_span(far, 'm')} away"] if far else ["lamps that fill the field"]
@@ -109,6 +109,8 @@ def _scene(scenes: list[Scene]) -> str:
 def _varied(output: Output) -> str:
     """Return over which lamps and production errors a worst case is."""
     lamps, made = output.study.population, output.study.production
+    if not output.trade_off[0].extreme:
+        return ""
     parts = []
     if lamps is not None:
         bins = [value for value in lamps.binning_nm.values() if value]

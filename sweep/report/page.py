@@ -212,7 +212,7 @@ def page_of(
         kind=kind,
         title=title,
         answer=marked(" ".join(answer)),
-        holds=holds,
+        holds=marked(holds),
         lead={"title": "", "picture": None, "table": None, **first},
         price=None if price is None else part(price, None),
         limits=limits,

@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 
 Values = Float[Array, " numbers"]
 Pairs = tuple[Float[Array, " _points"], Float[Array, " _points"]]
+_NARROW = 2.0
+"""A front on whose axis all points would take this times its room is drawn alone, with others at its edge."""
 _ABOVE, _BELOW, _LEFT = 34, 52, 62
 """Room of a panel for its title, its axis and its numbers, px."""
 
@@ -349,7 +351,22 @@ class Scatter:
 
     def room(self, *, wide: bool) -> tuple[float, float]:
         """Numbers on the left, names on the right."""
-        return self.left, right_of((point.text for point in self.points), wide=wide)
+        low, high = self._ends()
+        texts = [f"{point.text}{'' if low <= point.x <= high else ' ' * 7}" for point in self.points]
+        return self.left, right_of(texts, wide=wide)
+
+    def _ends(self) -> tuple[float, float]:
+        """Return the ends of the axis: all points, or those around the front where it is narrow beside them."""
+        front = [part[0] for part in (self.cloud, self.traced, self.bound) if part is not None and len(part[0])]
+        own = [point.x for point in self.points if point.name == self.bold]
+        if not front or not own:
+            return -np.inf, np.inf
+        near = np.concatenate([*front, own])
+        low, high = float(near.min()), float(near.max())
+        every = [*near, *(point.x for point in self.points)]
+        room = max(0.25 * (high - low), 1.0)
+        wide = max(every) - min(every) > _NARROW * (high - low + 2 * room)
+        return (low - room, high + room) if wide else (-np.inf, np.inf)
 
     def tall(self, *, wide: bool) -> float:
         """As stated, or lower."""
@@ -365,27 +382,34 @@ class Scatter:
             at = int(np.argmax(self.bound[1]))
             words_at(
                 axes,
-                "upper bound ",
+                " upper bound",
                 float(self.bound[0][at]),
                 float(self.bound[1][at]),
                 color=DIM,
-                ha="right",
+                ha="left",
                 va="bottom",
             )
         if self.traced is not None:
             axes.plot(*self.traced, color=styles[self.bold].color if self.bold else GAIN, linewidth=2.4)
         if self.level is not None:
             axes.axhline(self.level, color=INK, linestyle=(0, (1, 2)), linewidth=1.2)
+        low_x, high_x = self._ends()
+        texts = {point.name: point.text for point in self.points}
         for point in self.points:
             style, bold = styles[point.name], point.name == self.bold
-            axes.plot(point.x, point.y, style.marker, color=style.color, markersize=13 if bold else 8, zorder=5,
-                      markeredgecolor="white", markeredgewidth=0.8)  # fmt: skip
+            x = np.clip(point.x, low_x, high_x)
+            axes.plot(x, point.y, style.marker, color=style.color, zorder=5, clip_on=False,
+                      markersize=13 if bold else 8, markeredgecolor="white", markeredgewidth=0.8)  # fmt: skip
+            if not low_x <= point.x <= high_x:
+                texts[point.name] += f" ({'◂' if point.x < low_x else '▸'} {point.x:.0f} %)"
+        if np.isfinite([low_x, high_x]).all():
+            axes.set_xlim(low_x, high_x)
         for number, line in zip(self.lines or (), (axes.axhline, axes.axvline), strict=False):
             line(number, color=INK, linestyle=(0, (1, 2)), linewidth=1.2)
-        axes.margins(0.08)
+        axes.margins(0.08 if np.isinf(low_x) else 0.0, 0.08)
         low, high = axes.get_ylim()
         axes.set_ylim(min(0.0, low) if low < 0.5 * high else low, high + 0.05 * (high - low))
-        ends = {point.text: (point.y, styles[point.name], point.name == self.bold) for point in self.points}
+        ends = {texts[point.name]: (point.y, styles[point.name], point.name == self.bold) for point in self.points}
         label_ends(axes, ends, axes.get_ylim())
         axes.set_xlabel(self.x_label, fontsize=font(axes.figure), color=INK)  # type: ignore[arg-type]
 

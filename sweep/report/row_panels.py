@@ -244,7 +244,8 @@ class Ratios:
         axes.axvline(1, 0, share, color=INK, linewidth=1.2)
         for one in self.ratios:
             style, bold = styles[one.name], one.name == self.bold
-            apart = 0.7 * (names.index(one.name) / max(1, len(names) - 1) - 0.5) * (len(names) > 1)
+            here = [name for name in names if any((r.row, r.name) == (one.row, name) for r in self.ratios)]
+            apart = 0.7 * (here.index(one.name) / max(1, len(here) - 1) - 0.5) * (len(here) > 1)
             y = rows.index(one.row) + apart
             if one.low is not None and one.high is not None:
                 axes.plot((one.low, one.high), (y, y), color=style.color, linewidth=3, alpha=0.4, solid_capstyle="butt")
@@ -253,7 +254,7 @@ class Ratios:
                 y,
                 style.marker,
                 color=style.color,
-                markersize=10 if bold else 7,
+                markersize=11 if bold else 8,
                 markeredgecolor="white",
                 zorder=5,
             )

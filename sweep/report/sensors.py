@@ -88,7 +88,7 @@ def report_sensors(manifest: Manifest, runs: Sequence[SensorRun]) -> list[str]:
         )
     links = [f"{run.folder.name}/{REPORT}" for run in runs]
     study = outputs[0][1].study
-    lead = Told("By design", (), picture, table_of(summary))
+    lead = Told("By design", (), picture, table_of(summary.drop(columns=["more", "on"])))
     text = page_of(
         folder.name, study.title or study.question or folder.name, answer, stated, lead, sections,
         kind="report of a sweep over sensors", limits=[*further, *notes], files=[RESULTS, *links],
@@ -105,7 +105,7 @@ def _curves(outputs: Sequence[tuple[SensorAndLights, Output]]) -> str:
     sensors = {output.provenance.sensor.name: output.provenance.sensor.surrogate for _, output in outputs}
     lights = {output.provenance.lights.name: output.provenance.lights.surrogate for _, output in outputs}
     parts = [
-        joined([f"{name}{' (modeled, not measured)' * modeled}" for name, modeled in known.items()])
+        joined([f"{name}{' (**modeled, not measured**)' * modeled}" for name, modeled in known.items()])
         for known in (sensors, lights)
     ]
     return f"curves of {parts[0]}; lamps of {parts[1]}"
@@ -156,6 +156,7 @@ def _summary(figures: pd.DataFrame) -> pd.DataFrame:
             "design": design,
             "on": joined([*of_design["sensor"].unique()]),
             "with lights": len(of_design),
+            "more": _verdict(of_design),
             "separation": _span(of_design["ratio"]),
             "light": _span(of_design["light_ratio"]),
             "more of both": f"{int(more.sum())} of {len(of_design)}",
@@ -172,8 +173,9 @@ def _answer(summary: pd.DataFrame, n_found: int, reference: str, words: str) -> 
     rows_of = summary.to_dict("records")
     for row in rows_of[:n_found]:
         text = (
-            f"On {row['on']}, the {row['design']} has **{row['separation']} times** the {words} of {reference} at "
-            f"**{row['light']} times** its light: more of both on {row['more of both']} pairs of sensor and lamps"
+            f"**{row['more']}** on {row['on']}: the {row['design']} has {row['separation']} times the {words} of "
+            f"{reference} at {row['light']} times its light, more of both on {row['more of both']} pairs of sensor and "
+            "lamps"
         )
         sure = row.get("by 5 % quantiles", "")
         of_random = f"by the 5 % quantiles of random sensors{'' if sure == row['more of both'] else f' on {sure}'}"
@@ -196,6 +198,12 @@ def _together(table: pd.DataFrame, goal: Column) -> Iterator[str]:
             text += " on that one" * (designed_on != ALL)
             parts.append(text + (f" and breaks a constraint by {broken:.2g} of its bound" if broken else ""))
         yield f"Of the best {goal.words} of each sensor and lights: {'; '.join(parts)}."
+
+
+def _verdict(of_design: pd.DataFrame) -> str:
+    """Return whether a design separates more than the plain CFA on all sensors, some or none."""
+    above = int((of_design["ratio"] > 1).sum())
+    return "More separation" if above == len(of_design) else "Less separation" if not above else "More on some"
 
 
 def _span(values: pd.Series[float]) -> str:

@@ -91,6 +91,18 @@ def change(value: float, of: float) -> str:
     return f"× {digits(ratio)}" if ratio >= _TIMES else f"{100 * (ratio - 1):+.0f}{NARROW}%".replace("-", "−")
 
 
+def against_in_words(value: float, of: float, name: str) -> str:
+    """Return a value against another: `68 % more than RGGB`, `3.75 times that of RGGB`; empty where unknown."""
+    if not (of > 0 and value > 0):
+        return ""
+    ratio = value / of
+    if abs(ratio - 1) < SAME:
+        return f"as much as {name}"
+    if ratio >= _TIMES:
+        return f"{digits(ratio)} times that of {name}"
+    return f"{100 * abs(ratio - 1):.0f}{NARROW}% {'more' if ratio > 1 else 'less'} than {name}"
+
+
 def effect(column: Column, value: float, of: float) -> str:
     """Return whether a value is a gain, a loss or the same against another."""
     if value == of or (of and abs(value / of - 1) < SAME):

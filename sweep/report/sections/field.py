@@ -38,6 +38,7 @@ class Field(Section):
     moves: bool
     filters: Curves | None
     edges_of: Mapping[str, str]
+    notes_of: Mapping[str, tuple[str, ...]]
 
     heading = "From the center to the corner"
     leads = True
@@ -76,6 +77,7 @@ class Field(Section):
                     label(row): ", ".join(f"{a:.0f} to {b:.0f} nm" for a, b in edges_of(row))
                     for row in rows.to_dict("records")
                 },
+                {label(row): tuple(colorants_of(output, row)) for row in rows.to_dict("records")},
             )
 
     def _falls(self, name: str) -> bool:
@@ -134,7 +136,7 @@ class Field(Section):
         lines = []
         if self.bound is not None:
             lines.append(
-                f"No filter that {'moves like it' if self.moves else 'does not move'} and stays below the curve that it replaces exceeds {self.column.format_bound(self.bound)} over the field {self.bound_of} (proven, before "
+                f"No filter that {'moves like it' if self.moves else 'does not move'} and stays below the curve that it replaces keeps more than {self.column.format_bound(self.bound)} at every place of the field {self.bound_of} (proven, before "
                 f"rounding); {quoted(self.hero)} reaches {amount(self.worst[self.hero] / self.bound, 'share')} of that."
             )
         return lines

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.types import Array, Float
+from ...camera.scene import WhitePatchExposure
 from ...metrics.columns.chromatic import CHROMATIC_CSD
 from ...metrics.columns.flicker import FALSE_HUE, LAMP_SEEN, MODULATION
 from ...results.output import Output
@@ -22,6 +23,8 @@ from ..words import amount, change, joined, number, quoted
 Values = Float[Array, " numbers"]
 _ALL = 1 - 1e-9
 _MOST_SERIES = 2
+_SHOWN = 0.01
+"""Share of the largest false hue from which on that of a series is drawn."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +40,7 @@ class Worst:
 class OverPulses:
     """Shares over one number: of lamps missed, swings of brightness, false hue of the yellow/red distance.
 
-    `fixed`: the other number of the pulses, in words; `apart`: least yellow/red distance of each, DN.
+    `fixed`: the other number of the pulses, in words; `apart`: distance of the two types, DN.
     """
 
     numbers: Numbers
@@ -45,8 +48,18 @@ class OverPulses:
     missed: Mapping[str, Values]
     swing: Mapping[str, Values]
     hue: Mapping[str, Values]
-    apart: Mapping[str, float]
+    apart: Mapping[str, Values]
     worst: Mapping[str, tuple[Worst, ...]]
+
+    def with_worst(self, name: str) -> tuple[Values, Values]:
+        """Return numbers and false hue of a design, with the worst place between them."""
+        x, y = np.array(self.numbers.x), self.hue[name]
+        for known in self.worst.get(FALSE_HUE, ()):
+            if known.name == name and known.at not in x:
+                share = known.value / float(np.interp(known.at, x, self.apart[name]))
+                at = int(np.searchsorted(x, known.at))
+                return np.insert(x, at, known.at), np.insert(y, at, share)
+        return x, y
 
     @property
     def span(self) -> str:
@@ -66,6 +79,7 @@ class Flicker(Section):
     hero: str
     rggb: str
     pair: str
+    exposure: str = "the exposure"
 
     heading = "Pulsed lamps"
     leads = True
@@ -93,9 +107,8 @@ class Flicker(Section):
             shares = {name: hue[name] / np.where(apart[name] > 0, apart[name], np.nan) for name in hue if name in apart}
             numbers = Numbers(base, key, tuple(scenarios.values()))
             missed = {name: 1 - values for name, values in seen.items()}
-            least = {name: float(np.min(values)) for name, values in apart.items()}
             swing = over_series(rows, scenarios, MODULATION)
-            found.append(OverPulses(numbers, _fixed(output, scenarios), missed, swing, shares, least, worst))
+            found.append(OverPulses(numbers, _fixed(output, scenarios), missed, swing, shares, apart, worst))
         if found and all(float(np.max([*one.missed.values()])) <= 1 - _ALL for one in found):
             hero, rggb = answering(output), reference_of(output, output.scenarios[0])
             names = "/".join(pair)
@@ -104,6 +117,7 @@ class Flicker(Section):
                 "" if hero is None else label(hero),
                 "" if rggb is None else label(rggb),
                 names,
+                _exposure(output),
             )
 
     def _extreme(self, quantity: str, computed: str) -> tuple[Worst, OverPulses]:
@@ -123,7 +137,7 @@ class Flicker(Section):
         swing, over = self._extreme(MODULATION, "swing")
         refined = all(one.worst.get(LAMP_SEEN) for one in self.series)
         lines = [
-            f"**Never**: the exposure meets a lamp in every phase of pulses {joined([one.span for one in self.series])}"
+            f"**Never**: {self.exposure} meets a lamp in every phase of pulses {joined([one.span for one in self.series])}"
             f"{', also between the computed ones' * refined}. Its brightness swings by up to "
             f"**±{amount(swing.value, 'share')}** ({swing.name} at {over.numbers.with_unit(swing.at)})."
         ]
@@ -138,13 +152,8 @@ class Flicker(Section):
         return lines
 
     def _hue(self, name: str) -> float:
-        """Return the largest false hue of a design as a share of its least distance, between the scenes where known."""
-        shares = [most_of([one.hue.get(name)]) for one in self.series]
-        for one in self.series:
-            for known in one.worst.get(FALSE_HUE, ()):
-                if known.name == name and one.apart.get(name, 0.0) > 0:
-                    shares.append(known.value / one.apart[name])
-        return max((share for share in shares if np.isfinite(share)), default=np.nan)
+        """Return the largest false hue of a design as a share of its distance, between the scenes where known."""
+        return most_of(one.with_worst(name)[1] for one in self.series)
 
     @property
     def limits(self) -> list[str]:
@@ -158,26 +167,36 @@ class Flicker(Section):
     def picture(self) -> Picture | None:
         """Missed lamps and swings above false hue, a column for each series."""
         above, below = list[Panel](), list[Panel]()
-        most_hue = 100 * max(most_of(one.hue.values()) for one in self.series)
+        most_hue = 100 * max(most_of(one.with_worst(name)[1] for name in one.hue) for one in self.series)
         most_swing = 100 * max(most_of(one.swing.values()) for one in self.series)
         for one in self.series:
             x, axis = np.array(one.numbers.drawn), f"{one.numbers.axis}{f' ({one.fixed})' if one.fixed else ''}"
             most = {"missed": np.max([*one.missed.values()], axis=0), "swing": np.max([*one.swing.values()], axis=0)}
             lines = {f"{name}, worst CFA": Line(x, 100 * values) for name, values in most.items()}
-            hue = {name: Line(x, 100 * np.nan_to_num(v)) for name, v in one.hue.items()}
+            points = {name: one.with_worst(name) for name in one.hue}
+            hue = {n: Line(one.numbers.factor * at, 100 * np.nan_to_num(y)) for n, (at, y) in points.items()}
             log = one.numbers.log
             above.append(
                 Lines("lamps missed, and swing of brightness / %", axis, lines, log_x=log, height=190, most=most_swing)
             )
-            below.append(
-                Lines(
-                    f"false hue / % of the {self.pair} distance", axis, hue, self.hero, log, height=190, most=most_hue
+            if 100 * most_of(one.hue.values()) > _SHOWN * most_hue:
+                below.append(
+                    Lines(
+                        f"false hue / % of the {self.pair} distance",
+                        axis,
+                        hue,
+                        self.hero,
+                        log,
+                        height=190,
+                        most=most_hue,
+                    )
                 )
-            )
         alone = (
             f"Lamps missed, swing of brightness and false hue over {joined([one.numbers.name for one in self.series])}."
         )
-        caption = "Worst of all lamps and all moments of the pulses, at the computed pulses (dots)."
+        caption = "Worst of all lamps and all moments of the pulses, at the computed pulses and the worst between them."
+        if len(below) < len(above):
+            caption += f" Elsewhere the false hue is below {_SHOWN * most_hue:.2g} %."
         return Picture((*above, *below), alone, caption, columns=len(self.series))
 
     @property
@@ -207,6 +226,13 @@ class Flicker(Section):
             ),
             tuple(rows),
         )
+
+
+def _exposure(output: Output) -> str:
+    """Return the exposure that all scenes share, in words."""
+    exposures = [scene.exposure for scene in output.study.scenarios.values()]
+    fixed = {exposure.exposure_s for exposure in exposures if not isinstance(exposure, WhitePatchExposure)}
+    return f"an exposure of {amount(fixed.pop(), 's')}" if len(fixed) == 1 else "the exposure"
 
 
 def _fixed(output: Output, scenarios: Mapping[str, float]) -> str:

@@ -20,7 +20,7 @@ from ..panels import Curves, Map, Panel, Picture
 from ..row_panels import Row as Drawn
 from ..row_panels import Rows
 from ..section import MOST_ROWS, Section, Table
-from ..terms import bound_conditions, edges_in_words, edges_of
+from ..terms import bound_conditions, edges_in_words, edges_of, format_missed_constraints
 from ..words import amount, change, digits, joined, lamp, of_column, quantity, quoted
 from .trade_off import filter_curves
 
@@ -37,6 +37,7 @@ class Judged:
     nominal: float
     share: tuple[float, float, float] | None
     breaks: str
+    missed: str = ""
 
 
 @dataclass(frozen=True)
@@ -103,7 +104,8 @@ class Lamps(Section):
             lost = amount(best.nominal, "DN")
             lines.append(
                 f"That costs **{amount(1 - best.nominal / rival.nominal, 'share')}** of the nominal separation of {quoted(rival.name)} ({lost} instead of "
-                f"{amount(rival.nominal, 'DN')}), which keeps {of_column(self.column, rival.worst)} in the worst case."
+                f"{amount(rival.nominal, 'DN')}), which keeps {of_column(self.column, rival.worst)} in the worst case"
+                f"{f', but {rival.missed}' if rival.missed else ''}."
             )
         return lines
 
@@ -187,7 +189,8 @@ def _judged(output: Output, row: Row, rows: Sequence[Row]) -> Judged:
     column = output.trade_off[0]
     share = tuple(float(row.get(name, np.nan)) for name in ("yield", "yield_low", "yield_high"))
     known = (share[0], share[1], share[2]) if np.isfinite(share).all() else None
-    return Judged(label(row), float(row[column.name]), float(row[column.of]), known, _breaks(output, row, rows))
+    missed = "" if row["kind"] == REFERENCE else format_missed_constraints(output, row)
+    return Judged(label(row), float(row[column.name]), float(row[column.of]), known, _breaks(output, row, rows), missed)
 
 
 def _breaks(output: Output, row: Row, rows: Sequence[Row]) -> str:

@@ -95,16 +95,29 @@ class Noise(Section):
 
     @property
     def answer(self) -> list[str]:
-        """Where each CFA and design has at most the allowed error."""
+        """Where RGGB, the answering design and the one with the widest range have at most the allowed error."""
+        widest = sorted(self.ranges, key=lambda name: -self._width(name))
+        shown = [name for name in widest if name in (RGGB, self.hero) or name == widest[0]]
         groups: dict[str, list[str]] = {}
-        for name, found in self.ranges.items():
-            groups.setdefault(ranges_in_words(self.numbers, found), []).append(name)
-        ordered = sorted(groups.items(), key=lambda item: (RGGB not in item[1], self.hero not in item[1]))
-        parts = [f"**{where}** with {joined([quoted(name) for name in names])}" for where, names in ordered]
+        for name in shown:
+            groups.setdefault(ranges_in_words(self.numbers, self.ranges[name]), []).append(name)
+        parts = [f"**{where}** with {joined([quoted(name) for name in names])}" for where, names in groups.items()]
         rarely, what = one_in(self.allowed).replace("1 in", "1 error in"), joined([*self.states])
-        return [
-            f"Over {self.numbers.name}, {what} lamps of unknown brightness are told apart with at most {rarely} {'; '.join(parts)}."
+        rest = [name for name in widest if name not in shown]
+        lines = [
+            f"{what.capitalize()} lamps of unknown brightness are told apart with at most {rarely} {'; '.join(parts)}."
         ]
+        if rest:
+            lines.append(
+                f"Others: {'; '.join(f'{quoted(n)} {ranges_in_words(self.numbers, self.ranges[n])}' for n in rest)}."
+            )
+        return lines
+
+    def _width(self, name: str) -> float:
+        """Return how much of the numbers is in a design's ranges, on the axis of the figure."""
+        scale = np.log if self.numbers.log else np.asarray
+        ends = np.clip(np.array(self.ranges[name]).reshape(-1, 2), self.numbers.x[0], self.numbers.x[-1])
+        return float(np.diff(scale(ends), axis=1).sum())
 
     @property
     def limits(self) -> list[str]:

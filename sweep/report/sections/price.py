@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from ...metrics.columns.chromatic import CHROMATIC_CSD
 from ...metrics.columns.color_separation import CSD
 from ...metrics.columns.exposure import EXPOSURE
+from ...metrics.columns.pixel_separation import CHROMATIC_PIXEL_CSD, PIXEL_CSD
 from ...metrics.columns.sensitivity import CFA_SENSITIVITY
 from ...metrics.quantity import Column
 from ...results.output import Output
@@ -20,7 +21,11 @@ from ..series import scene_in_words
 from ..words import amount, change, effect, of_column, quantity
 
 _TASKS = ("color_delta_e_mean_d65", "low_light_lux_led", "low_light_lux_a")
-_MOST = 10
+_MOST = 12
+COUNTED = (
+    "By pixel, two green pixels count as two, as noise sees them; the separation of the literature counts each channel "
+    "once, a tile of four channels in full."
+)
 
 
 @dataclass(frozen=True)
@@ -77,8 +82,10 @@ class Price(Section):
         if "gain" in effects.get(CFA_SENSITIVITY, "") and any("loss" in effects.get(name, "") for name in _TASKS[1:]):
             note = (
                 "Why light is a gain and lux a loss: the tile collects more light, but the color matrix that makes RGB of its channels multiplies "
-                "the noise."
+                "the noise. "
             )
+        if any(column.metric in (PIXEL_CSD, CHROMATIC_PIXEL_CSD) for column in self.columns):
+            note += COUNTED
         return Table(
             ("", *self.names, f"against {self.names[0]}", ""),
             tuple(rows),
@@ -100,7 +107,7 @@ def _names(output: Output) -> list[str]:
     separation = output.trade_off[0]
     names = [separation.name, *([separation.of] if separation.extreme else [])]
     if separation.pair is not None:
-        names += [pair_name(CSD, separation.pair), pair_name(CHROMATIC_CSD, separation.pair)]
+        names += [pair_name(metric, separation.pair) for metric in (CSD, PIXEL_CSD, CHROMATIC_CSD, CHROMATIC_PIXEL_CSD)]
     names += [CFA_SENSITIVITY, *_TASKS, EXPOSURE]
     names += [name for name in output.distances if output.columns[name].metric == CSD]
     return list(dict.fromkeys(names))

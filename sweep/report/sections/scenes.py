@@ -10,12 +10,13 @@ from ...metrics.quantity import Column
 from ...results.output import Output
 from ...results.tables import SEARCHED, SWEPT
 from ...study.axes import series_of
+from ..hold import scene_conditions
 from ..leaders import label, leaders_of, reference_of
 from ..panels import Picture
 from ..row_panels import Row, Rows
 from ..section import MOST_ROWS, Section, Table
 from ..series import scene_in_words
-from ..words import amount, change, of_column, quantity
+from ..words import amount, change, joined, of_column, quantity
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,8 @@ class Scenes(Section):
                 ratio, rggb_name = float(best[column.name]) / float(rggb[column.name]), label(rggb)
                 drawn.append(Row(scene_in_words(scenario), ratio, text=f"{value}; {rggb_name} {its}", lost=ratio < 1))
                 above += ratio > 1
-            rows.append((scene_in_words(scenario), f"{label(best)} of {best['cfa']}", value, light, its))
+            what = scene_conditions([output.study.scenarios[scenario]])
+            rows.append((f"{scene_in_words(scenario)}: {what}", f"{label(best)} of {best['cfa']}", value, light, its))
         shown = tuple(drawn) if len(drawn) == len(rows) <= MOST_ROWS else ()
         alone = output.provenance.search is None and not series_of(output.scenarios)
         yield cls(column, tuple(rows[:MOST_ROWS]), len(rows), shown, (above, len(drawn)), rggb_name, alone)
@@ -63,10 +65,17 @@ class Scenes(Section):
         if not self.swept or not self.drawn:
             return []
         above, of = self.above
-        least, most = (pick(self.drawn, key=lambda one: one.value) for pick in (min, max))
+        gains, losses = ([row for row in self.drawn if row.lost == lost] for lost in (False, True))
+        ends = dict.fromkeys(change(pick(row.value for row in gains), 1.0) for pick in (min, max)) if gains else {}
+        more = f", **{' to '.join(ends)}**" if gains else ""
+        lost = (
+            f"; **{joined([f'{change(row.value, 1.0)} in {row.name} ({row.text})' for row in losses])}**"
+            if losses
+            else ""
+        )
         return [
-            f"In **{above} of {of} scenes** the best filter of this sweep has a larger {quantity(self.column)} than {self.rggb}: "
-            f"from {_against(least)} to {_against(most)}."
+            f"In **{above} of {of} scenes** the best filter of this sweep has a larger {quantity(self.column)} than "
+            f"{self.rggb}{more}{lost}."
         ]
 
     @property
@@ -94,8 +103,3 @@ class Scenes(Section):
             else ""
         )
         return Table(("scene", "best design", quantity(self.column), "light", "RGGB"), self.rows, note)
-
-
-def _against(one: Row) -> str:
-    """Return a scene with its ratio and its values."""
-    return f"**{change(one.value, 1.0)}** in {one.name} ({one.text})"

@@ -309,14 +309,16 @@ class Series(Section):
         lines = {}
         for name, y in self.values.items():
             drawn = np.maximum(np.nan_to_num(y, nan=_LEAST_DRAWN), _LEAST_DRAWN) if self._vanishes else y
-            lines[name] = Line(x, np.where(seen, drawn, np.nan), self.bests.get(name))
+            lines[name] = self._with_worst(name, Line(x, np.where(seen, drawn, np.nan), self.bests.get(name)))
         rings = self._rings()
         level, band, panels = (_LEAST, "1 DN") if self._vanishes and not pulsed else None, None, list[Panel]()
         if self.missed is not None and pulsed:
             last = float(x[np.flatnonzero(~seen)[-1]])
             dark = self.numbers.factor * (self.dark_s or 0.0) if self.numbers.key == "exposure_s" else last
             band = (float(x[0]), max(last, dark), "the lamp\nmay be dark")
-            phases = {"every CFA": Line(x, 100 * self.missed)}
+            ends = np.append(x, dark), np.append(100 * self.missed, 0.0)
+            order = np.argsort(ends[0], kind="stable")
+            phases = {"every CFA": Line(ends[0][order], ends[1][order])}
             panels.append(
                 Lines(
                     "phases of the pulses that miss the lamp / %",
@@ -357,6 +359,14 @@ class Series(Section):
             for one in found
             if one is not None and one[1] >= self._least
         )
+
+    def _with_worst(self, name: str, line: Line) -> Line:
+        """Return a line with its worst place, if the series was searched for that."""
+        if not self.searched or name not in self.worst or line.upper is not None:
+            return line
+        value, number = self.worst[name]
+        at = int(np.searchsorted(line.x, self.numbers.factor * number))
+        return Line(np.insert(line.x, at, self.numbers.factor * number), np.insert(line.y, at, value))
 
     def _least_rings(self) -> Iterator[Ring]:
         """Yield the worst places of the filter and of RGGB."""

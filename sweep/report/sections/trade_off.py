@@ -8,13 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.types import Array, Float
+from ...metrics.columns.chromatic import CHROMATIC_CSD
+from ...metrics.columns.color_separation import CSD
 from ...metrics.columns.confusion import CNR, D_PRIME
+from ...metrics.columns.pixel_separation import CHROMATIC_PIXEL_CSD, PIXEL_CSD
 from ...metrics.columns.sensitivity import CFA_SENSITIVITY
 from ...metrics.columns.tasks import PREFIX
 from ...metrics.limiting import limited_by_name
 from ...metrics.quantity import OF_A_SHARE, WORST_CASE, Column
 from ...results.output import Output
 from ...results.tables import NAMED, REFERENCE, SEARCHED, SWEPT
+from ...spectra.lights import pair_name
 from ..leaders import (
     Row,
     bounds_figure,
@@ -39,7 +43,7 @@ from ..terms import (
     is_angle_dependent,
     response_of,
 )
-from ..words import amount, article, change, joined, lamps, of_column, quantity, quoted
+from ..words import against_in_words, amount, article, joined, lamps, of_column, quantity, quoted
 
 Values = Float[Array, " wavelengths"]
 _MOST_CLOUD = 400
@@ -88,6 +92,7 @@ class TradeOff(Section):
     bounds: Pairs | None
     light_of: str
     own: tuple[str, ...] = ()
+    by_pixel: tuple[float, float] | None = None
 
     heading = "What it buys"
     leads = True
@@ -140,6 +145,7 @@ class TradeOff(Section):
             traced=_line(output, scenario, "objective", best),
             bounds=_line(output, scenario, "limit", best) if bounds_figure(output, scenario, str(best["cfa"])) else None,
             own=tuple(_least(output, best, rggb)),
+            by_pixel=_by_pixel(column, best, rggb),
             light_of="a sensor without filters" if sensor.has_clear else f"{sensor.reference} pixels alone",
         )  # fmt: skip
 
@@ -156,16 +162,12 @@ class TradeOff(Section):
             else f"{best.name}{notes}, the best {self.found},"
         )
         text = f"{edges}{who if edges or who.startswith(best.name) else who[:1].upper() + who[1:]}"
-        less = rggb is not None and rggb.separation > best.separation
         plain = [one for one in (rggb, self.tile) if one is not None]
-        parts = [
-            f"{one.name}: {of_column(self.column, one.separation)}"
-            + (f", {change(best.separation, one.separation)}" if less else "")
-            for one in plain
-        ]
-        beside = f" ({('; ' if less else ', ').join(parts)})" if plain else ""
-        if rggb is not None and less:
-            beside = f", **less than {rggb.name}**{beside}"
+        beside = (
+            f" ({', '.join(f'{one.name}: {of_column(self.column, one.separation)}' for one in plain)})" if plain else ""
+        )
+        if rggb is not None and (against := against_in_words(best.separation, rggb.separation, rggb.name)):
+            beside = f", **{against}**{beside}"
         if self.own:
             text += f" has {joined([*self.own])}"
         elif self.column.pair is None or self.column.metric in (D_PRIME, CNR):
@@ -193,7 +195,14 @@ class TradeOff(Section):
     @property
     def limits(self) -> list[str]:
         """Nearest lamps, upper bound, and who separates more."""
-        lines = [f"The nearest pair is {lamps(self.lamps)}."] if self.lamps else []
+        lines = []
+        if self.by_pixel is not None and self.rggb is not None:
+            mine, its = self.by_pixel
+            lines.append(
+                f"With every pixel counted, as noise sees them, it separates by {of_column(self.column, mine)}, "
+                f"{against_in_words(mine, its, self.rggb.name)} ({of_column(self.column, its)})."
+            )
+        lines += [f"The nearest pair is {lamps(self.lamps)}."] if self.lamps else []
         if self.bound is not None:
             share = amount(self.best.separation / self.bound, "share") if self.bound > 0 else ""
             lines.append(
@@ -223,7 +232,9 @@ class TradeOff(Section):
         )  # fmt: skip
         alone = f"{self.best.name}: {of_column(self.column, self.best.separation)} at {amount(self.best.light, 'share')} of the light, beside other CFAs."
         parts = ["Solid line: the best of the search at each level of light."] if self.traced is not None else []
-        parts += ["Dashed: the upper bound at each level of light."] if self.bounds is not None else []
+        parts += (
+            ["Dashed: the upper bound at each level of light, which falls with it."] if self.bounds is not None else []
+        )
         parts += ["Small dots: swept designs on the front."] if self.cloud is not None else []
         parts += ["Areas: the lamps' spectra."] if self.filters is not None else []
         return Picture(tuple(panels), alone, " ".join(parts))
@@ -274,6 +285,15 @@ def filter_curves(output: Output, best: Row, color: str, height: float = 320) ->
         tuple(edge for pair in edges for edge in pair),
         height,
     )
+
+
+def _by_pixel(column: Column, best: Row, rggb: Row | None) -> tuple[float, float] | None:
+    """Return the separations with every pixel counted, where the study's is one that counts each channel once."""
+    name = {CSD: PIXEL_CSD, CHROMATIC_CSD: CHROMATIC_PIXEL_CSD}.get(column.metric)
+    if name is None or column.extreme or rggb is None or column.pair is None:
+        return None
+    values = [float(row.get(pair_name(name, column.pair), np.nan)) for row in (best, rggb)]
+    return (values[0], values[1]) if np.isfinite(values).all() else None
 
 
 def _unconverged(output: Output, best: Row) -> Iterator[str]:
@@ -348,7 +368,8 @@ def _kept(output: Output, best: Row, rggb: Row | None) -> Iterator[str]:
     for name, bound in output.constraints.items():
         column = output.columns.get(name)
         if column is not None and column.metric.startswith(PREFIX):
-            beside = "" if rggb is None else f"; {label(rggb)}: {of_column(column, float(rggb[name]))}"
+            plain = [row for row in (rggb, own_tile(output, best)) if row is not None]
+            beside = "".join(f"; {label(row)}: {of_column(column, float(row[name]))}" for row in plain)
             yield f"{quantity(column)} at **{of_column(column, float(best[name]))}** ({format_bounded(column, bound)}{beside})"
 
 
