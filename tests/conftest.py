@@ -10,22 +10,20 @@ from typing import Any
 
 import pandas as pd
 import pytest
-from jaxtyping import install_import_hook
 
-from .shapes import checked
+from .shapes import check_types
 
 ROOT = Path(__file__).parent.parent
 UNCHECKED = ("kernels.py", "user_effects.py", "app.py", "__init__.py")
 """How names of files end that are left out: Numba compiles no function that is wrapped, effects of users are checked
 by the package itself, and typer hands over a context of another class."""
 if "UNCHECKED_TYPES" not in os.environ:  # of tests that take long
-    install_import_hook(
-        [
+    check_types(
+        {
             ".".join(path.relative_to(ROOT).with_suffix("").parts)
             for path in (ROOT / "sweep").rglob("*.py")
             if not path.name.endswith(UNCHECKED) and path.parent.name != "commands"
-        ],
-        f"{checked.__module__}.{checked.__name__}",
+        }
     )
 
 from sweep.study import Study

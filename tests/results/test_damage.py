@@ -256,8 +256,10 @@ def pipes(path: Path, _: Path, __: int) -> None:
 
 
 def terabytes(path: Path, _: Path, __: int) -> None:
-    with suppress(OSError):  # a disk that has no holes in files
-        os.truncate(path, 2**40)
+    """The first of a folder: to read as much of one as is allowed takes a second."""
+    if path == min(path.parent.iterdir()):
+        with suppress(OSError):  # a disk that has no holes in files
+            os.truncate(path, 2**40)
 
 
 @pytest.mark.parametrize("attack", [pickles, other_content, links, pipes, terabytes])

@@ -30,6 +30,7 @@ SCENE: dict[str, Any] = {
     "noise": True,
 }
 WEIGHTED = {"captures": "split_pixel", "merge": "weighted", "prnu": 0.01}
+LAMP = {"target": True}
 OWN_QE = {"captures": [{"well_e": 9000}, {"sensitivity": 0.02, "well_e": 8000, "qe_factor": {"N": 0.8, "Cy": 1.1}}]}
 
 
@@ -49,15 +50,15 @@ def hdr_problem(objective: Objective, intensities_cd: list[float], target: bool 
     )
 
 
-@pytest.mark.parametrize("pixel", [{}, WEIGHTED, OWN_QE, {"target": True}], ids=["split", "weighted", "own QE", "lamp"])
+@pytest.mark.parametrize("pixel", [{}, WEIGHTED, OWN_QE, LAMP], ids=["split", "weighted", "own QE", "lamp"])
 @pytest.mark.parametrize("objective", [CHROMATIC, Objective(least={"error_yellow_red": 1.0})], ids=str)
 def test_derivatives_of_merged_noise_agree_with_differences(objective: Objective, pixel: dict[str, Any]) -> None:
     """In the dark, at a handover of N, in the small photodiode, and where it is full."""
-    problem = hdr_problem(objective, [0.5, 16.0, 500.0], **pixel)
+    problem = hdr_problem(objective, [16.0, 500.0] if pixel == LAMP else [0.5, 16.0, 500.0], **pixel)
     u, step = np.array([0.41, 0.33, 0.57, 0.62]), 1e-4
     own, by_u = rows_at(problem, u)
     scale = np.abs(by_u).max(axis=1) + 1e-6 * np.abs(own) + 1e-9  # differences of saturated signals are rounding
-    for k in range(4):
+    for k in (0, 3) if pixel == LAMP else range(4):  # whose moments take long, and have no parameters of their own
         off = step * np.eye(4)[k]
         wide, near = (
             (rows_at(problem, u + off / n)[0] - rows_at(problem, u - off / n)[0]) / (2 * step / n) for n in (1, 2)

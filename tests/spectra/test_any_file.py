@@ -21,6 +21,7 @@ from sweep.spectra.units import Use, unit_of, used_as
 from sweep.study import load_study
 
 from ..build import one_line
+from ..cases import thinned
 from ..commanded import commanded
 from ..watchdog import within
 
@@ -164,10 +165,11 @@ def reads_back(path: Path, written: Written) -> bool:
     return True
 
 
-def test_of_a_thousand_layouts_none_is_another_number(tmp_path: Path) -> None:
-    rng, read = np.random.default_rng(11), 0
+@pytest.mark.parametrize("seed", thinned(range(4), 4))
+def test_of_a_thousand_layouts_none_is_another_number(tmp_path: Path, seed: int) -> None:
+    rng, read = np.random.default_rng([11, seed]), 0
     refused: dict[str, int] = {}
-    for number in range(1000):
+    for number in range(250):
         written = table(rng)
         path = tmp_path / f"a.{('csv', 'txt', 'dat')[number % 3]}"
         encoding = str(rng.choice(["utf-8", "utf-8-sig", "utf-16", "latin-1", "utf-16-le"]))
@@ -176,7 +178,7 @@ def test_of_a_thousand_layouts_none_is_another_number(tmp_path: Path) -> None:
         read += ok
         if not ok:
             refused[written.unit] = refused.get(written.unit, 0) + 1
-    assert read > 850, refused
+    assert read > 212, refused
 
 
 MEANINGS = """

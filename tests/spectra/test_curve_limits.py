@@ -110,17 +110,17 @@ def lines(path: Path, header: str, *rows: str) -> Path:
     return path
 
 
-def test_tables_that_are_too_large_are_one_line(tmp_path: Path) -> None:
+@pytest.mark.parametrize("most", [1000, pytest.param(MOST_SAMPLES, marks=pytest.mark.slow)])
+def test_tables_that_are_too_large_are_one_line(tmp_path: Path, most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sweep.spectra.read_table.MOST_SAMPLES", most)
     names = ",".join(f"c{i}" for i in range(20_000))
     wide = lines(
         tmp_path / "wide.csv", "wavelength_nm," + names, *[f"{400 + i},{','.join(['0.5'] * 20_000)}" for i in range(3)]
     )
-    long = lines(
-        tmp_path / "long.csv", "wavelength_nm,a", *[f"{400 + i * 1e-4:.4f},1" for i in range(MOST_SAMPLES + 1)]
-    )
+    long = lines(tmp_path / "long.csv", "wavelength_nm,a", *[f"{400 + i * 1e-4:.4f},1" for i in range(most + 1)])
     for path, said in (
         (wide, f"too many curves in one file (got 20000); allowed: at most {MOST_CURVES:,}"),
-        (long, f"too many samples in one file (got {MOST_SAMPLES + 1}); allowed: at most {MOST_SAMPLES:,}"),
+        (long, f"too many samples in one file (got {most + 1}); allowed: at most {most:,}"),
     ):
         with pytest.raises(DataError) as caught, within(HANG_S):
             read_curves(path)
