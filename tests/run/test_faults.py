@@ -184,7 +184,7 @@ def test_a_cluster_gives_the_same_rows_with_a_worker_killed(tmp_path: Path) -> N
 
 
 def test_a_search_that_was_killed_is_not_repeated(tmp_path: Path) -> None:
-    study = load_study(study_file(tmp_path))
+    study = load_study(study_file(tmp_path, 2))
 
     def stop(phase: str, done: int, _total: int) -> None:
         if phase == "search starts" and done == 2:

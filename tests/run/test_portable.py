@@ -39,6 +39,7 @@ start()
 
 def test_a_run_is_interrupted_and_continued(tmp_path: Path) -> None:
     path = study_file(tmp_path, 3)
+    path.write_text(path.read_text().replace("max_evaluations: 200", "max_evaluations: 12"))
     paths = str(path), str(tmp_path / "out")
     first = subprocess.run([sys.executable, "-c", INTERRUPTED, *paths], capture_output=True, text=True, check=False)
     assert "InterruptedRunError" in first.stderr
