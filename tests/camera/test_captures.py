@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -112,6 +113,14 @@ def test_mean_and_variance_are_those_of_draws(seed: int) -> None:
     assert found.variance[0] == pytest.approx(spread.mean(), rel=0.02, abs=tolerance)
 
 
+@cache
+def chances_of_codes(well_e: float, dn_per_e: float, offset_dn: float, read_noise_e: float, full_dn: int) -> Array:
+    """Probability of each code, of 0 to 5,499 electrons."""
+    mean = (np.minimum(np.arange(5_500), well_e) * dn_per_e + offset_dn)[:, None]
+    edges = np.concatenate([[-np.inf], np.arange(full_dn) + 0.5, [np.inf]])
+    return np.diff(special.ndtr((edges - mean) / (dn_per_e * read_noise_e)), axis=1)
+
+
 def outcomes(expected: Array, pixel: Pixel) -> dict[float, float]:
     """Probability of each merged value of `merge: saturated` without PRNU, from SciPy's distributions alone."""
     light, at, limits = relative_light(pixel), exposure_of(pixel), limits_dn(pixel)
@@ -123,9 +132,8 @@ def outcomes(expected: Array, pixel: Pixel) -> dict[float, float]:
         left = stats.poisson.pmf(counts, expected[g]) * passed.sum()
         for k in exposure.numbers:
             one, numbers = pixel.read_as[k], np.arange(pixel.read_as[k].full_scale_dn + 1)
-            mean = (np.minimum(counts, one.well_e) * one.dn_per_e + one.offset_dn)[:, None]
-            edges = np.concatenate([[-np.inf], numbers[:-1] + 0.5, [np.inf]])
-            chance = np.diff(special.ndtr((edges - mean) / (one.dn_per_e * one.read_noise_e)), axis=1)
+            facts = one.well_e, one.dn_per_e, one.offset_dn, one.read_noise_e, one.full_scale_dn
+            chance = chances_of_codes(*facts)[counts]
             usable = numbers < (np.inf if limits[k] is None else limits[k])
             values = (numbers - one.offset_dn) / one.dn_per_e / light[at[k]]
             for value, share in zip(values[usable], left @ chance[:, usable], strict=True):

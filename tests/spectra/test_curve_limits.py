@@ -110,17 +110,24 @@ def lines(path: Path, header: str, *rows: str) -> Path:
     return path
 
 
-@pytest.mark.parametrize("most", [1000, pytest.param(MOST_SAMPLES, marks=pytest.mark.slow)])
-def test_tables_that_are_too_large_are_one_line(tmp_path: Path, most: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sweep.spectra.read_table.MOST_SAMPLES", most)
-    names = ",".join(f"c{i}" for i in range(20_000))
+@pytest.mark.parametrize(
+    ("curves", "samples"), [(50, 1000), pytest.param(MOST_CURVES, MOST_SAMPLES, marks=pytest.mark.slow)]
+)
+def test_tables_that_are_too_large_are_one_line(
+    tmp_path: Path, curves: int, samples: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sweep.spectra.read_table.MOST_CURVES", curves)
+    monkeypatch.setattr("sweep.spectra.read_table.MOST_SAMPLES", samples)
+    names = ",".join(f"c{i}" for i in range(2 * curves))
     wide = lines(
-        tmp_path / "wide.csv", "wavelength_nm," + names, *[f"{400 + i},{','.join(['0.5'] * 20_000)}" for i in range(3)]
+        tmp_path / "wide.csv",
+        "wavelength_nm," + names,
+        *[f"{400 + i},{','.join(['0.5'] * 2 * curves)}" for i in range(3)],
     )
-    long = lines(tmp_path / "long.csv", "wavelength_nm,a", *[f"{400 + i * 1e-4:.4f},1" for i in range(most + 1)])
+    long = lines(tmp_path / "long.csv", "wavelength_nm,a", *[f"{400 + i * 1e-4:.4f},1" for i in range(samples + 1)])
     for path, said in (
-        (wide, f"too many curves in one file (got 20000); allowed: at most {MOST_CURVES:,}"),
-        (long, f"too many samples in one file (got {most + 1}); allowed: at most {most:,}"),
+        (wide, f"too many curves in one file (got {2 * curves}); allowed: at most {curves:,}"),
+        (long, f"too many samples in one file (got {samples + 1}); allowed: at most {samples:,}"),
     ):
         with pytest.raises(DataError) as caught, within(HANG_S):
             read_curves(path)
