@@ -36,6 +36,7 @@ PICTURES = (
     "balanced",
     "measured",
     "sensors",
+    "cameras",
     "paper",
     "scorecard",
     "distance",
@@ -50,7 +51,7 @@ PICTURES = (
 )
 """Studies of which the documents show the first picture of their report."""
 README = STUDIES.parent / "README.md"
-ANSWERED = (STUDIES / "README.md", STUDIES / "guide" / "11-hdr-and-flicker.md")
+ANSWERED = (README, STUDIES / "README.md", STUDIES / "guide" / "11-hdr-and-flicker.md")
 """Documents with the answers of studies."""
 ROW = re.compile(r"^\| `(\w+)` \| (.*) \| !\[(.*)\]\(figures/(\w+)\.png\) \| (.*) \|$", re.MULTILINE)
 
@@ -58,7 +59,7 @@ ROW = re.compile(r"^\| `(\w+)` \| (.*) \| !\[(.*)\]\(figures/(\w+)\.png\) \| (.*
 def answer_of(said: str) -> str:
     """The answer that a run prints: what stands before the effects that were left out."""
     lines = said.splitlines()
-    ends = ("Left out: ", "Others: ", "Of the best ", "Note: ", "Files: ")
+    ends = ("Left out: ", "Others: ", "RGGB over ", "More of both: ", "Of the best ", "Note: ", "Files: ")
     return " ".join(lines[: next((at for at, line in enumerate(lines) if line.startswith(ends)), 1)])
 
 

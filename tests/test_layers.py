@@ -134,3 +134,12 @@ def test_packages_whose_versions_a_run_keeps_are_installed_with_the_package() ->
     project = tomllib.loads((PACKAGE.parent / "pyproject.toml").read_text())["project"]
     required = {re.split(r"[<>=\[]", text)[0] for text in project["dependencies"]}
     assert {*_PACKAGES} <= required | {project["name"]}
+
+
+def test_a_wheel_has_every_file_of_the_package() -> None:
+    """What is no code and no text for readers is named in pyproject.toml."""
+    root = Path(__file__).parents[1]
+    named = tomllib.loads((root / "pyproject.toml").read_text())["tool"]["setuptools"]["package-data"]["sweep"]
+    shipped = {path for pattern in named for path in (root / "sweep").glob(pattern)}
+    files = [path for path in (root / "sweep").rglob("*") if path.is_file() and "__pycache__" not in path.parts]
+    assert not [path for path in files if path not in shipped and path.suffix not in (".py", ".md")]

@@ -134,9 +134,11 @@ def measured_sensor(name: str, grid: WavelengthGrid) -> SensorCurves:
     """
     measured = SENSORS[name]
     curves = measured.curves(grid)
-    source = f"built-in {name}, digitized: {measured.source}"
-    clear = "W" if "W" in curves else "C"
-    return SensorCurves(name, curves, clear, source, variants=own_red(curves), ir_cut=ir_cut(name, grid))
+    source = f"built-in {name}, {measured.what.rpartition(', ')[2]}: {measured.source}"
+    known = [channel for channel in ("W", "C") if channel in curves]
+    clear = known[0] if known else max(curves, key=lambda channel: float(curves[channel].sum()))
+    variants, cut = own_red(curves), ir_cut(name, grid)
+    return SensorCurves(name, curves, clear, source, variants=variants, has_clear=bool(known), ir_cut=cut)
 
 
 BUILT_IN_SENSORS: dict[str, Callable[[WavelengthGrid], SensorCurves]] = {

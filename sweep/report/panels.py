@@ -415,6 +415,40 @@ class Scatter:
 
 
 @dataclass(frozen=True)
+class Dots:
+    """A cloud of dots for each name, whose name stands beside it, and words at some of the dots."""
+
+    title: str
+    x_label: str
+    groups: Mapping[str, Pairs]
+    marks: tuple[tuple[str, float, float], ...] = ()
+    height: float = 360
+
+    def room(self, *, wide: bool) -> tuple[float, float]:
+        """Numbers on the left, names on the right."""
+        return _LEFT, right_of(self.groups, wide=wide)
+
+    def tall(self, *, wide: bool) -> float:
+        """As stated, or lower."""
+        return self.height if wide else 270
+
+    def draw(self, axes: Axes) -> None:
+        """Draw dots, their names at the height of their middle, and words."""
+        styles, ends = styles_of(self.groups), {}
+        for name, (x, y) in self.groups.items():
+            style = styles[name]
+            axes.plot(x, y, style.marker, color=style.color, markersize=7, alpha=0.75, markeredgecolor="white")
+            ends[name] = (float(np.median(y)), style, False)
+        axes.margins(0.06)
+        axes.set_xlim(left=0.0)
+        axes.set_ylim(bottom=0.0)
+        for text, *place_of in self.marks:
+            words_at(axes, f" {text}", *place_of, color=DIM, fontsize=font(axes.figure) - 2)  # type: ignore[arg-type]
+        label_ends(axes, ends, axes.get_ylim())
+        axes.set_xlabel(self.x_label, fontsize=font(axes.figure), color=INK)  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True)
 class Map:
     """Heights over two numbers, with levels and a marked place; NaN where nothing is known or allowed.
 

@@ -12,6 +12,9 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from ..metrics.columns.chromatic import CHROMATIC_CSD
+from ..metrics.columns.color_separation import CSD
+from ..metrics.columns.pixel_separation import CHROMATIC_PIXEL_CSD, PIXEL_CSD
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.quantity import Column
 from ..results.dataset import part_paths
@@ -20,16 +23,26 @@ from ..results.output import Output, read_output
 from ..results.tables import ALL_SENSORS, REFERENCE, REPORT, RESULTS, SEARCHED, read_table
 from ..runs.all_sensors import ALL
 from ..runs.uncertainty import REFERENCE_CFA, UNCLIPPED
+from ..spectra.lights import pair_name
 from ..study import SensorAndLights, folder_name
 from .hold import holds_for
 from .page import page_of, plain
-from .panels import Picture
+from .panels import Dots, Picture
 from .row_panels import Ratio, Ratios
 from .section import Told, table_of
-from .words import joined, quantity
+from .words import digits, joined, quantity
 
 PICTURE = "sensors"
 _KEYS = ("sensor", "lights")
+_MANY = 12
+"""From more sensors with lights on, each is a dot of one picture."""
+_MOST_NAMED = 6
+_MORE = {
+    "by_pixel": "with every pixel counted",
+    "chromatic": "of lamps of any brightness",
+    "chromatic_by_pixel": "both",
+}
+"""Other ways to count a separation, in words."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +93,8 @@ def report_sensors(manifest: Manifest, runs: Sequence[SensorRun]) -> list[str]:
     if len(together):
         further += _together(together, outputs[0][1].goal)
     notes = [*_notes(outputs)]
+    if figures["sensor"].nunique() > _MANY:
+        further.insert(0, _distribution(figures, words))
     picture = picture_of(figures, words)
     sections = [Told("On each sensor", (), None, table_of(_shown(figures), f"{RESULTS} has all rows."))]
     if len(together):
@@ -88,7 +103,9 @@ def report_sensors(manifest: Manifest, runs: Sequence[SensorRun]) -> list[str]:
         )
     links = [f"{run.folder.name}/{REPORT}" for run in runs]
     study = outputs[0][1].study
-    lead = Told("By design", (), picture, table_of(summary.drop(columns=["more", "on"])))
+    lead = Told(
+        "By design", (), picture, table_of(summary.drop(columns=["more", "on", *_MORE.values()], errors="ignore"))
+    )
     text = page_of(
         folder.name, study.title or study.question or folder.name, answer, stated, lead, sections,
         kind="report of a sweep over sensors", limits=[*further, *notes], files=[RESULTS, *links],
@@ -103,6 +120,10 @@ def report_sensors(manifest: Manifest, runs: Sequence[SensorRun]) -> list[str]:
 def _curves(outputs: Sequence[tuple[SensorAndLights, Output]]) -> str:
     """Return all sensors and lights, and which are modeled."""
     sensors = {output.provenance.sensor.name: output.provenance.sensor.surrogate for _, output in outputs}
+    if len(sensors) > _MOST_NAMED:
+        modeled = [name for name, surrogate in sensors.items() if surrogate]
+        told = f"; {joined(modeled)} **modeled, not measured**" if modeled else ""
+        sensors = {f"{len(sensors)} sensors{told}": False}
     lights = {output.provenance.lights.name: output.provenance.lights.surrogate for _, output in outputs}
     parts = [
         joined([f"{name}{' (**modeled, not measured**)' * modeled}" for name, modeled in known.items()])
@@ -120,7 +141,7 @@ def _figures(member: SensorAndLights, output: Output) -> Iterator[dict[str, Any]
     plain = scenario_rows[scenario_rows["kind"] == REFERENCE]
     known = plain[plain["name"] == REFERENCE_CFA]
     reference = (known if len(known) else plain if len(plain) else scenario_rows).iloc[0]
-    drawn = _uncertain(output, separation)
+    drawn, others = _uncertain(output, separation), _counted_otherwise(output)
     for row in scenario_rows.to_dict("records"):
         yield {
             "sensor": member.sensor,
@@ -134,8 +155,20 @@ def _figures(member: SensorAndLights, output: Output) -> Iterator[dict[str, Any]
             "light": float(row[CFA_SENSITIVITY]),
             "ratio": float(row[separation]) / float(reference[separation]),
             "light_ratio": float(row[CFA_SENSITIVITY]) / float(reference[CFA_SENSITIVITY]),
+            **{key: float(row[name]) for key, name in others.items()},
+            **{f"{key}_ratio": float(row[name]) / float(reference[name]) for key, name in others.items()},
             **drawn.get(row["design_id"], {}),
         }
+
+
+def _counted_otherwise(output: Output) -> dict[str, str]:
+    """Return the columns of the same two types that count separations in other ways, by the keys of `_MORE`."""
+    column = output.trade_off[0]
+    if column.metric != CSD or column.extreme or column.pair is None:
+        return {}
+    metrics = dict(zip(_MORE, (PIXEL_CSD, CHROMATIC_CSD, CHROMATIC_PIXEL_CSD), strict=True))
+    names = {key: pair_name(metric, column.pair) for key, metric in metrics.items()}
+    return {key: name for key, name in names.items() if name in output.named_rows}
 
 
 def _uncertain(output: Output, separation: str) -> Mapping[Any, Mapping[str, float]]:
@@ -154,12 +187,13 @@ def _summary(figures: pd.DataFrame) -> pd.DataFrame:
         more = (of_design["ratio"] > 1) & (of_design["light_ratio"] > 1)
         row = {
             "design": design,
-            "on": joined([*of_design["sensor"].unique()]),
+            "on": _sensors(of_design),
             "with lights": len(of_design),
             "more": _verdict(of_design),
             "separation": _span(of_design["ratio"]),
             "light": _span(of_design["light_ratio"]),
             "more of both": f"{int(more.sum())} of {len(of_design)}",
+            **{words: _span(of_design[f"{key}_ratio"]) for key, words in _MORE.items() if f"{key}_ratio" in of_design},
         }
         if "ratio_5" in of_design:
             sure = int(((of_design["ratio_5"] > 1) & (of_design["light_ratio_5"] > 1)).sum())
@@ -172,14 +206,15 @@ def _answer(summary: pd.DataFrame, n_found: int, reference: str, words: str) -> 
     """Yield on how many sensors the searched designs separate more at more light, and a line on all others."""
     rows_of = summary.to_dict("records")
     for row in rows_of[:n_found]:
-        text = (
-            f"**{row['more']}** on {row['on']}: the {row['design']} has {row['separation']} times the {words} of "
-            f"{reference} at {row['light']} times its light, more of both on {row['more of both']} pairs of sensor and "
-            "lamps"
+        otherwise = "; ".join(f"{what} {row[what]}" for what in _MORE.values() if what in row)
+        yield (
+            f"**{row['more']}** on {row['on']}: the {row['design']} has **{row['separation']} times** the {words} of "
+            f"{reference} at {row['light']} times its light{f' ({otherwise})' if otherwise else ''}."
         )
+    for row in rows_of[:n_found]:
         sure = row.get("by 5 % quantiles", "")
-        of_random = f"by the 5 % quantiles of random sensors{'' if sure == row['more of both'] else f' on {sure}'}"
-        yield f"{text}, {'also ' * (sure == row['more of both'])}{of_random}." if sure else f"{text}."
+        of_random = f", by the 5 % quantiles of random sensors on {sure}" if sure else ""
+        yield f"More of both: the {row['design']} on {row['more of both']} pairs of sensor and lamps{of_random}."
     others = [f"{r['design']} {r['separation']} at {r['light']} ({r['more of both']})" for r in rows_of[n_found:]]
     if others:
         yield f"Others: {', '.join(others)}."
@@ -200,16 +235,34 @@ def _together(table: pd.DataFrame, goal: Column) -> Iterator[str]:
         yield f"Of the best {goal.words} of each sensor and lights: {'; '.join(parts)}."
 
 
+def _distribution(figures: pd.DataFrame, words: str) -> str:
+    """Return how the plain CFA is spread over many sensors."""
+    plain = figures[figures["name"] == figures["reference"]].drop_duplicates(["sensor", "lights"])
+    parts = []
+    for key, what in (("dn", words), ("chromatic", "the same for lamps of any brightness")):
+        if key in plain:
+            ends = [digits(float(plain[key].quantile(share))) for share in (0, 0.05, 0.5, 0.95, 1)]
+            parts.append(f"{what} {ends[0]} to {ends[4]} DN (5 to 95 %: {ends[1]} to {ends[3]}, median {ends[2]})")
+    return f"{plain['name'].iloc[0]} over {len(plain)} sensors with lamps: {'; '.join(parts)}."
+
+
 def _verdict(of_design: pd.DataFrame) -> str:
     """Return whether a design separates more than the plain CFA on all sensors, some or none."""
     above = int((of_design["ratio"] > 1).sum())
     return "More separation" if above == len(of_design) else "Less separation" if not above else "More on some"
 
 
+def _sensors(rows: pd.DataFrame) -> str:
+    """Return the names of a few sensors, or how many there are."""
+    names = [*rows["sensor"].unique()]
+    return joined(names) if len(names) <= _MOST_NAMED else f"{len(names)} sensors"
+
+
 def _span(values: pd.Series[float]) -> str:
-    """Return the range of ratios."""
+    """Return the range of ratios; of many with the median."""
     low, high = f"{values.min():.2f}", f"{values.max():.2f}"
-    return low if low == high else f"{low} to {high}"
+    middle = f" (median {values.median():.2f})" if len(values) > _MANY else ""
+    return low if low == high else f"{low} to {high}{middle}"
 
 
 def _notes(outputs: Sequence[tuple[SensorAndLights, Output]]) -> Iterator[str]:
@@ -234,7 +287,7 @@ def _shown(figures: pd.DataFrame) -> pd.DataFrame:
             "design": figures["name"],
             "CFA": figures["cfa"],
             "separation / DN": figures["dn"].map("{:.1f}".format),
-            "light of a clear sensor's": figures["light"].map("{:.3f}".format),
+            "light": figures["light"].map("{:.3f}".format),
             "times the reference's separation": figures["ratio"].map("{:.2f}".format),
             "times its light": figures["light_ratio"].map("{:.2f}".format),
         }
@@ -248,6 +301,8 @@ def _shown(figures: pd.DataFrame) -> pd.DataFrame:
 
 def picture_of(figures: pd.DataFrame, words: str) -> Picture:
     """Return ratios of separation and of light of each design on each sensor, with bars from 5 to 95 %."""
+    if figures["sensor"].nunique() > _MANY and "chromatic" in figures:
+        return _of_many(figures, words)
     figures = figures[figures["name"] != figures["reference"]]
     reference = figures["reference"].iloc[0] if len(figures) else REFERENCE_CFA
     panels = []
@@ -260,3 +315,17 @@ def picture_of(figures: pd.DataFrame, words: str) -> Picture:
         panels.append(Ratios(f"{title} / that of {reference}", "times", tuple(ratios)))
     caption = f"Right of the line: more than {reference}. Bars: 5 to 95 % of random sensors."
     return Picture(tuple(panels), f"{words} and light on each sensor, against {reference}.", caption)
+
+
+def _of_many(figures: pd.DataFrame, words: str) -> Picture:
+    """Return the separation against that of lamps of any brightness, a dot for each sensor and design."""
+    groups = {
+        str(design): (rows["chromatic"].to_numpy(dtype=float), rows["dn"].to_numpy(dtype=float))
+        for design, rows in figures.groupby("design", sort=False)
+    }
+    named = figures[~figures["sensor"].str.contains("/")]
+    marks = [(f"{row['sensor']}", float(row["chromatic"]), float(row["dn"])) for row in named.to_dict("records")]
+    panel = Dots(f"{words} / DN", f"{words} for lamps of any brightness / DN", groups, tuple(marks))
+    return Picture(
+        (panel,), f"{words} on each sensor.", "A dot for each sensor and set of lamps; built-in sensors named."
+    )

@@ -18,6 +18,8 @@ from .workers import run_with_progress
 
 ALL = "all sensors"
 _STARTS = 8
+_MOST_LEFT_OUT = 12
+"""Sensors that are left out in turn; of more there is one filter for all."""
 _SCHEMA = pa.schema(
     [(name, pa.string()) for name in ("designed_on", "space", "sensor", "lights")]
     + [("judged", pa.bool_())]
@@ -29,7 +31,7 @@ _SCHEMA = pa.schema(
 def all_sensors_table(
     studies: Sequence[tuple[SensorAndLights, Study]], parallel: Parallel, progress: Progress
 ) -> pa.Table | None:
-    """Search one filter for all sensors that have the searched space, and one for all but each sensor in turn.
+    """Search one filter for all sensors that have the searched space, and one for all but each of a few in turn.
 
     Each filter has the largest worst objective over the sensors and lights that it is designed on, under the
     constraints on each of them. One row per filter and sensor with lights: `designed_on` (all sensors, or all but one),
@@ -67,7 +69,8 @@ def _of_space(
     members = [member for member, _, _ in searched]
     problems, search = [problem for _, problem, _ in searched], searched[0][2]
     parts: dict[str, list[int]] = {ALL: [*range(len(members))]}
-    parts |= {f"all but {sensor}": [at for at, m in enumerate(members) if m.sensor != sensor] for sensor in sensors}
+    left_out = sensors if len(sensors) <= _MOST_LEFT_OUT else ()
+    parts |= {f"all but {sensor}": [at for at, m in enumerate(members) if m.sensor != sensor] for sensor in left_out}
     alone = {f"{at}": [at] for at in range(len(members))}
     calls, of_call = [], []
     for name, numbers in (parts | alone).items():

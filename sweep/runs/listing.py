@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -136,11 +137,25 @@ def list_data() -> Answer:
     """Return for each set of spectra its data card: kind, range, license, groups, source, credit and digest."""
     lines, total = [], 0
     sets = [*cards(), *surrogate_cards()]
+    groups: dict[str, list[str]] = {}
+    for _, name, _ in _measured():
+        groups.setdefault(name.partition("/")[0], []).append(name)
     for kind, name, measured in _measured():
         low, high = measured.range_nm
+        group, _, own = name.partition("/")
+        if name != groups[group][0]:
+            continue
+        alike = [one.partition("/")[2] for one in groups[group]] if own else []
+        what = (
+            f"{len(alike)} cameras as `{group}/NAME`, each {measured.what.partition(' behind ')[2]}"
+            if own
+            else measured.what
+        )
         lines += [
-            f"{name}: {measured.what}; {low:g} to {high:g} nm, {measured.license}",
+            f"{group}: {what}; {low:g} to {high:g} nm, {measured.license}",
             f"  {kind}: {', '.join(measured.names)}",
+            *textwrap.wrap(f"names: {', '.join(alike)}", 118, initial_indent="  ", subsequent_indent="    ")
+            * bool(own),
             f"  source: {measured.source}",
             *(f"  sha256: {sha256}  {file}" for file, sha256 in measured.digests.items()),
         ]
@@ -156,7 +171,8 @@ def list_data() -> Answer:
             f"  sha256: {card.sha256}",
         ]
     lines += [
-        f"Sensors: {', '.join(BUILT_IN_SENSORS)}; lights: {', '.join(BUILT_IN_LIGHTS)} (ar0820, tl16: surrogates).",
+        f"Sensors: {', '.join(name for name in BUILT_IN_SENSORS if '/' not in name)}, rawtoaces/NAME; "
+        f"lights: {', '.join(BUILT_IN_LIGHTS)} (ar0820, tl16: surrogates).",
         f"{total} spectra in {len(sets)} sets. A study's tasks name their groups: tasks: {{own: ...}}.",
     ]
     facts = [

@@ -6,6 +6,7 @@ few hundred bytes of aliases become billions of values.
 
 from __future__ import annotations
 
+import fnmatch
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -44,6 +45,7 @@ _LOOKS_LIKE_A_NUMBER = re.compile(r"[-+.]*[0-9][-+.0-9xo_a-fA-F]*")
 _SURROGATE = re.compile("[\ud800-\udfff]")
 """Half of a character: `\\ud800`. No file takes it."""
 _NOT_ALLOWED = "not allowed"
+_MOST_NAMED = 8
 _GONE = {
     "recognition.patches": "no such key: errors are exact without patches",
     "validate.lights": "`lights: [A, B]`, which runs the study on both",
@@ -259,6 +261,26 @@ class Document:
         """Set a key to an entry of another one's list, with its position."""
         entries = self.data[key]
         self._tree.put(self.data, to, entries[at], self._tree.place(entries, at) or self.place((key,)))
+
+    def expand(self, key: str, names: Iterable[str]) -> None:
+        """Replace each entry of a list with `*` by the names that it stands for.
+
+        Raises StudyError for one that stands for none.
+        """
+        entries, known = self.data.get(key), list(names)
+        if not isinstance(entries, list):
+            return
+        expanded = list[tuple[Any, Place]]()
+        for at, entry in enumerate(entries):
+            place = self._tree.place(entries, at) or self.place((key,))
+            found = fnmatch.filter(known, entry) if isinstance(entry, str) and "*" in entry else [entry]
+            if not found:
+                raise StudyError(self.issue((key, at), "no built-in name fits", entry, ", ".join(known[:_MOST_NAMED])))
+            expanded += [(name, place) for name in found]
+        self._tree.put(self.data, key, [], self.place((key,)))
+        for name, place in expanded:
+            self.data[key].append(name)
+            self._tree.put(self.data[key], len(self.data[key]) - 1, name, place)
 
     def place(self, path: Sequence[Key]) -> Place:
         """Return the position of the deepest existing key of a path.

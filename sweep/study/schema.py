@@ -268,7 +268,7 @@ class StudySection(Section):
     """QE curves: `ar0820`, a built-in surrogate, a measured one (`sweep list data`), a plugin of a package, or a
     mapping with `files`."""
     sensors: list[named(BUILT_IN_SENSORS) | SensorSection] | None = None  # type: ignore[valid-type]
-    """Several sensors instead of `sensor`: one run for each, and their comparison."""
+    """Several sensors instead of `sensor`: one run for each, and their comparison; `rawtoaces/*` are all that fit."""
     camera: CameraName | None = None
     """Pixel and lens of a camera for the road, where `pixel` and `optics` of the scenarios state nothing else: `road`,
     f/2 and a split pixel of 2.8 um; `road_read_once`, its large photodiode alone, read once."""

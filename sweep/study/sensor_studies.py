@@ -12,7 +12,7 @@ from ..spectra.builtin.measured_sets import LUXEON, SENSORS
 from .document import Document
 from .schema import Modification, StudySection
 
-_MOST = 24
+_MOST = 100
 _SURROGATE_CURVES = ("C", "R", "G", "B", "Y", "Cy", "Rx")
 _MEASURED = {**SENSORS, "luxeon": LUXEON}
 _SPACES = ("cfas", "designs", "sweeps", "boxes")
@@ -49,6 +49,7 @@ def members_of(document: Document) -> list[SensorAndLights]:
     data = document.data
     if data.get("sensors") is not None and "sensor" in data:
         raise StudyError(document.issue(("sensors",), "beside `sensor`", None, "one of both"))
+    document.expand("sensors", BUILT_IN_SENSORS)
     sensors, lights = _listed(document, "sensors", data.get("sensor")), _listed(document, "lights", data.get("lights"))
     if len(sensors) * len(lights) > _MOST:
         allowed = f"at most {_MOST} sensors times lights"

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
+import numpy as np
+
 from ...base.types import PerWavelength
 from ..formats import digest, read_curves
 from ..spectrum import Curves, WavelengthGrid, photons_from_energy
@@ -19,18 +21,32 @@ _ISETCAM = "ISETCam, https://github.com/ISET/isetcam"
 class MeasuredFile:
     """File of curves.
 
-    `times`: column that multiplies all others; empty if none does.
+    `times`: column that multiplies all others; empty if none does. `per_energy`: responses to power, not to photons,
+    each set to a largest QE of 1.
     """
 
     file: str
     columns: Mapping[str, str]
     scale: float = 1.0
     times: str = ""
+    per_energy: bool = False
 
     @property
     def raw(self) -> Curves:
         """Curves of the file."""
         return _read(self.file)
+
+    def on(self, grid: WavelengthGrid) -> dict[str, PerWavelength]:
+        """Return the curves on a grid, photons to electrons."""
+        raw, factor = self.raw, np.full(grid.size, self.scale)
+        if self.times:
+            factor = factor * raw.on(grid, self.times)
+        if self.per_energy:
+            top = max(
+                float((raw.samples(column)[1] / raw.samples(column)[0]).max()) for column in self.columns.values()
+            )
+            factor = factor / (grid.nodes_nm * top)
+        return {name: raw.on(grid, column) * factor for name, column in self.columns.items()}
 
 
 @dataclass(frozen=True)
@@ -58,11 +74,7 @@ class MeasuredSet:
 
         Raises DataError if the grid goes beyond.
         """
-        return {
-            name: file.raw.on(grid, column) * file.scale * (file.raw.on(grid, file.times) if file.times else 1.0)
-            for file in self.files
-            for name, column in file.columns.items()
-        }
+        return {name: curve for file in self.files for name, curve in file.on(grid).items()}
 
     def photons(self, grid: WavelengthGrid) -> dict[str, PerWavelength]:
         """Return photons of spectra of radiant power."""
@@ -104,6 +116,19 @@ SENSORS: dict[str, MeasuredSet] = {
     ),
 }
 """Sensors by name; `C` is the pixel without a filter, `Rx` the red of RCCC."""
+RAWTOACES = "rawtoaces"
+_CAMERAS = "rawtoaces_cameras.csv"
+with (_FOLDER / _CAMERAS).open(encoding="utf-8") as _lines:
+    _NAMES = dict.fromkeys(column.partition(":")[0] for column in next(_lines).strip().split(",")[1:])
+SENSORS |= {
+    f"{RAWTOACES}/{name}": MeasuredSet(
+        f"{name.replace('_', ' ')} behind its own IR cut: response to power, relative, measured with a monochromator",
+        "rawtoaces-data of the Academy Software Foundation, joined to one file and rounded to five digits",
+        "Apache-2.0",
+        (MeasuredFile(_CAMERAS, {channel: f"{name}:{channel}" for channel in "RGB"}, per_energy=True),),
+    )
+    for name in _NAMES
+}
 LUXEON = MeasuredSet(
     "five Luxeon Rebel LEDs as green, yellow and red lights: relative spectral power, measured",
     _ISETCAM,
