@@ -75,7 +75,7 @@ def with_run(text: str, folder: Path) -> str:
     (price,) = Price.of(output)
     assert price.table is not None
     table = [price.table.head, ["---"] * len(price.table.head), *price.table.rows]
-    lines = [" ".join(answer_of_run(output)), "", *(f"- {line}" for line in limits_of(output)), ""]
+    lines = [" ".join(answer_of_run(output)), "", *(f"- {line}" for line in limits_of(output)[:3]), ""]
     lines += [f"| {' | '.join(cells)} |" for cells in table]
     lines += ["", price.table.note, "", f"{holds_for(output)}"]
     body = "\n".join(lines).replace("\u00a0", " ")

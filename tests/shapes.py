@@ -20,7 +20,7 @@ from jaxtyping import AbstractArray, jaxtyped
 
 _CONF = BeartypeConf(is_pep484_tower=True)
 """A whole number is a float, too, as for mypy."""
-_MARK = "_checked"
+_MARK = "__checked_types__"
 Function = Any
 """A function, also one that beartype or jaxtyping made."""
 

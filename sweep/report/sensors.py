@@ -30,6 +30,7 @@ from .page import page_of, plain
 from .panels import Dots, Picture
 from .row_panels import Ratio, Ratios
 from .section import Told, table_of
+from .sections.price import COUNTED
 from .words import digits, joined, quantity
 
 PICTURE = "sensors"
@@ -38,8 +39,8 @@ _MANY = 12
 """From more sensors with lights on, each is a dot of one picture."""
 _MOST_NAMED = 6
 _MORE = {
-    "by_pixel": "with every pixel counted",
-    "chromatic": "of lamps of any brightness",
+    "by_pixel": "by pixel",
+    "chromatic": "at any brightness",
     "chromatic_by_pixel": "both",
 }
 """Other ways to count a separation, in words."""
@@ -313,7 +314,7 @@ def picture_of(figures: pd.DataFrame, words: str) -> Picture:
             ends = (low, high) if np.isfinite([low, high]).all() else (None, None)
             ratios.append(Ratio(f"{row['sensor']}, {row['lights']}", str(row["design"]), float(row[of]), *ends))
         panels.append(Ratios(f"{title} / that of {reference}", "times", tuple(ratios)))
-    caption = f"Right of the line: more than {reference}. Bars: 5 to 95 % of random sensors."
+    caption = f"Right of the line: more than {reference}. Bars: 5 to 95 % of random sensors. {COUNTED}"
     return Picture(tuple(panels), f"{words} and light on each sensor, against {reference}.", caption)
 
 

@@ -103,7 +103,8 @@ class Sources:
     ) -> _Made | None:
         """Return a built-in sensor or lights on the study's wavelengths, also beyond theirs; None after issues."""
         if name not in known:
-            allowed = f"{', '.join(known)}, or a mapping with `files`"
+            shown = dict.fromkeys(f"{one.partition('/')[0]}/NAME" if "/" in one else one for one in known)
+            allowed = f"{', '.join(shown)}, or a mapping with `files`"
             self.refuse(Fault(at, f"unknown built-in {at[-1]}", name, allowed, nearest(name, known)))
             return None
         try:

@@ -85,6 +85,23 @@ def chromatic(made: Made, quantity: Quantity) -> list[float]:
     return [min(of_any_brightness(case[first], case[second]) for case in design) for design in lamps]
 
 
+def by_pixel(made: Made) -> np.ndarray:
+    """Readings with a place for each pixel of the tile, not of each channel."""
+    return made.read[..., made.setup.camera.mosaic.indices.ravel()]
+
+
+def pixel_csd(made: Made, quantity: Quantity) -> list[float]:
+    first, second = (made.setup.members[name] for name in quantity.pair or ())
+    return [min(cdist(case[first], case[second]).min() for case in design) for design in by_pixel(made)]
+
+
+def chromatic_pixel_csd(made: Made, quantity: Quantity) -> list[float]:
+    first, second = (made.setup.members[name] for name in quantity.pair or ())
+    tile = made.setup.camera.mosaic.indices.ravel()
+    lamps = [design - unlit(made, at)[tile] for at, design in enumerate(by_pixel(made))]
+    return [min(of_any_brightness(case[first], case[second]) for case in design) for design in lamps]
+
+
 def readings_of(made: Made, design: int, brightness: float) -> tuple[np.ndarray, np.ndarray]:
     """Mean and variance of real lamps that are so much brighter, in the exposure of a design."""
     exposure = FixedExposure(kind="fixed", exposure_s=made.exposure_s[design])
@@ -241,6 +258,8 @@ DEFINITIONS: dict[str, tuple[Callable[[Made, Quantity], list[float]], float]] = 
     "csd": (csd, 1e-12),
     "best_phase_csd": (best_phase, 1e-12),
     "chromatic_csd": (chromatic, 1e-9),
+    "pixel_csd": (pixel_csd, 1e-12),
+    "chromatic_pixel_csd": (chromatic_pixel_csd, 1e-9),
     "chromatic_dprime": (chromatic_in_noise, 1e-5),
     "chromatic_error": (chromatic_error, 0.1),  # those of equal brightness: exact sums over digital numbers
     "sensitivity": (sensitivity, 1e-12),
@@ -352,7 +371,8 @@ def test_searchable_quantities_have_a_worst_case() -> None:
     goals = {name for name, quantity in QUANTITIES.items() if quantity.goal}
     worst = {quantity.of for quantity in shifted.values() if quantity.extreme == WORST_CASE}
     assert worst == {name for name in goals if not QUANTITIES[name].nominal}
-    assert {name for name in goals if QUANTITIES[name].nominal} == {n for n, q in QUANTITIES.items() if q.states}
+    known = {name for name, quantity in QUANTITIES.items() if quantity.states or quantity.per_pixel}
+    assert {name for name in goals if QUANTITIES[name].nominal} == known
     assert all(QUANTITIES[name].smooth is not None for name in goals)
     assert all((QUANTITIES[name].scale == "log10") == (QUANTITIES[name].direction == "less") for name in goals)
 

@@ -100,7 +100,7 @@ def test_no_fault_follows_from_another(tmp_path: Path, old: str, new: str, expec
         (
             "sensor: ar0820",
             "sensor: ar0280",
-            "tiny.yaml:2: sensor: unknown built-in sensor (got 'ar0280'); allowed: ar0820, opencam, ar0132at, mt9v024, or a mapping with `files`; "
+            "tiny.yaml:2: sensor: unknown built-in sensor (got 'ar0280'); allowed: ar0820, opencam, ar0132at, mt9v024, rawtoaces/NAME, or a mapping with `files`; "
             "did you mean 'ar0820'?",
         ),
         (
@@ -126,7 +126,7 @@ def test_no_fault_follows_from_another(tmp_path: Path, old: str, new: str, expec
             "csd_green_orange, csd_green_red, csd_yellow_orange, csd_yellow_red, csd_orange_red, "
             "chromatic_csd_green_yellow, chromatic_csd_green_orange, chromatic_csd_green_red, chromatic_csd_yellow_orange, "
             "chromatic_csd_yellow_red, chromatic_csd_orange_red, sensitivity, cfa_sensitivity, slope_per_nm, min_transmission, "
-            "edge_width_nm, band_width_nm; did you mean 'sensitivity'?",
+            "edge_width_nm, band_width_nm, pixel_csd_green_yellow",
         ),
         (
             "  space: edges\n",

@@ -179,7 +179,7 @@ def test_a_run_keeps_the_spectra_of_user_tasks(tmp_path: Path) -> None:
     assert code == 0, said
     output = read_output(tmp_path / "tasks")
     error = output.table["paint_error_d65"].iloc[0]
-    assert f"a paint pairwise error D65 of {digits(error)}" in told
+    assert f"a paint pairwise error under daylight of {digits(error)}" in told
     assert list(output.curves.tasks) == [("paint mine", "paints.csv:white"), ("paint mine", "paints.csv:yellow")]
     assert output.provenance.data_sha256["paints.csv"] == sha256(PAINTS.encode()).hexdigest()
     first = load_study(tmp_path / "own.yaml").tasks

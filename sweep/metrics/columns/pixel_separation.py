@@ -27,7 +27,7 @@ _LATTICE = "where phases, field positions or moments count, the smallest over th
 class PixelSeparation(Metric):
     """CSD and chromatic CSD of each pair of signal types, with every pixel counted."""
 
-    order = 2
+    order = 98
 
     def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
         return tuple(
