@@ -24,6 +24,7 @@ from .published import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_publish
 from .section import Section
 from .sections.colors import Colors
 from .sections.curves import SensorCurves
+from .sections.deeper_reds import DeeperReds
 from .sections.edges import Edges
 from .sections.field import Field
 from .sections.flicker import Flicker
@@ -51,6 +52,7 @@ ORDER: tuple[type[Section], ...] = (
         TradeOff,
         Scenes,
         Edges,
+        DeeperReds,
         Tasks,
         Colors,
         Uncertain,

@@ -127,6 +127,12 @@ FILES = {
     "the search: design_id, norm, peak of the yellow LED (yellow_nm) and of the red one (red_nm), how many pairs of "
     "widths the norm allows (pairs), how many of these have the wanted distance (separated), the smallest one "
     "(least_dn) and the widths there (yellow_fwhm_nm, red_fwhm_nm)",
+    files.LAMP_LIMITS: "where lamps fill the field of one scene beside RGGB, for each named design and answer of the "
+    "search, by the shape of a red LED (those of tl16's lamps, modeled, and a Gaussian of 18 nm) and quantity: the "
+    "peak from which on a deeper red is nearer to the study's yellows than with RGGB (`red_limit_nm`), its color there "
+    "(`red_limit_x`, `red_limit_y`) and distance (`red_limit_dn`), the same of reds toward the yellow "
+    "(`yellow_limit_nm`), and from which peak on the distance is below the one that the study wants "
+    "(`wanted_limit_nm`); 630 where that holds at the first red, empty where it does not up to 60 nm from there",
     files.LEFT_OUT: "where each light is left out of a search in turn: the objective (of a worst case the nominal "
     "quantity, too), signal_type, signal, the optimum that was `seen`, the same design `with_it`, and the `fall`",
     files.SENSOR_MAP: "where a scene has a `field`, for each plain CFA, named design and answer of the search: "

@@ -64,8 +64,8 @@ class Output:
     """Results of a run; `table` has the rows that a report shows.
 
     `study`: the study that was run, and `resolved` its file. `audited`: rows of `sweep audit`; `left_out`: a row per
-    light that was left out of a search; `regions`:
-    cells of the maps of color regions. `error_against_noise`: color error against noise;
+    light that was left out of a search; `regions`: cells of the maps of color regions; `lamp_limits`: reds that designs
+    fail on. `error_against_noise`: color error against noise;
     `places`: separations over the sensor; `map`: the best objective over two parameters; `handovers`: where captures of
     an HDR pixel are full; `worst`: worst values over series; `saturated`: signals that fill a pixel; `uncertainty`:
     quantiles over random sensors; `vision`: tables of the benchmark of vision by their files' names.
@@ -84,6 +84,7 @@ class Output:
     audited: pd.DataFrame | None
     left_out: pd.DataFrame | None
     regions: pd.DataFrame | None
+    lamp_limits: pd.DataFrame | None
     error_against_noise: pd.DataFrame | None
     places: pd.DataFrame | None
     map: pd.DataFrame | None
@@ -272,6 +273,7 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         audited=more.get(files.AUDIT),
         left_out=more.get(files.LEFT_OUT),
         regions=more.get(files.REGIONS_MAP),
+        lamp_limits=more.get(files.LAMP_LIMITS),
         error_against_noise=more.get(files.TRADED),
         places=more.get(files.SENSOR_MAP),
         map=more.get(files.MAP),

@@ -31,6 +31,7 @@ LIMITED_BY = "limited_by.parquet"
 ROBUSTNESS = "robustness.parquet"
 UNCERTAINTY = "uncertainty.parquet"
 REGIONS_MAP = "regions.parquet"
+LAMP_LIMITS = "lamp_limits.parquet"
 SENSOR_MAP = "sensor_map.parquet"
 TRADED = "color_noise.parquet"
 COMBINATIONS, MAP = "combinations.parquet", "map.parquet"
@@ -49,6 +50,7 @@ REPORT, FIGURES, VISION_FIGURES = "report.html", "figures", "vision-"
 MADE_BY_RUN = frozenset(
     (
         *(DESIGNS, PARETO, SEARCH_LOG, FRONT, CURVES, POINTS, CROSSINGS, LIMITED_BY, ROBUSTNESS, REGIONS_MAP),
+        LAMP_LIMITS,
         *(SENSOR_MAP, TRADED, LEFT_OUT, COMBINATIONS, MAP, HANDOVERS, WORST, SATURATED),
         UNCERTAINTY,
         *(*VISION_TABLES, ALL_SENSORS, PROVENANCE, RESOLVED),

@@ -16,6 +16,7 @@ from ..results.tables import (
     CROSSINGS,
     CURVES,
     HANDOVERS,
+    LAMP_LIMITS,
     LIMITED_BY,
     POINTS,
     REGIONS_MAP,
@@ -35,6 +36,7 @@ from .colors import error_against_noise_table
 from .crossings import USABLE_RANGES
 from .details import OVER_SENSOR, Details, limited_by_table
 from .handovers import CAPTURES_FULL
+from .moved_lamps import MOVED_LAMPS
 from .robustness import ROBUST
 from .saturated import SATURATION
 from .uncertainty import uncertainty_table
@@ -81,6 +83,7 @@ _ANALYSES = {
     SATURATED: SATURATION,
     ROBUSTNESS: ROBUST,
     REGIONS_MAP: ALLOWED_LAMPS,
+    LAMP_LIMITS: MOVED_LAMPS,
     SENSOR_MAP: OVER_SENSOR,
     HANDOVERS: CAPTURES_FULL,
     WORST: WORST_VALUES,

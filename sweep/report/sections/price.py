@@ -21,7 +21,7 @@ from ..series import scene_in_words
 from ..words import amount, change, effect, of_column, quantity
 
 _TASKS = ("color_delta_e_mean_d65", "low_light_lux_led", "low_light_lux_a")
-_MOST = 12
+_MOST = 10
 COUNTED = "By pixel, RGGB's two greens count as two, as noise sees them; the CSD counts each channel once."
 
 

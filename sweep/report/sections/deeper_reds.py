@@ -1,0 +1,86 @@
+"""From which red LEDs on the answering design separates less than RGGB."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...results.output import Output
+from ..leaders import RGGB, answering, label
+from ..section import Section, Table
+from ..words import quantity, quoted
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Limits of one shape of the LED and one quantity, nm and DN; NaN where there is none."""
+
+    shape: str
+    words: str
+    red_nm: float
+    x: float
+    y: float
+    dn: float
+    yellow_nm: float
+    wanted_nm: float
+
+
+@dataclass(frozen=True)
+class DeeperReds(Section):
+    """Limits of the answering design."""
+
+    name: str
+    limits_of: tuple[Limit, ...]
+
+    heading = "Deeper reds"
+
+    @classmethod
+    def of(cls, output: Output) -> Iterator[Section]:
+        """Yield it for a run that moved reds."""
+        best = answering(output)
+        if output.lamp_limits is None or best is None:
+            return
+        known = output.lamp_limits[output.lamp_limits["design_id"] == best["design_id"]]
+        numbers = ["red_limit_nm", "red_limit_x", "red_limit_y", "red_limit_dn", "yellow_limit_nm", "wanted_limit_nm"]
+        limits = tuple(
+            Limit(row["shape"], quantity(output.columns[row["quantity"]]), *(float(row[name]) for name in numbers))
+            for row in known.to_dict("records")
+            if row["quantity"] in output.columns
+        )
+        if limits:
+            yield cls(label(best), limits)
+
+    @property
+    def answer(self) -> list[str]:
+        """From which peak on the design is below RGGB, by quantity, over the shapes."""
+        parts = []
+        for words in dict.fromkeys(one.words for one in self.limits_of):
+            peaks = [one.red_nm for one in self.limits_of if one.words == words]
+            low, high = np.min(peaks), np.max(peaks)
+            where = (
+                f"from a red peak of **{low:.1f} to {_nm(high)}** on" if np.isfinite(high) else "not for every shape"
+            )
+            parts.append(f"{words} {where}")
+        return [f"At the same red, {quoted(self.name)} has less than {RGGB}, by the LED's shape: {'; '.join(parts)}."]
+
+    @property
+    def table(self) -> Table | None:
+        """A row for each shape, with the color where it is first below RGGB."""
+        kinds = list(dict.fromkeys(one.words for one in self.limits_of))
+        wanted = any(np.isfinite(one.wanted_nm) for one in self.limits_of)
+        rows = []
+        for shape in dict.fromkeys(one.shape for one in self.limits_of):
+            of = [one for one in self.limits_of if one.shape == shape]
+            first = of[0]
+            color = f"{first.x:.3f}, {first.y:.3f}" if np.isfinite(first.x) else ""
+            more = [_nm(first.wanted_nm)] if wanted else []
+            rows.append((shape, *(_nm(one.red_nm) for one in of), color, _nm(first.yellow_nm), *more))
+        head = ("LED", *kinds, "x, y of the first", "and up to")
+        note = "German and US: the shapes of tl16's LEDs, modeled."
+        return Table((*head, *(["below the wanted one from"] if wanted else [])), tuple(rows), note)
+
+
+def _nm(value: float) -> str:
+    return f"{value:.1f}\u00a0nm" if np.isfinite(value) else "not found"

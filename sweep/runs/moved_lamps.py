@@ -1,0 +1,114 @@
+"""Lamps a design fails on: from which peak of a red LED on it separates less than RGGB does at the same red."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pyarrow as pa
+
+from ..base.types import Array, DesignCurves, Float, delayed
+from ..camera.model import SceneModel
+from ..camera.setup import Setup
+from ..metrics.chromatic import squared_distance
+from ..metrics.columns.chromatic import CHROMATIC_CSD
+from ..metrics.columns.color_separation import CSD
+from ..results.tables import REFERENCE
+from ..spectra.color import chromaticity
+from ..spectra.lights import Lights
+from ..spectra.moved_leds import moved, red_shapes
+from ..spectra.signal_color import VISIBLE
+from ..study import Study
+from .analysis import Analysis, Calls, NamedDesign, named_designs
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+PAIR = ("yellow", "red")
+_RGGB = "RGGB"
+_START_NM, _STEP_NM, _STEPS = 630.0, 0.1, 600
+"""Peak from which reds move, both ways, in such steps, and how many."""
+_NUMBERS = ("red_limit_nm", "red_limit_x", "red_limit_y", "red_limit_dn", "yellow_limit_nm", "wanted_limit_nm")
+_SCHEMA = pa.schema(
+    [
+        ("design_id", pa.int64()),
+        ("shape", pa.string()),
+        ("quantity", pa.string()),
+        *((n, pa.float64()) for n in _NUMBERS),
+    ]
+)
+
+
+def _asked(study: Study) -> bool:
+    """Return whether lamps fill the field of one scene, read once, and RGGB is there to compare with."""
+    scenes = list(study.scenarios.values())
+    plain = len(scenes) == 1 and scenes[0].target is None and scenes[0].drive is None and scenes[0].field is None
+    pair = study.quantities[study.trade_off[0]].pair
+    return plain and pair == PAIR and _RGGB in study.mosaics and not study.section.pixel.captures
+
+
+def _calls(study: Study, rows: pd.DataFrame) -> Calls:
+    """Compute limits of designs with a filter: a row for each shape of the LED and quantity.
+
+    `red_limit_nm` is the peak from which on the least distance of a red to the study's yellows is less than RGGB's at
+    the same red, with its color, x and y, and the distance there; `yellow_limit_nm` the same toward the yellow;
+    `wanted_limit_nm` the peak from which on it is below the distance that the study wants. None: not up to 60 nm away.
+    """
+    designs = [*named_designs(study, rows)]
+    rggb = next((one for one in designs if one.row["name"] == _RGGB), None)
+    population, regions = study.section.population, study.section.regions
+    wanted_dn = next(
+        (of.wanted_dn for of in (population, regions) if of is not None and of.wanted_dn is not None), None
+    )
+    for design in designs:
+        if rggb is not None and design.row["kind"] != REFERENCE:
+            yield design.key, delayed(_limits, design, rggb, wanted_dn)
+
+
+def _limits(design: NamedDesign, rggb: NamedDesign, wanted_dn: float | None) -> list[dict[str, Any]]:
+    """Return the rows of one design."""
+    peaks_nm, rows = np.asarray(_START_NM + _STEP_NM * np.arange(-_STEPS, _STEPS + 1), dtype=float), []
+    for name, shape in red_shapes().items():
+        reds = moved(shape, peaks_nm, design.setup.camera.grid)
+        own, its = (distances(of.setup.with_all_effects, of.curves, reds) for of in (design, rggb))
+        for quantity in (CSD, CHROMATIC_CSD):
+            below = own[quantity] < its[quantity]
+            red, yellow = _first(below[_STEPS:]), _first(below[_STEPS::-1])
+            row: dict[str, Any] = {"shape": name, "quantity": f"{quantity}_{'_'.join(PAIR)}"}
+            if red is not None:
+                peak = peaks_nm[_STEPS + red]
+                x, y = chromaticity(VISIBLE, moved(shape, np.array([peak]), VISIBLE))[0]
+                row |= {"red_limit_nm": peak, "red_limit_x": x, "red_limit_y": y}
+                row["red_limit_dn"] = own[quantity][_STEPS + red]
+            if yellow is not None:
+                row["yellow_limit_nm"] = peaks_nm[_STEPS - yellow]
+            if wanted_dn is not None and (at := _first(own[quantity][_STEPS:] < wanted_dn)) is not None:
+                row["wanted_limit_nm"] = peaks_nm[_STEPS + at]
+            rows.append({key: value if isinstance(value, str) else float(value) for key, value in row.items()})
+    return rows
+
+
+def _first(below: np.ndarray) -> int | None:
+    """Return the place of the first that is true."""
+    return int(below.argmax()) if below.any() else None
+
+
+def distances(
+    setup: Setup, curves: DesignCurves, reds: Float[Array, "reds wavelengths"]
+) -> dict[str, Float[Array, " reds"]]:
+    """Return least distances of reds to the yellows of the setup, DN: CSD and that of lamps of any brightness."""
+    yellows = setup.lights.photons[setup.members[PAIR[0]]]
+    photons = np.concatenate([yellows, reds])
+    names = tuple(map(str, range(len(photons))))
+    lights = Lights("moved", names, names, photons, setup.lights.photon_ratio, "modeled", surrogate=True)
+    model = SceneModel(replace(setup, lights=lights))
+    dn, dark = model.read(curves)[0][0, 0], model.unlit(curves, model.exposure_s(curves))[0, 0]
+    first, second = dn[: len(yellows)], dn[len(yellows) :]
+    lamps = [np.repeat(dn_of - dark, times, axis=0) for dn_of, times in ((second, len(first)), (first, 1))]
+    far = squared_distance(lamps[0], np.tile(lamps[1], (len(second), 1))).reshape(len(second), -1)
+    near = np.linalg.norm(second[:, None] - first[None], axis=2)
+    return {CSD: near.min(axis=1), CHROMATIC_CSD: np.sqrt(far.min(axis=1))}
+
+
+MOVED_LAMPS = Analysis("lamps that designs fail on", _asked, lambda _: _SCHEMA, _calls)
