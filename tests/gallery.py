@@ -37,6 +37,7 @@ PICTURES = (
     "measured",
     "sensors",
     "cameras",
+    "deep_red",
     "paper",
     "scorecard",
     "distance",
