@@ -125,8 +125,9 @@ FILES = {
     "`at_least_dn`, below which no sensor is (without `shift_nm` and `ir_cut_nm`)",
     files.REGIONS_MAP: "where a study asks for maps of color regions, for each plain CFA, named design and answer of "
     "the search: design_id, norm, peak of the yellow LED (yellow_nm) and of the red one (red_nm), how many pairs of "
-    "widths the norm allows (pairs), how many of these have the wanted distance (separated), the smallest one "
-    "(least_dn) and the widths there (yellow_fwhm_nm, red_fwhm_nm)",
+    "widths the norm allows (pairs), how many of these have the wanted distance (separated), how many RGGB keeps "
+    "farther apart, also at any brightness (below_rggb, chromatic_below_rggb; empty without RGGB), the smallest "
+    "distance (least_dn) and the widths there (yellow_fwhm_nm, red_fwhm_nm)",
     files.LAMP_LIMITS: "where lamps fill the field of one scene beside RGGB, for each named design and answer of the "
     "search, by the shape of a red LED (those of tl16's lamps, modeled, and a Gaussian of 18 nm) and quantity: the "
     "peak from which on a deeper red is nearer to the study's yellows than with RGGB (`red_limit_nm`), its color there "

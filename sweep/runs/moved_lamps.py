@@ -20,13 +20,12 @@ from ..spectra.lights import Lights
 from ..spectra.moved_leds import moved, red_shapes
 from ..spectra.signal_color import VISIBLE
 from ..study import Study
-from .analysis import Analysis, Calls, NamedDesign, named_designs
+from .analysis import RGGB, Analysis, Calls, NamedDesign, named_designs
 
 if TYPE_CHECKING:
     import pandas as pd
 
 PAIR = ("yellow", "red")
-_RGGB = "RGGB"
 _START_NM, _STEP_NM, _STEPS = 630.0, 0.1, 600
 """Peak from which reds move, both ways, in such steps, and how many."""
 _NUMBERS = ("red_limit_nm", "red_limit_x", "red_limit_y", "red_limit_dn", "yellow_limit_nm", "wanted_limit_nm")
@@ -45,7 +44,7 @@ def _asked(study: Study) -> bool:
     scenes = list(study.scenarios.values())
     plain = len(scenes) == 1 and scenes[0].target is None and scenes[0].drive is None and scenes[0].field is None
     pair = study.quantities[study.trade_off[0]].pair
-    return plain and pair == PAIR and _RGGB in study.mosaics and not study.section.pixel.captures
+    return plain and pair == PAIR and RGGB in study.mosaics and not study.section.pixel.captures
 
 
 def _calls(study: Study, rows: pd.DataFrame) -> Calls:
@@ -56,7 +55,7 @@ def _calls(study: Study, rows: pd.DataFrame) -> Calls:
     `wanted_limit_nm` the peak from which on it is below the distance that the study wants. None: not up to 60 nm away.
     """
     designs = [*named_designs(study, rows)]
-    rggb = next((one for one in designs if one.row["name"] == _RGGB), None)
+    rggb = next((one for one in designs if one.row["name"] == RGGB), None)
     population, regions = study.section.population, study.section.regions
     wanted_dn = next(
         (of.wanted_dn for of in (population, regions) if of is not None and of.wanted_dn is not None), None

@@ -31,12 +31,20 @@ def test_a_map_is_that_of_every_pair_read_out(tmp_path: Path) -> None:
     study = load(tmp_path, TEXT)
     ran(study, tmp_path / "out", 1)
     found = pd.read_parquet(tmp_path / "out" / REGIONS_MAP)
-    wave, qe = study.grid.nodes_nm, np.stack([study.sensor.qe[name] for name in "RGB"])
-    scale = 0.95 * 4095 * study.lights.photon_ratio * study.grid.size / qe.sum(axis=1).max()
+    wave = study.grid.nodes_nm
 
-    def read(peak: float, fwhm: float) -> np.ndarray:
+    def read(peak: float, fwhm: float, channels: tuple[str, ...] = ("R", "G", "B")) -> np.ndarray:
+        qe = np.stack([study.sensor.qe[name] for name in channels])
+        scale = 0.95 * 4095 * study.lights.photon_ratio * study.grid.size / qe.sum(axis=1).max()
         photons = 1 / np.cosh((wave - peak) * 2 * np.arccosh(2) / fwhm)
         return np.asarray(np.rint(photons / photons.sum() @ qe.T * scale))
+
+    def far_apart(
+        yellow: tuple[float, float], red: tuple[float, float], channels: tuple[str, ...]
+    ) -> tuple[float, float]:
+        a, b = read(*yellow, channels), read(*red, channels)
+        sine = np.sqrt(max(0.0, 1 - (a @ b) ** 2 / ((a @ a) * (b @ b))))
+        return float(np.linalg.norm(a - b)), float(min(np.linalg.norm(a), np.linalg.norm(b)) * sine)
 
     own = found[found["design_id"] == 0]
     assert {*own["yellow_nm"]} == {peak for peak, _ in YELLOW}
@@ -54,6 +62,14 @@ def test_a_map_is_that_of_every_pair_read_out(tmp_path: Path) -> None:
             assert row["least_dn"] == pytest.approx(min(apart.values()))
             assert apart[row["yellow_fwhm_nm"], row["red_fwhm_nm"]] == pytest.approx(row["least_dn"])
     assert (own["pairs"] == 3 * 3).any()
+    assert own["below_rggb"].sum() == own["chromatic_below_rggb"].sum() == 0
+    for row in found[found["design_id"] == 1].to_dict("records"):
+        yellow = {fwhm for peak, fwhm in YELLOW if peak == row["yellow_nm"]}
+        if row["pairs"] == len(yellow) * len(widths):
+            lamps = [((row["yellow_nm"], a), (row["red_nm"], b)) for a in yellow for b in widths]
+            both = [(far_apart(*pair, ("R", "Y", "Cy")), far_apart(*pair, ("R", "G", "B"))) for pair in lamps]
+            assert row["below_rggb"] == sum(mine[0] < its[0] for mine, its in both)
+            assert row["chromatic_below_rggb"] == sum(mine[1] < its[1] for mine, its in both)
 
 
 @pytest.mark.slow

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 
 from ...base.types import Array, Float
 from ...metrics.columns.sensitivity import CFA_SENSITIVITY
@@ -230,6 +231,7 @@ class OfNorm:
     yellow_nm: Float[Array, " yellows"]
     red_nm: Float[Array, " reds"]
     apart_dn: Float[Array, "yellows reds"]
+    below: tuple[float, float] | None
 
 
 @dataclass(frozen=True)
@@ -263,6 +265,7 @@ class Allowed(Section):
                     OfNorm(
                         names[design], float(own["separated"].sum()) / pairs, led["yellow"], led["red"], float(near["least_dn"]),
                         least.index.to_numpy(dtype=float), least.columns.to_numpy(dtype=float), least.to_numpy(dtype=float),
+                        _below(own, pairs),
                     )
                 )  # fmt: skip
             if designs:
@@ -282,6 +285,15 @@ class Allowed(Section):
         return [
             f"Of all {self.pairs:,} pairs of a yellow and a red LED that {self.norm} allows, at least {self.wanted_dn:g} DN are kept apart by {', '.join(parts)}."
         ]
+
+    @property
+    def short(self) -> str:
+        """Its answer, and how often the design that answers is below RGGB."""
+        hero = next((one for one in self.designs if one.name == self.hero and one.below is not None), None)
+        if hero is None or hero.below is None:
+            return self.answer[0]
+        csd, chromatic = map(format_share, hero.below)
+        return f"{self.answer[0]} Pair by pair {quoted(hero.name)} is below RGGB in {csd}, at any brightness in {chromatic}."
 
     @property
     def _shown(self) -> list[OfNorm]:
@@ -313,3 +325,10 @@ class Allowed(Section):
         return Table(
             ("", f"{self.wanted_dn:g} DN or more", "nearest yellow", "nearest red", "their distance"), tuple(rows)
         )
+
+
+def _below(cells: pd.DataFrame, pairs: int) -> tuple[float, float] | None:
+    """Return the shares of pairs that RGGB keeps farther apart, also at any brightness."""
+    if cells["below_rggb"].isna().any():
+        return None
+    return float(cells["below_rggb"].sum()) / pairs, float(cells["chromatic_below_rggb"].sum()) / pairs
