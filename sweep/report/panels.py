@@ -92,7 +92,8 @@ class Picture:
         top, width = 0.0, 72 * float(figure.get_size_inches()[0]) / columns
         for line, height in zip(lines, heights, strict=True):
             sides = [
-                max(panel.room(wide=wide)[side] for panel in self.panels) if columns == 1 else None for side in (0, 1)
+                max(panel.room(wide=wide)[side] for panel in self.panels) if wide and columns == 1 else None
+                for side in (0, 1)
             ]
             for at, panel in enumerate(line):
                 left, right = (
