@@ -18,6 +18,7 @@ from sweep.report import read_output
 from sweep.report.hold import holds_for
 from sweep.report.page import answer_of as answer_of_run
 from sweep.report.page import limits_of, sections_of
+from sweep.report.sections.deeper_reds import DeeperReds
 from sweep.report.sections.price import Price
 
 STUDIES = Path(__file__).parent.parent / "studies"
@@ -73,12 +74,17 @@ def with_answer(text: str, study: str, answer: str) -> str:
 def with_run(text: str, folder: Path) -> str:
     """The README with the answer, limits and price of a run."""
     output = read_output(folder)
-    (price,) = Price.of(output)
+    (price,), (reds,) = Price.of(output), DeeperReds.of(output)
     assert price.table is not None
     table = [price.table.head, ["---"] * len(price.table.head), *price.table.rows]
-    lines = [" ".join(answer_of_run(output)), "", *(f"- {line}" for line in limits_of(output)[:3]), ""]
+    lines = [
+        " ".join(answer_of_run(output)),
+        "",
+        *(f"- {line}" for line in (*limits_of(output)[:3:2], *reds.answer)),
+        "",
+    ]
     lines += [f"| {' | '.join(cells)} |" for cells in table]
-    lines += ["", price.table.note, "", f"{holds_for(output)}"]
+    lines += ["", price.table.note, "", holds_for(output).partition(" Pixels in")[0]]
     body = "\n".join(lines).replace("\u00a0", " ")
     block = re.compile(rf"(<!-- run: {output.study.study} -->\n).*?(<!-- end -->)", re.DOTALL)
     return block.sub(lambda found: f"{found[1]}\n{body}\n\n{found[2]}", text)

@@ -55,15 +55,16 @@ class DeeperReds(Section):
     @property
     def answer(self) -> list[str]:
         """From which peak on the design is below RGGB, by quantity, over the shapes."""
-        parts = []
-        for words in dict.fromkeys(one.words for one in self.limits_of):
+        kinds = list(dict.fromkeys(one.words for one in self.limits_of))
+        ends = []
+        for words in kinds:
             peaks = [one.red_nm for one in self.limits_of if one.words == words]
-            low, high = np.min(peaks), np.max(peaks)
-            where = (
-                f"from a red peak of **{low:.1f} to {_nm(high)}** on" if np.isfinite(high) else "not for every shape"
-            )
-            parts.append(f"{words} {where}")
-        return [f"At the same red, {quoted(self.name)} has less than {RGGB}, by the LED's shape: {'; '.join(parts)}."]
+            ends.append(f"**{np.min(peaks):.1f} to {_nm(np.max(peaks))}**" if np.isfinite(peaks).all() else "no peak")
+        more = [f", and at any brightness from {end}" for end in ends[1:]]
+        return [
+            f"At the same red, {quoted(self.name)} has less {kinds[0]} than {RGGB} from a red peak of {ends[0]} on, by the "
+            f"LED's shape{''.join(more)}."
+        ]
 
     @property
     def table(self) -> Table | None:
