@@ -9,6 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ..base.errors import UpperBoundExceededError, ValidationIssue
+from ..metrics.columns.pixel_separation import CHROMATIC_PIXEL_CSD, PIXEL_CSD
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.quantity import DN
 from ..results.facts import SearchFacts
@@ -100,8 +101,8 @@ def upper_bound(output: Output) -> SearchFacts | None:
 def upper_bound_beside(output: Output, row: Row) -> float | None:
     """Return the upper bound that holds for a row's filter and is not below the row's value.
 
-    A value that is read out may exceed a bound before quantization by its rounding, at most sqrt(channels) DN; no
-    bound stands beside such a value.
+    A value that is read out may exceed a bound before quantization by its rounding, at most sqrt(channels) DN, or 2 DN
+    with every pixel counted; no bound stands beside such a value.
 
     Raises UpperBoundExceededError if a value exceeds its bound by more.
     """
@@ -113,7 +114,9 @@ def upper_bound_beside(output: Output, row: Row) -> float | None:
     value, bound = float(row[output.goal.name]), search.limit_proven
     if value <= bound:
         return bound
-    if output.goal.unit == DN and value > bound + math.sqrt(len(output.mosaic(search.cfa).channels)):
+    by_pixel = output.goal.metric in (PIXEL_CSD, CHROMATIC_PIXEL_CSD)
+    rounding = 2.0 if by_pixel else math.sqrt(len(output.mosaic(search.cfa).channels))
+    if output.goal.unit == DN and value > bound + rounding:
         problem = f"upper bound exceeded (bug): {label(row)} has {value:.9g} DN, but its upper bound is {bound:.9g} DN"
         raise UpperBoundExceededError(ValidationIssue(f"{problem}; this is an error of the program, not of the study"))
     return None

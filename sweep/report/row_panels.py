@@ -225,7 +225,7 @@ class Ratios:
 
     def room(self, *, wide: bool) -> tuple[float, float]:
         """Names of rows on the left."""
-        return (16 + 7.2 * max(map(len, self._rows)) if wide else 8), 12
+        return (16 + 7.2 * max(map(len, self._rows), default=0) if wide else 8), 12
 
     def draw(self, axes: Axes) -> None:
         """Draw marks, intervals and a key above them."""
@@ -236,7 +236,7 @@ class Ratios:
         log_axis(axes, "x", low, high)
         axes.set_xlim(low / 1.1, high * 1.1)
         width_px = 72 * axes.get_position().width * float(axes.figure.get_size_inches()[0])  # type: ignore[union-attr]
-        columns = max(1, min(len(names), int(width_px / (24 + 0.5 * (size - 2) * max(map(len, names))))))
+        columns = max(1, min(len(names), int(width_px / (24 + 0.5 * (size - 2) * max(map(len, names), default=1)))))
         axes.set_ylim(len(rows) - 0.3, -0.9 - 0.5 * -(-len(names) // columns))
         below, above = axes.get_ylim()
         share = (below + 0.6) / (below - above)  # the key stands above the rows

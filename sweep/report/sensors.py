@@ -31,7 +31,7 @@ from .panels import Dots, Picture
 from .row_panels import Ratio, Ratios
 from .section import Told, table_of
 from .sections.price import COUNTED
-from .words import digits, joined, quantity
+from .words import SAME, digits, joined, quantity
 
 PICTURE = "sensors"
 _KEYS = ("sensor", "lights")
@@ -95,7 +95,7 @@ def report_sensors(manifest: Manifest, runs: Sequence[SensorRun]) -> list[str]:
         further += _together(together, outputs[0][1].goal)
     notes = [*_notes(outputs)]
     if figures["sensor"].nunique() > _MANY:
-        further.insert(0, _distribution(figures, words))
+        further.insert(0, _distribution(figures, words, column.unit))
     picture = picture_of(figures, words)
     sections = [Told("On each sensor", (), None, table_of(_shown(figures), f"{RESULTS} has all rows."))]
     if len(together):
@@ -154,12 +154,18 @@ def _figures(member: SensorAndLights, output: Output) -> Iterator[dict[str, Any]
             "reference": str(reference["name"]),
             "dn": float(row[separation]),
             "light": float(row[CFA_SENSITIVITY]),
-            "ratio": float(row[separation]) / float(reference[separation]),
-            "light_ratio": float(row[CFA_SENSITIVITY]) / float(reference[CFA_SENSITIVITY]),
+            "ratio": _ratio(row, reference, separation),
+            "light_ratio": _ratio(row, reference, CFA_SENSITIVITY),
             **{key: float(row[name]) for key, name in others.items()},
-            **{f"{key}_ratio": float(row[name]) / float(reference[name]) for key, name in others.items()},
+            **{f"{key}_ratio": _ratio(row, reference, name) for key, name in others.items()},
             **drawn.get(row["design_id"], {}),
         }
+
+
+def _ratio(row: Mapping[Any, Any], reference: Mapping[Any, Any] | pd.Series[Any], name: str) -> float:
+    """Return a quantity times that of the plain CFA; NaN where that has none."""
+    of = float(reference[name])
+    return float(row[name]) / of if of > 0 else float("nan")
 
 
 def _counted_otherwise(output: Output) -> dict[str, str]:
@@ -218,7 +224,8 @@ def _answer(summary: pd.DataFrame, n_found: int, reference: str, words: str) -> 
         yield f"More of both: the {row['design']} on {row['more of both']} pairs of sensor and lamps{of_random}."
     others = [f"{r['design']} {r['separation']} at {r['light']} ({r['more of both']})" for r in rows_of[n_found:]]
     if others:
-        yield f"Others: {', '.join(others)}."
+        what = "Others" if n_found else f"Times the {words} of {reference}, at times its light (more of both)"
+        yield f"{what}: {', '.join(others)}."
 
 
 def _together(table: pd.DataFrame, goal: Column) -> Iterator[str]:
@@ -236,21 +243,25 @@ def _together(table: pd.DataFrame, goal: Column) -> Iterator[str]:
         yield f"Of the best {goal.words} of each sensor and lights: {'; '.join(parts)}."
 
 
-def _distribution(figures: pd.DataFrame, words: str) -> str:
+def _distribution(figures: pd.DataFrame, words: str, unit: str) -> str:
     """Return how the plain CFA is spread over many sensors."""
     plain = figures[figures["name"] == figures["reference"]].drop_duplicates(["sensor", "lights"])
     parts = []
     for key, what in (("dn", words), ("chromatic", "the same for lamps of any brightness")):
         if key in plain:
             ends = [digits(float(plain[key].quantile(share))) for share in (0, 0.05, 0.5, 0.95, 1)]
-            parts.append(f"{what} {ends[0]} to {ends[4]} DN (5 to 95 %: {ends[1]} to {ends[3]}, median {ends[2]})")
+            most = f"{ends[4]} {unit}".strip()
+            parts.append(f"{what} {ends[0]} to {most} (5 to 95 %: {ends[1]} to {ends[3]}, median {ends[2]})")
     return f"{plain['name'].iloc[0]} over {len(plain)} sensors with lamps: {'; '.join(parts)}."
 
 
 def _verdict(of_design: pd.DataFrame) -> str:
     """Return whether a design separates more than the plain CFA on all sensors, some or none."""
-    above = int((of_design["ratio"] > 1).sum())
-    return "More separation" if above == len(of_design) else "Less separation" if not above else "More on some"
+    ratios = of_design["ratio"]
+    above, below = int((ratios > 1 + SAME).sum()), int((ratios < 1 - SAME).sum())
+    if len(ratios) in (above, below):
+        return "More" if above else "Less"
+    return "More on some" if above else "As much or less" if below else "As much"
 
 
 def _sensors(rows: pd.DataFrame) -> str:
@@ -261,6 +272,8 @@ def _sensors(rows: pd.DataFrame) -> str:
 
 def _span(values: pd.Series[float]) -> str:
     """Return the range of ratios; of many with the median."""
+    if values.isna().all():
+        return "unknown"
     low, high = f"{values.min():.2f}", f"{values.max():.2f}"
     middle = f" (median {values.median():.2f})" if len(values) > _MANY else ""
     return low if low == high else f"{low} to {high}{middle}"
@@ -287,7 +300,7 @@ def _shown(figures: pd.DataFrame) -> pd.DataFrame:
             "lights": figures["lights"],
             "design": figures["name"],
             "CFA": figures["cfa"],
-            "separation / DN": figures["dn"].map("{:.1f}".format),
+            "separation": figures["dn"].map("{:.1f}".format),
             "light": figures["light"].map("{:.3f}".format),
             "times the reference's separation": figures["ratio"].map("{:.2f}".format),
             "times its light": figures["light_ratio"].map("{:.2f}".format),
@@ -314,7 +327,9 @@ def picture_of(figures: pd.DataFrame, words: str) -> Picture:
             ends = (low, high) if np.isfinite([low, high]).all() else (None, None)
             ratios.append(Ratio(f"{row['sensor']}, {row['lights']}", str(row["design"]), float(row[of]), *ends))
         panels.append(Ratios(f"{title} / that of {reference}", "times", tuple(ratios)))
-    caption = f"Right of the line: more than {reference}. Bars: 5 to 95 % of random sensors. {COUNTED}"
+    caption = f"Right of the line: more than {reference}."
+    caption += " Bars: 5 to 95 % of random sensors." if "ratio_5" in figures else ""
+    caption += f" {COUNTED}" if "by_pixel" in figures else ""
     return Picture(tuple(panels), f"{words} and light on each sensor, against {reference}.", caption)
 
 
@@ -327,6 +342,5 @@ def _of_many(figures: pd.DataFrame, words: str) -> Picture:
     named = figures[~figures["sensor"].str.contains("/")]
     marks = [(f"{row['sensor']}", float(row["chromatic"]), float(row["dn"])) for row in named.to_dict("records")]
     panel = Dots(f"{words} / DN", f"{words} for lamps of any brightness / DN", groups, tuple(marks))
-    return Picture(
-        (panel,), f"{words} on each sensor.", "A dot for each sensor and set of lamps; built-in sensors named."
-    )
+    caption = "A dot for each sensor and set of lamps; those that are no camera of a collection have names."
+    return Picture((panel,), f"{words} on each sensor.", caption)

@@ -133,7 +133,8 @@ FILES = {
     "peak from which on a deeper red is nearer to the study's yellows than with RGGB (`red_limit_nm`), its color there "
     "(`red_limit_x`, `red_limit_y`) and distance (`red_limit_dn`), the same of reds toward the yellow "
     "(`yellow_limit_nm`), and from which peak on the distance is below the one that the study wants "
-    "(`wanted_limit_nm`); 630 where that holds at the first red, empty where it does not up to 60 nm from there",
+    "(`wanted_limit_nm`); 630 where that holds at the first red, empty where it does not up to 60 nm from there, "
+    "or 20 nm from an end of the wavelengths",
     files.LEFT_OUT: "where each light is left out of a search in turn: the objective (of a worst case the nominal "
     "quantity, too), signal_type, signal, the optimum that was `seen`, the same design `with_it`, and the `fall`",
     files.SENSOR_MAP: "where a scene has a `field`, for each plain CFA, named design and answer of the search: "

@@ -17,7 +17,7 @@ from ..metrics.columns.color_separation import CSD
 from ..results.tables import REFERENCE
 from ..spectra.color import chromaticity
 from ..spectra.lights import Lights
-from ..spectra.moved_leds import moved, red_shapes
+from ..spectra.moved_leds import FIRST_NM, moved, red_shapes
 from ..spectra.signal_color import VISIBLE
 from ..study import Study
 from .analysis import RGGB, Analysis, Calls, NamedDesign, named_designs
@@ -26,8 +26,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 PAIR = ("yellow", "red")
-_START_NM, _STEP_NM, _STEPS = 630.0, 0.1, 600
-"""Peak from which reds move, both ways, in such steps, and how many."""
+_STEP_NM, _STEPS = 0.1, 600
+"""Steps in which reds move, and how many."""
+_MARGIN_NM = 20.0
+"""Peaks so near an end of the grid are left out: it would cut the LED."""
 _NUMBERS = ("red_limit_nm", "red_limit_x", "red_limit_y", "red_limit_dn", "yellow_limit_nm", "wanted_limit_nm")
 _SCHEMA = pa.schema(
     [
@@ -67,12 +69,14 @@ def _calls(study: Study, rows: pd.DataFrame) -> Calls:
 
 def _limits(design: NamedDesign, rggb: NamedDesign, wanted_dn: float | None) -> list[dict[str, Any]]:
     """Return the rows of one design."""
-    peaks_nm, rows = np.asarray(_START_NM + _STEP_NM * np.arange(-_STEPS, _STEPS + 1), dtype=float), []
+    peaks_nm, rows = np.asarray(FIRST_NM + _STEP_NM * np.arange(-_STEPS, _STEPS + 1), dtype=float), []
     for name, shape in red_shapes().items():
-        reds = moved(shape, peaks_nm, design.setup.camera.grid)
+        grid = design.setup.camera.grid
+        reds = moved(shape, peaks_nm, grid)
         own, its = (distances(of.setup.with_all_effects, of.curves, reds) for of in (design, rggb))
+        inside = (peaks_nm >= grid.start_nm + _MARGIN_NM) & (peaks_nm <= grid.stop_nm - _MARGIN_NM)
         for quantity in (CSD, CHROMATIC_CSD):
-            below = own[quantity] < its[quantity]
+            below = inside & (own[quantity] < its[quantity])
             red, yellow = _first(below[_STEPS:]), _first(below[_STEPS::-1])
             row: dict[str, Any] = {"shape": name, "quantity": f"{quantity}_{'_'.join(PAIR)}"}
             if red is not None:
@@ -82,7 +86,8 @@ def _limits(design: NamedDesign, rggb: NamedDesign, wanted_dn: float | None) -> 
                 row["red_limit_dn"] = own[quantity][_STEPS + red]
             if yellow is not None:
                 row["yellow_limit_nm"] = peaks_nm[_STEPS - yellow]
-            if wanted_dn is not None and (at := _first(own[quantity][_STEPS:] < wanted_dn)) is not None:
+            near = inside & (own[quantity] < (wanted_dn or 0.0))
+            if (at := _first(near[_STEPS:])) is not None:
                 row["wanted_limit_nm"] = peaks_nm[_STEPS + at]
             rows.append({key: value if isinstance(value, str) else float(value) for key, value in row.items()})
     return rows

@@ -12,6 +12,8 @@ from .builtin.surrogate import surrogate_parameters
 from .spectrum import WavelengthGrid, equal_photons
 
 GAUSS_FWHM_NM = 18.0
+FIRST_NM = 630.0
+"""Peak from which reds move, both ways."""
 Shape = Callable[[PerWavelength, float], PerWavelength]
 """Photon spectrum of an LED at a peak, nm."""
 

@@ -38,7 +38,7 @@ _LEAST_ERROR = 1e-12
 def brightness_note(section: StudySection, requested: RequestedQuantities) -> str | None:
     """Return a note where the objective counts how bright a lamp is, and lamps differ in photons."""
     known = quantities_of(requested)
-    counted = [name for name in section.objective.weights if name in known and known[name].role == "separation"]
+    counted = [name for name in section.objective.weights if name in known and _counts_brightness(known[name])]
     if not counted or all(scene.equal_photons for scene in section.scenarios.values()):
         return None
     return (
@@ -93,6 +93,11 @@ def _check_slopes(path: KeyPath, quantity: Quantity, section: StudySection) -> I
     if section.search is not None and section.search.algorithm in GRADIENT and not quantity.slopes:
         allowed = f"`search: {{algorithm: ...}}`: {', '.join(DIRECT)}"
         yield Fault(path, f"{quantity.name} has no derivatives, which {section.search.algorithm} needs", None, allowed)
+
+
+def _counts_brightness(quantity: Quantity) -> bool:
+    """Return whether a separation counts how bright lamps are."""
+    return quantity.role == "separation" or (quantity.per_pixel and quantity.distance_kind == DN)
 
 
 def _unknown(

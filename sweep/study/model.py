@@ -133,7 +133,7 @@ class Study:
         column, known = self.objective.column, self.quantities
         if known[column].role != "light":
             return column, "sensitivity"
-        constrained = [name for name in self.constraints if known[name].role == "separation"]
+        constrained = [name for name in self.constraints if known[name].distance_kind in (DN, "chromatic")]
         return (constrained or [csd_name(self.pairs[0])])[0], column
 
     @property

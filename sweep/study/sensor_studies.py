@@ -12,7 +12,7 @@ from ..spectra.builtin.measured_sets import LUXEON, SENSORS
 from .document import Document
 from .schema import Modification, StudySection
 
-_MOST = 100
+_MOST = 200
 _SURROGATE_CURVES = ("C", "R", "G", "B", "Y", "Cy", "Rx")
 _MEASURED = {**SENSORS, "luxeon": LUXEON}
 _SPACES = ("cfas", "designs", "sweeps", "boxes")

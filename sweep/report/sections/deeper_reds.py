@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...results.output import Output
+from ...spectra.moved_leds import FIRST_NM
 from ..leaders import RGGB, answering, label
 from ..section import Section, Table
 from ..words import quantity, quoted
@@ -56,14 +57,11 @@ class DeeperReds(Section):
     def answer(self) -> list[str]:
         """From which peak on the design is below RGGB, by quantity, over the shapes."""
         kinds = list(dict.fromkeys(one.words for one in self.limits_of))
-        ends = []
-        for words in kinds:
-            peaks = [one.red_nm for one in self.limits_of if one.words == words]
-            ends.append(f"**{np.min(peaks):.1f} to {_nm(np.max(peaks))}**" if np.isfinite(peaks).all() else "no peak")
-        more = [f", and at any brightness from {end}" for end in ends[1:]]
+        ends = [_ends([one.red_nm for one in self.limits_of if one.words == words]) for words in kinds]
+        more = [f", and at any brightness {end}" for end in ends[1:]]
         return [
-            f"At the same red, {quoted(self.name)} has less {kinds[0]} than {RGGB} from a red peak of {ends[0]} on, by the "
-            f"LED's shape{''.join(more)}."
+            f"At the same red, {quoted(self.name)} has less {kinds[0]} than {RGGB} {ends[0]}, by the LED's shape"
+            f"{''.join(more)}."
         ]
 
     @property
@@ -81,6 +79,19 @@ class DeeperReds(Section):
         head = ("LED", *kinds, "x, y of the first", "and up to")
         note = "German and US: the shapes of tl16's LEDs, modeled."
         return Table((*head, *(["below the wanted one from"] if wanted else [])), tuple(rows), note)
+
+
+def _ends(peaks_nm: list[float]) -> str:
+    """Return from which peak on, over the shapes that have one."""
+    known = [peak for peak in peaks_nm if np.isfinite(peak)]
+    if not known:
+        return "from none of these reds on"
+    if min(known) == max(known) == FIRST_NM:
+        return f"already at {_nm(FIRST_NM)}"
+    low, high = f"{min(known):.1f}", _nm(max(known))
+    span = f"**{low} to {high}**" if high != _nm(min(known)) else f"**{high}**"
+    some = "" if len(known) == len(peaks_nm) else f" for {len(known)} of {len(peaks_nm)} shapes"
+    return f"from a red peak of {span} on{some}"
 
 
 def _nm(value: float) -> str:

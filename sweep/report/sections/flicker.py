@@ -55,8 +55,9 @@ class OverPulses:
         """Return numbers and false hue of a design, with the worst place between them."""
         x, y = np.array(self.numbers.x), self.hue[name]
         for known in self.worst.get(FALSE_HUE, ()):
-            if known.name == name and known.at not in x:
-                share = known.value / float(np.interp(known.at, x, self.apart[name]))
+            apart = float(np.interp(known.at, x, self.apart[name]))
+            if known.name == name and known.at not in x and apart > 0:
+                share = known.value / apart
                 at = int(np.searchsorted(x, known.at))
                 return np.insert(x, at, known.at), np.insert(y, at, share)
         return x, y

@@ -158,7 +158,7 @@ class Series(Section):
             return None
         across = np.log(x) if self.numbers.log else x
         apart = (np.log(mine) - np.log(its)) if log else mine - its
-        if apart[0] == apart[1] or apart[0] * apart[1] > 0:
+        if apart[0] * apart[1] >= 0 or (self.missed is not None and (self.missed[at : at + 2] > _SEEN).any()):
             return None
         share = float(apart[0] / (apart[0] - apart[1]))
         number = float(across[0] + share * (across[1] - across[0]))
@@ -205,7 +205,7 @@ class Series(Section):
         if self.dark_s and self.numbers.key == "exposure_s":
             worst = self.numbers.at(int(np.argmax(self.missed)))
             yield (
-                f"A lamp pulsed {self.pulses} is dark for up to **{amount(self.dark_s, 's')}**: a longer exposure meets every pulse; one of "
+                f"A {f'lamp pulsed {self.pulses}' if self.pulses else 'pulsed lamp'} is dark for up to **{amount(self.dark_s, 's')}**: a longer exposure meets every pulse; one of "
                 f"{worst} misses it in up to {most} of the phases."
             )
             return
@@ -263,7 +263,8 @@ class Series(Section):
                 key=lambda d: -np.nan_to_num(self.values[d][most], nan=-np.inf),
             )
             rival = next((name for name in (RGGB, self.hero) if name in others), next(iter(others), None))
-            beside = f"; {quoted(rival)} {self._value(rival, most)}" if rival else ""
+            known = rival is not None and np.isfinite(self.values[rival][most])
+            beside = f"; {quoted(rival)} {self._value(rival, most)}" if rival and known else ""
             where = self.numbers.between(start, stop, *ends)
             parts.append(
                 f"**{quoted(leader)}**{verb} {where} ({self._value(leader, most)} at {self.numbers.at(most)}{beside})"

@@ -174,7 +174,8 @@ class TradeOff(Section):
             text += f" has {article(quantity(self.column))} of **{value}**{self.over}{beside}"
         else:
             far = self.column.words.startswith("chromatic")
-            text += f" separates {self.column.pair[0]} from {self.column.pair[1]} lamps{' of any brightness' * far} by **{value}**{self.over}{beside}"
+            by_pixel = self.column.metric in (PIXEL_CSD, CHROMATIC_PIXEL_CSD)
+            text += f" separates {self.column.pair[0]} from {self.column.pair[1]} lamps{' of any brightness' * far}{' with every pixel counted' * by_pixel} by **{value}**{self.over}{beside}"
         light = f"It collects **{amount(best.light, 'share')}** of the light of {self.light_of}"
         lights = [f"{one.name}: {amount(one.light, 'share')}" for one in plain]
         light += f" ({', '.join(lights)})" if plain else ""
@@ -198,9 +199,10 @@ class TradeOff(Section):
         lines = []
         if self.by_pixel is not None and self.rggb is not None:
             mine, its = self.by_pixel
+            against = against_in_words(mine, its, self.rggb.name)
+            beside = f", {against} ({of_column(self.column, its)})" if against else ""
             lines.append(
-                f"With every pixel counted, as noise sees them, it separates by {of_column(self.column, mine)}, "
-                f"{against_in_words(mine, its, self.rggb.name)} ({of_column(self.column, its)})."
+                f"With every pixel counted, as noise sees them, it separates by {of_column(self.column, mine)}{beside}."
             )
         lines += [f"The nearest pair is {lamps(self.lamps)}."] if self.lamps else []
         if self.bound is not None:
