@@ -24,7 +24,7 @@ from ..designs.tolerance import Tolerance
 from ..metrics.bound import Bound
 from ..metrics.columns.tasks import PREFIX
 from ..metrics.objective import Objective, columns_of
-from ..metrics.quantity import Quantity, RequestedQuantities
+from ..metrics.quantity import DN, Quantity, RequestedQuantities
 from ..metrics.separation import csd_name
 from ..metrics.user_metrics import UserMetric
 from ..search.problem import Problem

@@ -75,14 +75,28 @@ def _along(readings: CaseReadings) -> tuple[dict[Pair, PerDesign], PerDesign]:
     """Return distances, DN, of designs that differ in one channel, and up to which of them the closed form holds."""
     assert readings.fixed is not None
     assert readings.values is not None
-    setup, channel, dark = readings.setup, readings.channel, readings.dark
-    distances, most_dn, least_dn = chromatic_along(
-        readings.fixed, channel, readings.values, dark, setup.members, readings.pairs
-    )
+    of_designs = readings.fixed, readings.channel, readings.values, readings.dark
+    distances, most_dn, least_dn = chromatic_along(*of_designs, readings.setup.members, readings.pairs)
+    return distances, _room(readings, most_dn, least_dn)
+
+
+def room_along(readings: CaseReadings) -> PerDesign:
+    """Return the chromatic distance up to which the closed form holds, of designs that differ in one channel, DN."""
+    assert readings.fixed is not None
+    assert readings.values is not None
+    others = np.delete(readings.fixed, readings.channel, axis=1)
+    lit = np.delete(readings.fixed - readings.dark[0], readings.channel, axis=1).max(axis=1, initial=-np.inf)
+    own = readings.values - readings.dark[:, readings.channel, None]
+    least_dn = np.maximum(own, lit).min(axis=1)
+    return _room(readings, np.maximum(readings.values.max(axis=1), others.max(initial=-np.inf)), least_dn)
+
+
+def _room(readings: CaseReadings, most_dn: PerDesign, least_dn: PerDesign) -> PerDesign:
+    dark, channel = readings.dark, readings.channel
     dark_dn, others_dn = dark[:, channel], np.delete(dark[0], channel)
     darkest_dn = np.minimum(dark_dn, others_dn.min(initial=np.inf))
     brightest_dn = np.maximum(dark_dn, others_dn.max(initial=-np.inf))
-    return distances, room_of(setup, most_dn, least_dn, darkest_dn, brightest_dn)
+    return room_of(readings.setup, most_dn, least_dn, darkest_dn, brightest_dn)
 
 
 class ChromaticConfusion(Metric):

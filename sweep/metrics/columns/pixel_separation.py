@@ -6,15 +6,16 @@ from functools import partial
 
 import numpy as np
 
-from ...base.types import PerDesign
+from ...base.types import PerChannel, PerDesign
 from ...camera.brightness import room_dn
 from ...spectra.lights import Pair, class_pairs, pair_name
 from ..batch import Batch, CaseReadings
-from ..chromatic import chromatic_rows, chromatic_separations
+from ..chromatic import chromatic_along, chromatic_rows, chromatic_separations
 from ..metric import Metric
 from ..quantity import DN, Columns, Quantity, RequestedQuantities
 from ..separation import pixel_roots, separations, separations_along
 from ..smooth import SmoothDesign
+from .chromatic import room_along
 
 PIXEL_CSD, CHROMATIC_PIXEL_CSD = "pixel_csd", "chromatic_pixel_csd"
 _COUNTED = (
@@ -71,8 +72,7 @@ class PixelSeparation(Metric):
 
     def of_readings(self, readings: CaseReadings) -> Columns:
         """Compute the columns in closed form; chromatic ones are NaN where a pixel may fill before."""
-        setup, dark = readings.setup, readings.dark
-        roots, members = pixel_roots(setup.camera.mosaic), setup.members
+        roots, members = pixel_roots(readings.setup.camera.mosaic), readings.setup.members
         if readings.whole is not None:
             apart = separations(readings.whole * roots, members)
         else:
@@ -81,16 +81,12 @@ class PixelSeparation(Metric):
             channel = readings.channel
             apart = separations_along(readings.fixed * roots, channel, readings.values * roots[channel], members)
         columns = {pair_name(PIXEL_CSD, pair): distances for pair, distances in apart.items()}
-        if not readings.pairs:
-            return columns
-        room = room_dn(setup, readings.dn, dark) * roots.min()
-        distances = dict.fromkeys(readings.pairs, np.full(len(dark), np.nan))
-        if (room > 0).any():
-            distances = chromatic_separations((readings.dn - dark[:, None]) * roots, members)
-        return columns | {
-            pair_name(CHROMATIC_PIXEL_CSD, pair): np.where(distances[pair] <= room, distances[pair], np.nan)
-            for pair in readings.pairs
-        }
+        if readings.pairs:
+            distances, room = _far_apart(readings, roots)
+            for pair in readings.pairs:
+                far = np.where(distances[pair] <= room * roots.min(), distances[pair], np.nan)
+                columns[pair_name(CHROMATIC_PIXEL_CSD, pair)] = far
+        return columns
 
     def of_batch(self, batch: Batch) -> Columns:
         """Compute columns that have no closed form from brightness curves."""
@@ -100,6 +96,22 @@ class PixelSeparation(Metric):
             for walked in [_walked(batch, closed)]
             for pair, values in closed.items()
         }
+
+
+def _far_apart(readings: CaseReadings, roots: PerChannel) -> tuple[dict[Pair, PerDesign], PerDesign]:
+    """Return distances with every pixel counted, DN, and up to which of those without it the closed form holds."""
+    setup, dark, pairs = readings.setup, readings.dark, readings.pairs
+    if readings.whole is not None:
+        room = room_dn(setup, readings.dn, dark)
+        distances = dict.fromkeys(pairs, np.full(len(dark), np.nan))
+        if (room > 0).any():
+            distances = chromatic_separations((readings.dn - dark[:, None]) * roots, setup.members)
+        return distances, room
+    assert readings.fixed is not None
+    assert readings.values is not None
+    channel, counted = readings.channel, (readings.fixed * roots, readings.values * roots[readings.channel])
+    distances, _, _ = chromatic_along(counted[0], channel, counted[1], dark * roots, setup.members, pairs)
+    return distances, room_along(readings)
 
 
 def _walked(batch: Batch, closed: dict[Pair, PerDesign]) -> dict[Pair, PerDesign]:
