@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -18,6 +18,7 @@ from ..base.types import (
     DesignSignals,
     Float,
     MemberNumbers,
+    PerChannel,
     PerDesign,
 )
 from ..camera.brightness import LampReadings
@@ -64,6 +65,15 @@ class CaseReadings:
         whole = np.repeat(self.fixed[None], len(self.values), axis=0)
         whole[..., self.channel] = self.values
         return whole
+
+    def times(self, factors: PerChannel) -> CaseReadings:
+        """Return the readings with each channel multiplied."""
+        dark = self.dark * factors
+        if self.whole is not None:
+            return replace(self, dark=dark, whole=self.whole * factors)
+        assert self.fixed is not None
+        assert self.values is not None
+        return replace(self, dark=dark, fixed=self.fixed * factors, values=self.values * factors[self.channel])
 
 
 @dataclass

@@ -14,13 +14,12 @@ from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.quantity import DN
 from ..results.facts import SearchFacts
 from ..results.output import Output
-from ..results.tables import NAMED, REFERENCE, SEARCHED, SWEPT
+from ..results.tables import NAMED, REFERENCE, RGGB, SEARCHED, SWEPT
 from ..study.schema import Modification
 
 if TYPE_CHECKING:
     import pandas as pd
 
-RGGB = "RGGB"
 Row = Mapping[Any, Any]
 
 

@@ -20,9 +20,9 @@ from ..metrics.quantity import Column
 from ..results.dataset import part_paths
 from ..results.manifest import Manifest
 from ..results.output import Output, read_output
-from ..results.tables import ALL_SENSORS, REFERENCE, REPORT, RESULTS, SEARCHED, read_table
+from ..results.tables import ALL_SENSORS, REFERENCE, REPORT, RESULTS, RGGB, SEARCHED, read_table
 from ..runs.all_sensors import ALL
-from ..runs.uncertainty import REFERENCE_CFA, UNCLIPPED
+from ..runs.uncertainty import UNCLIPPED
 from ..spectra.lights import pair_name
 from ..study import SensorAndLights, folder_name
 from .hold import holds_for
@@ -140,7 +140,7 @@ def _figures(member: SensorAndLights, output: Output) -> Iterator[dict[str, Any]
         (output.named_rows["scenario"] == output.scenario) & (output.named_rows["status"] == "ok")
     ]
     plain = scenario_rows[scenario_rows["kind"] == REFERENCE]
-    known = plain[plain["name"] == REFERENCE_CFA]
+    known = plain[plain["name"] == RGGB]
     reference = (known if len(known) else plain if len(plain) else scenario_rows).iloc[0]
     drawn, others = _uncertain(output, separation), _counted_otherwise(output)
     for row in scenario_rows.to_dict("records"):
@@ -318,7 +318,7 @@ def picture_of(figures: pd.DataFrame, words: str) -> Picture:
     if figures["sensor"].nunique() > _MANY and "chromatic" in figures:
         return _of_many(figures, words)
     figures = figures[figures["name"] != figures["reference"]]
-    reference = figures["reference"].iloc[0] if len(figures) else REFERENCE_CFA
+    reference = figures["reference"].iloc[0] if len(figures) else RGGB
     panels = []
     for of, title in (("ratio", words), ("light_ratio", "light of the whole CFA")):
         ratios = []

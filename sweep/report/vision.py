@@ -12,7 +12,7 @@ from scipy.stats import rankdata
 from ..base.types import Array, Bool, BoolArray, Float, IndexArray, Int
 from ..metrics.share import format_share
 from ..results.output import Output
-from ..results.tables import VISION, VISION_CONDITIONS
+from ..results.tables import RGGB, VISION, VISION_CONDITIONS
 from ..vision.readers import OBSERVER
 from ..vision.scenes import NETWORK, SHUFFLED, UNSEEN, states_of
 from ..vision.scores import Interval, confusion_matrix, interval_of_seeds, mean_of
@@ -22,7 +22,6 @@ READER_NAMES = {
     OBSERVER: "ideal observer",
     NETWORK: "network",
 }
-_REFERENCE = "RGGB"
 _FEWEST_RANKED = 5
 """Designs that a rank correlation between designs needs."""
 PREDICTORS = {
@@ -52,7 +51,7 @@ class Benchmark:
     @property
     def reference(self) -> str:
         """Design that the others are compared with."""
-        return _REFERENCE if _REFERENCE in self.designs else self.designs[0]
+        return RGGB if RGGB in self.designs else self.designs[0]
 
     @cached_property
     def readers(self) -> list[str]:

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SCHEMA_VERSION = "3"
+RGGB = "RGGB"
+"""The plain CFA that others are compared with, where a study has it."""
 RESULTS, DESIGNS, PARETO = "results.parquet", "designs.parquet", "pareto.parquet"
 SEARCH_LOG = "search.parquet"
 FRONT = "front.parquet"

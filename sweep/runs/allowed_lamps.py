@@ -13,10 +13,11 @@ import pyarrow as pa
 from ..base.types import Array, Float, IndexArray, Int, delayed
 from ..camera.model import SceneModel
 from ..metrics.chromatic import squared_distance
+from ..results.tables import RGGB
 from ..spectra.lights import Lights
 from ..spectra.single_leds import Norm, SingleLeds, all_leds
 from ..study import Study
-from .analysis import RGGB, Analysis, Calls, NamedDesign, named_designs
+from .analysis import Analysis, Calls, NamedDesign, named_designs
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -19,8 +19,6 @@ from .workers import run_with_progress
 if TYPE_CHECKING:
     import pandas as pd
 
-RGGB = "RGGB"
-"""The plain CFA that others are compared with."""
 Calls = Iterable[tuple[dict[str, Any], Call]]
 """What all rows of a call's answer have, and the call; it returns a list of rows."""
 

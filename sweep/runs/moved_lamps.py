@@ -14,13 +14,13 @@ from ..camera.setup import Setup
 from ..metrics.chromatic import squared_distance
 from ..metrics.columns.chromatic import CHROMATIC_CSD
 from ..metrics.columns.color_separation import CSD
-from ..results.tables import REFERENCE
+from ..results.tables import REFERENCE, RGGB
 from ..spectra.color import chromaticity
 from ..spectra.lights import Lights
 from ..spectra.moved_leds import FIRST_NM, moved, red_shapes
 from ..spectra.signal_color import VISIBLE
 from ..study import Study
-from .analysis import RGGB, Analysis, Calls, NamedDesign, named_designs
+from .analysis import Analysis, Calls, NamedDesign, named_designs
 
 if TYPE_CHECKING:
     import pandas as pd

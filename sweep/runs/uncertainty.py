@@ -17,7 +17,7 @@ from ..camera.setup import Setup
 from ..designs.space import Space
 from ..metrics.separation import csd_name
 from ..metrics.smooth import smooth_csd
-from ..results.tables import REFERENCE
+from ..results.tables import REFERENCE, RGGB
 from ..spectra.lights import Pair, class_pairs
 from ..study import Study
 from .analysis import named_designs
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SHARES = (0.05, 0.5, 0.95)
-REFERENCE_CFA = "RGGB"
 """CFA that others are compared with; the first plain one where a study does not have it."""
 UNCLIPPED = "pixels may saturate: random sensors are read before clipping"
 _CONFIDENCE = 0.95
@@ -62,7 +61,7 @@ def uncertainty_table(study: Study, rows: pd.DataFrame, parallel: Parallel, prog
     drawn_sensors = [*run_with_progress(parallel, calls, "random sensors", progress)]
     plain = [row for row in shown if row["kind"] == REFERENCE] or shown
     names = [row["name"] for row in plain]
-    reference = REFERENCE_CFA if REFERENCE_CFA in names else names[0]
+    reference = RGGB if RGGB in names else names[0]
     of_reference = {
         row["scenario"]: sensors for row, sensors in zip(shown, drawn_sensors, strict=True) if row["name"] == reference
     }

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from functools import partial
 
 import numpy as np
 
-from ...base.types import PerDesign
+from ...base.types import Bool, BoolArray, PerDesign
 from ...camera.brightness import room_dn, room_of
 from ...spectra.lights import Pair, class_pairs, pair_name
 from ..batch import Batch, CaseReadings
@@ -47,28 +48,55 @@ class ChromaticSeparation(Metric):
 
     def of_readings(self, readings: CaseReadings) -> Columns:
         """Compute the columns in closed form; NaN where a pixel may fill before lamps look most alike."""
-        setup, pairs = readings.setup, readings.pairs
+        pairs = readings.pairs
         if not pairs:
             return {}
         if readings.whole is None:
-            distances, room = _along(readings)
+            distances, holds_dn = _along(readings)
         else:
-            room = room_dn(setup, readings.dn, readings.dark)
+            holds_dn = room(readings)
             distances = dict.fromkeys(pairs, np.full(len(readings.dn), np.nan))
-            if (room > 0).any():
-                distances = chromatic_separations(readings.dn - readings.dark[:, None], setup.members)
-        return {
-            pair_name(CHROMATIC_CSD, pair): np.where(distances[pair] <= room, distances[pair], np.nan) for pair in pairs
-        }
+            if (holds_dn > 0).any():
+                distances = in_closed_form(readings)
+        closed = {pair: np.where(distances[pair] <= holds_dn, distances[pair], np.nan) for pair in pairs}
+        return {pair_name(CHROMATIC_CSD, pair): values for pair, values in closed.items()}
 
     def of_batch(self, batch: Batch) -> Columns:
         """Compute columns that have no closed form from brightness curves."""
         closed = {pair: batch.columns[pair_name(CHROMATIC_CSD, pair)] for pair in batch.pairs}
-        if not closed:
-            return {}
-        missing = np.any([np.isnan(values) for values in closed.values()], axis=0)
-        walked = batch.over_brightness(missing)[0]
-        return {pair_name(CHROMATIC_CSD, p): np.where(missing, walked[p], values) for p, values in closed.items()}
+        found = completed(closed, lambda missing: batch.over_brightness(missing)[0])
+        return {pair_name(CHROMATIC_CSD, pair): distances for pair, distances in found.items()}
+
+
+def in_closed_form(readings: CaseReadings) -> dict[Pair, PerDesign]:
+    """Return distances as if no pixel filled, DN."""
+    if readings.whole is None:
+        return _along(readings)[0]
+    return chromatic_separations(readings.dn - readings.dark[:, None], readings.setup.members)
+
+
+def room(readings: CaseReadings) -> PerDesign:
+    """Return the chromatic distance up to which the closed form holds, DN."""
+    if readings.whole is not None:
+        return room_dn(readings.setup, readings.dn, readings.dark)
+    assert readings.fixed is not None
+    assert readings.values is not None
+    others = np.delete(readings.fixed, readings.channel, axis=1)
+    lit = np.delete(readings.fixed - readings.dark[0], readings.channel, axis=1).max(axis=1, initial=-np.inf)
+    own = readings.values - readings.dark[:, readings.channel, None]
+    least_dn = np.maximum(own, lit).min(axis=1)
+    return _room(readings, np.maximum(readings.values.max(axis=1), others.max(initial=-np.inf)), least_dn)
+
+
+def completed(
+    closed: Mapping[Pair, PerDesign], walk: Callable[[Bool[BoolArray, " designs"]], dict[Pair, PerDesign]]
+) -> dict[Pair, PerDesign]:
+    """Return distances with those that have no closed form from brightness curves."""
+    if not closed:
+        return {}
+    missing = np.any([np.isnan(values) for values in closed.values()], axis=0)
+    walked = walk(missing)
+    return {pair: np.where(missing, walked[pair], values) for pair, values in closed.items()}
 
 
 def _along(readings: CaseReadings) -> tuple[dict[Pair, PerDesign], PerDesign]:
@@ -78,17 +106,6 @@ def _along(readings: CaseReadings) -> tuple[dict[Pair, PerDesign], PerDesign]:
     of_designs = readings.fixed, readings.channel, readings.values, readings.dark
     distances, most_dn, least_dn = chromatic_along(*of_designs, readings.setup.members, readings.pairs)
     return distances, _room(readings, most_dn, least_dn)
-
-
-def room_along(readings: CaseReadings) -> PerDesign:
-    """Return the chromatic distance up to which the closed form holds, of designs that differ in one channel, DN."""
-    assert readings.fixed is not None
-    assert readings.values is not None
-    others = np.delete(readings.fixed, readings.channel, axis=1)
-    lit = np.delete(readings.fixed - readings.dark[0], readings.channel, axis=1).max(axis=1, initial=-np.inf)
-    own = readings.values - readings.dark[:, readings.channel, None]
-    least_dn = np.maximum(own, lit).min(axis=1)
-    return _room(readings, np.maximum(readings.values.max(axis=1), others.max(initial=-np.inf)), least_dn)
 
 
 def _room(readings: CaseReadings, most_dn: PerDesign, least_dn: PerDesign) -> PerDesign:

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...results.output import Output
+from ...results.tables import RGGB
 from ...spectra.moved_leds import FIRST_NM
-from ..leaders import RGGB, answering, label
+from ..leaders import answering, label
 from ..section import Section, Table
 from ..words import quantity, quoted
 

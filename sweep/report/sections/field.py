@@ -10,7 +10,8 @@ import numpy as np
 from ...base.types import Array, Float
 from ...metrics.quantity import Column
 from ...results.output import Output
-from ..leaders import RGGB, answering, label, leaders_of, upper_bound_beside
+from ...results.tables import RGGB
+from ..leaders import answering, label, leaders_of, upper_bound_beside
 from ..look import styles_of
 from ..panels import Curves, Line, Lines, Picture, Ring
 from ..section import MOST_ROWS, Section, Table

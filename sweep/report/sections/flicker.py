@@ -12,9 +12,10 @@ from ...camera.scene import WhitePatchExposure
 from ...metrics.columns.chromatic import CHROMATIC_CSD
 from ...metrics.columns.flicker import FALSE_HUE, LAMP_SEEN, MODULATION
 from ...results.output import Output
+from ...results.tables import RGGB
 from ...spectra.lights import pair_name
 from ...study.axes import series_of
-from ..leaders import RGGB, answering, label, reference_of
+from ..leaders import answering, label, reference_of
 from ..panels import Line, Lines, Panel, Picture
 from ..section import Section, Table
 from ..series import Numbers, over_series
@@ -50,6 +51,12 @@ class OverPulses:
     hue: Mapping[str, Values]
     apart: Mapping[str, Values]
     worst: Mapping[str, tuple[Worst, ...]]
+
+    @property
+    def least_seen(self) -> float:
+        """The smallest share of phases in which a lamp is seen, between the scenes, too, where known."""
+        refined = [known.value for known in self.worst.get(LAMP_SEEN, ())]
+        return min([1 - float(np.max([*self.missed.values()])), *refined])
 
     def with_worst(self, name: str) -> tuple[Values, Values]:
         """Return numbers and false hue of a design, with the worst place between them."""
@@ -110,7 +117,7 @@ class Flicker(Section):
             missed = {name: 1 - values for name, values in seen.items()}
             swing = over_series(rows, scenarios, MODULATION)
             found.append(OverPulses(numbers, _fixed(output, scenarios), missed, swing, shares, apart, worst))
-        if found and all(float(np.max([*one.missed.values()])) <= 1 - _ALL for one in found):
+        if found and all(one.least_seen >= _ALL for one in found):
             hero, rggb = answering(output), reference_of(output, output.scenarios[0])
             names = "/".join(pair)
             yield cls(

@@ -13,7 +13,7 @@ from ...metrics.columns.sensitivity import CFA_SENSITIVITY
 from ...metrics.quantity import WORST_CASE, Column
 from ...metrics.share import format_share
 from ...results.output import Output
-from ...results.tables import NAMED, REFERENCE, SEARCHED
+from ...results.tables import NAMED, REFERENCE, RGGB, SEARCHED
 from ...spectra.color import NORM_NAMES
 from ..leaders import Row, answering, label, leaders_of, reference_of, upper_bound_beside
 from ..look import styles_of
@@ -297,7 +297,7 @@ class Allowed(Section):
 
     @property
     def _shown(self) -> list[OfNorm]:
-        order = sorted(self.designs, key=lambda one: (one.name != self.hero, one.name != "RGGB", -one.share))
+        order = sorted(self.designs, key=lambda one: (one.name != self.hero, one.name != RGGB, -one.share))
         return order[:_MOST_MAPS]
 
     @property

@@ -14,8 +14,9 @@ from ...metrics.columns.chromatic import CHROMATIC_ERROR
 from ...metrics.columns.confusion import STATE_ERROR
 from ...metrics.columns.sensitivity import CFA_SENSITIVITY
 from ...results.output import Output
+from ...results.tables import RGGB
 from ...study.axes import series_of
-from ..leaders import RGGB, answering, label
+from ..leaders import answering, label
 from ..panels import Line, Lines, Picture
 from ..row_panels import Bar, Bars
 from ..section import MOST_ROWS, Section, Table

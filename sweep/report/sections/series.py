@@ -14,8 +14,9 @@ from ...metrics.columns.flicker import LAMP_SEEN
 from ...metrics.columns.sensitivity import CFA_SENSITIVITY
 from ...metrics.quantity import DN, Column
 from ...results.output import Output
+from ...results.tables import RGGB
 from ...study.axes import series_of
-from ..leaders import RGGB, answering, label
+from ..leaders import answering, label
 from ..panels import Line, Lines, Panel, Picture, Ring
 from ..section import MOST_ROWS, Section, Table
 from ..series import Numbers, over_series
