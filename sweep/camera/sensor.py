@@ -134,7 +134,7 @@ def measured_sensor(name: str, grid: WavelengthGrid) -> SensorCurves:
     """
     measured = SENSORS[name]
     curves = measured.curves(grid)
-    source = f"built-in {name}, {measured.what.rpartition(', ')[2]}: {measured.source}"
+    source = f"built-in {name}: {measured.source}"
     known = [channel for channel in ("W", "C") if channel in curves]
     clear = known[0] if known else max(curves, key=lambda channel: float(curves[channel].sum()))
     variants, cut = own_red(curves), ir_cut(name, grid)

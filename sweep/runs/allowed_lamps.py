@@ -3,27 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
 
-from ..base.types import Array, Float, IndexArray, Int, delayed
-from ..camera.model import SceneModel
-from ..metrics.chromatic import squared_distance
+from ..base.types import delayed
 from ..results.tables import RGGB
-from ..spectra.lights import Lights
 from ..spectra.single_leds import Norm, SingleLeds, all_leds
 from ..study import Study
 from .analysis import Analysis, Calls, NamedDesign, named_designs
+from .led_readings import Readings, apart, read
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_TOGETHER = 128
-"""LEDs that are read out at once."""
 _SCHEMA = pa.schema(
     [
         ("design_id", pa.int64()),
@@ -61,14 +56,14 @@ def _cells(
     """Return the rows of one design."""
     cells = []
     for norm, (yellow, red) in allowed.items():
-        own, its = (None if one is None else (_read(one, yellow), _read(one, red)) for one in (design, rggb))
-        assert own is not None
+        own = _both(design, yellow, red)
+        its = None if rggb is None else _both(rggb, yellow, red)
         for yellow_nm, red_nm in product(np.unique(yellow.peak_nm), np.unique(red.peak_nm)):
             yellows, reds = np.flatnonzero(yellow.peak_nm == yellow_nm), np.flatnonzero(red.peak_nm == red_nm)
-            csd, chromatic = _apart(*own, yellows, reds)
+            csd, chromatic = apart(*own, yellows, reds)
             below: tuple[int | None, ...] = (None, None)
             if its is not None:
-                both = zip((csd, chromatic), _apart(*its, yellows, reds), strict=True)
+                both = zip((csd, chromatic), apart(*its, yellows, reds), strict=True)
                 below = tuple(int((mine < of_rggb).sum()) for mine, of_rggb in both)
             at = np.unravel_index(int(csd.argmin()), csd.shape)
             cells.append(
@@ -88,38 +83,9 @@ def _cells(
     return cells
 
 
-@dataclass(frozen=True)
-class _Readings:
-    """Numbers of LEDs in each phase, DN, and those without light."""
-
-    dn: Float[Array, "phases lights channels"]
-    dark: Float[Array, "phases channels"]
-
-
-def _read(design: NamedDesign, leds: SingleLeds) -> _Readings:
-    """Return DN of LEDs with the photons of the study's lights."""
-    setup, parts = design.setup.with_all_effects, []
-    photons = leds.photons(setup.camera.grid)
-    for start in range(0, len(photons), _TOGETHER):
-        part = photons[start : start + _TOGETHER]
-        names = tuple(map(str, range(len(part))))
-        lights = Lights("leds", names, names, part, setup.lights.photon_ratio, "modeled", surrogate=True)
-        parts.append(SceneModel(replace(setup, lights=lights)).read(design.curves)[0][0])
-    model = SceneModel(setup)
-    return _Readings(np.concatenate(parts, axis=1), model.unlit(design.curves, model.exposure_s(design.curves))[0])
-
-
-def _apart(
-    first: _Readings, second: _Readings, firsts: Int[IndexArray, " firsts"], seconds: Int[IndexArray, " seconds"]
-) -> tuple[Float[Array, "firsts seconds"], Float[Array, "firsts seconds"]]:
-    """Return the CSD of each two lights and that of lamps of any brightness, the smallest over all phases, DN."""
-    csd, chromatic = list[np.ndarray](), list[np.ndarray]()
-    for a, b, dark in zip(first.dn, second.dn, first.dark, strict=True):
-        one, other = a[firsts], b[seconds]
-        csd.append(np.linalg.norm(one[:, None] - other[None], axis=2))
-        lit = (np.repeat(one - dark, len(other), axis=0), np.tile(other - dark, (len(one), 1)))
-        chromatic.append(np.sqrt(squared_distance(*lit)).reshape(len(one), len(other)))
-    return np.asarray(np.min(csd, axis=0), dtype=float), np.asarray(np.min(chromatic, axis=0), dtype=float)
+def _both(design: NamedDesign, yellow: SingleLeds, red: SingleLeds) -> tuple[Readings, Readings]:
+    grid = design.setup.camera.grid
+    return read(design, yellow.photons(grid)), read(design, red.photons(grid))
 
 
 ALLOWED_LAMPS = Analysis("color regions", lambda study: study.section.regions is not None, lambda _: _SCHEMA, _calls)

@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
 
-from ..base.types import Array, DesignCurves, Float, delayed
-from ..camera.model import SceneModel
-from ..camera.setup import Setup
-from ..metrics.chromatic import squared_distance
+from ..base.types import Array, Float, delayed
 from ..metrics.columns.chromatic import CHROMATIC_CSD
 from ..metrics.columns.color_separation import CSD
 from ..results.tables import REFERENCE, RGGB
 from ..spectra.color import chromaticity
-from ..spectra.lights import Lights
 from ..spectra.moved_leds import FIRST_NM, moved, red_shapes
 from ..spectra.signal_color import VISIBLE
 from ..study import Study
 from .analysis import Analysis, Calls, NamedDesign, named_designs
+from .led_readings import apart, read
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -73,7 +69,7 @@ def _limits(design: NamedDesign, rggb: NamedDesign, wanted_dn: float | None) -> 
     for name, shape in red_shapes().items():
         grid = design.setup.camera.grid
         reds = moved(shape, peaks_nm, grid)
-        own, its = (distances(of.setup.with_all_effects, of.curves, reds) for of in (design, rggb))
+        own, its = _nearest(design, reds), _nearest(rggb, reds)
         inside = (peaks_nm >= grid.start_nm + _MARGIN_NM) & (peaks_nm <= grid.stop_nm - _MARGIN_NM)
         for quantity in (CSD, CHROMATIC_CSD):
             below = inside & (own[quantity] < its[quantity])
@@ -98,21 +94,11 @@ def _first(below: np.ndarray) -> int | None:
     return int(below.argmax()) if below.any() else None
 
 
-def distances(
-    setup: Setup, curves: DesignCurves, reds: Float[Array, "reds wavelengths"]
-) -> dict[str, Float[Array, " reds"]]:
-    """Return least distances of reds to the yellows of the setup, DN: CSD and that of lamps of any brightness."""
-    yellows = setup.lights.photons[setup.members[PAIR[0]]]
-    photons = np.concatenate([yellows, reds])
-    names = tuple(map(str, range(len(photons))))
-    lights = Lights("moved", names, names, photons, setup.lights.photon_ratio, "modeled", surrogate=True)
-    model = SceneModel(replace(setup, lights=lights))
-    dn, dark = model.read(curves)[0][0, 0], model.unlit(curves, model.exposure_s(curves))[0, 0]
-    first, second = dn[: len(yellows)], dn[len(yellows) :]
-    lamps = [np.repeat(dn_of - dark, times, axis=0) for dn_of, times in ((second, len(first)), (first, 1))]
-    far = squared_distance(lamps[0], np.tile(lamps[1], (len(second), 1))).reshape(len(second), -1)
-    near = np.linalg.norm(second[:, None] - first[None], axis=2)
-    return {CSD: near.min(axis=1), CHROMATIC_CSD: np.sqrt(far.min(axis=1))}
+def _nearest(design: NamedDesign, reds: Float[Array, "reds wavelengths"]) -> dict[str, Float[Array, " reds"]]:
+    """Return least distances of reds to the study's yellows, DN: CSD and that of lamps of any brightness."""
+    yellows = design.setup.lights.photons[design.setup.members[PAIR[0]]]
+    both = apart(read(design, yellows), read(design, reds))
+    return dict(zip((CSD, CHROMATIC_CSD), (distances.min(axis=0) for distances in both), strict=True))
 
 
 MOVED_LAMPS = Analysis("lamps that designs fail on", _asked, lambda _: _SCHEMA, _calls)

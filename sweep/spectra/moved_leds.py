@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from ..base.types import Array, Float, PerWavelength
-from .builtin.led import led_photons
-from .builtin.surrogate import surrogate_parameters
+from .builtin.data_sets.tl16 import red_led
 from .spectrum import WavelengthGrid, equal_photons
 
 GAUSS_FWHM_NM = 18.0
@@ -21,14 +21,14 @@ Shape = Callable[[PerWavelength, float], PerWavelength]
 def red_shapes() -> dict[str, Shape]:
     """Return shapes of red LEDs: those of the lamps of `tl16`, modeled, and a Gaussian of 18 nm FWHM."""
 
-    def of_lamps(region: str) -> Shape:
-        led = surrogate_parameters().lights[region]["red"]
-        return lambda wavelength_nm, peak_nm: led_photons(wavelength_nm, peak_nm, led.blue_nm, led.red_nm)
-
     def gauss(wavelength_nm: PerWavelength, peak_nm: float) -> PerWavelength:
         return np.asarray(np.exp(-4 * np.log(2) * ((wavelength_nm - peak_nm) / GAUSS_FWHM_NM) ** 2))
 
-    return {"German": of_lamps("germany"), "US": of_lamps("us"), f"Gaussian, {GAUSS_FWHM_NM:g} nm": gauss}
+    return {
+        "German": partial(red_led, "germany"),
+        "US": partial(red_led, "us"),
+        f"Gaussian, {GAUSS_FWHM_NM:g} nm": gauss,
+    }
 
 
 def moved(shape: Shape, peaks_nm: Float[Array, " peaks"], grid: WavelengthGrid) -> Float[Array, "peaks wavelengths"]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ....base.types import PerWavelength
 from ...lights import Lights, make_lights
 from ...spectrum import WavelengthGrid
 from ..led import led_photons
@@ -31,6 +32,12 @@ def tl16(grid: WavelengthGrid, parameters: SurrogateParameters) -> Lights:
     return make_lights(
         grid, "tl16", signals, "built-in surrogate tl16", photon_ratio=parameters.photon_ratio, surrogate=True
     )
+
+
+def red_led(region: str, wavelength_nm: PerWavelength, peak_nm: float) -> PerWavelength:
+    """Return the photon spectrum of a red LED of a region's shape at another peak, 1 there."""
+    led = surrogate_parameters().lights[region]["red"]
+    return led_photons(wavelength_nm, peak_nm, led.blue_nm, led.red_nm)
 
 
 def lights(grid: WavelengthGrid) -> Lights:

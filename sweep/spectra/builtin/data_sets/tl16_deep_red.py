@@ -6,34 +6,28 @@ import numpy as np
 
 from ...lights import Lights, make_lights
 from ...spectrum import WavelengthGrid
-from ..led import led_photons
 from ..surrogate import surrogate_parameters
 from . import tl16
 
-FIRST_NM, LAST_NM, STEP_NM = 627.0, 660.0, 3.0
-"""From tl16's reds to the deepest that norms without a limit toward red allow."""
+_SHORTEST_NM, _LONGEST_NM, _STEP_NM = 627.0, 660.0, 3.0
+"""Peaks from the shortest of tl16's reds to measured deep reds."""
 
 
 def lights(grid: WavelengthGrid) -> Lights:
     """Return the signals."""
     known = tl16.lights(grid)
-    parameters = surrogate_parameters()
-    others = [
-        (name, kind, photons)
-        for name, kind, photons in zip(known.names, known.types, known.photons, strict=True)
-        if kind != "red"
+    others = [light for light in zip(known.names, known.types, known.photons, strict=True) if light[1] != "red"]
+    peaks_nm = np.arange(_SHORTEST_NM, _LONGEST_NM + _STEP_NM / 2, _STEP_NM)
+    reds = [
+        (f"{region}_shape_{peak_nm:.0f}_red", "red", tl16.red_led(region, grid.nodes_nm, float(peak_nm)))
+        for region in tl16.LAMPS
+        for peak_nm in peaks_nm
     ]
-    reds = []
-    for region in tl16.LAMPS:
-        led = parameters.lights[region]["red"]
-        for peak_nm in np.arange(FIRST_NM, LAST_NM + STEP_NM / 2, STEP_NM):
-            spectrum = led_photons(grid.nodes_nm, float(peak_nm), led.blue_nm, led.red_nm)
-            reds.append((f"{region}_shape_{peak_nm:.0f}_red", "red", spectrum))
     return make_lights(
         grid,
         "tl16_deep_red",
         [*others, *reds],
         "built-in surrogate tl16 with deeper reds",
-        photon_ratio=parameters.photon_ratio,
+        photon_ratio=surrogate_parameters().photon_ratio,
         surrogate=True,
     )
