@@ -27,7 +27,8 @@ from ..spectra.lights import pair_name
 from ..study import SensorAndLights, folder_name
 from .hold import holds_for
 from .page import page_of, plain
-from .panels import Dots, Picture
+from .panels import Picture
+from .point_panels import Dots
 from .row_panels import Ratio, Ratios
 from .section import Told, table_of
 from .sections.price import COUNTED

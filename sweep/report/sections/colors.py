@@ -9,7 +9,8 @@ import numpy as np
 
 from ...results.output import Output
 from ..leaders import answering, label
-from ..panels import Line, Lines, Pairs, Panel, Picture
+from ..panels import Line, Lines, Panel, Picture
+from ..point_panels import Pairs
 from ..section import Section
 from ..words import digits
 

@@ -30,7 +30,8 @@ from ..leaders import (
     upper_bound_beside,
 )
 from ..look import CHANNELS, DIM, styles_of
-from ..panels import Curves, Pairs, Panel, Picture, Point, Scatter
+from ..panels import Curves, Panel, Picture
+from ..point_panels import Pairs, Point, Scatter
 from ..section import Section
 from ..series import scene_in_words
 from ..terms import (
