@@ -10,6 +10,7 @@ import numpy as np
 from ..base.types import Array, ChannelCurves, Float, PerWavelength
 from ..designs.technology import Technology, index_of
 from ..spectra.spectrum import WavelengthGrid
+from .curve_errors import UncertainCurves
 from .mosaic import Mosaic
 from .pixel import Pixel
 
@@ -21,7 +22,7 @@ class Camera:
     `grid`: wavelengths of all curves, nm; `qe`: QE of the mosaic's channels, electrons per photon; rows of `modified`
     hold the base curve; `modified`: channels whose curve a design replaces, one per curve of the family; `clear_qe`: QE
     of the clear pixel, the reference of the CFA sensitivity; `technologies`: physical principle of each channel's
-    filter, None if it is not stated; empty if none is stated.
+    filter, None if it is not stated; empty if none is stated; `uncertain`: the curves where they are not known exactly.
     """
 
     grid: WavelengthGrid
@@ -31,6 +32,7 @@ class Camera:
     clear_qe: PerWavelength
     pixel: Pixel
     technologies: tuple[Technology | None, ...] = field(default=(), kw_only=True)
+    uncertain: UncertainCurves | None = field(default=None, kw_only=True)
 
     @property
     def base_qe(self) -> ChannelCurves:

@@ -13,12 +13,14 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from ..base.types import Array, Float, PerSample, PerWavelength, Section
+from ..spectra.population import check_draws
 from ..spectra.spectrum import WavelengthGrid
 from .noise.gaussian import share_below
 from .sensor import SensorCurves
@@ -49,6 +51,15 @@ class CurveErrors(Section):
     """Shift of the IR cut, nm; of sensors whose IR cut is known apart (`ar0820`, `opencam`)."""
     draws: Annotated[int, Field(ge=100, le=100_000)] = 2000
     """Random sensors."""
+    wanted_yield: float | None = Field(default=None, ge=0.5, le=0.9999)
+    """Share of random cameras: `yield_csd_...` is the CSD that this share has at least, as objective or constraint.
+    A camera has random curves and a production error of its own, and sees all lights of the study, or, where these have
+    a `population`, two random lamps."""
+
+    @model_validator(mode="after")
+    def _enough(self) -> CurveErrors:
+        check_draws(self.wanted_yield, self.draws)
+        return self
 
     @property
     def linear(self) -> bool:
@@ -56,8 +67,21 @@ class CurveErrors(Section):
         return self.shift_nm == 0 and self.ir_cut_nm == 0
 
 
+@dataclass(frozen=True)
+class UncertainCurves:
+    """Curves of a camera's channels that are not known exactly; `names`: of the sensor's curve in each channel."""
+
+    sensor: SensorCurves
+    names: tuple[str, ...]
+    errors: CurveErrors
+
+    def drawn(self, grid: WavelengthGrid, seed: Sequence[int]) -> Float[Array, "draws channels wavelengths"]:
+        """Draw curves of all channels, those of modified ones without their filter."""
+        return drawn_curves(self.sensor, grid, self.names, self.errors, seed)
+
+
 def drawn_curves(
-    sensor: SensorCurves, grid: WavelengthGrid, names: Sequence[str], errors: CurveErrors, seed: int
+    sensor: SensorCurves, grid: WavelengthGrid, names: Sequence[str], errors: CurveErrors, seed: Sequence[int]
 ) -> Float[Array, "draws names wavelengths"]:
     """Draw curves of a sensor; those of a name are the same whatever others are drawn."""
     wave, cut = grid.nodes_nm, sensor.ir_cut
@@ -76,12 +100,12 @@ def drawn_curves(
     return curves
 
 
-def _rng(name: str, seed: int, part: int) -> np.random.Generator:
+def _rng(name: str, seed: Sequence[int], part: int) -> np.random.Generator:
     """Return a generator of a curve's own."""
-    return np.random.default_rng([seed, zlib.crc32(name.encode()), part])
+    return np.random.default_rng([*seed, zlib.crc32(name.encode()), part])
 
 
-def _evenly(name: str, errors: CurveErrors, seed: int, count: int) -> Float[Array, "rows columns"]:
+def _evenly(name: str, errors: CurveErrors, seed: Sequence[int], count: int) -> Float[Array, "rows columns"]:
     """Return numbers from -1 to 1."""
     return np.asarray(_rng(name, seed, 0).uniform(-1, 1, (count, errors.draws)), dtype=float)
 
@@ -92,9 +116,10 @@ def _root(wave: PerSample, length_nm: float) -> Float[Array, "samples samples"]:
     return np.asarray(np.linalg.cholesky(correlation + _JITTER * np.eye(wave.size)), dtype=float)
 
 
-def with_filters(
-    curves: Float[Array, "draws wavelengths"], base: PerWavelength, designed: PerWavelength
-) -> Float[Array, "draws wavelengths"]:
-    """Put a filter on drawn curves: its transmission relative to the curve that it replaces stays."""
+def linear_in_filter(
+    curves: Float[Array, "draws wavelengths"], base: PerWavelength
+) -> tuple[Float[Array, "draws wavelengths"], Float[Array, "draws wavelengths"]]:
+    """Return weights and rest of drawn curves: behind a filter of QE N they are weights N + rest; N / base stays."""
     known = base > _LEAST_BASE * base.max()
-    return curves * np.divide(designed, base, out=np.ones_like(base), where=known)
+    weights = np.divide(curves, base, out=np.zeros_like(curves), where=np.broadcast_to(known, curves.shape))
+    return weights, np.where(known, 0.0, curves)

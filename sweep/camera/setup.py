@@ -13,6 +13,7 @@ from ..spectra.lights import Lights
 from ..spectra.tasks import StudyTasks
 from .accuracy import STANDARD, Accuracy
 from .camera import Camera
+from .curve_errors import CurveErrors
 from .scene import Scene
 from .user_effects import UserEffect
 
@@ -53,6 +54,22 @@ class Setup:
     def members(self) -> dict[str, MemberNumbers]:
         """Indices of the signals of each signal type."""
         return self.lights.members
+
+    @property
+    def wanted_yield(self) -> float:
+        """The share of random cameras, or lamps and cameras, of a yield; 0: none."""
+        stated = [None if part is None else part.wanted_yield for part in (self._errors, self.lights.population)]
+        return next((share for share in stated if share is not None), 0.0)
+
+    @property
+    def draws_sensors(self) -> bool:
+        """True if the cameras of a yield have random curves."""
+        return self._errors is not None and self._errors.wanted_yield is not None
+
+    @property
+    def _errors(self) -> CurveErrors | None:
+        uncertain = self.camera.uncertain
+        return None if uncertain is None else uncertain.errors
 
     def computes(self, effect: str) -> bool:
         """Return whether an effect is computed."""

@@ -34,7 +34,7 @@ from .complex_step import COMPLEX_STEP, Smooth, moving, root, tail_decades
 from .separation import pixel_roots, separation
 
 if TYPE_CHECKING:
-    from .drawn import LampsAndCameras
+    from .drawn import Sample
     from .members import PopulationModel
 
 Made = TypeVar("Made")
@@ -106,7 +106,7 @@ class SmoothDesign:
         free: Int[IndexArray, " free"],
         span: PerFree,
         members: PopulationModel | None = None,
-        drawn: LampsAndCameras | None = None,
+        drawn: Sample | None = None,
         images: SeededVision | None = None,
     ) -> None:
         """Compute curves and derivatives."""
@@ -225,26 +225,8 @@ class SmoothDesign:
     def distance_of_a_share(self, pair: Pair) -> Rows:
         """Return the distance that the wanted share of random lamps and cameras has, DN, as one row."""
         assert self._drawn is not None
-        draws, model = self._drawn.draws(pair), self._drawn.population_model.linear
-        families = [
-            self.family.perturbed(error_index) if any(error_index) else self.family
-            for error_index in draws.production_errors
-        ]
-        curves = np.stack([family.curves(self.x[None])[0] for family in families])
-        value, chosen = self._drawn.kept(curves, [pair])[pair]
-        slope = np.zeros(self._free.size)
-        if np.isfinite(value):
-            which = np.searchsorted(draws.starts, chosen, side="right") - 1
-            for error_index in np.unique(which):
-                subset, design_curves = chosen[which == error_index], curves[error_index]
-                differences = draws.differences(subset, model.smooth(design_curves[None])[0])
-                by_u = families[error_index].gradient(self.x)[self._free] * self._span[:, None, None]
-                slopes = (
-                    draws.differences(subset, model.smooth_with_gradient(design_curves, by_u)[1]) * differences
-                ).sum(axis=-1)
-                length = np.linalg.norm(differences, axis=-1)
-                slope += np.divide(slopes, length, out=np.zeros_like(slopes), where=length > 0).sum(axis=1)
-        return Rows(np.array([value]), slope[None] / chosen.size)
+        value, slope = self._drawn.share_and_slope(pair, self.family, self.x, self._free, self._span)
+        return Rows(np.array([value]), slope[None])
 
     @cached_property
     def _response_of_members(

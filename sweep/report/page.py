@@ -32,6 +32,7 @@ from .sections.lamps import Lamps
 from .sections.left_out import LeftOut
 from .sections.method import Method
 from .sections.noise import Noise
+from .sections.other_cameras import OtherCameras
 from .sections.price import Price
 from .sections.published import Published
 from .sections.scenes import Scenes
@@ -56,6 +57,7 @@ ORDER: tuple[type[Section], ...] = (
         Tasks,
         Colors,
         Uncertain,
+        OtherCameras,
         LeftOut,
         Published,
         SensorCurves,

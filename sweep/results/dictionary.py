@@ -52,7 +52,9 @@ _WORST = (
     "all effects, over all members exactly"
 )
 _OF_A_SHARE = (
-    "the CSD that at least the share `population.wanted_yield` of the drawn lamps and cameras has, and with 95 % "
+    "the CSD that at least the share `population.wanted_yield` of the drawn lamps and cameras has, or "
+    "`uncertainty.wanted_yield` of cameras with random curves that see all lights (with a population, two random lamps "
+    "each), and with 95 % "
     "confidence (one-sided, binomial) that share of all, where the design was not chosen by the same draws, as a "
     "search's is: the mean of the draws that rank right below, a tenth of all that may have less, before clipping and "
     "rounding, with all effects; no limit is computed of it, and a limit of others leaves a constraint on it out"
@@ -123,6 +125,10 @@ FILES = {
     "random sensors fall below, with 95 % intervals (`_low`, `_high`); `ratio_...`, `light_ratio_...`, CSD and light "
     "relative to the `reference` on the same sensor; `ratio_sd`, `light_ratio_sd` and their `correlation`; "
     "`at_least_dn`, below which no sensor is (without `shift_nm` and `ir_cut_nm`)",
+    files.YIELDS: "where `population.wanted_yield` or `uncertainty.wanted_yield` is stated, for each plain CFA, named "
+    "design and answer of the search: `dn`, the CSD that the `share` of other random lamps and cameras has, which no "
+    "search has looked at (`draws` of them, before clipping and rounding), with a 95 % interval of that of all "
+    "(`dn_low`, `dn_high`)",
     files.REGIONS_MAP: "where a study asks for maps of color regions, for each plain CFA, named design and answer of "
     "the search: design_id, norm, peak of the yellow LED (yellow_nm) and of the red one (red_nm), how many pairs of "
     "widths the norm allows (pairs), how many of these have the wanted distance (separated), how many RGGB keeps "

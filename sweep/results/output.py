@@ -68,7 +68,8 @@ class Output:
     fail on. `error_against_noise`: color error against noise;
     `places`: separations over the sensor; `map`: the best objective over two parameters; `handovers`: where captures of
     an HDR pixel are full; `worst`: worst values over series; `saturated`: signals that fill a pixel; `uncertainty`:
-    quantiles over random sensors; `vision`: tables of the benchmark of vision by their files' names.
+    quantiles over random sensors; `yields`: of other random lamps and cameras; `vision`: tables of the
+    benchmark of vision by their files' names.
     """
 
     folder: Path
@@ -92,6 +93,7 @@ class Output:
     worst: pd.DataFrame | None
     saturated: pd.DataFrame
     uncertainty: pd.DataFrame | None
+    yields: pd.DataFrame | None
     vision: Mapping[str, pd.DataFrame]
     _made: dict[object, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
@@ -281,6 +283,7 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         worst=more.get(files.WORST),
         saturated=more[files.SATURATED],
         uncertainty=more.get(files.UNCERTAINTY),
+        yields=more.get(files.YIELDS),
         vision={name: more[name] for name in files.VISION_TABLES if name in more},
     )
 

@@ -32,6 +32,7 @@ CROSSINGS = "crossings.parquet"
 LIMITED_BY = "limited_by.parquet"
 ROBUSTNESS = "robustness.parquet"
 UNCERTAINTY = "uncertainty.parquet"
+YIELDS = "yields.parquet"
 REGIONS_MAP = "regions.parquet"
 LAMP_LIMITS = "lamp_limits.parquet"
 SENSOR_MAP = "sensor_map.parquet"
@@ -54,7 +55,7 @@ MADE_BY_RUN = frozenset(
         *(DESIGNS, PARETO, SEARCH_LOG, FRONT, CURVES, POINTS, CROSSINGS, LIMITED_BY, ROBUSTNESS, REGIONS_MAP),
         LAMP_LIMITS,
         *(SENSOR_MAP, TRADED, LEFT_OUT, COMBINATIONS, MAP, HANDOVERS, WORST, SATURATED),
-        UNCERTAINTY,
+        *(UNCERTAINTY, YIELDS),
         *(*VISION_TABLES, ALL_SENSORS, PROVENANCE, RESOLVED),
     )
 )

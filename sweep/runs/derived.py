@@ -27,6 +27,7 @@ from ..results.tables import (
     TRADED,
     UNCERTAINTY,
     WORST,
+    YIELDS,
 )
 from ..search.limit import Limit
 from ..study import Study
@@ -41,6 +42,7 @@ from .robustness import ROBUST
 from .saturated import SATURATION
 from .uncertainty import uncertainty_table
 from .worst import WORST_VALUES
+from .yields import JUDGED_YIELDS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -82,6 +84,7 @@ class DerivedInput:
 _ANALYSES = {
     SATURATED: SATURATION,
     ROBUSTNESS: ROBUST,
+    YIELDS: JUDGED_YIELDS,
     REGIONS_MAP: ALLOWED_LAMPS,
     LAMP_LIMITS: MOVED_LAMPS,
     SENSOR_MAP: OVER_SENSOR,

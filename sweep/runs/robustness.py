@@ -13,7 +13,7 @@ from ..base.types import Array, Float, delayed
 from ..camera.setup import Setup
 from ..designs.space import Space
 from ..designs.tolerance import AS_DESIGNED, NONE, ProductionError, Tolerance
-from ..metrics.drawn import draws_of
+from ..metrics.drawn_sensors import fresh_samples
 from ..metrics.members import PopulationModel, population_model
 from ..metrics.separation import csd_name
 from ..metrics.share import share_interval
@@ -93,11 +93,12 @@ def _calls(study: Study, rows: pd.DataFrame) -> Calls:
             if other.row["kind"] == REFERENCE and other.row["scenario"] == design.row["scenario"]
         ]
         best = max(plain, key=lambda other: other.row[f"worst_{csd_name(pair)}"], default=design)
-        rival = None if best is design else _candidate(study, best)
-        yield design.key, delayed(_robustness, _candidate(study, design), rival, pair, study.section.seed)
+        rival = None if best is design else candidate_of(study, best)
+        yield design.key, delayed(_robustness, candidate_of(study, design), rival, pair, study.section.seed)
 
 
-def _candidate(study: Study, design: NamedDesign) -> Candidate:
+def candidate_of(study: Study, design: NamedDesign) -> Candidate:
+    """Return a named design with the production errors of its study."""
     point = np.array([[design.row[name] for name in design.space.parameters]], dtype=float)
     return Candidate(design.setup, design.space, point, study.tolerance)
 
@@ -108,9 +109,9 @@ def _robustness(design: Candidate, rival: Candidate | None, pair: Pair, seed: in
     population = design.setup.lights.population
     assert population is not None
     if population.wanted_dn is not None:
-        successes = int((drawn_dn(design, pair, seed) >= population.wanted_dn).sum())
-        low, high = share_interval(successes, population.draws)
-        found |= {"yield": successes / population.draws, "yield_low": low, "yield_high": high}
+        has_it = drawn_dn(design, pair, seed) >= population.wanted_dn
+        low, high = share_interval(int(has_it.sum()), has_it.size)
+        found |= {"yield": float(has_it.mean()), "yield_low": low, "yield_high": high}
     return [found]
 
 
@@ -163,14 +164,15 @@ def _first(below: Callable[[float], bool]) -> float | None:
 
 
 def drawn_dn(design: Candidate, pair: Pair, seed: int) -> Float[Array, " draws"]:
-    """Return the CSD of two random members per draw, before clipping and rounding; equal draws for all designs."""
-    model = population_model(design.setup)
-    tolerance = design.tolerance if design.space.filter is not None else NONE
-    draws = draws_of(model.members, pair, tolerance, (seed, 1))
-    dn = np.empty(draws.size)
-    for number, production_error in enumerate(draws.production_errors):
-        draws.distances(number, model.linear.smooth(design.curves(production_error))[0], dn)
-    return dn
+    """Return the CSD of random lamps and cameras, before clipping and rounding; equal draws for all designs.
+
+    No search has looked at these draws.
+    """
+    tolerance, parts = design.tolerance if design.space.filter is not None else NONE, []
+    for sample in fresh_samples(design.setup, tolerance, seed):
+        curves = np.concatenate([design.curves(production_error) for production_error in sample.production_errors])
+        parts.append(sample.distances(curves, [pair])[pair])
+    return np.concatenate(parts)
 
 
 ROBUST = Analysis("robustness", lambda study: _pair(study) is not None, lambda _: _SCHEMA, _calls, is_kept=True)

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 import pyarrow as pa
 
-from ..base.types import Array, DesignNumbers, DesignParameters, Float
+from ..base.types import DesignNumbers, DesignParameters
 from ..camera.model import SceneModel, scene_model
 from ..camera.plan import Plan
 from ..camera.setup import Setup
@@ -182,14 +182,12 @@ def worst_cases(
 
 
 def _of_a_share(
-    space: Space, setup: Setup, points: Float[Array, "points 2"], rules: Rules, yields: Sequence[Quantity]
+    space: Space, setup: Setup, points: DesignParameters, rules: Rules, yields: Sequence[Quantity]
 ) -> Columns:
     """Return the CSD that the wanted share of random lamps and cameras has."""
-    from ..metrics.drawn import LampsAndCameras  # noqa: PLC0415  (only where a share of lamps and cameras counts)
-    from ..metrics.members import population_model  # noqa: PLC0415
+    from ..metrics.drawn_sensors import searched_sample  # noqa: PLC0415  (only where a share of cameras counts)
 
-    tolerance = rules.tolerance if space.filter is not None else NONE
-    drawn = LampsAndCameras(population_model(setup), tolerance, rules.seed)
+    drawn = searched_sample(setup, rules.tolerance if space.filter is not None else NONE, rules.seed)
     pairs = [quantity.pair for quantity in yields if quantity.pair is not None]
     csds = drawn.columns(
         lambda production_error, designs: space.curves(points[designs], setup.camera.grid.size, production_error),

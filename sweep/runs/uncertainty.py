@@ -9,12 +9,10 @@ import numpy as np
 import pyarrow as pa
 
 from ..base.types import Array, ChannelCurves, Float, Parallel, PerSample, PerValue, Progress, delayed
-from ..camera.curve_errors import CurveErrors, drawn_curves, with_filters
+from ..camera.curve_errors import CurveErrors, linear_in_filter
 from ..camera.linear import linear_model
 from ..camera.scene import WhitePatchExposure
-from ..camera.sensor import SensorCurves
 from ..camera.setup import Setup
-from ..designs.space import Space
 from ..metrics.separation import csd_name
 from ..metrics.smooth import smooth_csd
 from ..results.tables import REFERENCE, RGGB
@@ -56,12 +54,11 @@ def uncertainty_table(study: Study, rows: pd.DataFrame, parallel: Parallel, prog
     shown, calls = [], []
     for design in named_designs(study, rows):
         shown.append(design.row)
-        setup, names = design.setup.with_all_effects, _names(study, design.space)
-        calls.append(delayed(_on_sensors, setup, design.curves[0], study.sensor, names, errors, study.section.seed))
+        calls.append(delayed(_on_sensors, design.setup.with_all_effects, design.curves[0], study.section.seed))
     drawn_sensors = [*run_with_progress(parallel, calls, "random sensors", progress)]
     plain = [row for row in shown if row["kind"] == REFERENCE] or shown
     names = [row["name"] for row in plain]
-    reference = RGGB if RGGB in names else names[0]
+    reference = RGGB if RGGB in names else next(iter(names), RGGB)
     of_reference = {
         row["scenario"]: sensors for row, sensors in zip(shown, drawn_sensors, strict=True) if row["name"] == reference
     }
@@ -82,28 +79,19 @@ def uncertainty_table(study: Study, rows: pd.DataFrame, parallel: Parallel, prog
     return pa.Table.from_pylist(table_rows, schema=_SCHEMA)
 
 
-def _names(study: Study, space: Space) -> list[str]:
-    """Return the curve of each channel; of a modified one that which its filter replaces."""
-    bases = {} if space.filter is None else space.filter.bases
-    return study.sensor.mosaic_curves(study.mosaics[space.cfa], {**study.section.cfas[space.cfa].curves, **bases})
-
-
 def _on_sensors(
-    setup: Setup,
-    curves: ChannelCurves,
-    sensor: SensorCurves,
-    names: list[str],
-    errors: CurveErrors,
-    seed: int,
+    setup: Setup, curves: ChannelCurves, seed: int
 ) -> tuple[dict[Pair, PerValue], PerValue, dict[Pair, float]]:
     """Return CSDs by pair and the mean QE of the tile on every sensor, and lower bounds where there are some."""
     camera, pairs = setup.camera, class_pairs(setup.lights.classes)
-    drawn = drawn_curves(sensor, camera.grid, names, errors, seed)
+    assert camera.uncertain is not None
+    drawn, errors = camera.uncertain.drawn(camera.grid, [seed]), camera.uncertain.errors
     for channel, curve in zip(camera.modified, curves, strict=True):
-        drawn[:, channel] = with_filters(drawn[:, channel], camera.qe[channel], curve)
+        weights, rest = linear_in_filter(drawn[:, channel], camera.qe[channel])
+        drawn[:, channel] = weights * curve + rest
     designed = camera.qe.copy()
     designed[list(camera.modified)] = curves
-    free = setup.with_camera(modified=tuple(range(len(names))), qe=designed)
+    free = setup.with_camera(modified=tuple(range(len(designed))), qe=designed)
     parts = [slice(start, start + _TOGETHER) for start in range(0, len(drawn), _TOGETHER)]
     csds = {pair: np.concatenate([smooth_csd(free, drawn[part], pair) for part in parts]) for pair in pairs}
     counts = camera.mosaic.counts
@@ -133,16 +121,21 @@ def _at_least(setup: Setup, designed: ChannelCurves, pair: Pair, errors: CurveEr
     return least / (1.0 if is_fixed else (1 + errors.gain) * (1 + errors.noise))
 
 
-def _quantiles(of: str, values: PerSample) -> dict[str, float]:
-    """Return quantiles with distribution-free intervals (order statistics)."""
+def quantile(values: PerSample, share: float) -> tuple[float, float, float]:
+    """Return a quantile with a distribution-free 95 % interval (order statistics)."""
     from scipy.stats import binom  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
-    ordered, n, quantiles = np.sort(values), values.size, dict[str, float]()
-    for share, name in zip(SHARES, _ENDS[::3], strict=True):
-        ranks = math.ceil(share * n), *binom.ppf([(1 - _CONFIDENCE) / 2, (1 + _CONFIDENCE) / 2], n, share)
-        at = [min(max(int(rank) - 1 + step, 0), n - 1) for rank, step in zip(ranks, (0, 0, 1), strict=True)]
-        quantiles |= {f"{of}_{name}{end}": float(ordered[i]) for end, i in zip(("", "_low", "_high"), at, strict=True)}
-    return quantiles
+    ordered, n = np.sort(values), values.size
+    ranks = math.ceil(share * n), *binom.ppf([(1 - _CONFIDENCE) / 2, (1 + _CONFIDENCE) / 2], n, share)
+    at = [min(max(int(rank) - 1 + step, 0), n - 1) for rank, step in zip(ranks, (0, 0, 1), strict=True)]
+    value, low, high = (float(ordered[i]) for i in at)
+    return value, low, high
+
+
+def _quantiles(of: str, values: PerSample) -> dict[str, float]:
+    """Return the quantiles of a column with their intervals."""
+    columns = [f"{of}_{end}" for end in _ENDS]
+    return dict(zip(columns, (end for share in SHARES for end in quantile(values, share)), strict=True))
 
 
 def _spread(ratio: Float[Array, " draws"], light: Float[Array, " captures"]) -> dict[str, float]:

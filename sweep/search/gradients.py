@@ -27,7 +27,7 @@ from ..metrics.smooth import Rows, SmoothDesign
 from .problem import Evaluation, Problem, SearchRun
 
 if TYPE_CHECKING:
-    from ..metrics.drawn import LampsAndCameras
+    from ..metrics.drawn import Sample
     from ..metrics.members import PopulationModel
 
 BACK_OFF = 1e-8
@@ -72,10 +72,10 @@ def _members_of(setup: Setup) -> PopulationModel:
     return population_model(setup)
 
 
-def _drawn_of(problem: Problem, setup: Setup) -> LampsAndCameras:
-    from ..metrics.drawn import LampsAndCameras  # noqa: PLC0415  (only where a share of lamps and cameras counts)
+def _drawn_of(problem: Problem, setup: Setup) -> Sample:
+    from ..metrics.drawn_sensors import searched_sample  # noqa: PLC0415  (only where a share of cameras counts)
 
-    return LampsAndCameras(_members_of(setup), problem.tolerance, problem.seed)
+    return searched_sample(setup, problem.tolerance, problem.seed)
 
 
 def _finite(point: Point) -> Point:

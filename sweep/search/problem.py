@@ -50,11 +50,8 @@ class Problem:
         requested = RequestedQuantities(
             self.setup.lights.classes, self.states, edge_shift=True, tasks=tasks, user_metrics=self.user_metrics
         )
-        population = self.setup.lights.population
-        wanted_yield = 0.0 if population is None else population.wanted_yield or 0.0
-        requested = replace(
-            requested, population=self.population, wanted_yield=wanted_yield, vision=self.vision is not None
-        )
+        wanted_yield, vision = self.setup.wanted_yield, self.vision is not None
+        requested = replace(requested, population=self.population, wanted_yield=wanted_yield, vision=vision)
         return quantities_of(requested)
 
     @property

@@ -39,6 +39,13 @@ LEDs is less than that of the peak, because the eye's sensitivity falls there.)
 """
 
 
+def check_draws(wanted_yield: float | None, draws: int) -> None:
+    """Raise ValueError if too few draws are below the value that a share of them has."""
+    if wanted_yield is not None and draws * (1 - wanted_yield) + _ROUNDING < _LEAST_BELOW:
+        least = math.ceil(_LEAST_BELOW / (1 - wanted_yield) - _ROUNDING)
+        raise ValueError(f"wanted_yield {wanted_yield:g} needs at least {least:,} `draws`, not {draws:,}")
+
+
 def _by_name(value: Any) -> Any:
     """Convert a single number to one for every signal."""
     return value if isinstance(value, dict) else {_ALL: value}
@@ -99,9 +106,7 @@ class Population(Section):
             if not low <= 0 <= high:
                 lamp = name or "a lamp"
                 raise ValueError(f"ageing_nm: {lamp} begins as new, so from 0 or less to 0 or more")
-        if self.wanted_yield is not None and self.draws * (1 - self.wanted_yield) + _ROUNDING < _LEAST_BELOW:
-            least = math.ceil(_LEAST_BELOW / (1 - self.wanted_yield) - _ROUNDING)
-            raise ValueError(f"wanted_yield {self.wanted_yield:g} needs at least {least:,} `draws`, not {self.draws:,}")
+        check_draws(self.wanted_yield, self.draws)
         if self.wanted_yield is not None and self.draws > _MOST_HELD:
             raise ValueError(f"wanted_yield takes at most {_MOST_HELD:,} `draws`, not {self.draws:,}")
         return self

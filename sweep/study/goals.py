@@ -112,7 +112,8 @@ def _unknown(
         needed = "`production.edge_shift_nm`" + (" or `population`" if shifted.distance_kind == DN else "")
         return Fault(path, f"{name} needs {needed}", None, "a shift above 0")
     if name in {n for n, q in quantities_of(replace(requested, wanted_yield=1.0)).items() if q.extreme == OF_A_SHARE}:
-        return Fault(path, f"{name} needs `population.wanted_yield`", None, "a share, such as 0.99")
+        problem = f"{name} needs `wanted_yield` of `population` or `uncertainty`"
+        return Fault(path, problem, None, "a share, such as 0.99")
     of_states = quantities_of(replace(requested, states=requested.classes))
     if not requested.states and name in of_states and name not in quantities_of(requested):
         return Fault(path, f"{name} needs `recognition`", None, "`recognition: {}`, and noise in every scenario")

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..base.errors import StudyError, ValidationIssue
 from ..camera.camera import Camera
+from ..camera.curve_errors import UncertainCurves
 from ..camera.effects import Box
 from ..camera.mosaic import Mosaic
 from ..camera.pixel import Pixel
@@ -196,7 +197,8 @@ class Study:
         mosaic, scene = self.mosaics[cfa], self.scenarios[scenario]
         replaced = {**self.section.cfas[cfa].curves, **bases}
         modified = tuple(mosaic.channels.index(channel) for channel in bases)
-        technologies = [self.sensor.technologies.get(name) for name in self.sensor.mosaic_curves(mosaic, replaced)]
+        names, errors = self.sensor.mosaic_curves(mosaic, replaced), self.section.uncertainty
+        technologies = [self.sensor.technologies.get(name) for name in names]
         for channel in modified:
             technologies[channel] = technology
         camera = Camera(
@@ -207,6 +209,7 @@ class Study:
             clear_qe=self.sensor.curve(self.sensor.clear),
             pixel=self.pixel_in(scene),
             technologies=tuple(technologies) if any(technologies) else (),
+            uncertain=None if errors is None else UncertainCurves(self.sensor, tuple(names), errors),
         )
         return Setup(
             camera,

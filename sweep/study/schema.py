@@ -356,4 +356,5 @@ class StudySection(Section):
     @property
     def wanted_yield(self) -> float:
         """The share of random lamps and cameras of a yield; 0: none."""
-        return 0.0 if self.population is None else self.population.wanted_yield or 0.0
+        stated = [part.wanted_yield for part in (self.uncertainty, self.population) if part is not None]
+        return next((share for share in stated if share is not None), 0.0)

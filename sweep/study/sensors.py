@@ -10,6 +10,7 @@ import numpy as np
 from ..base.errors import DataError, Fault, unknown
 from ..base.types import Array, Float, FloatArray, PerWavelength
 from ..camera.angular import grazing_fault
+from ..camera.scene import WhitePatchExposure
 from ..camera.sensor import BUILT_IN_SENSORS, SensorCurves, make_sensor
 from ..camera.sensor_field import PLACES, SensorField
 from ..designs.space import Space
@@ -228,3 +229,13 @@ def check_uncertainty(section: StudySection, sensor: SensorCurves, spaces: Seque
     if any(t is not None and t.interference is not None for t in (*filters, *sensor.technologies.values())):
         problem = "of filters that do not move with the angle of the light; thin layers do"
         yield Fault(("uncertainty",), problem, None, "no `interference`")
+    if section.uncertainty.wanted_yield is None:
+        return
+    path = ("uncertainty", "wanted_yield")
+    if section.population is not None and section.population.wanted_yield is not None:
+        problem = "stated of `population`, too; of `uncertainty` it counts random curves and random lamps"
+        yield Fault(path, problem, section.uncertainty.wanted_yield, "one of them")
+    for name, scene in section.scenarios.items():
+        if scene.drive is not None and isinstance(scene.exposure, WhitePatchExposure):
+            problem = f"random cameras under a pulsed light need a fixed exposure (scenario {name})"
+            yield Fault(path, problem, section.uncertainty.wanted_yield, "`exposure: {kind: fixed, ...}`")

@@ -100,7 +100,7 @@ def own_draws(names: list[str], n: int, errors: CurveErrors, rng: np.random.Gene
 
 
 def uncertain(folder: Path, errors: CurveErrors, cfas: str = "[RGGB, RYYCy]") -> pd.DataFrame:
-    keys = {name: f"{value}" for name, value in errors.model_dump().items()}
+    keys = {name: f"{value}" for name, value in errors.model_dump(exclude_none=True).items()}
     text = (
         "study: uncertain\nsensor: opencam\nlights: tl16\nwavelengths: {stop_nm: 664}\n"
         f"cfas: {cfas}\nuncertainty: {{{', '.join(f'{k}: {v}' for k, v in keys.items())}}}\n"
@@ -148,12 +148,12 @@ def test_curves_are_the_same_for_every_design() -> None:
     sensor = BUILT_IN_SENSORS["opencam"](GRID)
     errors = ERRORS.model_copy(update={"draws": 100})
     together, alone, other = (
-        drawn_curves(sensor, GRID, names, errors, seed)[:, -1]
+        drawn_curves(sensor, GRID, names, errors, [seed])[:, -1]
         for names, seed in ((["R", "G", "Y"], 1), (["Y"], 1), (["Y"], 2))
     )
     np.testing.assert_array_equal(together, alone)
     assert (other != alone).any()
-    nothing = drawn_curves(sensor, GRID, ["R"], CurveErrors(draws=100), 1)[:, 0]
+    nothing = drawn_curves(sensor, GRID, ["R"], CurveErrors(draws=100), [1])[:, 0]
     np.testing.assert_allclose(nothing, np.tile(sensor.qe["R"], (100, 1)), rtol=1e-12)
 
 

@@ -11,11 +11,10 @@ import pandas as pd
 import pytest
 from scipy.stats import binom
 
-from sweep.designs.tolerance import ProductionError, Tolerance
-from sweep.metrics import drawn as drawn_module
+from sweep.designs.tolerance import Tolerance
 from sweep.metrics.bound import Bound
-from sweep.metrics.drawn import LampsAndCameras, rank_below
-from sweep.metrics.members import population_model
+from sweep.metrics.drawn import rank_below
+from sweep.metrics.drawn_sensors import searched_sample
 from sweep.metrics.objective import Objective
 from sweep.metrics.share import share_interval
 from sweep.results.tables import RESULTS
@@ -137,7 +136,7 @@ def test_as_column_and_constraint_any_number_of_workers_gives_the_same(tmp_path:
         (
             "wanted_yield: 0.99, ",
             "",
-            "yield_csd_yellow_red needs `population.wanted_yield`; allowed: a share, such as 0.99",
+            "yield_csd_yellow_red needs `wanted_yield` of `population` or `uncertainty`; allowed: a share, such as 0.99",
         ),
         ("draws: 4000", "draws: 500", "wanted_yield 0.99 needs at least 1,000 `draws`, not 500"),
         ("draws: 4000", "draws: 1000001", "wanted_yield takes at most 1,000,000 `draws`, not 1,000,001"),
@@ -158,21 +157,12 @@ def test_the_limit_leaves_a_constraint_on_it_out_and_says_so() -> None:
     assert found.proven == without.proven > 0
 
 
-def test_many_designs_are_made_in_blocks_and_read_out_once_for_all_pairs_within_rounding(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_many_designs_have_the_yields_of_each_alone() -> None:
     loaded, search = lamps()
-    points, size, made = search.space.points(0, 7), loaded.grid.size, list[int]()
-    drawn = LampsAndCameras(population_model(problem().setup), loaded.tolerance, 1)
-    monkeypatch.setattr(drawn_module, "_HELD", 3 * 101 * size)
-
-    def come_out(off: ProductionError, some: slice) -> np.ndarray:
-        made.append(len(points[some]))
-        return search.space.curves(points[some], size, off)
-
-    found = drawn.columns(come_out, len(points), [YELLOW_RED])["csd_yellow_red"]
-    assert max(made) == 3
-    errors = drawn.draws(YELLOW_RED).production_errors
+    points, size = search.space.points(0, 7), loaded.grid.size
+    sample = searched_sample(problem().setup, loaded.tolerance, 1)
+    found = sample.columns(lambda off, some: search.space.curves(points[some], size, off), len(points), [YELLOW_RED])
     for at in range(7):
-        alone = np.concatenate([search.space.curves(points[at : at + 1], size, off) for off in errors])
-        assert found[at] == pytest.approx(drawn.kept(alone, [YELLOW_RED])[YELLOW_RED][0], rel=1e-9)
+        alone = [search.space.curves(points[at : at + 1], size, off) for off in sample.production_errors]
+        distances = sample.distances(np.concatenate(alone), [YELLOW_RED])[YELLOW_RED]
+        assert found["csd_yellow_red"][at] == pytest.approx(sample.of_share(distances)[0], rel=1e-9)

@@ -1,0 +1,65 @@
+"""The separation that a share of random lamps and cameras has, judged on draws that no search has looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from ...metrics.separation import csd_name
+from ...metrics.share import format_share
+from ...results.output import Output
+from ..leaders import answering, label
+from ..panels import Picture
+from ..row_panels import Row, Rows
+from ..section import Section
+from ..words import of_column
+
+
+@dataclass(frozen=True)
+class OtherCameras(Section):
+    """A bar for each design: what the share has, with its 95 % interval."""
+
+    words: str
+    axis: str
+    rows: tuple[Row, ...]
+    hero: str
+    share: float
+    draws: int
+
+    heading = "On other random lamps and cameras"
+
+    @classmethod
+    def of(cls, output: Output) -> Iterator[Section]:
+        """Yield it for a study that wants a share of random lamps or cameras."""
+        pair, best = output.trade_off[0].pair, answering(output)
+        if output.yields is None or pair is None:
+            return
+        column = output.columns[csd_name(pair)]
+        known = output.yields[output.yields["scenario"] == output.scenario].to_dict("records")
+        if known:
+            yield cls(
+                column.words,
+                column.axis,
+                tuple(
+                    Row(r["name"], r["dn"], None, r["dn_low"], r["dn_high"], of_column(column, r["dn"])) for r in known
+                ),
+                "" if best is None else label(best),
+                known[0]["share"],
+                known[0]["draws"],
+            )
+
+    @property
+    def answer(self) -> list[str]:
+        """What the share has with each design."""
+        share = format_share(self.share, 0)
+        return [
+            f"Of {self.draws:,} random lamps and cameras that no search has looked at, {share} have at least the "
+            f"{self.words} in the bars, before clipping and rounding; bars are 95 % intervals of what {share} of all have."
+        ]
+
+    @property
+    def picture(self) -> Picture | None:
+        """A bar each."""
+        share = format_share(self.share, 0)
+        panel = Rows(self.axis, f"{self.axis} of {share} of them", self.rows, self.hero)
+        return Picture((panel,), f"{self.words} that {share} of other random lamps and cameras have.")

@@ -1,0 +1,48 @@
+"""Separation that the wanted share of random lamps and cameras has, on draws that no search has looked at."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pyarrow as pa
+
+from ..base.types import delayed
+from ..metrics.separation import csd_name
+from ..spectra.lights import Pair
+from ..study import Study
+from .analysis import Analysis, Calls, named_designs
+from .robustness import Candidate, candidate_of, drawn_dn
+from .uncertainty import quantile
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_SCHEMA = pa.schema(
+    [("design_id", pa.int64()), ("name", pa.string()), ("scenario", pa.string()), ("quantity", pa.string())]
+    + [("share", pa.float64()), ("draws", pa.int64())]
+    + [(name, pa.float64()) for name in ("dn", "dn_low", "dn_high")]
+)
+
+
+def _calls(study: Study, rows: pd.DataFrame) -> Calls:
+    """Judge each design, with a 95 % interval of the value that the share of all lamps and cameras has."""
+    pair = study.quantities[study.trade_off[0]].pair
+    assert pair is not None
+    for design in named_designs(study, rows):
+        key = design.key | {"name": design.row["name"], "scenario": design.row["scenario"]}
+        yield key, delayed(_judged, candidate_of(study, design), pair, study.section.wanted_yield, study.section.seed)
+
+
+def _judged(design: Candidate, pair: Pair, share: float, seed: int) -> list[dict[str, Any]]:
+    dn = drawn_dn(design, pair, seed)
+    of_all = dict(zip(("dn", "dn_low", "dn_high"), quantile(dn, 1 - share), strict=True))
+    return [{"quantity": csd_name(pair), "share": share, "draws": dn.size, **of_all}]
+
+
+JUDGED_YIELDS = Analysis(
+    "other lamps and cameras",
+    lambda study: study.requested.wanted_yield > 0 and study.quantities[study.trade_off[0]].pair is not None,
+    lambda _: _SCHEMA,
+    _calls,
+    is_kept=True,
+)
