@@ -38,6 +38,8 @@ PICTURES = (
     "measured",
     "sensors",
     "cameras",
+    "infrared",
+    "uncertain",
     "deep_red",
     "paper",
     "scorecard",
@@ -53,7 +55,12 @@ PICTURES = (
 )
 """Studies of which the documents show the first picture of their report."""
 README = STUDIES.parent / "README.md"
-ANSWERED = (README, STUDIES / "README.md", STUDIES / "guide" / "11-hdr-and-flicker.md")
+ANSWERED = (
+    README,
+    STUDIES / "README.md",
+    STUDIES / "guide" / "11-hdr-and-flicker.md",
+    STUDIES / "guide" / "12-sensors.md",
+)
 """Documents with the answers of studies."""
 ROW = re.compile(r"^\| `(\w+)` \| (.*) \| !\[(.*)\]\(figures/(\w+)\.png\) \| (.*) \|$", re.MULTILINE)
 

@@ -12,6 +12,8 @@ from ..base.errors import SweepError, ValidationIssue
 from ..base.types import IndexArray, Int
 
 _TOKEN = re.compile(r"[A-Z][a-z0-9]*")
+PRESETS = {"RGBIR": ("BGRG", "GIGI", "RGBG", "GIGI")}
+"""Tiles of more than four pixels by name, a letter for each: `I` sees the infrared alone."""
 
 
 @dataclass(frozen=True)
@@ -41,17 +43,20 @@ class Mosaic:
 
     @classmethod
     def from_name(cls, name: str) -> Mosaic:
-        """Make a 2 x 2 mosaic from its name, row by row: ``RYYCy`` is R Y / Y Cy.
+        """Make a 2 x 2 mosaic from its name, row by row: ``RYYCy`` is R Y / Y Cy; or a preset.
 
         Raises SweepError if the name does not have exactly four channels.
         """
+        if name in PRESETS:
+            return cls.from_rows(name, [list(row) for row in PRESETS[name]])
         tokens = _TOKEN.findall(name)
         if "".join(tokens) != name or len(tokens) != 4:
             raise SweepError(
                 ValidationIssue(
                     "not the name of a 2x2 CFA",
                     value=name,
-                    allowed="four channels, each a capital and small letters (RGGB, RYYCy), or a mapping with `tile`",
+                    allowed="four channels, each a capital and small letters (RGGB, RYYCy), "
+                    f"{', '.join(PRESETS)}, or a mapping with `tile`",
                 )
             )
         return cls.from_rows(name, [tokens[:2], tokens[2:]])

@@ -12,7 +12,7 @@ from ..base.errors import DataError, ValidationIssue, nearest
 from ..base.types import Array, Float, PerWavelength
 from ..designs.technology import Technology
 from ..spectra.builtin.ar0820 import ar0820, ir_cut_transmission
-from ..spectra.builtin.measured_sets import SENSORS, ir_cut
+from ..spectra.builtin.measured_sets import SENSORS, WIDE, ir_cut
 from ..spectra.builtin.surrogate import SurrogateParameters, surrogate_parameters
 from ..spectra.spectrum import WavelengthGrid
 from .mosaic import Mosaic
@@ -136,7 +136,7 @@ def measured_sensor(name: str, grid: WavelengthGrid) -> SensorCurves:
     curves = measured.curves(grid)
     source = f"built-in {name}: {measured.source}"
     known = [channel for channel in ("W", "C") if channel in curves]
-    clear = known[0] if known else max(curves, key=lambda channel: float(curves[channel].sum()))
+    clear = known[0] if known else max(curves.keys() - WIDE.keys(), key=lambda channel: float(curves[channel].sum()))
     variants, cut = own_red(curves), ir_cut(name, grid)
     return SensorCurves(name, curves, clear, source, variants=variants, has_clear=bool(known), ir_cut=cut)
 

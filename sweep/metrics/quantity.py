@@ -193,7 +193,8 @@ class Quantity(Column):
         meaning = (
             f"at least {percent} of the drawn lamps and cameras (`population`, `production`, `uncertainty`) have this "
             f"`{self.name}`, and with 95 % confidence {percent} of all, where the design was not chosen by the same "
-            "draws: the mean of draws of a rank so low, before clipping and rounding, with all effects; it has no upper bound"
+            "draws: the mean of draws of a rank so low, before clipping and rounding, with all effects; it has no "
+            "upper bound"
         )
         label = f"{self.words} of {percent} of drawn lamps and cameras"
         named = replace(self, name=YIELD + self.name, meaning=meaning, label=label, extreme=OF_A_SHARE, of=self.name)

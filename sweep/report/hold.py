@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from ..camera.scene import Scene, WhitePatchExposure
+from ..metrics.quantity import OF_A_SHARE
 from ..results.output import Output
 from ..study.axes import series_of
 from .leaders import Row, answering, modifications
@@ -107,8 +108,8 @@ def scene_conditions(scenes: list[Scene]) -> str:
 
 
 def _varied(output: Output) -> str:
-    """Return over which lamps and production errors a worst case is."""
-    lamps, made = output.study.population, output.study.production
+    """Return over which lamps, production errors and curves a worst case or a share is."""
+    lamps, made, curves = output.study.population, output.study.production, output.study.uncertainty
     if not output.trade_off[0].extreme:
         return ""
     parts = []
@@ -119,7 +120,13 @@ def _varied(output: Output) -> str:
     parts += [f"edges within ±{made.edge_shift_nm:g} nm"] if made.edge_shift_nm else []
     parts += [f"thickness within ±{100 * made.thickness:g} %"] if made.thickness else []
     parts += [f"bands up to {100 * made.broadening:g} % wider"] if made.broadening else []
-    return f"worst cases over {', '.join(parts)}" if parts else ""
+    drawn = output.trade_off[0].extreme == OF_A_SHARE
+    if drawn and curves is not None and curves.wanted_yield is not None:
+        errors = {"height": f"{100 * curves.gain:g} %", "wavelength": f"{curves.shift_nm:g} nm"}
+        errors |= {"shape": f"{100 * curves.noise:g} %", "IR cut": f"{curves.ir_cut_nm:g} nm"}
+        known = [f"±{size} in {of}" for of, size in errors.items() if not size.startswith("0 ")]
+        parts += [f"curves off by {', '.join(known)}"] if known else []
+    return f"{'random draws' if drawn else 'worst cases'} over {', '.join(parts)}" if parts else ""
 
 
 def _filters(output: Output) -> str:

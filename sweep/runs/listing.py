@@ -15,7 +15,7 @@ from ..results.folder import run_in
 from ..results.identity import run_facts, several_facts
 from ..results.lock import in_use
 from ..results.tables import PROVENANCE
-from ..spectra.builtin.measured_sets import LUXEON, SENSORS, MeasuredSet
+from ..spectra.builtin.measured_sets import BENKNER, LUXEON, SENSORS, MeasuredSet
 from ..spectra.builtin.registry import BUILT_IN_LIGHTS
 from ..spectra.builtin.spectra import cards
 from ..spectra.builtin.surrogate_spectra import surrogate_cards
@@ -172,7 +172,7 @@ def list_data() -> Answer:
         ]
     lines += [
         f"Sensors: {', '.join(name for name in BUILT_IN_SENSORS if '/' not in name)}, rawtoaces/NAME; "
-        f"lights: {', '.join(BUILT_IN_LIGHTS)} (ar0820, tl16: surrogates).",
+        f"lights: {', '.join(BUILT_IN_LIGHTS)} (ar0820, tl16, tl16_deep_red, filament: surrogates).",
         f"{total} spectra in {len(sets)} sets. A study's tasks name their groups: tasks: {{own: ...}}.",
     ]
     facts = [
@@ -185,4 +185,5 @@ def list_data() -> Answer:
 
 def _measured() -> list[tuple[str, str, MeasuredSet]]:
     """Return kind, name and set of the measured sensors and lights."""
-    return [*(("sensor", name, measured) for name, measured in SENSORS.items()), ("lights", "luxeon", LUXEON)]
+    lights = ("lights", "luxeon", LUXEON), ("lights", "led_benkner", BENKNER)
+    return [*(("sensor", name, measured) for name, measured in SENSORS.items()), *lights]

@@ -15,7 +15,7 @@ from ..base.disk import is_file, is_folder
 from ..base.errors import MOST_ISSUES, DataError, Fault, StudyError, ValidationIssue, faults_of, nearest, unknown
 from ..base.types import PerWavelength
 from ..camera.sensor import SensorCurves
-from ..spectra.builtin.surrogate import BUILT_IN_RANGE_NM
+from ..spectra.builtin.surrogate import BUILT_IN_RANGE_NM, MODELED
 from ..spectra.colorants import BUILTIN_COLORANTS, Colorants, read_colorants
 from ..spectra.formats import digest, read_curves
 from ..spectra.lens_files import ChiefRays, read_chief_rays
@@ -108,7 +108,8 @@ class Sources:
             self.refuse(Fault(at, f"unknown built-in {at[-1]}", name, allowed, nearest(name, known)))
             return None
         try:
-            return known[name](self.grid) if anywhere or self.in_built_in_range("the built-in curves") else None
+            inside = anywhere or name not in MODELED or self.in_built_in_range("the built-in curves")
+            return known[name](self.grid) if inside else None
         except DataError as error:
             (first, *_) = error.issues
             self.refuse(

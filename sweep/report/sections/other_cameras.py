@@ -6,13 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from ...metrics.separation import csd_name
-from ...metrics.share import format_share
 from ...results.output import Output
 from ..leaders import answering, label
 from ..panels import Picture
 from ..row_panels import Row, Rows
 from ..section import Section
-from ..words import of_column
+from ..words import NARROW, joined, of_column, quoted
 
 
 @dataclass(frozen=True)
@@ -51,15 +50,18 @@ class OtherCameras(Section):
     @property
     def answer(self) -> list[str]:
         """What the share has with each design."""
-        share = format_share(self.share, 0)
+        named = joined([f"{row.text} with {quoted(row.name)}" for row in reversed(self.rows)])
         return [
-            f"Of {self.draws:,} random lamps and cameras that no search has looked at, {share} have at least the "
-            f"{self.words} in the bars, before clipping and rounding; bars are 95 % intervals of what {share} of all have."
+            f"Of {self.draws:,} other random lamps and cameras, {self._percent} have a {self.words} of at least {named}, "
+            f"before clipping and rounding; bars: 95 % intervals of what {self._percent} of all have."
         ]
+
+    @property
+    def _percent(self) -> str:
+        return f"{100 * self.share:.10g}{NARROW}%"
 
     @property
     def picture(self) -> Picture | None:
         """A bar each."""
-        share = format_share(self.share, 0)
-        panel = Rows(self.axis, f"{self.axis} of {share} of them", self.rows, self.hero)
-        return Picture((panel,), f"{self.words} that {share} of other random lamps and cameras have.")
+        panel = Rows(f"{self.words} of {self._percent} of them", self.axis, self.rows, self.hero)
+        return Picture((panel,), f"{self.words} that {self._percent} of other random lamps and cameras have.")

@@ -14,6 +14,8 @@ from ..formats import digest, read_curves
 from ..spectrum import Curves, WavelengthGrid, photons_from_energy
 
 _FOLDER = Path(__file__).parent / "measured"
+WIDE = {"Wide": "R + G + B, its largest value set to 1", "Wsum": "R + G + B"}
+"""Pixels without a color filter, modeled for cameras of three measured channels; their scale is not known."""
 _ISETCAM = "ISETCam, https://github.com/ISET/isetcam"
 
 
@@ -51,12 +53,13 @@ class MeasuredFile:
 
 @dataclass(frozen=True)
 class MeasuredSet:
-    """Sensor or set of lights with its origin."""
+    """Sensor or set of lights with its origin; `wide`: with modeled pixels without a color filter (`WIDE`)."""
 
     what: str
     source: str
     license: str
     files: tuple[MeasuredFile, ...]
+    wide: bool = False
 
     @property
     def range_nm(self) -> tuple[float, float]:
@@ -67,14 +70,18 @@ class MeasuredSet:
     @property
     def names(self) -> list[str]:
         """Curves."""
-        return [name for file in self.files for name in file.columns]
+        return [*(name for file in self.files for name in file.columns), *(WIDE if self.wide else ())]
 
     def curves(self, grid: WavelengthGrid) -> dict[str, PerWavelength]:
         """Return the curves on a grid.
 
         Raises DataError if the grid goes beyond.
         """
-        return {name: curve for file in self.files for name, curve in file.on(grid).items()}
+        curves = {name: curve for file in self.files for name, curve in file.on(grid).items()}
+        if self.wide:
+            together = np.sum(list(curves.values()), axis=0)
+            curves |= dict(zip(WIDE, (together / together.max(), together), strict=True))
+        return curves
 
     def photons(self, grid: WavelengthGrid) -> dict[str, PerWavelength]:
         """Return photons of spectra of radiant power."""
@@ -122,13 +129,21 @@ with (_FOLDER / _CAMERAS).open(encoding="utf-8") as _lines:
     _NAMES = dict.fromkeys(column.partition(":")[0] for column in next(_lines).strip().split(",")[1:])
 SENSORS |= {
     f"{RAWTOACES}/{name}": MeasuredSet(
-        f"{name.replace('_', ' ')} behind its own IR cut: response to power, relative, measured with a monochromator",
+        f"{name.replace('_', ' ')} behind its own IR cut: response to power, relative, measured with a monochromator; "
+        f"modeled: {'; '.join(f'{curve} = {how}' for curve, how in WIDE.items())}",
         "rawtoaces-data of the Academy Software Foundation, joined to one file and rounded to five digits",
         "Apache-2.0",
         (MeasuredFile(_CAMERAS, {channel: f"{name}:{channel}" for channel in "RGB"}, per_energy=True),),
+        wide=True,
     )
     for name in _NAMES
 }
+BENKNER = MeasuredSet(
+    "measured LEDs: one green, two red and a deep red of 660 nm; relative spectral power",
+    "SBenkner/Spectral-Fitting, TU Darmstadt (doi:10.1109/ACCESS.2022.3197280), resampled to 1 nm",
+    "BSD-3",
+    (MeasuredFile("led_benkner.csv", {n: n for n in ("green_1", "red_1", "red_2", "red_3")}),),
+)
 LUXEON = MeasuredSet(
     "five Luxeon Rebel LEDs as green, yellow and red lights: relative spectral power, measured",
     _ISETCAM,

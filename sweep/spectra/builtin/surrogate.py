@@ -13,6 +13,8 @@ from ...base.types import Fraction, NonNegative, Positive, Section
 
 BUILT_IN_RANGE_NM = (400.0, 700.0)
 """Wavelengths that the surrogate curves are stated for; an IR cut filter closes the rest."""
+MODELED = ("ar0820", "tl16", "tl16_deep_red")
+"""Sensors and lights that are modeled between these wavelengths; others say themselves where they end."""
 LEAK_NODES_NM = (400.0, 600.0, 700.0)
 
 

@@ -1,0 +1,16 @@
+"""LEDs measured at TU Darmstadt (BSD-3): a green, two reds and a deep red of 660 nm; beside the amber of `luxeon`."""
+
+from __future__ import annotations
+
+from ...lights import Lights, make_lights
+from ...spectrum import WavelengthGrid
+from ..measured_sets import BENKNER, LUXEON
+
+_AMBER = "amber_592"
+
+
+def lights(grid: WavelengthGrid) -> Lights:
+    """Return the LEDs, inside 400 to 700 nm."""
+    signals = [(name, name.partition("_")[0], photons) for name, photons in BENKNER.photons(grid).items()]
+    signals.insert(1, (_AMBER, "yellow", LUXEON.photons(grid)[_AMBER]))
+    return make_lights(grid, "led_benkner", signals, f"measured: {BENKNER.source}; amber: {LUXEON.source}")
