@@ -47,7 +47,7 @@ from ..terms import (
 from ..words import against_in_words, amount, article, joined, lamps, of_column, quantity, quoted
 
 Values = Float[Array, " wavelengths"]
-_MOST_CLOUD = 400
+_MOST_CLOUD, _MOST_LESS = 400, 5
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class TradeOff(Section):
 
     `found`: how it was found, for a sentence; `edges`: of stopbands, nm; `notes`: colorants and the like; `over`: what
     its separation is the worst of; `where`: scene, if there are several; `tile`: the plain CFA of its own tile; `kept`: constrained figures beside the lamps; `bound`: of any filter in its pixel, `below`:
-    the curve that it replaces, and the constraints that the bound leaves out; `own`: an objective that is to be the least, in its own unit; `more`: a design that separates more, and what it misses.
+    the curve that it replaces, and the constraints that the bound leaves out; `own`: an objective that is to be the least, in its own unit; `more`: a design that separates more, and what it misses; `less`: other designs where RGGB itself is best.
     """
 
     column: Column
@@ -94,6 +94,7 @@ class TradeOff(Section):
     light_of: str
     own: tuple[str, ...] = ()
     by_pixel: tuple[float, float] | None = None
+    less: tuple[Side, ...] = ()
 
     heading = "What it buys"
     leads = True
@@ -147,6 +148,7 @@ class TradeOff(Section):
             bounds=_line(output, scenario, "limit", best) if bounds_figure(output, scenario, str(best["cfa"])) else None,
             own=tuple(_least(output, best, rggb)),
             by_pixel=_by_pixel(column, best, rggb),
+            less=() if rggb is not None else tuple(sorted((_side(column, row) for row in shown), key=lambda one: -one.separation)[:_MOST_LESS]),
             light_of="a sensor without filters" if sensor.has_clear else f"{sensor.reference} pixels alone",
         )  # fmt: skip
 
@@ -181,9 +183,12 @@ class TradeOff(Section):
         lights = [f"{one.name}: {amount(one.light, 'share')}" for one in plain]
         light += f" ({', '.join(lights)})" if plain else ""
         where = f" in {self.where}" if self.where else ""
+        less = [f"{one.name} ({of_column(self.column, one.separation)})" for one in self.less]
+        less = [] if self.equal or self.own or self.more is not None else less
         return [
             f"{text}{where}.",
             f"{light}.",
+            *([f"Less have {joined(less)}."] if less else []),
             *([f"It keeps {joined([*self.kept])}."] if self.kept else []),
             *(
                 [
