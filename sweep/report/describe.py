@@ -120,7 +120,11 @@ def _png(title: str, facts: Facts, colors: Mapping[str, LightColor | None]) -> b
 def _curve_facts(curve: Curve, color: LightColor | None) -> dict[str, Any]:
     """Largest value of a curve, where it is, and the color of a light."""
     peak = {"largest": curve.values.max(), "at_nm": curve.peak_nm} if curve.values.size else {}
-    hue = {} if color is None else {"xy": color.xy, "dominant_nm": color.dominant_nm, "region": color.region}
+    hue = (
+        {}
+        if color is None
+        else {"xy": color.xy, "dominant_nm": color.dominant_nm, "region": color.region, "markers": [*color.markers]}
+    )
     return {"name": curve.name, **peak, **hue}
 
 
@@ -184,4 +188,5 @@ def _color_words(color: LightColor | None) -> str:
         region = f"{color.region} of EN 12368"
     else:
         region = f"in no region of EN 12368, {color.distance:.3f} from {color.nearest}"
-    return f"xy {color.xy[0]:.4f} {color.xy[1]:.4f}, dominant {hue}, {region}"
+    also = "".join(f", also of {name}" for name in color.markers)
+    return f"xy {color.xy[0]:.4f} {color.xy[1]:.4f}, dominant {hue}, {region}{also}"

@@ -143,6 +143,12 @@ LED circular signals of 2005, which replaced part 2, is not in it: its bounds co
 compared by the Lighting Research Center, Rensselaer, "LED Traffic Signal Comparison". UN R48, which SAE J578 shares:
 yellow (0.545, 0.425), (0.597, 0.390), red (0.645, 0.335), (0.721, 0.259), of vehicles' lamps.
 """
+_J578 = "SAE J578-2020, 3.1.6, for automated driving system marker lamps (SAE J3134); read in one summary"
+MARKER_REGIONS: Mapping[str, ColorRegion] = {
+    "blue-green marker lamps of SAE J578": ColorRegion(((0.5, 1, 0.5), (1, 0, 0.2), (0, -1, -0.32)), _J578)
+}
+"""Colors of other lamps that a signal may have, too: blue-green, y <= 0.500 - 0.500 x, x <= 0.200, y >= 0.320, overlaps
+EN 12368's green where LEDs of 495 to 498 nm lie."""
 NORM_NAMES: Mapping[str, str] = {"en_12368": "EN 12368", "ite": "ITE (1985, 1998)", "un_r48": "UN R48 and SAE J578"}
 
 

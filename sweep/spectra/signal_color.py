@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from ..base.types import Array, Float, FloatArray
-from .color import REGIONS, VISIBLE_NM, chromaticity
+from .color import MARKER_REGIONS, REGIONS, VISIBLE_NM, chromaticity
 from .spectrum import WavelengthGrid
 
 VISIBLE = WavelengthGrid(start_nm=VISIBLE_NM[0], stop_nm=VISIBLE_NM[1], step_nm=1.0)
@@ -28,7 +28,8 @@ class LightColor:
     """Color of one light.
 
     `xy`: CIE 1931, 2 degree observer; `dominant_nm`: dominant wavelength, nm; None for white and purple; `purity`:
-    excitation purity, 1 on the spectral locus; `distance`: distance to it in x, y (0 inside).
+    excitation purity, 1 on the spectral locus; `distance`: distance to it in x, y (0 inside); `markers`: other lamps
+    that may have this color.
     """
 
     xy: tuple[float, float]
@@ -37,6 +38,7 @@ class LightColor:
     region: str | None
     nearest: str
     distance: float
+    markers: tuple[str, ...] = ()
 
     @property
     def signal(self) -> str | None:
@@ -72,6 +74,7 @@ def light_color(photons: Float[Array, " 471"]) -> LightColor | None:
         region=inside[0] if inside else None,
         nearest=inside[0] if inside else nearest,
         distance=0.0 if inside else distance,
+        markers=tuple(name for name, region in MARKER_REGIONS.items() if region.violation(xy)[0] <= 0),
     )
 
 

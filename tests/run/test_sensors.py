@@ -316,4 +316,6 @@ def test_a_measured_sensor_has_its_brightest_curve_for_clear(name: str) -> None:
     sensor = BUILT_IN_SENSORS[name](GRID)
     assert not sensor.surrogate
     assert all(len(digest) == 64 for digest in SENSORS[name].digests.values())
-    assert sensor.qe[sensor.clear].sum() == pytest.approx(max(q.sum() for n, q in sensor.qe.items() if n not in WIDE), rel=0.02)
+    assert sensor.qe[sensor.clear].sum() == pytest.approx(
+        max(q.sum() for n, q in sensor.qe.items() if n not in WIDE), rel=0.02
+    )

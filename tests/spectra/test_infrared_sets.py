@@ -13,6 +13,7 @@ from sweep.camera.mosaic import Mosaic
 from sweep.camera.sensor import BUILT_IN_SENSORS
 from sweep.spectra.builtin.registry import BUILT_IN_LIGHTS
 from sweep.spectra.color import REGIONS, SIGNAL_REGIONS, chromaticity
+from sweep.spectra.signal_color import VISIBLE, light_color
 from sweep.spectra.spectrum import WavelengthGrid
 from sweep.study import load_study
 
@@ -54,6 +55,22 @@ def test_lamps_of_the_surrogate_that_ite_forbids() -> None:
         ours = [at for at, name in enumerate(lights.names) if name.startswith("us_") and name.endswith(kind)]
         outside[kind] = int((SIGNAL_REGIONS["ite"][kind].violation(colors[ours]) > 0).sum()), len(ours)
     assert outside == {"yellow": (2, 11), "red": (3, 11)}
+
+
+def test_a_green_lamp_may_have_the_color_of_a_marker_lamp() -> None:
+    """Monochromatic light by the CIE's table: greens of EN 12368 from 495 to 498 nm are blue-green of J578, too."""
+    cie = pd.read_csv(MEASURED.parent / "cie_1931.csv", header=None, skiprows=1).to_numpy()
+    both = []
+    for nm, *xyz in cie[:, :4]:
+        x, y = (value / sum(xyz) for value in xyz[:2])
+        green = y <= 0.726 - 0.726 * x and x <= 0.625 * y - 0.041 and y >= 0.4
+        photons = (VISIBLE.nodes_nm == nm).astype(float)
+        color = light_color(photons)
+        assert color is not None
+        assert (color.region == "green") == green
+        assert bool(color.markers) == (y <= 0.5 - 0.5 * x and x <= 0.2 and y >= 0.32)
+        both += [nm] * bool(green and color.markers)
+    assert (min(both), max(both)) == (495, 498)
 
 
 def test_wide_pixels_are_the_sum_of_measured_ones() -> None:
