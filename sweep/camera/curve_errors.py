@@ -29,6 +29,8 @@ _LEAST_CUT = 1e-3
 """Transmission of the IR cut below which nothing is known of what is behind it."""
 _LEAST_BASE = 1e-6
 """Share of a curve's peak below which the transmission of a filter on it is not known."""
+_MOST_HELD = 20_000
+"""Random sensors that every worker of a search holds: of so many about 1 GB."""
 _IR_CUT = "IR cut"
 _JITTER = 1e-10
 
@@ -54,11 +56,13 @@ class CurveErrors(Section):
     wanted_yield: float | None = Field(default=None, ge=0.5, le=0.9999)
     """Share of random cameras: `yield_csd_...` is the CSD that this share has at least, as objective or constraint.
     A camera has random curves and a production error of its own, and sees all lights of the study, or, where these have
-    a `population`, two random lamps."""
+    a `population`, two random lamps. At most 20,000 `draws`; designs are judged on ten times as many others."""
 
     @model_validator(mode="after")
     def _enough(self) -> CurveErrors:
         check_draws(self.wanted_yield, self.draws)
+        if self.wanted_yield is not None and self.draws > _MOST_HELD:
+            raise ValueError(f"wanted_yield takes at most {_MOST_HELD:,} `draws`, not {self.draws:,}")
         return self
 
     @property

@@ -51,7 +51,8 @@ _HELD = 4_000_000
 class Draws:
     """Two lights and a camera per draw, sorted by production error.
 
-    `below`: spectrum below the shift of both lights; `place`: field position, 0 to 1.
+    `below`: spectrum below the shift of both lights; `place`: field position, 0 to 1; `order`: number of each draw
+    before it was sorted.
     """
 
     production_errors: tuple[ProductionError, ...]
@@ -59,6 +60,7 @@ class Draws:
     below: Int[IndexArray, "draws 2"]
     share: Float[Array, "draws 2"]
     place: Float[Array, " draws"]
+    order: Int[IndexArray, " draws"]
 
     @property
     def size(self) -> int:
@@ -117,7 +119,7 @@ def draws_of(members: Members, pair: Pair, tolerance: Tolerance, seed: Sequence[
     production_errors, which = drawn_errors(tolerance, [edge[:, 0], film[:, 0], broader[:, 0]])
     order = np.argsort(which, kind="stable")
     starts = np.searchsorted(which[order], np.arange(len(production_errors) + 1))
-    return Draws(production_errors, starts, (first + below)[order], (shifts - below)[order], place[order, 0])
+    return Draws(production_errors, starts, (first + below)[order], (shifts - below)[order], place[order, 0], order)
 
 
 def drawn_errors(

@@ -28,8 +28,8 @@ from ..camera.exposure import exposure_times, relative_slope
 from ..camera.linear import linear_model
 from ..camera.setup import Setup
 from ..designs.tolerance import Tolerance
-from ..spectra.lights import Pair
-from .drawn import LampsAndCameras, Sample, drawn_errors, draws_of, lengths_slope
+from ..spectra.lights import Pair, class_pairs
+from .drawn import Draws, LampsAndCameras, Sample, drawn_errors, draws_of, lengths_slope
 from .members import population_model
 from .separation import separation
 
@@ -96,7 +96,13 @@ class RandomSensors(Sample):
         self._camera = camera = scene.camera
         self._setup = scene.with_camera(modified=tuple(range(len(camera.qe))))
         self._linear = linear_model(self._setup)
-        self._drawn = uncertain.drawn(camera.grid, seed)
+        if self._population is None:
+            which = drawn_errors(tolerance, [*np.random.default_rng([*seed, 0]).random((3, self.size))])[1]
+            order = np.argsort(which, kind="stable")
+            self._starts = np.searchsorted(which[order], np.arange(len(self.production_errors) + 1))
+        else:  # production errors, and so the order, are the same for each two types
+            order = self._lamps(class_pairs(setup.lights.classes)[0]).order
+        self._drawn = uncertain.drawn(camera.grid, seed)[order]
         parts = [linear_in_filter(self._drawn[:, at], camera.qe[at]) for at in camera.modified]
         self._weights = np.stack([weights for weights, _ in parts], axis=1) if parts else self._drawn[:, :0]
         self._rest = np.stack([rest for _, rest in parts], axis=1) if parts else self._drawn[:, :0]
@@ -155,6 +161,11 @@ class RandomSensors(Sample):
         """Electrons/s of the channels of each draw on the white patch, without filters."""
         return np.asarray(self._drawn @ self._linear.scene.white)
 
+    def _lamps(self, pair: Pair) -> Draws:
+        """Return the two random lamps of each draw."""
+        assert self._population is not None
+        return draws_of(self._population.members, pair, self._tolerance, self._seed, self.size)
+
     def _of(self, pair: Pair) -> _Seen:
         if pair not in self._seen:
             self._seen[pair] = self._made(pair)
@@ -164,11 +175,9 @@ class RandomSensors(Sample):
         """Return what the draws see of two types: all lights, or two random lamps each."""
         types = [self._setup.members[name] for name in pair]
         if self._population is None:
-            rng = np.random.default_rng([*self._seed, 0])
-            errors, which = drawn_errors(self._tolerance, [*rng.random((3, self.size))])
-            starts, n_first = np.searchsorted(np.sort(which), np.arange(len(errors) + 1)), types[0].size
+            starts, n_first = self._starts, types[0].size
         else:
-            draws, n_first = draws_of(self._population.members, pair, self._tolerance, self._seed, self.size), 1
+            draws, n_first = self._lamps(pair), 1
             starts = draws.starts
         fixed, of_modified = None, {}
         for channel in range(len(self._camera.qe)):

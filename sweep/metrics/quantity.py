@@ -187,16 +187,16 @@ class Quantity(Column):
             self, name=WORST + self.name, meaning=meaning, label=label, extreme=WORST_CASE, of=self.name, goal=True
         )
 
-    def of_share(self, share: float) -> Quantity:
-        """Return the value that a share of the drawn lamps and cameras has."""
+    def of_share(self, share: float, drawn: str) -> Quantity:
+        """Return the value that a share of what is drawn has, in words."""
         percent = f"{100 * share:.10g} %"
         meaning = (
-            f"at least {percent} of the drawn lamps and cameras (`population`, `production`, `uncertainty`) have this "
+            f"at least {percent} of the drawn {drawn} (`population`, `production`, `uncertainty`) have this "
             f"`{self.name}`, and with 95 % confidence {percent} of all, where the design was not chosen by the same "
             "draws: the mean of draws of a rank so low, before clipping and rounding, with all effects; it has no "
             "upper bound"
         )
-        label = f"{self.words} of {percent} of drawn lamps and cameras"
+        label = f"{self.words} of {percent} of drawn {drawn}"
         named = replace(self, name=YIELD + self.name, meaning=meaning, label=label, extreme=OF_A_SHARE, of=self.name)
         unknown = replace(named, distance_kind="", linear=None, smooth_members=None)
         return replace(unknown, scale="linear", smooth=self.yield_rows, yield_rows=None)

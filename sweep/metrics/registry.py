@@ -25,7 +25,8 @@ def listed(requested: RequestedQuantities) -> list[Quantity]:
     quantities = [quantity for metric in METRICS for quantity in metric.quantities(requested)]
     worst = [worst_case for quantity in quantities if (worst_case := _worst(quantity, requested)) is not None]
     drawn = [quantity for quantity in quantities if requested.wanted_yield and quantity.yield_rows is not None]
-    return [*quantities, *worst, *(quantity.of_share(requested.wanted_yield) for quantity in drawn)]
+    what = "lamps and cameras" if requested.population else "sensors"
+    return [*quantities, *worst, *(quantity.of_share(requested.wanted_yield, what) for quantity in drawn)]
 
 
 def _worst(quantity: Quantity, requested: RequestedQuantities) -> Quantity | None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import pyarrow as pa
 
 from ..base.types import delayed
+from ..metrics.quantity import OF_A_SHARE
 from ..metrics.separation import csd_name
 from ..spectra.lights import Pair
 from ..study import Study
@@ -26,11 +27,19 @@ _SCHEMA = pa.schema(
 
 def _calls(study: Study, rows: pd.DataFrame) -> Calls:
     """Judge each design, with a 95 % interval of the value that the share of all lamps and cameras has."""
-    pair = study.quantities[study.trade_off[0]].pair
-    assert pair is not None
     for design in named_designs(study, rows):
         key = design.key | {"name": design.row["name"], "scenario": design.row["scenario"]}
-        yield key, delayed(_judged, candidate_of(study, design), pair, study.section.wanted_yield, study.section.seed)
+        for pair in _pairs(study):
+            candidate, share = candidate_of(study, design), study.section.wanted_yield
+            yield key, delayed(_judged, candidate, pair, share, study.section.seed)
+
+
+def _pairs(study: Study) -> list[Pair]:
+    """Return the types whose yield is asked for, in the order of the lights; else those of the front."""
+    asked = [study.quantities[name] for name in (*study.objective.weights, *study.constraints)]
+    wanted = {quantity.pair for quantity in asked if quantity.extreme == OF_A_SHARE}
+    wanted = wanted or {study.quantities[study.trade_off[0]].pair}
+    return [pair for pair in study.pairs if pair in wanted]
 
 
 def _judged(design: Candidate, pair: Pair, share: float, seed: int) -> list[dict[str, Any]]:
@@ -41,7 +50,7 @@ def _judged(design: Candidate, pair: Pair, share: float, seed: int) -> list[dict
 
 JUDGED_YIELDS = Analysis(
     "other lamps and cameras",
-    lambda study: study.requested.wanted_yield > 0 and study.quantities[study.trade_off[0]].pair is not None,
+    lambda study: study.requested.wanted_yield > 0 and bool(_pairs(study)),
     lambda _: _SCHEMA,
     _calls,
     is_kept=True,

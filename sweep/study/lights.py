@@ -13,8 +13,7 @@ from ..base.disk import is_folder
 from ..base.errors import DataError, Fault, ValidationIssue, unknown
 from ..base.types import FloatArray
 from ..camera.pixel import unquantized
-from ..spectra.builtin.registry import BUILT_IN_LIGHTS
-from ..spectra.builtin.surrogate import BUILT_IN_RANGE_NM
+from ..spectra.builtin.registry import BUILT_IN_LIGHTS, ENDS
 from ..spectra.color import VISIBLE_NM
 from ..spectra.formats import is_curve_file
 from ..spectra.light_files import lights_file
@@ -66,9 +65,11 @@ def with_light_files(section: StudySection, sources: Sources) -> StudySection:
     return section.model_copy(update={"lights": lights})
 
 
-def _padded(make: Callable[[WavelengthGrid], Lights], grid: WavelengthGrid) -> Lights:
+def _padded(
+    make: Callable[[WavelengthGrid], Lights], ends: Callable[[], tuple[float, float]], grid: WavelengthGrid
+) -> Lights:
     """Return built-in lights on a grid that goes beyond their wavelengths, and 0 there."""
-    nodes, (low, high) = grid.nodes_nm, BUILT_IN_RANGE_NM
+    nodes, (low, high) = grid.nodes_nm, ends()
     inside = np.flatnonzero((nodes >= low) & (nodes <= high))
     if inside.size < 2:
         raise DataError(ValidationIssue("no wavelengths of built-in lights", value=f"{low:g} to {high:g} nm"))
@@ -87,7 +88,7 @@ def _built_in(section: LightsSection, sources: Sources, at: KeyPath) -> Lights |
         )
     known, anywhere = BUILT_IN_LIGHTS, section.outside == "zero"
     if anywhere:
-        known = {name: partial(_padded, make) for name, make in BUILT_IN_LIGHTS.items()}
+        known = known | {name: partial(_padded, known[name], ends) for name, ends in ENDS.items()}
     return None if excess else sources.built_in(at, section.builtin, known, anywhere=anywhere)
 
 

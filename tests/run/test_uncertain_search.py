@@ -11,6 +11,7 @@ from scipy.optimize import NonlinearConstraint, differential_evolution
 
 from sweep.camera.curve_errors import CurveErrors, linear_in_filter
 from sweep.camera.linear import linear_model
+from sweep.designs.tolerance import NONE
 from sweep.metrics.drawn import draws_of
 from sweep.metrics.drawn_sensors import RandomSensors, searched_sample
 from sweep.metrics.members import population_model
@@ -87,17 +88,20 @@ def test_every_draw_is_read_as_a_camera_of_its_curves(tmp_path: Path, more: str,
     found, starts = sample.distances(curves, [PAIR])[PAIR], sample.starts(PAIR)
     uncertain, camera = problem.setup.camera.uncertain, problem.setup.camera
     assert uncertain is not None
-    drawn = uncertain.drawn(camera.grid, (1, 2))
+    drawn, order = uncertain.drawn(camera.grid, (1, 2)), np.arange(200)
     model = None if study.lights.population is None else population_model(problem.setup)
     scene = problem.setup if model is None else model.setup
     whole = scene.with_all_effects.with_camera(modified=tuple(range(len(camera.qe))))
     lamps = None if model is None else draws_of(model.members, PAIR, problem.tolerance, (1, 2), 200)
+    if lamps is not None:
+        order = lamps.order
     (channel,) = camera.modified
     for draw in range(0, 200, 13):
         error = int(np.searchsorted(starts, draw, side="right")) - 1
-        weights, rest = linear_in_filter(drawn[draw : draw + 1, channel], camera.qe[channel])
-        drawn[draw, channel] = (weights * curves[error] + rest)[0]
-        (response,) = linear_model(whole).smooth(drawn[draw][None])
+        one = drawn[order[draw]]
+        weights, rest = linear_in_filter(one[None, channel], camera.qe[channel])
+        one[channel] = (weights * curves[error] + rest)[0]
+        (response,) = linear_model(whole).smooth(one[None])
         if lamps is None:
             first, second = (response[0][whole.members[name]] for name in PAIR)
             own = np.linalg.norm(first[:, None] - second, axis=-1).min()
@@ -146,6 +150,26 @@ def test_a_search_over_random_cameras_beats_the_exact_one_on_others(tmp_path: Pa
     assert -evolved.fun <= 1.01 * ours
 
 
+def test_a_plain_cfa_and_a_filter_that_changes_nothing_see_the_same_cameras(tmp_path: Path) -> None:
+    """Also where production errors, which a plain CFA does not have, sort the draws."""
+    problem = problem_of(load(tmp_path, TEXT + LAMPS))
+    base = problem.setup.camera.base_qe
+    with_errors, without = (RandomSensors(problem.setup, of, (1, 2)) for of in (problem.tolerance, NONE))
+    one = with_errors.distances(np.repeat(base[None], len(with_errors.production_errors), axis=0), [PAIR])[PAIR]
+    other = without.distances(base[None], [PAIR])[PAIR]
+    np.testing.assert_allclose(np.sort(one), np.sort(other), rtol=1e-12)
+
+
+def test_every_yield_that_is_asked_for_is_judged(tmp_path: Path) -> None:
+    text = TEXT.replace(
+        "objective: yield_csd_yellow_red", "objective: {minimum: {yield_csd_yellow_red: 1, yield_csd_green_yellow: 1}}"
+    )
+    ran(load(tmp_path, text.split("search:")[0].replace("draws: 1000", "draws: 200")), tmp_path / "out", 1)
+    judged = pd.read_parquet(tmp_path / "out" / "yields.parquet")
+    assert set(judged["quantity"]) == {"csd_yellow_red", "csd_green_yellow"}
+    assert set(judged["draws"]) == {2000}
+
+
 def test_fresh_cameras_are_others(tmp_path: Path) -> None:
     problem = problem_of(load(tmp_path, TEXT))
     curves = problem.family.curves(X[None])
@@ -159,6 +183,7 @@ def test_fresh_cameras_are_others(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "line"),
     [
+        ("draws: 1000", "draws: 30000", "wanted_yield takes at most 20,000 `draws`, not 30,000"),
         ("draws: 1000", "draws: 100", "wanted_yield 0.95 needs at least 200 `draws`, not 100"),
         (", wanted_yield: 0.95", "", "yield_csd_yellow_red needs `wanted_yield` of `population` or `uncertainty`"),
         (

@@ -35,6 +35,18 @@ def test_filament_signals_have_the_colors_of_the_norm_and_planck_s_infrared() ->
     np.testing.assert_allclose(behind[clear] / behind[-1], photons[clear] / photons[-1], rtol=1e-4)
 
 
+def test_filaments_keep_their_infrared_where_others_end(tmp_path: Path) -> None:
+    text = (STUDIES / "infrared.yaml").read_text()
+    (tmp_path / "infrared_cuts.csv").write_text((STUDIES / "infrared_cuts.csv").read_text())
+    ends = {}
+    for name in ("filament", "luxeon", "led_benkner", "tl16"):
+        path = tmp_path / f"{name}.yaml"
+        path.write_text(text.replace("lights: filament", f"lights: {{builtin: {name}, outside: zero}}"))
+        lights = load_study(path).lights
+        ends[name] = 400 + 5 * int(np.flatnonzero(lights.photons.sum(axis=0)).max())
+    assert ends == {"filament": 1000, "luxeon": 695, "led_benkner": 700, "tl16": 700}
+
+
 def test_measured_leds_are_those_of_their_file() -> None:
     grid = WavelengthGrid()
     lights = BUILT_IN_LIGHTS["led_benkner"](grid)
@@ -78,7 +90,13 @@ def test_wide_pixels_are_the_sum_of_measured_ones() -> None:
     sensor = BUILT_IN_SENSORS["rawtoaces/Canon_EOS_5D"](grid)
     total = sum(sensor.qe[channel] for channel in "RGB")
     np.testing.assert_allclose(sensor.qe["Wsum"], total, rtol=1e-14)
-    np.testing.assert_allclose(sensor.qe["Wide"], total / np.max(total), rtol=1e-14)
+    raw, wave = pd.read_csv(MEASURED / "rawtoaces_cameras.csv"), np.arange(380.0, 781)
+    measured = [np.interp(wave, raw["wavelength_nm"], raw[f"Canon_EOS_5D:{channel}"]) / wave for channel in "RGB"]
+    unscaled = np.sum(measured, axis=0)
+    there = np.interp(grid.nodes_nm, wave, unscaled)
+    np.testing.assert_allclose(sensor.qe["Wide"], there / unscaled.max(), rtol=1e-6)
+    narrow = BUILT_IN_SENSORS["rawtoaces/Canon_EOS_5D"](WavelengthGrid(start_nm=600))
+    assert narrow.qe["Wide"][0] == pytest.approx(sensor.qe["Wide"][40], rel=1e-12)
     assert sensor.clear in "RGB"
     assert not sensor.has_clear
 

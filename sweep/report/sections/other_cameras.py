@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from ...metrics.separation import csd_name
 from ...results.output import Output
 from ..leaders import answering, label
 from ..panels import Picture
@@ -24,18 +23,19 @@ class OtherCameras(Section):
     hero: str
     share: float
     draws: int
+    drawn: str
 
-    heading = "On other random lamps and cameras"
+    heading = "On other random draws"
 
     @classmethod
     def of(cls, output: Output) -> Iterator[Section]:
         """Yield it for a study that wants a share of random lamps or cameras."""
-        pair, best = output.trade_off[0].pair, answering(output)
-        if output.yields is None or pair is None:
+        best = answering(output)
+        if output.yields is None:
             return
-        column = output.columns[csd_name(pair)]
-        known = output.yields[output.yields["scenario"] == output.scenario].to_dict("records")
-        if known:
+        of_scene = output.yields[output.yields["scenario"] == output.scenario]
+        for name in of_scene["quantity"].unique():
+            column, known = output.columns[name], of_scene[of_scene["quantity"] == name].to_dict("records")
             yield cls(
                 column.words,
                 column.axis,
@@ -45,6 +45,7 @@ class OtherCameras(Section):
                 "" if best is None else label(best),
                 known[0]["share"],
                 known[0]["draws"],
+                "lamps and cameras" if output.study.population is not None else "sensors",
             )
 
     @property
@@ -52,7 +53,7 @@ class OtherCameras(Section):
         """What the share has with each design."""
         named = joined([f"{row.text} with {quoted(row.name)}" for row in reversed(self.rows)])
         return [
-            f"Of {self.draws:,} other random lamps and cameras, {self._percent} have a {self.words} of at least {named}, "
+            f"Of {self.draws:,} other random {self.drawn}, {self._percent} have a {self.words} of at least {named}, "
             f"before clipping and rounding; bars: 95 % intervals of what {self._percent} of all have."
         ]
 
@@ -64,4 +65,4 @@ class OtherCameras(Section):
     def picture(self) -> Picture | None:
         """A bar each."""
         panel = Rows(f"{self.words} of {self._percent} of them", self.axis, self.rows, self.hero)
-        return Picture((panel,), f"{self.words} that {self._percent} of other random lamps and cameras have.")
+        return Picture((panel,), f"{self.words} that {self._percent} of other random {self.drawn} have.")

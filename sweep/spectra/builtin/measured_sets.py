@@ -79,8 +79,10 @@ class MeasuredSet:
         """
         curves = {name: curve for file in self.files for name, curve in file.on(grid).items()}
         if self.wide:
-            together = np.sum(list(curves.values()), axis=0)
-            curves |= dict(zip(WIDE, (together / together.max(), together), strict=True))
+            together, (low, high) = np.sum(list(curves.values()), axis=0), self.range_nm
+            whole = WavelengthGrid(start_nm=low, stop_nm=high)
+            top = np.sum([curve for file in self.files for curve in file.on(whole).values()], axis=0).max()
+            curves |= dict(zip(WIDE, (together / top, together), strict=True))
         return curves
 
     def photons(self, grid: WavelengthGrid) -> dict[str, PerWavelength]:
@@ -139,7 +141,7 @@ SENSORS |= {
     for name in _NAMES
 }
 BENKNER = MeasuredSet(
-    "measured LEDs: one green, two red and a deep red of 660 nm; relative spectral power",
+    "measured LEDs: one green, two red and a deep red of 660 nm, as lights beside the amber of luxeon (400 to 700 nm)",
     "SBenkner/Spectral-Fitting, TU Darmstadt (doi:10.1109/ACCESS.2022.3197280), resampled to 1 nm",
     "BSD-3",
     (MeasuredFile("led_benkner.csv", {n: n for n in ("green_1", "red_1", "red_2", "red_3")}),),

@@ -13,3 +13,7 @@ BUILT_IN_LIGHTS: dict[str, Callable[[WavelengthGrid], Lights]] = {
     file.__name__.rpartition(".")[2]: file.lights for file in files_in(data_sets)
 }
 """Data sets by their names; each is a function of the wavelength grid."""
+ENDS: dict[str, Callable[[], tuple[float, float]]] = {
+    file.__name__.rpartition(".")[2]: file.range_nm for file in files_in(data_sets) if hasattr(file, "range_nm")
+}
+"""Wavelengths of those that end, nm."""

@@ -11,6 +11,12 @@ _AMBER = "amber_592"
 
 def lights(grid: WavelengthGrid) -> Lights:
     """Return the LEDs, inside 400 to 700 nm."""
+    amber = LUXEON.photons(grid)[_AMBER]
     signals = [(name, name.partition("_")[0], photons) for name, photons in BENKNER.photons(grid).items()]
-    signals.insert(1, (_AMBER, "yellow", LUXEON.photons(grid)[_AMBER]))
+    signals.insert(1, (_AMBER, "yellow", amber))
     return make_lights(grid, "led_benkner", signals, f"measured: {BENKNER.source}; amber: {LUXEON.source}")
+
+
+def range_nm() -> tuple[float, float]:
+    """Return the wavelengths that all have, nm."""
+    return max(BENKNER.range_nm[0], LUXEON.range_nm[0]), min(BENKNER.range_nm[1], LUXEON.range_nm[1])

@@ -22,3 +22,8 @@ def lights(grid: WavelengthGrid) -> Lights:
     """
     signals = [(name, _TYPES[name], photons) for name, photons in LUXEON.photons(grid).items()]
     return make_lights(grid, "luxeon", signals, f"built-in luxeon, measured: {LUXEON.source}")
+
+
+def range_nm() -> tuple[float, float]:
+    """Return the wavelengths that all have, nm."""
+    return LUXEON.range_nm

@@ -12,7 +12,7 @@ from ....base.types import PerWavelength
 from ...lights import Lights, make_lights
 from ...spectrum import WavelengthGrid
 from ..led import led_photons
-from ..surrogate import SurrogateParameters, surrogate_parameters
+from ..surrogate import BUILT_IN_RANGE_NM, SurrogateParameters, surrogate_parameters
 
 LAMPS = {"us": 11, "germany": 5}
 ORANGE_LAMPS = {"us": 3}
@@ -43,3 +43,8 @@ def red_led(region: str, wavelength_nm: PerWavelength, peak_nm: float) -> PerWav
 def lights(grid: WavelengthGrid) -> Lights:
     """Return the signals of `tl16` with the package's parameters."""
     return tl16(grid, surrogate_parameters())
+
+
+def range_nm() -> tuple[float, float]:
+    """Return the wavelengths that all have, nm."""
+    return BUILT_IN_RANGE_NM

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...lights import Lights, make_lights
 from ...spectrum import WavelengthGrid
-from ..surrogate import surrogate_parameters
+from ..surrogate import BUILT_IN_RANGE_NM, surrogate_parameters
 from . import tl16
 
 _SHORTEST_NM, _LONGEST_NM, _STEP_NM = 627.0, 660.0, 3.0
@@ -31,3 +31,8 @@ def lights(grid: WavelengthGrid) -> Lights:
         photon_ratio=surrogate_parameters().photon_ratio,
         surrogate=True,
     )
+
+
+def range_nm() -> tuple[float, float]:
+    """Return the wavelengths that all have, nm."""
+    return BUILT_IN_RANGE_NM
