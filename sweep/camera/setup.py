@@ -10,6 +10,7 @@ from weakref import WeakValueDictionary
 
 from ..base.types import MemberNumbers
 from ..spectra.lights import Lights
+from ..spectra.population import stated_yield
 from ..spectra.tasks import StudyTasks
 from .accuracy import STANDARD, Accuracy
 from .camera import Camera
@@ -58,8 +59,7 @@ class Setup:
     @property
     def wanted_yield(self) -> float:
         """The share of random cameras, or lamps and cameras, of a yield; 0: none."""
-        stated = [None if part is None else part.wanted_yield for part in (self._errors, self.lights.population)]
-        return next((share for share in stated if share is not None), 0.0)
+        return stated_yield(self._errors, self.lights.population)
 
     @property
     def draws_sensors(self) -> bool:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, Protocol, TypeVar
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -44,6 +44,19 @@ def check_draws(wanted_yield: float | None, draws: int) -> None:
     if wanted_yield is not None and draws * (1 - wanted_yield) + _ROUNDING < _LEAST_BELOW:
         least = math.ceil(_LEAST_BELOW / (1 - wanted_yield) - _ROUNDING)
         raise ValueError(f"wanted_yield {wanted_yield:g} needs at least {least:,} `draws`, not {draws:,}")
+
+
+class States(Protocol):
+    """Section that may state the share of a yield."""
+
+    @property
+    def wanted_yield(self) -> float | None: ...
+
+
+def stated_yield(*sections: States | None) -> float:
+    """Return the share of a yield that the first of some sections states; 0: none."""
+    stated = (section.wanted_yield for section in sections if section is not None)
+    return next((share for share in stated if share is not None), 0.0)
 
 
 def _by_name(value: Any) -> Any:

@@ -19,7 +19,7 @@ from ..designs.technology import PIGMENT, Stated
 from ..designs.tolerance import Tolerance
 from ..metrics.bound import Bound
 from ..metrics.objective import Objective
-from ..spectra.population import Population
+from ..spectra.population import Population, stated_yield
 from ..spectra.single_leds import RegionMap
 from ..spectra.spectrum import WavelengthGrid
 from ..vision.section import Vision
@@ -356,5 +356,4 @@ class StudySection(Section):
     @property
     def wanted_yield(self) -> float:
         """The share of random lamps and cameras of a yield; 0: none."""
-        stated = [part.wanted_yield for part in (self.uncertainty, self.population) if part is not None]
-        return next((share for share in stated if share is not None), 0.0)
+        return stated_yield(self.uncertainty, self.population)

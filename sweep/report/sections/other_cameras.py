@@ -10,6 +10,7 @@ from ..leaders import answering, label
 from ..panels import Picture
 from ..row_panels import Row, Rows
 from ..section import Section
+from ..series import scene_in_words
 from ..words import NARROW, joined, of_column, quoted
 
 
@@ -24,6 +25,7 @@ class OtherCameras(Section):
     share: float
     draws: int
     drawn: str
+    where: str
 
     heading = "On other random draws"
 
@@ -46,6 +48,7 @@ class OtherCameras(Section):
                 known[0]["share"],
                 known[0]["draws"],
                 "lamps and cameras" if output.study.population is not None else "sensors",
+                "" if len(output.scenarios) == 1 else f"In {scene_in_words(output.scenario)}, ",
             )
 
     @property
@@ -53,7 +56,7 @@ class OtherCameras(Section):
         """What the share has with each design."""
         named = joined([f"{row.text} with {quoted(row.name)}" for row in reversed(self.rows)])
         return [
-            f"Of {self.draws:,} other random {self.drawn}, {self._percent} have a {self.words} of at least {named}, "
+            f"{self.where}{'of' if self.where else 'Of'} {self.draws:,} other random {self.drawn}, {self._percent} have a {self.words} of at least {named}, "
             f"before clipping and rounding; bars: 95 % intervals of what {self._percent} of all have."
         ]
 

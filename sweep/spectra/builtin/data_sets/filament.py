@@ -1,8 +1,7 @@
 """Surrogate of signals with a filament lamp: a black body behind dyed lenses, which let the near infrared through.
 
-Not measured. Edges of the lenses are chosen so that each color lies in its region of EN 12368. Dyed polycarbonate is
-clear from about 750 nm on; glass colored with copper is not, and would be darker there. Tungsten emits 5 to 10 % less
-of its near infrared than a black body.
+Not measured. Edges of the lenses are chosen so that each color lies in its region of EN 12368; that lenses are clear
+from 750 nm on is assumed. Tungsten emits less near infrared than a black body of its color.
 """
 
 from __future__ import annotations
