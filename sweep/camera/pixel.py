@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from functools import lru_cache
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
@@ -28,6 +29,7 @@ from .captures import (
 DarkCurrent = Annotated[float, Field(ge=0, le=1e15)]
 """Electrons per second; any well is full in less than a second."""
 
+DEFAULT_PITCH_UM = 2.1
 MOST_PRNU = 0.1
 """Largest relative deviation of gains: a Gaussian gain is then positive within ten of them. Sensors have 0.01."""
 Prnu = Annotated[float, Field(ge=0, le=MOST_PRNU)]
@@ -55,12 +57,14 @@ class Optics(Section):
 class Pixel(Section):
     """A pixel and its readout; the defaults are those of an AR0820 with 12 bits."""
 
-    pitch_um: float = Field(default=2.1, ge=1e-3, le=1e5)
+    pitch_um: float = Field(default=DEFAULT_PITCH_UM, ge=1e-3, le=1e5)
     """Pixel pitch, micrometers."""
     fill_factor: Share = 1.0
     """Light-sensitive share of the pixel's area."""
     well_e: WellE = 10_000.0
     """Full well, electrons."""
+    well_e_per_um2: Annotated[float, Field(ge=1e-6, le=1e9)] | None = None
+    """Full well per area of the pixel, electrons/um2, instead of `well_e`: it grows with the square of the pitch."""
     bits: Bits = 12
     """Bits of the ADC."""
     gain_dn_per_e: GainDnPerE | None = None
@@ -90,6 +94,19 @@ class Pixel(Section):
     companding: Annotated[tuple[_Knee, ...], BeforeValidator(as_tuple, json_schema_input_type=list[_Knee])] = ()
     """Knees of the code that the merged value is stored in: [DN of the merged value, code], from [0, 0] on."""
 
+    @model_validator(mode="before")
+    @classmethod
+    def _with_well(cls, value: Any) -> Any:
+        """Return the keys with the full well that follows from the pitch."""
+        density = value.get("well_e_per_um2") if isinstance(value, dict) else None
+        pitch_um = value.get("pitch_um", DEFAULT_PITCH_UM) if isinstance(value, dict) else None
+        if not all(isinstance(number, int | float) for number in (density, pitch_um)):
+            return value
+        well_e = float(density) * float(pitch_um) ** 2  # type: ignore[arg-type]
+        if "well_e" in value and not math.isclose(value["well_e"], well_e, rel_tol=1e-9):
+            raise ValueError(f"well_e_per_um2 gives well_e {well_e:g}: leave one of both out")
+        return {**value, "well_e": well_e}
+
     @model_validator(mode="after")
     def _consistent(self) -> Pixel:
         for number, pixel in enumerate(self.read_as or (self,)):
@@ -117,6 +134,14 @@ class Pixel(Section):
         if self.companding and self.knees[0, -1] < top_dn * (1 - 1e-9):
             raise ValueError(f"companding: the last knee must be at {top_dn:.6g} DN or more, where all are saturated")
         return self
+
+    def with_numbers(self, changes: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the keys of the pixel with some of them replaced; of a full well and its density the replaced one."""
+        keys: dict[str, Any] = {**self.model_dump(exclude_unset=True), **changes}
+        given = [name for name in ("well_e", "well_e_per_um2") if name in changes] or ["well_e_per_um2"]
+        if keys.get(given[0]) is not None:
+            keys = {key: value for key, value in keys.items() if key in given or not key.startswith("well_e")}
+        return keys
 
     @property
     def knees(self) -> Float[Array, "2 knees"]:

@@ -172,6 +172,9 @@ class Scene(Section):
     """Luminance that is added over the whole field, also in front of the target, flat in photons, cd/m2."""
     drive: PwmDrive | None = None
     """Pulsed LED."""
+    pixel: Pixel | None = None
+    """Numbers of the pixel that this scenario has otherwise than the study's `pixel` (`{bits: 10}`); pixels of other
+    captures are `pixels` of a study."""
     field: SensorField | None = None
     """Field positions, of which the worst counts."""
     off_axis_deg: float = Field(default=0.0, ge=0, lt=90)
@@ -182,6 +185,18 @@ class Scene(Section):
     """Light that the lens spreads over the field."""
     noise: Annotated[Noise | None, BeforeValidator(_noise, json_schema_input_type=bool | Noise | None)] = None
     """Photon, read and dark noise and PRNU, before the mean is taken: true, or figures of its own."""
+    series: str = ""
+    """The scenario whose `each` made this one; stated by a run."""
+    at: dict[str, float] = {}
+    """Values of `each` that made this scenario, by dotted key; stated by a run."""
+
+    def __hash__(self) -> int:
+        return hash(self.model_dump_json())
+
+    def pixel_of(self, pixel: Pixel) -> Pixel:
+        """Return the pixel of a study with the numbers and the noise of this scene."""
+        of_scene = pixel if self.pixel is None else self.pixel
+        return of_scene if self.noise is None else self.noise.of(of_scene)
 
     @property
     def equal_photons(self) -> bool:

@@ -68,8 +68,9 @@ def curves_in_words(output: Output) -> str:
 def _camera(output: Output) -> str:
     pixel, scenes = output.study.pixel, list(output.study.scenarios.values())
     lens = _span((scene.optics.f_number for scene in scenes), "")
-    wells = max(capture.well_e for capture in pixel.read_as or (pixel,))
-    readings = f"{pixel.bits} bits"
+    read = [scene.pixel_of(pixel) for scene in scenes]
+    wells = _span((max(capture.well_e for capture in of.read_as or (of,)) for of in read), "e", ",.0f")
+    readings = f"{_span((of.bits for of in read), '')} bits"
     if pixel.captures:
         top_dn = pixel.saturation_e * pixel.dn_per_e + pixel.offset_dn
         several = len({capture.bits for capture in pixel.read_as}) > 1
@@ -77,8 +78,8 @@ def _camera(output: Output) -> str:
             f"{len(pixel.captures)} captures{'' if several else f' of {pixel.bits} bits'} merged to {top_dn:,.0f} DN"
         )
     else:
-        readings += f" (full scale {pixel.full_scale_dn:,} DN)"
-    return f"f/{lens}, a pixel of {pixel.pitch_um:g} µm and {wells:,.0f} e, {readings}"
+        readings += f" (full scale {_span((of.full_scale_dn for of in read), 'DN', ',.0f')})"
+    return f"f/{lens}, a pixel of {_span((of.pitch_um for of in read), 'µm')} and {wells}, {readings}"
 
 
 def scene_conditions(scenes: list[Scene]) -> str:
@@ -142,10 +143,11 @@ def _filters(output: Output) -> str:
     )
 
 
-def _span(values: Iterable[float], unit: str) -> str:
+def _span(values: Iterable[float], unit: str, form: str = "") -> str:
     """Return one value, or the least and the most."""
-    known = sorted({float(f"{value:.3g}") for value in values})
-    text = number(known[0]) if len(known) == 1 else f"{number(known[0])} to {number(known[-1])}"
+    known = sorted({value if form else float(f"{value:.3g}") for value in values})
+    ends = [format(value, form) if form else number(value) for value in (known[0], known[-1])]
+    text = ends[0] if len(known) == 1 else f"{ends[0]} to {ends[1]}"
     return f"{text}\u00a0{unit}" if unit else text
 
 
@@ -155,7 +157,7 @@ def saturation_lines(output: Output) -> Iterator[str]:
     if not (rows[_FULL] > 0).any():
         return
     total, told = int(rows["signals"].max()), set[str]()
-    for (base, key), scenarios in series_of(output.scenarios).items():
+    for (base, key), scenarios in series_of(output.study.scenarios).items():
         told |= scenarios.keys()
         numbers, ranges = Numbers(base, key, tuple(scenarios.values())), dict[str, list[str]]()
         filled = over_series(rows, scenarios, _FULL)
@@ -167,7 +169,7 @@ def saturation_lines(output: Output) -> Iterator[str]:
                 f"{'every design' if len(names) == len(filled) else joined([quoted(name) for name in names])} {where}"
                 for where, names in ranges.items()
             ]
-            among = f" ({base})" if len(series_of(output.scenarios)) > 1 else ""
+            among = f" ({base})" if len(series_of(output.study.scenarios)) > 1 else ""
             yield f"Lamps saturate pixels{among}: {'; '.join(parts)}."
     others = rows[~rows["scenario"].isin(told) & (rows[_FULL] > 0)]
     for scenario, of_scene in others.groupby("scenario", sort=False):

@@ -33,6 +33,13 @@ _LABELS = {
     "cra_max_deg": ("chief ray angle in the corner", "degrees"),
     "level": ("exposure of the brightest channel on white", "share"),
     "f_number": ("f-number", ""),
+    "bits": ("bit depth", "bits"),
+    "pitch_um": ("pixel pitch", "µm"),
+    "well_e": ("full well", "e"),
+    "well_e_per_um2": ("full well per area", "e/µm²"),
+    "crosstalk": ("crosstalk", "share"),
+    "prnu": ("PRNU", "share"),
+    "fill_factor": ("fill factor", "share"),
 }
 
 

@@ -143,6 +143,9 @@ def quantity(column: Column) -> str:
 def full_scale(output: Output) -> str:
     """Return the full scale beside the first number of digital numbers on a page."""
     pixel = output.study.pixel
+    read = {scene.pixel_of(pixel).full_scale_dn for scene in output.study.scenarios.values()}
+    if len(read) > 1:
+        return ""
     if pixel.captures:
         return f" of {pixel.saturation_e * pixel.dn_per_e + pixel.offset_dn:,.0f}"
     return f" of {pixel.full_scale_dn:,}"

@@ -25,6 +25,9 @@ _KEYS = {
     ("name",): "name of a plain CFA, a named design or the search's answer",
     ("space",): "name of the sweep, box, design or CFA of the study that the filter belongs to",
     ("cfa", "family", "scenario"): "CFA, filter family and scenario",
+    ("series", "key", "value"): "where scenarios are made by `each`: the scenario that has it, the dotted key by whose "
+    "value each one differs (null in a grid), and that value",
+    ("pixel.bits, ...",): "value of each key of `each`, by its dotted name",
     ("left_nm, ...",): "parameters of the families, unit in the name",
 }
 _VERDICTS = {

@@ -75,6 +75,7 @@ _KEYS = (
     pa.field("filter_id", pa.int64(), nullable=False),
     *(pa.field(name, _TEXT) for name in ("kind", "name", "space", "cfa", "family", "scenario")),
 )
+_SERIES = (pa.field("series", _TEXT), pa.field("key", _TEXT), pa.field("value", pa.float64()))
 _VERDICTS = (
     pa.field("violation", pa.float64()),
     pa.field("feasible", pa.bool_()),
@@ -105,14 +106,20 @@ def is_of_run(name: str) -> bool:
 
 
 def result_schema(
-    parameters: Sequence[str], quantities: Sequence[str], *, searched: bool, marked: bool = False
+    parameters: Sequence[str],
+    quantities: Sequence[str],
+    *,
+    searched: bool,
+    marked: bool = False,
+    axes: Sequence[str] = (),
 ) -> pa.Schema:
     """Return the columns of rows.
 
-    `searched`: with those of the answers of a search; `marked`: with `pareto`.
+    `axes`: dotted keys of `each`; `searched`: with those of the answers of a search; `marked`: with `pareto`.
     """
     numbers = (*parameters, *quantities, *(OF_SEARCH if searched else ()))
-    fields = list(_KEYS) + [pa.field(name, pa.float64()) for name in numbers] + list(_VERDICTS)
+    places = [*_SERIES, *(pa.field(name, pa.float64()) for name in axes)] if axes else []
+    fields = [*_KEYS, *places, *(pa.field(name, pa.float64()) for name in numbers), *_VERDICTS]
     if marked:
         fields.append(pa.field(ON_FRONT, pa.bool_()))
     return pa.schema(fields, metadata={"cfa_sweep_schema": SCHEMA_VERSION, _PARAMETERS: json.dumps(list(parameters))})

@@ -57,7 +57,9 @@ def between(study: Study, setup: Setup, scenarios: Mapping[str, float]) -> Betwe
 
 
 def _section(study: Study, scenario: str) -> dict[str, Any]:
-    section: dict[str, Any] = study.scenarios[scenario].model_dump(mode="json", by_alias=True, exclude_none=True)
+    section: dict[str, Any] = study.scenarios[scenario].model_dump(
+        mode="json", by_alias=True, exclude_none=True, exclude={"series", "at"}
+    )
     return section
 
 

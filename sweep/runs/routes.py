@@ -37,7 +37,7 @@ _MOST_LETTERS = 200
 class Rules:
     """Rules by which designs become rows.
 
-    `schema`: of the rows of a run; `shown`: of those that its report shows.
+    `schema`: of the rows of a run; `shown`: of those that its report shows; `places`: of the scenes on the axes.
     """
 
     schema: pa.Schema
@@ -50,6 +50,7 @@ class Rules:
     plans: Mapping[str, Plan]
     vision: Vision | None
     seed: int
+    places: Mapping[str, Mapping[str, str | float]]
 
     @cached_property
     def quantities(self) -> Mapping[str, Quantity]:

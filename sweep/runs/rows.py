@@ -27,6 +27,7 @@ from ..results.shown import Selection
 from ..results.tables import ON_FRONT, SWEPT, result_schema, word_mask
 from ..spectra.lights import pair_name
 from ..study import Study
+from ..study.axes import axes_of, places_of
 from .routes import Rules, Wanted, quantities_at
 
 _MOST_CHUNKS, _LEAST_JOBS = 16, 64
@@ -133,10 +134,13 @@ def swept_quantities(study: Study) -> Mapping[str, Quantity]:
 def rules_of(study: Study) -> Rules:
     """Return the rules of a study."""
     section, quantities, swept = study.section, study.quantities, swept_quantities(study)
-    of_rows = {"searched": study.search is not None}
+    axes, searched = axes_of(study.scenarios), study.search is not None
     return Rules(
-        schema=described(result_schema(study.parameters, list(swept), **of_rows), quantities),
-        shown=described(result_schema(study.parameters, list(quantities), marked=True, **of_rows), quantities),
+        places=places_of(study.scenarios),
+        schema=described(result_schema(study.parameters, list(swept), searched=searched, axes=axes), quantities),
+        shown=described(
+            result_schema(study.parameters, list(quantities), marked=True, searched=searched, axes=axes), quantities
+        ),
         requested=study.requested,
         objective=study.objective,
         constraints=study.constraints,
@@ -245,6 +249,10 @@ def _table(at: Rows, rules: Rules, schema: pa.Schema, values: Mapping[str, Any])
         "cfa": _word(space.cfa, n),
         "family": _word("none" if space.filter is None else space.filter.family.kind, n),
         "scenario": _word(at.scenario, n),
+        **{
+            name: _word(value, n) if isinstance(value, str) else np.full(n, float(value))
+            for name, value in rules.places.get(at.scenario, {}).items()
+        },
         **{name: points[:, i] for i, name in enumerate(space.parameters)},
         **values,
     }

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Mapping
 from copy import deepcopy
 from itertools import product
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, ValidationError, ValidationInfo, model_validator
 
 from ..base.errors import Fault
 from ..base.types import Number, Section
+from ..camera.pixel import Pixel
 from ..camera.scene import Scene
 from .schema_curves import Name
 
@@ -84,6 +85,7 @@ Values = Annotated[Axis, BeforeValidator(_axis, json_schema_input_type=float | l
 Span = Annotated[Axis, BeforeValidator(_span, json_schema_input_type=float | list[float] | Axis)]
 
 
+ZIP = "zip"
 _MOST_SCENARIOS = 2000
 _MOST_KEYS = 500_000
 """Most keys of all scenarios that `each` makes."""
@@ -92,14 +94,25 @@ _MOST_KEYS = 500_000
 class ScenarioTemplate(Scene):
     """Scenario as the file has it; with `each`, one for every combination of its values."""
 
-    each: Annotated[dict[Name, Values], Field(min_length=1)] | None = None
-    """Dotted key of the scenario (target.distance_m) -> values."""
+    each: Annotated[dict[Name, Values | dict[Name, Values]], Field(min_length=1)] | None = None
+    """Dotted key of the scenario (`target.distance_m`, `pixel.bits`) -> values; `zip`: such keys whose first values go
+    together, then the second ones."""
 
 
-def expanded(value: Any) -> Any:
+def expanded(value: Any, info: ValidationInfo) -> Any:
     """Replace scenarios that have `each: {key: values}` by one scenario per combination of values."""
     if not isinstance(value, dict):
         return value
+    scenarios = _expanded(value)
+    if isinstance(pixel := info.data.get("pixel"), Pixel):  # else it has a fault of its own
+        for name, entry in scenarios.items():
+            changes = entry.get("pixel") if isinstance(entry, dict) else None
+            if isinstance(changes, dict):
+                scenarios[name] = entry | {"pixel": pixel.with_numbers(changes)}
+    return scenarios
+
+
+def _expanded(value: dict[str, Any]) -> dict[str, Any]:
     scenarios: dict[str, Any] = {}
     for name, entry in value.items():
         if not isinstance(entry, dict) or "each" not in entry:
@@ -108,7 +121,7 @@ def expanded(value: Any) -> Any:
         each = entry["each"]
         if not isinstance(each, dict) or not each:
             raise Fault((name, "each"), "no mapping of keys", each, "{target.distance_m: [20, 50]}")
-        axes = [_numbers((name, "each", key), axis) for key, axis in each.items()]
+        axes = [_points((name, "each"), key, axis) for key, axis in each.items()]
         count = math.prod(map(len, axes))
         if count + len(scenarios) > _MOST_SCENARIOS:
             raise Fault((name, "each"), "too many scenarios", f"{count:,}", f"at most {_MOST_SCENARIOS:,} in a study")
@@ -117,9 +130,11 @@ def expanded(value: Any) -> Any:
         for point in product(*axes):
             scenario = deepcopy({key: inner for key, inner in entry.items() if key != "each"})
             full = str(name)
-            for key, number in zip(map(str, each), point, strict=True):
+            at = {key: number for values in point for key, number in values.items()}
+            for key, number in at.items():
                 _set(scenario, str(name), key, number)
                 full += f" {key.rsplit('.', 1)[-1]}={number:.12g}"
+            scenario |= {"series": str(name), "at": at}
             if full in scenarios:
                 raise Fault((name,), "two scenarios have one name", full, "other names, or other values")
             scenarios[full] = scenario
@@ -132,6 +147,21 @@ def _size(value: Any) -> int:
     """Keys and values of a part of a study."""
     inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
     return 1 + sum(map(_size, inner))
+
+
+def _points(path: tuple[str, ...], key: Any, axis: Any) -> list[dict[str, float]]:
+    """Values of one key of `each`, or of all keys of its `zip`, by key."""
+    if key != ZIP:
+        return [{str(key): number} for number in _numbers((*path, key), axis)]
+    if not isinstance(axis, dict) or not axis:
+        raise Fault(
+            (*path, ZIP), "no mapping of keys", axis, "{pixel.pitch_um: [2.1, 4.2], target.width_px: [3840, 1920]}"
+        )
+    values = {str(inner): _numbers((*path, ZIP, inner), numbers) for inner, numbers in axis.items()}
+    if len({len(numbers) for numbers in values.values()}) > 1:
+        counts = ", ".join(f"{inner} {len(numbers)}" for inner, numbers in values.items())
+        raise Fault((*path, ZIP), "as many values of each key", counts, "lists of equal length")
+    return [dict(zip(values, point, strict=True)) for point in zip(*values.values(), strict=True)]
 
 
 def _numbers(path: tuple[str, ...], axis: Any) -> tuple[float, ...]:
@@ -159,20 +189,38 @@ def _set(mapping: dict[str, Any], name: str, dotted: str, number: float) -> None
     mapping[path[-1]] = number
 
 
-def series_of(scenarios: Iterable[str]) -> dict[tuple[str, str], dict[str, float]]:
-    """Group scenarios that differ in a single number.
+def series_of(scenes: Mapping[str, Scene]) -> dict[tuple[str, str], dict[str, float]]:
+    """Group scenarios that one number tells apart: those of an `each` of which a key has another value in each.
 
-    (name, key) -> scenario -> number, in ascending order.
+    (name, last part of the key) -> scenario -> number, in ascending order.
     """
-    groups: dict[tuple[str, str], dict[str, float]] = {}
-    for name in scenarios:
-        base, _, last = str(name).rpartition(" ")
-        key, _, number = last.partition("=")
-        try:
-            value = float(number)
-        except ValueError:  # a scenario that a person named may have an `=` followed by anything
-            continue
-        if base and "=" not in base and math.isfinite(value):
-            groups.setdefault((base, key), {})[name] = value
-    ordered = {group: dict(sorted(values.items(), key=lambda item: item[1])) for group, values in groups.items()}
-    return {group: values for group, values in ordered.items() if len(values) > 1}
+    made: dict[str, dict[str, Mapping[str, float]]] = {}
+    for name, scene in scenes.items():
+        if scene.at:
+            made.setdefault(scene.series, {})[name] = scene.at
+    groups = {}
+    for series, places in made.items():
+        for key in next(iter(places.values())):
+            values = {name: at[key] for name, at in places.items() if key in at}
+            if 1 < len(places) == len({*values.values()}):
+                ordered = dict(sorted(values.items(), key=lambda item: item[1]))
+                groups[series, key.rpartition(".")[2]] = ordered
+                break
+    return groups
+
+
+def axes_of(scenes: Mapping[str, Scene]) -> tuple[str, ...]:
+    """Return the dotted keys of `each`, in order."""
+    return tuple(dict.fromkeys(key for scene in scenes.values() for key in scene.at))
+
+
+def places_of(scenes: Mapping[str, Scene]) -> dict[str, dict[str, str | float]]:
+    """Return the values of each scene on all axes, by dotted key; in a series its name, key and value, too."""
+    single: dict[str, dict[str, str | float]] = {
+        name: {"key": next(key for key in scenes[name].at if key.rpartition(".")[2] == last), "value": value}
+        for (_, last), members in series_of(scenes).items()
+        for name, value in members.items()
+    }
+    return {
+        name: {"series": scene.series, **single.get(name, {}), **scene.at} for name, scene in scenes.items() if scene.at
+    }

@@ -24,7 +24,12 @@ def check_scenes(section: StudySection) -> Iterator[Fault]:
     """Check LED norms and that every target forms an image that can be computed."""
     yield from _check_regions(section)
     for name, scene in section.scenarios.items():
-        if (fault := psf.image_fault(scene, section.pixel)) is not None:
+        if scene.pixel is not None:
+            for key in ("captures", "companding"):
+                if getattr(scene.pixel, key) != getattr(section.pixel, key):
+                    problem = "one scenario has no others than the study: a pixel of its own is one of `pixels`"
+                    yield Fault(("scenarios", name, "pixel", key), problem, None, "`pixels: {NAME: {captures: ...}}`")
+        if (fault := psf.image_fault(scene, scene.pixel_of(section.pixel))) is not None:
             yield fault.under("scenarios", name)
 
 

@@ -262,6 +262,10 @@ class Document:
         entries = self.data[key]
         self._tree.put(self.data, to, entries[at], self._tree.place(entries, at) or self.place((key,)))
 
+    def put(self, key: str, value: Any, of: Sequence[Key]) -> None:
+        """Set a key, with the position of another one."""
+        self._tree.put(self.data, key, value, self.place(of))
+
     def expand(self, key: str, names: Iterable[str]) -> None:
         """Replace each entry of a list with `*` by the names that it stands for.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
@@ -25,8 +24,6 @@ from .schema import StudySection
 from .sources import Sources
 
 _SLACK = 1e-9
-_NUMBERS = re.compile(r"( [^ =]+=[^ =]+)+$")
-"""Numbers that `each` adds to a scenario's name."""
 _MOST_OF_AXIS = 200
 """Values of one parameter of a map."""
 _MOST_LIGHT = 10.0
@@ -145,7 +142,7 @@ def search_of(section: StudySection, spaces: Sequence[Space], sources: Sources) 
         sources.refuse(unknown(("search", "space"), "sweep or box", chosen, names))
     elif chosen in boxes and not _free(boxes[chosen], requested.map or {}):
         sources.refuse(Fault(("search", "space"), "every parameter is fixed", chosen, "one free parameter or more"))
-    bases = {name: _NUMBERS.sub("", name) for name in scenarios}
+    bases = {name: scene.series or name for name, scene in section.scenarios.items()}
     scenario_name = requested.scenario or scenarios[0]
     searched = (
         [scenario_name] if scenario_name in bases else [name for name, base in bases.items() if base == scenario_name]

@@ -40,13 +40,13 @@ def load_study(
     members = members_of(document)
     if member is None and len(members) > 1:
         names = ", ".join(known_member.name for known_member in members)
-        problem = f"a study of several sensors or lights ({names}): `sweep run` runs all"
-        key = "sensors" if "sensors" in document.data else "lights"
+        problem = f"a study of several sensors, pixels or lights ({names}): `sweep run` runs all"
+        key = next(key for key in ("sensors", "pixels", "lights") if key in document.data)
         raise StudyError(document.issue((key,), problem, None, f"one of each here: {way_to_one(document)}"))
     chosen, notes = member or members[0], list[str]()
     choose(document, chosen)
     section = _checked(document)
-    if max(chosen.indices) >= 0:
+    if max(chosen.indices) >= 0 or chosen.pixel:
         section, notes = narrowed(section, chosen)
         if len(members) > 1:
             section = section.model_copy(update={"study": chosen.name})

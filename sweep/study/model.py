@@ -222,8 +222,8 @@ class Study:
         )
 
     def pixel_in(self, scene: Scene) -> Pixel:
-        """Return the study's pixel with the noise of a scene."""
-        return self.pixel if scene.noise is None else scene.noise.of(self.pixel)
+        """Return the study's pixel with the numbers and the noise of a scene."""
+        return scene.pixel_of(self.pixel)
 
     def box(self, space: Space, scenario: str) -> Box:
         """Return the parameter range of a space, for a plan of the scenario."""

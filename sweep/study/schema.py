@@ -9,6 +9,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from ..base.types import Number, Section
 from ..camera.accuracy import STANDARD, AccuracySection
+from ..camera.captures import CaptureNames
 from ..camera.curve_errors import CurveErrors
 from ..camera.mosaic import Mosaic
 from ..camera.pixel import Pixel
@@ -274,6 +275,8 @@ class StudySection(Section):
     f/2 and a split pixel of 2.8 um; `road_read_once`, its large photodiode alone, read once."""
     pixel: Pixel = Pixel()
     """The pixel and its readout."""
+    pixels: dict[Name, CaptureNames | Pixel | None] | None = None
+    """Several pixels: one run for each, and their comparison; NAME: keys that differ from `pixel`, or captures."""
     lights: Annotated[
         LightsSection,
         BeforeValidator(

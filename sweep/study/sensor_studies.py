@@ -1,4 +1,4 @@
-"""Studies of several sensors or light sets: one study for each pair of them."""
+"""Studies of several sensors, pixels or light sets: one study for each combination of them."""
 
 from __future__ import annotations
 
@@ -21,12 +21,14 @@ _SPACES = ("cfas", "designs", "sweeps", "boxes")
 class SensorAndLights(NamedTuple):
     """One sensor under one set of lights.
 
-    `indices`: their places in the lists of the study; -1 where there is no list.
+    `indices`: their places in the lists of the study; -1 where there is no list. `pixel`: one of several, which is part
+    of the sensor's name.
     """
 
     sensor: str
     lights: str
     indices: tuple[int, int]
+    pixel: str = ""
 
     @property
     def name(self) -> str:
@@ -35,7 +37,7 @@ class SensorAndLights(NamedTuple):
 
 
 class SensorStudies(NamedTuple):
-    """A study of several sensors or light sets: its name and its members."""
+    """A study of several sensors, pixels or light sets: its name and its members."""
 
     name: str
     members: tuple[SensorAndLights, ...]
@@ -51,10 +53,25 @@ def members_of(document: Document) -> list[SensorAndLights]:
         raise StudyError(document.issue(("sensors",), "beside `sensor`", None, "one of both"))
     document.expand("sensors", BUILT_IN_SENSORS)
     sensors, lights = _listed(document, "sensors", data.get("sensor")), _listed(document, "lights", data.get("lights"))
-    if len(sensors) * len(lights) > _MOST:
-        allowed = f"at most {_MOST} sensors times lights"
-        raise StudyError(document.issue(("sensors",), "too many", len(sensors) * len(lights), allowed))
-    return [SensorAndLights(sensor, light_set, (i, k)) for (sensor, i), (light_set, k) in product(sensors, lights)]
+    pixels = _pixels(document)
+    if (count := len(sensors) * len(lights) * len(pixels)) > _MOST:
+        allowed = f"at most {_MOST} sensors times pixels times lights"
+        raise StudyError(document.issue(("sensors",), "too many", count, allowed))
+    return [
+        SensorAndLights(f"{sensor} {pixel}".strip(), light_set, (i, k), pixel)
+        for (sensor, i), pixel, (light_set, k) in product(sensors, pixels, lights)
+    ]
+
+
+def _pixels(document: Document) -> list[str]:
+    """Return the names of several pixels; an empty one without."""
+    pixels = document.data.get("pixels")
+    if pixels is None:
+        return [""]
+    if not isinstance(pixels, dict) or not pixels:
+        example = "{plain: , split: split_pixel}"
+        raise StudyError(document.issue(("pixels",), "no mapping of names to pixels", pixels, example))
+    return [str(name) for name in pixels]
 
 
 def _listed(document: Document, key: str, alone: Any) -> list[tuple[str, int]]:
@@ -78,6 +95,9 @@ def _name(entry: Any, key: str, at: int) -> str:
 def way_to_one(document: Document) -> str:
     """Return the options that choose a member."""
     options = []
+    if isinstance(pixels := document.data.get("pixels"), dict):
+        name = next(iter(pixels))
+        options.append(f"a mapping `pixels` of one in the file, such as `{name}`")
     for key in ("sensors", "lights"):
         entries = document.data.get(key)
         if isinstance(entries, list):
@@ -95,6 +115,14 @@ def choose(document: Document, member: SensorAndLights) -> None:
         if at >= 0:
             document.take(key, at, to)
     document.data.pop("sensors", None)
+    if member.pixel:
+        pixels = document.data["pixels"]
+        own = next(pixel for name, pixel in pixels.items() if str(name) == member.pixel)
+        keys = {"captures": own} if isinstance(own, str) else {} if own is None else own
+        general = document.data.get("pixel", {})
+        both = general | keys if isinstance(keys, dict) and isinstance(general, dict) else keys
+        document.put("pixel", both, ("pixels", member.pixel))
+        document.data.pop("pixels")
 
 
 def narrowed(section: StudySection, member: SensorAndLights) -> tuple[StudySection, list[str]]:

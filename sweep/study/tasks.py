@@ -162,8 +162,9 @@ def check_tasks_in_scenes(
             _AT, "tasks see filters that do not move with the angle of the light", None, "no interference filter"
         )
     for name, scene in section.scenarios.items():
-        electrons = max(_most_electrons(tasks, scene, section.pixel, sensor, section.wavelengths.step_nm))
-        most = min(section.pixel.well_e, section.pixel.full_scale_dn / section.pixel.dn_per_e)
+        pixel = scene.pixel_of(section.pixel)
+        electrons = max(_most_electrons(tasks, scene, pixel, sensor, section.wavelengths.step_nm))
+        most = min(pixel.well_e, pixel.full_scale_dn / pixel.dn_per_e)
         if electrons > most:
             value = f"{electrons:.3g} electrons in scenario {name}"
             yield Fault((*_AT, "exposure_s"), "a patch of a task fills the well", value, f"at most {most:.3g}")

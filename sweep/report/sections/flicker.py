@@ -100,7 +100,7 @@ class Flicker(Section):
             return
         pair, found = output.trade_off[0].pair, []
         far = pair_name(CHROMATIC_CSD, pair)
-        for (base, key), scenarios in series_of(output.scenarios).items():
+        for (base, key), scenarios in series_of(output.study.scenarios).items():
             seen = over_series(rows, scenarios, LAMP_SEEN)
             if not seen or not np.isfinite(np.concatenate([*seen.values()])).all():
                 continue

@@ -59,7 +59,7 @@ class Noise(Section):
         rows, allowed = _with_worst_error(output), recognition.error_max
         light = {str(row["name"]): float(row[CFA_SENSITIVITY]) for row in rows.to_dict("records")}
         answers = answering(output)
-        for (base, key), scenarios in series_of(output.scenarios).items():
+        for (base, key), scenarios in series_of(output.study.scenarios).items():
             numbers = Numbers(base, key, tuple(scenarios.values()))
             x = np.array(numbers.x)
             errors = over_series(rows, scenarios, CHROMATIC_ERROR)

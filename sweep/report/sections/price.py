@@ -94,7 +94,7 @@ class Price(Section):
 
 def _where(output: Output, best: Row) -> str:
     """Return the scene, where the study has others that are no series."""
-    inner = {name for members in series_of(output.scenarios).values() for name in members}
+    inner = {name for members in series_of(output.study.scenarios).values() for name in members}
     alone = len(output.scenarios) == 1 or inner >= {*output.scenarios}
     return "" if alone else scene_in_words(str(best["scenario"]))
 

@@ -40,7 +40,7 @@ class Scenes(Section):
         if len(output.scenarios) < 2 or not output.table["kind"].isin([SWEPT, SEARCHED]).any():
             return
         column = output.trade_off[0]
-        inner = {name for members in series_of(output.scenarios).values() for name in list(members)[1:-1]}
+        inner = {name for members in series_of(output.study.scenarios).values() for name in list(members)[1:-1]}
         rows, drawn, above, rggb_name = list[tuple[str, ...]](), list[Row](), 0, ""
         for scenario in (name for name in output.scenarios if name not in inner):
             best, rggb = leaders_of(output, scenario).chosen, reference_of(output, scenario)
@@ -56,7 +56,7 @@ class Scenes(Section):
             what = scene_conditions([output.study.scenarios[scenario]])
             rows.append((f"{scene_in_words(scenario)}: {what}", f"{label(best)} of {best['cfa']}", value, light, its))
         shown = tuple(drawn) if len(drawn) == len(rows) <= MOST_ROWS else ()
-        alone = output.provenance.search is None and not series_of(output.scenarios)
+        alone = output.provenance.search is None and not series_of(output.study.scenarios)
         yield cls(column, tuple(rows[:MOST_ROWS]), len(rows), shown, (above, len(drawn)), rggb_name, alone)
 
     @property

@@ -63,7 +63,7 @@ class Series(Section):
     @classmethod
     def of(cls, output: Output) -> Iterator[Section]:
         """Yield one for each series; those in which separations vanish come first."""
-        rows, column, series = output.named_rows, output.trade_off[0], series_of(output.scenarios)
+        rows, column, series = output.named_rows, output.trade_off[0], series_of(output.study.scenarios)
         best = [
             c.name
             for c in output.columns.values()
