@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..base.types import (
@@ -14,7 +16,7 @@ from ..base.types import (
     PerWavelength,
 )
 from .pixel import irradiance_factor
-from .scene import WhitePatchExposure
+from .scene import FixedExposure, WhitePatchExposure
 from .setup import Setup
 
 
@@ -67,6 +69,14 @@ def largest_sensitivity_not_brightest(setup: Setup) -> float:
     camera, rates = setup.camera, setup.camera.qe.sum(axis=1)
     fixed_rate, modified = (rates[list(channels)].max(initial=0.0) for channels in (camera.fixed, camera.modified))
     return float(fixed_rate / modified) if modified > 0 else np.inf
+
+
+def exposed_at(setup: Setup, sensitivity: float) -> Setup:
+    """Return the setup with the exposure time that it has where the only modified channel has a sensitivity."""
+    white = setup.camera.base_qe.sum(axis=1) * (sensitivity * white_irradiance(setup)[0] * setup.camera.area_step_m2_nm)
+    (time_s,) = exposure_times(setup, white[None])
+    scene = setup.scene.model_copy(update={"exposure": FixedExposure(exposure_s=float(time_s))})
+    return replace(setup, scene=scene)
 
 
 def relative_slope(

@@ -13,13 +13,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..base.errors import SweepError, UpperBoundExceededError, ValidationIssue
 from ..base.types import PerWavelength
-from ..camera.exposure import may_be_brightest
+from ..camera.exposure import exposed_at, largest_sensitivity_not_brightest, may_be_brightest
 from ..camera.pixel import unquantized
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.columns.sensitivity import SENSITIVITY
@@ -41,6 +42,8 @@ _SENSITIVITY_TOLERANCE = 1e-6
 _MOST_PROGRAMS = 5000
 _ATTEMPTS, _ATTEMPT_PROGRAMS = 5, 100
 """How often bounds on worst cases are raised until a filter keeps them, with so many linear programs each."""
+_MOST_HALVINGS, _LOOSE = 24, 1e-3
+"""Times that an interval of sensitivities is halved, and the relative width at which a bound is close enough."""
 _PROOF_TOLERANCE = 1e-9
 """A design may exceed a proven limit by this share, which is rounding, and no more."""
 _NOT_LINEAR = "is not linear in the filter"
@@ -81,6 +84,68 @@ def limit_of(
     refused = reason_without_bound(problem)
     if refused is not None:
         raise SweepError(ValidationIssue(f"no limit: {refused}"))
+    effort = tolerance_dn, most_programs, sensitivities
+    if may_be_brightest(problem.setup, _most_sensitive(problem)):
+        return _limit_of_exposures(problem, *effort)
+    return _limit_of(problem, *effort)
+
+
+def _limit_of_exposures(
+    problem: Problem, tolerance_dn: float, most_programs: int, sensitivities: Sequence[float]
+) -> Limit:
+    """Compute the upper bound where the modified channel may be the brightest one on white and set the exposure.
+
+    Then the exposure falls with its sensitivity s, and distances with the exposure. So filters with s from a to b have
+    no more than a linear program for these says at the exposure of a. Where that is loose the interval is halved.
+    """
+    stated, most = problem.constraints.get(SENSITIVITY), _most_sensitive(problem)
+    least = 0.0 if stated is None or stated.min is None else stated.min
+    dim = largest_sensitivity_not_brightest(problem.setup)
+
+    def part(a: float, b: float) -> _Part:
+        within = replace(problem, constraints={**problem.constraints, SENSITIVITY: Bound.model_construct(min=a, max=b)})
+        if a < dim:
+            return _Part(a, b, _limit_of(within, tolerance_dn, most_programs, sensitivities))
+        exposed = replace(within, setup=exposed_at(problem.setup, a - 2 * FEASIBLE))
+        limit = _limit_of(exposed, tolerance_dn, most_programs, [max(s, a) for s in sensitivities])
+        if limit.curve is not None:  # as it is at its own exposure
+            relaxed = _relaxed(within)[0]
+            attained, curve = _inside(relaxed, limit.curve, None, _pool_of(relaxed))
+            limit = replace(limit, attained=attained, curve=curve if attained > -np.inf else None)
+        return _Part(a, b, limit)
+
+    ends = [least, dim, most] if least < dim < most else [least, most]
+    parts = [part(a, b) for a, b in pairwise(ends)]
+    for _ in range(_MOST_HALVINGS):
+        highest, attained = max(parts, key=lambda p: p.limit.proven), max(p.limit.attained for p in parts)
+        a, b = highest.least, highest.most
+        if a < dim or b <= a * (1 + _LOOSE) or highest.limit.proven - attained <= _LOOSE * highest.limit.proven:
+            break
+        parts.remove(highest)
+        parts += [part(a, (a + b) / 2), part((a + b) / 2, b)]
+    best, limits = max((p.limit for p in parts), key=lambda limit: limit.attained), [p.limit for p in parts]
+    elsewhere = [
+        max((p.limit.elsewhere[k] for p in parts if p.most >= s), default=-np.inf) for k, s in enumerate(sensitivities)
+    ]
+    return replace(
+        best,
+        proven=max(limit.proven for limit in limits),
+        programs=sum(limit.programs for limit in limits),
+        open_parts=sum(limit.open_parts for limit in limits),
+        elsewhere=tuple(elsewhere),
+    )
+
+
+class _Part(NamedTuple):
+    """Sensitivities of the modified channel, and the bound on filters with these."""
+
+    least: float
+    most: float
+    limit: Limit
+
+
+def _limit_of(problem: Problem, tolerance_dn: float, most_programs: int, sensitivities: Sequence[float]) -> Limit:
+    """Compute the upper bound where the exposure does not depend on the filter."""
     relaxed, left_out = _relaxed(problem)
     distances = any(relaxed.quantities[name].distance_kind for name in relaxed.objective.weights)
     tolerance = tolerance_dn if distances else _SENSITIVITY_TOLERANCE
@@ -204,7 +269,7 @@ def reason_without_bound(problem: Problem) -> str | None:
         ),
         (lambda: _clips(problem), "signals exceed the full well or the range of the ADC"),
         (
-            lambda: may_be_brightest(problem.setup, _most_sensitive(problem)),
+            lambda: may_be_brightest(problem.setup, _most_sensitive(problem)) and not _scales(problem),
             "the modified channel could set the exposure",
         ),
     )
@@ -222,6 +287,14 @@ def _mixes_chromatic(problem: Problem) -> bool:
     names, setup = (*problem.objective.weights, *problem.constraints), problem.setup
     chromatic = any(problem.quantities[name].distance_kind == "chromatic" for name in names)
     return chromatic and (setup.all_heights or setup.scene.brightness is not None)
+
+
+def _scales(problem: Problem) -> bool:
+    """Return whether distances are in proportion to an exposure that is known from the sensitivity of the filter."""
+    names = {*problem.objective.weights, *problem.constraints}
+    noisy = any(problem.quantities[name].distance_kind == "noise" for name in names)
+    bound, dark = problem.constraints.get(SENSITIVITY), largest_sensitivity_not_brightest(problem.setup) == 0
+    return not (noisy or _moves(problem) or (dark and (bound is None or not bound.min)))
 
 
 def _most_sensitive(problem: Problem) -> float:
