@@ -12,8 +12,12 @@ from ..base.errors import SweepError, ValidationIssue
 from ..base.types import IndexArray, Int
 
 _TOKEN = re.compile(r"[A-Z][a-z0-9]*")
-PRESETS = {"RGBIR": ("BGRG", "GIGI", "RGBG", "GIGI")}
-"""Tiles of more than four pixels by name, a letter for each: `I` sees the infrared alone."""
+PRESETS = {
+    "RGBIR": ("BGRG", "GIGI", "RGBG", "GIGI"),
+    "RGBW4x4": ("WGWR", "GWRW", "WBWG", "BWGW"),
+    "QuadRGGB": ("RRGG", "RRGG", "GGBB", "GGBB"),
+}
+"""Tiles of more than four pixels by name, a letter for each: `I` sees the infrared alone, `W` is a clear pixel."""
 
 
 @dataclass(frozen=True)

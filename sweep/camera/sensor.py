@@ -112,11 +112,12 @@ def make_sensor(name: str, qe: Mapping[str, PerWavelength], source: str, clear: 
 
 
 def own_red(names: Collection[str]) -> dict[str, dict[str, str]]:
-    """Return the channels that have another curve in RCCC and RCCB: a red of their own, where a sensor has one.
+    """Return the channels that have another curve in some CFAs: CFA -> channel -> curve.
 
-    Returns CFA -> channel -> curve.
+    RCCC and RCCB have a red of their own, where a sensor has one; the clear pixels of RGBW4x4 may be named C.
     """
-    return {cfa: {"R": "Rx"} for cfa in ("RCCC", "RCCB")} if "Rx" in names else {}
+    red = {cfa: {"R": "Rx"} for cfa in ("RCCC", "RCCB")} if "Rx" in names else {}
+    return red | ({"RGBW4x4": {"W": "C"}} if "C" in names and "W" not in names else {})
 
 
 def ar0820_sensor(grid: WavelengthGrid, parameters: SurrogateParameters) -> SensorCurves:

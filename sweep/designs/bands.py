@@ -16,6 +16,8 @@ from .tolerance import ProductionError
 
 _HALF = SPAN_PER_WIDTH / 2
 _PER_BAND = 5
+_LIT, _BEYOND_NM = 0.01, 30.0
+"""Share of its peak from which on a curve has light, and how far an edge may lie beyond it."""
 _FEW = 64
 """From so many designs on, a compiled pass saves more time than it takes to load."""
 LEFT, LEFT_WIDTH, RIGHT, RIGHT_WIDTH, DEPTH = range(_PER_BAND)
@@ -105,6 +107,13 @@ class Bands:
             most += np.outer(depths, left_high - right_low).max(axis=0)
         return least, most
 
+    def edges_within(self, base: PerWavelength) -> dict[str, tuple[float, float]]:
+        """Return for each edge the wavelengths, nm, where a curve has light, and some beyond that."""
+        lit = self._wave[base >= _LIT * base.max()]
+        ends = float(lit[0]) - _BEYOND_NM, float(lit[-1]) + _BEYOND_NM
+        at_edges = [p for number, p in enumerate(self.parameters) if number % _PER_BAND in (LEFT, RIGHT)]
+        return {p.name: (max(ends[0], p.low), min(ends[1], p.high)) for p in at_edges}
+
     def perturbed(self, production_error: ProductionError) -> Bands:
         """Return the bands as production makes them."""
         return Bands(production_error.nominal_nm(self._wave), self._count)
@@ -165,6 +174,10 @@ class Banded(Family):
     def dimensions(self) -> Mapping[str, ParameterWeights]:
         """See `Bands.dimensions`."""
         return self._bands.dimensions
+
+    def usual_box(self, base: PerWavelength) -> Mapping[str, tuple[float, float]]:
+        """Return for each edge the wavelengths where the base has light, and some beyond that."""
+        return self._bands.edges_within(base)
 
     def perturbed(self, production_error: ProductionError) -> Self:
         """Return the family with shifted bands between the same curves; see `Family.perturbed`."""

@@ -130,6 +130,11 @@ class Family(ABC):
         """Lengths in production by name: rows r; a length is min(r @ x), nm; by default none."""
         return {}
 
+    def usual_box(self, base: PerWavelength) -> Mapping[str, tuple[float, float]]:
+        """Return ranges of parameters outside which nothing changes on a base curve: by default none."""
+        assert base.ndim == 1
+        return {}
+
     def perturbed(self, production_error: ProductionError) -> Family:
         """Return the family as production makes it; by default it has no edges that could shift."""
         if any(production_error):

@@ -38,6 +38,7 @@ from .sections.published import Published
 from .sections.scenes import Scenes
 from .sections.series import Series
 from .sections.tasks import Tasks
+from .sections.tiles import AllTiles
 from .sections.trade_off import TradeOff
 from .sections.uncertain import Uncertain
 from .terms import format_constraints, unknown_lines
@@ -57,6 +58,7 @@ ORDER: tuple[type[Section], ...] = (
         Tasks,
         Colors,
         Uncertain,
+        AllTiles,
         OtherCameras,
         LeftOut,
         Published,

@@ -36,7 +36,7 @@ def row_space(study: Study, row: Mapping[Any, Any]) -> Space:
     """Return the design space of a row."""
     if row["kind"] == "search":
         assert study.search is not None
-        return study.search.space
+        return next(space for space in study.search.searched if space.name == row["space"])
     ends = np.cumsum([space.size for space in study.spaces])  # ids run through the spaces of each scenario
     return study.spaces[int(np.searchsorted(ends, row["design_id"] % ends[-1], side="right"))]
 

@@ -159,6 +159,12 @@ FILES = {
     "concentration of a single absorption band in a film of 0.8 um, `mol_per_l` and `percent_by_weight`",
     files.FRONT: "results of the search at each level of sensitivity, and the limit there; between two levels rows "
     "with the limit alone: " + ", ".join(files.front_schema(["<parameters>"]).names),
+    files.TILES: "of a search over tiles, a row for each tile at each level of light (`cfa_sensitivity_min`; null: "
+    "what the study itself needs): `space`, `cfa`, the curve that its modified pixel is made from (`base`), how many "
+    "`kinds` of pixels, its `status` (`searched`; `excluded`: its upper bound `limit` is no more than the best that "
+    "was found; `too dark`; `impossible`: no filter meets the constraints), the best filter found in it, and of the "
+    "`best` tile other separations of the same lamps, DN, as they are read out: "
+    + ", ".join(files.tiles_schema(["<parameters>"]).names),
     files.CURVES: "a row per curve and wavelength: " + ", ".join(SCHEMA.names),
     files.POINTS: "points of the clouds: design_id, signal_type, signal, channel, dn",
     files.CROSSINGS: "where a study with `recognition` has scenarios that differ in one number: the numbers `at` which "

@@ -93,7 +93,8 @@ class SearchFacts(_Facts):
     `scenario`: of several (`scenarios`) the one in which the answer is worst. `cfa`, `channel`: the searched ones.
     `bounded`: kind and name of the spaces whose feasible filters the limit holds for, in that scenario.
     `refinement`: the algorithm that continued from the best point of all starts; `endings` has its status at the end.
-    `scenes_added`: of a series, between its scenarios, where the worst value was found.
+    `scenes_added`: of a series, between its scenarios, where the worst value was found. `tiles`: of a search over
+    tiles, how many became what; `tiles_limit`: the bound over all.
     """
 
     algorithm: str
@@ -121,6 +122,8 @@ class SearchFacts(_Facts):
     combinations: tuple[str, ...] = ()
     refinement: str | None = None
     scenes_added: int = 0
+    tiles: dict[str, int] = {}
+    tiles_limit: float | None = None
 
     @property
     def converged(self) -> bool:

@@ -53,6 +53,7 @@ _COLUMNS: dict[str, Sequence[str]] = {
     files.SATURATED: ["design_id", "full_signals", "signals"],
     files.POINTS: ["design_id", "signal_type", "signal", "channel", "dn"],
     files.FRONT: files.front_schema(()).names,
+    files.TILES: files.tiles_schema(()).names,
     files.LEFT_OUT: ["objective", "signal_type", "signal", "fall"],
     files.ROBUSTNESS: ["design_id", "breaks_at", "breaks_broadening"],
 }
@@ -81,6 +82,7 @@ class Output:
     curves: KeptCurves
     points: pd.DataFrame
     front: pd.DataFrame | None
+    tiles: pd.DataFrame | None
     crossings: pd.DataFrame | None
     audited: pd.DataFrame | None
     left_out: pd.DataFrame | None
@@ -271,6 +273,7 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         curves=curves,
         points=more[files.POINTS],
         front=more.get(files.FRONT),
+        tiles=more.get(files.TILES),
         crossings=more.get(files.CROSSINGS),
         audited=more.get(files.AUDIT),
         left_out=more.get(files.LEFT_OUT),

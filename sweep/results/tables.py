@@ -45,6 +45,7 @@ VISION_STREET = "vision_street.parquet"
 VISION_TABLES = (VISION, VISION_CONDITIONS, VISION_STREET)
 """Tables of the benchmark of vision: a row per image, per distance and level, per picture that was read wrongly, per
 light level and state of detections in streets, and per picture of a street."""
+TILES = "tiles.parquet"
 AUDIT, ALL_SENSORS = "audit.parquet", "all_sensors.parquet"
 PROVENANCE = "provenance.json"
 RESOLVED = "study.resolved.yaml"
@@ -55,7 +56,7 @@ MADE_BY_RUN = frozenset(
         *(DESIGNS, PARETO, SEARCH_LOG, FRONT, CURVES, POINTS, CROSSINGS, LIMITED_BY, ROBUSTNESS, REGIONS_MAP),
         LAMP_LIMITS,
         *(SENSOR_MAP, TRADED, LEFT_OUT, COMBINATIONS, MAP, HANDOVERS, WORST, SATURATED),
-        *(UNCERTAINTY, YIELDS),
+        *(UNCERTAINTY, YIELDS, TILES),
         *(*VISION_TABLES, ALL_SENSORS, PROVENANCE, RESOLVED),
     )
 )
@@ -146,6 +147,17 @@ def front_schema(parameters: Sequence[str]) -> pa.Schema:
     number = pa.float64()
     names = ("sensitivity_min", "cfa_sensitivity_min", "objective", "sensitivity", "cfa_sensitivity", "limit", "gap")
     fields = [pa.field(name, number) for name in (*names, *parameters)] + [pa.field("evaluations", pa.int64())]
+    return pa.schema(fields, metadata={"cfa_sweep_schema": SCHEMA_VERSION})
+
+
+def tiles_schema(parameters: Sequence[str]) -> pa.Schema:
+    """Return the columns of a search over tiles: a row for each tile and level of light."""
+    text, number = pa.dictionary(pa.int32(), pa.string()), pa.float64()
+    counted = ("csd", "pixel_csd", "chromatic_csd", "chromatic_pixel_csd")
+    fields = [pa.field("cfa_sensitivity_min", number), *(pa.field(name, text) for name in ("space", "cfa", "base"))]
+    fields += [pa.field("kinds", pa.int32()), pa.field("status", text), pa.field("best", pa.bool_())]
+    names = ("limit", "objective", "sensitivity", "cfa_sensitivity", *parameters, *counted)
+    fields += [pa.field(name, number) for name in names]
     return pa.schema(fields, metadata={"cfa_sweep_schema": SCHEMA_VERSION})
 
 

@@ -39,6 +39,7 @@ from ..results.tables import (
     SEARCH_LOG,
     SEARCHED,
     SWEPT,
+    TILES,
     VISION_STREET,
     VISION_TABLES,
     json_of,
@@ -70,6 +71,7 @@ from .search import (
     search_log,
 )
 from .sweep import Planned, RunOptions, Sweep
+from .tiles import TileAnswer, run_tile_search, tile_facts, tile_front_table, tiles_table
 from .uncertainty import UNCLIPPED
 from .workers import Workers, stopped_by_signals, workers
 
@@ -95,6 +97,7 @@ def _whole(study: Study) -> set[str]:
     names = {DESIGNS, PARETO, PROVENANCE, *(part_name(part.number) for part in parts)}
     if study.search is not None:
         names |= {SEARCH_LOG, part_name(len(parts))} | ({FRONT} if study.search.levels else set())
+        names |= {TILES} if study.search.tiles else set()
         names |= {LEFT_OUT} if study.leaves_one_out else set()
         names |= {MAP} if study.search.map else set()
         names |= {COMBINATIONS} if len(numbers_of(study.problem(study.search))) > 1 else set()
@@ -183,6 +186,7 @@ class _Run:
         self.rules, self.selection = self.planned.rules, self.planned.selection
         self.sweep = Sweep(self.planned, self.manifest, self.pool)
         self.gathered = Gathered(self.selection, self.rules.wanted_of_swept.schema)
+        self.over_tiles: TileAnswer | None = None
 
     def make(self, wrong: set[str]) -> tuple[str, ...]:
         """Make files and those that depend on them; provenance comes last, and marks a finished run."""
@@ -210,6 +214,9 @@ class _Run:
             return None
         cached_calls = self._kept("search")
         try:
+            if self.study.search.tiles:
+                self.over_tiles = run_tile_search(self.study, self.study.search, cached_calls, self.progress)
+                return self.over_tiles.answer
             return run_search(self.study, self.study.search, cached_calls, self.progress)
         except UpperBoundExceededError:
             cached_calls.drop_limits()
@@ -241,8 +248,11 @@ class _Run:
                 self._write(MAP, map_table(self.study, answer.search, self._kept("map"), self.progress))
             if answer.choice is not None:
                 self._write(COMBINATIONS, combinations_table(self.study, answer))
+            if self.over_tiles is not None:
+                self._write(TILES, tiles_table(self.study, self.over_tiles))
             if answer.search.levels:
-                self._write(FRONT, front_table(self.study, answer))
+                found = self.over_tiles
+                self._write(FRONT, front_table(self.study, answer) if found is None else tile_front_table(found))
             if self.study.leaves_one_out:
                 cached_calls = self._kept("left out")
                 self._write(
@@ -289,7 +299,8 @@ class _Run:
 
     def _limit(self) -> Limit | None:
         """Return the upper bound of a search in one scenario, computed alone if the search need not be repeated."""
-        if self.study.search is not None and len(self.study.search.scenarios) > 1:
+        search = self.study.search
+        if search is not None and (len(search.scenarios) > 1 or search.tiles):
             return None
         if "answer" in self.__dict__ or self.study.search is None:
             return None if self.answer is None else self.answer.limit
@@ -314,6 +325,7 @@ class _Run:
             warnings.append(UNCLIPPED)
         if answer is not None:
             facts["search"] = search_facts(study, answer)
+            facts["search"] |= {} if self.over_tiles is None else tile_facts(self.over_tiles)
             if not any(run.status in CONVERGED for run in answer.runs):
                 warnings.append("no start of the search converged: more `max_evaluations` may find a better design")
             noisy = any(study.quantities[name].states for name in study.objective.weights)

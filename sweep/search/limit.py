@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -42,8 +41,8 @@ _SENSITIVITY_TOLERANCE = 1e-6
 _MOST_PROGRAMS = 5000
 _ATTEMPTS, _ATTEMPT_PROGRAMS = 5, 100
 """How often bounds on worst cases are raised until a filter keeps them, with so many linear programs each."""
-_MOST_HALVINGS, _LOOSE = 24, 1e-3
-"""Times that an interval of sensitivities is halved, and the relative width at which a bound is close enough."""
+_LOOSE = 1e-3
+"""Relative width at which a bound over an interval of sensitivities is close enough."""
 _PROOF_TOLERANCE = 1e-9
 """A design may exceed a proven limit by this share, which is rounding, and no more."""
 _NOT_LINEAR = "is not linear in the filter"
@@ -85,7 +84,7 @@ def limit_of(
     if refused is not None:
         raise SweepError(ValidationIssue(f"no limit: {refused}"))
     effort = tolerance_dn, most_programs, sensitivities
-    if may_be_brightest(problem.setup, _most_sensitive(problem)):
+    if may_be_brightest(problem.setup):
         return _limit_of_exposures(problem, *effort)
     return _limit_of(problem, *effort)
 
@@ -101,29 +100,30 @@ def _limit_of_exposures(
     stated, most = problem.constraints.get(SENSITIVITY), _most_sensitive(problem)
     least = 0.0 if stated is None or stated.min is None else stated.min
     dim = largest_sensitivity_not_brightest(problem.setup)
+    relaxed = _relaxed(problem)[0]
 
     def part(a: float, b: float) -> _Part:
         within = replace(problem, constraints={**problem.constraints, SENSITIVITY: Bound.model_construct(min=a, max=b)})
-        if a < dim:
-            return _Part(a, b, _limit_of(within, tolerance_dn, most_programs, sensitivities))
-        exposed = replace(within, setup=exposed_at(problem.setup, a - 2 * FEASIBLE))
+        exposed = replace(within, setup=exposed_at(problem.setup, max(0.0, a - 2 * FEASIBLE)))
         limit = _limit_of(exposed, tolerance_dn, most_programs, [max(s, a) for s in sensitivities])
-        if limit.curve is not None:  # as it is at its own exposure
-            relaxed = _relaxed(within)[0]
-            attained, curve = _inside(relaxed, limit.curve, None, _pool_of(relaxed))
-            limit = replace(limit, attained=attained, curve=curve if attained > -np.inf else None)
+        share = 0.0 if limit.curve is None else float(limit.curve.sum() / problem.setup.camera.base_qe.sum())
+        if limit.curve is not None and share > max(a, dim):  # at its own exposure
+            own = replace(relaxed, setup=exposed_at(problem.setup, share))
+            limit = replace(limit, attained=_attained(own, limit.curve, _pool_of(own).least(limit.curve)))
         return _Part(a, b, limit)
 
-    ends = [least, dim, most] if least < dim < most else [least, most]
-    parts = [part(a, b) for a, b in pairwise(ends)]
-    for _ in range(_MOST_HALVINGS):
+    parts = [part(least, most)]
+    while sum(p.limit.programs for p in parts) < most_programs:
         highest, attained = max(parts, key=lambda p: p.limit.proven), max(p.limit.attained for p in parts)
         a, b = highest.least, highest.most
-        if a < dim or b <= a * (1 + _LOOSE) or highest.limit.proven - attained <= _LOOSE * highest.limit.proven:
+        loose = max(_LOOSE * highest.limit.proven, tolerance_dn)
+        if b <= max(dim, a * (1 + _LOOSE)) or highest.limit.proven - attained <= loose:
             break
         parts.remove(highest)
-        parts += [part(a, (a + b) / 2), part((a + b) / 2, b)]
+        middle = dim if a < dim else (a + b) / 2
+        parts += [part(a, middle), part(middle, b)]
     best, limits = max((p.limit for p in parts), key=lambda limit: limit.attained), [p.limit for p in parts]
+    best = best if best.attained > -np.inf else replace(best, curve=None)
     elsewhere = [
         max((p.limit.elsewhere[k] for p in parts if p.most >= s), default=-np.inf) for k, s in enumerate(sensitivities)
     ]

@@ -350,7 +350,7 @@ class Document:
         for position, part in enumerate(loc):
             key = _written(node, part)
             if key != part:
-                varied = {part for name in node[key]["each"] for part in str(name).split(".")}
+                varied = {part for name in node[key].get("each", ()) for part in str(name).split(".")}
             if _has(node, key):
                 path.append(key)
                 node = node[key]
@@ -438,7 +438,8 @@ def _written(node: Any, key: Key) -> Key:
     """Return the key as the file has it: a scenario made by `each` is named after the one that it was made from."""
     if isinstance(node, dict) and isinstance(key, str) and key not in node:
         for name, entry in node.items():
-            if isinstance(entry, dict) and isinstance(entry.get("each"), dict) and key.startswith(f"{name} "):
+            made = isinstance(entry, dict) and (isinstance(entry.get("each"), dict) or entry.get("cfa") == "tiles")
+            if made and key.startswith(f"{name} "):
                 return str(name)
     return key
 

@@ -132,16 +132,8 @@ def search_of(section: StudySection, spaces: Sequence[Space], sources: Sources) 
     if requested is None:
         return None
     boxes = {space.name: space for space in spaces if space.kind in ("sweep", "search")}
-    names = [*section.sweeps, *section.boxes]
+    chosen, tiles = _chosen(section, boxes, sources)
     scenarios = list(section.scenarios)
-    chosen = requested.space or (names[0] if len(names) == 1 else None)
-    if chosen is None:
-        problem = "missing: the search needs one sweep or box"
-        sources.refuse(Fault(("search", "space"), problem, None, ", ".join(names) or "a sweep"))
-    elif chosen not in names:
-        sources.refuse(unknown(("search", "space"), "sweep or box", chosen, names))
-    elif chosen in boxes and not _free(boxes[chosen], requested.map or {}):
-        sources.refuse(Fault(("search", "space"), "every parameter is fixed", chosen, "one free parameter or more"))
     bases = {name: scene.series or name for name, scene in section.scenarios.items()}
     scenario_name = requested.scenario or scenarios[0]
     searched = (
@@ -158,6 +150,8 @@ def search_of(section: StudySection, spaces: Sequence[Space], sources: Sources) 
         return None
     if len(searched) > 1:
         sources.refuse(*_check_series(section))
+        if tiles:
+            sources.refuse(Fault(("search", "scenario"), "a search over tiles is in one scenario", None, searched[0]))
     levels: tuple[float, ...] = ()
     if requested.front is not None:
         levels = Axis(min=requested.front.min, max=requested.front.max, count=requested.front.count).points()
@@ -175,9 +169,45 @@ def search_of(section: StudySection, spaces: Sequence[Space], sources: Sources) 
     name += " (search)" if name in others else ""
     starts = 1 if requested.algorithm in ONE_START else requested.starts
     effort = requested.algorithm, starts, requested.max_evaluations
-    return Search(
-        name, space, searched[0], tuple(searched), *effort, levels, _map_of(requested.map or {}, space, sources)
-    )
+    held = _map_of(requested.map or {}, space, sources)
+    return Search(name, space, searched[0], tuple(searched), *effort, levels, tiles, held)
+
+
+def _chosen(
+    section: StudySection, boxes: Mapping[str, Space], sources: Sources
+) -> tuple[str | None, tuple[Space, ...]]:
+    """Return the name of the searched space, and all spaces of a search over tiles, of which it is the first."""
+    assert section.search is not None
+    requested, groups = section.search, dict[str, list[Space]]()
+    for name, box in section.boxes.items():
+        groups.setdefault(box.group or name, []).extend([boxes[name]] if name in boxes else [])
+    names = [*section.sweeps, *groups]
+    chosen = requested.space or (names[0] if len(names) == 1 else None)
+    if chosen is None:
+        problem = "missing: the search needs one sweep or box"
+        sources.refuse(Fault(("search", "space"), problem, None, ", ".join(names) or "a sweep"))
+    elif chosen not in names:
+        sources.refuse(unknown(("search", "space"), "sweep or box", chosen, names))
+    tiles = groups.get(chosen or "", []) if chosen not in boxes else []
+    if tiles:
+        sources.refuse(*_check_tiles(section, tiles, chosen or ""))
+        chosen = tiles[0].name
+    if chosen is not None and chosen in boxes and not _free(boxes[chosen], requested.map or {}):
+        sources.refuse(Fault(("search", "space"), "every parameter is fixed", chosen, "one free parameter or more"))
+    return chosen, tuple(tiles)
+
+
+def _check_tiles(section: StudySection, tiles: Sequence[Space], name: str) -> Iterator[Fault]:
+    """Check that a search over tiles is asked for what it has."""
+    assert section.search is not None
+    if section.search.map is not None:
+        yield Fault(("search", "map"), "of one tile, and the search is over several", None, "a box with a `cfa`")
+    if section.search.algorithm != "SLSQP":
+        yield Fault(("search", "algorithm"), "of a search over tiles", section.search.algorithm, "SLSQP")
+    if section.validation is not None and section.validation.leave_one_out:
+        yield Fault(("validate", "leave_one_out"), "of one tile, and the search is over several", name, "a box of one")
+    if any(space.filter is not None and isinstance(space.filter.family, ChoosingFamily) for space in tiles):
+        yield Fault(("search", "space"), "a search over tiles has no choice from a catalog", name, "another family")
 
 
 def _check_series(section: StudySection) -> Iterator[Fault]:
@@ -254,7 +284,11 @@ def _check_merged(section: StudySection) -> Iterator[Fault]:
 def refuse_unreachable(study: Study) -> None:
     """Raise InfeasibleError if no filter of the searched space can meet a constraint."""
     search = study.search
-    if search is not None and (beyond := unreachable_constraints(study, search.space, search.scenario)):
+    if (
+        search is not None
+        and not search.tiles
+        and (beyond := unreachable_constraints(study, search.space, search.scenario))
+    ):
         raise InfeasibleError([ValidationIssue(f"{study.name}: no design can be feasible"), *beyond])
 
 

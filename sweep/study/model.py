@@ -41,7 +41,8 @@ from .schema import StudySection
 class Search:
     """A search inside the box of a sweep.
 
-    Its objective counts in `scenario`, or with its worst value over all `scenarios` of a series.
+    Its objective counts in `scenario`, or with its worst value over all `scenarios` of a series. `tiles`: spaces of
+    which the best one is searched, of which `space` is the first; its levels are then those of the CFA sensitivity.
     """
 
     name: str
@@ -52,7 +53,13 @@ class Search:
     starts: int
     max_evaluations: int
     levels: tuple[float, ...] = ()
+    tiles: tuple[Space, ...] = ()
     map: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+
+    @property
+    def searched(self) -> tuple[Space, ...]:
+        """All spaces of which a filter may be the answer."""
+        return self.tiles or (self.space,)
 
 
 @dataclass(frozen=True)
@@ -244,8 +251,8 @@ class Study:
         by one overflow together.
         """
         tolerance_dn = self.section.tolerance_dn if tolerance_dn is None else tolerance_dn
-        searched = None if self.search is None or scenario not in self.search.scenarios else self.search.space
-        spaces = [space for space in self.spaces if space.size or space is searched] or list(self.spaces)
+        searched = () if self.search is None or scenario not in self.search.scenarios else self.search.searched
+        spaces = [space for space in self.spaces if space.size or space in searched] or list(self.spaces)
         try:
             boxes = [self.box(space, scenario) for space in spaces]
             return plan_scene(scenario, boxes, tolerance_dn, self.section.accuracy, for_noise=bool(self.states))

@@ -39,11 +39,13 @@ from .schema_curves import (
     listed,
     named,
 )
+from .tiles import with_tiles
 
 _MOST_ROWS = 64
 _MOST_LETTERS = 100
 _MOST_DRAWN = 1_000_000
 _MOST_OWN = 50
+_MOST_BOXES = 10_000
 MOST_TYPES = 40
 """Signal types of a study; 780 pairs of them have columns of their own."""
 
@@ -150,10 +152,17 @@ class SweepSection(Modification):
 
 
 class BoxSection(Modification):
-    """A box that is searched but not swept; a parameter that is not named may take all its family's values."""
+    """A box that is searched but not swept; `cfa: tiles` makes one for each pixel of each of the study's tiles.
+
+    An edge that is not named lies where the base curve has light; another parameter may take all its family's values.
+    """
 
     box: dict[Name, Span] = {}
     """Parameter -> range."""
+    below: bool = False
+    """True: the filter takes light away only; where `to` is above the base it is the base."""
+    group: str = ""
+    """The box of all `tiles` that this one is of; stated by a run."""
 
 
 class Production(Section):
@@ -210,9 +219,10 @@ class SearchSection(Section):
     name: Name | None = None
     """Name of the best design in tables and report; left out, `best` and the family."""
     space: Name | None = None
-    """The sweep or box to search; may be left out where there is one."""
+    """The sweep or box to search; may be left out where there is one. Of a box of all `tiles`, the best tile."""
     front: Levels | None = None
-    """Levels of the lowest allowed sensitivity at which the search is repeated for the trade-off."""
+    """Levels of the lowest allowed sensitivity at which the search is repeated for the trade-off; over `tiles` levels
+    of the CFA sensitivity, the light of the whole tile."""
     map: Annotated[dict[Name, Values], Field(min_length=2, max_length=2)] | None = None
     """Two parameters and their values: the best objective at each pair of values, with all others free."""
     scenario: Name | None = None
@@ -303,10 +313,14 @@ class StudySection(Section):
     """Distances at which the size of a light on the sensor is told, by name."""
     cfas: Annotated[
         dict[Name, CfaSection],
-        BeforeValidator(_cfas, json_schema_input_type=list[Name] | dict[Name, CfaSection | None]),
+        BeforeValidator(
+            _cfas, json_schema_input_type=list[Name] | dict[Name, CfaSection | list[Name] | Literal["2x2"] | int | None]
+        ),
         Field(min_length=1, max_length=1000),
     ]
-    """CFAs to compare: a list of names of 2x2 pixels (RGGB, RYYCy), or NAME: {tile: [[R, G], [B, W]]}."""
+    """CFAs to compare: a list of names of 2x2 pixels (RGGB, RYYCy), or NAME: {tile: [[R, G], [B, W]]}. Beside names,
+    `tiles: 2x2` with `of` (a list of channels) makes all tiles of these, and `tiles: [RGGB, RYYCy]` those; with
+    `modified: 1` a box with `cfa: tiles` is searched in each pixel of each."""
     colorants: Annotated[
         ColorantsSection | None,
         BeforeValidator(catalog, json_schema_input_type=list[Name] | Name | ColorantsSection | None),
@@ -316,7 +330,7 @@ class StudySection(Section):
     """Single filters to compare with, by name."""
     sweeps: Annotated[dict[Name, SweepSection], Field(max_length=1000)] = {}
     """Sets of filters, by name: grids, samples of a box, lists."""
-    boxes: Annotated[dict[Name, BoxSection], Field(max_length=1000)] = {}
+    boxes: Annotated[dict[Name, BoxSection], Field(max_length=_MOST_BOXES)] = {}
     """Ranges of filters that are searched but not swept, by name."""
     production: Production = Production()
     """Production tolerances of the filter; then worst_... quantities exist."""
@@ -353,8 +367,8 @@ class StudySection(Section):
 
     @model_validator(mode="before")
     @classmethod
-    def _of_camera(cls, value: Any) -> Any:
-        return with_camera(value)
+    def _written_out(cls, value: Any) -> Any:
+        return with_tiles(with_camera(value))
 
     @property
     def wanted_yield(self) -> float:

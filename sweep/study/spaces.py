@@ -21,7 +21,7 @@ from ..designs.ungridded import ListedDesigns, Method, PairedDesigns, SampledDes
 from ..spectra.builtin.surrogate import surrogate_parameters
 from ..spectra.colorants import Colorants
 from .document import KeyPath
-from .schema import DesignSection, Modification, StudySection, SweepSection
+from .schema import BoxSection, DesignSection, Modification, StudySection, SweepSection
 from .sensors import check_filter
 from .sources import Sources
 from .user_code import allowed, code_of, is_from_outside
@@ -191,12 +191,15 @@ class SpaceBuilder:
         target = self.sensor.curve(entry.to) if isinstance(entry.to, str) else None
         if isinstance(entry.to, float | int):
             target = base * entry.to
+        if target is not None and isinstance(entry, BoxSection) and entry.below:
+            target = np.minimum(base, target)
         try:
             family = self._family(entry, base, target)
         except SweepError as error:
             self.sources.refuse(*faults_of((*path, "family"), error))
             return []
-        ordered = self._axes(axes, axes_path, family.parameters)
+        usual = family.usual_box(base) if kind == "search" else {}
+        ordered = self._axes({**usual, **axes}, axes_path, family.parameters)
         if rows is not None and rows.size * len(ordered) > _MOST_DRAWN:
             allowed = f"at most {_MOST_DRAWN // len(ordered):,} designs of {len(ordered)} parameters"
             self.sources.refuse(Fault(path, "too many designs that are no grid", f"{rows.size:,}", allowed))
