@@ -160,6 +160,7 @@ def own_tile(output: Output, row: Row) -> Row | None:
 
 
 def modifications(output: Output) -> list[Modification]:
-    """Return the study's named designs, sweeps and boxes."""
-    study = output.study
-    return [*study.designs.values(), *study.sweeps.values(), *study.boxes.values()]
+    """Return the study's named designs, sweeps and boxes; of a box over tiles that of the best tile."""
+    study, search = output.study, output.provenance.search
+    boxes = [box for name, box in study.boxes.items() if not box.group or (search is not None and name == search.space)]
+    return [*study.designs.values(), *study.sweeps.values(), *boxes]

@@ -88,7 +88,8 @@ class Numbers:
     def with_unit(self, number: float) -> str:
         """Return a number with its unit: `5.56 ms`, `10 %`."""
         unit = {"s": "ms", "share": "%"}.get(self.unit, self.unit)
-        text = number_of(self.factor * number)
+        whole = self.unit == "bits" and number == round(number)
+        text = f"{number:.0f}" if whole else number_of(self.factor * number)
         return f"{text}\u00a0{unit}" if unit else text
 
     def at(self, place: int) -> str:

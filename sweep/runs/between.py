@@ -41,7 +41,7 @@ class Between:
 
 
 def between(study: Study, setup: Setup, scenarios: Mapping[str, float]) -> Between | None:
-    """Return the scenes between scenarios that differ in the number of their names alone, else None."""
+    """Return the scenes between scenarios that differ in one number alone, else None; none lies between whole ones."""
     names = list(scenarios)
     leaves = [dict(_leaves(_section(study, name))) for name in names]
     paths = {path for of in leaves for path in of if of.get(path) != leaves[0].get(path)}
@@ -50,7 +50,7 @@ def between(study: Study, setup: Setup, scenarios: Mapping[str, float]) -> Betwe
     path = paths.pop()
     values = [of.get(path) for of in leaves]
     same = all(
-        isinstance(value, int | float) and math.isclose(value, number, rel_tol=1e-9)
+        isinstance(value, float) and math.isclose(value, number, rel_tol=1e-9)
         for value, number in zip(values, scenarios.values(), strict=True)
     )
     return Between(study, setup, names[0], path) if same else None

@@ -15,7 +15,7 @@ from ...metrics.quantity import DN, Column
 from ...results.output import Output
 from ..section import Section, Table
 from ..terms import bound_conditions, edges_in_words, edges_of
-from ..words import amount, of_column
+from ..words import amount, joined, of_column
 
 _LOOSE = 0.5
 _COUNTED = {
@@ -62,41 +62,41 @@ class AllTiles(Section):
     def answer(self) -> list[str]:
         """The best tile, what none exceeds, and how many were searched."""
         best, proven, counts = self.best[0], self.limits_of[0], self.counts
-        total = sum(counts.values())
-        lines = [
-            f"Of {total} tiles with one modified pixel, **{_tile(best)}** is the best one: "
-            f"{of_column(self.column, best['objective'])}, with {edges_in_words(edges_of(best))}, before rounding to digital numbers."
-        ]
-        if np.isfinite(proven):
-            share = amount(best["objective"] / proven, "share") if proven > 0 else ""
-            lines.append(
-                f"No filter that takes light away from one pixel of any of them exceeds **{self.column.format_bound(proven)}** {self.under} (proven); "
-                f"it reaches {share} of that."
-            )
         told = {
             "searched": "searched",
-            "excluded": "excluded without a search, since no filter in them is better",
+            "excluded": "excluded without a search, since their upper bounds are no higher",
             "too dark": "too dark with any filter",
-            "impossible": "without any filter that meets the constraints (proven)",
+            "impossible": "without a filter that meets the constraints (proven)",
         }
         parts = [f"{count} {told.get(status, status)}" for status, count in counts.items() if count]
-        lines.append(f"Tiles: {'; '.join(parts)}.")
-        return lines
+        text = (
+            f"Of {sum(counts.values())} tiles with one modified pixel ({joined(parts)}), **{_tile(best)}** is the best "
+            f"found: **{of_column(self.column, best['objective'])}**, with {edges_in_words(edges_of(best))}, before "
+            "rounding to digital numbers."
+        )
+        if np.isfinite(proven):
+            text += (
+                " No filter that takes light away from one pixel of any of these tiles exceeds "
+                f"**{self.column.format_bound(proven)}** {self.under} (proven)."
+            )
+        return [text]
 
     @property
     def limits(self) -> list[str]:
         """Where the bound is far, and what the search is within."""
+        known = zip(self.best, self.limits_of, strict=True)
         far = [
-            f"{100 * best['cfa_sensitivity']:.1f} %"
-            for best, proven in zip(self.best, self.limits_of, strict=True)
+            amount(best["cfa_sensitivity"], "share")
+            for best, proven in known
             if np.isfinite(proven) and best["objective"] < _LOOSE * proven
         ]
         lines = [
             "The filters are found within the study's box of edges; tiles with equal values count as the one with more light, then with fewer kinds of pixels."
         ]
+        far = list(dict.fromkeys(far))
         if far:
             lines.append(
-                f"At {', '.join(far)} of the light the bound is more than twice what was found: a filter of another shape may be much better."
+                f"At {joined(far)} of the light the bound is more than twice what was found: another shape may be much better."
             )
         return lines
 
@@ -109,7 +109,7 @@ class AllTiles(Section):
             "tile",
             "light",
             "edges",
-            self.column.words,
+            "found",
             "none exceeds",
             *(_COUNTED[name] for name in counted),
         ]
@@ -118,8 +118,8 @@ class AllTiles(Section):
             level = row["cfa_sensitivity_min"]
             rows.append(
                 (
-                    "as the study" if not np.isfinite(level) else amount(level, "share"),
-                    _tile(row),
+                    "the study's" if not np.isfinite(level) else amount(level, "share"),
+                    f"{row['cfa']}, N of {row['base']}",
                     amount(row["cfa_sensitivity"], "share"),
                     edges_in_words(edges_of(row)).replace("**", "").removeprefix("edges at "),
                     of_column(self.column, row["objective"]),
