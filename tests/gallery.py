@@ -25,6 +25,7 @@ STUDIES = Path(__file__).parent.parent / "studies"
 
 PICTURES = (
     "stopband",
+    "tiles",
     "chromatic",
     "freeform",
     "producible",
@@ -44,6 +45,7 @@ PICTURES = (
     "paper",
     "scorecard",
     "distance",
+    "pixel",
     "exposure",
     "fog",
     "night",
@@ -60,6 +62,7 @@ ANSWERED = (
     STUDIES / "README.md",
     STUDIES / "guide" / "11-hdr-and-flicker.md",
     STUDIES / "guide" / "12-sensors.md",
+    STUDIES / "guide" / "13-pixel-and-tile.md",
 )
 """Documents with the answers of studies."""
 ROW = re.compile(r"^\| `(\w+)` \| (.*) \| !\[(.*)\]\(figures/(\w+)\.png\) \| (.*) \|$", re.MULTILINE)

@@ -88,9 +88,12 @@ class Numbers:
     def with_unit(self, number: float) -> str:
         """Return a number with its unit: `5.56 ms`, `10 %`."""
         unit = {"s": "ms", "share": "%"}.get(self.unit, self.unit)
-        whole = self.unit == "bits" and number == round(number)
-        text = f"{number:.0f}" if whole else number_of(self.factor * number)
+        text = self.bare(number)
         return f"{text}\u00a0{unit}" if unit else text
+
+    def bare(self, number: float) -> str:
+        """Return a number in the unit of an axis, without it."""
+        return number_of(self.factor * number)
 
     def at(self, place: int) -> str:
         """Return one of the numbers with its unit."""

@@ -17,7 +17,7 @@ from ..metrics.bound import Bound
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY, SENSITIVITY, cfa_sensitivity_at
 from .limit import check_bound, limit_of, reason_without_bound
 from .problem import Evaluation, Problem
-from .solver import search_from
+from .solver import search_from, smooth_evaluation
 from .trade_off import Effort, with_least
 
 _BOUND_DN, _PROGRAMS, _MORE_PROGRAMS = 0.5, 100, 400
@@ -112,6 +112,7 @@ def search_tiles(
         progress("tiles at all levels of light", total - left, total)
     found.polish(parallel)
     found.carry()
+    found.share()
     found.tighten(parallel)
     winners = tuple(found.winner(level) for level in range(len(all_levels)))
     return Tiles(all_levels, tuple(tuple(row) for row in tiles), winners)
@@ -193,6 +194,16 @@ class _Found:
                 whose.append((level, tile))
         for (level, tile), best in zip(whose, parallel(calls), strict=True):
             self.take(level, tile, best)
+
+    def share(self) -> None:
+        """Put the best filter of each level into the other tiles of its base: of equal tiles all have it then."""
+        for level, row in enumerate(self.tiles):
+            values = [self.value(level, i) for i in range(len(row))]
+            top = values.index(max(values))
+            best = row[top].best
+            for i in self._alike(top):
+                if best is not None and row[i].limit >= best.objective * (1 - _TIE_SHARE):
+                    self.take(level, i, smooth_evaluation(self.problem(level, i), best.x))
 
     def tighten(self, parallel: Parallel) -> None:
         """Compute the highest bounds of each level at its own light, a few times; all of them hold anyway."""

@@ -58,6 +58,5 @@ def test_an_error_that_comes_back_between_two_numbers_is_found() -> None:
     assert [row["at"] for row in found] == pytest.approx([3 * np.exp(-0.2), 3 * np.exp(0.2)], rel=2e-3)
 
 
-def test_numbers_of_names_are_those_of_the_scenes_or_nothing_is_looked_for(tmp_path: Path) -> None:
-    named = [f'"dim percent={name}": {{{LEVEL % level}}}' for name, level in ((50, 0.5), (2, 0.02))]
-    assert crossings(tmp_path, *named).empty
+def test_nothing_is_looked_for_between_whole_numbers(tmp_path: Path) -> None:
+    assert crossings(tmp_path, f"dim: {{{LEVEL % 0.5}, each: {{pixel.bits: [4, 12]}}}}").empty

@@ -15,6 +15,7 @@ import pandas as pd
 import pytest
 
 from sweep.base.errors import OutputError
+from sweep.camera.scene import Scene
 from sweep.designs.families.stopband import MultiStopband
 from sweep.designs.space import Filter, Space
 from sweep.metrics.bound import FEASIBLE
@@ -172,4 +173,4 @@ def test_a_full_disk_is_one_line_and_loses_nothing(tmp_path: Path, jobs: int) ->
 
 
 def test_a_scenario_may_have_any_name() -> None:
-    assert series_of(("road speed=high", "road speed=3")) == {}
+    assert series_of({"road speed=2": Scene(), "road speed=3": Scene()}) == {}

@@ -297,7 +297,7 @@ def test_other_commands_say_how_to_choose_one(tmp_path: Path) -> None:
     assert commanded("check", path)[0] == 0
     code, _, err = commanded("plan", path)
     assert code == 2
-    assert "a study of several sensors or lights" in err
+    assert "a study of several sensors, pixels or lights" in err
 
 
 def test_a_plain_run_is_not_overwritten(tmp_path: Path) -> None:

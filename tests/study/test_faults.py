@@ -72,7 +72,7 @@ def test_no_fault_follows_from_another(tmp_path: Path, old: str, new: str, expec
         (
             "search:\n",
             "serach:\n",
-            "tiny.yaml:20: serach: unknown key; allowed: study, title, question, seed, wavelengths, sensor, sensors, camera, pixel, lights, "
+            "tiny.yaml:20: serach: unknown key; allowed: study, title, question, seed, wavelengths, sensor, sensors, camera, pixel, pixels, lights, "
             "scenarios, columns, tolerance_dn, accuracy, geometry, cfas, colorants, designs, sweeps, boxes, production, population, uncertainty, regions, recognition, tasks, vision, metrics, effects, objective, constraints, search, validate, published; did you mean 'search'?",
         ),
         (
@@ -182,7 +182,7 @@ def test_no_fault_follows_from_another(tmp_path: Path, old: str, new: str, expec
         (
             "sensor: ar0820\n",
             "sensor: ar0820\npixel: {well_ke: 10}\n",
-            "tiny.yaml:3: pixel.well_ke: unknown key; allowed: pitch_um, fill_factor, well_e, bits, gain_dn_per_e, "
+            "tiny.yaml:3: pixel.well_ke: unknown key; allowed: pitch_um, fill_factor, well_e, well_e_per_um2, bits, gain_dn_per_e, "
             "offset_dn, crosstalk, read_noise_e, dark_e_per_s, prnu, captures, merge, threshold, companding; did you mean 'well_e'?",
         ),
         (

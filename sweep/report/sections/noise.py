@@ -204,7 +204,7 @@ def ranges_in_words(numbers: Numbers, ranges: tuple[tuple[float, float], ...]) -
     parts = []
     for low, high in ranges:
         if math.isinf(low) and math.isinf(high):
-            parts.append(f"from {digits(numbers.factor * numbers.x[0])} to {numbers.at(len(numbers.x) - 1)}")
+            parts.append(f"from {numbers.bare(numbers.x[0])} to {numbers.at(len(numbers.x) - 1)}")
         elif math.isinf(low):
             parts.append(f"up to {numbers.with_unit(inward(high, up=False))}")
         elif math.isinf(high):
