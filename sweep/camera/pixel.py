@@ -100,7 +100,8 @@ class Pixel(Section):
         """Return the keys with the full well that follows from the pitch."""
         density = value.get("well_e_per_um2") if isinstance(value, dict) else None
         pitch_um = value.get("pitch_um", DEFAULT_PITCH_UM) if isinstance(value, dict) else None
-        if not all(isinstance(number, int | float) for number in (density, pitch_um)):
+        well = 0.0 if not isinstance(value, dict) else value.get("well_e", 0.0)
+        if not all(isinstance(number, int | float) for number in (density, pitch_um, well)):
             return value
         well_e = float(density) * float(pitch_um) ** 2  # type: ignore[arg-type]
         if "well_e" in value and not math.isclose(value["well_e"], well_e, rel_tol=1e-9):
@@ -136,12 +137,11 @@ class Pixel(Section):
         return self
 
     def with_numbers(self, changes: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the keys of the pixel with some of them replaced; of a full well and its density the replaced one."""
-        keys: dict[str, Any] = {**self.model_dump(exclude_unset=True), **changes}
-        given = [name for name in ("well_e", "well_e_per_um2") if name in changes] or ["well_e_per_um2"]
-        if keys.get(given[0]) is not None:
-            keys = {key: value for key, value in keys.items() if key in given or not key.startswith("well_e")}
-        return keys
+        """Return the keys of the pixel with some of them replaced; see `merged`."""
+        keys = self.model_dump(exclude_unset=True)
+        if self.well_e_per_um2 is not None:
+            keys.pop("well_e", None)
+        return merged(keys, changes)
 
     @property
     def knees(self) -> Float[Array, "2 knees"]:
@@ -192,6 +192,13 @@ class Pixel(Section):
         if self.captures:
             return max(capture.saturation_e / of.light for capture, of in zip(self.read_as, self.captures, strict=True))
         return min(self.well_e, (self.full_scale_dn - self.offset_dn) / self.dn_per_e)
+
+
+def merged(keys: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the keys of a pixel with some of them replaced; a full well replaces its density, and the other way."""
+    wells = {"well_e", "well_e_per_um2"}
+    gone = {name for name in wells & keys.keys() if wells & changes.keys() - {name}}
+    return {**{key: value for key, value in keys.items() if key not in gone}, **changes}
 
 
 @lru_cache(maxsize=64)

@@ -42,7 +42,7 @@ from .sections.tiles import AllTiles
 from .sections.trade_off import TradeOff
 from .sections.uncertain import Uncertain
 from .terms import format_constraints, unknown_lines
-from .words import scaled
+from .words import joined, quantity, quoted, scaled
 
 ORDER: tuple[type[Section], ...] = (
     *(
@@ -110,12 +110,23 @@ def answer_of(output: Output) -> list[str]:
         return [f"No design meets every constraint{f': {under}' if under else ''}.", *unknown_lines(output)]
     lead, _ = sections_of(output)
     sentences = [] if lead is None else lead.answer
-    first, *rest = sentences[:_MOST_ANSWERS] or ["No CFA or design of this study could be computed."]
+    first, *rest = sentences[:_MOST_ANSWERS] or [_of_scenes(output)]
     return (
         [scaled(output, first), *rest]
         if " DN" in first or "\u00a0DN" in first
         else [first, *(scaled(output, line) if at == 0 else line for at, line in enumerate(rest))]
     )
+
+
+def _of_scenes(output: Output) -> str:
+    """Return in how many scenes each CFA or design has the largest separation."""
+    column, rows = output.trade_off[0], output.named_rows
+    known = rows[(rows["status"] == "ok") & rows[column.name].notna()]
+    if known.empty:
+        return "No CFA or design of this study could be computed."
+    best = known.loc[known.groupby("scenario", observed=True, sort=False)[column.name].idxmax(), "name"].value_counts()
+    parts = [f"**{quoted(str(name))}** in {count}" for name, count in best.items() if count]
+    return f"Of {len(output.scenarios):,} scenes, the largest {quantity(column)} has {joined(parts)}."
 
 
 def limits_of(output: Output) -> list[str]:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -112,7 +113,10 @@ def _limit_of_exposures(
             limit = replace(limit, attained=_attained(own, limit.curve, _pool_of(own).least(limit.curve)))
         return _Part(a, b, limit)
 
-    parts = [part(least, most)]
+    inner = sorted(s for s in sensitivities if max(least, dim) < s < most)
+    asked = inner[len(inner) // 2 :: max(1, len(inner) // 2)]
+    ends = sorted({least, most, *asked, *([max(least, dim)] if inner else [])})
+    parts = [part(a, b) for a, b in pairwise(ends)]
     while sum(p.limit.programs for p in parts) < most_programs:
         highest, attained = max(parts, key=lambda p: p.limit.proven), max(p.limit.attained for p in parts)
         a, b = highest.least, highest.most

@@ -250,12 +250,11 @@ def _bound_all(
     problems: Sequence[Problem], tiles: list[list[TileAtLevel]], parallel: Parallel, progress: Progress
 ) -> None:
     """Compute upper bounds: one proof for all tiles of the same channels, at the least light, and tangents above it."""
-    if not problems or any(reason_without_bound(problem) is not None for problem in problems):
-        return
+    bounded = [reason_without_bound(problem) is None for problem in problems]
     groups: dict[Hashable, list[tuple[int, int]]] = {}
     for level, row in enumerate(tiles):
         for i, tile in enumerate(row):
-            if tile.limit > -np.inf:
+            if tile.limit > -np.inf and bounded[i]:
                 groups.setdefault(_kind(problems[i]), []).append((level, i))
     calls, whose = [], []
     for members in groups.values():

@@ -86,6 +86,8 @@ Span = Annotated[Axis, BeforeValidator(_span, json_schema_input_type=float | lis
 
 
 ZIP = "zip"
+_MADE = ("series", "at", "each")
+"""Keys of scenarios that say how `each` made them."""
 _MOST_SCENARIOS = 2000
 _MOST_KEYS = 500_000
 """Most keys of all scenarios that `each` makes."""
@@ -151,6 +153,8 @@ def _size(value: Any) -> int:
 
 def _points(path: tuple[str, ...], key: Any, axis: Any) -> list[dict[str, float]]:
     """Values of one key of `each`, or of all keys of its `zip`, by key."""
+    if str(key).partition(".")[0] in _MADE:
+        raise Fault((*path, key), "no number of a scenario", None, "target.distance_m, pixel.bits, ...")
     if key != ZIP:
         return [{str(key): number} for number in _numbers((*path, key), axis)]
     if not isinstance(axis, dict) or not axis:
@@ -174,7 +178,11 @@ def _numbers(path: tuple[str, ...], axis: Any) -> tuple[float, ...]:
         raise Fault(path, "not a number" if texts else "no values", value, FORMS) from None
     if checked.size > _MOST_SCENARIOS:
         raise Fault(path, "too many values", f"{checked.size:,}", f"at most {_MOST_SCENARIOS:,}")
-    return tuple(axis) if isinstance(axis, list) else checked.points()
+    if isinstance(axis, list):
+        return tuple(axis)
+    points = checked.points()
+    whole = isinstance(axis, dict) and all(isinstance(axis.get(end), int) for end in ("min", "max"))
+    return tuple(int(value) if whole and value == int(value) else value for value in points)
 
 
 def _set(mapping: dict[str, Any], name: str, dotted: str, number: float) -> None:

@@ -7,6 +7,7 @@ from itertools import product
 from typing import Any, NamedTuple
 
 from ..base.errors import StudyError, SweepError
+from ..camera.pixel import merged
 from ..camera.sensor import BUILT_IN_SENSORS, own_red
 from ..spectra.builtin.measured_sets import LUXEON, SENSORS
 from .document import Document
@@ -120,7 +121,7 @@ def choose(document: Document, member: SensorAndLights) -> None:
         own = next(pixel for name, pixel in pixels.items() if str(name) == member.pixel)
         keys = {"captures": own} if isinstance(own, str) else {} if own is None else own
         general = document.data.get("pixel", {})
-        both = general | keys if isinstance(keys, dict) and isinstance(general, dict) else keys
+        both = general if not isinstance(general, dict) else merged(general, keys) if isinstance(keys, dict) else keys
         document.put("pixel", both, ("pixels", member.pixel))
         document.data.pop("pixels")
 

@@ -85,9 +85,17 @@ class SpaceBuilder:
         for name, sweep in section.sweeps.items():
             way, axes, rows = _sweep_axes(sweep, section.seed)
             spaces += self._filtered("sweep", name, sweep, axes, ("sweeps", name, way), rows)
-        for name, box in section.boxes.items():
-            axes = {key: axis.points() for key, axis in box.box.items()}
-            spaces += self._filtered("search", name, box, axes, ("boxes", name, "box"))
+        return spaces + self._boxes()
+
+    def _boxes(self) -> list[Space]:
+        """Return the boxes that are searched but not swept."""
+        wrong, spaces = set[str](), list[Space]()
+        for name, box in self.section.boxes.items():
+            if box.group in wrong:  # what is wrong with one tile is wrong with all
+                continue
+            before, axes = len(self.sources.issues), {key: axis.points() for key, axis in box.box.items()}
+            spaces += self._filtered("search", name, box, axes, ("boxes", box.group or name, "box"))
+            wrong |= {box.group} - {""} if len(self.sources.issues) > before else set()
         return spaces
 
     def _without_curve(self, mosaic: Mosaic) -> list[str]:

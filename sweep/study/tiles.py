@@ -23,7 +23,11 @@ _ALLOWED = "{tiles: 2x2, of: [R, G, B, Y, Cy], modified: 1}, or {tiles: [RGGB, R
 def with_tiles(value: Any) -> Any:
     """Return the keys of a study with its tiles written out: each a CFA, and a box of each filter in each."""
     cfas = value.get("cfas") if isinstance(value, dict) else None
-    if not isinstance(cfas, dict) or not isinstance(cfas.get(TILES), str | list):
+    if not isinstance(cfas, dict):
+        return value
+    if not isinstance(cfas.get(TILES), str | list):
+        if isinstance(cfas.get(_OF), list) or isinstance(cfas.get(_COUNT), int):
+            raise Fault(("cfas", TILES), "missing", None, _ALLOWED)
         return value
     modified = cfas.get(_COUNT, 0)
     if modified not in (0, 1) or isinstance(modified, bool):
@@ -31,7 +35,15 @@ def with_tiles(value: Any) -> Any:
     tiles, named = _tiles_of(value, cfas, modified=bool(modified)), dict(cfas)
     for key in (TILES, _OF, _COUNT):
         named.pop(key, None)
-    boxes = value.get("boxes", {})
+    written = _boxes_of(value.get("boxes", {}), tiles, modified)
+    if clash := [cfa for cfa, *_ in tiles if modified and cfa in named]:
+        raise Fault(("cfas", clash[0]), "one of the tiles has this name", None, "another name")
+    made = {cfa: {"tile": rows} for cfa, rows, _ in tiles if cfa not in named}
+    return value | {"cfas": named | made} | ({"boxes": written} if written else {})
+
+
+def _boxes_of(boxes: Any, tiles: Sequence[tuple[str, Any, str]], modified: int) -> dict[str, Any]:
+    """Return the boxes of a study, with those of all tiles written out."""
     written: dict[str, Any] = {}
     for name, box in boxes.items() if isinstance(boxes, dict) else ():
         if not isinstance(box, dict) or box.get("cfa") != TILES:
@@ -48,14 +60,17 @@ def with_tiles(value: Any) -> Any:
     if modified and not any(isinstance(box, dict) and box.get("group") for box in written.values()):
         example = "`boxes: {stopband: {cfa: tiles, family: stopband, to: 0.1}}`"
         raise Fault(("cfas", _COUNT), "no box says which filter modifies the pixel", modified, example)
-    made = {cfa: {"tile": rows} for cfa, rows, _ in tiles if cfa not in named}
-    return value | {"cfas": named | made} | ({"boxes": written} if written else {})
+    return written
 
 
 def _tiles_of(value: Mapping[str, Any], cfas: Mapping[str, Any], *, modified: bool) -> list[tuple[str, Any, str]]:
     """Return the name and the rows of each tile, and the channel whose pixel is modified; empty for none."""
     stated = cfas[TILES]
     if isinstance(stated, list):
+        if _OF in cfas:
+            raise Fault(("cfas", _OF), "goes with `tiles: 2x2`; a list names its tiles", None, f"no `{_OF}`")
+        if len({str(name) for name in stated}) < len(stated) or not stated:
+            raise Fault(("cfas", TILES), "a list of different tiles", stated, _ALLOWED)
         return [tile for name in stated for tile in _of_pattern(name, modified=modified)]
     channels = cfas.get(_OF)
     known = isinstance(channels, list) and all(isinstance(name, str) for name in channels)
