@@ -17,7 +17,7 @@ from .tolerance import ProductionError
 _HALF = SPAN_PER_WIDTH / 2
 _PER_BAND = 5
 _LIT, _BEYOND_NM = 0.01, 30.0
-"""Share of its peak from which on a curve has light, and how far an edge may lie beyond it."""
+"""Share of its peak from which on a curve has light, and how far an edge may lie beyond it, nm."""
 _FEW = 64
 """From so many designs on, a compiled pass saves more time than it takes to load."""
 LEFT, LEFT_WIDTH, RIGHT, RIGHT_WIDTH, DEPTH = range(_PER_BAND)
@@ -110,9 +110,9 @@ class Bands:
     def edges_within(self, base: PerWavelength) -> dict[str, tuple[float, float]]:
         """Return for each edge the wavelengths, nm, where a curve has light, and some beyond that."""
         lit = self._wave[base >= _LIT * base.max()]
-        ends = float(lit[0]) - _BEYOND_NM, float(lit[-1]) + _BEYOND_NM
+        low, high = max(lit[0] - _BEYOND_NM, self._wave[0]), min(lit[-1] + _BEYOND_NM, self._wave[-1])
         at_edges = [p for number, p in enumerate(self.parameters) if number % _PER_BAND in (LEFT, RIGHT)]
-        return {p.name: (max(ends[0], p.low), min(ends[1], p.high)) for p in at_edges}
+        return {p.name: (max(float(low), p.low), min(float(high), p.high)) for p in at_edges}
 
     def perturbed(self, production_error: ProductionError) -> Bands:
         """Return the bands as production makes them."""

@@ -56,7 +56,7 @@ def found(study: Study, levels: tuple[float, ...] = ()) -> tuple[list[Problem], 
     )
 
 
-def brute_force(problem: Problem, starts: int = 16, evaluations: int = 125) -> float:
+def brute_force(problem: Problem, starts: int = 8, evaluations: int = 80) -> float:
     """The best of a search in one tile, as a study of that tile alone makes it."""
     points = starting_points(problem, starts, 1)
     best = best_feasible(
@@ -86,9 +86,9 @@ def test_the_best_of_few_tiles_is_that_of_a_search_in_each(tmp_path: Path, objec
 @pytest.mark.slow
 @pytest.mark.parametrize("light", [0.5, 0.6])
 @pytest.mark.parametrize("objective", ["csd_yellow_red", "chromatic_csd_yellow_red"])
-def test_the_best_of_all_tiles_is_that_of_a_search_in_each(tmp_path: Path, objective: str, light: float) -> None:
+def test_the_best_of_more_tiles_is_that_of_a_search_in_each(tmp_path: Path, objective: str, light: float) -> None:
     changes = ("min: 0.4", f"min: {light}"), ("chromatic_csd_yellow_red", objective)
-    check_against_brute_force(*found(tiles_study(tmp_path, "R, G, B, C, Y, Cy", *changes)))
+    check_against_brute_force(*found(tiles_study(tmp_path, "R, C, Y, Cy", *changes)))
 
 
 def test_levels_of_light_have_no_better_filter_at_more(tmp_path: Path) -> None:
