@@ -110,7 +110,7 @@ class Bands:
     def edges_within(self, base: PerWavelength) -> dict[str, tuple[float, float]]:
         """Return for each edge the wavelengths, nm, where a curve has light, and some beyond that."""
         lit = self._wave[base >= _LIT * base.max()]
-        low, high = max(lit[0] - _BEYOND_NM, self._wave[0]), min(lit[-1] + _BEYOND_NM, self._wave[-1])
+        low, high = lit[0] - _BEYOND_NM, lit[-1] + _BEYOND_NM
         at_edges = [p for number, p in enumerate(self.parameters) if number % _PER_BAND in (LEFT, RIGHT)]
         return {p.name: (max(float(low), p.low), min(float(high), p.high)) for p in at_edges}
 
