@@ -26,8 +26,10 @@ _AT_ONCE = 2
 """Tiles of each level in one round, whatever the number of workers."""
 _EVALUATIONS, _STARTS, _SEEDS = 80, 4, 4
 _TIGHTENED = 4
-_POLISHED = 3
-"""Best tiles of each level that are searched once more, from the answers of one another."""
+_POLISHED, _POLISHED_FIRST = 3, 8
+"""Best tiles of each level that are searched once more, from all starts and the answers of one another: more of them
+at the light that the study needs.
+"""
 _TIE, _TIE_SHARE = 1e-3, 1e-6
 """Values that are no farther apart, absolute or relative, are equal: the tile with more light is preferred."""
 SEARCHED, EXCLUDED, DARK, IMPOSSIBLE = "searched", "excluded", "too dark", "impossible"
@@ -110,7 +112,8 @@ def search_tiles(
         rounds += 1
         left = sum(not t.is_searched and t.limit > found.best_value(k) for k, row in enumerate(tiles) for t in row)
         progress("tiles at all levels of light", total - left, total)
-    found.polish(parallel)
+    found.polish(parallel, (0,), _POLISHED_FIRST)
+    found.polish(parallel, range(1, len(all_levels)), _POLISHED)
     found.carry()
     found.share()
     found.tighten(parallel)
@@ -183,13 +186,14 @@ class _Found:
             if i != tile and np.array_equal(problem.setup.camera.base_qe, base)
         ]  # fmt: skip
 
-    def polish(self, parallel: Parallel) -> None:
-        """Search the best tiles of each level once more, from all starts and the answers of one another."""
+    def polish(self, parallel: Parallel, levels: Sequence[int], count: int) -> None:
+        """Search the best tiles of some levels once more, from all starts and the answers of one another."""
         calls, whose = [], []
-        for level in range(len(self.tiles)):
-            ranked = sorted(range(len(self.problems)), key=lambda i: (-self.value(level, i), i))[:_POLISHED]
+        for level in levels:
+            values = [self.value(level, i) for i in range(len(self.problems))]
+            ranked = np.argsort([-value for value in values], kind="stable")[:count].tolist()
             for tile in (i for i in ranked if self.tiles[level][i].best is not None):
-                starts = [*self.seeds(level, tile), *self.effort.starts[1:]]
+                starts = [*self.seeds(level, tile), *self.effort.starts]
                 calls.append(delayed(_searched, self.problem(level, tile), starts, self.effort.seed))
                 whose.append((level, tile))
         for (level, tile), best in zip(whose, parallel(calls), strict=True):
