@@ -142,6 +142,22 @@ def studies() -> list[dict[str, Any]]:
     return [*(YAML(typ="safe", pure=True).load(text) for text in (*texts, OWN)), *[WHOLE] * len(texts)]
 
 
+def without_replaced(tree: dict[str, Any]) -> dict[str, Any]:
+    """A study with a value of `each` in place of what its scenario states of that key, which counts for nothing."""
+    tree = deepcopy(tree)
+    scenarios = tree.get("scenarios")
+    for scene in scenarios.values() if isinstance(scenarios, dict) else ():
+        each = scene.get("each") if isinstance(scene, dict) else None
+        for dotted, values in each.items() if isinstance(each, dict) else ():
+            *path, last = str(dotted).split(".")
+            inner = scene
+            for key in path:
+                inner = inner.get(key) if isinstance(inner, dict) else None
+            if isinstance(inner, dict) and last in inner and isinstance(values, list) and values:
+                inner[last] = values[0]
+    return tree
+
+
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 41))])
 def test_a_changed_study_loads_or_is_refused_where_it_was_changed(
     studies: list[dict[str, Any]], tmp_path: Path, seed: int
@@ -156,7 +172,7 @@ def test_a_changed_study_loads_or_is_refused_where_it_was_changed(
         text = StringIO()
         YAML(typ="safe", pure=True).dump(tree, text)
         file.write_bytes(text.getvalue().encode("utf-8", "surrogatepass"))
-        marked = impossible(tree) or not EDITOR.is_valid(tree)
+        marked = impossible(tree) or not EDITOR.is_valid(without_replaced(tree))
         with warnings.catch_warnings(), within(HANG_S):
             warnings.simplefilter("error")
             try:
