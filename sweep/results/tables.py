@@ -46,6 +46,8 @@ VISION_TABLES = (VISION, VISION_CONDITIONS, VISION_STREET)
 """Tables of the benchmark of vision: a row per image, per distance and level, per picture that was read wrongly, per
 light level and state of detections in streets, and per picture of a street."""
 TILES = "tiles.parquet"
+COUNTED = ("csd", "pixel_csd", "chromatic_csd", "chromatic_pixel_csd")
+"""Metrics of separations beside the objective of a search over tiles: of equal brightness or any, also by pixel."""
 AUDIT, ALL_SENSORS = "audit.parquet", "all_sensors.parquet"
 PROVENANCE = "provenance.json"
 RESOLVED = "study.resolved.yaml"
@@ -153,10 +155,9 @@ def front_schema(parameters: Sequence[str]) -> pa.Schema:
 def tiles_schema(parameters: Sequence[str]) -> pa.Schema:
     """Return the columns of a search over tiles: a row for each tile and level of light."""
     text, number = pa.dictionary(pa.int32(), pa.string()), pa.float64()
-    counted = ("csd", "pixel_csd", "chromatic_csd", "chromatic_pixel_csd")
     fields = [pa.field("cfa_sensitivity_min", number), *(pa.field(name, text) for name in ("space", "cfa", "base"))]
     fields += [pa.field("kinds", pa.int32()), pa.field("status", text), pa.field("best", pa.bool_())]
-    names = ("limit", "objective", "sensitivity", "cfa_sensitivity", *parameters, *counted)
+    names = ("limit", "objective", "sensitivity", "cfa_sensitivity", *parameters, *COUNTED)
     fields += [pa.field(name, number) for name in names]
     return pa.schema(fields, metadata={"cfa_sweep_schema": SCHEMA_VERSION})
 

@@ -11,11 +11,8 @@ import pyarrow as pa
 from ..base.errors import InfeasibleError, ValidationIssue
 from ..base.types import Parallel, Progress, delayed
 from ..camera.model import SceneModel
-from ..metrics.columns.chromatic import CHROMATIC_CSD
-from ..metrics.columns.color_separation import CSD
-from ..metrics.columns.pixel_separation import CHROMATIC_PIXEL_CSD, PIXEL_CSD
 from ..metrics.evaluate import evaluate_some
-from ..results.tables import front_schema, tiles_schema
+from ..results.tables import COUNTED, front_schema, tiles_schema
 from ..search.limit import limit_of, reason_without_bound
 from ..search.problem import Problem, best_feasible, starting_points
 from ..search.solver import search_from
@@ -24,9 +21,6 @@ from ..search.trade_off import Effort, check_proof
 from ..spectra.lights import pair_name
 from ..study import Search, Study
 from .search import SearchAnswer
-
-_BESIDE = (CSD, PIXEL_CSD, CHROMATIC_CSD, CHROMATIC_PIXEL_CSD)
-"""Separations that stand beside the objective: of lamps of equal brightness or of any, by channel and by pixel."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +99,7 @@ def tiles_table(study: Study, found: TileAnswer) -> pa.Table:
 def _beside(study: Study, problem: Problem, row: dict[str, Any], names: tuple[str, ...]) -> dict[str, float]:
     """Return the separations of a filter in other ways to count, as the camera reads them out."""
     pair = study.quantities[study.trade_off[0]].pair
-    known = [] if pair is None else [(name, study.quantities.get(pair_name(name, pair))) for name in _BESIDE]
+    known = [] if pair is None else [(name, study.quantities.get(pair_name(name, pair))) for name in COUNTED]
     quantities = {name: quantity for name, quantity in known if quantity is not None}
     curves = problem.family.curves(np.array([[row[name] for name in names]]))
     values = evaluate_some(SceneModel(problem.setup), curves, list(quantities.values()), study.states)

@@ -114,8 +114,8 @@ def _limit_of_exposures(
         return _Part(a, b, limit)
 
     inner = sorted(s for s in sensitivities if max(least, dim) < s < most)
-    asked = inner[len(inner) // 2 :: max(1, len(inner) // 2)]
-    ends = sorted({least, most, *asked, *([max(least, dim)] if inner else [])})
+    asked = [max(least, dim), inner[len(inner) // 2], inner[-1]] if inner else []
+    ends = sorted({least, most, *asked})
     parts = [part(a, b) for a, b in pairwise(ends)]
     while sum(p.limit.programs for p in parts) < most_programs:
         highest, attained = max(parts, key=lambda p: p.limit.proven), max(p.limit.attained for p in parts)

@@ -84,40 +84,37 @@ def search_tiles(
     effort: Effort,
     parallel: Parallel,
     progress: Progress,
-    *,
-    every: bool = False,
 ) -> Tiles:
     """Find the best filter over all tiles at the light that the study needs, and at each level.
 
-    `every`: search every tile, to compare. Raises UpperBoundExceededError if a filter exceeds the bound of its tile.
+    Raises UpperBoundExceededError if a filter exceeds the bound of its tile.
     """
     all_levels = (0.0, *levels)
     tiles = [[_at_level(problem, level) for problem in problems] for level in all_levels]
-    if not every:
-        _bound_all(problems, tiles, parallel, progress)
-    found = _Found(problems, tiles, effort)
-    total, rounds = sum(tile.limit > -np.inf for row in tiles for tile in row), 0
+    _bound_all(problems, tiles, parallel, progress)
+    searches = _Searches(problems, tiles, effort)
+    total = sum(tile.limit > -np.inf for row in tiles for tile in row)
     while True:
         calls, applied = [], list[tuple[int, int]]()
         for level, row in enumerate(tiles):
-            best = -np.inf if every else found.best_value(level)
-            waiting = [i for i, tile in enumerate(row) if not tile.is_searched and tile.limit > max(best, -1e300)]
+            best = searches.best_value(level)
+            waiting = [i for i, tile in enumerate(row) if not tile.is_searched and tile.limit > best]
             for i in sorted(waiting, key=lambda i: (-row[i].limit, i))[:_AT_ONCE]:
-                calls.append(delayed(_searched, found.problem(level, i), found.starts(level, i), effort.seed))
+                calls.append(delayed(_searched, searches.problem(level, i), searches.starts(level, i), effort.seed))
                 applied.append((level, i))
         if not calls:
             break
         for (level, i), answer in zip(applied, parallel(calls), strict=True):
-            found.take(level, i, answer)
-        rounds += 1
-        left = sum(not t.is_searched and t.limit > found.best_value(k) for k, row in enumerate(tiles) for t in row)
+            tiles[level][i].is_searched = True
+            searches.take(level, i, answer)
+        left = sum(not t.is_searched and t.limit > searches.best_value(k) for k, row in enumerate(tiles) for t in row)
         progress("tiles at all levels of light", total - left, total)
-    found.polish(parallel, (0,), _POLISHED_FIRST)
-    found.polish(parallel, range(1, len(all_levels)), _POLISHED)
-    found.carry()
-    found.share()
-    found.tighten(parallel)
-    winners = tuple(found.winner(level) for level in range(len(all_levels)))
+    searches.polish(parallel, (0,), _POLISHED_FIRST)
+    searches.polish(parallel, range(1, len(all_levels)), _POLISHED)
+    searches.carry()
+    searches.share()
+    searches.tighten(parallel)
+    winners = tuple(searches.winner(level) for level in range(len(all_levels)))
     return Tiles(all_levels, tuple(tuple(row) for row in tiles), winners)
 
 
@@ -128,7 +125,7 @@ def _searched(problem: Problem, starts: Sequence[Float[Array, " free"]], seed: i
 
 
 @dataclass
-class _Found:
+class _Searches:
     """What is found so far."""
 
     problems: Sequence[Problem]
@@ -141,9 +138,8 @@ class _Found:
         return self.problems[tile] if least <= 0 else with_least(self.problems[tile], SENSITIVITY, least)
 
     def take(self, level: int, tile: int, best: Evaluation) -> None:
-        """Keep the answer of a search, if it is the best one of its tile."""
+        """Keep a filter of a tile, if it is the best one."""
         at = self.tiles[level][tile]
-        at.is_searched = True
         if best.feasible and (at.best is None or best.objective > at.best.objective):
             check_bound(best.objective, at.limit)
             at.best = best

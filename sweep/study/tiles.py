@@ -106,13 +106,11 @@ def _of_pattern(name: Any, *, modified: bool) -> Iterator[tuple[str, Any, str]]:
         yield "".join(flat) if len(flat) == _SMALL else f"{name} with {channel} modified", tile, channel
 
 
-def distinct_tiles(channels: Sequence[str], *, mirrored: bool = False) -> list[tuple[str, ...]]:
-    """Return the 2x2 tiles, row by row, that are no shifts of each other; `mirrored`: and no mirror images."""
+def distinct_tiles(channels: Sequence[str]) -> list[tuple[str, ...]]:
+    """Return the 2x2 tiles, row by row, that are no shifts of each other."""
     kept: dict[tuple[int, ...], None] = {}
     for a, b, c, d in product(range(len(channels)), repeat=4):
         shifts = [(a, b, c, d), (b, a, d, c), (c, d, a, b), (d, c, b, a)]
-        if mirrored:  # rows and columns exchanged; other mirror images and turns are shifts of both
-            shifts += [(e, g, f, h) for e, f, g, h in shifts]
         kept.setdefault(min(shifts))
     return [tuple(channels[index] for index in tile) for tile in kept]
 

@@ -19,12 +19,11 @@ HEAD = "study: t\nsensor: ar0820\nlights: tl16\n"
 BOX = "boxes: {stopband: {cfa: tiles, to: G, box: {left_width_nm: [5, 55], right_width_nm: [5, 55]}}}\n"
 
 
-@pytest.mark.parametrize(("n", "shifted", "mirrored"), [(6, 351, 231), (7, 637, 406)])
-def test_tiles_are_as_many_as_burnside_says(n: int, shifted: int, mirrored: int) -> None:
-    """Fixed by a shift along rows, columns or both: n^2 each; by an exchange of rows and columns n^3, or n with one."""
+@pytest.mark.parametrize(("n", "shifted"), [(6, 351), (7, 637)])
+def test_tiles_are_as_many_as_burnside_says(n: int, shifted: int) -> None:
+    """Fixed by a shift along rows, columns or both: n^2 each."""
     names = [f"X{i}" for i in range(n)]
     assert len(distinct_tiles(names)) == shifted == (n**4 + 3 * n**2) // 4
-    assert len(distinct_tiles(names, mirrored=True)) == mirrored == (n**4 + 2 * n**3 + 3 * n**2 + 2 * n) // 8
     torus = {min(np.roll(np.reshape(t, (2, 2)), s, (0, 1)).tobytes() for s in product((0, 1), repeat=2)) for t in product(range(3), repeat=4)}  # fmt: skip
     assert len(distinct_tiles(names[:3])) == len(torus)
 

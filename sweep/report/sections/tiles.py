@@ -8,22 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from ...metrics.columns.chromatic import CHROMATIC_CSD
-from ...metrics.columns.color_separation import CSD
-from ...metrics.columns.pixel_separation import CHROMATIC_PIXEL_CSD, PIXEL_CSD
 from ...metrics.quantity import DN, Column
 from ...results.output import Output
+from ...results.tables import COUNTED
 from ..section import Section, Table
 from ..terms import bound_conditions, edges_in_words, edges_of
 from ..words import amount, joined, of_column
 
 _LOOSE = 0.5
-_COUNTED = {
-    CSD: "lamps of equal brightness",
-    PIXEL_CSD: "these, every pixel counted",
-    CHROMATIC_CSD: "lamps of any brightness",
-    CHROMATIC_PIXEL_CSD: "these, by pixel",
-}
+_WORDS = ("lamps of equal brightness", "these, every pixel counted", "lamps of any brightness", "these, by pixel")
+_COUNTED = dict(zip(COUNTED, _WORDS, strict=True))
 
 
 @dataclass(frozen=True)
