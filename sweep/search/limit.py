@@ -114,7 +114,7 @@ def _limit_of_exposures(
         return _Part(a, b, limit)
 
     inner = sorted(s for s in sensitivities if max(least, dim) < s < most)
-    asked = [max(least, dim), inner[len(inner) // 2], inner[-1]] if inner else []
+    asked = [max(least, dim), inner[len(inner) // 2]] if inner else []
     ends = sorted({least, most, *asked})
     parts = [part(a, b) for a, b in pairwise(ends)]
     while sum(p.limit.programs for p in parts) < most_programs:
