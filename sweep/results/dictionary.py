@@ -184,9 +184,12 @@ FILES = {
     "light and regularization of the color matrix",
     files.VISION: "a row per image of the benchmark of vision: design_id, name, cfa, seed, order (of the lenses), "
     "lamps (seen in training or unseen), image, state, lamp, intensity_cd, background, phantom, distance_m, level, "
-    "and what each reader says with its probability: observer, network",
+    "and of each reader (observer, network, prototypes) what it says, its probability (`_p`), and the error to expect "
+    "of that answer, one less its probability by the observer (`_risk`)",
     files.VISION_CONDITIONS: "of each design at each distance and level of light: csd (DN), dprime and pair_error, the "
     "smallest or the largest over the pairs of lenses",
+    files.VISION_LEARNING: "of readers that learn, by the number of `images` that they have learned from, distance and "
+    "level of light, lenses in any order: `error`, `risk` (to expect by the ideal observer), `observer_risk`",
     files.VISION_STREET: "of streets: average_precision of the simplest detector for each design, seed, light level "
     "and signal type (`state`), of `lit` lit lenses",
     files.ALL_SENSORS: "of a study of several sensors, one filter for all of them and one for all but each: "

@@ -41,10 +41,10 @@ COMBINATIONS, MAP = "combinations.parquet", "map.parquet"
 HANDOVERS, WORST, SATURATED = "handovers.parquet", "worst.parquet", "saturated.parquet"
 LEFT_OUT = "leave_one_out.parquet"
 VISION, VISION_CONDITIONS = "vision.parquet", "vision_conditions.parquet"
-VISION_STREET = "vision_street.parquet"
-VISION_TABLES = (VISION, VISION_CONDITIONS, VISION_STREET)
-"""Tables of the benchmark of vision: a row per image, per distance and level, per picture that was read wrongly, per
-light level and state of detections in streets, and per picture of a street."""
+VISION_LEARNING, VISION_STREET = "vision_learning.parquet", "vision_street.parquet"
+VISION_TABLES = (VISION, VISION_CONDITIONS, VISION_LEARNING, VISION_STREET)
+"""Tables of the benchmark of vision: a row per image, per distance and level, per reader and number of images
+that it has learned from, and per light level and state of detections in streets."""
 TILES = "tiles.parquet"
 COUNTED = ("csd", "pixel_csd", "chromatic_csd", "chromatic_pixel_csd")
 """Metrics of separations beside the objective of a search over tiles: of equal brightness or any, also by pixel."""

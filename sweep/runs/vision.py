@@ -17,12 +17,12 @@ from ..metrics.columns.confusion import D_PRIME, STATE_ERROR
 from ..metrics.evaluate import evaluate
 from ..metrics.separation import csd_name
 from ..results.designs import named_rows, row_curves
-from ..results.tables import SEARCHED, VISION, VISION_CONDITIONS, VISION_STREET
+from ..results.tables import SEARCHED, VISION, VISION_CONDITIONS, VISION_LEARNING, VISION_STREET
 from ..spectra.lights import class_pairs, pair_name
 from ..study import Study
 from ..vision.images import setup_at
 from ..vision.readers import OBSERVER, Answers, SeedReading, read_images
-from ..vision.scenes import NETWORK, ORDERS, SEEN, UNSEEN, states_of
+from ..vision.scenes import NETWORK, ORDERS, PROTOTYPES, SEEN, SHUFFLED, UNSEEN, states_of
 from ..vision.section import Vision
 from .workers import run_with_progress
 
@@ -31,19 +31,30 @@ if TYPE_CHECKING:
 
 _TEXT, _NUMBER, _COUNT = pa.string(), pa.float64(), pa.int64()
 _DESIGN = [("design_id", _COUNT), ("name", _TEXT), ("cfa", _TEXT)]
-_READERS = (OBSERVER, NETWORK)
+_READERS = (OBSERVER, NETWORK, PROTOTYPES)
 _IMAGES = pa.schema(
     [
         *_DESIGN,
         *(("seed", _COUNT), ("order", _TEXT), ("lamps", _TEXT), ("image", _COUNT), ("state", _TEXT), ("lamp", _TEXT)),
         *(("intensity_cd", _NUMBER), ("background", _TEXT), ("phantom", pa.bool_())),
         *(("distance_m", _NUMBER), ("level", _TEXT)),
-        *(field for reader in _READERS for field in ((reader, _TEXT), (f"{reader}_p", _NUMBER))),
+        *(
+            (f"{reader}{end}", kind)
+            for reader in _READERS
+            for end, kind in (("", _TEXT), ("_p", _NUMBER), ("_risk", _NUMBER))
+        ),
     ]
 )
 _CONDITIONS = pa.schema(
     [*_DESIGN, ("distance_m", _NUMBER), ("level", _TEXT)]
     + [(name, _NUMBER) for name in ("csd", "dprime", "pair_error")]
+)
+_LEARNING = pa.schema(
+    [
+        *_DESIGN,
+        *(("seed", _COUNT), ("reader", _TEXT), ("images", _COUNT), ("distance_m", _NUMBER), ("level", _TEXT)),
+        *(("test_images", _COUNT), ("error", _NUMBER), ("risk", _NUMBER), ("observer_risk", _NUMBER)),
+    ]
 )
 _STREET = pa.schema(
     [*_DESIGN, ("seed", _COUNT), ("level", _TEXT), ("state", _TEXT), ("lit", _COUNT), ("average_precision", _NUMBER)]
@@ -65,10 +76,12 @@ def vision_tables(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
     calls = [delayed(read_images, *setups[at], vision, (study.section.seed, seed)) for at, seed in pairs]
     images: list[dict[str, Any]] = []
     detected: list[dict[str, Any]] = []
+    learning: list[dict[str, Any]] = []
     readings = run_with_progress(parallel, calls, "images read (designs x seeds)", progress)
     for (at, seed), reading in zip(pairs, readings, strict=True):
         design = {name: designs[at][name] for name, _ in _DESIGN}
         images += _image_rows(study, vision, design | {"seed": seed}, reading)
+        learning += _learning_rows(design | {"seed": seed}, vision, reading)
         detected += _street_rows(design | {"seed": seed}, vision, reading)
     conditions: list[dict[str, Any]] = []
     known = parallel([delayed(predictors, *setup, vision) for setup in setups])
@@ -80,6 +93,7 @@ def vision_tables(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
     tables = {
         VISION: pa.Table.from_pylist(images, schema=_IMAGES),
         VISION_CONDITIONS: pa.Table.from_pylist(conditions, schema=_CONDITIONS),
+        VISION_LEARNING: pa.Table.from_pylist(learning, schema=_LEARNING),
     }
     if vision.street is not None:
         tables[VISION_STREET] = pa.Table.from_pylist(detected, schema=_STREET)
@@ -119,10 +133,34 @@ def _rows_of(study: Study, vision: Vision, key: dict[str, Any], answers: Answers
             "distance_m": vision.distances_m[scenes.distance[at]],
             "level": levels[scenes.level[at]],
         }
+        least = answers.probabilities.get(OBSERVER)
         for name, probabilities in answers.probabilities.items():
             best = int(probabilities[at].argmax())
             row |= {name: states[best], f"{name}_p": float(probabilities[at, best])}
+            row |= {} if least is None else {f"{name}_risk": float(1 - least[at, best])}
         yield row
+
+
+def _learning_rows(key: dict[str, Any], vision: Vision, reading: SeedReading) -> Iterator[dict[str, Any]]:
+    """Yield errors of readers of some numbers of images, at each distance and level, lenses in any order."""
+    shown = reading.unseen[SHUFFLED]
+    scenes, least, levels = shown.scenes, shown.probabilities[OBSERVER], list(vision.levels)
+    for reader, images, said in reading.learning:
+        wrong, risk = said != scenes.state, 1 - np.take_along_axis(least, said[:, None], axis=1)[:, 0]
+        for distance, level in product(range(len(vision.distances_m)), range(len(levels))):
+            here = (scenes.distance == distance) & (scenes.level == level)
+            row = {
+                "reader": reader,
+                "images": images,
+                "distance_m": vision.distances_m[distance],
+                "level": levels[level],
+            }
+            row |= {
+                "test_images": int(here.sum()),
+                "error": float(wrong[here].mean()),
+                "risk": float(risk[here].mean()),
+            }
+            yield key | row | {"observer_risk": float((1 - least.max(axis=1))[here].mean())}
 
 
 def _street_rows(key: dict[str, Any], vision: Vision, reading: SeedReading) -> Iterator[dict[str, Any]]:

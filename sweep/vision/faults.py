@@ -16,6 +16,7 @@ from ..camera.scene import FixedExposure, Scene
 from ..spectra.color import luminance_per_photon_radiance
 from ..spectra.lights import Lights
 from ..spectra.spectrum import WavelengthGrid
+from .crops import reach_px
 from .section import (
     FEWEST_LAMPS,
     MOST_BITS,
@@ -26,8 +27,8 @@ from .section import (
     Vision,
 )
 
-_HELD_TIMES = 8
-"""Times that a network's training images are held in single precision: mirrored, in blocks, joined, scaled."""
+_PER_PROTOTYPE = 8
+"""Bytes of a prototype's pixel: its mean and its direction."""
 _LEAST_LUMINANCE = 1e-20
 """cd/m^2 for each photon/s/sr/m^2 of a lamp that the eye sees; at 555 nm it is 2.4e-16."""
 
@@ -111,7 +112,7 @@ def _merged_faults(pixel: Pixel) -> Iterator[Fault]:
 
 
 def _memory_faults(vision: Vision, lights: Lights, mosaics: Mapping[str, Mosaic]) -> Iterator[Fault]:
-    """Check that lamps at all phases, the observer's cases at one distance and level, and training images fit."""
+    """Check that lamps at all phases, the observer's cases at one distance and level, and prototypes fit."""
     pixels = vision.crop_px**2
     n_lenses = len(vision.lenses)
     test_lamps = sum(max(1, len(lights.members.get(lens, ())) // 4) for lens in vision.lenses)
@@ -124,9 +125,11 @@ def _memory_faults(vision: Vision, lights: Lights, mosaics: Mapping[str, Mosaic]
             allowed = f"at most {MOST_BYTES / 2**30:g} GiB: smaller images, fewer positions, lamps or distances"
             yield Fault(("vision",), problem, f"{every / 2**30:.1f} GiB", allowed)
             return
-        planes = len(mosaic.channels) if vision.input == "demosaicked" else 1
-        trained = 4 * _HELD_TIMES * planes * pixels * max(vision.train_images, vision.check_images)
-        if vision.network and trained > MOST_BYTES:
-            allowed = f"at most {MOST_BYTES / 2**30:g} GiB: smaller images, or fewer of them"
-            yield Fault(("vision",), f"images take too much memory (CFA {name})", f"{trained / 2**30:.1f} GiB", allowed)
+        crop = reach_px(vision, mosaic.indices.shape[0]).size * reach_px(vision, mosaic.indices.shape[1]).size
+        hidden = math.factorial(n_lenses) * (1 + n_lenses * len(vision.intensities_cd)) * 2 * places
+        conditions = len(vision.distances_m) * len(vision.levels) * len(vision.backgrounds)
+        if vision.prototypes and (held := _PER_PROTOTYPE * crop * hidden * conditions) > MOST_BYTES:
+            problem = f"prototypes of {hidden:,} classes of a head take too much memory (CFA {name})"
+            allowed = f"prototypes: false, or at most {MOST_BYTES / 2**30:g} GiB"
+            yield Fault(("vision", "prototypes"), problem, f"{held / 2**30:.1f} GiB", allowed)
             return

@@ -1,24 +1,22 @@
-"""Small convolutional network on planes of raw pixels, trained with JAX; the same for every CFA.
+"""Dense networks on the pixels of a crop, one for each distance and light level, trained with JAX.
 
-Two layers of 3 x 3 filters (40 and 64 of them, the second with a stride of two) and a dense layer of 128 follow on the
-planes; what is known of a scene (distance, light) scales and shifts the first filters and the dense layer. Beside the
-state the network learns which lens is lit, the order of the lenses and the sun on them. The order of the sums is fixed:
-one seed gives the same numbers on one machine. Where JAX has a GPU, it is taken.
+They are the same for every CFA: two hidden layers of 128 and 64 values with ReLU; background and order of the lenses
+shift the first. The networks of all distances of a level are trained at once, as one product of matrices. The order of
+the sums is fixed: one seed gives the same numbers on one machine. Where JAX has a GPU, it is taken.
 """
 
 from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import partial
-from typing import Any
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.types import Array, Float, IndexArray, Int
+from ..base.types import Array, Float
 
 # Before JAX is loaded: workers have one thread each, and sums have one order; workers share a GPU's memory.
 os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1")
@@ -28,118 +26,98 @@ import jax
 import jax.numpy as jnp
 import optax
 
-_FILTERS = ((40, 1), (64, 2))
-_DENSE = 128
-_BATCH, _BATCHES = 128, 8
-_RATE, _DECAY = 6e-3, 1e-4
+_HIDDEN = (128, 64)
+STEPS = 8
+"""Steps of one call."""
+_RATE, _DECAY, _SECOND = 6e-3, 1e-4, 0.99
 _WARM_UP = 0.05
 """Share of the steps in which the rate rises; then it falls along a cosine."""
-_BESIDE = 0.2
-"""Weight of what is learned beside the state."""
-_AT_ONCE = 4096
-_OPTIMIZER = optax.chain(optax.scale_by_adam(), optax.add_decayed_weights(_DECAY))
+_OPTIMIZER = optax.chain(optax.scale_by_adam(b2=_SECOND), optax.add_decayed_weights(_DECAY))
 """AdamW, whose rate is passed to each step."""
 _Weights = dict[str, Any]
-Inputs = tuple[NDArray[np.float32], NDArray[np.float32]]
-"""Planes, [n, rows, columns, planes], and what is known, [n, known]."""
 
 
-def _start(key: Any, inputs: Inputs, n_outputs: int) -> _Weights:
-    """Return He's initial weights."""
-    high, wide, planes = inputs[0].shape[1:]
-    n_known = inputs[1].shape[1]
-    weights: _Weights = {}
-    keys = jax.random.split(key, len(_FILTERS) + 3)
-    for at, (filters, step) in enumerate(_FILTERS):
-        weights[f"filters{at}"] = jax.random.normal(keys[at], (9 * planes, filters)) * math.sqrt(2 / (9 * planes))
-        weights[f"bias{at}"] = jnp.zeros(filters)
-        planes, high, wide = filters, -(-high // step), -(-wide // step)
-    first = _FILTERS[0][0]
-    weights["scale"], weights["shift"] = jnp.zeros((n_known, first)), jnp.zeros((n_known, first))
-    n_inputs = high * wide * planes
-    weights["dense"] = jax.random.normal(keys[-3], (n_inputs, _DENSE)) * math.sqrt(2 / n_inputs)
-    weights["dense_bias"] = jnp.zeros(_DENSE)
-    weights["known"] = jax.random.normal(keys[-2], (n_known, _DENSE)) * 0.1
-    weights["last"] = jax.random.normal(keys[-1], (_DENSE, n_outputs)) * math.sqrt(1 / _DENSE)
-    weights["last_bias"] = jnp.zeros(n_outputs)
+class Examples(NamedTuple):
+    """Images of all distances of one level, for some steps.
+
+    `known`: zeros and ones of background and order; `state`: empty where nothing is learned.
+    """
+
+    crops: Float[Array, "steps distances images inputs"] | NDArray[np.float32]
+    known: NDArray[np.float32]
+    state: NDArray[np.int32]
+
+
+def _start(key: Any, distances: int, inputs: int, known: int, states: int) -> _Weights:
+    """Return He's initial weights of the networks of a level."""
+    sizes, weights = (inputs, *_HIDDEN, states), dict[str, Any]()
+    keys = jax.random.split(key, len(sizes))
+    for at, (before, after) in enumerate(pairwise(sizes)):
+        weights[f"dense{at}"] = jax.random.normal(keys[at], (distances, before, after)) * math.sqrt(2 / before)
+        weights[f"bias{at}"] = jnp.zeros((distances, 1, after))
+    weights["known"] = jax.random.normal(keys[-1], (distances, known, _HIDDEN[0])) * 0.1
     return weights
 
 
-def _filtered(x: Any, filters: Any, bias: Any, step: int) -> Any:
-    """Apply 3 x 3 filters as one matrix product, many times faster on a CPU than XLA's own convolution."""
-    high, wide = x.shape[1:3]
-    padded = jnp.pad(x, ((0, 0), (1, 1), (1, 1), (0, 0)))
-    shifts = [padded[:, i : i + high : step, j : j + wide : step] for i in range(3) for j in range(3)]
-    return jnp.concatenate(shifts, axis=-1) @ filters + bias
+def _logits(weights: _Weights, crops: Any, known: Any) -> Any:
+    x = jax.nn.relu(crops @ weights["dense0"] + weights["bias0"] + known @ weights["known"])
+    for at in range(1, len(_HIDDEN)):
+        x = jax.nn.relu(x @ weights[f"dense{at}"] + weights[f"bias{at}"])
+    return x @ weights[f"dense{len(_HIDDEN)}"] + weights[f"bias{len(_HIDDEN)}"]
 
 
-def _outputs(weights: _Weights, x: Any, known: Any) -> Any:
-    for at, (_, step) in enumerate(_FILTERS):
-        x = _filtered(x, weights[f"filters{at}"], weights[f"bias{at}"], step)
-        if at == 0:
-            x = x * (1 + (known @ weights["scale"])[:, None, None]) + (known @ weights["shift"])[:, None, None]
-        x = jax.nn.relu(x)
-    x = x.reshape(len(x), -1) @ weights["dense"] + weights["dense_bias"] + known @ weights["known"]
-    return jax.nn.relu(x) @ weights["last"] + weights["last_bias"]
+def _loss(weights: list[_Weights], levels: Sequence[Examples]) -> Any:
+    """Return the sum over distances and levels: the networks do not share anything."""
+    parts = (
+        optax.softmax_cross_entropy_with_integer_labels(_logits(own, at.crops, at.known), at.state).mean(axis=1).sum()
+        for own, at in zip(weights, levels, strict=True)
+    )
+    return sum(parts)
 
 
-def _loss(weights: _Weights, x: Any, known: Any, y: Any, sizes: tuple[int, ...]) -> Any:
-    parts = jnp.split(_outputs(weights, x, known), np.cumsum(sizes)[:-1], axis=1)
-    losses = [optax.softmax_cross_entropy_with_integer_labels(part, y[:, at]).mean() for at, part in enumerate(parts)]
-    return losses[0] + _BESIDE * sum(losses[1:])
+@jax.jit
+def _steps(held: tuple[list[_Weights], Any], batches: tuple[list[Examples], Any]) -> tuple[list[_Weights], Any]:
+    """Take one step for each of a few batches and rates."""
 
-
-@partial(jax.jit, static_argnames="sizes")
-def _steps(held: tuple[_Weights, Any], batches: tuple[Any, ...], sizes: tuple[int, ...]) -> tuple[_Weights, Any]:
-    """Take one step for each of a few batches of planes, what is known, targets and rate."""
-
-    def step(held: tuple[_Weights, Any], batch: tuple[Any, ...]) -> tuple[tuple[_Weights, Any], None]:
-        x, known, y, rate = batch
-        gradient = jax.grad(_loss)(held[0], x, known, y, sizes)
+    def step(held: tuple[list[_Weights], Any], batch: tuple[list[Examples], Any]) -> tuple[Any, None]:
+        levels, rate = batch
+        gradient = jax.grad(_loss)(held[0], levels)
         updates, moved = _OPTIMIZER.update(gradient, held[1], held[0])
         return (optax.apply_updates(held[0], jax.tree.map(lambda u: -rate * u, updates)), moved), None
 
     return jax.lax.scan(step, held, batches)[0]
 
 
-_outputs_compiled: Callable[..., Any] = jax.jit(_outputs)
+_compiled_logits: Callable[..., Any] = jax.jit(_logits)
 
 
-@dataclass(frozen=True)
-class Network:
-    """Trained network."""
+def train(images: Callable[[int], list[Examples]], n_states: int, calls: int, seed: tuple[int, ...]) -> list[_Weights]:
+    """Train the networks of all levels by AdamW, with a rate that falls along a cosine.
 
-    weights: _Weights
-    n_states: int
-
-    def logits(self, planes: NDArray[np.float32], known: NDArray[np.float32]) -> Float[Array, "images states"]:
-        """Return the logarithm of the probability of each state, but for a constant of each image."""
-        starts = range(0, len(planes), _AT_ONCE)
-        parts = [
-            _outputs_compiled(self.weights, planes[at : at + _AT_ONCE], known[at : at + _AT_ONCE]) for at in starts
-        ]
-        return np.concatenate([np.asarray(part, dtype=float) for part in parts])[:, : self.n_states]
-
-
-def train(
-    inputs: Inputs,
-    targets: Int[IndexArray, "images targets"],
-    sizes: tuple[int, ...],
-    epochs: int,
-    seed: tuple[int, ...],
-) -> Network:
-    """Train a network by AdamW, with a rate that falls along a cosine."""
-    rng = np.random.default_rng(seed)
-    planes, known = inputs
-    weights = _start(jax.random.key(int(rng.integers(2**31))), inputs, sum(sizes))
-    calls = max(1, math.ceil(len(planes) / (_BATCH * _BATCHES)))
-    n_steps = epochs * calls * _BATCHES
+    `images`: new examples of each level, for a number of steps.
+    """
+    n_steps = calls * STEPS
     rate = optax.warmup_cosine_decay_schedule(_RATE / 20, _RATE, math.ceil(_WARM_UP * n_steps), n_steps, _RATE / 1000)
-    rates = np.asarray(rate(np.arange(n_steps)), dtype=np.float32).reshape(epochs, calls, _BATCHES)
-    held = weights, _OPTIMIZER.init(weights)
-    numbers = targets.astype(np.int32)
-    for epoch in range(epochs):
-        order = np.resize(rng.permutation(len(planes)), calls * _BATCH * _BATCHES).reshape(-1, _BATCHES, _BATCH)
-        for batch, of_steps in zip(order, rates[epoch], strict=True):
-            held = _steps(held, (planes[batch], known[batch], numbers[batch], of_steps), sizes)
-    return Network(held[0], sizes[0])
+    rates = np.asarray(rate(np.arange(n_steps)), dtype=np.float32).reshape(calls, STEPS)
+    key = jax.random.key(int(np.random.default_rng(seed).integers(2**31)))
+    held: Any = None
+    for of_steps in rates:
+        levels = images(STEPS)
+        if held is None:
+            keys = jax.random.split(key, len(levels))
+            start = [
+                _start(k, at.crops.shape[1], at.crops.shape[-1], at.known.shape[-1], n_states)
+                for k, at in zip(keys, levels, strict=True)
+            ]
+            held = start, _OPTIMIZER.init(start)
+        held = _steps(held, (levels, of_steps))
+    weights: list[_Weights] = held[0]
+    return weights
+
+
+def logits(
+    weights: _Weights, distance: int, crops: NDArray[np.float32], known: NDArray[np.float32]
+) -> Float[Array, "images states"]:
+    """Return the logarithm of the probability of each state, but for a constant of each image."""
+    own = {name: np.asarray(part[distance]) for name, part in weights.items()}
+    return np.asarray(_compiled_logits(own, crops, known), dtype=float)

@@ -1,32 +1,36 @@
-"""One design in the benchmark: answers of the ideal observer and the network to the same images, for one seed."""
+"""One design in the benchmark: answers of the ideal observer and of readers that learn to the same images."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
+from scipy.optimize import minimize_scalar
+from scipy.special import log_softmax, softmax
 
-from ..base.types import Array, ChannelCurves, Float, FloatArray, IndexArray, Int
+from ..base.types import Array, ChannelCurves, Float, ImageNumbers, IndexArray, Int
 from ..camera.setup import Setup
-from .batches import batches, images_of_split, scene_key, scenes_of
+from .batches import scene_key, scenes_of
+from .crops import Crops, Seen
 from .detections import precisions
 from .detector import Detector
 from .images import HeadCamera
 from .lamps import CHECK, TEST, TRAIN, Lamps, split_lamps
 from .observer import posteriors
-from .scenes import NETWORK, ORDERS, Scenes, draw_scenes
+from .prototypes import Prototypes
+from .scenes import FIXED, NETWORK, ORDERS, PROTOTYPES, SHUFFLED, Scenes, draw_scenes
 from .section import Vision
 from .street import StreetCamera, draw_streets, street_labels
 
-if TYPE_CHECKING:
-    from .network_reader import NetworkReader
-
-"""Images that were read wrongly and are kept to look at, of each design."""
 _KNOWN_KEY = 1
 _KEY = {"design_id": 0, "name": "", "cfa": "", "seed": 0}
 """Labels of images that are not written to files."""
 OBSERVER = "observer"
+_SHARES = (1 / 64, 1 / 8, 1.0)
+"""Of the images of training: error over images."""
 
 
 @dataclass(frozen=True)
@@ -39,39 +43,77 @@ class Answers:
 
 @dataclass(frozen=True)
 class SeedReading:
-    """Answers of one seed by order of the lenses, on lamps that the network has not seen, and on those it has.
+    """Answers of one seed by order of the lenses, on lamps that the readers have not learned from, and on those.
 
+    `learning`: answers to the unseen images in any order by readers of some images: name, their number, and states.
     `precision` is that of a detector in streets and `lit` the number of lit lenses, by level
     and lens. Without streets they are empty.
     """
 
     unseen: dict[str, Answers]
     seen: dict[str, Answers]
+    learning: list[tuple[str, int, Int[IndexArray, " images"]]]
     precision: Float[Array, "streets lenses"]
     lit: Int[IndexArray, "streets lenses"]
+
+
+class Reader(Protocol):
+    """What has learned to read crops."""
+
+    def log_probabilities(self, seen: Seen) -> Float[Array, "images states"]:
+        """Return the logarithm of the probability of each state, but for a constant of each image."""
 
 
 def read_images(setup: Setup, curves: ChannelCurves, vision: Vision, seed: tuple[int, int]) -> SeedReading:
     """Read the images of one design and one seed."""
     camera = HeadCamera(setup, curves, vision)
     lamps = split_lamps(setup.lights, vision, seed)
-    reader = _network(camera, lamps, seed) if vision.network else None
+    crops = Crops(camera, lamps[TRAIN], seed)
+
+    def seen_of(scenes: Scenes, order: str) -> Seen:
+        return crops.seen(camera.images(scenes), scenes, fixed=order == FIXED)
+
     unseen: dict[str, Answers] = {}
     seen: dict[str, Answers] = {}
+    shown: list[tuple[Answers, Seen]] = []
     for order in ORDERS:
         scenes = scenes_of(vision, lamps, order, TEST, seed)
-        known_scenes = draw_scenes(
-            vision, lamps[TRAIN], order, vision.test_images // 2, (*scene_key(seed, order), _KNOWN_KEY)
-        )
+        known = draw_scenes(vision, lamps[TRAIN], order, vision.test_images // 2, (*scene_key(seed, order), _KNOWN_KEY))
         # The observer of the lamps that were learned from is not asked for: the bound is that of the test.
-        images = camera.images(scenes)
-        answers = {OBSERVER: posteriors(camera, scenes, images, lamps[TEST], order)}
-        known: dict[str, FloatArray] = {}
-        if reader is not None:
-            answers[NETWORK] = reader.read(batches(camera, scenes, _KEY, order, TEST, "raw"))
-            known[NETWORK] = reader.read(batches(camera, known_scenes, _KEY, order, TEST, "raw"))
-        unseen[order], seen[order] = Answers(scenes, answers), Answers(known_scenes, known)
-    return SeedReading(unseen, seen, *_streets(camera, lamps, seed))
+        held = posteriors(camera, scenes, camera.images(scenes), lamps[TEST], order)
+        unseen[order], seen[order] = Answers(scenes, {OBSERVER: held}), Answers(known, {})
+        shown += [(unseen[order], seen_of(scenes, order)), (seen[order], seen_of(known, order))]
+    check = scenes_of(vision, lamps, SHUFFLED, CHECK, seed)
+    of_check, in_any_order = seen_of(check, SHUFFLED), shown[-2][1]
+    learning: list[tuple[str, int, Int[IndexArray, " images"]]] = []
+    for name, learned, most in _learners(vision, seed):
+        for images in (math.ceil(most * share) for share in _SHARES):
+            reader = learned(crops, images)
+            learning.append((name, images, reader.log_probabilities(in_any_order).argmax(axis=1)))
+        scale = 1 / _temperature(reader.log_probabilities(of_check), check.state)
+        for answers, own in shown:
+            answers.probabilities[name] = softmax(scale * reader.log_probabilities(own), axis=1)
+    return SeedReading(unseen, seen, learning, *_streets(camera, lamps, seed))
+
+
+def _learners(vision: Vision, seed: tuple[int, int]) -> Iterator[tuple[str, Callable[[Crops, int], Reader], int]]:
+    """Yield name, training and number of images of each reader that learns."""
+    if vision.prototypes:
+        yield PROTOTYPES, Prototypes, vision.prototype_images
+    if vision.network:
+        from .network_reader import NetworkReader  # noqa: PLC0415  (JAX: only where a study asks for a network)
+
+        yield NETWORK, lambda crops, images: NetworkReader(crops, images, seed), vision.network_images
+
+
+def _temperature(logs: Float[Array, "images states"], states: ImageNumbers) -> float:
+    """Return by which to divide for the largest likelihood (Guo et al., ICML 2017)."""
+
+    def loss(log_temperature: float) -> float:
+        log_shares = log_softmax(logs / math.exp(log_temperature), axis=1)
+        return -float(np.take_along_axis(log_shares, states[:, None], axis=1).mean())
+
+    return math.exp(minimize_scalar(loss, bounds=(-2.0, 3.0), method="bounded").x)
 
 
 def _streets(
@@ -101,13 +143,3 @@ def observer_error(setup: Setup, curves: ChannelCurves, vision: Vision, seed: tu
     lamps = split_lamps(setup.lights, vision, seed)
     scenes = scenes_of(vision, lamps, order, TEST, seed)
     return float(np.mean(1 - posteriors(camera, scenes, camera.images(scenes), lamps[TEST], order).max(axis=1)))
-
-
-def _network(camera: HeadCamera, lamps: dict[str, Lamps], seed: tuple[int, int]) -> NetworkReader:
-    from .network_reader import NetworkReader  # noqa: PLC0415  (JAX: only where a study asks for a network)
-
-    reader = NetworkReader(camera.vision, camera.setup.camera.mosaic, camera.pixel)
-    key = _KEY | {"seed": seed[1]}
-    training, check = (images_of_split(camera, lamps, key, seed[0], split, "raw") for split in (TRAIN, CHECK))
-    reader.learn(training, check, seed)
-    return reader

@@ -18,10 +18,10 @@ FIXED, SHUFFLED = "fixed", "shuffled"
 ORDERS = (FIXED, SHUFFLED)
 """Order of the lenses: as in the street, so that the place of the lit one says its color, or any."""
 SEEN, UNSEEN = "seen", "unseen"
-"""Lamps of an image: used in the training of the network or not; the image itself never is."""
+"""Lamps of an image: used in the training of readers or not; the image itself never is."""
 PHANTOM_SHARE = 0.5
-NETWORK = "network"
-"""Name of the reader that is trained."""
+NETWORK, PROTOTYPES = "network", "prototypes"
+"""Names of the readers that learn."""
 
 
 @cache

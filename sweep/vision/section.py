@@ -15,7 +15,7 @@ Seen = Literal["raw", "demosaicked"]
 Material = Literal["foliage", "sky", "gray", "dark gray", "black", "white", "canopy", "soil", "asphalt", "concrete"]
 _Intensity = Annotated[float, Field(ge=1e-3, le=1e6)]
 _Text = Annotated[str, Field(min_length=1, max_length=100)]
-MOST_IMAGES = 100_000
+MOST_IMAGES, MOST_LEARNED = 100_000, 100_000_000
 FEWEST_LAMPS = 3
 """Fewest lamps of each lens: one to train, one to check, one to test."""
 MOST_BITS, MOST_WELL_E, MOST_READ_NOISE_DN = 12, 30_000.0, 100.0
@@ -35,6 +35,8 @@ class LightLevel(Section):
     phantom_cd: float = Field(default=0.0, ge=0, le=1e6)
     """Intensity of an unlit lens in low sun, in half of the scenes, cd (EN 12368 classes its ratio to a lit lens:
     1 to 16); 0: no sun on the lens."""
+    train_weight: float = Field(default=1.0, gt=0, le=1e6)
+    """Weight of this level in the images from which readers learn."""
 
 
 class Street(Section):
@@ -70,7 +72,7 @@ class Street(Section):
 
 
 class Vision(Section):
-    """Benchmark of vision: images of signal heads, read by the ideal observer and by a small network.
+    """Benchmark of vision: images of signal heads, read by the ideal observer and by readers that learn.
 
     The observer reads raw pixels: on average over heads as they are drawn here, no reader of either input errs less.
     """
@@ -98,22 +100,25 @@ class Vision(Section):
     seeds: int = Field(default=5, ge=2, le=20)
     """Seeds; each trains networks of its own."""
     train_images: int = Field(default=10_000, ge=50, le=MOST_IMAGES)
-    """Training images of each seed and CFA, lenses in any order."""
+    """Images of each seed and CFA for your own detector to learn from, lenses in any order."""
     check_images: int = Field(default=400, ge=20, le=MOST_IMAGES)
-    """Images of each seed and CFA by which the network's confidence is calibrated, lenses in any order."""
+    """Images of each seed and CFA by which the readers' confidence is calibrated, lenses in any order."""
     test_images: int = Field(default=400, ge=20, le=MOST_IMAGES)
     """Test images of each seed, order of lenses and CFA."""
-    epochs: int = Field(default=5, ge=1, le=1000)
-    """Passes over the training images and, where the tile has any, their mirror images."""
     unknown_cost: Fraction = 0.2
     """Cost of the answer "unknown"; a wrong answer costs 1."""
+    prototypes: bool = True
+    """`false` leaves the prototype network out; the ideal observer always reads the images."""
+    prototype_images: int = Field(default=300_000, ge=1000, le=MOST_LEARNED)
+    """Images from which the prototype network learns, of each seed and CFA; each is seen once, and not held."""
     network: bool = True
-    """`false` leaves the network out; the ideal observer always reads the images."""
+    """`false` leaves out the network that is trained by gradients."""
+    network_images: int = Field(default=100_000, ge=1000, le=MOST_LEARNED)
+    """Images from which that network learns, of each seed and CFA; each is seen once, and not held."""
     street: Street | None = None
     """Images of a street, too."""
     input: Seen = "raw"
-    """Input of the network: `raw` pixels, a plane for each pixel of the tile, or every channel at every pixel,
-    `demosaicked` by a tent as wide as the tile."""
+    """Input of the network: `raw` pixels, or every channel at every pixel, `demosaicked` by a tent."""
 
     @model_validator(mode="after")
     def _fits(self) -> Vision:

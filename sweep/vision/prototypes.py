@@ -1,0 +1,145 @@
+"""Prototype network: a matched filter for each hidden class of a head, and the sum of the likelihoods of a state.
+
+A class is all that is random but the lamp: place, sun, order of the lenses, which is lit and where, its intensity. Its
+prototype is the mean of its training images in units of the noise, where the noise is 1. Lamps of one class differ
+along the light of a lamp alone, by a variance that is learned, too. Priors are those of the scenes; nothing descends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+
+from ..base.types import Array, Float, ImageNumbers, IndexArray
+from .crops import Crops, Float32, Heads, Seen
+from .scenes import PHANTOM_SHARE, orders_of_lenses
+
+_AT_ONCE = 20_000
+_SPREAD = 0.1
+"""Share of the images by which the spread along lamps is learned."""
+_PRIOR_IMAGES = 5.0
+"""Weight, in images, of no spread."""
+
+
+class _Classes(NamedTuple):
+    """Hidden classes of a light level before one background.
+
+    `dark`: class of the same head without the lamp; `group`: classes that differ in the place alone; `share`:
+    probability with the lenses in any order, and in the street's.
+    """
+
+    heads: Heads
+    dark: ImageNumbers
+    group: ImageNumbers
+    share: Float[Array, "2 classes"]
+
+
+def _classes(crops: Crops, level: int) -> _Classes:
+    """Return the hidden classes; without sun an order counts by where the lit lens is."""
+    vision = crops.vision
+    orders, n_kinds = orders_of_lenses(len(vision.lenses)), len(vision.lenses)
+    rows: dict[tuple[int, ...], int] = {}
+    shares: list[list[float]] = []
+    of_sun = (1 - PHANTOM_SHARE, PHANTOM_SHARE) if crops.sunny[level] else (1.0,)
+    cases = product(enumerate(of_sun), range(len(orders)), range(-1, n_kinds), range(len(vision.intensities_cd)))
+    for (sunny, share), order, kind, intensity in cases:
+        position = -1 if kind < 0 else int(np.flatnonzero(orders[order] == kind)[0])
+        key = (sunny, order if sunny else -1, kind, position, intensity if kind >= 0 else 0)
+        at = rows.setdefault(key, len(shares))
+        if at == len(shares):
+            shares.append([0.0, 0.0, order])
+        part = share / ((1 + n_kinds) * len(vision.intensities_cd))
+        shares[at][0] += part / len(orders)
+        shares[at][1] += part * (order == 0)
+    table, known, n = np.array(list(rows)), np.array(shares), crops.n_places
+    dark = [rows[sunny, order, -1, -1, 0] for sunny, order, *_ in rows]
+    place = np.tile(np.arange(n), len(table))
+    of_class = table[:, 2], table[:, 4], known[:, 2].astype(np.intp), table[:, 0]
+    kinds, intensities, of_order, with_sun = (np.repeat(part, n) for part in of_class)
+    heads = Heads(kinds, intensities, of_order, with_sun, place, np.zeros_like(place))
+    group = np.repeat(np.arange(len(table)), n)
+    return _Classes(heads, np.repeat(dark, n) * n + place, group, np.repeat(known[:, :2].T, n, axis=1) / n)
+
+
+class _Learned(NamedTuple):
+    """Prototypes of the classes of one distance, level and background."""
+
+    classes: _Classes
+    means: Float32
+    counts: Float[Array, " classes"]
+    directions: Float32
+    spread: Float[Array, " classes"]
+
+
+class Prototypes:
+    """Prototypes of one design."""
+
+    def __init__(self, crops: Crops, images: int) -> None:
+        """Learn from a number of images, as many of each class as it is frequent."""
+        vision = crops.vision
+        self._learned: dict[tuple[int, int, int], _Learned] = {}
+        self._states = 1 + len(vision.lenses)
+        weights = np.array([level.train_weight for level in vision.levels.values()])
+        shares = weights / weights.sum() / (len(vision.distances_m) * len(vision.backgrounds))
+        for level, share in enumerate(shares):
+            classes = _classes(crops, level)
+            for distance, background in product(range(len(vision.distances_m)), range(len(vision.backgrounds))):
+                learned = _learned(crops, distance, level, background, classes, images * share)
+                self._learned[distance, level, background] = learned
+
+    def log_probabilities(self, seen: Seen) -> Float[Array, "images states"]:
+        """Return the logarithm of the probability of each state, but for a constant of each image."""
+        logs = np.empty((len(seen.crops), self._states))
+        for (distance, level), where in seen.conditions():
+            for background in np.unique(seen.background[where]):
+                here = where[seen.background[where] == background]
+                learned = self._learned[distance, level, int(background)]
+                logs[here] = _log_probabilities(learned, seen.crops[here], seen.fixed, self._states)
+        return logs
+
+
+def _learned(crops: Crops, distance: int, level: int, background: int, classes: _Classes, images: float) -> _Learned:
+    heads = classes.heads._replace(background=np.full_like(classes.heads.background, background))
+
+    def drawn(counts: IndexArray) -> Iterator[tuple[ImageNumbers, Float32]]:
+        """Yield some classes and new images of each, in their order."""
+        block = np.cumsum(counts) // _AT_ONCE
+        for own in np.split(np.arange(counts.size), np.flatnonzero(np.diff(block)) + 1):
+            yield own, crops.draw(distance, level, Heads(*(np.repeat(part[own], counts[own]) for part in heads)))
+
+    def summed(values: Float32, counts: IndexArray) -> Float32:
+        return np.asarray(np.add.reduceat(values, np.cumsum(counts) - counts, axis=0))
+
+    counts, others = (
+        np.maximum(np.rint(images * part * classes.share[0]), 1).astype(np.intp) for part in (1 - _SPREAD, _SPREAD)
+    )
+    sums = np.concatenate([summed(z, counts[own]) for own, z in drawn(counts)])
+    means = sums / counts[:, None].astype(np.float32)
+    directions = means - means[classes.dark]
+    directions /= np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-12)
+    squares = []
+    for own, z in drawn(others):
+        mean, direction = (np.repeat(part[own], others[own], axis=0) for part in (means, directions))
+        squares.append(summed(np.einsum("ij,ij->i", z - mean, direction) ** 2, others[own]))
+    total, n = (np.bincount(classes.group, part) for part in (np.concatenate(squares), others))
+    spread = np.maximum((total + _PRIOR_IMAGES) / (n + _PRIOR_IMAGES), 1.0)[classes.group]
+    return _Learned(classes, means, counts.astype(float), directions, spread)
+
+
+def _log_probabilities(learned: _Learned, crops: Float32, fixed: bool, n_states: int) -> Float[Array, "images states"]:
+    from scipy.special import logsumexp  # noqa: PLC0415  (slow to import)
+
+    classes, counts = learned.classes, learned.counts
+    known = classes.share[int(fixed)] > 0
+    means, directions, kind = learned.means[known], learned.directions[known], classes.heads.kind[known]
+    reference = means.mean(axis=0)
+    x, m = (crops - reference).astype(float), (means - reference).astype(float)
+    v, along_v = 1 + 1 / counts[known], learned.spread[known] + 1 / counts[known]
+    apart = (x**2).sum(axis=1)[:, None] - 2 * x @ m.T + (m**2).sum(axis=1)
+    along = (x @ directions.T - (m * directions).sum(axis=1)) ** 2
+    logs = -0.5 * ((apart - along) / v + along / along_v + np.log(along_v) + (x.shape[1] - 1) * np.log(v))
+    logs += np.log(classes.share[int(fixed)][known])
+    return np.stack([logsumexp(logs[:, kind == state - 1], axis=1) for state in range(n_states)], axis=1)
