@@ -104,6 +104,14 @@ class ImageSplit(StrEnum):
     TEST = "test"
 
 
+class ImageFormat(StrEnum):
+    """Formats of exported images."""
+
+    ARRAYS = "arrays"
+    COCO = "coco"
+    YOLO = "yolo"
+
+
 class ImageForm(StrEnum):
     """Forms of exported images."""
 

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
 
 from ..base.answer import Answer
+from ..base.errors import DataError, ValidationIssue
 from ..results.atomic import atomic, write_text
 from ..results.folder import run_folder
 from ..results.output import Output, read_output
+from ..runs.read_detections import is_of_streets, read_detections
 from ..runs.score import (
-    Reader,
+    LEARNED,
     check_unique,
     in_any_order,
     network_of,
@@ -23,10 +26,20 @@ from ..runs.score import (
     vision_of,
     whole_scores,
 )
-from ..runs.score_streets import is_of_streets, labels_of_test, read_detections, street_lines, street_scores
-from ..vision.detections import ALL
-from ..vision.scenes import NETWORK, states_of
+from ..runs.score_streets import (
+    found_sentence,
+    labels_of_test,
+    shape_of,
+    street_lines,
+    street_scores,
+    vision_with_streets,
+    whole,
+)
+from ..vision.boxes import categories_of
+from ..vision.detections import ALL, FALSE_PER_IMAGE
+from ..vision.scenes import SHUFFLED, states_of
 from .hold import holds_for
+from .leaders import answering, label
 from .page import page_of
 from .panels import Line, Lines, Picture
 from .section import Told, table_of
@@ -42,8 +55,8 @@ def score(folder: Path | str, predictions: Sequence[Path | str], *, output: Path
     folder : path-like
         Folder of a finished run of a study with `vision`.
     predictions : sequence of path-like
-        A CSV or Parquet file for each reader: image_id, and state or a probability of each. Files with positions are
-        detections in streets.
+        For each reader a CSV or Parquet file: image_id, and state or a probability of each. Detections in streets are
+        results of COCO (.json), a folder of these or of YOLO's text files, or a table with x_px, y_px, state and score.
     output : path-like, optional
         Folder of ``scores.parquet`` and ``scores.html``; left out, FOLDER/scores.
 
@@ -64,53 +77,125 @@ def score(folder: Path | str, predictions: Sequence[Path | str], *, output: Path
 
 
 def _score_readers(output: Output, predictions: Sequence[Path], to: Path) -> tuple[list[str], dict[str, pd.DataFrame]]:
-    """Score files of predictions and the run's network, and write the scores; return lines and tables."""
+    """Score files of predictions and the run's readers, and write tables and page; return lines and tables."""
     vision, tables = vision_of(output), dict[str, pd.DataFrame]()
-    check_unique([path.stem for path in predictions] + ([NETWORK] if vision.network else []))
+    own = [
+        network_of(images, name) for images in [unseen_images(output)] for name in LEARNED if images[name].notna().any()
+    ]
+    check_unique([path.stem for path in predictions] + [reader.name for reader in own])
     of_streets = [path for path in predictions if vision.street is not None and is_of_streets(path)]
-    predictions = [path for path in predictions if path not in of_streets]
-    lines = list[str]()
+    lines, sections = list[str](), list[Told]()
     if of_streets:
-        tables["streets"] = _score_streets(output, of_streets, to)
+        tables["streets"] = _score_streets(output, of_streets)
         lines += street_lines(tables["streets"])
-    if not predictions:
-        return [*lines, f"Files: {to}/: {STREETS}."], tables
-    images = unseen_images(output)
-    readers: list[Reader] = [read_predictions(path, images, states_of(vision)) for path in predictions]
-    if vision.network:
-        readers.append(network_of(images))
-    scores = pd.concat([scores_of(reader, images, vision.unknown_cost) for reader in readers], ignore_index=True)
-    with atomic(to / TABLE) as hidden:
-        scores.to_parquet(hidden, index=False)
-    lines += score_lines(scores)
-    shown = scores.drop(columns=["design_id"]).round(4)
-    lead = Told("Errors", (), picture_of(scores), table_of(summary_table(scores)))
-    further = Told("By distance and light", (), None, table_of(shown, f"{TABLE} has all."))
+        sections += _of_streets(output, tables["streets"])
+    if len(of_streets) < len(predictions):
+        images = unseen_images(output)
+        readers = [read_predictions(path, images, states_of(vision)) for path in predictions if path not in of_streets]
+        parts = [scores_of(reader, images, vision.unknown_cost) for reader in [*readers, *own]]
+        tables["images"] = pd.concat(parts, ignore_index=True)
+        lines += score_lines(tables["images"])
+        sections += _of_images(tables["images"])
+    files = {"streets": STREETS, "images": TABLE}
+    for name, scores in tables.items():
+        with atomic(to / files[name]) as hidden:
+            scores.to_parquet(hidden, index=False)
+    lead, *further = sections
     text = page_of(
         output.study.study,
-        "How often do readers err?",
-        lines,
+        "Which CFA does a detector read best?" if of_streets else "How often do readers err?",
+        lead.answer,
         holds_for(output),
-        lead,
-        [further],
+        replace(lead, sentences=()),
+        further,
         kind="scores of readers",
-        files=[TABLE],
+        limits=_LIMITS[bool(of_streets)],
+        files=[files[name] for name in tables],
     )
     write_text(text, to / PAGE)
-    files = ", ".join([TABLE, PAGE, *([STREETS] if of_streets else [])])
-    return [*lines, f"Files: {to}/: {files}."], {"images": scores, **tables}
+    return [*lines, f"Files: {to}/: {', '.join([*(files[name] for name in tables), PAGE])}."], tables
 
 
-def _score_streets(output: Output, predictions: Sequence[Path], to: Path) -> pd.DataFrame:
-    vision = output.study.vision
-    assert vision is not None
-    labels = labels_of_test(output)
-    detections_of = {path.stem: read_detections(path, labels, vision.lenses) for path in predictions}
-    parts = [street_scores(name, detections, labels, vision.lenses) for name, detections in detections_of.items()]
-    scores = pd.concat(parts, ignore_index=True)
-    with atomic(to / STREETS) as hidden:
-        scores.to_parquet(hidden, index=False)
-    return scores
+_LIMITS = {
+    True: (
+        "Streets: lenses stand in the street's order; images of the test, of lamps that training does not show. Each "
+        "seed is scored apart; figures are means over the seeds. Intervals hold 95 % of draws of the scenes of each "
+        "light level, the same for all designs: for these lamps and this detector as it was trained.",
+        "A box is found that overlaps one of its state by 0.5 (AP50) or by 0.5 to 0.95 (AP); a point within a lens's "
+        "diameter. A false box counts at the distance whose boxes are nearest in size, and at all intensities.",
+    ),
+    False: ("Lenses in any order, lamps that training does not show. Intervals are Student's t over the seeds.",),
+}
+
+
+def _score_streets(output: Output, predictions: Sequence[Path]) -> pd.DataFrame:
+    vision, labels = vision_with_streets(output), labels_of_test(output)
+    parts = []
+    for path in predictions:
+        found = read_detections(path, labels, categories_of(vision), lambda cfa: shape_of(output, cfa))
+        if found.empty:
+            raise DataError(ValidationIssue("no detections", str(path)))
+        parts.append(street_scores(output, path.stem, found, labels))
+    return pd.concat(parts, ignore_index=True)
+
+
+def _of_streets(output: Output, scores: pd.DataFrame) -> Iterator[Told]:
+    """Yield a section for each detector and kind of box: what is found, over distance."""
+    lenses, best = vision_with_streets(output).lenses, answering(output)
+    lens = "red" if "red" in lenses else lenses[0]
+    for (reader, kind), rows in scores.groupby(["reader", "kind"], sort=False):
+        totals = whole(rows)
+        names = list(totals["name"])
+        hero = "" if best is None else label(best)
+        if hero not in names[1:]:
+            hero = str(totals["name"].iloc[int(totals["ap50"].to_numpy().argmax())])
+        at = rows[(rows["state"] == lens) & (rows["distance_m"] != ALL)]
+        lines = {
+            str(name): Line(own["distance_m"].to_numpy(dtype=float), *(100 * own[c].to_numpy() for c in ("found",)))
+            for name, own in at.groupby("name", sort=False)
+        }
+        title = f"{reader}: {lens} {kind}s found / %"
+        picture = Picture(
+            (Lines(title, "distance / m", lines, hero, height=260),),
+            f"Share of {lens} {kind}s that {reader} finds over distance.",
+            f"With one false box in {1 / FALSE_PER_IMAGE:.0f} images, all light levels together.",
+        )
+        told = totals[["name", "targets"]].copy()
+        columns = {
+            "found": "found / %",
+            "ap50": "AP50 / %",
+            "ap": "AP / %",
+            "ap50_apart": f"AP50 less that of {names[0]}",
+        }
+        for column, head in columns.items():
+            if column in totals and totals[column].notna().any():
+                ends = [totals[f"{column}{end}"].mul(100).map("{:.1f}".format) for end in ("", "_low", "_high")]
+                told[head] = ends[0] + " (" + ends[1] + " to " + ends[2] + ")"
+        told.loc[told["name"] == names[0], f"AP50 less that of {names[0]}"] = "-"
+        words = f"{reader}: {kind}s"
+        yield Told(
+            words,
+            (found_sentence(rows, lens, hero),),
+            picture,
+            table_of(told, f"{STREETS} has states, distances, levels and intensities."),
+        )
+
+
+def _of_images(scores: pd.DataFrame) -> Iterator[Told]:
+    """Yield how often readers err, and that by distance and light."""
+    totals = whole_scores(scores)
+    order = "in any order" if totals["order"].iloc[0] == SHUFFLED else "in the street's order"
+    first, *others = (row for row in totals.to_dict("records") if row["reader"] == totals["reader"].iloc[0])
+    text = f"{first['reader']} errs on {100 * first['error']:.1f} % of {first['images']:,} images with {first['name']}"
+    if others:
+        least = min(others, key=lambda row: float(row["error"]))
+        ends = [f"{100 * least[f'apart{end}']:+.1f}" for end in ("", "_low", "_high")]
+        text += f", and least of the others on {100 * least['error']:.1f} % with {least['name']}"
+        text += f": {ends[0]} ({ends[1]} to {ends[2]})"
+    text += f"; heads with lenses {order}, all distances and light levels."
+    yield Told("Errors", (text,), picture_of(scores), table_of(summary_table(scores)))
+    shown = scores.drop(columns=["design_id"]).round(4)
+    yield Told("By distance and light", (), None, table_of(shown, f"{TABLE} has all."))
 
 
 def summary_table(scores: pd.DataFrame) -> pd.DataFrame:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -12,15 +14,16 @@ from scipy.stats import rankdata
 from ..base.types import Array, Bool, BoolArray, Float, IndexArray, Int
 from ..metrics.share import format_share
 from ..results.output import Output
-from ..results.tables import RGGB, VISION, VISION_CONDITIONS
+from ..results.tables import RGGB, VISION, VISION_CONDITIONS, VISION_LEARNING
 from ..vision.readers import OBSERVER
-from ..vision.scenes import NETWORK, SHUFFLED, UNSEEN, states_of
+from ..vision.scenes import NETWORK, PROTOTYPES, SHUFFLED, UNSEEN, states_of
 from ..vision.scores import Interval, confusion_matrix, interval_of_seeds, mean_of
 from ..vision.section import Vision
 
 READER_NAMES = {
     OBSERVER: "ideal observer",
-    NETWORK: "network",
+    PROTOTYPES: "prototype network",
+    NETWORK: "trained network",
 }
 _FEWEST_RANKED = 5
 """Designs that a rank correlation between designs needs."""
@@ -42,6 +45,7 @@ class Benchmark:
     seed: int
     images: pd.DataFrame
     conditions: pd.DataFrame
+    learning: pd.DataFrame
 
     @cached_property
     def designs(self) -> list[str]:
@@ -60,8 +64,13 @@ class Benchmark:
 
     @property
     def main_reader(self) -> str:
-        """Reader by which designs are compared: the network, or without one the observer."""
-        return NETWORK if NETWORK in self.readers else OBSERVER
+        """Reader by which designs are compared: the prototype network, the trained one, or the observer."""
+        return self.learners[0] if self.learners else OBSERVER
+
+    @property
+    def learners(self) -> list[str]:
+        """Readers that learn."""
+        return [reader for reader in self.readers if reader != OBSERVER]
 
     def _answers(self, order: str, lamps: str = UNSEEN) -> pd.DataFrame:
         return self.images[(self.images["order"] == order) & (self.images["lamps"] == lamps)]
@@ -75,6 +84,23 @@ class Benchmark:
         rows = self._answers(order, lamps)
         rows = rows.assign(wrong=(rows[reader] != rows["state"]).astype(float))
         return rows.pivot(index=["seed", "image"], columns="name", values="wrong")[self.designs]
+
+    @lru_cache  # noqa: B019
+    def risk(self, reader: str) -> pd.DataFrame:
+        """Return the error to expect by the observer for each answer, lenses in any order, as rows of `wrong`.
+
+        On average over scenes it is the share of wrong answers, and scatters less.
+        """
+        rows = self._answers(SHUFFLED)
+        return rows.pivot(index=["seed", "image"], columns="name", values=f"{reader}_risk")[self.designs]
+
+    def times_observer(self, design: str, reader: str, distances_m: Sequence[float]) -> Interval:
+        """Return the error to expect of a reader over that of the observer at some distances."""
+        here = self.scenes(SHUFFLED)["distance_m"].isin(distances_m).to_numpy()
+        seeds = self.seeds(SHUFFLED)[here]
+        own, least = (self.risk(name)[design].to_numpy()[here] for name in (reader, OBSERVER))
+        by_seed = np.array([own[seeds == seed].mean() / least[seeds == seed].mean() for seed in np.unique(seeds)])
+        return interval_of_seeds(float(own.mean() / least.mean()), by_seed)
 
     @lru_cache  # noqa: B019
     def seeds(self, order: str, lamps: str = UNSEEN) -> Int[IndexArray, " scenes"]:
@@ -112,7 +138,7 @@ def benchmark_of(output: Output) -> Benchmark:
     """Return the benchmark of a run whose study has one."""
     vision = output.study.vision
     assert vision is not None
-    tables = output.vision[VISION], output.vision[VISION_CONDITIONS]
+    tables = (output.vision[name] for name in (VISION, VISION_CONDITIONS, VISION_LEARNING))
     return output.cached("vision", lambda: Benchmark(vision, output.study.seed, *tables))
 
 
@@ -131,7 +157,7 @@ def format_percent(interval: Interval) -> str:
 
 @dataclass(frozen=True)
 class Ranks:
-    """Rank correlations of each of `PREDICTORS` with the rarity of the network's errors: 1 predicts every order.
+    """Rank correlations of each of `PREDICTORS` with the rarity of a reader's errors: 1 predicts every order.
 
     `everywhere` is over all designs, distances and levels; `between` is the mean over distances and levels of the
     correlation between designs. `conditions` has one row per design, distance and level, with predictors and `error`.
@@ -142,9 +168,9 @@ class Ranks:
     conditions: pd.DataFrame
 
 
-@lru_cache(maxsize=4)
-def ranks_of(benchmark: Benchmark) -> Ranks:
-    """Return the rank correlations, lenses in any order, with intervals over the seeds."""
+@lru_cache(maxsize=8)
+def ranks_of(benchmark: Benchmark, reader: str) -> Ranks:
+    """Return the rank correlations with the errors to expect of a reader, lenses in any order, by seeds."""
     scenes, seeds = benchmark.scenes(SHUFFLED), benchmark.seeds(SHUFFLED)
     # The first row is of all scenes, then one of each seed.
     of_seed = seeds == np.unique(seeds)[:, None]
@@ -152,15 +178,14 @@ def ranks_of(benchmark: Benchmark) -> Ranks:
     where = list(dict.fromkeys(zip(benchmark.conditions["distance_m"], benchmark.conditions["level"], strict=True)))
     here = np.stack([((scenes["distance_m"] == d) & (scenes["level"] == v)).to_numpy() for d, v in where])
     # [1 + n_seeds, designs, conditions]
-    readers = benchmark.readers[:2]
-    errors = {reader: _by_condition(benchmark.wrong(reader, SHUFFLED), here, weights) for reader in readers}
+    errors = {name: _by_condition(benchmark.risk(name), here, weights) for name in dict.fromkeys((OBSERVER, reader))}
     table = benchmark.conditions.set_index(["name", "distance_m", "level"])
     known = {n: np.array([[table[n][d, *at] for at in where] for d in benchmark.designs]) for n in list(PREDICTORS)[:3]}
-    wrong_shares = errors[benchmark.main_reader]
+    wrong_shares = errors[reader]
     everywhere, between = {}, {}
     for name in PREDICTORS:
         given = errors[name] if name in errors else np.broadcast_to(known[name], wrong_shares.shape)
-        if benchmark.main_reader == name:
+        if reader == name:
             continue
         sign = -1.0 if name in _FALLS else 1.0
         flat = _spearman(sign * given.reshape(len(given), -1), wrong_shares.reshape(len(wrong_shares), -1))
@@ -177,6 +202,42 @@ def ranks_of(benchmark: Benchmark) -> Ranks:
         conditions[name] = (errors[name][0] if name in errors else known[name]).ravel()
     conditions["error"] = wrong_shares[0].ravel()
     return Ranks(everywhere, between, conditions)
+
+
+class Lesson(NamedTuple):
+    """A reader that has learned from some images: error over the observer's by design, and what the CSD says of it."""
+
+    reader: str
+    images: int
+    times: dict[str, float]
+    csd: Interval
+
+
+def lessons_of(benchmark: Benchmark) -> list[Lesson]:
+    """Return what readers of fewer images reach, and the mean rank correlation of CSD and errors between designs.
+
+    Correlations are of one distance and level, means over all of them; intervals over the seeds.
+    """
+    where, lessons = ["distance_m", "level"], list[Lesson]()
+    csd = benchmark.conditions.pivot(index=where, columns="name", values="csd")[benchmark.designs]
+    for reader in benchmark.learners:
+        of_reader = benchmark.learning[benchmark.learning["reader"] == reader]
+        for images in sorted(of_reader["images"].unique()):
+            rows = of_reader[of_reader["images"] == images]
+            # Conditions have equally many images, but for one.
+            by_seed = rows.pivot(index=["seed", *where], columns="name", values="risk")[benchmark.designs]
+            means = [by_seed.groupby(where).mean(), *(own.droplevel("seed") for _, own in by_seed.groupby("seed"))]
+            ranks = [_spearman(-csd.loc[own.index].to_numpy(), own.to_numpy()) for own in means]
+            known = np.array([np.ma.masked_invalid(own).mean() for own in ranks], dtype=float)
+            if len(benchmark.designs) < _FEWEST_RANKED:
+                known = np.full_like(known, np.nan)
+            sums = rows[["risk", "observer_risk"]].mul(rows["test_images"], axis=0).groupby(rows["name"]).sum()
+            times = {
+                name: float(sums.loc[name, "risk"] / sums.loc[name, "observer_risk"]) for name in benchmark.designs
+            }
+            found = interval_of_seeds(float(known[0]), known[1:]).within(-1.0, 1.0)
+            lessons.append(Lesson(reader, int(images), times, found))
+    return lessons
 
 
 def _by_condition(

@@ -1,17 +1,17 @@
 """Images of a benchmark of vision as files, with labels: for detectors of other people.
 
-Scenes, lamps and photons are those of the run: an image of the test is the one that the ideal observer and the network
+Scenes, lamps and photons are those of the run: an image of the test is the one that the ideal observer and the readers
 have read, and its `image_id` names it in a file of predictions.
 """
 
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 import pandas as pd
@@ -19,22 +19,31 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from ..base.cache import Cache
 from ..base.errors import OutputError, ValidationIssue
 from ..base.types import ChannelCurves, Parallel, Progress, delayed
 from ..camera.setup import Setup
 from ..results.atomic import atomic, write_text
 from ..study import Study
-from ..vision.batches import Batch, Form, images_of_split
+from ..vision.batches import TOGETHER, Batch, Form, batches, images_of_split, scenes_of
 from ..vision.images import HeadCamera
-from ..vision.lamps import SPLITS, TEST, TRAIN, split_lamps
+from ..vision.isp import isp_of
+from ..vision.lamps import SPLITS, TEST, split_lamps
+from ..vision.scenes import ORDERS, SHUFFLED
 from ..vision.section import Vision
-from ..vision.street import StreetCamera, draw_streets
-from .coco import coco
+from ..vision.street import STREET, StreetCamera, count_of, draw_streets, street_shape
+from .boxed import data_yaml, write_coco, yolo_lines
 from .vision import vision_designs
 from .workers import run_with_progress
 
+Format = Literal["arrays", "coco", "yolo"]
+"""Arrays of heads and streets, or a PNG for each street with boxes."""
+FORMATS = get_args(Format)
 MANIFEST, STREET_MANIFEST = "manifest.parquet", "street.parquet"
 _SETTINGS, _PARTS_FOLDER = "images.json", "parts"
+_BLOCK_PIXELS = 2**25
+"""Pixels of streets that are repeated if an export is killed."""
+_COMPRESSION = 1
 _TEXT, _NUMBER, _COUNT = pa.string(), pa.float64(), pa.int64()
 _KINDS: dict[pa.DataType, str] = {
     _TEXT: "image_id file name cfa order split state lamp background level",
@@ -44,32 +53,53 @@ _KINDS: dict[pa.DataType, str] = {
     pa.list_(_TEXT): "lenses",
     pa.list_(_NUMBER): "lens_x_px lens_y_px",
 }
-_SCHEMA = pa.schema([(name, kind) for kind, names in _KINDS.items() for name in names.split()])
 _STREET_KINDS: dict[pa.DataType, str] = {
     _TEXT: "image_id file name cfa order split background level",
-    _COUNT: "index design_id seed image",
+    _COUNT: "index design_id seed image coco_id",
     pa.bool_(): "phantom",
     pa.list_(_TEXT): "state",
     pa.list_(
         _NUMBER
     ): "intensity_cd distance_m lens_diameter_px head_x_px head_y_px lit_y_px head_width_px head_height_px",
 }
-_STREET_SCHEMA = pa.schema([(name, kind) for kind, names in _STREET_KINDS.items() for name in names.split()])
+
+
+def _schema(kinds: Mapping[pa.DataType, str]) -> pa.Schema:
+    return pa.schema([(name, kind) for kind, names in kinds.items() for name in names.split()])
+
+
+_SCHEMA, _STREET_SCHEMA = _schema(_KINDS), _schema(_STREET_KINDS)
 
 
 @dataclass(frozen=True)
 class ImageFiles:
-    """Folder and form of exported images.
-
-    `png`: a PNG for each image instead of arrays of 1,024; `coco`: True for boxes of COCO, too, for the PNGs of each
-    design and split.
-    """
+    """Folder, format and form of exported images."""
 
     folder: Path
+    format: Format
     form: Form
-    png: bool
     splits: tuple[str, ...] = SPLITS
-    coco: bool = False
+
+
+class _Block(NamedTuple):
+    """Some images of one design, seed, order (or streets) and split."""
+
+    row: Mapping[str, Any]
+    seed: int
+    order: str
+    split: str
+    start: int
+    stop: int
+
+    def part(self, folder: Path) -> Path:
+        """Return its part of the manifest, which is written when its images are."""
+        name = f"{self.row['design_id']}-{self.seed}-{self.order}-{self.split}-{self.start}.parquet"
+        return folder / _PARTS_FOLDER / name
+
+
+def dataset_of(row: Mapping[str, Any]) -> str:
+    """Return the folder of a design's PNGs."""
+    return f"{row['design_id']}-{re.sub(r'[^A-Za-z0-9]+', '-', str(row['name'])).strip('-')}"
 
 
 def write_images(
@@ -80,14 +110,17 @@ def write_images(
     files: ImageFiles,
     parallel: Parallel,
     progress: Progress,
-) -> pa.Table:
-    """Write the images of every design, seed, order and split, and their manifest.
+) -> dict[str, int]:
+    """Write the images of every design, seed, order and split, and their manifests.
 
-    Deterministic; what an interrupted export has finished, a design with a seed each, is kept and not repeated.
+    Deterministic; the blocks that an interrupted export has finished are kept and not repeated.
 
-    Returns manifest, a row per image. Raises OutputError if the folder holds other images, or the disk refuses.
+    Returns the number of images of each split, streets among them. Raises OutputError if the folder holds other images,
+    or the disk refuses.
     """
-    settings = {"fingerprint": fingerprint, "form": files.form, "png": files.png, "splits": list(files.splits)}
+    names = [str(row["name"]) for row, *_ in designs]
+    settings: dict[str, Any] = {"fingerprint": fingerprint, "format": files.format, "form": files.form}
+    settings |= {"splits": [*files.splits], "designs": names}
     known = files.folder / _SETTINGS
     if known.exists():
         if json.loads(known.read_text(encoding="utf-8")) != settings:
@@ -95,38 +128,67 @@ def write_images(
     elif files.folder.exists() and any(files.folder.iterdir()):
         raise OutputError(ValidationIssue("holds other files", str(files.folder), allowed="a new or empty folder"))
     write_text(json.dumps(settings), known)
-    parts, calls = [], []
+    calls, blocks = [], list[_Block]()
     for row, setup, curves in designs:
-        for number in range(vision.seeds):
-            parts.append(files.folder / _PARTS_FOLDER / f"{row['design_id']}-{number}.parquet")
-            if not parts[-1].exists():
-                calls.append(delayed(_write_part, row, setup, curves, vision, (seed, number), files, parts[-1]))
-    for _ in run_with_progress(parallel, calls, "images written (designs x seeds)", progress):
+        for block in _blocks(row, setup, vision, files):
+            blocks.append(block)
+            if not block.part(files.folder).exists():
+                calls.append(delayed(_write_block, block, setup, curves, vision, seed, files))
+    for _ in run_with_progress(parallel, calls, "images written (blocks)", progress):
         pass
-    manifest = _joined(parts, files.folder / MANIFEST)
-    manifests = [("coco", manifest)]
-    if vision.street is not None:
-        manifests.append(
-            ("coco-street", _joined([_of_streets(part) for part in parts], files.folder / STREET_MANIFEST))
-        )
-    if files.coco:
-        tiles = {int(row["design_id"]): setup.camera.mosaic.indices.shape for row, setup, _ in designs}
-        for stem, table in manifests:
-            for (design_id, split), part in table.to_pandas().groupby(["design_id", "split"]):
-                boxes = json.dumps(coco(part, vision, tiles[int(design_id)]))
-                write_text(boxes, files.folder / f"{stem}-{design_id}-{split}.json")
-    return manifest
+    streets = [block for block in blocks if block.order == STREET]
+    heads = [block for block in blocks if block.order != STREET]
+    for some, schema, name in ((heads, _SCHEMA, MANIFEST), (streets, _STREET_SCHEMA, STREET_MANIFEST)):
+        if some:
+            _join([block.part(files.folder) for block in some], schema, files.folder / name)
+    if files.format != "arrays":
+        for row, setup, curves in designs:
+            _describe(row, setup, curves, vision, files, [block for block in streets if block.row == row])
+    return {split: sum(b.stop - b.start for b in blocks if b.split == split) for split in files.splits}
 
 
-def _joined(parts: Sequence[Path], to: Path) -> pa.Table:
-    manifest = pa.concat_tables([pq.read_table(part) for part in parts])
-    with atomic(to) as hidden:
-        pq.write_table(manifest, hidden)
-    return manifest
+def _blocks(row: Mapping[str, Any], setup: Setup, vision: Vision, files: ImageFiles) -> Iterator[_Block]:
+    """Yield what is written at once: of streets as many as the memory and the time of a killed one allow."""
+    for seed in range(vision.seeds):
+        for split in files.splits:
+            if vision.street is not None:
+                high, wide = street_shape(vision, setup.camera.mosaic.indices.shape)
+                step, most = max(1, min(TOGETHER, _BLOCK_PIXELS // (high * wide))), count_of(vision.street, split)
+                for start in range(0, most, step):
+                    yield _Block(row, seed, STREET, split, start, min(start + step, most))
+            if files.format == "arrays":
+                most = vision.images_of(split)
+                for order in ORDERS if split == TEST else (SHUFFLED,):
+                    for start in range(0, most, TOGETHER):
+                        yield _Block(row, seed, order, split, start, min(start + TOGETHER, most))
 
 
-def _of_streets(part: Path) -> Path:
-    return part.with_name(f"{part.stem}-street.parquet")
+def _join(parts: Sequence[Path], schema: pa.Schema, to: Path) -> None:
+    """Write one manifest, part by part."""
+    with atomic(to) as hidden, pq.ParquetWriter(hidden, schema) as writer:
+        for part in parts:
+            writer.write_table(pq.read_table(part, schema=schema))
+
+
+def _describe(
+    row: Mapping[str, Any], setup: Setup, curves: ChannelCurves, vision: Vision, files: ImageFiles, own: list[_Block]
+) -> None:
+    """Write what tells a detector of the PNGs of a design: boxes of COCO or `data.yaml`, and the ISP's constants."""
+    folder = files.folder / dataset_of(row)
+    shape = street_shape(vision, setup.camera.mosaic.indices.shape)
+    if files.format == "yolo":
+        write_text(data_yaml(files.splits, vision), folder / "data.yaml")
+    else:
+        for split in files.splits:
+            parts = [block.part(files.folder) for block in own if block.split == split]
+            write_coco(parts, vision, shape, folder / "annotations" / f"instances_{split}.json")
+    if files.form == "isp":
+        qe = HeadCamera(setup, curves, vision).qe
+        lights = {level.light for level in vision.levels.values()}
+        isps = {light: isp_of(setup.camera.grid, qe, light) for light in sorted(lights)}
+        channels = list(setup.camera.mosaic.channels)
+        held = {light: {"white": isp.white.tolist(), "matrix": isp.matrix.tolist()} for light, isp in isps.items()}
+        write_text(json.dumps({"channels": channels, "gamma": "sRGB", "lights": held}, indent=1), folder / "isp.json")
 
 
 def images_of_run(study: Study, rows: pd.DataFrame, split: str, names: Sequence[str], form: Form) -> Iterator[Batch]:
@@ -141,63 +203,75 @@ def images_of_run(study: Study, rows: pd.DataFrame, split: str, names: Sequence[
                 yield from images_of_split(camera, lamps, _key(row, number), study.section.seed, split, form)
 
 
+def streets_of_run(study: Study, rows: pd.DataFrame, split: str, names: Sequence[str], form: Form) -> Iterator[Batch]:
+    """Yield the streets of a run's benchmark, without files, design by design and seed by seed."""
+    vision = study.section.vision
+    assert vision is not None
+    assert vision.street is not None
+    for row, setup, curves in vision_designs(study, rows):
+        if row["name"] in names:
+            streets = StreetCamera(HeadCamera(setup, curves, vision), vision.street)
+            for number in range(vision.seeds):
+                key = (study.section.seed, number)
+                lamps, scenes = split_lamps(setup.lights, vision, key), draw_streets(vision, vision.street, split, key)
+                yield from streets.batches(scenes, lamps[split], _key(row, number), split, form)
+
+
 def _key(row: Mapping[str, Any], seed: int) -> dict[str, Any]:
     return {name: row[name] for name in ("design_id", "name", "cfa")} | {"seed": seed}
 
 
-def _write_part(
-    row: Mapping[str, Any],
-    setup: Setup,
-    curves: ChannelCurves,
-    vision: Vision,
-    seed: tuple[int, int],
-    files: ImageFiles,
-    part: Path,
+_cameras: Cache[tuple[Any, ...], HeadCamera] = Cache(1)
+
+
+def _write_block(
+    block: _Block, setup: Setup, curves: ChannelCurves, vision: Vision, seed: int, files: ImageFiles
 ) -> int:
-    """Write the images of one design and seed, then their part of the manifest."""
-    camera, lamps = HeadCamera(setup, curves, vision), split_lamps(setup.lights, vision, seed)
-    key = _key(row, seed[1])
-    if vision.street is not None:
-        streets = StreetCamera(camera, vision.street)
-        drawn = {split: draw_streets(vision, vision.street, split, seed) for split in (TRAIN, TEST)}
-        batches = (
-            streets.batches(drawn[split], lamps[split], key, split, files.form)
-            for split in files.splits
-            if split in drawn
-        )
-        _write_batches(chain.from_iterable(batches), files, _STREET_SCHEMA, _of_streets(part))
-    batches = (images_of_split(camera, lamps, key, seed[0], split, files.form) for split in files.splits)
-    return _write_batches(chain.from_iterable(batches), files, _SCHEMA, part)
+    """Write some images, then their part of the manifest."""
+    camera = _cameras.get((str(files.folder), block.row["design_id"]), lambda: HeadCamera(setup, curves, vision))
+    key, where = _key(block.row, block.seed), (seed, block.seed)
+    lamps, some = split_lamps(setup.lights, vision, where), slice(block.start, block.stop)
+    if block.order != STREET:
+        scenes = scenes_of(vision, lamps, block.order, block.split, where)
+        made, schema = batches(camera, scenes, key, block.order, block.split, files.form, some), _SCHEMA
+    else:
+        assert vision.street is not None
+        streets = draw_streets(vision, vision.street, block.split, where)
+        own = StreetCamera(camera, vision.street)
+        made, schema = own.batches(streets, lamps[block.split], key, block.split, files.form, some), _STREET_SCHEMA
+    arrays = files.format == "arrays"
+    written = _write_arrays(made, block, files) if arrays else _write_pictures(made, block, vision, files)
+    tables = [pa.Table.from_pandas(t, schema=schema, preserve_index=False) for t in written]
+    with atomic(block.part(files.folder)) as hidden:
+        pq.write_table(pa.concat_tables(tables), hidden)
+    return block.stop - block.start
 
 
-def _write_batches(batches: Iterable[Batch], files: ImageFiles, schema: pa.Schema, part: Path) -> int:
-    """Write images, then their part of the manifest."""
-    tables = [
-        pa.Table.from_pandas(_write_block(batch, files), schema=schema, preserve_index=False) for batch in batches
-    ]
-    with atomic(part) as hidden:
-        pq.write_table(pa.concat_tables([schema.empty_table(), *tables]), hidden)
-    return sum(map(len, tables))
+def _write_arrays(made: Iterable[Batch], block: _Block, files: ImageFiles) -> Iterator[pd.DataFrame]:
+    """Write an array of images, and yield their rows of the manifest."""
+    stem = f"images/{block.row['design_id']}/{block.seed}-{block.order}-{block.split}"
+    for images, labels in made:
+        name = f"{stem}-{labels['image'].iloc[0]}.npz"
+        with atomic(files.folder / name) as hidden, hidden.open("wb") as file:
+            np.savez_compressed(file, images=images)
+        yield labels.assign(file=name, index=np.arange(len(labels)))
 
 
-def _write_block(batch: Batch, files: ImageFiles) -> pd.DataFrame:
-    """Write some images, and return their rows of the manifest."""
-    images, labels = batch
-    first = labels.iloc[0]
-    stem = f"images/{first['design_id']}/{first['seed']}-{first['order']}-{first['split']}"
-    if files.png:
-        names = [f"{stem}-{number}.png" for number in labels["image"]]
+def _write_pictures(made: Iterable[Batch], block: _Block, vision: Vision, files: ImageFiles) -> Iterator[pd.DataFrame]:
+    """Write a PNG of each street, for YOLO beside its boxes, and yield their rows of the manifest."""
+    folder = dataset_of(block.row)
+    for images, labels in made:
+        names = [f"{folder}/images/{block.split}/{name}.png" for name in labels["image_id"]]
         for image, name in zip(images, names, strict=True):
             _write_png(image, files.folder / name)
-        return labels.assign(file=names, index=0)
-    name = f"{stem}-{first['image']}.npz"
-    with atomic(files.folder / name) as hidden, hidden.open("wb") as file:
-        np.savez_compressed(file, images=images)
-    return labels.assign(file=name, index=np.arange(len(labels)))
+        if files.format == "yolo":
+            for name, text in yolo_lines(labels, vision, images.shape[1:3]):
+                write_text(text, files.folder / folder / "labels" / block.split / f"{name}.txt")
+        yield labels.assign(file=names, index=0)
 
 
 def _write_png(image: NDArray[np.uint8] | NDArray[np.uint16], path: Path) -> None:
     from PIL import Image  # noqa: PLC0415  (slow to import)
 
     with atomic(path) as hidden, hidden.open("wb") as file:
-        Image.fromarray(image).save(file, "PNG")
+        Image.fromarray(image).save(file, "PNG", compress_level=_COMPRESSION)

@@ -24,7 +24,7 @@ from ..results.tables import VISION
 from ..vision.batches import image_id
 from ..vision.detections import ALL
 from ..vision.lamps import TEST
-from ..vision.scenes import NETWORK, SHUFFLED, UNSEEN, states_of
+from ..vision.scenes import NETWORK, PROTOTYPES, SHUFFLED, UNSEEN, states_of
 from ..vision.scores import Interval, interval_of_seeds
 from ..vision.section import Vision
 
@@ -78,10 +78,14 @@ def scores_of_table(output: Output, predictions: pd.DataFrame) -> pd.DataFrame:
     return scores_of(reader, images, vision.unknown_cost)
 
 
-def network_of(images: pd.DataFrame) -> Reader:
-    """Return the run's own network as a reader."""
-    columns = {_ID: _ID, NETWORK: "answer", f"{NETWORK}_p": "confidence"}
-    return Reader(NETWORK, images[list(columns)].rename(columns=columns))
+LEARNED = (PROTOTYPES, NETWORK)
+"""Readers of a run that learn."""
+
+
+def network_of(images: pd.DataFrame, name: str) -> Reader:
+    """Return a reader of the run as one of predictions."""
+    columns = {_ID: _ID, name: "answer", f"{name}_p": "confidence"}
+    return Reader(name, images[list(columns)].rename(columns=columns))
 
 
 def table_of(path: Path) -> pd.DataFrame:

@@ -1,30 +1,25 @@
-"""Scores of a detector's answers to the street images of a benchmark: average precision, differences of CFAs."""
+"""Scores of a detector's answers to the street images of a benchmark: average precision, what is found, differences."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from pathlib import Path
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from ..base.errors import DataError, ValidationIssue, nearest
+from ..base.errors import SweepError, ValidationIssue
 from ..results.output import Output
 from ..results.tables import VISION
-from ..vision.detections import ALL, precision_scores, precisions
+from ..vision.boxes import HEAD, POINT, targets_of
+from ..vision.detections import ALL, FALSE_PER_IMAGE, Judge, Subset, draws_of, judged, scores_of_draws
 from ..vision.lamps import TEST
-from ..vision.street import draw_streets, street_labels
-from .score import issue_of, table_of
+from ..vision.scenes import states_of
+from ..vision.section import Vision
+from ..vision.street import draw_streets, street_labels, street_shape
 
-COLUMNS = ("image_id", "x_px", "y_px", "state", "score")
-
-
-def is_of_streets(path: Path) -> bool:
-    """Return whether a file of answers has positions.
-
-    True for detections.
-    """
-    return "x_px" in table_of(path)
+_KEY_OF_DRAWS = 40
 
 
 def labels_of_test(output: Output) -> pd.DataFrame:
@@ -32,12 +27,11 @@ def labels_of_test(output: Output) -> pd.DataFrame:
 
     Returns a row per image, see `street_labels`.
     """
-    vision = output.study.vision
-    assert vision is not None
-    assert vision.street is not None
+    vision = vision_with_streets(output)
     designs = output.vision[VISION][["design_id", "name", "cfa"]].drop_duplicates().to_dict("records")
     tables = []
     for number in range(vision.seeds):
+        assert vision.street is not None
         scenes = draw_streets(vision, vision.street, TEST, (output.study.seed, number))
         for design in designs:
             key, mosaic = {str(name): value for name, value in design.items()}, output.mosaic(design["cfa"])
@@ -45,53 +39,102 @@ def labels_of_test(output: Output) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True)
 
 
-def read_detections(path: Path, labels: pd.DataFrame, lenses: Sequence[str]) -> pd.DataFrame:
-    """Read a file of detections: a row each, with `image_id`, `x_px`, `y_px`, `state` and `score`.
+def vision_with_streets(output: Output) -> Vision:
+    """Return the benchmark of a run with streets; raises SweepError if it has none."""
+    vision = output.study.vision
+    if vision is None or vision.street is None:
+        raise SweepError(ValidationIssue("the study has no `vision.street`", str(output.folder)))
+    return vision
 
-    `path`: CSV or Parquet; positions are from the center of the first pixel. Raises DataError for a file that cannot be
-    read, other columns, images or states, and what is no number.
+
+def shape_of(output: Output, cfa: str) -> tuple[int, int]:
+    """Return the size of the streets of a CFA, pixels."""
+    return street_shape(vision_with_streets(output), output.mosaic(cfa).indices.shape)
+
+
+def street_scores(output: Output, reader: str, detections: pd.DataFrame, labels: pd.DataFrame) -> pd.DataFrame:
+    """Score a detector: rows for each kind of box, and in it for states, distances, levels and intensities.
+
+    Designs without a detection are left out; the others are compared with the first of them.
     """
-    table = table_of(path)
-    missing = [name for name in COLUMNS if name not in table]
-    if missing:
-        raise DataError(ValidationIssue("a column is missing", str(path), None, None, missing[0], ", ".join(COLUMNS)))
-    issues = []
-    ids, states = table["image_id"].astype(str), table["state"].astype(str)
-    others, unknown = ids[~ids.isin(labels["image_id"])], states[~states.isin(lenses)]
-    if len(others):
-        issues.append(issue_of("not an image of a street of the test", path, others, "image_id"))
-    if len(unknown):
-        near = nearest(unknown.iloc[0], lenses)
-        issues.append(issue_of("no signal type", path, unknown, "state", ", ".join(lenses), near))
-    numbers = {name: pd.to_numeric(table[name], errors="coerce") for name in ("x_px", "y_px", "score")}
-    for name, values in numbers.items():
-        wrong = table[name][~np.isfinite(values)].astype(str)
-        if len(wrong):
-            issues.append(issue_of("no number", path, wrong, name, "a number"))
-    if issues:
-        raise DataError(issues)
-    return pd.DataFrame({"image_id": ids, "state": states, **numbers})
+    vision = vision_with_streets(output)
+    names = [str(name) for name in labels["name"].unique() if (detections["name"] == name).any()]
+    judges: dict[str, dict[str, list[Judge]]] = {}
+    # All designs show the same scenes: of one seed they are drawn alike.
+    for number, of_seed in labels.groupby("seed"):
+        levels = of_seed[of_seed["name"] == names[0]].sort_values("image")["level"].to_numpy() if names else np.empty(0)
+        draws = draws_of(levels, (output.study.seed, _KEY_OF_DRAWS, *of_seed["seed"].head(1)))
+        for kind, name in product(detections["kind"].unique(), names):
+            images = of_seed[of_seed["name"] == name]
+            targets = targets_of(images, kind, shape_of(output, images["cfa"].iloc[0]))
+            own = detections["seed"].eq(number) & detections["name"].eq(name) & detections["kind"].eq(kind)
+            judge = judged(kind, _states(vision, kind), targets, detections[own], levels, draws)
+            judges.setdefault(kind, {}).setdefault(name, []).append(judge)
+    tables = []
+    for kind, by_name in judges.items():
+        for of in _subsets(vision, kind):
+            rows = pd.DataFrame(scores_of_draws(by_name, of, names[0]))
+            where = {key: f"{value:g}" if isinstance(value, float) else value for key, value in of._asdict().items()}
+            tables.append(rows.assign(reader=reader, kind=kind, **where))
+    first = ["reader", "kind", *Subset._fields]
+    scores = pd.concat(tables, ignore_index=True)
+    return scores[[*first, *(name for name in scores.columns if name not in first)]]
 
 
-def street_scores(reader: str, detections: pd.DataFrame, labels: pd.DataFrame, lenses: Sequence[str]) -> pd.DataFrame:
-    """Score a detector: one row per design and light level, and all levels, with 95 % intervals over the seeds."""
-    parts = [
-        precisions(images, detections, lenses).assign(name=images["name"].iloc[0], seed=images["seed"].iloc[0])
-        for _, images in labels.groupby(["name", "seed"], sort=False)
-    ]
-    scores = precision_scores(pd.concat(parts, ignore_index=True), str(labels["name"].iloc[0]))
-    scores.insert(0, "reader", reader)
-    return scores
+def _states(vision: Vision, kind: str) -> Sequence[str]:
+    return states_of(vision) if kind == HEAD else vision.lenses
+
+
+def _subsets(vision: Vision, kind: str) -> Iterator[Subset]:
+    """Yield what is told: all, and each state, distance, level and intensity, and each state at each distance."""
+    states = _states(vision, kind)
+    yield Subset()
+    yield from (Subset(state=state) for state in states)
+    yield from (Subset(distance_m=distance) for distance in vision.distances_m)
+    yield from (Subset(level=level) for level in vision.levels)
+    yield from (Subset(intensity_cd=candelas) for candelas in vision.intensities_cd)
+    yield from (Subset(state=state, distance_m=distance) for state, distance in product(states, vision.distances_m))
+
+
+def whole(scores: pd.DataFrame) -> pd.DataFrame:
+    """Return the scores of all targets of a kind."""
+    return scores[(scores[list(Subset._fields)] == ALL).all(axis=1)]
+
+
+def found_sentence(scores: pd.DataFrame, lens: str, better: str) -> str:
+    """Return which share of a signal type is found with the first design, and with another, at one distance."""
+    at = scores[(scores["state"] == lens) & (scores["distance_m"] != ALL)]
+    first = at[at["name"] == at["name"].iloc[0]]
+    # Where neither finds all or nothing.
+    distance = first.loc[(first["found"] - 0.8).abs().idxmin(), "distance_m"]
+    here = at[at["distance_m"] == distance].set_index("name")
+    name, other = str(first["name"].iloc[0]), here.loc[better]
+    what = {HEAD: f"{lens} heads", POINT: f"{lens} lamps"}.get(str(first["kind"].iloc[0]), f"{lens} lamps")
+    text = (
+        f"{first['reader'].iloc[0]} finds {100 * here.loc[name, 'found']:.0f} % of {what} at {distance} m with {name}"
+    )
+    if better != name:
+        ends = [f"{100 * other[f'found_apart{end}']:+.0f}" for end in ("", "_low", "_high")]
+        text += f" and {100 * other['found']:.0f} % with {better}: {ends[0]} ({ends[1]} to {ends[2]})"
+    return f"{text}, with one false box in {1 / FALSE_PER_IMAGE:.0f} images."
 
 
 def street_lines(scores: pd.DataFrame) -> Iterator[str]:
-    """Yield a line per detector and design, over all light levels."""
-    totals = scores[scores["level"] == ALL]
-    first = totals["name"].iloc[0]
-    for row in totals.to_dict("records"):
-        text = f"{row['reader']}, {row['name']}: average precision {row['average_precision']:.3f}"
-        text += f" ({row['average_precision_low']:.3f} to {row['average_precision_high']:.3f})"
-        if row["name"] != first:
-            note = "" if row["apart_low"] > 0 or row["apart_high"] < 0 else ", not told apart"
-            text += f"; {row['apart']:+.3f} ({row['apart_low']:+.3f} to {row['apart_high']:+.3f}) against {first}{note}"
-        yield f"{text}."
+    """Yield a line per detector, kind of box and design, over all targets."""
+    totals = whole(scores)
+    for (reader, kind), rows in totals.groupby(["reader", "kind"], sort=False):
+        first = rows["name"].iloc[0]
+        for row in rows.to_dict("records"):
+            text = f"{reader}, {kind}s, {row['name']}: average precision {_told(row, 'ap50')}"
+            text += (
+                f", over overlaps of 0.5 to 0.95 {_told(row, 'ap')}" if "ap" in row and np.isfinite(row["ap"]) else ""
+            )
+            if row["name"] != first:
+                note = "" if row["ap50_apart_low"] > 0 or row["ap50_apart_high"] < 0 else ", not told apart"
+                text += f"; {_told(row, 'ap50_apart', '+')} against {first}{note}"
+            yield f"{text}."
+
+
+def _told(row: Mapping[Any, Any], name: str, sign: str = "") -> str:
+    value, low, high = (f"{row[f'{name}{end}']:{sign}.3f}" for end in ("", "_low", "_high"))
+    return f"{value} ({low} to {high})"

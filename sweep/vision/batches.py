@@ -24,6 +24,8 @@ pictures of a plain ISP (uint8 sRGB)."""
 FORMS = get_args(Form)
 TOGETHER = 1024
 """Images that are held at once."""
+_STRIP_ROWS = 128
+"""Rows of images that are developed at once, about."""
 _KEYS = {TEST: 0, TRAIN: 2, CHECK: 3}
 """Last number of the seed of each split's scenes."""
 
@@ -42,8 +44,7 @@ def image_id(design_id: int, seed: int, order: str, split: str, number: int) -> 
 
 def scenes_of(vision: Vision, lamps: dict[str, Lamps], order: str, split: str, seed: tuple[int, int]) -> Scenes:
     """Return the scenes of a split."""
-    count = {TEST: vision.test_images, TRAIN: vision.train_images, CHECK: vision.check_images}[split]
-    return draw_scenes(vision, lamps[split], order, count, (*scene_key(seed, order), _KEYS[split]))
+    return draw_scenes(vision, lamps[split], order, vision.images_of(split), (*scene_key(seed, order), _KEYS[split]))
 
 
 def scene_key(seed: tuple[int, int], order: str) -> tuple[int, ...]:
@@ -55,14 +56,21 @@ def scene_key(seed: tuple[int, int], order: str) -> tuple[int, ...]:
 
 
 def batches(
-    camera: HeadCamera, scenes: Scenes, key: Mapping[str, Any], order: str, split: str, form: Form
+    camera: HeadCamera,
+    scenes: Scenes,
+    key: Mapping[str, Any],
+    order: str,
+    split: str,
+    form: Form,
+    some: slice = slice(None),
 ) -> Iterator[Batch]:
-    """Yield the images of scenes in blocks of `TOGETHER`.
+    """Yield the images of scenes, or of some, in blocks of `TOGETHER`.
 
     `key`: `design_id`, `name`, `cfa` and `seed`, for the labels.
     """
-    for start in range(0, len(scenes), TOGETHER):
-        block = scenes.subset(slice(start, start + TOGETHER))
+    first, last, _ = some.indices(len(scenes))
+    for start in range(first, last, TOGETHER):
+        block = scenes.subset(slice(start, min(start + TOGETHER, last)))
         numbers = np.arange(start, start + len(block))
         ids = {"image_id": [image_id(key["design_id"], key["seed"], order, split, int(number)) for number in numbers]}
         where = {"order": order, "split": split, "image": numbers}
@@ -116,16 +124,27 @@ def formed(camera: HeadCamera, scenes: Scenes, form: Form) -> NDArray[Any]:
 def in_form(camera: HeadCamera, numbers: Numbers, levels: Int[IndexArray, " values"], form: Form) -> NDArray[Any]:
     """Return drawn images in a form."""
     values_dn, pixel = camera.table.values_dn, camera.pixel
-    dn = values_dn[numbers]
     if form == "raw":
+        dn = values_dn[numbers]
         return dn.astype(np.float32) if pixel.captures else np.rint(dn).astype(np.uint16)
-    above_dn = demosaicked(dn, camera.setup.camera.mosaic) - pixel.offset_dn
-    if form == "demosaicked":
-        return above_dn.astype(np.float32)
-    share = above_dn / (values_dn[-1] - pixel.offset_dn)
+    mosaic = camera.setup.camera.mosaic
+    is_linear = form == "demosaicked"
+    channels = len(mosaic.channels) if is_linear else 3
+    images: NDArray[Any] = np.empty((*numbers.shape, channels), dtype=np.float32 if is_linear else np.uint8)
     lights = np.array([level.light for level in camera.levels])[levels]
-    pictures = np.empty((*share.shape[:3], 3), dtype=np.uint8)
-    for light in np.unique(lights):
-        isp = isp_of(camera.setup.camera.grid, camera.qe, light)
-        pictures[lights == light] = isp.developed(share[lights == light])
-    return pictures
+    isps = (
+        {} if is_linear else {light: isp_of(camera.setup.camera.grid, camera.qe, light) for light in np.unique(lights)}
+    )
+    # Strip by strip, each with a tile more on both sides, as far as a tent reaches.
+    tile = mosaic.indices.shape[0]
+    high = tile * (_STRIP_ROWS // tile + 1)
+    for top in range(0, numbers.shape[1], high):
+        first = max(top - tile, 0)
+        strip = demosaicked(values_dn[numbers[:, first : top + high + tile]], mosaic)[:, top - first :][:, :high]
+        strip -= pixel.offset_dn
+        if is_linear:
+            images[:, top : top + high] = strip
+        for light, isp in isps.items():
+            here = lights == light
+            images[here, top : top + high] = isp.developed(strip[here] / (values_dn[-1] - pixel.offset_dn))
+    return images

@@ -1,63 +1,251 @@
-"""Scores of detections of lit lenses: average precision of each signal type."""
+"""Scores of detections: average precision as pycocotools has it, and the share that is found, with intervals.
+
+A detection is right that overlaps a target of its state which no better one has found: by 0.5 (intersection over union)
+or by 0.5, 0.55 ... 0.95, averaged; a point that is near enough. Precision is averaged at 101 recalls.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
-from ..base.types import Array, Bool, BoolArray, Float
-from .scores import interval_of_seeds
+from ..base.types import Array, Float, FloatArray, IndexArray, Int
+from .boxes import POINT, targets_of
+from .detection_kernels import average_precisions, match
+from .scenes import OFF
+from .scores import CONFIDENCE, Interval, interval_of_seeds
 
 ALL = "all"
-"""In place of a light level or distance: all of them."""
-_LEAST_RADIUS_PX = 2.0
+"""In place of a state, light level, distance or intensity: all of them."""
+_THRESHOLDS = np.linspace(0.5, 0.95, 10)
+_RECALLS = np.linspace(0.0, 1.0, 101)
+_MOST_IN_AN_IMAGE = 100
+"""Detections of one image and category that count, best first."""
+_DRAWS = 500
+FALSE_PER_IMAGE = 0.1
+"""False boxes of lit states an image, at which the share that is found is told."""
 
 
-def match_radius_px(diameter_px: Float[Array, " detections"]) -> Float[Array, " detections"]:
-    """Return how far a detection may be from the center of a lit lens: its diameter, and at least 2 pixels."""
-    return np.asarray(np.maximum(diameter_px, _LEAST_RADIUS_PX), dtype=float)
+class Matched(NamedTuple):
+    """Detections of one design, seed and state, by falling score, with what they find.
 
-
-def average_precision(
-    right: Bool[BoolArray, " detections"], score: Float[Array, " detections"], n_targets: int
-) -> float:
-    """Return the area under the curve of precision over recall, of the largest precision at that recall or more.
-
-    As of PASCAL VOC since 2010 (Everingham et al., IJCV 2015), over all recalls.
-
-    `right`: True for detections of a target that no detection of a higher score has found. Returns 0 to 1. NaN without
-    targets.
+    `target`: the one found at each threshold, or -1; `image`: of the seed, by number; `distance_m`: of a target of
+    their size, NaN where they have none.
     """
-    if not n_targets:
-        return float("nan")
-    order = np.argsort(-score, kind="stable")
-    hits = np.cumsum(right[order])
-    precision = hits / np.arange(1, hits.size + 1)
-    best = np.maximum.accumulate(precision[::-1])[::-1]
-    return float(best[right[order]].sum() / n_targets)
+
+    targets: pd.DataFrame
+    target: Int[IndexArray, "thresholds detections"]
+    image: Int[IndexArray, " detections"]
+    score: Float[Array, " detections"]
+    distance_m: Float[Array, " detections"]
+
+
+def matched(targets: pd.DataFrame, found: pd.DataFrame, kind: str) -> Matched:
+    """Match detections of a state with its targets.
+
+    `targets`: of `targets_of`; `found`: `image`, `left`, `top`, `width`, `height`, `score`.
+    """
+    targets = targets.sort_values("image", kind="stable")
+    found = found.sort_values(["image", "score"], ascending=[True, False], kind="stable")
+    found = found[found.groupby("image").cumcount() < _MOST_IN_AN_IMAGE]
+    n_images = 1 + int(max([*targets["image"], *found["image"]], default=0))
+    starts = [np.searchsorted(table["image"].to_numpy(), np.arange(n_images + 1)) for table in (found, targets)]
+    boxes = [table[["left", "top", "width", "height"]].to_numpy(dtype=float) for table in (found, targets)]
+    thresholds = _THRESHOLDS[:1] if kind == POINT else _THRESHOLDS
+    target = np.empty((thresholds.size, len(found)), dtype=np.intp)
+    match(boxes[0], starts[0], boxes[1], starts[1], thresholds, kind == POINT, target)
+    by_score = np.argsort(-found["score"].to_numpy(dtype=float), kind="stable")
+    image, score = (found[name].to_numpy()[by_score] for name in ("image", "score"))
+    sizes = np.sqrt(boxes[0][:, 2] * boxes[0][:, 3])[by_score]
+    return Matched(targets, target[:, by_score], image, score, _distances(targets, sizes, kind))
+
+
+def _distances(targets: pd.DataFrame, sizes: Float[Array, " detections"], kind: str) -> Float[Array, " detections"]:
+    """Return the distance whose targets are nearest in size."""
+    if kind == POINT or targets.empty:
+        return np.full(len(sizes), np.nan)
+    area = (targets["width"] * targets["height"]).groupby(targets["distance_m"]).median()
+    known = np.log(np.sqrt(np.maximum(area.to_numpy(dtype=float), 1e-12)))
+    away = np.abs(np.log(np.maximum(sizes, 1e-6))[:, None] - known)
+    return np.asarray(area.index.to_numpy(dtype=float)[away.argmin(axis=1)])
+
+
+class Subset(NamedTuple):
+    """Which targets count; `ALL` for any."""
+
+    state: str = ALL
+    distance_m: float | str = ALL
+    level: str = ALL
+    intensity_cd: float | str = ALL
+
+
+def _counted(own: Matched, of: Subset, level_of_image: NDArray[Any]) -> tuple[NDArray[np.bool_], NDArray[np.int8]]:
+    """Return which targets count, and whether detections are right (1), false (0) or do not count (-1)."""
+    table = own.targets
+    counts = np.ones(len(table), dtype=bool)
+    for name in ("distance_m", "level", "intensity_cd"):
+        if getattr(of, name) != ALL:
+            counts &= (table[name] == getattr(of, name)).to_numpy()
+    hits = np.where(own.target >= 0, np.where(np.append(counts, False)[own.target], 1, -1), 0).astype(np.int8)
+    away = np.zeros(len(own.image), dtype=bool)
+    if of.level != ALL:
+        away |= level_of_image[own.image] != of.level
+    if of.distance_m != ALL:
+        away |= np.isfinite(own.distance_m) & (own.distance_m != of.distance_m)
+    hits[:, away] = np.where(hits[:, away] == 0, -1, hits[:, away])
+    return counts, hits
+
+
+@dataclass(frozen=True)
+class Judge:
+    """Targets and detections of one kind, of one design and seed, by state.
+
+    `weights`: of the images; the first row is what is told, the others are draws for its interval.
+    """
+
+    by_state: Mapping[str, Matched]
+    levels: NDArray[Any]
+    weights: Float[Array, "draws images"]
+
+    def precisions(self, of: Subset) -> tuple[Float[Array, "draws thresholds"], Float[Array, "draws thresholds"]]:
+        """Return average precision and largest recall, mean over the states that have targets."""
+        precisions, recalls = [], []
+        for own in (matched for state, matched in self.by_state.items() if of.state in (ALL, state)):
+            counts, hits = _counted(own, of, self.levels)
+            total = self.weights[:, own.targets["image"].to_numpy(dtype=np.intp)[counts]].sum(axis=1)
+            precision, recall = (np.empty((len(self.weights), len(hits))) for _ in range(2))
+            average_precisions(hits, own.image, self.weights, total, _RECALLS, precision, recall)
+            precisions.append(precision)
+            recalls.append(recall)
+        return _mean(precisions), _mean(recalls)
+
+    @cached_property
+    def _scores(self) -> Float[Array, " draws"]:
+        """Score above which lit states have `FALSE_PER_IMAGE` false boxes an image."""
+        false = [(own.score, own.image, own.target[0] < 0) for state, own in self.by_state.items() if state != OFF]
+        score, image = (np.concatenate([part[at][part[2]] for part in false]) for at in (0, 1))
+        order = np.argsort(-score, kind="stable")
+        cumulated = np.cumsum(self.weights[:, image[order]], axis=1)
+        allowed = FALSE_PER_IMAGE * self.weights.sum(axis=1, keepdims=True)
+        return np.asarray(np.append(score[order], -np.inf)[(cumulated <= allowed).sum(axis=1)], dtype=float)
+
+    def found(self, of: Subset) -> Float[Array, " draws"]:
+        """Return the share of the lit targets that is found with `FALSE_PER_IMAGE` false boxes an image."""
+        right, total = np.zeros(len(self.weights)), np.zeros(len(self.weights))
+        for state, own in self.by_state.items():
+            if state != OFF and of.state in (ALL, state):
+                counts, hits = _counted(own, of, self.levels)
+                total += self.weights[:, own.targets["image"].to_numpy(dtype=np.intp)[counts]].sum(axis=1)
+                here = hits[0] > 0
+                sure = own.score[here] > self._scores[:, None]
+                right += (self.weights[:, own.image[here]] * sure).sum(axis=1)
+        return np.asarray(np.divide(right, total, out=np.full_like(right, np.nan), where=total > 0), dtype=float)
+
+    def statistics(self, of: Subset) -> dict[str, Float[Array, " draws"]]:
+        """Return average precision at 0.5 and over all thresholds, largest recall, and what is found."""
+        precision, recall = self.precisions(of)
+        if precision.shape[1] == 1:  # points
+            return {"ap50": precision[:, 0], "found": self.found(of)}
+        whole = {"ap50": precision[:, 0], "ap": precision.mean(axis=1), "recall": recall.mean(axis=1)}
+        return whole | {"found": self.found(of)}
+
+
+def _mean(parts: Sequence[FloatArray]) -> FloatArray:
+    """Return the mean of what is known."""
+    values = np.stack(parts)
+    known = np.isfinite(values)
+    total = np.where(known, values, 0.0).sum(axis=0)
+    mean = np.divide(total, known.sum(axis=0), out=np.full_like(total, np.nan), where=known.any(axis=0))
+    return np.asarray(mean, dtype=float)
+
+
+def judged(
+    kind: str,
+    states: Sequence[str],
+    targets: pd.DataFrame,
+    found: pd.DataFrame,
+    levels: NDArray[Any],
+    weights: Float[Array, "draws images"],
+) -> Judge:
+    """Match the detections of a design and seed: columns as of `matched`, and `state`."""
+    by_state = {
+        state: matched(targets[targets["state"] == state], found[found["state"] == state], kind) for state in states
+    }
+    return Judge(by_state, levels, weights)
+
+
+def draws_of(levels: NDArray[Any], seed: tuple[int, ...]) -> Float[Array, "draws images"]:
+    """Return how often each image counts: once, then as drawn with replacement among those of its light level."""
+    rng = np.random.default_rng(seed)
+    weights = np.zeros((1 + _DRAWS, levels.size))
+    weights[0] = 1.0
+    for level in dict.fromkeys(levels.tolist()):
+        here = np.flatnonzero(levels == level)
+        weights[1:, here] = rng.multinomial(here.size, np.full(here.size, 1 / here.size), size=_DRAWS)
+    return weights
+
+
+def scores_of_draws(judges: Mapping[str, Sequence[Judge]], of: Subset, reference: str) -> Iterator[dict[str, Any]]:
+    """Yield a row for each design: statistics, mean over the seeds, their differences from the reference, intervals.
+
+    `judges`: of each seed, by design. Each seed is scored apart; an interval holds 95 % of the draws of its scenes.
+    """
+    by_name = {name: _of_seeds([judge.statistics(of) for judge in own]) for name, own in judges.items()}
+    for name, own in judges.items():
+        n_targets = sum(
+            int(_counted(of_state, of, judge.levels)[0].sum())
+            for judge in own
+            for state, of_state in judge.by_state.items()
+            if of.state in (ALL, state)
+        )
+        row: dict[str, Any] = {"name": name, "targets": n_targets}
+        for statistic, values in by_name[name].items():
+            row |= _interval(values).columns(statistic)
+            if reference in by_name:
+                row |= _interval(values - by_name[reference][statistic]).columns(f"{statistic}_apart")
+        yield row
+
+
+def _of_seeds(parts: Sequence[Mapping[str, Float[Array, " draws"]]]) -> dict[str, Float[Array, " draws"]]:
+    return {name: _mean([part[name] for part in parts]) for name in parts[0]}
+
+
+def _interval(values: Float[Array, " draws"]) -> Interval:
+    drawn = values[1:][np.isfinite(values[1:])]
+    if not drawn.size:
+        return Interval(float(values[0]), np.nan, np.nan)
+    low, high = np.quantile(drawn, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
+    return Interval(float(values[0]), float(low), float(high))
 
 
 def precisions(labels: pd.DataFrame, detections: pd.DataFrame, lenses: Sequence[str]) -> pd.DataFrame:
-    """Return the average precision of each signal type in the images of each light level.
+    """Return the average precision of points of each signal type in the images of each light level.
 
-    A detection is right within `match_radius_px` of a lit lens of its state that no detection of a higher score has
-    found; everything else, brake lamps and heads that are off among it, is wrong. Columns `level`, `state`, `lit`
-    (number of lit lenses), `average_precision`; of detections `image_id`, `x_px`, `y_px`, `state`, `score`.
+    Columns `level`, `state`, `lit` (number of lit lenses), `average_precision`; of detections `image_id`, `x_px`,
+    `y_px`, `state`, `score`.
     """
-    names = ["state", "head_x_px", "lit_y_px", "lens_diameter_px"]
-    targets = labels[["image_id", "level", *names]].explode(names, ignore_index=True)
-    located = detections.merge(labels[["image_id", "level"]], on="image_id").reset_index(drop=True)
+    targets, levels = targets_of(labels, POINT), labels["level"].to_numpy()
+    found = points_of(detections, labels)
+    judge = judged(POINT, lenses, targets, found, levels, np.ones((1, len(labels))))
     rows = []
-    for level in labels["level"].unique():
-        for state in lenses:
-            here, said = (part[(part["level"] == level) & (part["state"] == state)] for part in (targets, located))
-            said = said.sort_values("score", ascending=False, kind="stable")
-            ap = average_precision(_right(here, said), said["score"].to_numpy(dtype=float), len(here))
-            rows.append({"level": level, "state": state, "lit": len(here), "average_precision": ap})
+    for level, state in product(dict.fromkeys(levels.tolist()), lenses):
+        lit = int(((targets["level"] == level) & (targets["state"] == state)).sum())
+        precision = judge.precisions(Subset(state=state, level=level))[0][0, 0]
+        rows.append({"level": level, "state": state, "lit": lit, "average_precision": float(precision)})
     return pd.DataFrame(rows)
+
+
+def points_of(detections: pd.DataFrame, labels: pd.DataFrame) -> pd.DataFrame:
+    """Return detected places as boxes without size."""
+    known = detections.merge(labels[["image_id", "image"]], on="image_id")
+    return known.rename(columns={"x_px": "left", "y_px": "top"}).assign(width=0.0, height=0.0)
 
 
 def precision_scores(table: pd.DataFrame, reference: str) -> pd.DataFrame:
@@ -79,21 +267,3 @@ def precision_scores(table: pd.DataFrame, reference: str) -> pd.DataFrame:
                 row |= interval_of_seeds(float(of_seeds.mean()), np.array(of_seeds, dtype=float)).columns(column)
             rows.append(row)
     return pd.DataFrame(rows)
-
-
-def _right(targets: pd.DataFrame, detections: pd.DataFrame) -> Bool[BoolArray, " detections"]:
-    """Return which detections, by falling score, have found a target."""
-    rows = {name: np.asarray(at, dtype=np.intp) for name, at in targets.groupby("image_id").indices.items()}
-    x_px, y_px, radius_px = (
-        targets[name].to_numpy(dtype=float) for name in ("head_x_px", "lit_y_px", "lens_diameter_px")
-    )
-    radius_px, is_taken = match_radius_px(radius_px), np.zeros(len(targets), dtype=bool)
-    right = np.zeros(len(detections), dtype=bool)
-    for i, (name, x, y) in enumerate(zip(detections["image_id"], detections["x_px"], detections["y_px"], strict=True)):
-        here = rows.get(name, np.empty(0, dtype=np.intp))
-        away = np.hypot(x_px[here] - x, y_px[here] - y)
-        free = (away <= radius_px[here]) & ~is_taken[here]
-        if free.any():
-            right[i] = True
-            is_taken[here[np.where(free, away, np.inf).argmin()]] = True
-    return right

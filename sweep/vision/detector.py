@@ -19,7 +19,7 @@ from ..base.types import Array, BoolArray, Float, IndexArray, Int
 from ..camera.mosaic import Mosaic
 from ..camera.pixel import Pixel
 from .batches import Batch
-from .detections import match_radius_px
+from .boxes import match_radius_px
 from .planes import in_noise, tile_planes
 
 _AROUND, _APART = 7, 5

@@ -26,6 +26,7 @@ from .section import (
     MOST_WELL_E,
     Vision,
 )
+from .street import MOST_COLUMNS, MOST_ROWS, street_shape
 
 _PER_PROTOTYPE = 8
 """Bytes of a prototype's pixel: its mean and its direction."""
@@ -59,6 +60,11 @@ def vision_faults(
             rows, columns = mosaic.indices.shape
             problem = f"the tile of {name} ({rows} x {columns}) does not divide the images"
             yield Fault(("vision", "crop_px"), problem, vision.crop_px, "a multiple of every tile")
+        if vision.street is not None:
+            rows, columns = street_shape(vision, mosaic.indices.shape)
+            if rows > MOST_ROWS or columns > MOST_COLUMNS:
+                problem = f"streets of {columns} x {rows} pixels (CFA {name})"
+                yield Fault(("vision", "street"), problem, None, f"at most {MOST_COLUMNS} x {MOST_ROWS}")
     for distance_m in vision.distances_m:
         scene = Scene(target=vision.target(distance_m), optics=vision.optics, exposure=FixedExposure(exposure_s=1.0))
         if (fault := psf.image_fault(scene, pixel)) is not None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..base.types import Array, Bool, BoolArray, Float, ImageNumbers, IndexArray, Int, PerValue
 
-_CONFIDENCE = 0.95
+CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def interval_of_seeds(value: float, by_seed: Float[Array, " seeds"]) -> Interval
     known = by_seed[np.isfinite(by_seed)]
     if known.size < 2:
         return Interval(value, np.nan, np.nan)
-    reach = stdtrit(known.size - 1, (1 + _CONFIDENCE) / 2) * known.std(ddof=1) / np.sqrt(known.size)
+    reach = stdtrit(known.size - 1, (1 + CONFIDENCE) / 2) * known.std(ddof=1) / np.sqrt(known.size)
     return Interval(value, float(value - reach), float(value + reach))
 
 

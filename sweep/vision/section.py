@@ -46,9 +46,9 @@ class Street(Section):
     street's order. A reader says where lit lenses are, and of which signal type.
     """
 
-    columns: int = Field(default=6, ge=1, le=40)
+    columns: int = Field(default=6, ge=1, le=80)
     """Cells side by side."""
-    rows: int = Field(default=3, ge=1, le=40)
+    rows: int = Field(default=3, ge=1, le=50)
     """Cells one above the other."""
     heads: int = Field(default=3, ge=1, le=100)
     """Heads in each image."""
@@ -60,6 +60,8 @@ class Street(Section):
     """Share of the light that the lens spreads evenly over the image (integral of veiling glare, ISO 9358)."""
     train_images: int = Field(default=100, ge=20, le=MOST_IMAGES)
     """Training images of each seed and CFA."""
+    check_images: int = Field(default=20, ge=20, le=MOST_IMAGES)
+    """Images of each seed and CFA by which your own detector may be chosen."""
     test_images: int = Field(default=100, ge=20, le=MOST_IMAGES)
     """Test images of each seed and CFA."""
 
@@ -129,6 +131,10 @@ class Vision(Section):
             if len(set(values)) < len(values):
                 raise ValueError(f"{name}: one is named twice")
         return self
+
+    def images_of(self, split: str) -> int:
+        """Return the number of heads of a split, of each seed, order and CFA."""
+        return {"train": self.train_images, "check": self.check_images, "test": self.test_images}[split]
 
     def target(self, distance_m: float) -> Target:
         """Return a lens of the head at a distance as the target of a scene."""

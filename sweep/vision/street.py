@@ -16,7 +16,7 @@ from ..spectra.builtin.task_sets import spectra_of_group
 from .batches import Batch, Form, image_id, in_form
 from .head import head_places_px, heights, housing_diameters
 from .images import HeadCamera
-from .lamps import TEST, TRAIN, Lamps
+from .lamps import CHECK, TEST, TRAIN, Lamps
 from .materials import ambient_light
 from .scenes import PHANTOM_SHARE, states_of
 from .section import Illuminant, Street, Vision
@@ -27,7 +27,9 @@ _HEAD, _BRAKE, _STREET_LAMP = range(3)
 _JITTER_PX = 12
 _BRAKE_CD, _STREET_CD = (60.0, 260.0), (500.0, 5000.0)
 _KEY_OF_STREET = 20
-_AT_ONCE = 32
+_AT_ONCE_PIXELS, _MOST_AT_ONCE = 2**20, 32
+MOST_ROWS, MOST_COLUMNS = 1208, 1920
+"""Largest street, pixels: a crop of the sensor."""
 _BRAKE_GROUP = "brake red"
 _STREET_LIGHTS: tuple[Illuminant, ...] = ("LED street light", "sodium street light")
 
@@ -65,8 +67,8 @@ class StreetScenes:
 
 def draw_streets(vision: Vision, street: Street, split: str, seed: tuple[int, int]) -> StreetScenes:
     """Draw streets, evenly over the light levels, the rest at random; equal for all CFAs."""
-    rng = np.random.default_rng((*seed, _KEY_OF_STREET, (TRAIN, TEST).index(split)))
-    n = street.train_images if split == TRAIN else street.test_images
+    rng = np.random.default_rng((*seed, _KEY_OF_STREET, (TRAIN, TEST, CHECK).index(split)))
+    n = count_of(street, split)
     levels = list(vision.levels.values())
     level = np.arange(n) % len(levels)
     kinds = kinds_of(street)
@@ -98,6 +100,11 @@ def draw_streets(vision: Vision, street: Street, split: str, seed: tuple[int, in
         lamp=lamp,
         candelas=candelas,
     )
+
+
+def count_of(street: Street, split: str) -> int:
+    """Return the number of streets of a split, of each seed and CFA."""
+    return {TRAIN: street.train_images, CHECK: street.check_images, TEST: street.test_images}[split]
 
 
 def kinds_of(street: Street) -> Int[IndexArray, " lamps"]:
@@ -183,15 +190,23 @@ class StreetCamera:
         return np.asarray((1 - share) * image + share * tiled_means, dtype=float)
 
     def batches(
-        self, scenes: StreetScenes, lamps: Lamps, key: Mapping[str, Any], split: str, form: Form
+        self,
+        scenes: StreetScenes,
+        lamps: Lamps,
+        key: Mapping[str, Any],
+        split: str,
+        form: Form,
+        some: slice = slice(None),
     ) -> Iterator[Batch]:
-        """Yield images with labels, some at once."""
-        labels = street_labels(self.camera.vision, self.camera.setup.camera.mosaic, scenes, key, split)
-        for start in range(0, len(scenes), _AT_ONCE):
-            block = scenes.subset(slice(start, start + _AT_ONCE))
+        """Yield images with labels, or those of some, a few at once."""
+        labels = street_labels(self.camera.vision, self.camera.setup.camera.mosaic, scenes, key, split, some)
+        first, last, _ = some.indices(len(scenes))
+        step = max(1, min(_MOST_AT_ONCE, _AT_ONCE_PIXELS // (self.shape[0] * self.shape[1])))
+        for start in range(first, last, step):
+            block = scenes.subset(slice(start, min(start + step, last)))
             numbers = self.camera.drawn(self.expected(block, lamps).reshape(len(block), -1), block.key)
             images = in_form(self.camera, numbers.reshape(-1, *self.shape), block.level, form)
-            yield Batch(images, labels.iloc[start : start + len(block)].reset_index(drop=True))
+            yield Batch(images, labels.iloc[start - first : start - first + len(block)].reset_index(drop=True))
 
 
 def corners_px(vision: Vision, tile: tuple[int, ...], scenes: StreetScenes) -> Int[IndexArray, "images lamps 2"]:
@@ -204,13 +219,20 @@ def corners_px(vision: Vision, tile: tuple[int, ...], scenes: StreetScenes) -> I
 
 
 def street_labels(
-    vision: Vision, mosaic: Mosaic, scenes: StreetScenes, key: Mapping[str, Any], split: str
+    vision: Vision,
+    mosaic: Mosaic,
+    scenes: StreetScenes,
+    key: Mapping[str, Any],
+    split: str,
+    some: slice = slice(None),
 ) -> pd.DataFrame:
-    """Return the labels of streets.
+    """Return the labels of streets, or of some.
 
-    Returns a row per image, lists with an entry for each head.
+    Returns a row per image, lists with an entry for each head; `coco_id` is a number of the image within its split.
     """
     assert vision.street is not None
+    numbers, count = np.arange(len(scenes))[some], len(scenes)
+    scenes = scenes.subset(some)
     heads, places = slice(0, vision.street.heads), head_places_px(vision, mosaic)
     middle = places[(scenes.place[:, heads] * len(places)).astype(np.intp)]
     corners = corners_px(vision, mosaic.indices.shape, scenes)[:, heads]
@@ -220,8 +242,9 @@ def street_labels(
     state = scenes.state[:, heads]
     lit_y_px = y_px + diameter_px * np.append(0.0, heights(vision))[state]
     wide, high = housing_diameters(vision)
-    ids = [image_id(key["design_id"], key["seed"], STREET, split, number) for number in range(len(scenes))]
-    where = {"image_id": ids, **key, "order": STREET, "split": split, "image": np.arange(len(scenes))}
+    ids = [image_id(key["design_id"], key["seed"], STREET, split, number) for number in numbers]
+    where = {"image_id": ids, **key, "order": STREET, "split": split, "image": numbers}
+    where["coco_id"] = (key["design_id"] * vision.seeds + key["seed"]) * count + numbers + 1
     return pd.DataFrame(where).assign(
         background=np.array(vision.backgrounds, dtype=object)[scenes.background],
         level=np.array(list(vision.levels), dtype=object)[scenes.level],

@@ -15,6 +15,7 @@ from ..options import (
     Designs,
     Force,
     ImageForm,
+    ImageFormat,
     ImageSplit,
     Jobs,
     RunFolder,
@@ -72,11 +73,13 @@ def export(
         ImageForm,
         typer.Option(help="Images: raw mosaics, all channels at all pixels, or pictures of a plain ISP."),
     ] = ImageForm.RAW,
-    png: Annotated[bool, typer.Option("--png", help="A PNG for each image; without it, arrays (.npz).")] = False,
+    format_: Annotated[
+        ImageFormat,
+        typer.Option("--format", help="Images: arrays (.npz), or PNGs of streets with boxes of COCO or YOLO."),
+    ] = ImageFormat.ARRAYS,
     split: Annotated[
         list[ImageSplit] | None, typer.Option(help="Images of this split; may be repeated.", show_default="all")
     ] = None,
-    coco: Annotated[bool, typer.Option("--coco", help="Boxes in COCO's format beside PNGs.")] = False,
     jobs: Jobs = None,
     data: Annotated[
         Path | None, typer.Option(help="Folder with the run's curve files, which are then read again and compared.")
@@ -93,9 +96,10 @@ def export(
     quiet: Quiet = False,
 ) -> None:
     """Write a filter of a finished run as CSV and as ISETCam color filters (.mat), or the images of a benchmark."""
-    if (not design) == (images is None):
-        raise SweepError(ValidationIssue("one of --design and --images", allowed="--design best, or --images FOLDER"))
-    if design:
+    if not design and images is None:
+        allowed = "--design best, or --images FOLDER (of some designs with --design)"
+        raise SweepError(ValidationIssue("one of --design and --images", allowed=allowed))
+    if design and images is None:
         from ...report.export import export as exported
 
         answer = exported(
@@ -114,8 +118,8 @@ def export(
         assert images is not None
         with ProgressDisplay(quiet=quiet) as display:
             splits = tuple(name.value for name in split or ImageSplit)
-            files = ImageFiles(images, form.value, png, splits, coco)
-            answer = export_images(folder, files, data, jobs, display.update, allow_code=allow_code)
+            files = ImageFiles(images, format_.value, form.value, splits)
+            answer = export_images(folder, files, design or (), data, jobs, display.update, allow_code=allow_code)
     print_answer(answer, as_json=as_json, quiet=quiet)
 
 
@@ -130,7 +134,11 @@ def score(
     folder: RunFolder,
     predictions: Annotated[
         list[Path],
-        typer.Argument(help="CSV or Parquet: image_id, and state or a probability of each.", show_default=False),
+        typer.Argument(
+            help="CSV or Parquet: image_id, and state or a probability of each; or COCO results (.json), a folder of "
+            "YOLO's text files, or a table of points: detections in streets.",
+            show_default=False,
+        ),
     ],
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Folder of the scores.", show_default="FOLDER/scores")

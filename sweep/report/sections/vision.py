@@ -5,15 +5,28 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import numpy as np
+
 from ...results.output import Output
 from ...results.tables import VISION_STREET
 from ...vision.detections import ALL, precision_scores
 from ...vision.readers import OBSERVER
-from ...vision.scenes import NETWORK, SHUFFLED
+from ...vision.scenes import SHUFFLED
 from ..leaders import answering, label
 from ..panels import Line, Lines, Panel, Picture
 from ..section import MOST_ROWS, Section, Table
-from ..vision import PREDICTORS, READER_NAMES, Benchmark, Ranks, benchmark_of, format_interval, format_percent, ranks_of
+from ..vision import (
+    PREDICTORS,
+    READER_NAMES,
+    Benchmark,
+    Lesson,
+    Ranks,
+    benchmark_of,
+    format_interval,
+    format_percent,
+    lessons_of,
+    ranks_of,
+)
 from ..words import joined
 
 _MOST_LEVELS = 3
@@ -48,7 +61,10 @@ class Vision(Section):
                     else f"{row['apart']:+.3f} ({row['apart_low']:+.3f} to {row['apart_high']:+.3f})"
                 )
                 street.append((str(row["name"]), f"{row['average_precision']:.3f}", apart))
-        yield cls(benchmark, ranks_of(benchmark), "" if best is None else label(best), tuple(street))
+        ranks = ranks_of(benchmark, benchmark.main_reader)
+        yield cls(benchmark, ranks, "" if best is None else label(best), tuple(street))
+        if benchmark.learners:
+            yield Lessons(benchmark, tuple(lessons_of(benchmark)))
 
     @property
     def _who(self) -> str:
@@ -72,22 +88,21 @@ class Vision(Section):
         if csd is not None:
             how = "does not predict" if not csd.low > 0 else "predicts" if csd.value >= _WELL else "predicts badly"
             lines.append(
-                f"The color separation **{how}** which CFA is read best at the same distance and light (rank correlation {format_interval(csd)})."
+                f"The color separation **{how}** with which CFA it errs least at the same distance and light (rank correlation {format_interval(csd)})."
             )
         return lines
 
     @property
     def limits(self) -> list[str]:
-        """The ideal observer's errors, predictors, streets."""
+        """Errors of all readers, predictors, streets."""
         benchmark, lines = self.benchmark, list[str]()
-        if benchmark.main_reader == NETWORK:
-            pairs = [
-                (d, benchmark.error(d, NETWORK, SHUFFLED), benchmark.error(d, OBSERVER, SHUFFLED))
-                for d in benchmark.designs
+        for reader in benchmark.learners:
+            errors = [
+                f"{design} {100 * benchmark.error(design, reader, SHUFFLED).value:.1f} ({benchmark.times_observer(design, reader, benchmark.vision.distances_m).value:.2f})"
+                for design in benchmark.designs
             ]
-            errors = [f"{design} {100 * ours.value:.1f} and {100 * least.value:.1f}" for design, ours, least in pairs]
             lines.append(
-                f"Percent read wrongly by the network and by the ideal observer (unseen lamps, lenses in any order): {', '.join(errors)}."
+                f"Percent read wrongly by the {READER_NAMES[reader]}, and times the ideal observer's (unseen lamps, lenses in any order): {', '.join(errors)}."
             )
         others = [f"{PREDICTORS[n]} {format_interval(v)}" for n, v in self.ranks.between.items() if n != "csd"]
         if others:
@@ -114,7 +129,7 @@ class Vision(Section):
                 Lines(f"{level}, {of.illuminance_lx:g} lx: wrong / %", "distance / m", lines, self.hero, height=260)
             )
         caption = (
-            f"Lines: the {self._who}. Bands go down to the ideal observer, which knows how images come about."
+            f"Lines: the {self._who}. Bands go down to the ideal observer, which knows how images come about. Errors to expect by its probabilities."
             if OBSERVER in rows
             else f"Lines: the {self._who}."
         )
@@ -147,3 +162,74 @@ class Vision(Section):
             ),
             tuple(rows),
         )
+
+
+@dataclass(frozen=True)
+class Lessons(Section):
+    """Errors of readers over the number of images that they have learned from."""
+
+    benchmark: Benchmark
+    lessons: tuple[Lesson, ...]
+
+    heading = "What a reader learns"
+
+    @classmethod
+    def of(cls, output: Output) -> Iterator[Section]:  # noqa: ARG003
+        """Yield none: it stands after the images."""
+        yield from ()
+
+    @property
+    def answer(self) -> list[str]:
+        """How near the bound readers come, and what that means for the separation."""
+        lines = []
+        for reader in self.benchmark.learners:
+            own = [lesson for lesson in self.lessons if lesson.reader == reader]
+            first, last = (sorted(lesson.times.values()) for lesson in (own[0], own[-1]))
+            lines.append(
+                f"The {READER_NAMES[reader]} errs {last[0]:.2f} to {last[-1]:.2f} times as often as the ideal observer after {own[-1].images:,} images ({first[0]:.2f} to {first[-1]:.2f} after {own[0].images:,})."
+            )
+        return lines
+
+    @property
+    def picture(self) -> Picture | None:
+        """Errors over the observer's, a panel for each reader."""
+        panels = []
+        for reader in self.benchmark.learners:
+            own = [lesson for lesson in self.lessons if lesson.reader == reader]
+            images = np.array([float(lesson.images) for lesson in own])
+            lines = {
+                name: Line(images, np.array([lesson.times[name] for lesson in own])) for name in self.benchmark.designs
+            }
+            panels.append(
+                Lines(
+                    f"{READER_NAMES[reader]}: times the observer's error",
+                    "images",
+                    lines,
+                    log_x=True,
+                    log_y=True,
+                    height=260,
+                )
+            )
+        return Picture(
+            tuple(panels),
+            "Errors of readers over the ideal observer's, over the images that they have learned from.",
+            "Each reader is trained anew for each number of images; each image is seen once.",
+            columns=2,
+        )
+
+    @property
+    def table(self) -> Table | None:
+        """What the separation predicts of readers that are nearer to the bound."""
+        rows = [
+            (
+                READER_NAMES[lesson.reader],
+                f"{lesson.images:,}",
+                f"{np.mean(list(lesson.times.values())):.2f}",
+                format_interval(lesson.csd),
+            )
+            for lesson in self.lessons
+        ]
+        ideal = ranks_of(self.benchmark, OBSERVER).between.get("csd")
+        if ideal is not None:
+            rows.append((READER_NAMES[OBSERVER], "", "1.00", format_interval(ideal)))
+        return Table(("reader", "images", "times the observer's error, mean", "rank correlation with CSD"), tuple(rows))

@@ -1,0 +1,176 @@
+"""Files of detections in streets: COCO results, folders of YOLO, and tables of points."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ..base.disk import read_input
+from ..base.errors import DataError, ValidationIssue, nearest
+from ..vision.boxes import POINT, Category
+from .score import issue_of, table_of
+
+COLUMNS = ("image_id", "x_px", "y_px", "state", "score")
+_BOX = ("left", "top", "width", "height")
+_MOST_BYTES = 500_000_000
+_FIELDS = 6
+"""Of a line of YOLO: class, center and size as shares of the image, confidence."""
+Shape = tuple[int, int]
+
+
+def is_of_streets(path: Path) -> bool:
+    """Return whether answers are detections: a folder, COCO results, or a table with positions."""
+    return path.is_dir() or path.suffix == ".json" or "x_px" in table_of(path)
+
+
+def read_detections(
+    path: Path, labels: pd.DataFrame, categories: Sequence[Category], shape: Callable[[str], Shape]
+) -> pd.DataFrame:
+    """Read detections: `name`, `seed` and `image` of the street, `kind`, `state`, box or place, `score`.
+
+    `labels`: of the streets of the test; `shape`: rows and columns of the images of a CFA. Raises DataError for what
+    cannot be read, for other images and categories, and what is no number.
+    """
+    if path.is_dir():
+        found = _of_folder(path, labels, categories, shape)
+    elif path.suffix == ".json":
+        found = _of_coco(path, labels, categories)
+    else:
+        found = _of_table(path, labels, [category.state for category in categories if category.kind != "head"])
+    return found.merge(labels[["image_id", "name", "seed", "image"]], on="image_id")
+
+
+def _of_folder(
+    path: Path, labels: pd.DataFrame, categories: Sequence[Category], shape: Callable[[str], Shape]
+) -> pd.DataFrame:
+    """Read the files of one detector, in folders at any depth: COCO results, or text of YOLO for each image."""
+    results, texts = sorted(path.rglob("*.json")), sorted(path.rglob("*.txt"))
+    if results:
+        return pd.concat([_of_coco(file, labels, categories) for file in results], ignore_index=True)
+    if not texts:
+        raise DataError(ValidationIssue("no detections", str(path), allowed="*.json of COCO, or *.txt of YOLO"))
+    rows, cfas = list[tuple[Any, ...]](), dict(zip(labels["image_id"], labels["cfa"], strict=True))
+    for file in texts:
+        if file.stem not in cfas:
+            raise DataError(_of_other_image(file, None, file.stem, labels))
+        high, wide = shape(cfas[file.stem])
+        for at, line in enumerate(_text(file).splitlines(), 1):
+            fields = line.split()
+            if fields:
+                number, x, y, width, height, score = _of_yolo(file, at, fields, len(categories))
+                box = (x - width / 2) * wide, (y - height / 2) * high, width * wide, height * high
+                rows.append((file.stem, *categories[number], *box, score))
+    return _frame(rows)
+
+
+def _of_yolo(
+    file: Path, line: int, fields: Sequence[str], n_categories: int
+) -> tuple[int, float, float, float, float, float]:
+    """Return class, center, size and confidence of a line."""
+    if len(fields) != _FIELDS:
+        allowed = "class, center, width, height and confidence (`save_conf=True`)"
+        raise DataError(ValidationIssue(f"a line of {len(fields)} fields", str(file), line, None, None, allowed))
+    try:
+        number, (x, y, width, height, score) = int(fields[0]), (float(field) for field in fields[1:])
+    except ValueError:
+        raise DataError(ValidationIssue("no number", str(file), line, None, " ".join(fields))) from None
+    if not 0 <= number < n_categories:
+        raise DataError(ValidationIssue("no class", str(file), line, None, number, f"0 to {n_categories - 1}"))
+    if not (np.isfinite([x, y, score]).all() and 0 <= width <= 1 and 0 <= height <= 1):
+        problem, allowed = "no box", "shares of the width and height of the image, from 0 to 1"
+        raise DataError(ValidationIssue(problem, str(file), line, None, " ".join(fields[1:]), allowed))
+    return number, x, y, width, height, score
+
+
+def _of_coco(path: Path, labels: pd.DataFrame, categories: Sequence[Category]) -> pd.DataFrame:
+    """Read results as pycocotools writes and reads them; images by number, or by the stem of their file."""
+    try:
+        held = json.loads(_text(path))
+    except (ValueError, RecursionError) as error:
+        raise DataError(ValidationIssue(f"no JSON: {str(error)[:100]}", str(path))) from None
+    if not isinstance(held, list):
+        problem, allowed = "no results of COCO", "a list of image_id, category_id, bbox and score"
+        raise DataError(ValidationIssue(problem, str(path), None, None, type(held).__name__, allowed))
+    known: dict[object, str] = dict(zip(labels["coco_id"], labels["image_id"], strict=True))
+    known |= {name: name for name in labels["image_id"]}
+    rows = []
+    for at, entry in enumerate(held):
+        key, fault = f"[{at}]", None
+        one = entry if isinstance(entry, Mapping) else {}
+        image, number, box, score = (one.get(name) for name in ("image_id", "category_id", "bbox", "score"))
+        missing = [name for name in ("image_id", "category_id", "bbox", "score") if name not in one]
+        name = known.get(image if isinstance(image, int) else Path(str(image)).stem)
+        if missing:
+            fault = ValidationIssue(
+                "a key is missing", str(path), None, key, missing[0], "image_id, category_id, bbox, score"
+            )
+        elif name is None:
+            fault = _of_other_image(path, f"{key}.image_id", image, labels)
+        elif not (isinstance(number, int) and 1 <= number <= len(categories)):
+            allowed = ", ".join(f"{i} ({category.name})" for i, category in enumerate(categories, 1))
+            fault = ValidationIssue("no category", str(path), None, f"{key}.category_id", number, allowed)
+        elif not _is_box(box):
+            allowed = "left, top, width and height, pixels"
+            fault = ValidationIssue("no box", str(path), None, f"{key}.bbox", box, allowed)
+        elif not _is_number(score):
+            fault = ValidationIssue("no number", str(path), None, f"{key}.score", score, "a number")
+        if fault is not None:
+            raise DataError(fault)
+        rows.append((name, *categories[number - 1], *map(float, box), float(score)))  # type: ignore[operator, arg-type]
+    return _frame(rows)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and bool(np.isfinite(value))
+
+
+def _is_box(value: object) -> bool:
+    return isinstance(value, list) and len(value) == len(_BOX) and all(map(_is_number, value)) and min(value[2:]) >= 0
+
+
+def _of_other_image(path: Path, key: str | None, image: object, labels: pd.DataFrame) -> ValidationIssue:
+    numbers = labels["coco_id"]
+    allowed = f"{numbers.min()} to {numbers.max()}, or names such as {labels['image_id'].iloc[0]}"
+    near = nearest(image, labels["image_id"]) if isinstance(image, str) else None
+    return ValidationIssue("not an image of a street of the test", str(path), None, key, image, allowed, near)
+
+
+def _text(path: Path) -> str:
+    try:
+        return read_input(path, _MOST_BYTES, DataError).decode("utf-8-sig")
+    except ValueError:
+        raise DataError(ValidationIssue("no text in UTF-8", str(path))) from None
+
+
+def _frame(rows: Sequence[tuple[Any, ...]]) -> pd.DataFrame:
+    return pd.DataFrame(rows, columns=["image_id", "kind", "state", *_BOX, "score"])
+
+
+def _of_table(path: Path, labels: pd.DataFrame, lenses: Sequence[str]) -> pd.DataFrame:
+    """Read CSV or Parquet: a row each; positions are from the center of the first pixel."""
+    table = table_of(path)
+    missing = [name for name in COLUMNS if name not in table]
+    if missing:
+        raise DataError(ValidationIssue("a column is missing", str(path), None, None, missing[0], ", ".join(COLUMNS)))
+    issues = []
+    ids, states = table["image_id"].astype(str), table["state"].astype(str)
+    others, unknown = ids[~ids.isin(labels["image_id"])], states[~states.isin(lenses)]
+    if len(others):
+        issues.append(issue_of("not an image of a street of the test", path, others, "image_id"))
+    if len(unknown):
+        near = nearest(unknown.iloc[0], lenses)
+        issues.append(issue_of("no signal type", path, unknown, "state", ", ".join(lenses), near))
+    numbers = {name: pd.to_numeric(table[name], errors="coerce") for name in ("x_px", "y_px", "score")}
+    for name, values in numbers.items():
+        wrong = table[name][~np.isfinite(values)].astype(str)
+        if len(wrong):
+            issues.append(issue_of("no number", path, wrong, name, "a number"))
+    if issues:
+        raise DataError(issues)
+    places = {"left": numbers["x_px"], "top": numbers["y_px"], "width": 0.0, "height": 0.0}
+    return pd.DataFrame({"image_id": ids, "kind": POINT, "state": states, **places, "score": numbers["score"]})
