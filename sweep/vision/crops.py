@@ -70,6 +70,8 @@ class Crops:
         self._shape = rows.size, columns.size
         self._pixels = (side[rows][:, None] * vision.crop_px + side[columns]).ravel()
         self.n_places = camera.n_places()
+        tiled = np.tile(camera.setup.camera.mosaic.indices, [-(-vision.crop_px // size) for size in tile])
+        self.channels = tiled[: vision.crop_px, : vision.crop_px].ravel()[self._pixels]
         table = camera.table
         scaled = in_noise(table.values_dn, camera.pixel).astype(np.float32)
         # Of numbers: a node's first one at or above each share, from which a draw looks on.

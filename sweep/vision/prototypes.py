@@ -1,8 +1,9 @@
 """Prototype network: a matched filter for each hidden class of a head, and the sum of the likelihoods of a state.
 
 A class is all that is random but the lamp: place, sun, order of the lenses, which is lit and where, its intensity. Its
-prototype is the mean of its training images in units of the noise, where the noise is 1. Lamps of one class differ
-along the light of a lamp alone, by a variance that is learned, too. Priors are those of the scenes; nothing descends.
+prototype is the mean of its training images in units of the noise, where the noise is 1. Lamps of one class differ in
+how bright the light of a lamp is in each channel, by a covariance that is learned, too. Priors are those of the scenes;
+nothing descends.
 """
 
 from __future__ import annotations
@@ -65,13 +66,16 @@ def _classes(crops: Crops, level: int) -> _Classes:
 
 
 class _Learned(NamedTuple):
-    """Prototypes of the classes of one distance, level and background."""
+    """Prototypes of the classes of one distance, level and background.
+
+    `directions`: light of a lamp in each channel, normalized; `spread`: covariance along them, noise included.
+    """
 
     classes: _Classes
     means: Float32
     counts: Float[Array, " classes"]
     directions: Float32
-    spread: Float[Array, " classes"]
+    spread: Float[Array, "classes channels channels"]
 
 
 class Prototypes:
@@ -118,15 +122,20 @@ def _learned(crops: Crops, distance: int, level: int, background: int, classes: 
     )
     sums = np.concatenate([summed(z, counts[own]) for own, z in drawn(counts)])
     means = sums / counts[:, None].astype(np.float32)
-    directions = means - means[classes.dark]
-    directions /= np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-12)
+    in_channel = crops.channels == np.arange(1 + crops.channels.max())[:, None]
+    directions = (means - means[classes.dark])[:, None] * in_channel.astype(np.float32)
+    directions /= np.maximum(np.linalg.norm(directions, axis=2, keepdims=True), 1e-12)
     squares = []
     for own, z in drawn(others):
         mean, direction = (np.repeat(part[own], others[own], axis=0) for part in (means, directions))
-        squares.append(summed(np.einsum("ij,ij->i", z - mean, direction) ** 2, others[own]))
-    total, n = (np.bincount(classes.group, part) for part in (np.concatenate(squares), others))
-    spread = np.maximum((total + _PRIOR_IMAGES) / (n + _PRIOR_IMAGES), 1.0)[classes.group]
-    return _Learned(classes, means, counts.astype(float), directions, spread)
+        along = np.einsum("ij,icj->ic", z - mean, direction)
+        squares.append(summed(along[:, :, None] * along[:, None], others[own]))
+    of_group, n = np.zeros((classes.group[-1] + 1, *squares[0].shape[1:])), np.bincount(classes.group, others)
+    np.add.at(of_group, classes.group, np.concatenate(squares))
+    of_group += _PRIOR_IMAGES * np.eye(len(in_channel))
+    values, vectors = np.linalg.eigh(of_group / (n + _PRIOR_IMAGES)[:, None, None])
+    spread = (vectors * np.maximum(values, 1.0)[:, None]) @ vectors.transpose(0, 2, 1)
+    return _Learned(classes, means, counts.astype(float), directions, spread[classes.group])
 
 
 def _log_probabilities(learned: _Learned, crops: Float32, fixed: bool, n_states: int) -> Float[Array, "images states"]:
@@ -135,11 +144,16 @@ def _log_probabilities(learned: _Learned, crops: Float32, fixed: bool, n_states:
     classes, counts = learned.classes, learned.counts
     known = classes.share[int(fixed)] > 0
     means, directions, kind = learned.means[known], learned.directions[known], classes.heads.kind[known]
-    reference = means.mean(axis=0)
+    reference, n_channels = means.mean(axis=0), directions.shape[1]
     x, m = (crops - reference).astype(float), (means - reference).astype(float)
-    v, along_v = 1 + 1 / counts[known], learned.spread[known] + 1 / counts[known]
+    # A mean of n images scatters by 1/n.
+    v, of_mean = 1 + 1 / counts[known], np.eye(n_channels) / counts[known, None, None]
+    inverse = np.linalg.inv(learned.spread[known] + of_mean)
     apart = (x**2).sum(axis=1)[:, None] - 2 * x @ m.T + (m**2).sum(axis=1)
-    along = (x @ directions.T - (m * directions).sum(axis=1)) ** 2
-    logs = -0.5 * ((apart - along) / v + along / along_v + np.log(along_v) + (x.shape[1] - 1) * np.log(v))
+    along = np.stack([x @ own.T - (m * own).sum(axis=1) for own in directions.transpose(1, 0, 2)])
+    logs = -0.5 * (
+        (apart - (along**2).sum(axis=0)) / v + np.einsum("cij,jcd,dij->ij", along, inverse, along, optimize=True)
+    )
+    logs += 0.5 * (np.linalg.slogdet(inverse)[1] - (x.shape[1] - n_channels) * np.log(v))
     logs += np.log(classes.share[int(fixed)][known])
     return np.stack([logsumexp(logs[:, kind == state - 1], axis=1) for state in range(n_states)], axis=1)
