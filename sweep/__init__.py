@@ -28,6 +28,7 @@ _LOCATIONS = {
     "audit": "runs.audit:audit",
     "compare": "report.compare:compare",
     "export": "report.export:export",
+    "export_images": "report.export_images:export_images",
     "score": "report.scores:score",
     "show": "api.run:show",
     "describe": "report.describe:describe",

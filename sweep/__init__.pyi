@@ -16,6 +16,7 @@ from .metrics.quantity import Quantity
 from .report.compare import compare
 from .report.describe import describe
 from .report.export import export
+from .report.export_images import export_images
 from .report.scores import score
 from .runs.audit import audit
 from .runs.listing import list_studies
@@ -45,6 +46,7 @@ __all__ = [
     "describe",
     "evaluate",
     "export",
+    "export_images",
     "lights",
     "list_studies",
     "load_study",

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 
 from sweep.base.errors import EXIT_CODES
 from sweep.results.dictionary import columns_table, files_table
+from sweep.study import load_study
 from sweep.study.editors import SCHEMA_FILE, schema_text
+from sweep.vision.isp import isp_of
+from sweep.vision.section import Illuminant
 
 from .study_reference import study_reference
 
@@ -21,8 +25,28 @@ def exit_codes_table() -> list[str]:
     return ["| exit code | meaning |", "| --- | --- |", *rows]
 
 
+def isp_table() -> list[str]:
+    """Constants of the ISP of four CFAs by day and under a street lamp as Markdown."""
+    study = load_study(ROOT / "studies" / "vision.yaml")
+    lines = ["| CFA | light | white | matrix to R, G, B |", "| --- | --- | --- | --- |"]
+    lights: tuple[Illuminant, ...] = ("daylight", "LED street light")
+    for name, light in product(("RGGB", "RCCB", "RYYCy", "RYN4Cy"), lights):
+        (space,) = (one for one in study.spaces if one.name == name)
+        camera = study.setup(space, next(iter(study.scenarios))).camera
+        qe = camera.qe.copy()
+        qe[list(camera.modified)] = space.curves(space.points(0, 1), study.grid.size)[0]
+        isp = isp_of(study.grid, qe, light)
+        white = ", ".join(
+            f"{channel} {share:.2f}" for channel, share in zip(camera.mosaic.channels, isp.white, strict=True)
+        )
+        rows = "; ".join(" ".join(f"{value:.2f}" for value in row) for row in isp.matrix)
+        lines.append(f"| {name} | {light} | {white} | {rows} |")
+    return lines
+
+
 PRINTED: dict[str, dict[str, Callable[[], list[str]]]] = {
     "outputs/README.md": {"files": files_table, "columns": columns_table},
+    "studies/guide/07-other-tasks-and-images.md": {"isp": isp_table},
     "studies/guide/reference.md": {"exit codes": exit_codes_table, "study": study_reference},
 }
 

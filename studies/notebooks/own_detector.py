@@ -36,6 +36,7 @@ study = sweep.make_study(
         "seeds": 2,
         "train_images": 1000,
         "test_images": 100,
+        "prototypes": False,
         "network": False,
     },
 )

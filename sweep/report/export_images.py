@@ -8,34 +8,82 @@ from pathlib import Path
 
 from ..base.answer import Answer
 from ..base.errors import SweepError, ValidationIssue, nearest
-from ..base.types import Progress
+from ..base.types import Progress, silent
 from ..results.designs import study_of
+from ..results.folder import run_folder
 from ..results.manifest import Manifest
 from ..results.output import read_output
-from ..runs.image_files import MANIFEST, STREET_MANIFEST, ImageFiles, dataset_of, write_images
+from ..runs.image_files import FORMATS, MANIFEST, STREET_MANIFEST, Format, ImageFiles, dataset_of, write_images
 from ..runs.score import vision_of
 from ..runs.vision import vision_designs
 from ..runs.workers import workers
+from ..vision.batches import FORMS, Form
+from ..vision.lamps import SPLITS
 from ..vision.street import street_shape
 
 
 def export_images(
-    folder: Path,
-    files: ImageFiles,
-    designs: Sequence[str],
-    data: Path | None,
-    jobs: int | None,
-    progress: Progress,
+    folder: Path | str,
+    images: Path | str,
     *,
+    format: Format = "arrays",  # noqa: A002  (as the option of the command)
+    form: Form = "raw",
+    split: Sequence[str] = SPLITS,
+    design: Sequence[str] = (),
+    data: Path | str | None = None,
+    jobs: int | None = None,
+    progress: Progress = silent,
     allow_code: bool = False,
 ) -> Answer:
-    """Write the images of a run's benchmark with labels, and say what they are.
+    """Write the images of a run's benchmark of vision with labels, and say what they are.
 
-    `designs`: names; all where it is empty; `data`: folder of the study's files; without it, the curves that the run
-    kept are taken; `allow_code`: True to run the code that the study names. Raises SweepError if the study has no
-    `vision`, or no streets or a form of no PNG, of which boxes are. Raises OutputError as `read_output` and
-    `write_images`.
+    Parameters
+    ----------
+    folder : path-like
+        Folder of a finished run of a study with `vision`.
+    images : path-like
+        Folder of the images: a new or empty one, or that of an export that was interrupted.
+    format : {'arrays', 'coco', 'yolo'}
+        Arrays of heads and of streets, or a PNG for each street with boxes around heads and lit lenses.
+    form : {'raw', 'demosaicked', 'isp'}
+        Raw mosaics, every channel at every pixel, or pictures of a plain ISP.
+    split : sequence of {'train', 'check', 'test'}
+        Splits.
+    design : sequence of str
+        Names of designs; all where it is empty.
+    data : path-like, optional
+        Folder of the study's files; left out, the curves that the run kept are taken.
+    jobs : int, optional
+        Worker processes; left out, one for each core.
+    progress : callable
+        Told how far it is.
+    allow_code : bool
+        Permit the code that the study names to run.
+
+    Returns
+    -------
+    Answer
+        Numbers of images, their size, and the files.
+
+    Raises
+    ------
+    SweepError
+        If the study has no images, no such design, split, format or form, boxes are asked for without streets or of a
+        form of no PNG, or the folder holds other files.
     """
+    folder = run_folder(folder)
+    for key, value, known in (
+        ("format", format, FORMATS),
+        ("form", form, FORMS),
+        *(("split", s, SPLITS) for s in split),
+    ):
+        if value not in known:
+            raise SweepError(
+                ValidationIssue(
+                    "unknown", key=key, value=value, allowed=", ".join(known), nearest=nearest(value, known)
+                )
+            )
+    files = ImageFiles(Path(images), format, form, tuple(split))
     output = read_output(folder)
     vision = vision_of(output)
     if files.format != "arrays":
@@ -48,14 +96,14 @@ def export_images(
         if files.form == "raw" and output.study.pixel.captures:
             problem = "merged values of an HDR pixel are no whole numbers of 16 bits"
             raise SweepError(ValidationIssue(problem, key=key, allowed="--form isp, or --format arrays"))
-    study = study_of(output, data, allow_code=allow_code)
-    known = vision_designs(study, output.named_rows)
-    names = [str(row["name"]) for row, *_ in known]
-    for name in designs:
+    study = study_of(output, None if data is None else Path(data), allow_code=allow_code)
+    made = vision_designs(study, output.named_rows)
+    names = [str(row["name"]) for row, *_ in made]
+    for name in design:
         if name not in names:
             allowed, near = ", ".join(names), nearest(name, names)
             raise SweepError(ValidationIssue("unknown", key="--design", value=name, allowed=allowed, nearest=near))
-    chosen = [one for one in known if not designs or one[0]["name"] in designs]
+    chosen = [one for one in made if not design or one[0]["name"] in design]
     with workers(jobs or os.cpu_count() or 1) as parallel:
         fingerprint = Manifest(folder).fingerprint
         counts = write_images(chosen, vision, study.section.seed, fingerprint, files, parallel, progress)

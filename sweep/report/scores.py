@@ -119,8 +119,8 @@ def _score_readers(output: Output, predictions: Sequence[Path], to: Path) -> tup
 _LIMITS = {
     True: (
         "Streets: lenses stand in the street's order; images of the test, of lamps that training does not show. Each "
-        "seed is scored apart; figures are means over the seeds. Intervals hold 95 % of draws of the scenes of each "
-        "light level, the same for all designs: for these lamps and this detector as it was trained.",
+        "seed is scored apart; figures are means over the seeds. Intervals of 95 % are from draws of the scenes of "
+        "each light level, the same for all designs: for these lamps and this detector as it was trained.",
         "A box is found that overlaps one of its state by 0.5 (AP50) or by 0.5 to 0.95 (AP); a point within a lens's "
         "diameter. A false box counts at the distance whose boxes are nearest in size, and at all intensities.",
     ),
@@ -158,7 +158,7 @@ def _of_streets(output: Output, scores: pd.DataFrame) -> Iterator[Told]:
         picture = Picture(
             (Lines(title, "distance / m", lines, hero, height=260),),
             f"Share of {lens} {kind}s that {reader} finds over distance.",
-            f"With one false box in {1 / FALSE_PER_IMAGE:.0f} images, all light levels together.",
+            f"Mean over {FALSE_PER_IMAGE[0]:g} to {FALSE_PER_IMAGE[1]:g} false boxes an image; all light levels.",
         )
         told = totals[["name", "targets"]].copy()
         columns = {

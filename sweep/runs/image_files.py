@@ -203,20 +203,6 @@ def images_of_run(study: Study, rows: pd.DataFrame, split: str, names: Sequence[
                 yield from images_of_split(camera, lamps, _key(row, number), study.section.seed, split, form)
 
 
-def streets_of_run(study: Study, rows: pd.DataFrame, split: str, names: Sequence[str], form: Form) -> Iterator[Batch]:
-    """Yield the streets of a run's benchmark, without files, design by design and seed by seed."""
-    vision = study.section.vision
-    assert vision is not None
-    assert vision.street is not None
-    for row, setup, curves in vision_designs(study, rows):
-        if row["name"] in names:
-            streets = StreetCamera(HeadCamera(setup, curves, vision), vision.street)
-            for number in range(vision.seeds):
-                key = (study.section.seed, number)
-                lamps, scenes = split_lamps(setup.lights, vision, key), draw_streets(vision, vision.street, split, key)
-                yield from streets.batches(scenes, lamps[split], _key(row, number), split, form)
-
-
 def _key(row: Mapping[str, Any], seed: int) -> dict[str, Any]:
     return {name: row[name] for name in ("design_id", "name", "cfa")} | {"seed": seed}
 

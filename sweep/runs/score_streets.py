@@ -116,7 +116,7 @@ def found_sentence(scores: pd.DataFrame, lens: str, better: str) -> str:
     if better != name:
         ends = [f"{100 * other[f'found_apart{end}']:+.0f}" for end in ("", "_low", "_high")]
         text += f" and {100 * other['found']:.0f} % with {better}: {ends[0]} ({ends[1]} to {ends[2]})"
-    return f"{text}, with one false box in {1 / FALSE_PER_IMAGE:.0f} images."
+    return f"{text}, at {FALSE_PER_IMAGE[0]:g} to {FALSE_PER_IMAGE[1]:g} false boxes an image."
 
 
 def street_lines(scores: pd.DataFrame) -> Iterator[str]:

@@ -29,8 +29,9 @@ _RECALLS = np.linspace(0.0, 1.0, 101)
 _MOST_IN_AN_IMAGE = 100
 """Detections of one image and category that count, best first."""
 _DRAWS = 500
-FALSE_PER_IMAGE = 0.1
-"""False boxes of lit states an image, at which the share that is found is told."""
+FALSE_PER_IMAGE = 0.03, 0.3
+"""False boxes of lit states an image: the share that is found is the mean over nine numbers between, evenly in their
+logarithm, as in Dollar et al., PAMI 2012."""
 
 
 class Matched(NamedTuple):
@@ -127,25 +128,27 @@ class Judge:
         return _mean(precisions), _mean(recalls)
 
     @cached_property
-    def _scores(self) -> Float[Array, " draws"]:
-        """Score above which lit states have `FALSE_PER_IMAGE` false boxes an image."""
+    def _scores(self) -> Float[Array, "numbers draws"]:
+        """Scores above which lit states have each number of `FALSE_PER_IMAGE` false boxes an image."""
         false = [(own.score, own.image, own.target[0] < 0) for state, own in self.by_state.items() if state != OFF]
         score, image = (np.concatenate([part[at][part[2]] for part in false]) for at in (0, 1))
         order = np.argsort(-score, kind="stable")
         cumulated = np.cumsum(self.weights[:, image[order]], axis=1)
-        allowed = FALSE_PER_IMAGE * self.weights.sum(axis=1, keepdims=True)
-        return np.asarray(np.append(score[order], -np.inf)[(cumulated <= allowed).sum(axis=1)], dtype=float)
+        images = self.weights.sum(axis=1, keepdims=True)
+        first = [(cumulated <= number * images).sum(axis=1) for number in np.geomspace(*FALSE_PER_IMAGE, 9)]
+        return np.asarray(np.append(score[order], -np.inf)[np.stack(first)], dtype=float)
 
     def found(self, of: Subset) -> Float[Array, " draws"]:
-        """Return the share of the lit targets that is found with `FALSE_PER_IMAGE` false boxes an image."""
+        """Return the share of the lit targets that is found, mean over `FALSE_PER_IMAGE` false boxes an image."""
         right, total = np.zeros(len(self.weights)), np.zeros(len(self.weights))
         for state, own in self.by_state.items():
             if state != OFF and of.state in (ALL, state):
                 counts, hits = _counted(own, of, self.levels)
                 total += self.weights[:, own.targets["image"].to_numpy(dtype=np.intp)[counts]].sum(axis=1)
                 here = hits[0] > 0
-                sure = own.score[here] > self._scores[:, None]
-                right += (self.weights[:, own.image[here]] * sure).sum(axis=1)
+                weights = self.weights[:, own.image[here]]
+                for least in self._scores:
+                    right += (weights * (own.score[here] > least[:, None])).sum(axis=1) / len(self._scores)
         return np.asarray(np.divide(right, total, out=np.full_like(right, np.nan), where=total > 0), dtype=float)
 
     def statistics(self, of: Subset) -> dict[str, Float[Array, " draws"]]:
@@ -195,7 +198,7 @@ def draws_of(levels: NDArray[Any], seed: tuple[int, ...]) -> Float[Array, "draws
 def scores_of_draws(judges: Mapping[str, Sequence[Judge]], of: Subset, reference: str) -> Iterator[dict[str, Any]]:
     """Yield a row for each design: statistics, mean over the seeds, their differences from the reference, intervals.
 
-    `judges`: of each seed, by design. Each seed is scored apart; an interval holds 95 % of the draws of its scenes.
+    `judges`: of each seed, by design. Each seed is scored apart, and its scenes are drawn.
     """
     by_name = {name: _of_seeds([judge.statistics(of) for judge in own]) for name, own in judges.items()}
     for name, own in judges.items():
@@ -207,9 +210,8 @@ def scores_of_draws(judges: Mapping[str, Sequence[Judge]], of: Subset, reference
         )
         row: dict[str, Any] = {"name": name, "targets": n_targets}
         for statistic, values in by_name[name].items():
-            row |= _interval(values).columns(statistic)
-            if reference in by_name:
-                row |= _interval(values - by_name[reference][statistic]).columns(f"{statistic}_apart")
+            row |= _interval(values).within(0.0, 1.0).columns(statistic)
+            row |= _interval(values - by_name[reference][statistic]).columns(f"{statistic}_apart")
         yield row
 
 
@@ -218,11 +220,16 @@ def _of_seeds(parts: Sequence[Mapping[str, Float[Array, " draws"]]]) -> dict[str
 
 
 def _interval(values: Float[Array, " draws"]) -> Interval:
+    """Return a value with the interval that holds 95 % of the draws, mirrored at it.
+
+    Average precision of few scenes is too large, of draws of them twice so (the basic bootstrap: Davison and Hinkley,
+    Bootstrap Methods, 1997, 2.4).
+    """
     drawn = values[1:][np.isfinite(values[1:])]
     if not drawn.size:
         return Interval(float(values[0]), np.nan, np.nan)
     low, high = np.quantile(drawn, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
-    return Interval(float(values[0]), float(low), float(high))
+    return Interval(float(values[0]), float(2 * values[0] - high), float(2 * values[0] - low))
 
 
 def precisions(labels: pd.DataFrame, detections: pd.DataFrame, lenses: Sequence[str]) -> pd.DataFrame:

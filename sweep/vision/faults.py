@@ -28,8 +28,6 @@ from .section import (
 )
 from .street import MOST_COLUMNS, MOST_ROWS, street_shape
 
-_PER_PROTOTYPE = 8
-"""Bytes of a prototype's pixel: its mean and its direction."""
 _LEAST_LUMINANCE = 1e-20
 """cd/m^2 for each photon/s/sr/m^2 of a lamp that the eye sees; at 555 nm it is 2.4e-16."""
 
@@ -133,8 +131,9 @@ def _memory_faults(vision: Vision, lights: Lights, mosaics: Mapping[str, Mosaic]
             return
         crop = reach_px(vision, mosaic.indices.shape[0]).size * reach_px(vision, mosaic.indices.shape[1]).size
         hidden = math.factorial(n_lenses) * (1 + n_lenses * len(vision.intensities_cd)) * 2 * places
+        each = 4 * (1 + len(mosaic.channels))  # bytes of a pixel's mean, and of a direction for each channel
         conditions = len(vision.distances_m) * len(vision.levels) * len(vision.backgrounds)
-        if vision.prototypes and (held := _PER_PROTOTYPE * crop * hidden * conditions) > MOST_BYTES:
+        if vision.prototypes and (held := each * crop * hidden * conditions) > MOST_BYTES:
             problem = f"prototypes of {hidden:,} classes of a head take too much memory (CFA {name})"
             allowed = f"prototypes: false, or at most {MOST_BYTES / 2**30:g} GiB"
             yield Fault(("vision", "prototypes"), problem, f"{held / 2**30:.1f} GiB", allowed)

@@ -242,7 +242,7 @@ def street_labels(
     state = scenes.state[:, heads]
     lit_y_px = y_px + diameter_px * np.append(0.0, heights(vision))[state]
     wide, high = housing_diameters(vision)
-    ids = [image_id(key["design_id"], key["seed"], STREET, split, number) for number in numbers]
+    ids = [image_id(key["design_id"], key["seed"], STREET, split, int(number)) for number in numbers]
     where = {"image_id": ids, **key, "order": STREET, "split": split, "image": numbers}
     where["coco_id"] = (key["design_id"] * vision.seeds + key["seed"]) * count + numbers + 1
     return pd.DataFrame(where).assign(

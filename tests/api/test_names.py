@@ -15,7 +15,20 @@ from ..conftest import ROOT
 
 NAMES = {
     *("load_study", "make_study", "read_run", "read_curves", "studies", "sensor", "lights", "evaluate"),
-    *("check", "plan", "new_study", "list_studies", "run", "status", "show", "audit", "compare", "export", "score"),
+    *(
+        "check",
+        "plan",
+        "new_study",
+        "list_studies",
+        "run",
+        "status",
+        "show",
+        "audit",
+        "compare",
+        "export",
+        "export_images",
+        "score",
+    ),
     *("describe", "Answer", "LoadedStudy", "FinishedRun", "Quantity", "SweepError"),
     *("Pixel", "Optics", "Scene", "Target", "WavelengthGrid"),
     *("Stopband", "MultiStopband", "Dual", "FreeForm"),

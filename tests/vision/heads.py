@@ -26,7 +26,7 @@ LEVELS = {
 
 def vision(**changes: Any) -> Vision:
     given: dict[str, Any] = {"fov_deg": 120.0, "distances_m": [150.0, 400.0], "levels": LEVELS}
-    return Vision(**given | {"test_images": 60, "train_images": 200, "epochs": 2, "seeds": 2} | changes)
+    return Vision(**given | {"test_images": 60, "train_images": 200, "seeds": 2} | changes)
 
 
 def head_setup(cfa: str = "RGGB", grid: WavelengthGrid = GRID, **pixel: Any) -> Setup:

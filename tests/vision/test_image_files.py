@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,6 +14,7 @@ from PIL import Image
 from sweep.results.output import read_output
 from sweep.runs.vision import vision_designs
 from sweep.study import load_study
+from sweep.vision.batches import formed
 from sweep.vision.images import HeadCamera
 from sweep.vision.isp import isp_of
 from sweep.vision.lamps import TEST, split_lamps
@@ -21,7 +23,7 @@ from sweep.vision.readers import scenes_of
 
 from ..commanded import commanded
 from ..conftest import draw_nothing
-from .heads import GRID, head_setup
+from .heads import GRID, LEVELS, NO_FILTERS, head_setup, vision
 
 BENCHMARK = """\
 study: heads
@@ -42,6 +44,7 @@ vision:
   check_images: 20
   seeds: 2
   network: false
+  prototypes: false
   street: {columns: 3, rows: 2, heads: 2, brake_lamps: 2, street_lamps: 1, train_images: 20, test_images: 20}
 """
 
@@ -130,58 +133,155 @@ def test_the_lit_lens_is_where_the_label_says(run: Path, tmp_path: Path) -> None
 def test_an_interrupted_export_goes_on_and_another_is_refused(run: Path, tmp_path: Path) -> None:
     whole, torn = tmp_path / "whole", tmp_path / "torn"
     first, _ = exported(run, whole), exported(run, torn)
-    for path in (torn / "manifest.parquet", torn / "parts" / "1-0.parquet", *(torn / "images" / "1").glob("0-*.npz")):
+    parts = (torn / "parts" / name for name in ("1-0-shuffled-train-0.parquet", "0-1-street-test-0.parquet"))
+    for path in (torn / "manifest.parquet", *parts, *(torn / "images" / "1").glob("0-*.npz")):
         path.unlink()
     pd.testing.assert_frame_equal(exported(run, torn), first)
-    for path in whole.rglob("*.npz"):
-        assert path.read_bytes() == (torn / path.relative_to(whole)).read_bytes()
+    assert files_of(whole) == files_of(torn)
     refused("holds other images", "export", run, "--images", whole, "--form", "isp")
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "notes.txt").write_text("x")
     refused("holds other files", "export", run, "--images", tmp_path / "mine")
     refused("one of --design and --images", "export", run)
-    refused("of more than three channels", "export", run, "--images", tmp_path / "d", "--png", "--form", "demosaicked")
+    for options, said in (
+        (("--form", "demosaicked"), "PNGs of more than three channels"),
+        (("--design", "RGBG"), "did you mean 'RGGB'"),
+    ):
+        refused(said, "export", run, "--images", tmp_path / "d", "--format", "coco", *options)
     assert not (tmp_path / "d").exists()
 
 
-def test_pictures_are_files_that_viewers_open(run: Path, tmp_path: Path) -> None:
-    manifest = exported(run, tmp_path / "isp", "--form", "isp", "--png")
-    row = manifest.query("name == 'RGGB' and state == 'red' and distance_m == 40 and level == 'day'").iloc[0]
-    with Image.open(tmp_path / "isp" / row["file"]) as picture:
-        assert picture.mode == "RGB"
-        assert picture.size == (24, 24)
-        red, green, blue = np.moveaxis(np.asarray(picture, dtype=float), 2, 0)
-    at = int(np.clip(round(row["lens_y_px"][int(row["lit"])]), 0, 23)), round(row["lens_x_px"][0])
-    assert red[at] > 2 * max(green[at], blue[at])
+def files_of(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-def test_coco_boxes_hold_the_lenses(run: Path, tmp_path: Path) -> None:
-    """Images of the test alone; at night the brightest pixel is in the box of its image."""
-    manifest = exported(run, tmp_path / "coco", "--form", "raw", "--png", "--coco", "--split", "test")
-    names = [f"coco-{kind}{design}-test.json" for kind in ("", "street-") for design in (0, 1)]
-    assert sorted(path.name for path in (tmp_path / "coco").glob("coco-*")) == names
-    held = json.loads((tmp_path / "coco" / "coco-1-test.json").read_text())
-    files = {one["id"]: one["file_name"] for one in held["images"]}
-    assert sorted(files.values()) == sorted(manifest.query("design_id == 1 and split == 'test'")["file"])
-    states, by_file = {one["id"]: one["name"] for one in held["categories"]}, manifest.set_index("file")
-    for one in held["annotations"]:
-        row, (left, top, width, height) = by_file.loc[files[one["image_id"]]], one["bbox"]
-        assert states[one["category_id"]] == row["state"]
-        if row["distance_m"] == 100:
-            assert (width, height) == pytest.approx((1.6 * row["lens_diameter_px"], 4.6 * row["lens_diameter_px"]))
-        if row["level"] == "night" and row["state"] != "off":
-            pixels = np.asarray(Image.open(tmp_path / "coco" / row.name))
-            y, x = np.unravel_index(pixels.argmax(), pixels.shape)
-            assert top - 1 <= y + 0.5 <= top + height + 1
-            assert left - 1 <= x + 0.5 <= left + width + 1
-    streets = json.loads((tmp_path / "coco" / "coco-street-0-test.json").read_text())
-    assert (len(streets["images"]), len(streets["annotations"])) == (40, 80)
-    first = streets["images"][0]
-    assert Image.open(tmp_path / "coco" / first["file_name"]).size == (first["width"], first["height"]) == (108, 72)
-    refused("with --png", "export", run, "--images", tmp_path / "d", "--coco")
+@pytest.fixture(scope="module")
+def pictures(run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    to = tmp_path_factory.mktemp("pictures") / "coco"
+    code, out, err = commanded(
+        "export", run, "--images", to, "--form", "isp", "--format", "coco", "--split", "test", "--jobs", 1
+    )
+    assert code == 0, err
+    assert "Streets are a crop of 108 x 72 pixels of the sensor." in out
+    return to
 
 
-def test_detections_in_streets_are_scored(run: Path, tmp_path: Path) -> None:
+def annotated(folder: Path) -> dict[str, Any]:
+    return dict(json.loads((folder / "annotations" / "instances_test.json").read_text()))
+
+
+def test_boxes_hold_the_lamps(pictures: Path) -> None:
+    """At night a lit lens is the brightest in its box, by its color; a head has the state of its lamp."""
+    held, streets = annotated(pictures / "0-RGGB"), pd.read_parquet(pictures / "street.parquet")
+    names = {one["id"]: one["name"] for one in held["categories"]}
+    assert list(names.values()) == ["off head", "red head", "yellow head", "green head", *LAMPS]
+    assert (len(held["images"]), streets["coco_id"].is_unique) == (40, True)
+    lamps = [one for one in held["annotations"] if names[one["category_id"]] in LAMPS]
+    heads = [one for one in held["annotations"] if one not in lamps]
+    assert len(heads) == 80
+    assert len(lamps) == sum(names[one["category_id"]] != "off head" for one in heads)
+    files, seen = {one["id"]: one["file_name"] for one in held["images"]}, 0
+    levels = streets.set_index("image_id")["level"]
+    for one in lamps:
+        name, (left, top, width, height) = files[one["image_id"]], one["bbox"]
+        if levels[Path(name).stem] == "night" and names[one["category_id"]] == "red lamp" and width > 4:
+            with Image.open(pictures / "0-RGGB" / "images" / "test" / name) as picture:
+                assert (picture.mode, picture.size) == ("RGB", (108, 72))
+                y, x = round(top + height / 2 - 0.5), round(left + width / 2 - 0.5)
+                red, green, blue = np.asarray(picture, dtype=float)[y, x]
+            assert red > 1.5 * max(green, blue)
+            seen += 1
+    assert seen >= 2
+    known = json.loads((pictures / "0-RGGB" / "isp.json").read_text())
+    assert np.sum(known["lights"]["daylight"]["matrix"], axis=1) == pytest.approx([1, 1, 1])
+
+
+LAMPS = ["red lamp", "yellow lamp", "green lamp"]
+
+
+def test_perfect_boxes_come_back(run: Path, pictures: Path, tmp_path: Path) -> None:
+    """With numbers, stems and file names of COCO, and as text of YOLO: all score 1."""
+    yolo = tmp_path / "exported"
+    code, _, err = commanded("export", run, "--images", yolo, "--format", "yolo", "--design", "RYYCy", "--jobs", 1)
+    assert code == 0, err
+    told = (yolo / "1-RYYCy" / "data.yaml").read_text().splitlines()
+    assert told[:5] == ["train: images/train", "val: images/check", "test: images/test", "names:", "  0: off head"]
+    for file in (yolo / "1-RYYCy" / "labels" / "test").glob("*.txt"):
+        with_scores = "".join(f"{line} 0.5\n" for line in file.read_text().splitlines())
+        (tmp_path / "texts" / "RYYCy").mkdir(parents=True, exist_ok=True)
+        (tmp_path / "texts" / "RYYCy" / file.name).write_text(with_scores)
+    for kind in ("numbers", "stems", "names"):
+        (tmp_path / kind).mkdir()
+        for name in ("0-RGGB", "1-RYYCy"):
+            held = annotated(pictures / name)
+            files = {one["id"]: one["file_name"] for one in held["images"]}
+            called = {"numbers": int, "stems": lambda at, f=files: Path(f[at]).stem, "names": lambda at, f=files: f[at]}
+            rows = [
+                {"image_id": called[kind](one["image_id"]), "score": 0.5}  # type: ignore[operator]
+                | {key: one[key] for key in ("category_id", "bbox")}
+                for one in held["annotations"]
+            ]
+            (tmp_path / kind / f"{name}.json").write_text(json.dumps(rows))
+    readers = [tmp_path / name for name in ("numbers", "stems", "names", "texts")]
+    code, out, err = commanded("score", run, *readers, "--output", tmp_path / "scores")
+    assert code == 0, err
+    assert out.count("average precision 1.000 (1.000 to 1.000)") == 14  # heads and lamps, two designs; of YOLO one
+    table = pd.read_parquet(tmp_path / "scores" / "street_scores.parquet")
+    scores = table[["ap50", "ap", "recall", "found"]].to_numpy()
+    np.testing.assert_allclose(scores[np.isfinite(scores)], 1.0)
+    assert set(table["distance_m"]) == {"all", "40", "100"}
+    page = (tmp_path / "scores" / "scores.html").read_text()
+    assert "% of red heads at" in page
+    assert "street&#39;s order" in page or "street's order" in page
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"image_id": 99999}, "[0].image_id: not an image of a street of the test (got 99999)"),
+        ({"image_id": "0-0-street-test-x"}, "did you mean '0-0-street-test-"),
+        ({"category_id": 9}, "[0].category_id: no category (got 9)"),
+        ({"bbox": [1, 2, 3]}, "[0].bbox: no box"),
+        ({"bbox": [1, 2, -3, 4]}, "[0].bbox: no box"),
+        ({"score": "x"}, "[0].score: no number (got 'x')"),
+        ({"score": None}, "[0].score: no number"),
+    ],
+)
+def test_other_results_are_refused_with_a_line(run: Path, tmp_path: Path, change: dict[str, Any], said: str) -> None:
+    row: dict[str, Any] = {"image_id": 1, "category_id": 1, "bbox": [1, 2, 3, 4], "score": 0.5}
+    (tmp_path / "mine.json").write_text(json.dumps([row | change]))
+    refused(said, "score", run, tmp_path / "mine.json", "--output", tmp_path / "scores")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("0 0.5 0.5 0.1 0.1", ":1: a line of 5 fields"),
+        ("9 0.5 0.5 0.1 0.1 0.9", ":1: no class (got 9); allowed: 0 to 6"),
+        ("0 0.5 x 0.1 0.1 0.9", ":1: no number"),
+        ("0 50 50 10 10 0.9", ":1: no box"),
+    ],
+)
+def test_other_lines_of_yolo_are_refused(run: Path, tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / "mine").mkdir()
+    refused("no detections", "score", run, tmp_path / "mine", "--output", tmp_path / "scores")
+    (tmp_path / "mine" / "0-0-street-test-0.txt").write_text(text)
+    refused(said, "score", run, tmp_path / "mine", "--output", tmp_path / "scores")
+    (tmp_path / "mine" / "0-0-street-test-0.txt").rename(tmp_path / "mine" / "classes.txt")
+    refused("not an image of a street of the test (got 'classes')", "score", run, tmp_path / "mine")
+
+
+def test_what_is_no_list_is_refused(run: Path, pictures: Path, tmp_path: Path) -> None:
+    refused(
+        "no results of COCO (got 'dict')", "score", run, pictures / "0-RGGB" / "annotations" / "instances_test.json"
+    )
+    (tmp_path / "torn.json").write_text('[{"image_id": 1, "bb')
+    refused("no JSON", "score", run, tmp_path / "torn.json")
+    (tmp_path / "empty.json").write_text("[]")
+    refused("no detections", "score", run, tmp_path / "empty.json")
+
+
+def test_points_in_streets_are_scored(run: Path, tmp_path: Path) -> None:
     """The labels themselves are all right; of other images, states and numbers each has a line."""
     exported(run, tmp_path / "raw", "--split", "test")
     columns = ["state", "head_x_px", "lit_y_px"]
@@ -190,7 +290,7 @@ def test_detections_in_streets_are_scored(run: Path, tmp_path: Path) -> None:
     lit.to_csv(tmp_path / "right.csv", index=False)
     code, out, err = commanded("score", run, tmp_path / "right.csv", "--output", tmp_path / "scores")
     assert code == 0, err
-    assert "right, RGGB: average precision 1.000 (1.000 to 1.000)" in out
+    assert "right, points, RGGB: average precision 1.000 (1.000 to 1.000)" in out
     assert "not told apart" in out
     table = pd.read_parquet(tmp_path / "scores" / "street_scores.parquet")
     assert set(table["level"]) == {"all", "day", "night"}
@@ -201,6 +301,19 @@ def test_detections_in_streets_are_scored(run: Path, tmp_path: Path) -> None:
     ):
         lit.assign(**change).to_csv(tmp_path / "wrong.csv", index=False)
         refused(line, "score", run, tmp_path / "wrong.csv", "--output", tmp_path / "scores")
+
+
+def test_strips_are_parts_of_whole_images(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Developed a few rows at a time, images are the same bit for bit."""
+    requested = vision(levels={name: LEVELS[name] for name in ("day", "night")})
+    setup = head_setup("RYYCy")
+    camera, lamps = HeadCamera(setup, NO_FILTERS, requested), split_lamps(setup.lights, requested, (1, 0))
+    scenes = scenes_of(requested, lamps, "shuffled", TEST, (1, 0))
+    for form in ("demosaicked", "isp"):
+        whole = formed(camera, scenes, form)
+        with monkeypatch.context() as patch:
+            patch.setattr("sweep.vision.batches._STRIP_ROWS", 3)
+            np.testing.assert_array_equal(formed(camera, scenes, form), whole)
 
 
 @pytest.mark.parametrize("cfa", ["RGGB", "RYYCy"])

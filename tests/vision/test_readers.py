@@ -12,14 +12,15 @@ import pytest
 from scipy.special import ndtr
 
 from sweep.base.errors import SweepError
-from sweep.vision.batches import formed
+from sweep.vision.crops import Crops, Heads
 from sweep.vision.image_kernels import draw_numbers, log_likelihoods
 from sweep.vision.images import HeadCamera
 from sweep.vision.installed import require_network
-from sweep.vision.lamps import CHECK, TEST, TRAIN, split_lamps
+from sweep.vision.lamps import CHECK, TEST, TRAIN, Lamps, split_lamps
 from sweep.vision.network_reader import NetworkReader
 from sweep.vision.observer import posteriors
 from sweep.vision.pixel_table import pixel_table
+from sweep.vision.prototypes import Prototypes
 from sweep.vision.scenes import FIXED, ORDERS, SHUFFLED, draw_scenes
 from sweep.vision.scores import confusion_matrix, costs, macro_f1, mean_of
 
@@ -51,38 +52,84 @@ def test_the_likelihood_errs_as_two_gaussians_do() -> None:
     assert doubt.mean() == pytest.approx(least, abs=0.005)
 
 
-@pytest.mark.slow
-def test_the_network_errs_as_two_gaussians_do() -> None:
-    """Two images that differ in four of 64 values, in Gaussian noise; what is known says which of two signs they have."""
-    from sweep.vision.network import train
-
-    rng = np.random.default_rng(4)
-    apart = np.zeros((4, 4, 4))
-    apart[1:3, 1:3, 2] = 1.2
-
-    def some(n: int) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
-        truth, sign = rng.integers(2, size=n), rng.integers(2, size=n)
-        planes = ((2 * sign - 1) * truth)[:, None, None, None] * apart + rng.standard_normal((n, 4, 4, 4))
-        return (planes.astype(np.float32), np.eye(2, dtype=np.float32)[sign]), truth[:, None]
-
-    inputs, states = some(60_000)
-    seen, truth = some(20_000)
-    network = train(inputs, states, (2,), 4, (1,))
-    error, least = (network.logits(*seen).argmax(axis=1) != truth[:, 0]).mean(), ndtr(-0.5 * 1.2 * 2)
-    assert least - 0.01 < error < least + 0.01
+LEARNERS = {
+    "prototypes": Prototypes,
+    "network": lambda crops, images: NetworkReader(crops, images, (1, 0)),
+}
 
 
-def test_the_inputs_of_the_network_have_one_noise() -> None:
-    """From few electrons to a full well, and mirror images have the channels of the tile at the same places."""
-    reader = NetworkReader(vision(), head_setup().camera.mosaic, head_setup().camera.pixel)
-    pixel, rng = head_setup().camera.pixel, np.random.default_rng(3)
-    for electrons in (3.0, 30.0, 1000.0, 8000.0):
-        gain = 1 + pixel.prnu * rng.standard_normal((200, 24, 24))
-        counts = rng.poisson(electrons * gain) + pixel.read_noise_e * rng.standard_normal((200, 24, 24))
-        planes = reader.planes(np.rint(counts * pixel.dn_per_e + pixel.offset_dn))
-        assert planes.std() == pytest.approx(1.0, abs=0.12), electrons
-    columns = np.broadcast_to(np.arange(24), (1, 24, 24)) % 2 * 100 + 500
-    np.testing.assert_array_equal(reader.planes(columns), reader.planes(columns, mirrored=True))
+def cameras(cfa: str = "RGGB", **changes: object) -> tuple[HeadCamera, dict[str, Lamps]]:
+    requested, setup = vision(**changes), head_setup(cfa)
+    return HeadCamera(setup, NO_FILTERS, requested), split_lamps(setup.lights, requested, (1, 0))
+
+
+def test_crops_are_the_middle_of_images() -> None:
+    """Of one head and its lamps, mean and noise are those of whole images in units of the noise."""
+    camera, lamps = cameras()
+    crops, n = Crops(camera, lamps[TRAIN], (1, 0)), 4000
+    scenes = draw_scenes(camera.vision, lamps[TRAIN], SHUFFLED, n, (5,))
+    zeros = np.zeros(n, dtype=int)
+    members = lamps[TRAIN].of_lens[0]
+    same = replace(
+        scenes,
+        **dict.fromkeys(("distance", "level", "background", "order"), zeros),  # type: ignore[arg-type]
+        **{"state": zeros + 1, "lamp": members[np.arange(n) % members.size], "intensity": zeros + 1},
+        **{"phantom": zeros + 1, "place": zeros + 0.0},
+    )
+    whole = crops.seen(camera.images(same), same, fixed=False).crops
+    alone = crops.draw(0, 0, Heads(zeros, zeros + 1, zeros, zeros + 1, zeros, zeros))
+    assert whole.shape == alone.shape == (n, 144)
+    apart = (whole.mean(axis=0) - alone.mean(axis=0)) / np.sqrt((whole.var(axis=0) + alone.var(axis=0)) / n)
+    assert np.abs(apart).max() < 4.5
+    assert apart.std() < 1.2
+    np.testing.assert_allclose(whole.std(axis=0) / alone.std(axis=0), 1.0, atol=0.08)
+    dark = alone[:, :12]  # away from the lens, where lamps do not differ
+    assert dark.std(axis=0).mean() == pytest.approx(1.0, abs=0.12)
+
+
+def test_crops_are_all_different_and_the_same_again() -> None:
+    camera, lamps = cameras()
+    first, again = (Crops(camera, lamps[TRAIN], (1, 0)) for _ in range(2))
+    heads = first.random(0, 500)
+    np.testing.assert_array_equal(np.stack(heads), np.stack(again.random(0, 500)))
+    drawn = first.draw(0, 0, heads)
+    np.testing.assert_array_equal(drawn, again.draw(0, 0, heads))
+    assert len(np.unique(drawn, axis=0)) == 500
+    assert not (drawn == first.draw(0, 0, heads)).all(axis=1).any()
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+def test_a_reader_is_better_with_more_images_and_never_than_the_observer(name: str) -> None:
+    """Expected errors by the observer's probabilities, of lamps that it has not learned from."""
+    camera, lamps = cameras("RYYCy", test_images=400)
+    scenes = draw_scenes(camera.vision, lamps[TEST], SHUFFLED, 400, (8,))
+    numbers = camera.images(scenes)
+    known = posteriors(camera, scenes, numbers, lamps[TEST], SHUFFLED)
+    risks, wrong = [], []
+    for images in (1500, 60_000):
+        crops = Crops(camera, lamps[TRAIN], (1, 0))
+        reader = LEARNERS[name](crops, images)
+        said = reader.log_probabilities(crops.seen(numbers, scenes, fixed=False)).argmax(axis=1)
+        risks.append((1 - known[np.arange(400), said]).mean())
+        wrong.append((said != scenes.state).astype(float))
+    least = (1 - known.max(axis=1)).mean()
+    assert least < risks[1] < risks[0] < 0.75
+    worse = wrong[1] - (known.argmax(axis=1) != scenes.state)
+    assert worse.mean() > -3 * worse.std() / np.sqrt(400)
+    assert abs((wrong[1] - risks[1]).mean()) < 4 * wrong[1].std() / np.sqrt(400)
+
+
+def test_prototypes_know_the_order_that_they_are_told() -> None:
+    """In the street's order the place of the lit lens says its type."""
+    camera, lamps = cameras("RCCC", distances_m=[150.0])
+    scenes = draw_scenes(camera.vision, lamps[TEST], FIXED, 300, (8,))
+    crops = Crops(camera, lamps[TRAIN], (1, 0))
+    reader, numbers = Prototypes(crops, 60_000), camera.images(scenes)
+    wrong = [
+        (reader.log_probabilities(crops.seen(numbers, scenes, fixed=told)).argmax(axis=1) != scenes.state).mean()
+        for told in (True, False)
+    ]
+    assert wrong[0] < 0.5 * wrong[1]
 
 
 @pytest.mark.parametrize(
@@ -117,8 +164,9 @@ def test_the_observer_of_an_hdr_pixel_sees_what_saturates_another() -> None:
         off = (found.argmax(axis=1) != scenes.state) - (1 - found.max(axis=1))
         assert abs(off.mean()) <= 4 * off.std() / np.sqrt(300) + 1e-6
         wrong[captures] = float((1 - found.max(axis=1)).mean())
-        planes = NetworkReader(requested, setup.camera.mosaic, camera.pixel).planes(formed(camera, scenes, "raw"))
-        assert np.isfinite(planes).all()
+        crops = Crops(camera, lamps, (1, 0))
+        told = Prototypes(crops, 3000).log_probabilities(crops.seen(camera.images(scenes), scenes, fixed=False))
+        assert np.isfinite(told).all()
     assert 0.01 < wrong["split_pixel"] < 0.6 * wrong["dual_gain"]
 
 
@@ -202,12 +250,16 @@ def test_invalid_vision_section_is_refused(tmp_path: Path) -> None:
     (found,) = issues(tmp_path, f"{BASE}pixel: {{bits: 14}}\n{requested.replace('yelow', 'yellow')}}}\n")
     assert "pixel.bits" in found
     assert "at most 12" in found
-    many = f"{requested.replace('yelow', 'yellow')}, crop_px: 48, places_per_pixel: 1, train_images: 25000"
-    (found,) = issues(tmp_path, f"{BASE}{many}, input: demosaicked}}\n")
-    assert "images take too much memory (CFA RGGB)" in found
-    assert "5.1 GiB" in found  # 25,000 images of 48 x 48 pixels, 3 channels of 4 bytes, held eight times
-    load(tmp_path, f"{BASE}{many}}}\n")
-    load(tmp_path, f"{BASE}{many}, input: demosaicked, network: false}}\n")
+    lenses = requested.replace("[red, yelow, green]", "[red, yellow, green, orange]").replace(
+        "[100]", "[20, 21, 22, 23]"
+    )
+    (found,) = issues(tmp_path, f"{BASE}{lenses}, crop_px: 48, backgrounds: [sky, gray, white, black, soil]}}\n")
+    assert "prototypes of 9,984 classes of a head take too much memory (CFA RGGB)" in found
+    assert "prototypes: false" in found
+    load(tmp_path, f"{BASE}{lenses}, crop_px: 48, backgrounds: [sky, gray, white, black, soil], prototypes: false}}\n")
+    wide = "street: {columns: 60, rows: 3}"
+    (found,) = issues(tmp_path, f"{BASE}{requested.replace('yelow', 'yellow')}, {wide}}}\n")
+    assert "streets of 2160 x 108 pixels (CFA RGGB)" in found
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sweep.vision.detections import average_precision, precisions
+from sweep.vision.detections import precisions
 from sweep.vision.detector import Detector
 from sweep.vision.images import HeadCamera
 from sweep.vision.lamps import TEST, TRAIN, Lamps, split_lamps
@@ -109,24 +109,22 @@ def test_images_do_not_depend_on_how_many_are_made_at_once() -> None:
     np.testing.assert_array_equal(together[40], alone[0])
 
 
-def test_average_precision_is_the_mean_of_the_best_precisions() -> None:
-    """By the definition: over targets, the largest precision of a threshold that finds as many or more."""
-    rng = np.random.default_rng(6)
-    for _ in range(50):
-        right, score, more = rng.random(12) < 0.4, rng.random(12), int(rng.integers(3))
-        targets = int(right.sum()) + more
-        order = np.argsort(-score)
-        wanted = 0.0
-        for found in range(1, int(right.sum()) + 1):
-            hits = [right[order[:n]].sum() for n in range(1, 13)]
-            wanted += max(hit / (n + 1) for n, hit in enumerate(hits) if hit >= found)
-        assert average_precision(right, score, max(targets, 1)) == pytest.approx(wanted / max(targets, 1))
-    assert np.isnan(average_precision(np.array([False]), np.array([1.0]), 0))
-
-
 def test_a_lens_is_found_once_and_near() -> None:
     labels = pd.DataFrame(
-        {"image_id": ["a"], "level": ["day"], "state": [["red", "off"]], "head_x_px": [[10.0, 40.0]]}
+        {
+            "image_id": ["a"],
+            "image": [0],
+            "level": ["day"],
+            "distance_m": [[100.0, 100.0]],
+            "intensity_cd": [[1.0, np.nan]],
+        }
+        | {
+            "head_y_px": [[8.0, 8.0]],
+            "head_width_px": [[6.0, 6.0]],
+            "head_height_px": [[18.0, 18.0]],
+            "state": [["red", "off"]],
+            "head_x_px": [[10.0, 40.0]],
+        }
         | {"lit_y_px": [[10.0, np.nan]], "lens_diameter_px": [[4.0, 4.0]]}
     )
     rows = [("a", 11.0, 10.0, "red", 0.9), ("a", 10.0, 10.0, "red", 0.8), ("a", 40.0, 10.0, "red", 0.7)]

@@ -113,13 +113,21 @@ def export(
         )
     else:
         from ...report.export_images import export_images
-        from ...runs.image_files import ImageFiles
 
         assert images is not None
         with ProgressDisplay(quiet=quiet) as display:
-            splits = tuple(name.value for name in split or ImageSplit)
-            files = ImageFiles(images, format_.value, form.value, splits)
-            answer = export_images(folder, files, design or (), data, jobs, display.update, allow_code=allow_code)
+            answer = export_images(
+                folder,
+                images,
+                format=format_.value,
+                form=form.value,
+                split=[name.value for name in split or ImageSplit],
+                design=design or (),
+                data=data,
+                jobs=jobs,
+                progress=display.update,
+                allow_code=allow_code,
+            )
     print_answer(answer, as_json=as_json, quiet=quiet)
 
 
