@@ -88,17 +88,15 @@ def _steps(held: tuple[list[_Weights], Any], batches: tuple[list[Examples], Any]
     return jax.lax.scan(step, held, batches)[0]
 
 
-_compiled_logits: Callable[..., Any] = jax.jit(_logits)
-
-
 def train(images: Callable[[int], list[Examples]], n_states: int, calls: int, seed: tuple[int, ...]) -> list[_Weights]:
     """Train the networks of all levels by AdamW, with a rate that falls along a cosine.
 
     `images`: new examples of each level, for a number of steps.
     """
     n_steps = calls * STEPS
-    rate = optax.warmup_cosine_decay_schedule(_RATE / 20, _RATE, math.ceil(_WARM_UP * n_steps), n_steps, _RATE / 1000)
-    rates = np.asarray(rate(np.arange(n_steps)), dtype=np.float32).reshape(calls, STEPS)
+    step = (np.arange(n_steps) + 1) / n_steps
+    falling = 0.5 * (1 + np.cos(math.pi * (step - _WARM_UP) / (1 - _WARM_UP)))
+    rates = (_RATE * np.where(step < _WARM_UP, step / _WARM_UP, falling)).astype(np.float32).reshape(calls, STEPS)
     key = jax.random.key(int(np.random.default_rng(seed).integers(2**31)))
     held: Any = None
     for of_steps in rates:
@@ -118,6 +116,12 @@ def train(images: Callable[[int], list[Examples]], n_states: int, calls: int, se
 def logits(
     weights: _Weights, distance: int, crops: NDArray[np.float32], known: NDArray[np.float32]
 ) -> Float[Array, "images states"]:
-    """Return the logarithm of the probability of each state, but for a constant of each image."""
-    own = {name: np.asarray(part[distance]) for name, part in weights.items()}
-    return np.asarray(_compiled_logits(own, crops, known), dtype=float)
+    """Return the logarithm of the probability of each state, but for a constant of each image.
+
+    By NumPy: JAX would compile anew for each number of images.
+    """
+    own = {name: np.asarray(part)[distance] for name, part in weights.items()}
+    x = np.maximum(crops @ own["dense0"] + own["bias0"] + known @ own["known"], 0.0)
+    for at in range(1, len(_HIDDEN)):
+        x = np.maximum(x @ own[f"dense{at}"] + own[f"bias{at}"], 0.0)
+    return np.asarray(x @ own[f"dense{len(_HIDDEN)}"] + own[f"bias{len(_HIDDEN)}"], dtype=float)

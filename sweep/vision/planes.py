@@ -13,7 +13,7 @@ from ..camera.pixel import Pixel
 _LEAST_PRNU = 1e-6
 
 
-def in_noise(raw: NDArray[np.generic], pixel: Pixel) -> Float[Array, "..."]:
+def in_noise(raw: NDArray[np.generic], pixel: Pixel) -> Float[Array, " ..."]:
     """Return raw values on a scale on which their noise is 1.
 
     With e electrons above the pedestal, (1/p) ln(1 + 2 p (sqrt(s^2 + e + p^2 e^2) + p e)) has a slope of 1 over the

@@ -250,13 +250,12 @@ def test_invalid_vision_section_is_refused(tmp_path: Path) -> None:
     (found,) = issues(tmp_path, f"{BASE}pixel: {{bits: 14}}\n{requested.replace('yelow', 'yellow')}}}\n")
     assert "pixel.bits" in found
     assert "at most 12" in found
-    lenses = requested.replace("[red, yelow, green]", "[red, yellow, green, orange]").replace(
-        "[100]", "[20, 21, 22, 23]"
-    )
-    (found,) = issues(tmp_path, f"{BASE}{lenses}, crop_px: 48, backgrounds: [sky, gray, white, black, soil]}}\n")
+    many = requested.replace("[red, yelow, green]", "[red, yellow, green, orange]").replace("[100]", "[20, 21, 22, 23]")
+    many += ", crop_px: 48, backgrounds: [sky, gray, white, black, soil]"
+    (found,) = issues(tmp_path, f"{BASE}{many}}}\n")
     assert "prototypes of 9,984 classes of a head take too much memory (CFA RGGB)" in found
     assert "prototypes: false" in found
-    load(tmp_path, f"{BASE}{lenses}, crop_px: 48, backgrounds: [sky, gray, white, black, soil], prototypes: false}}\n")
+    load(tmp_path, f"{BASE}{many}, prototypes: false}}\n")
     wide = "street: {columns: 60, rows: 3}"
     (found,) = issues(tmp_path, f"{BASE}{requested.replace('yelow', 'yellow')}, {wide}}}\n")
     assert "streets of 2160 x 108 pixels (CFA RGGB)" in found
