@@ -58,11 +58,12 @@ def vision_faults(
             rows, columns = mosaic.indices.shape
             problem = f"the tile of {name} ({rows} x {columns}) does not divide the images"
             yield Fault(("vision", "crop_px"), problem, vision.crop_px, "a multiple of every tile")
-        if vision.street is not None:
-            rows, columns = street_shape(vision, mosaic.indices.shape)
-            if rows > MOST_ROWS or columns > MOST_COLUMNS:
-                problem = f"streets of {columns} x {rows} pixels (CFA {name})"
-                yield Fault(("vision", "street"), problem, None, f"at most {MOST_COLUMNS} x {MOST_ROWS}")
+    if vision.street is not None:
+        shapes = {name: street_shape(vision, mosaic.indices.shape) for name, mosaic in mosaics.items()}
+        name, (rows, columns) = max(shapes.items(), key=lambda item: item[1][0] * item[1][1])
+        if rows > MOST_ROWS or columns > MOST_COLUMNS:
+            problem = f"streets of {columns} x {rows} pixels (CFA {name})"
+            yield Fault(("vision", "street"), problem, None, f"at most {MOST_COLUMNS} x {MOST_ROWS}")
     for distance_m in vision.distances_m:
         scene = Scene(target=vision.target(distance_m), optics=vision.optics, exposure=FixedExposure(exposure_s=1.0))
         if (fault := psf.image_fault(scene, pixel)) is not None:

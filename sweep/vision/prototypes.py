@@ -18,7 +18,7 @@ from ..base.types import Array, Float, ImageNumbers, IndexArray
 from .crops import Crops, Float32, Heads, Seen
 from .scenes import PHANTOM_SHARE, orders_of_lenses
 
-_AT_ONCE = 20_000
+_VALUES_AT_ONCE = 3_000_000
 _SPREAD = 0.1
 """Share of the images by which the spread along lamps is learned."""
 _PRIOR_IMAGES = 5.0
@@ -110,7 +110,7 @@ def _learned(crops: Crops, distance: int, level: int, background: int, classes: 
 
     def drawn(counts: IndexArray) -> Iterator[tuple[ImageNumbers, Float32]]:
         """Yield some classes and new images of each, in their order."""
-        block = np.cumsum(counts) // _AT_ONCE
+        block = np.cumsum(counts) // max(1, _VALUES_AT_ONCE // crops.channels.size)
         for own in np.split(np.arange(counts.size), np.flatnonzero(np.diff(block)) + 1):
             yield own, crops.draw(distance, level, Heads(*(np.repeat(part[own], counts[own]) for part in heads)))
 
