@@ -111,9 +111,9 @@ class Benchmark:
         """Return the share of images that were read wrongly."""
         return mean_of(self.wrong(reader, order, lamps)[design].to_numpy(), self.seeds(order, lamps))
 
-    def difference(self, design: str, order: str) -> Interval:
-        """Return the error of a design less that of the reference, on the same scenes."""
-        wrong = self.wrong(self.main_reader, order)
+    def difference(self, design: str, order: str, reader: str = "") -> Interval:
+        """Return the error of a design less that of the reference on the same scenes; of the main reader by default."""
+        wrong = self.wrong(reader or self.main_reader, order)
         return mean_of((wrong[design] - wrong[self.reference]).to_numpy(), self.seeds(order))
 
     def scenes(self, order: str, lamps: str = UNSEEN) -> pd.DataFrame:

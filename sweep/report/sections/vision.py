@@ -72,25 +72,28 @@ class Vision(Section):
 
     @property
     def answer(self) -> list[str]:
-        """Who errs less than with the reference, and whether the separation predicts it."""
+        """Who errs less than with the reference, and whether the separation predicts it, for each reader that learns."""
+        return [self._compared(reader) for reader in self.benchmark.learners or [OBSERVER]]
+
+    def _compared(self, reader: str) -> str:
         benchmark, groups = self.benchmark, dict[str, list[str]]()
         for design in benchmark.designs:
             if design != benchmark.reference:
-                difference = benchmark.difference(design, SHUFFLED)
+                difference = benchmark.difference(design, SHUFFLED, reader)
                 sure = difference.excludes_zero
                 word = "not separated from it" if not sure else "less often" if difference.value < 0 else "more often"
                 groups.setdefault(word, []).append(f"{design} {100 * difference.value:+.1f}" if sure else design)
         parts = [
             f"{word}{' with' if 'often' in word else ':'} **{', '.join(names)}**" for word, names in groups.items()
         ]
-        lines = [f"Against {benchmark.reference}, the {self._who} errs (percent of the images) {'; '.join(parts)}."]
-        csd = self.ranks.between.get("csd")
-        if csd is not None:
-            how = "does not predict" if not csd.low > 0 else "predicts" if csd.value >= _WELL else "predicts badly"
-            lines.append(
-                f"The color separation **{how}** with which CFA it errs least at the same distance and light (rank correlation {format_interval(csd)})."
-            )
-        return lines
+        text = (
+            f"Against {benchmark.reference}, the {READER_NAMES[reader]} errs (percent of the images) {'; '.join(parts)}"
+        )
+        csd = ranks_of(benchmark, reader).between.get("csd")
+        if csd is None:
+            return f"{text}."
+        how = "does not predict" if not csd.low > 0 else "predicts" if csd.value >= _WELL else "predicts badly"
+        return f"{text}; the color separation **{how}** with which CFA it errs least at the same distance and light (rank correlation {format_interval(csd)})."
 
     @property
     def limits(self) -> list[str]:
