@@ -31,7 +31,8 @@ study = sweep.make_study(
     cfas=["RGGB", "RYYCy"],
     vision={
         "fov_deg": 60,
-        "distances_m": [50, 100],
+        "distances_m": [75, 150],
+        "crop_px": 48,
         "levels": {
             "dusk": {"illuminance_lx": 100, "light": "LED street light", "exposure_s": 1e-4},
             "night": {"illuminance_lx": 10, "light": "sodium street light", "exposure_s": 1e-4},

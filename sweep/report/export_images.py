@@ -28,7 +28,7 @@ def export_images(
     *,
     format: Format = "arrays",  # noqa: A002  (as the option of the command)
     form: Form = "raw",
-    split: Sequence[str] = SPLITS,
+    split: Sequence[str] = (),
     design: Sequence[str] = (),
     data: Path | str | None = None,
     jobs: int | None = None,
@@ -48,7 +48,7 @@ def export_images(
     form : {'raw', 'demosaicked', 'isp'}
         Raw mosaics, every channel at every pixel, or pictures of a plain ISP.
     split : sequence of {'train', 'check', 'test'}
-        Splits.
+        Splits; all where it is empty.
     design : sequence of str
         Names of designs; all where it is empty.
     data : path-like, optional
@@ -83,7 +83,7 @@ def export_images(
                     "unknown", key=key, value=value, allowed=", ".join(known), nearest=nearest(value, known)
                 )
             )
-    files = ImageFiles(Path(images), format, form, tuple(split))
+    files = ImageFiles(Path(images), format, form, tuple(name for name in SPLITS if not split or name in split))
     output = read_output(folder)
     vision = vision_of(output)
     if files.format != "arrays":

@@ -166,8 +166,8 @@ class Lines:
         styles = styles_of(self.lines)
         x = np.concatenate([line.x for line in self.lines.values()])
         y = np.concatenate([line.y for line in self.lines.values()])
-        known = y[np.isfinite(y)]
-        low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
+        known = y[np.isfinite(y) & (y > 0)] if self.log_y else y[np.isfinite(y)]
+        low, high = (float(known.min()), float(known.max())) if known.size else (0.1 * self.log_y, 1.0)
         if self.level is not None:
             low, high = min(low, self.level[0]), max(high, self.level[0])
         if self.log_x:

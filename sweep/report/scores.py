@@ -13,7 +13,7 @@ from ..base.errors import DataError, ValidationIssue
 from ..results.atomic import atomic, write_text
 from ..results.folder import run_folder
 from ..results.output import Output, read_output
-from ..runs.read_detections import is_of_streets, read_detections
+from ..runs.read_detections import is_of_streets, read_detections, reader_name
 from ..runs.score import (
     LEARNED,
     check_unique,
@@ -58,7 +58,7 @@ def score(folder: Path | str, predictions: Sequence[Path | str], *, output: Path
         For each reader a CSV or Parquet file: image_id, and state or a probability of each. Detections in streets are
         results of COCO (.json), a folder of these or of YOLO's text files, or a table with x_px, y_px, state and score.
     output : path-like, optional
-        Folder of ``scores.parquet`` and ``scores.html``; left out, FOLDER/scores.
+        Folder of ``scores.parquet`` (heads), ``street_scores.parquet`` and ``scores.html``; left out, FOLDER/scores.
 
     Returns
     -------
@@ -82,8 +82,10 @@ def _score_readers(output: Output, predictions: Sequence[Path], to: Path) -> tup
     own = [
         network_of(images, name) for images in [unseen_images(output)] for name in LEARNED if images[name].notna().any()
     ]
-    check_unique([path.stem for path in predictions] + [reader.name for reader in own])
-    of_streets = [path for path in predictions if vision.street is not None and is_of_streets(path)]
+    check_unique([*map(reader_name, predictions), *(reader.name for reader in own)])
+    of_streets = [path for path in predictions if is_of_streets(path)]
+    if of_streets:
+        vision_with_streets(output)
     lines, sections = list[str](), list[Told]()
     if of_streets:
         tables["streets"] = _score_streets(output, of_streets)
@@ -122,7 +124,8 @@ _LIMITS = {
         "seed is scored apart; figures are means over the seeds. Intervals of 95 % are from draws of the scenes of "
         "each light level, the same for all designs: for these lamps and this detector as it was trained.",
         "A box is found that overlaps one of its state by 0.5 (AP50) or by 0.5 to 0.95 (AP); a point within a lens's "
-        "diameter. A false box counts at the distance whose boxes are nearest in size, and at all intensities.",
+        "diameter. A false box counts at the distance whose boxes are nearest in size, a false point at all, and both "
+        "at all intensities.",
     ),
     False: ("Lenses in any order, lamps that training does not show. Intervals are Student's t over the seeds.",),
 }
@@ -135,7 +138,7 @@ def _score_streets(output: Output, predictions: Sequence[Path]) -> pd.DataFrame:
         found = read_detections(path, labels, categories_of(vision), lambda cfa: shape_of(output, cfa))
         if found.empty:
             raise DataError(ValidationIssue("no detections", str(path)))
-        parts.append(street_scores(output, path.stem, found, labels))
+        parts.append(street_scores(output, reader_name(path), found, labels))
     return pd.concat(parts, ignore_index=True)
 
 

@@ -99,8 +99,10 @@ class Benchmark:
         here = self.scenes(SHUFFLED)["distance_m"].isin(distances_m).to_numpy()
         seeds = self.seeds(SHUFFLED)[here]
         own, least = (self.risk(name)[design].to_numpy()[here] for name in (reader, OBSERVER))
-        by_seed = np.array([own[seeds == seed].mean() / least[seeds == seed].mean() for seed in np.unique(seeds)])
-        return interval_of_seeds(float(own.mean() / least.mean()), by_seed)
+        parts = [np.ones(len(seeds), dtype=bool), *(seeds == seed for seed in np.unique(seeds))]
+        means = np.array([[own[part].mean(), least[part].mean()] for part in parts]).T
+        times = np.divide(means[0], means[1], out=np.full(len(parts), np.nan), where=means[1] > 0)
+        return interval_of_seeds(float(times[0]), times[1:])
 
     @lru_cache  # noqa: B019
     def seeds(self, order: str, lamps: str = UNSEEN) -> Int[IndexArray, " scenes"]:
@@ -228,13 +230,12 @@ def lessons_of(benchmark: Benchmark) -> list[Lesson]:
             by_seed = rows.pivot(index=["seed", *where], columns="name", values="risk")[benchmark.designs]
             means = [by_seed.groupby(where).mean(), *(own.droplevel("seed") for _, own in by_seed.groupby("seed"))]
             ranks = [_spearman(-csd.loc[own.index].to_numpy(), own.to_numpy()) for own in means]
-            known = np.array([np.ma.masked_invalid(own).mean() for own in ranks], dtype=float)
+            known = np.array([own[np.isfinite(own)].mean() if np.isfinite(own).any() else np.nan for own in ranks])
             if len(benchmark.designs) < _FEWEST_RANKED:
                 known = np.full_like(known, np.nan)
             sums = rows[["risk", "observer_risk"]].mul(rows["test_images"], axis=0).groupby(rows["name"]).sum()
-            times = {
-                name: float(sums.loc[name, "risk"] / sums.loc[name, "observer_risk"]) for name in benchmark.designs
-            }
+            ratios = sums["risk"] / sums["observer_risk"].where(sums["observer_risk"] > 0)
+            times = {name: float(ratios[name]) for name in benchmark.designs}
             found = interval_of_seeds(float(known[0]), known[1:]).within(-1.0, 1.0)
             lessons.append(Lesson(reader, int(images), times, found))
     return lessons

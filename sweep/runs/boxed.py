@@ -21,7 +21,10 @@ _SPLITS = {"train": "train", "check": "val", "test": "test"}
 def data_yaml(splits: Sequence[str], vision: Vision) -> str:
     """Return what YOLO is told of the images and labels beside it."""
     lines = [f"{_SPLITS[split]}: images/{split}" for split in splits]
-    lines += ["names:", *(f"  {number}: {category.name}" for number, category in enumerate(categories_of(vision)))]
+    lines += [
+        "names:",
+        *(f"  {number}: {json.dumps(category.name)}" for number, category in enumerate(categories_of(vision))),
+    ]
     return "\n".join([*lines, ""])
 
 

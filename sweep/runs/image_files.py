@@ -20,6 +20,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from ..base.cache import Cache
+from ..base.disk import read_facts
 from ..base.errors import OutputError, ValidationIssue
 from ..base.types import ChannelCurves, Parallel, Progress, delayed
 from ..camera.setup import Setup
@@ -122,8 +123,10 @@ def write_images(
     settings: dict[str, Any] = {"fingerprint": fingerprint, "format": files.format, "form": files.form}
     settings |= {"splits": [*files.splits], "designs": names}
     known = files.folder / _SETTINGS
+    if files.folder.exists() and not files.folder.is_dir():
+        raise OutputError(ValidationIssue("is no folder", str(files.folder), allowed="a new or empty folder"))
     if known.exists():
-        if json.loads(known.read_text(encoding="utf-8")) != settings:
+        if read_facts(known) != settings:
             raise OutputError(ValidationIssue("holds other images", str(files.folder), allowed="another folder"))
     elif files.folder.exists() and any(files.folder.iterdir()):
         raise OutputError(ValidationIssue("holds other files", str(files.folder), allowed="a new or empty folder"))
@@ -132,8 +135,8 @@ def write_images(
     for row, setup, curves in designs:
         for block in _blocks(row, setup, vision, files):
             blocks.append(block)
-            if not block.part(files.folder).exists():
-                calls.append(delayed(_write_block, block, setup, curves, vision, seed, files))
+            if not _is_whole(block.part(files.folder)):
+                calls.append(delayed(_write_block, block, setup, curves, vision, seed, files, fingerprint))
     for _ in run_with_progress(parallel, calls, "images written (blocks)", progress):
         pass
     streets = [block for block in blocks if block.order == STREET]
@@ -161,6 +164,15 @@ def _blocks(row: Mapping[str, Any], setup: Setup, vision: Vision, files: ImageFi
                 for order in ORDERS if split == TEST else (SHUFFLED,):
                     for start in range(0, most, TOGETHER):
                         yield _Block(row, seed, order, split, start, min(start + TOGETHER, most))
+
+
+def _is_whole(part: Path) -> bool:
+    """Return whether a block is written: its part of the manifest can be read."""
+    try:
+        pq.read_metadata(part)
+    except (OSError, pa.ArrowException):
+        return False
+    return True
 
 
 def _join(parts: Sequence[Path], schema: pa.Schema, to: Path) -> None:
@@ -211,10 +223,16 @@ _cameras: Cache[tuple[Any, ...], HeadCamera] = Cache(1)
 
 
 def _write_block(
-    block: _Block, setup: Setup, curves: ChannelCurves, vision: Vision, seed: int, files: ImageFiles
+    block: _Block,
+    setup: Setup,
+    curves: ChannelCurves,
+    vision: Vision,
+    seed: int,
+    files: ImageFiles,
+    fingerprint: str,
 ) -> int:
     """Write some images, then their part of the manifest."""
-    camera = _cameras.get((str(files.folder), block.row["design_id"]), lambda: HeadCamera(setup, curves, vision))
+    camera = _cameras.get((fingerprint, block.row["design_id"]), lambda: HeadCamera(setup, curves, vision))
     key, where = _key(block.row, block.seed), (seed, block.seed)
     lamps, some = split_lamps(setup.lights, vision, where), slice(block.start, block.stop)
     if block.order != STREET:

@@ -7,17 +7,18 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from ..base.disk import read_input
 from ..base.errors import DataError, ValidationIssue, nearest
 from ..vision.boxes import POINT, Category
-from .score import issue_of, table_of
+from .score import issue_of, numbers_of, table_of
 
 COLUMNS = ("image_id", "x_px", "y_px", "state", "score")
 _BOX = ("left", "top", "width", "height")
 _MOST_BYTES = 500_000_000
+_MOST = 1e9
+"""Of numbers in boxes and scores."""
 _FIELDS = 6
 """Of a line of YOLO: class, center and size as shares of the image, confidence."""
 Shape = tuple[int, int]
@@ -25,7 +26,12 @@ Shape = tuple[int, int]
 
 def is_of_streets(path: Path) -> bool:
     """Return whether answers are detections: a folder, COCO results, or a table with positions."""
-    return path.is_dir() or path.suffix == ".json" or "x_px" in table_of(path)
+    return path.is_dir() or path.suffix.lower() == ".json" or "x_px" in table_of(path)
+
+
+def reader_name(path: Path) -> str:
+    """Return the name of the detector of a file or folder."""
+    return path.resolve().name if path.is_dir() else path.stem
 
 
 def read_detections(
@@ -38,7 +44,7 @@ def read_detections(
     """
     if path.is_dir():
         found = _of_folder(path, labels, categories, shape)
-    elif path.suffix == ".json":
+    elif path.suffix.lower() == ".json":
         found = _of_coco(path, labels, categories)
     else:
         found = _of_table(path, labels, [category.state for category in categories if category.kind != "head"])
@@ -50,14 +56,23 @@ def _of_folder(
 ) -> pd.DataFrame:
     """Read the files of one detector, in folders at any depth: COCO results, or text of YOLO for each image."""
     results, texts = sorted(path.rglob("*.json")), sorted(path.rglob("*.txt"))
+    if results and texts:
+        raise DataError(ValidationIssue("results of COCO beside text of YOLO", str(path), allowed="one of them"))
+    of_image: dict[str, Path] = {}
     if results:
-        return pd.concat([_of_coco(file, labels, categories) for file in results], ignore_index=True)
+        parts = []
+        for file in results:
+            parts.append(_of_coco(file, labels, categories))
+            for name in parts[-1]["image_id"].unique():
+                _once(of_image, name, file)
+        return pd.concat(parts, ignore_index=True)
     if not texts:
         raise DataError(ValidationIssue("no detections", str(path), allowed="*.json of COCO, or *.txt of YOLO"))
     rows, cfas = list[tuple[Any, ...]](), dict(zip(labels["image_id"], labels["cfa"], strict=True))
     for file in texts:
         if file.stem not in cfas:
             raise DataError(_of_other_image(file, None, file.stem, labels))
+        _once(of_image, file.stem, file)
         high, wide = shape(cfas[file.stem])
         for at, line in enumerate(_text(file).splitlines(), 1):
             fields = line.split()
@@ -66,6 +81,12 @@ def _of_folder(
                 box = (x - width / 2) * wide, (y - height / 2) * high, width * wide, height * high
                 rows.append((file.stem, *categories[number], *box, score))
     return _frame(rows)
+
+
+def _once(of_image: dict[str, Path], name: str, file: Path) -> None:
+    """Refuse an image in two files, such as those of two runs of a detector."""
+    if (other := of_image.setdefault(name, file)) != file:
+        raise DataError(ValidationIssue(f"an image stands in {other}, too", str(file), value=name))
 
 
 def _of_yolo(
@@ -81,7 +102,7 @@ def _of_yolo(
         raise DataError(ValidationIssue("no number", str(file), line, None, " ".join(fields))) from None
     if not 0 <= number < n_categories:
         raise DataError(ValidationIssue("no class", str(file), line, None, number, f"0 to {n_categories - 1}"))
-    if not (np.isfinite([x, y, score]).all() and 0 <= width <= 1 and 0 <= height <= 1):
+    if not (max(abs(x), abs(y), abs(score)) < _MOST and 0 <= width <= 1 and 0 <= height <= 1):
         problem, allowed = "no box", "shares of the width and height of the image, from 0 to 1"
         raise DataError(ValidationIssue(problem, str(file), line, None, " ".join(fields[1:]), allowed))
     return number, x, y, width, height, score
@@ -104,14 +125,15 @@ def _of_coco(path: Path, labels: pd.DataFrame, categories: Sequence[Category]) -
         one = entry if isinstance(entry, Mapping) else {}
         image, number, box, score = (one.get(name) for name in ("image_id", "category_id", "bbox", "score"))
         missing = [name for name in ("image_id", "category_id", "bbox", "score") if name not in one]
-        name = known.get(image if isinstance(image, int) else Path(str(image)).stem)
+        is_number = isinstance(image, int) and not isinstance(image, bool)
+        name = known.get(image if is_number else Path(str(image)).stem)
         if missing:
             fault = ValidationIssue(
                 "a key is missing", str(path), None, key, missing[0], "image_id, category_id, bbox, score"
             )
         elif name is None:
             fault = _of_other_image(path, f"{key}.image_id", image, labels)
-        elif not (isinstance(number, int) and 1 <= number <= len(categories)):
+        elif isinstance(number, bool) or not (isinstance(number, int) and 1 <= number <= len(categories)):
             allowed = ", ".join(f"{i} ({category.name})" for i, category in enumerate(categories, 1))
             fault = ValidationIssue("no category", str(path), None, f"{key}.category_id", number, allowed)
         elif not _is_box(box):
@@ -126,7 +148,7 @@ def _of_coco(path: Path, labels: pd.DataFrame, categories: Sequence[Category]) -
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and bool(np.isfinite(value))
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < _MOST
 
 
 def _is_box(value: object) -> bool:
@@ -165,9 +187,9 @@ def _of_table(path: Path, labels: pd.DataFrame, lenses: Sequence[str]) -> pd.Dat
     if len(unknown):
         near = nearest(unknown.iloc[0], lenses)
         issues.append(issue_of("no signal type", path, unknown, "state", ", ".join(lenses), near))
-    numbers = {name: pd.to_numeric(table[name], errors="coerce") for name in ("x_px", "y_px", "score")}
+    numbers = {name: numbers_of(table[name]) for name in ("x_px", "y_px", "score")}
     for name, values in numbers.items():
-        wrong = table[name][~np.isfinite(values)].astype(str)
+        wrong = table[name][~(values.abs() < _MOST)].astype(str)
         if len(wrong):
             issues.append(issue_of("no number", path, wrong, name, "a number"))
     if issues:

@@ -90,6 +90,14 @@ def network_of(images: pd.DataFrame, name: str) -> Reader:
 
 def table_of(path: Path) -> pd.DataFrame:
     """Return a CSV or Parquet file as a table, its rows counted from 0. Raises DataError if it cannot be read."""
+    table = _table(path)
+    if table.columns.has_duplicates:
+        twice = table.columns[table.columns.duplicated()][0]
+        raise DataError(ValidationIssue("two columns of one name", str(path), value=twice))
+    return table
+
+
+def _table(path: Path) -> pd.DataFrame:
     content = read_input(path, _MOST_BYTES, DataError)
     try:
         if path.suffix == ".parquet":
@@ -149,7 +157,7 @@ def reader_of(table: pd.DataFrame, path: Path, images: pd.DataFrame, states: Seq
             allowed, near = ", ".join([*states, UNKNOWN]), nearest(other.iloc[0], [*states, UNKNOWN])
             issues.append(issue_of("no state", path, other, _STATE, allowed, near))
     else:
-        probabilities = table[list(states)].apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
+        probabilities = table[list(states)].apply(numbers_of).to_numpy(dtype=float)
         known = (np.abs(probabilities.sum(axis=1) - 1) <= _SUM) & (probabilities >= 0).all(axis=1)
         shown = pd.Series([", ".join(f"{p:g}" for p in row) for row in probabilities[~known]], table.index[~known])
         if len(shown):
@@ -171,6 +179,14 @@ def _id_issues(path: Path, ids: pd.Series[str], known: pd.Series[str]) -> Iterat
     if len(absent):
         problem, allowed = f"{len(absent):,} images of the test have no answer", f"all {len(known):,}, or `{UNKNOWN}`"
         yield ValidationIssue(problem, str(path), None, _ID, absent.iloc[0], allowed)
+
+
+def numbers_of(values: pd.Series[Any]) -> pd.Series[float]:
+    """Return values as numbers; NaN for what is none."""
+    try:
+        return pd.to_numeric(values, errors="coerce").astype(float)
+    except (OverflowError, TypeError, ValueError):  # an integer of hundreds of digits; a date
+        return pd.Series(np.nan, index=values.index)
 
 
 def issue_of(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..base.errors import SweepError, ValidationIssue
+from ..base.errors import DataError, SweepError, ValidationIssue
 from ..results.output import Output
 from ..results.tables import VISION
 from ..vision.boxes import HEAD, POINT, targets_of
@@ -58,13 +58,13 @@ def street_scores(output: Output, reader: str, detections: pd.DataFrame, labels:
     Designs without a detection are left out; the others are compared with the first of them.
     """
     vision = vision_with_streets(output)
-    names = [str(name) for name in labels["name"].unique() if (detections["name"] == name).any()]
     judges: dict[str, dict[str, list[Judge]]] = {}
+    names = {str(kind): _answered(reader, own, labels) for kind, own in detections.groupby("kind", sort=False)}
     # All designs show the same scenes: of one seed they are drawn alike.
     for number, of_seed in labels.groupby("seed"):
-        levels = of_seed[of_seed["name"] == names[0]].sort_values("image")["level"].to_numpy() if names else np.empty(0)
+        levels = of_seed.drop_duplicates("image").sort_values("image")["level"].to_numpy()
         draws = draws_of(levels, (output.study.seed, _KEY_OF_DRAWS, *of_seed["seed"].head(1)))
-        for kind, name in product(detections["kind"].unique(), names):
+        for kind, name in ((kind, name) for kind, own in names.items() for name in own):
             images = of_seed[of_seed["name"] == name]
             targets = targets_of(images, kind, shape_of(output, images["cfa"].iloc[0]))
             own = detections["seed"].eq(number) & detections["name"].eq(name) & detections["kind"].eq(kind)
@@ -73,12 +73,23 @@ def street_scores(output: Output, reader: str, detections: pd.DataFrame, labels:
     tables = []
     for kind, by_name in judges.items():
         for of in _subsets(vision, kind):
-            rows = pd.DataFrame(scores_of_draws(by_name, of, names[0]))
+            rows = pd.DataFrame(scores_of_draws(by_name, of, names[kind][0]))
             where = {key: f"{value:g}" if isinstance(value, float) else value for key, value in of._asdict().items()}
             tables.append(rows.assign(reader=reader, kind=kind, **where))
     first = ["reader", "kind", *Subset._fields]
     scores = pd.concat(tables, ignore_index=True)
     return scores[[*first, *(name for name in scores.columns if name not in first)]]
+
+
+def _answered(reader: str, detections: pd.DataFrame, labels: pd.DataFrame) -> list[str]:
+    """Return the designs that a detector has answered, in all seeds; raises DataError where it has not."""
+    seeds = labels["seed"].nunique()
+    counts = detections.groupby("name")["seed"].nunique()
+    for name, count in counts.items():
+        if count < seeds:
+            problem = f"no detections of {name} in {seeds - count} of {seeds} seeds"
+            raise DataError(ValidationIssue(problem, reader, allowed="answers to all streets of the test"))
+    return [str(name) for name in labels["name"].unique() if name in counts]
 
 
 def _states(vision: Vision, kind: str) -> Sequence[str]:
@@ -106,6 +117,8 @@ def found_sentence(scores: pd.DataFrame, lens: str, better: str) -> str:
     at = scores[(scores["state"] == lens) & (scores["distance_m"] != ALL)]
     first = at[at["name"] == at["name"].iloc[0]]
     # Where neither finds all or nothing.
+    if not first["found"].notna().any():
+        return f"No {lens} lamp is shown."
     distance = first.loc[(first["found"] - 0.8).abs().idxmin(), "distance_m"]
     here = at[at["distance_m"] == distance].set_index("name")
     name, other = str(first["name"].iloc[0]), here.loc[better]

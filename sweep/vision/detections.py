@@ -118,14 +118,26 @@ class Judge:
     def precisions(self, of: Subset) -> tuple[Float[Array, "draws thresholds"], Float[Array, "draws thresholds"]]:
         """Return average precision and largest recall, mean over the states that have targets."""
         precisions, recalls = [], []
-        for own in (matched for state, matched in self.by_state.items() if of.state in (ALL, state)):
+        for state in (state for state in self.by_state if of.state in (ALL, state)):
+            precision, recall = self._precisions(of._replace(state=state))
+            precisions.append(precision)
+            recalls.append(recall)
+        return _mean(precisions), _mean(recalls)
+
+    def _precisions(self, of: Subset) -> tuple[Float[Array, "draws thresholds"], Float[Array, "draws thresholds"]]:
+        """Return average precision and largest recall of one state, each computed once."""
+        if of not in self._known:
+            own = self.by_state[of.state]
             counts, hits = _counted(own, of, self.levels)
             total = self.weights[:, own.targets["image"].to_numpy(dtype=np.intp)[counts]].sum(axis=1)
             precision, recall = (np.empty((len(self.weights), len(hits))) for _ in range(2))
             average_precisions(hits, own.image, self.weights, total, _RECALLS, precision, recall)
-            precisions.append(precision)
-            recalls.append(recall)
-        return _mean(precisions), _mean(recalls)
+            self._known[of] = precision, recall
+        return self._known[of]
+
+    @cached_property
+    def _known(self) -> dict[Subset, tuple[FloatArray, FloatArray]]:
+        return {}
 
     @cached_property
     def _scores(self) -> Float[Array, "numbers draws"]:

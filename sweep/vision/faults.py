@@ -17,6 +17,7 @@ from ..spectra.color import luminance_per_photon_radiance
 from ..spectra.lights import Lights
 from ..spectra.spectrum import WavelengthGrid
 from .crops import reach_px
+from .head import head_places_px, housing_diameters
 from .section import (
     FEWEST_LAMPS,
     MOST_BITS,
@@ -54,10 +55,19 @@ def vision_faults(
             problem = f"a lamp of type {lens} is not visible, and has no luminous intensity"
             yield Fault(("vision", "lenses"), problem, lens, "lamps that the eye sees")
     for name, mosaic in mosaics.items():
-        if any(vision.crop_px % size for size in mosaic.indices.shape):
-            rows, columns = mosaic.indices.shape
-            problem = f"the tile of {name} ({rows} x {columns}) does not divide the images"
+        rows, columns = mosaic.indices.shape
+        if any(vision.crop_px % size or vision.crop_px < 2 * size for size in (rows, columns)):
+            problem = f"the tile of {name} ({rows} x {columns}) does not divide the images, twice at least"
             yield Fault(("vision", "crop_px"), problem, vision.crop_px, "a multiple of every tile")
+            return
+        if vision.street is not None:
+            nearest_m = min(vision.distances_m)
+            high_px = vision.target(nearest_m).object_resolution_px * housing_diameters(vision)[1]
+            y_px = head_places_px(vision, mosaic)[:, 1]
+            if y_px.min() - high_px / 2 < -0.5 or y_px.max() + high_px / 2 > vision.crop_px - 0.5:
+                problem = f"a head of {high_px:.1f} px at {nearest_m:g} m does not fit, of which a street has boxes"
+                yield Fault(("vision", "crop_px"), problem, vision.crop_px, "larger images, or heads farther away")
+                return
     if vision.street is not None:
         shapes = {name: street_shape(vision, mosaic.indices.shape) for name, mosaic in mosaics.items()}
         name, (rows, columns) = max(shapes.items(), key=lambda item: item[1][0] * item[1][1])

@@ -40,7 +40,7 @@ _Weights = dict[str, Any]
 class Examples(NamedTuple):
     """Images of all distances of one level, for some steps.
 
-    `known`: zeros and ones of background and order; `state`: empty where nothing is learned.
+    `known`: zeros and ones of background and order.
     """
 
     crops: Float[Array, "steps distances images inputs"] | NDArray[np.float32]

@@ -19,6 +19,7 @@ from .crops import Crops, Float32, Heads, Seen
 from .scenes import PHANTOM_SHARE, orders_of_lenses
 
 _VALUES_AT_ONCE = 3_000_000
+_READ_AT_ONCE = 256
 _SPREAD = 0.1
 """Share of the images by which the spread along lamps is learned."""
 _PRIOR_IMAGES = 5.0
@@ -99,9 +100,12 @@ class Prototypes:
         logs = np.empty((len(seen.crops), self._states))
         for (distance, level), where in seen.conditions():
             for background in np.unique(seen.background[where]):
-                here = where[seen.background[where] == background]
-                learned = self._learned[distance, level, int(background)]
-                logs[here] = _log_probabilities(learned, seen.crops[here], seen.fixed, self._states)
+                own, learned = (
+                    where[seen.background[where] == background],
+                    self._learned[distance, level, int(background)],
+                )
+                for here in np.split(own, np.arange(_READ_AT_ONCE, own.size, _READ_AT_ONCE)):
+                    logs[here] = _log_probabilities(learned, seen.crops[here], seen.fixed, self._states)
         return logs
 
 

@@ -16,6 +16,7 @@ Material = Literal["foliage", "sky", "gray", "dark gray", "black", "white", "can
 _Intensity = Annotated[float, Field(ge=1e-3, le=1e6)]
 _Text = Annotated[str, Field(min_length=1, max_length=100)]
 MOST_IMAGES, MOST_LEARNED = 100_000, 100_000_000
+_RESERVED = ("all", "off", "unknown")
 FEWEST_LAMPS = 3
 """Fewest lamps of each lens: one to train, one to check, one to test."""
 MOST_BITS, MOST_WELL_E, MOST_READ_NOISE_DN = 12, 30_000.0, 100.0
@@ -124,6 +125,10 @@ class Vision(Section):
 
     @model_validator(mode="after")
     def _fits(self) -> Vision:
+        for key, names in (("lenses", self.lenses), ("levels", self.levels)):
+            for name in names:
+                if name in _RESERVED:
+                    raise ValueError(f"{key}: {name!r} means something else; another name")
         if self.crop_px % 2:
             raise ValueError(f"crop_px {self.crop_px} must be even")
         for name in ("lenses", "distances_m", "intensities_cd", "backgrounds"):

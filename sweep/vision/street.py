@@ -28,6 +28,7 @@ _JITTER_PX = 12
 _BRAKE_CD, _STREET_CD = (60.0, 260.0), (500.0, 5000.0)
 _KEY_OF_STREET = 20
 _AT_ONCE_PIXELS, _MOST_AT_ONCE = 2**20, 32
+_IDS_OF_SPLIT = 10**12
 MOST_ROWS, MOST_COLUMNS = 1208, 1920
 """Largest street, pixels: a crop of the sensor."""
 _BRAKE_GROUP = "brake red"
@@ -228,7 +229,7 @@ def street_labels(
 ) -> pd.DataFrame:
     """Return the labels of streets, or of some.
 
-    Returns a row per image, lists with an entry for each head; `coco_id` is a number of the image within its split.
+    Returns a row per image, lists with an entry for each head; `coco_id` is a number of the image.
     """
     assert vision.street is not None
     numbers, count = np.arange(len(scenes))[some], len(scenes)
@@ -244,7 +245,8 @@ def street_labels(
     wide, high = housing_diameters(vision)
     ids = [image_id(key["design_id"], key["seed"], STREET, split, int(number)) for number in numbers]
     where = {"image_id": ids, **key, "order": STREET, "split": split, "image": numbers}
-    where["coco_id"] = (key["design_id"] * vision.seeds + key["seed"]) * count + numbers + 1
+    before = (key["design_id"] * vision.seeds + key["seed"]) * count
+    where["coco_id"] = (TEST, CHECK, TRAIN).index(split) * _IDS_OF_SPLIT + before + numbers + 1
     return pd.DataFrame(where).assign(
         background=np.array(vision.backgrounds, dtype=object)[scenes.background],
         level=np.array(list(vision.levels), dtype=object)[scenes.level],

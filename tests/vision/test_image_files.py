@@ -34,7 +34,7 @@ pixel: {read_noise_e: 2, offset_dn: 168, prnu: 0.01}
 cfas: [RGGB, RYYCy]
 vision:
   fov_deg: 120
-  distances_m: [40, 100]
+  distances_m: [80, 100]
   intensities_cd: [200]
   levels:
     day: {illuminance_lx: 40000, exposure_s: 5.0e-5}
@@ -111,7 +111,7 @@ def test_the_observer_s_own_answers_are_scored(run: Path, tmp_path: Path) -> Non
     assert out.splitlines()[0].startswith("ideal, RGGB: errs on")
     assert "+0.0 points (+0.0 to +0.0) against the ideal observer" in out
     scores = pd.read_parquet(tmp_path / "scores" / "scores.parquet")
-    assert set(scores["distance_m"]) == {"all", "40.0", "100.0"}
+    assert set(scores["distance_m"]) == {"all", "80.0", "100.0"}
     assert "<table" in (tmp_path / "scores" / "scores.html").read_text()
 
 
@@ -172,7 +172,7 @@ def annotated(folder: Path) -> dict[str, Any]:
 
 
 def test_boxes_hold_the_lamps(pictures: Path) -> None:
-    """At night a lit lens is the brightest in its box, by its color; a head has the state of its lamp."""
+    """By day a red lens is red where its box is; a head has the state of its lamp."""
     held, streets = annotated(pictures / "0-RGGB"), pd.read_parquet(pictures / "street.parquet")
     names = {one["id"]: one["name"] for one in held["categories"]}
     assert list(names.values()) == ["off head", "red head", "yellow head", "green head", *LAMPS]
@@ -185,7 +185,7 @@ def test_boxes_hold_the_lamps(pictures: Path) -> None:
     levels = streets.set_index("image_id")["level"]
     for one in lamps:
         name, (left, top, width, height) = files[one["image_id"]], one["bbox"]
-        if levels[Path(name).stem] == "night" and names[one["category_id"]] == "red lamp" and width > 4:
+        if levels[Path(name).stem] == "day" and names[one["category_id"]] == "red lamp" and width > 4:
             with Image.open(pictures / "0-RGGB" / "images" / "test" / name) as picture:
                 assert (picture.mode, picture.size) == ("RGB", (108, 72))
                 y, x = round(top + height / 2 - 0.5), round(left + width / 2 - 0.5)
@@ -206,7 +206,7 @@ def test_perfect_boxes_come_back(run: Path, pictures: Path, tmp_path: Path) -> N
     code, _, err = commanded("export", run, "--images", yolo, "--format", "yolo", "--design", "RYYCy", "--jobs", 1)
     assert code == 0, err
     told = (yolo / "1-RYYCy" / "data.yaml").read_text().splitlines()
-    assert told[:5] == ["train: images/train", "val: images/check", "test: images/test", "names:", "  0: off head"]
+    assert told[:5] == ["train: images/train", "val: images/check", "test: images/test", "names:", '  0: "off head"']
     for file in (yolo / "1-RYYCy" / "labels" / "test").glob("*.txt"):
         with_scores = "".join(f"{line} 0.5\n" for line in file.read_text().splitlines())
         (tmp_path / "texts" / "RYYCy").mkdir(parents=True, exist_ok=True)
@@ -230,7 +230,7 @@ def test_perfect_boxes_come_back(run: Path, pictures: Path, tmp_path: Path) -> N
     table = pd.read_parquet(tmp_path / "scores" / "street_scores.parquet")
     scores = table[["ap50", "ap", "recall", "found"]].to_numpy()
     np.testing.assert_allclose(scores[np.isfinite(scores)], 1.0)
-    assert set(table["distance_m"]) == {"all", "40", "100"}
+    assert set(table["distance_m"]) == {"all", "80", "100"}
     page = (tmp_path / "scores" / "scores.html").read_text()
     assert "% of red heads at" in page
     assert "street&#39;s order" in page or "street's order" in page

@@ -246,7 +246,7 @@ def test_invalid_vision_section_is_refused(tmp_path: Path) -> None:
     odd = "cfas: {RGGB: , RYNCy: , wide: {tile: [[R, G, B, R, G]]}}"
     text = BASE.replace("cfas: [RGGB, RYNCy]", odd)
     (found,) = issues(tmp_path, f"{text}{requested.replace('yelow', 'yellow')}}}\n")
-    assert "the tile of wide (1 x 5) does not divide the images" in found
+    assert "the tile of wide (1 x 5) does not divide the images, twice at least" in found
     (found,) = issues(tmp_path, f"{BASE}pixel: {{bits: 14}}\n{requested.replace('yelow', 'yellow')}}}\n")
     assert "pixel.bits" in found
     assert "at most 12" in found
@@ -257,8 +257,13 @@ def test_invalid_vision_section_is_refused(tmp_path: Path) -> None:
     assert "prototypes: false" in found
     load(tmp_path, f"{BASE}{many}, prototypes: false}}\n")
     wide = "street: {columns: 60, rows: 3}"
-    (found,) = issues(tmp_path, f"{BASE}{requested.replace('yelow', 'yellow')}, {wide}}}\n")
+    far = requested.replace("yelow", "yellow").replace("[100]", "[300]")
+    (found,) = issues(tmp_path, f"{BASE}{far}, {wide}}}\n")
     assert "streets of 2160 x 108 pixels (CFA RGGB)" in found
+    (found,) = issues(tmp_path, f"{BASE}{far.replace('[300]', '[50]')}, street: {{}}}}\n")
+    assert "a head of 67.5 px at 50 m does not fit, of which a street has boxes (got 24)" in found
+    (found,) = issues(tmp_path, f"{BASE}{far.replace('day', 'all')}}}\n")
+    assert "levels: 'all' means something else" in found
 
 
 @pytest.mark.slow

@@ -121,7 +121,7 @@ def export(
                 images,
                 format=format_.value,
                 form=form.value,
-                split=[name.value for name in split or ImageSplit],
+                split=[name.value for name in split or ()],
                 design=design or (),
                 data=data,
                 jobs=jobs,

@@ -86,6 +86,9 @@ class Vision(Section):
         parts = [
             f"{word}{' with' if 'often' in word else ':'} **{', '.join(names)}**" for word, names in groups.items()
         ]
+        if not groups:
+            error = format_percent(benchmark.error(benchmark.reference, reader, SHUFFLED))
+            return f"With {benchmark.reference}, the {READER_NAMES[reader]} errs on {error} % of the images."
         text = (
             f"Against {benchmark.reference}, the {READER_NAMES[reader]} errs (percent of the images) {'; '.join(parts)}"
         )
@@ -100,10 +103,11 @@ class Vision(Section):
         """Errors of all readers, predictors, streets."""
         benchmark, lines = self.benchmark, list[str]()
         for reader in benchmark.learners:
-            errors = [
-                f"{design} {100 * benchmark.error(design, reader, SHUFFLED).value:.1f} ({benchmark.times_observer(design, reader, benchmark.vision.distances_m).value:.2f})"
-                for design in benchmark.designs
-            ]
+            errors = []
+            for design in benchmark.designs:
+                times = benchmark.times_observer(design, reader, benchmark.vision.distances_m).value
+                more = f" ({times:.2f})" if np.isfinite(times) else ""
+                errors.append(f"{design} {100 * benchmark.error(design, reader, SHUFFLED).value:.1f}{more}")
             lines.append(
                 f"Percent read wrongly by the {READER_NAMES[reader]}, and times the ideal observer's (unseen lamps, lenses in any order): {', '.join(errors)}."
             )
@@ -187,7 +191,10 @@ class Lessons(Section):
         lines = []
         for reader in self.benchmark.learners:
             own = [lesson for lesson in self.lessons if lesson.reader == reader]
-            first, last = (sorted(lesson.times.values()) for lesson in (own[0], own[-1]))
+            first, last = (sorted(t for t in lesson.times.values() if np.isfinite(t)) for lesson in (own[0], own[-1]))
+            if not last:
+                lines.append("The ideal observer reads all of these images rightly.")
+                continue
             lines.append(
                 f"The {READER_NAMES[reader]} errs {last[0]:.2f} to {last[-1]:.2f} times as often as the ideal observer after {own[-1].images:,} images ({first[0]:.2f} to {first[-1]:.2f} after {own[0].images:,})."
             )
