@@ -43,6 +43,7 @@ from .leaders import answering, label
 from .page import page_of
 from .panels import Line, Lines, Picture
 from .section import Told, table_of
+from .vision import camera_of
 
 PAGE, TABLE, STREETS = "scores.html", "scores.parquet", "street_scores.parquet"
 
@@ -111,7 +112,7 @@ def _score_readers(output: Output, predictions: Sequence[Path], to: Path) -> tup
         replace(lead, sentences=()),
         further,
         kind="scores of readers",
-        limits=_LIMITS[bool(of_streets)],
+        limits=[*_LIMITS[bool(of_streets)], camera_of(vision)],
         files=[files[name] for name in tables],
     )
     write_text(text, to / PAGE)

@@ -22,6 +22,7 @@ from ..vision import (
     Lesson,
     Ranks,
     benchmark_of,
+    camera_of,
     format_interval,
     format_percent,
     lessons_of,
@@ -30,8 +31,6 @@ from ..vision import (
 from ..words import joined
 
 _MOST_LEVELS = 3
-_WELL = 0.5
-"""A rank correlation from which on something is said to predict well."""
 
 
 @dataclass(frozen=True)
@@ -73,35 +72,36 @@ class Vision(Section):
     @property
     def answer(self) -> list[str]:
         """Who errs less than with the reference, and whether the separation predicts it, for each reader that learns."""
-        return [self._compared(reader) for reader in self.benchmark.learners or [OBSERVER]]
+        benchmark, readers = self.benchmark, self.benchmark.learners or [OBSERVER]
+        if len(benchmark.designs) == 1:
+            error = format_percent(benchmark.error(benchmark.reference, readers[0], SHUFFLED))
+            return [f"With {benchmark.reference}, the {READER_NAMES[readers[0]]} errs on {error} % of the images."]
+        found = "; ".join(f"the {READER_NAMES[reader]} {self._compared(reader)}" for reader in readers)
+        lines = [f"Against {benchmark.reference} (percent of the images), {found}."]
+        ranks = {reader: ranks_of(benchmark, reader).between.get("csd") for reader in readers}
+        told = [format_interval(csd) for csd in ranks.values() if csd]
+        if told:
+            lines.append(
+                f"Rank correlation of the color separation with their errors at one distance and light: **{' and '.join(told)}**."
+            )
+        return lines
 
     def _compared(self, reader: str) -> str:
-        benchmark, groups = self.benchmark, dict[str, list[str]]()
-        for design in benchmark.designs:
-            if design != benchmark.reference:
-                difference = benchmark.difference(design, SHUFFLED, reader)
+        groups = dict[str, list[str]]()
+        for design in self.benchmark.designs:
+            if design != self.benchmark.reference:
+                difference = self.benchmark.difference(design, SHUFFLED, reader)
                 sure = difference.excludes_zero
-                word = "not separated from it" if not sure else "less often" if difference.value < 0 else "more often"
+                word = "not separated" if not sure else "errs less often" if difference.value < 0 else "errs more often"
                 groups.setdefault(word, []).append(f"{design} {100 * difference.value:+.1f}" if sure else design)
-        parts = [
+        return ", ".join(
             f"{word}{' with' if 'often' in word else ':'} **{', '.join(names)}**" for word, names in groups.items()
-        ]
-        if not groups:
-            error = format_percent(benchmark.error(benchmark.reference, reader, SHUFFLED))
-            return f"With {benchmark.reference}, the {READER_NAMES[reader]} errs on {error} % of the images."
-        text = (
-            f"Against {benchmark.reference}, the {READER_NAMES[reader]} errs (percent of the images) {'; '.join(parts)}"
         )
-        csd = ranks_of(benchmark, reader).between.get("csd")
-        if csd is None:
-            return f"{text}."
-        how = "does not predict" if not csd.low > 0 else "predicts" if csd.value >= _WELL else "predicts badly"
-        return f"{text}; the color separation **{how}** with which CFA it errs least at the same distance and light (rank correlation {format_interval(csd)})."
 
     @property
     def limits(self) -> list[str]:
         """Errors of all readers, predictors, streets."""
-        benchmark, lines = self.benchmark, list[str]()
+        benchmark, lines = self.benchmark, [camera_of(self.benchmark.vision)]
         for reader in benchmark.learners:
             errors = []
             for design in benchmark.designs:
@@ -165,7 +165,7 @@ class Vision(Section):
             (
                 "wrong / %",
                 *(READER_NAMES[reader] for reader in self.benchmark.readers),
-                f"less that of {self.benchmark.reference}",
+                f"{self._who}, less that of {self.benchmark.reference}",
             ),
             tuple(rows),
         )
@@ -187,7 +187,7 @@ class Lessons(Section):
 
     @property
     def answer(self) -> list[str]:
-        """How near the bound readers come, and what that means for the separation."""
+        """How near the bound readers come, and what the separation predicts on the way."""
         lines = []
         for reader in self.benchmark.learners:
             own = [lesson for lesson in self.lessons if lesson.reader == reader]
@@ -195,10 +195,19 @@ class Lessons(Section):
             if not last:
                 lines.append("The ideal observer reads all of these images rightly.")
                 continue
-            lines.append(
-                f"The {READER_NAMES[reader]} errs {last[0]:.2f} to {last[-1]:.2f} times as often as the ideal observer after {own[-1].images:,} images ({first[0]:.2f} to {first[-1]:.2f} after {own[0].images:,})."
-            )
+            text = f"The {READER_NAMES[reader]} errs {last[0]:.2f} to {last[-1]:.2f} times as often as the ideal observer after {own[-1].images:,} images ({first[0]:.2f} to {first[-1]:.2f} after {own[0].images:,})"
+            if np.isfinite(own[-1].csd.value):
+                text += f"; the rank correlation of the color separation with its errors goes from {own[0].csd.value:.2f} to {own[-1].csd.value:.2f}"
+            lines.append(f"{text}.")
+        ideal = ranks_of(self.benchmark, OBSERVER).between.get("csd")
+        if ideal is not None:
+            lines.append(f"With those of the ideal observer it is {format_interval(ideal)}.")
         return lines
+
+    @property
+    def short(self) -> str:
+        """All of it."""
+        return " ".join(self.answer)
 
     @property
     def picture(self) -> Picture | None:
@@ -206,14 +215,14 @@ class Lessons(Section):
         panels = []
         for reader in self.benchmark.learners:
             own = [lesson for lesson in self.lessons if lesson.reader == reader]
-            images = np.array([float(lesson.images) for lesson in own])
+            images = np.array([lesson.images / 1000 for lesson in own])
             lines = {
                 name: Line(images, np.array([lesson.times[name] for lesson in own])) for name in self.benchmark.designs
             }
             panels.append(
                 Lines(
                     f"{READER_NAMES[reader]}: times the observer's error",
-                    "images",
+                    "images / 1,000",
                     lines,
                     log_x=True,
                     log_y=True,
@@ -226,20 +235,3 @@ class Lessons(Section):
             "Each reader is trained anew for each number of images; each image is seen once.",
             columns=2,
         )
-
-    @property
-    def table(self) -> Table | None:
-        """What the separation predicts of readers that are nearer to the bound."""
-        rows = [
-            (
-                READER_NAMES[lesson.reader],
-                f"{lesson.images:,}",
-                f"{np.mean(list(lesson.times.values())):.2f}",
-                format_interval(lesson.csd),
-            )
-            for lesson in self.lessons
-        ]
-        ideal = ranks_of(self.benchmark, OBSERVER).between.get("csd")
-        if ideal is not None:
-            rows.append((READER_NAMES[OBSERVER], "", "1.00", format_interval(ideal)))
-        return Table(("reader", "images", "times the observer's error, mean", "rank correlation with CSD"), tuple(rows))
