@@ -50,6 +50,7 @@ vision:
   levels: {day: {illuminance_lx: 40000, exposure_s: 2.0e-5, phantom_cd: 50}}
   crop_px: 16
   places_per_pixel: 1
+  prototypes: false
   network: false
   seeds: 2
   train_images: 50
