@@ -53,7 +53,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (base / "smoke.yaml").write_text(STUDY)
     done = sweep("run", str(base / "smoke.yaml"), "--output", str(base), "--jobs", "1")
     assert done.returncode == 0, done.stderr
-    assert "rank correlation" in " ".join(done.stdout.split())
+    assert "Rank correlation" in " ".join(done.stdout.split())
     return base / "smoke"
 
 

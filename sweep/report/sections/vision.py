@@ -92,11 +92,15 @@ class Vision(Section):
             if design != self.benchmark.reference:
                 difference = self.benchmark.difference(design, SHUFFLED, reader)
                 sure = difference.excludes_zero
-                word = "not separated" if not sure else "errs less often" if difference.value < 0 else "errs more often"
+                word = (
+                    "shows no difference"
+                    if not sure
+                    else "errs less often"
+                    if difference.value < 0
+                    else "errs more often"
+                )
                 groups.setdefault(word, []).append(f"{design} {100 * difference.value:+.1f}" if sure else design)
-        return ", ".join(
-            f"{word}{' with' if 'often' in word else ':'} **{', '.join(names)}**" for word, names in groups.items()
-        )
+        return ", ".join(f"{word} with **{', '.join(names)}**" for word, names in groups.items())
 
     @property
     def limits(self) -> list[str]:
