@@ -29,11 +29,11 @@ from ..runs.score import (
 from ..runs.score_streets import (
     found_sentence,
     labels_of_test,
+    of_all_targets,
     shape_of,
     street_lines,
     street_scores,
     vision_with_streets,
-    whole,
 )
 from ..vision.boxes import categories_of
 from ..vision.detections import ALL, FALSE_PER_IMAGE
@@ -112,7 +112,7 @@ def _score_readers(output: Output, predictions: Sequence[Path], to: Path) -> tup
         replace(lead, sentences=()),
         further,
         kind="scores of readers",
-        limits=[*_LIMITS[bool(of_streets)], camera_of(vision)],
+        limits=[*(line for name in tables for line in _LIMITS[name]), _CHOSEN, camera_of(vision)],
         files=[files[name] for name in tables],
     )
     write_text(text, to / PAGE)
@@ -120,7 +120,7 @@ def _score_readers(output: Output, predictions: Sequence[Path], to: Path) -> tup
 
 
 _LIMITS = {
-    True: (
+    "streets": (
         "Streets: lenses stand in the street's order; images of the test, of lamps that training does not show. Each "
         "seed is scored apart; figures are means over the seeds. Intervals of 95 % are from draws of the scenes of "
         "each light level, the same for all designs: for these lamps and this detector as it was trained.",
@@ -128,8 +128,12 @@ _LIMITS = {
         "diameter. A false box counts at the distance whose boxes are nearest in size, a false point at all, and both "
         "at all intensities.",
     ),
-    False: ("Lenses in any order, lamps that training does not show. Intervals are Student's t over the seeds.",),
+    "images": ("Heads: lamps that training does not show. Intervals are Student's t over the seeds.",),
 }
+_CHOSEN = (
+    "The design named beside the first is the run's answer, or without an answer the best one of these images, which "
+    "chance favors; of heads it is always the latter."
+)
 
 
 def _score_streets(output: Output, predictions: Sequence[Path]) -> pd.DataFrame:
@@ -148,14 +152,14 @@ def _of_streets(output: Output, scores: pd.DataFrame) -> Iterator[Told]:
     lenses, best = vision_with_streets(output).lenses, answering(output)
     lens = "red" if "red" in lenses else lenses[0]
     for (reader, kind), rows in scores.groupby(["reader", "kind"], sort=False):
-        totals = whole(rows)
+        totals = of_all_targets(rows)
         names = list(totals["name"])
         hero = "" if best is None else label(best)
         if hero not in names[1:]:
             hero = str(totals["name"].iloc[int(totals["ap50"].to_numpy().argmax())])
         at = rows[(rows["state"] == lens) & (rows["distance_m"] != ALL)]
         lines = {
-            str(name): Line(own["distance_m"].to_numpy(dtype=float), *(100 * own[c].to_numpy() for c in ("found",)))
+            str(name): Line(own["distance_m"].to_numpy(dtype=float), 100 * own["found"].to_numpy(dtype=float))
             for name, own in at.groupby("name", sort=False)
         }
         title = f"{reader}: {lens} {kind}s found / %"
@@ -173,8 +177,7 @@ def _of_streets(output: Output, scores: pd.DataFrame) -> Iterator[Told]:
         }
         for column, head in columns.items():
             if column in totals and totals[column].notna().any():
-                ends = [totals[f"{column}{end}"].mul(100).map("{:.1f}".format) for end in ("", "_low", "_high")]
-                told[head] = ends[0] + " (" + ends[1] + " to " + ends[2] + ")"
+                told[head] = _percents(totals, column)
         told.loc[told["name"] == names[0], f"AP50 less that of {names[0]}"] = "-"
         words = f"{reader}: {kind}s"
         yield Told(
@@ -213,10 +216,15 @@ def summary_table(scores: pd.DataFrame) -> pd.DataFrame:
     columns = {"error": "errs on / %", "apart": f"less that of {first}", "above_observer": "less the ideal observer's"}
     table = totals[["reader", "name"]].rename(columns={"name": "design"})
     for column, title in columns.items():
-        ends = [totals[name].mul(100).map("{:.1f}".format) for name in (column, f"{column}_low", f"{column}_high")]
-        table[title] = ends[0] + " (" + ends[1] + " to " + ends[2] + ")"
+        table[title] = _percents(totals, column)
     table.loc[table["design"] == first, columns["apart"]] = "-"
     return table
+
+
+def _percents(scores: pd.DataFrame, column: str) -> pd.Series[str]:
+    """Return a share with its interval, in percent, without the sign."""
+    value, low, high = (scores[f"{column}{end}"].mul(100).map("{:.1f}".format) for end in ("", "_low", "_high"))
+    return value + " (" + low + " to " + high + ")"
 
 
 def picture_of(scores: pd.DataFrame) -> Picture:

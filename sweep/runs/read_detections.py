@@ -11,7 +11,8 @@ import pandas as pd
 
 from ..base.disk import read_input
 from ..base.errors import DataError, ValidationIssue, nearest
-from ..vision.boxes import POINT, Category
+from ..vision.boxes import HEAD, POINT, Category
+from ..vision.detections import points_of
 from .score import issue_of, numbers_of, table_of
 
 COLUMNS = ("image_id", "x_px", "y_px", "state", "score")
@@ -47,7 +48,7 @@ def read_detections(
     elif path.suffix.lower() == ".json":
         found = _of_coco(path, labels, categories)
     else:
-        found = _of_table(path, labels, [category.state for category in categories if category.kind != "head"])
+        found = _of_table(path, labels, [category.state for category in categories if category.kind != HEAD])
     return found.merge(labels[["image_id", "name", "seed", "image"]], on="image_id")
 
 
@@ -194,5 +195,4 @@ def _of_table(path: Path, labels: pd.DataFrame, lenses: Sequence[str]) -> pd.Dat
             issues.append(issue_of("no number", path, wrong, name, "a number"))
     if issues:
         raise DataError(issues)
-    places = {"left": numbers["x_px"], "top": numbers["y_px"], "width": 0.0, "height": 0.0}
-    return pd.DataFrame({"image_id": ids, "kind": POINT, "state": states, **places, "score": numbers["score"]})
+    return points_of(pd.DataFrame({"image_id": ids, "kind": POINT, "state": states, **numbers}))

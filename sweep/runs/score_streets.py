@@ -12,8 +12,8 @@ import pandas as pd
 from ..base.errors import DataError, SweepError, ValidationIssue
 from ..results.output import Output
 from ..results.tables import VISION
-from ..vision.boxes import HEAD, POINT, targets_of
-from ..vision.detections import ALL, FALSE_PER_IMAGE, Judge, Subset, draws_of, judged, scores_of_draws
+from ..vision.boxes import HEAD, targets_of
+from ..vision.detections import ALL, FALSE_PER_IMAGE, Judge, Subset, draws_of, judge_of, scores_of_draws
 from ..vision.lamps import TEST
 from ..vision.scenes import states_of
 from ..vision.section import Vision
@@ -68,7 +68,7 @@ def street_scores(output: Output, reader: str, detections: pd.DataFrame, labels:
             images = of_seed[of_seed["name"] == name]
             targets = targets_of(images, kind, shape_of(output, images["cfa"].iloc[0]))
             own = detections["seed"].eq(number) & detections["name"].eq(name) & detections["kind"].eq(kind)
-            judge = judged(kind, _states(vision, kind), targets, detections[own], levels, draws)
+            judge = judge_of(kind, _states(vision, kind), targets, detections[own], levels, draws)
             judges.setdefault(kind, {}).setdefault(name, []).append(judge)
     tables = []
     for kind, by_name in judges.items():
@@ -107,7 +107,7 @@ def _subsets(vision: Vision, kind: str) -> Iterator[Subset]:
     yield from (Subset(state=state, distance_m=distance) for state, distance in product(states, vision.distances_m))
 
 
-def whole(scores: pd.DataFrame) -> pd.DataFrame:
+def of_all_targets(scores: pd.DataFrame) -> pd.DataFrame:
     """Return the scores of all targets of a kind."""
     return scores[(scores[list(Subset._fields)] == ALL).all(axis=1)]
 
@@ -116,13 +116,13 @@ def found_sentence(scores: pd.DataFrame, lens: str, better: str) -> str:
     """Return which share of a signal type is found with the first design, and with another, at one distance."""
     at = scores[(scores["state"] == lens) & (scores["distance_m"] != ALL)]
     first = at[at["name"] == at["name"].iloc[0]]
-    # Where neither finds all or nothing.
     if not first["found"].notna().any():
         return f"No {lens} lamp is shown."
+    # Where the first finds nearest to 80 %: neither all nor nothing.
     distance = first.loc[(first["found"] - 0.8).abs().idxmin(), "distance_m"]
     here = at[at["distance_m"] == distance].set_index("name")
     name, other = str(first["name"].iloc[0]), here.loc[better]
-    what = {HEAD: f"{lens} heads", POINT: f"{lens} lamps"}.get(str(first["kind"].iloc[0]), f"{lens} lamps")
+    what = f"{lens} heads" if (first["kind"] == HEAD).all() else f"{lens} lamps"
     text = (
         f"{first['reader'].iloc[0]} finds {100 * here.loc[name, 'found']:.0f} % of {what} at {distance} m with {name}"
     )
@@ -134,7 +134,7 @@ def found_sentence(scores: pd.DataFrame, lens: str, better: str) -> str:
 
 def street_lines(scores: pd.DataFrame) -> Iterator[str]:
     """Yield a line per detector, kind of box and design, over all targets."""
-    totals = whole(scores)
+    totals = of_all_targets(scores)
     for (reader, kind), rows in totals.groupby(["reader", "kind"], sort=False):
         first = rows["name"].iloc[0]
         for row in rows.to_dict("records"):

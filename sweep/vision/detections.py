@@ -7,7 +7,7 @@ or by 0.5, 0.55 ... 0.95, averaged; a point that is near enough. Precision is av
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import product
 from typing import Any, NamedTuple
@@ -30,7 +30,7 @@ _MOST_IN_AN_IMAGE = 100
 """Detections of one image and category that count, best first."""
 _DRAWS = 500
 FALSE_PER_IMAGE = 0.03, 0.3
-"""False boxes of lit states an image: the share that is found is the mean over nine numbers between, evenly in their
+"""False positives per image (FPPI) of lit states: `found` is the recall, mean over nine of them, evenly in their
 logarithm, as in Dollar et al., PAMI 2012."""
 
 
@@ -48,7 +48,7 @@ class Matched(NamedTuple):
     distance_m: Float[Array, " detections"]
 
 
-def matched(targets: pd.DataFrame, found: pd.DataFrame, kind: str) -> Matched:
+def match_detections(targets: pd.DataFrame, found: pd.DataFrame, kind: str) -> Matched:
     """Match detections of a state with its targets.
 
     `targets`: of `targets_of`; `found`: `image`, `left`, `top`, `width`, `height`, `score`.
@@ -114,6 +114,7 @@ class Judge:
     by_state: Mapping[str, Matched]
     levels: NDArray[Any]
     weights: Float[Array, "draws images"]
+    _known: dict[Subset, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
 
     def precisions(self, of: Subset) -> tuple[Float[Array, "draws thresholds"], Float[Array, "draws thresholds"]]:
         """Return average precision and largest recall, mean over the states that have targets."""
@@ -136,10 +137,6 @@ class Judge:
         return self._known[of]
 
     @cached_property
-    def _known(self) -> dict[Subset, tuple[FloatArray, FloatArray]]:
-        return {}
-
-    @cached_property
     def _scores(self) -> Float[Array, "numbers draws"]:
         """Scores above which lit states have each number of `FALSE_PER_IMAGE` false boxes an image."""
         false = [(own.score, own.image, own.target[0] < 0) for state, own in self.by_state.items() if state != OFF]
@@ -151,7 +148,7 @@ class Judge:
         return np.asarray(np.append(score[order], -np.inf)[np.stack(first)], dtype=float)
 
     def found(self, of: Subset) -> Float[Array, " draws"]:
-        """Return the share of the lit targets that is found, mean over `FALSE_PER_IMAGE` false boxes an image."""
+        """Return the recall of lit targets, mean over `FALSE_PER_IMAGE`."""
         right, total = np.zeros(len(self.weights)), np.zeros(len(self.weights))
         for state, own in self.by_state.items():
             if state != OFF and of.state in (ALL, state):
@@ -164,7 +161,7 @@ class Judge:
         return np.asarray(np.divide(right, total, out=np.full_like(right, np.nan), where=total > 0), dtype=float)
 
     def statistics(self, of: Subset) -> dict[str, Float[Array, " draws"]]:
-        """Return average precision at 0.5 and over all thresholds, largest recall, and what is found."""
+        """Return average precision at 0.5 and over all thresholds, average recall, and recall at `FALSE_PER_IMAGE`."""
         precision, recall = self.precisions(of)
         if precision.shape[1] == 1:  # points
             return {"ap50": precision[:, 0], "found": self.found(of)}
@@ -181,7 +178,7 @@ def _mean(parts: Sequence[FloatArray]) -> FloatArray:
     return np.asarray(mean, dtype=float)
 
 
-def judged(
+def judge_of(
     kind: str,
     states: Sequence[str],
     targets: pd.DataFrame,
@@ -189,9 +186,10 @@ def judged(
     levels: NDArray[Any],
     weights: Float[Array, "draws images"],
 ) -> Judge:
-    """Match the detections of a design and seed: columns as of `matched`, and `state`."""
+    """Match the detections of a design and seed: columns as of `match_detections`, and `state`."""
     by_state = {
-        state: matched(targets[targets["state"] == state], found[found["state"] == state], kind) for state in states
+        state: match_detections(targets[targets["state"] == state], found[found["state"] == state], kind)
+        for state in states
     }
     return Judge(by_state, levels, weights)
 
@@ -251,8 +249,8 @@ def precisions(labels: pd.DataFrame, detections: pd.DataFrame, lenses: Sequence[
     `y_px`, `state`, `score`.
     """
     targets, levels = targets_of(labels, POINT), labels["level"].to_numpy()
-    found = points_of(detections, labels)
-    judge = judged(POINT, lenses, targets, found, levels, np.ones((1, len(labels))))
+    found = points_of(detections).merge(labels[["image_id", "image"]], on="image_id")
+    judge = judge_of(POINT, lenses, targets, found, levels, np.ones((1, len(labels))))
     rows = []
     for level, state in product(dict.fromkeys(levels.tolist()), lenses):
         lit = int(((targets["level"] == level) & (targets["state"] == state)).sum())
@@ -261,10 +259,9 @@ def precisions(labels: pd.DataFrame, detections: pd.DataFrame, lenses: Sequence[
     return pd.DataFrame(rows)
 
 
-def points_of(detections: pd.DataFrame, labels: pd.DataFrame) -> pd.DataFrame:
-    """Return detected places as boxes without size."""
-    known = detections.merge(labels[["image_id", "image"]], on="image_id")
-    return known.rename(columns={"x_px": "left", "y_px": "top"}).assign(width=0.0, height=0.0)
+def points_of(detections: pd.DataFrame) -> pd.DataFrame:
+    """Return places (`x_px`, `y_px`) as boxes without size."""
+    return detections.rename(columns={"x_px": "left", "y_px": "top"}).assign(width=0.0, height=0.0)
 
 
 def precision_scores(table: pd.DataFrame, reference: str) -> pd.DataFrame:

@@ -59,17 +59,19 @@ def _start(key: Any, distances: int, inputs: int, known: int, states: int) -> _W
     return weights
 
 
-def _logits(weights: _Weights, crops: Any, known: Any) -> Any:
-    x = jax.nn.relu(crops @ weights["dense0"] + weights["bias0"] + known @ weights["known"])
+def _logits(weights: _Weights, crops: Any, known: Any, relu: Callable[[Any], Any]) -> Any:
+    x = relu(crops @ weights["dense0"] + weights["bias0"] + known @ weights["known"])
     for at in range(1, len(_HIDDEN)):
-        x = jax.nn.relu(x @ weights[f"dense{at}"] + weights[f"bias{at}"])
+        x = relu(x @ weights[f"dense{at}"] + weights[f"bias{at}"])
     return x @ weights[f"dense{len(_HIDDEN)}"] + weights[f"bias{len(_HIDDEN)}"]
 
 
 def _loss(weights: list[_Weights], levels: Sequence[Examples]) -> Any:
     """Return the sum over distances and levels: the networks do not share anything."""
     parts = (
-        optax.softmax_cross_entropy_with_integer_labels(_logits(own, at.crops, at.known), at.state).mean(axis=1).sum()
+        optax.softmax_cross_entropy_with_integer_labels(_logits(own, at.crops, at.known, jax.nn.relu), at.state)
+        .mean(axis=1)
+        .sum()
         for own, at in zip(weights, levels, strict=True)
     )
     return sum(parts)
@@ -121,7 +123,4 @@ def logits(
     By NumPy: JAX would compile anew for each number of images.
     """
     own = {name: np.asarray(part)[distance] for name, part in weights.items()}
-    x = np.maximum(crops @ own["dense0"] + own["bias0"] + known @ own["known"], 0.0)
-    for at in range(1, len(_HIDDEN)):
-        x = np.maximum(x @ own[f"dense{at}"] + own[f"bias{at}"], 0.0)
-    return np.asarray(x @ own[f"dense{len(_HIDDEN)}"] + own[f"bias{len(_HIDDEN)}"], dtype=float)
+    return np.asarray(_logits(own, crops, known, lambda x: np.maximum(x, 0.0)), dtype=float)
