@@ -28,8 +28,21 @@ def holds_for(output: Output, curves: str = "") -> str:
         _varied(output),
         _filters(output),
     ]
+    return f"Holds for {'; '.join(part for part in parts if part)}{f'; with {under}' if under else ''}.{_images(output)}{_letters(output)}"
+
+
+def _images(output: Output) -> str:
+    """Return camera and scene of the images of a benchmark, which are not those of the scenarios."""
+    vision = output.study.vision
+    if vision is None:
+        return ""
+    levels = ", ".join(
+        f"{name} {level.illuminance_lx:g} lx and {1e6 * level.exposure_s:g} us" for name, level in vision.levels.items()
+    )
+    lamps = ", ".join(f"{candelas:g}" for candelas in vision.intensities_cd)
     return (
-        f"Holds for {'; '.join(part for part in parts if part)}{f'; with {under}' if under else ''}.{_letters(output)}"
+        f" Separations are of this scene; images are taken at f/{vision.optics.f_number:g} and {vision.fov_deg:g} degrees, with noise, of lenses of "
+        f"{vision.diameter_m:g} m and {lamps} cd: {levels}."
     )
 
 

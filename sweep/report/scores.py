@@ -43,7 +43,6 @@ from .leaders import answering, label
 from .page import page_of
 from .panels import Line, Lines, Picture
 from .section import Told, table_of
-from .vision import camera_of
 
 PAGE, TABLE, STREETS = "scores.html", "scores.parquet", "street_scores.parquet"
 
@@ -112,7 +111,7 @@ def _score_readers(output: Output, predictions: Sequence[Path], to: Path) -> tup
         replace(lead, sentences=()),
         further,
         kind="scores of readers",
-        limits=[*(line for name in tables for line in _LIMITS[name]), _CHOSEN, camera_of(vision)],
+        limits=[*(line for name in tables for line in _LIMITS[name]), _CHOSEN],
         files=[files[name] for name in tables],
     )
     write_text(text, to / PAGE)

@@ -144,18 +144,6 @@ def benchmark_of(output: Output) -> Benchmark:
     return output.cached("vision", lambda: Benchmark(vision, output.study.seed, *tables))
 
 
-def camera_of(vision: Vision) -> str:
-    """Return what the images of a benchmark are of, which are not those of the scenarios."""
-    levels = ", ".join(
-        f"{name} {level.illuminance_lx:g} lx and {1e6 * level.exposure_s:g} us" for name, level in vision.levels.items()
-    )
-    lamps = ", ".join(f"{candelas:g}" for candelas in vision.intensities_cd)
-    return (
-        f"Images are taken at f/{vision.optics.f_number:g} and {vision.fov_deg:g} degrees, with noise, of lenses of "
-        f"{vision.diameter_m:g} m and {lamps} cd: {levels}."
-    )
-
-
 def format_interval(interval: Interval) -> str:
     """Format a value with its interval."""
     return f"{interval.value:.2f} ({interval.low:.2f} to {interval.high:.2f})"

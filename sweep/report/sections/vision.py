@@ -22,7 +22,6 @@ from ..vision import (
     Lesson,
     Ranks,
     benchmark_of,
-    camera_of,
     format_interval,
     format_percent,
     lessons_of,
@@ -105,7 +104,7 @@ class Vision(Section):
     @property
     def limits(self) -> list[str]:
         """Errors of all readers, predictors, streets."""
-        benchmark, lines = self.benchmark, [camera_of(self.benchmark.vision)]
+        benchmark, lines = self.benchmark, list[str]()
         for reader in benchmark.learners:
             errors = []
             for design in benchmark.designs:
