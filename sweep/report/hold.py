@@ -28,7 +28,8 @@ def holds_for(output: Output, curves: str = "") -> str:
         _varied(output),
         _filters(output),
     ]
-    return f"Holds for {'; '.join(part for part in parts if part)}{f'; with {under}' if under else ''}.{_images(output)}{_letters(output)}"
+    what = f"{'; '.join(part for part in parts if part)}{f'; with {under}' if under else ''}"
+    return f"Holds for {what}.{_images(output)}{_letters(output)}"
 
 
 def _images(output: Output) -> str:
@@ -41,7 +42,8 @@ def _images(output: Output) -> str:
     )
     lamps = ", ".join(f"{candelas:g}" for candelas in vision.intensities_cd)
     return (
-        f" Separations are of this scene; images are taken at f/{vision.optics.f_number:g} and {vision.fov_deg:g} degrees, with noise, of lenses of "
+        f" Separations are of this scene; images are taken at f/{vision.optics.f_number:g} and {vision.fov_deg:g} "
+        "degrees, with noise, of lenses of "
         f"{vision.diameter_m:g} m and {lamps} cd: {levels}."
     )
 
