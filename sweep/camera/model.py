@@ -8,6 +8,7 @@ leaves out are not computed. A case is a field position, a sampling phase and a 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -125,13 +126,27 @@ class SceneModel:
         if setup.scene.target is not None:
             self.phases = different_phases(setup, scene_phases(setup))[0]
         self._positions: dict[tuple[float, int], FieldPosition] = {}
+        self._moments: Float[Array, " moments"] | None = None
         self.n_cases = len(self.heights) * (1 if self.phases is None else len(self.phases))
         """Number of sampling phases times number of field positions."""
+
+    def at(self, views: Sequence[View], moments: Float[Array, " moments"] | None = None) -> SceneModel:
+        """Return the model at some views of the scene, and at moments of a pulse instead of those of the accuracy."""
+        other = copy(self)
+        other.__dict__.update(_kept=list(views), _along=None)
+        other._moments = moments
+        other.n_cases = sum(view.readout.n_cases for view in views)
+        return other
 
     @cached_property
     def _white(self) -> tuple[FloatArray, float]:
         """Electrons/s on the white patch per unit of QE, and in the brightest channel that no design modifies."""
         return white_irradiance(self.setup) * self.setup.camera.area_step_m2_nm, fixed_white(self.setup)
+
+    @property
+    def own_moments(self) -> bool:
+        """True for the moments of a pulse that the accuracy states."""
+        return self._moments is None
 
     def exposure_s(self, curves: DesignCurves) -> PerDesign:
         """Return the exposure time of each design."""
@@ -213,49 +228,41 @@ class SceneModel:
         """Yield the views of the scene's own cases."""
         return iter(self.views() if self._kept is None else self._kept)
 
-    def scales(
-        self, exposure_s: PerDesign, moments: Float[Array, " moments"] | None = None
-    ) -> Float[Array, "... designs moments"]:
+    def scales(self, exposure_s: PerDesign) -> Float[Array, "... designs moments"]:
         """Return the light relative to its mean at the moments of a pulse, of an HDR pixel for each exposure.
 
-        `moments`: instead of those of the accuracy (see `pwm`).
+        Those of `at`, or those of the accuracy (see `pwm`).
         """
         if self.setup.camera.pixel.captures:
-            scales = pwm.exposure_scales(self.setup, exposure_s, moments)
-            return scales[..., np.sort(_different_moments(scales)[0])] if moments is None else scales
-        return pwm.scales(self.setup, exposure_s, moments)
+            scales = pwm.exposure_scales(self.setup, exposure_s, self._moments)
+            return scales[..., np.sort(_different_moments(scales)[0])] if self._moments is None else scales
+        return pwm.scales(self.setup, exposure_s, self._moments)
 
-    def read(
-        self,
-        curves: DesignCurves,
-        views: Sequence[View] | None = None,
-        moments: Float[Array, " moments"] | None = None,
-    ) -> tuple[DesignCases, PerDesign]:
+    def read(self, curves: DesignCurves) -> tuple[DesignCases, PerDesign]:
         """Read out a batch of designs.
 
-        `views`, `moments`: instead of those of the scene. Returns `dn`: digital numbers, DN; means under noise;
-        `exposure_s`: exposure time, s.
+        Returns `dn`: digital numbers, DN; means under noise; `exposure_s`: exposure time, s.
         """
         exposure_s = self.exposure_s(curves)
-        scales = self.scales(exposure_s, moments)
+        scales = self.scales(exposure_s)
         first, which = _different_moments(scales)
         scales = scales[..., first]
         parts = []
-        for view in self.own_views() if views is None else views:
+        for view in self.own_views():
             electrons = self._blocks(view, curves, scales, exposure_s)
             parts.append(np.concatenate([view.readout.folded(view.readout.transfer(of_some)) for of_some in electrons]))
         dn = np.concatenate(parts, axis=1)
         return dn[:, np.arange(dn.shape[1]).reshape(-1, first.size)[:, which].ravel()], exposure_s
 
-    def read_with_noise(self, curves: DesignCurves, views: Sequence[View] | None = None) -> NoisyReadout:
+    def read_with_noise(self, curves: DesignCurves) -> NoisyReadout:
         """Read out a batch of designs with the variance of the noise.
 
-        `views`: as of `read`. Pixels are read one by one: saturation and quantization must be computed.
+        Pixels are read one by one: saturation and quantization must be computed.
         """
         exposure_s = self.exposure_s(curves)
         scales = self.scales(exposure_s)
         parts = []
-        for view in self.own_views() if views is None else views:
+        for view in self.own_views():
             read = [view.readout.with_noise(e) for e in self._blocks(view, curves, scales, exposure_s)]
             parts.append([np.concatenate(values) for values in zip(*read, strict=True)])
         mean, variance, gaussian, reach = (np.concatenate(values, axis=1) for values in zip(*parts, strict=True))

@@ -22,8 +22,6 @@ MOST_PHASES = 1024
 """Phases of a lattice on a tile, at most."""
 _FINER, _MOST_FINE = 4, 1200
 """Factor by which the lattice is finer from which extremes are refined; its different phases, at most."""
-_FLAT_DN, _FLAT_STEPS_DN = 0.05, 1.0
-"""A start whose neighbors all differ from it by less is refined no further; the second where whole numbers step."""
 _ROUNDING = 1e-9
 
 
@@ -134,13 +132,13 @@ def read_at(target: Target, centers_px: Float[Array, "phases 2"]) -> Phases:
     return result
 
 
-def fine_lattice(setup: Setup) -> Lattice:
-    """Return the centers of the lattice from which extremes are refined.
+def lattice_of(setup: Setup, *, finer: bool) -> Lattice:
+    """Return the centers of the scene's lattice, or of a finer one, from which extremes are refined.
 
     Where pixels saturate, extremes are kinks, which are missed by slope times step: steps are halved until neighbors
     differ by little.
     """
-    target, steps = setup.scene.target, _FINER * setup.accuracy.phase_steps_per_px
+    target, steps = setup.scene.target, setup.accuracy.phase_steps_per_px * (_FINER if finer else 1)
     assert target is not None
     while True:
         phases = different_phases(setup, read_at(target, lattice_px(setup.camera.mosaic, steps)))[0]
@@ -148,13 +146,11 @@ def fine_lattice(setup: Setup) -> Lattice:
             break
         steps //= 2
     centers = np.unique(phases.center_px, axis=0)
-    rounds = setup.scene.noise is None and setup.computes("quantization")
     return Lattice(
         centers,
         np.full(len(centers), 1 / steps),
         max(0, math.floor(math.log2(1 / (steps * setup.accuracy.finest_phase_px)) + _ROUNDING)),
         period=np.array(setup.camera.mosaic.indices.shape[::-1], dtype=float),
-        flat=_FLAT_STEPS_DN if rounds else _FLAT_DN,
     )
 
 

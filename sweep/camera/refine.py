@@ -28,8 +28,7 @@ Search = Generator[_Places, _Values, tuple[PerValue, Float[Array, "values axes"]
 class Lattice:
     """Known places, the step between those around each, and how often it is divided by `finer`.
 
-    `period`: after which an axis begins again; `ends`: of the axes, in their place. `flat`: a start whose neighbors all
-    differ from it by less is refined no further.
+    `period`: after which an axis begins again; `ends`: of the axes, in their place.
     """
 
     places: _Places
@@ -38,7 +37,6 @@ class Lattice:
     finer: int = 2
     period: Float[Array, " axes"] | None = None
     ends: tuple[float, float] = (-np.inf, np.inf)
-    flat: float = 0.0
 
     @classmethod
     def along(cls, places: Float[Array, " places"], rounds: int, finer: int = 2) -> Lattice:
@@ -78,8 +76,12 @@ class _Known:
         return np.array([self._at[key] for key in keys])
 
 
-def search(lattice: Lattice, values: _Values) -> Search:
-    """Refine the smallest values over a lattice."""
+def search(lattice: Lattice, values: _Values, flat: PerValue | None = None) -> Search:
+    """Refine the smallest values over a lattice.
+
+    `flat`: a start whose neighbors all differ from it by less is refined no further.
+    """
+    flat = np.zeros(len(values)) if flat is None else flat
     known = _Known(lattice, values)
     shares = np.arange(1.0 - lattice.finer, lattice.finer) / lattice.finer
     around = np.array(list(product(shares, repeat=lattice.places.shape[1])))
@@ -91,7 +93,7 @@ def search(lattice: Lattice, values: _Values) -> Search:
             center = centers[value, start]
             near = lattice.apart(known.places, known.places[center]) <= known.steps[center] * share * (1 + _ROUNDING)
             change = np.abs(known.values[value, near] - known.values[value, center])
-            moving[value, start] = change.max() > lattice.flat
+            moving[value, start] = change.max() > flat[value]
         while moving.any():
             requested = np.unique(centers[moving])
             steps = known.steps[requested]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -25,16 +26,18 @@ from ..camera.brightness import LampReadings
 from ..camera.model import Changing, SceneModel, scene_model
 from ..camera.readout import NoisyReadout
 from ..camera.setup import Setup
-from ..designs.block import Block
+from ..designs.block import Block, CurveBlock
 from ..designs.family import Family
 from ..spectra.lights import Pair, class_pairs
 from ..vision.section import SeededVision
-from .brightness import chromatic_distance, curves_of
+from .brightness import Walk, curves_of
 from .quantity import Columns
 from .separation import pixel_roots
 
 _AT_ONCE = 1024
 """Designs that differ in one channel alone, or readouts of a design in a case, that are looked at at once."""
+DistanceKind = Literal["DN", "pixel", "noise"]
+"""Distances of lamps of any brightness: in DN, with every pixel counted, or in units of the noise."""
 _READ_AT_ONCE = 2**19
 """Digital numbers that metrics are given at once: 4 MiB, so that they stay in the cache."""
 
@@ -82,7 +85,8 @@ class Batch:
 
     `states`: signal types that noise may confuse; `pairs`: those whose chromatic distances are wanted; `family`,
     `points`: of the designs, if they are of one; `noisy`: columns under noise are wanted; `any_brightness`: of states
-    of any brightness, too; `columns`: those that are known.
+    of any brightness, too; `bounds`: bounds on errors, too; `columns`: those that are known; `by_case`: those of each
+    case; `walks`: along the brightness of the lamps of designs.
     """
 
     model: SceneModel
@@ -95,8 +99,10 @@ class Batch:
     images: SeededVision | None = None
     noisy: bool = False
     any_brightness: bool = False
+    bounds: bool = True
     columns: Columns = field(default_factory=dict)
-    _over_brightness: tuple[dict[Pair, PerDesign], dict[Pair, PerDesign]] | None = None
+    by_case: dict[str, Float[Array, "cases designs"]] = field(default_factory=dict)
+    walks: dict[tuple[int, DistanceKind], dict[Pair, Walk]] = field(default_factory=dict)
 
     @property
     def setup(self) -> Setup:
@@ -129,41 +135,78 @@ class Batch:
             return self.curves[design : design + 1]
         return self.block.subset(slice(design, design + 1)).curves()
 
-    def over_brightness(
-        self, wanted: Bool[BoolArray, " designs"] | None = None
-    ) -> tuple[dict[Pair, PerDesign], dict[Pair, PerDesign]]:
-        """Return the smallest distances of lamps of any brightness: of `wanted` designs, DN, and of states over noise.
+    def walked(
+        self, kind: DistanceKind, wanted: Bool[BoolArray, " designs"]
+    ) -> dict[Pair, Float[Array, "cases designs"]]:
+        """Return the smallest distances of lamps of any brightness in each case, of `wanted` designs, by pair.
 
-        Both at the first call, design by design, since brightness curves are large.
+        Distances in DN and of states over the noise are found at once, since brightness curves are large.
         """
-        if self._over_brightness is None:
-            wanted = np.zeros(self.size, dtype=bool) if wanted is None else wanted
-            states = class_pairs(list(self.states)) if self.any_brightness else []
-            of_pairs, of_states = ({p: np.full(self.size, np.nan) for p in pairs} for pairs in (self.pairs, states))
-            self._over_brightness = both = of_pairs, of_states
-            for design in np.flatnonzero(wanted | bool(states)):
-                cases = curves_of(self._lamps(int(design)), self.setup)
-                for noise, distances in enumerate(both if cases else ()):
-                    for a, b in distances if noise or wanted[design] else ():
-                        members = self.setup.members[a], self.setup.members[b]
-                        distances[a, b][design] = chromatic_distance(cases, *members, noise=bool(noise))
-        return self._over_brightness
-
-    def over_brightness_by_pixel(self, wanted: Bool[BoolArray, " designs"]) -> dict[Pair, PerDesign]:
-        """Return distances of lamps of any brightness of `wanted` designs, with every pixel counted, DN."""
-        roots, distances = pixel_roots(self.setup.camera.mosaic), {p: np.full(self.size, np.nan) for p in self.pairs}
+        kinds: list[DistanceKind] = [kind] if kind == "pixel" else ["DN"]
+        if self.any_brightness and kind != "pixel":
+            kinds.append("noise")
         for design in np.flatnonzero(wanted):
-            cases = curves_of([lamps.times(roots) for lamps in self._lamps(int(design))], self.setup)
-            for (a, b), of_pair in distances.items() if cases else ():
-                of_pair[design] = chromatic_distance(cases, self.setup.members[a], self.setup.members[b], noise=False)
-        return distances
+            if (int(design), kind) not in self.walks:
+                self._walk(int(design), kinds)
+        pairs = class_pairs(list(self.states)) if kind == "noise" else self.pairs
+        columns = {pair: np.full((self.n_cases, self.size), np.nan) for pair in pairs}
+        n_places = self.model.n_cases
+        for design in np.flatnonzero(wanted):
+            for pair, walk in self.walks[int(design), kind].items():
+                of_places = walk.distances.reshape(n_places, -1).min(axis=1)
+                columns[pair][:, design] = np.repeat(of_places, self.n_cases // n_places)
+        return columns
+
+    def _walk(self, design: int, kinds: Sequence[DistanceKind]) -> None:
+        lamps = self._lamps(design)
+        if "pixel" in kinds:
+            roots = pixel_roots(self.setup.camera.mosaic)
+            lamps = [of_case.times(roots) for of_case in lamps]
+        curves = curves_of(lamps, self.setup)
+        for kind in kinds:
+            noise = kind == "noise"
+            pairs = class_pairs(list(self.states)) if noise else self.pairs
+            members = {pair: [self.setup.members[name] for name in pair] for pair in pairs if curves}
+            self.walks[design, kind] = {
+                pair: Walk.of(curves, self.model.n_cases, *both, noise=noise) for pair, both in members.items()
+            }
 
     def _lamps(self, design: int) -> list[LampReadings]:
         """Return the lamps of a design over their brightness, in each case; none of one that is not finite."""
         curves = self.curves_of(design)
         if not (np.isfinite(curves).all() and np.isfinite(self.exposure_s[design])):
             return []
-        return [*scene_model(self.setup.over_brightness).lamps(curves)]
+        return [*self.bright_model.lamps(curves)]
+
+    def followed(self, model: SceneModel, design: int, kind: DistanceKind, walk: Walk) -> Float[Array, " cases"]:
+        """Return the smallest distances of the pairs of a walk of a design in the cases of another model."""
+        lamps = [*model.lamps(self.curves_of(design))]
+        if kind == "pixel":
+            lamps = [of_case.times(pixel_roots(self.setup.camera.mosaic)) for of_case in lamps]
+        n_moments = len(lamps) // model.n_cases
+        pairs = walk.at_moments if model.own_moments else [walk.at_any] * n_moments
+        distances = np.empty(len(lamps))
+        for curves in curves_of(lamps, self.setup):
+            of_cases = [pairs[case % n_moments] for case in curves.cases]
+            distances[curves.cases] = curves.follow(of_cases, noise=kind == "noise")
+        return distances
+
+    def of(self, model: SceneModel, design: int) -> Batch:
+        """Return one of the designs in another model of the scene, without bounds on errors."""
+        block = CurveBlock(self.curves_of(design))
+        return Batch(model, block, self.states, self.pairs, noisy=self.noisy, bounds=False)
+
+    @property
+    def finite(self) -> list[int]:
+        """Designs whose curves and exposures are numbers."""
+        known = np.flatnonzero(np.isfinite(self.exposure_s)).tolist()
+        return [design for design in known if np.isfinite(self.curves_of(design)).all()]
+
+    @cached_property
+    def bright_model(self) -> SceneModel:
+        """The model in which lamps of any brightness are read."""
+        setup = self.setup.over_brightness
+        return self.model if setup.left_out == self.setup.left_out else scene_model(setup)
 
     @cached_property
     def read_with_noise(self) -> NoisyReadout:

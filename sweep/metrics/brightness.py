@@ -8,7 +8,7 @@ is that of two Gaussians at the smallest d'. Curves are taken at nodes, and refi
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -22,7 +22,9 @@ LEAST_DN2 = 1e-9
 """Least variance in units of which a distance is taken, DN^2."""
 _MARGINS = (1.7, 1.05, 1.01)
 """Pairs are refined, again and again, that come as near as this times the nearest squared distance of all."""
-_MOST_PAIRS = 200
+_FOLLOWED = 1.1
+"""Pairs that come as near as this times the nearest squared distance are looked at in other cases, too."""
+_SCALE_DIGITS = 12
 _NEWTON_STEPS, _NEWTON_STEP, _CONVERGED = 12, 1e-5, 1e-10
 _FINER = 12
 """Finer segments in the place of the nearest one and its neighbors."""
@@ -47,26 +49,38 @@ class Nearest:
             self.reading[which], self.curve[which], self.factor[which], self.squared[which], self.bracket[which]
         )
 
+    @staticmethod
+    def joined(parts: Sequence[Nearest]) -> Nearest:
+        """Return the points of all parts."""
+        names = [field.name for field in fields(Nearest)]
+        return Nearest(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
 
 class BrightnessCurves:
     """Readings and brightness curves of all lamps in one case, or in several that differ in brightness alone.
 
-    `scales`: brightness of the lamps that are read in each of these, as of the moments of a pulse. `least_dn2`:
-    variance in units of which distances are taken at least.
+    `scales`: brightness of the lamps that are read in each of these cases, as of the moments of a pulse; `cases`: their
+    numbers; `least_dn2`: variance in units of which distances are taken at least.
     """
 
     def __init__(
         self,
         lamps: LampReadings,
         brightness: tuple[float, float] | None = None,
-        scales: Sequence[float] | Float[Array, " scales"] = (1.0,),
+        scales: Sequence[float] = (1.0,),
         steps: int = 1,
         least_dn2: float = LEAST_DN2,
+        cases: Sequence[int] = (0,),
     ) -> None:
         self.lamps = lamps
+        self.cases = np.array(cases)
         self._least_dn2 = least_dn2
-        self._scales = np.array(scales, dtype=float)
-        self._nodes = lamps.nodes(*(DARK_TO_FULL if brightness is None else brightness), steps)
+        self._scales, self._scale_of_case = np.unique(np.round(scales, _SCALE_DIGITS), return_inverse=True)
+        self._range, self._steps = DARK_TO_FULL if brightness is None else brightness, steps
+
+    @cached_property
+    def _nodes(self) -> Float[Array, "signals nodes"]:
+        return self.lamps.nodes(*self._range, self._steps)
 
     @property
     def darkest(self) -> float:
@@ -111,7 +125,36 @@ class BrightnessCurves:
 
     def refined(self, found: Nearest, *, noise: bool) -> Nearest:
         """Refine nearest points between finer nodes; curves that are straight between nodes need none."""
-        if not found.curve.size or (self.lamps.straight and not noise):
+        return found if self.lamps.straight and not noise else self._finer(found, noise=noise)
+
+    def of_cases(self, points: Nearest) -> Float[Array, " cases"]:
+        """Return the smallest distance among some points in each case."""
+        least = np.full(self._scales.size, np.inf)
+        np.minimum.at(least, points.reading // self.lamps.n_signals, points.squared)
+        return np.asarray(np.sqrt(least[self._scale_of_case]), dtype=float)
+
+    def pairs_of(self, points: Nearest, case: int) -> Nearest:
+        """Return the points of one case, of lamps of the scene's brightness, in brackets relative to theirs."""
+        scale = self._scale_of_case[case]
+        points = points.subset(points.reading // self.lamps.n_signals == scale)
+        brightness = self._scales[scale] or 1.0
+        return replace(points, reading=points.reading % self.lamps.n_signals, bracket=points.bracket / brightness)
+
+    def follow(self, pairs: Sequence[Nearest], *, noise: bool) -> Float[Array, " cases"]:
+        """Return the smallest distance of some pairs in each case, from where their points are known elsewhere."""
+        points = []
+        for scale, near in zip(self._scale_of_case, pairs, strict=True):
+            reading = near.reading + self.lamps.n_signals * scale
+            bracket = np.clip(near.bracket * self._scales[scale], *self._range)
+            points.append(replace(near, reading=reading, bracket=bracket))
+        found = self._finer(Nearest.joined(points), noise=noise)
+        for margin in _MARGINS[1:]:
+            most = margin * found.squared.min(initial=np.inf)
+            found = self._finer(found.subset(found.squared <= most), noise=noise)
+        return self.of_cases(found)
+
+    def _finer(self, found: Nearest, *, noise: bool) -> Nearest:
+        if not found.curve.size:
             return found
         (low, high), rows = found.bracket.T, np.arange(found.curve.size)
         nodes = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, _FINER + 1)
@@ -172,37 +215,80 @@ class BrightnessCurves:
 def curves_of(cases: Iterable[LampReadings], setup: Setup) -> list[BrightnessCurves]:
     """Return the curves of all cases; cases that differ in the brightness of all lamps alone share theirs."""
     brightness, steps = setup.scene.brightness, setup.accuracy.brightness_steps
-    if brightness is not None:
-        return [BrightnessCurves(lamps, brightness, steps=steps) for lamps in cases]
-    groups: list[tuple[LampReadings, list[float]]] = []
-    for lamps in cases:
-        first, scales = groups[-1] if groups else (lamps, [])
+    groups: list[tuple[LampReadings, list[float], list[int]]] = []
+    for number, lamps in enumerate(cases):
+        first, scales, numbers = groups[-1] if groups else (lamps, [], [])
         scale = float(lamps.lit_e.max() / first.lit_e.max()) if first.lit_e.max() > 0 else 0.0
-        if groups and lamps.alike(first, scale):
+        if groups and brightness is None and lamps.alike(first, scale):
             scales.append(scale)
+            numbers.append(number)
         else:
-            groups.append((lamps, [1.0]))
-    return [BrightnessCurves(lamps, scales=np.unique(np.round(scales, 12)), steps=steps) for lamps, scales in groups]
+            groups.append((lamps, [1.0], [number]))
+    return [BrightnessCurves(lamps, brightness, scales, steps, cases=numbers) for lamps, scales, numbers in groups]
 
 
-def chromatic_distance(
-    cases: Sequence[BrightnessCurves],
-    first: Int[IndexArray, " first"],
-    second: Int[IndexArray, " second"],
-    *,
-    noise: bool,
-) -> float:
-    """Return the smallest distance of two types over all cases, in units of the noise or in DN."""
-    found: list[Nearest] = []
-    least = np.inf
-    for case in cases:
-        found.append(case.nearest(first, second, noise=noise, margin=_MARGINS[0], nearest=least))
-        least = min(least, float(found[-1].squared.min(initial=np.inf)))
-    for margin in _MARGINS:
-        most = margin * min(float(points.squared.min(initial=np.inf)) for points in found)
-        near = [points.subset(np.flatnonzero(points.squared <= most)[:_MOST_PAIRS]) for points in found]
-        found = [case.refined(points, noise=noise) for case, points in zip(cases, near, strict=True)]
-    return float(np.sqrt(min(float(points.squared.min(initial=np.inf)) for points in found)))
+@dataclass(frozen=True)
+class Walk:
+    """Smallest distances of two types of lamps of any brightness, in each case; infinite where it is no smallest.
+
+    `pairs`: those that may be nearest in each case, as of `BrightnessCurves.pairs_of`; cases are moments of a place,
+    place by place.
+    """
+
+    distances: Float[Array, " cases"]
+    pairs: Sequence[Nearest]
+    n_moments: int
+
+    @cached_property
+    def at_moments(self) -> list[Nearest]:
+        """Pairs that may be nearest at each moment of any place."""
+        return [_distinct(self.pairs[moment :: self.n_moments]) for moment in range(self.n_moments)]
+
+    @cached_property
+    def at_any(self) -> Nearest:
+        """Pairs that may be nearest at any moment of any place."""
+        return _distinct(self.pairs)
+
+    @classmethod
+    def of(
+        cls,
+        curves: Sequence[BrightnessCurves],
+        n_places: int,
+        first: Int[IndexArray, " first"],
+        second: Int[IndexArray, " second"],
+        *,
+        noise: bool,
+    ) -> Walk:
+        """Walk along the brightness curves of all cases; distances are in DN, or in units of the noise."""
+        found: list[Nearest] = []
+        least = np.inf
+        for of_cases in curves:
+            found.append(of_cases.nearest(first, second, noise=noise, margin=_MARGINS[0], nearest=least))
+            least = min(least, float(found[-1].squared.min(initial=np.inf)))
+        coarse = [points.subset(points.squared <= _FOLLOWED * least) for points in found]
+        for margin in _MARGINS:
+            most = margin * min(float(points.squared.min(initial=np.inf)) for points in found)
+            found = [
+                of_cases.refined(points.subset(points.squared <= most), noise=noise)
+                for of_cases, points in zip(curves, found, strict=True)
+            ]
+        n_cases = sum(of_cases.cases.size for of_cases in curves)
+        distances, pairs = np.empty(n_cases), dict[int, Nearest]()
+        for of_cases, points, near in zip(curves, found, coarse, strict=True):
+            distances[of_cases.cases] = of_cases.of_cases(points)
+            pairs |= {int(number): of_cases.pairs_of(near, at) for at, number in enumerate(of_cases.cases)}
+        return cls(distances, [pairs[number] for number in range(n_cases)], n_cases // n_places)
+
+
+def _distinct(parts: Sequence[Nearest]) -> Nearest:
+    """Return the pairs of all parts once, in brackets that hold all of theirs."""
+    every = Nearest.joined(parts)
+    keys = np.stack([every.reading, every.curve], axis=1)
+    _, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    low, high = every.bracket[first].T.copy()
+    np.minimum.at(low, which.ravel(), every.bracket[:, 0])
+    np.maximum.at(high, which.ravel(), every.bracket[:, 1])
+    return replace(every.subset(first), bracket=np.stack([low, high], axis=1))
 
 
 def error_of(dprime: Float[Array, " *batch"] | float) -> Float[Array, " ..."]:

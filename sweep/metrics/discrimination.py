@@ -5,9 +5,8 @@ channel without variance separates two signals for certain, unless their means a
 
 Forms of two signals take the difference of their means, DN, and both variances, DN^2, channels on the last axis.
 
-With a `NoiseShape`, errors are those of Gaussians in the channels with Gaussian noise, or Bennett's bound from all
-channels, whichever is less: leaving channels out is a rule, too; 1e-12 is the least. Without one, all noise is
-Gaussian.
+An error is that of Gaussians with these moments. With a `NoiseShape`, a bound is that of Gaussians in the channels
+with Gaussian noise, or Bennett's from all channels, whichever is less: leaving channels out is a rule, too.
 """
 
 from __future__ import annotations
@@ -120,25 +119,16 @@ def detectability(
 
 
 def pairwise_error(
-    mean: DesignSignals,
-    variance: DesignSignals,
-    first: Int[IndexArray, " first"],
-    second: Int[IndexArray, " second"],
-    shape: NoiseShape | None = None,
+    mean: DesignSignals, variance: DesignSignals, first: Int[IndexArray, " first"], second: Int[IndexArray, " second"]
 ) -> PerDesign:
     """Return the largest probability that noise moves one point of a pair beyond the other: Q of their `margin`.
 
-    `shape`: shape of the noise; left out, Gaussian. 0.5 for coincident points.
+    0.5 for coincident points.
     """
-    errors = np.empty((len(mean), len(first) * len(second)))
-    for block, pair, difference, ours, theirs in _pairs(mean, variance, first, second):
-        gaussian_difference = difference if shape is None else shape.gaussian_only(block, pair, difference)
-        error = share_below(-margin(gaussian_difference, ours, theirs))
-        if shape is not None:
-            error = np.maximum(error, _LEFT_OUT)
-            error = np.minimum(error, shape.bound(block, pair, difference, ours + theirs))
-        errors[block] = error
-    return np.asarray(errors.max(axis=1), dtype=float)
+    errors = np.empty(len(mean))
+    for block, _, difference, ours, theirs in _pairs(mean, variance, first, second):
+        errors[block] = share_below(-margin(difference, ours, theirs)).max(axis=1)
+    return errors
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -11,19 +12,29 @@ from ..camera.model import SceneModel
 from ..camera.setup import Setup
 from ..designs.block import Block, CurveBlock
 from ..designs.family import Family
-from ..spectra.lights import Pair, class_pairs
+from ..spectra.lights import Pair, class_pairs, pair_name
 from ..vision.section import SeededVision
-from .batch import Batch
-from .columns.chromatic import CHROMATIC_DPRIME
+from .batch import Batch, DistanceKind
+from .brightness import Walk
+from .columns.chromatic import CHROMATIC_CSD, CHROMATIC_DPRIME, CHROMATIC_ERROR
 from .columns.color_separation import ColorSeparation
+from .columns.confusion import CNR, D_PRIME, ERROR, STATE_ERROR
 from .columns.exposure import EXPOSURE
+from .columns.pixel_separation import CHROMATIC_PIXEL_CSD
 from .columns.user import UserColumns
 from .metric import Metric
-from .places import over_cases, refine
+from .places import Sought, can_refine, over_cases, refine
 from .quantity import Columns, Quantity, RequestedQuantities
-from .registry import METRICS
+from .registry import METRICS, quantities_of
+from .separation import csd_name
 from .user_metrics import UserMetric
 
+CHROMATIC: dict[DistanceKind, str] = {
+    "DN": CHROMATIC_CSD,
+    "pixel": CHROMATIC_PIXEL_CSD,
+    "noise": CHROMATIC_DPRIME,
+}
+"""Metrics of distances of lamps of any brightness."""
 _CSD = next(metric for metric in METRICS if isinstance(metric, ColorSeparation))
 
 
@@ -46,8 +57,8 @@ def evaluate(
     left out, all of them; `points`: parameters of designs of the `family`, for the columns that these determine.
 
     CSDs are the smallest over sampling phases, field positions and moments of a pulse; ``best_phase_csd_<a>_<b>`` is
-    the largest over the phases of the smallest over the moments. Where all phases or field positions count, CSDs are
-    refined; other metrics are the worst over the lattice.
+    the largest over the phases of the smallest over the moments. Where all phases or field positions count, distances
+    and errors are refined.
     """
     block = _block(designs)
     pairs = class_pairs(model.setup.lights.classes) if chromatic is None else chromatic
@@ -55,26 +66,92 @@ def evaluate(
     wanted = "noise" in needs, "any brightness" in needs
     batch = Batch(model, block, states, tuple(pairs), probabilities, family, points, images, *wanted)
     others = [metric for metric in metrics if not isinstance(metric, ColorSeparation | UserColumns)]
-    by_case = _by_case(batch, [_CSD, *others, *map(UserColumns, user_metrics)])
-    batch.columns = over_cases(model, by_case, user_metrics) | {EXPOSURE: batch.exposure_s}
+    of_readings = [_CSD, *others, *map(UserColumns, user_metrics)]
+    requested = RequestedQuantities(
+        model.setup.lights.classes,
+        tuple(states),
+        any_place=True,
+        probabilities=probabilities,
+        user_metrics=tuple(user_metrics),
+    )
+    batch.by_case = _by_case(batch, of_readings)
+    readings = tuple(batch.by_case)
+    for metric in others:
+        batch.by_case |= metric.of_cases(batch)
+    quantities = quantities_of(requested)
+    batch.columns = over_cases(model, batch.by_case, quantities) | {EXPOSURE: batch.exposure_s}
+    if can_refine(model.setup):
+        for sought in (_of_readings(batch, readings, of_readings), _under_noise(batch, others)):
+            refine(sought, model, batch.by_case, batch.columns, quantities)
+        refine(_of_any_brightness(batch), batch.bright_model, batch.by_case, batch.columns, quantities)
     # Last those of any brightness: their errors are at least those of equal brightness.
     for metric in sorted(others, key=lambda metric: metric.needs == "any brightness"):
         batch.columns |= metric.of_batch(batch)
-    return batch.columns | refine(batch, by_case)
+    return batch.columns
+
+
+def _of_readings(batch: Batch, names: Sequence[str], metrics: Sequence[Metric]) -> list[Sought]:
+    """Return what is sought of each design's readings; chromatic distances where they have a closed form."""
+    csds = {csd_name(pair) for pair in class_pairs(batch.setup.lights.classes)}
+
+    def read(design: int, model: SceneModel) -> Columns:
+        return _by_case(batch.of(model, design), metrics)
+
+    sought = []
+    for design in batch.finite:
+        walked = {
+            pair_name(CHROMATIC[kind], pair) for kind in CHROMATIC for pair in batch.walks.get((design, kind), {})
+        }
+        own = tuple(name for name in names if name not in walked)
+        best = tuple(number for number, name in enumerate(own) if name in csds)
+        sought.append(Sought(design, batch.exposure_s[design], own, partial(read, design), fine=True, best=best))
+    return sought
+
+
+def _under_noise(batch: Batch, metrics: Sequence[Metric]) -> list[Sought]:
+    """Return what is sought of each design under noise: contrasts and errors, not the bounds on them."""
+    if not batch.noisy:
+        return []
+    noisy = [metric for metric in metrics if metric.needs == "noise"]
+
+    def read(design: int, model: SceneModel) -> Columns:
+        at = batch.of(model, design)
+        return {name: values for metric in noisy for name, values in metric.of_cases(at).items()}
+
+    pairs = class_pairs(list(batch.states))
+    names = (*(pair_name(metric, pair) for metric in (CNR, D_PRIME, ERROR) for pair in pairs), STATE_ERROR)
+    return [Sought(design, batch.exposure_s[design], names, partial(read, design)) for design in batch.finite]
+
+
+def _of_any_brightness(batch: Batch) -> list[Sought]:
+    """Return what is sought of each two types of lamps of any brightness in a design, each for itself."""
+    sought = []
+    for (design, kind), walks in batch.walks.items():
+        for pair, walk in walks.items():
+            name = pair_name(CHROMATIC[kind], pair)
+
+            def read(
+                model: SceneModel, of: tuple[int, DistanceKind, str, Walk] = (design, kind, name, walk)
+            ) -> Columns:
+                design, kind, name, walk = of
+                return {name: batch.followed(model, design, kind, walk)[:, None]}
+
+            if walk.distances.min() > 0:
+                sought.append(Sought(design, batch.exposure_s[design], (name,), read))
+    return sought
 
 
 def evaluate_some(
     model: SceneModel, curves: DesignCurves, quantities: Sequence[Quantity], states: Sequence[str]
 ) -> dict[str, float]:
-    """Return quantities of one design, by no more than their own metrics where these need none of the other columns."""
-    wanted, alone = {quantity.metric for quantity in quantities}, Batch(model, CurveBlock(curves), states)
-    alone.any_brightness = wanted == {CHROMATIC_DPRIME}
+    """Return quantities of one design, by no more metrics than they need."""
+    wanted = {quantity.metric for quantity in quantities}
+    if CHROMATIC_ERROR in wanted:
+        wanted.add(ERROR)  # the least of it
     requested = RequestedQuantities(model.setup.lights.classes, tuple(states), flicker=True)
     owners = [metric for metric in METRICS if wanted & {of.metric for of in metric.quantities(requested)}]
-    if alone.any_brightness or {metric.needs for metric in owners} == {"pulses"}:
-        columns = _of_batch(alone, owners)
-    else:
-        columns = evaluate(model, curves, states)
+    chromatic = [quantity.pair for quantity in quantities if quantity.metric in CHROMATIC.values() and quantity.pair]
+    columns = evaluate(model, curves, states, metrics=owners, chromatic=chromatic)
     return {quantity.name: float(columns[quantity.name][0]) for quantity in quantities}
 
 

@@ -13,9 +13,9 @@ from .quantity import Columns, Quantity, RequestedQuantities
 class Metric(ABC):
     """Columns that are computed together; a class in `metrics/columns/`.
 
-    `order` is their place in the table, `needs` what they are computed from. A metric overrides one of `of_readings`,
-    at each sampling phase, field position and moment alone, of which the worst counts, and `of_batch`, which asks the
-    batch for whatever it needs.
+    `order` is their place in the table, `needs` what they are computed from. A metric overrides `of_readings` or
+    `of_cases`, at each field position, sampling phase and moment, of which the worst counts and is refined, or
+    `of_batch`, which asks the batch for whatever it needs.
     """
 
     order: ClassVar[int] = 99
@@ -29,6 +29,10 @@ class Metric(ABC):
 
     def of_readings(self, readings: CaseReadings) -> Columns:  # noqa: ARG002
         """Compute the columns of designs, each in one case."""
+        return {}
+
+    def of_cases(self, batch: Batch) -> Columns:  # noqa: ARG002
+        """Compute the columns of designs in each case, [cases, designs], from what the batch reads."""
         return {}
 
     def of_batch(self, batch: Batch) -> Columns:  # noqa: ARG002

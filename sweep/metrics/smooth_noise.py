@@ -14,9 +14,9 @@ import numpy as np
 from ..base.types import DesignCurves, PerDesign
 from ..camera.linear import linear_model
 from ..camera.setup import Setup
-from ..spectra.lights import Pair, class_pairs
+from ..spectra.lights import Pair
 from .complex_step import Smooth, tail_decades
-from .discrimination import detectability, margin, overlap
+from .discrimination import detectability, margin
 from .smooth import Rows, SmoothDesign
 
 _OfPairs = Callable[[Smooth, Smooth, Smooth], Smooth]
@@ -31,30 +31,6 @@ def pair_rows(design: SmoothDesign, *, of: _OfPairs, pairs: Sequence[Pair], squa
     """Return a row for each two signals of the pairs of types, in every case of the scene."""
     rows = Rows.joined([_between(design, pair, of) for pair in pairs])
     return rows.squares() if squared else rows
-
-
-def bound_rows(design: SmoothDesign, *, types: Sequence[str]) -> Rows:
-    """Return -log10 of the sum of the overlaps of each signal with those of other types, in every case of the scene."""
-    sums: dict[str, list[Rows]] = {name: [] for name in types}  # [n_cases x n_own x n_others] of each other type
-    n_cases, sizes = len(design.response), {name: len(index) for name, index in design.setup.members.items()}
-    for a, b in class_pairs(tuple(types)):
-        rows = _between(design, (a, b), overlap)
-        values = rows.values.reshape(n_cases, sizes[a], sizes[b])
-        by_u = rows.by_u.reshape(*values.shape, -1)
-        sums[a].append(Rows(values, by_u))
-        sums[b].append(Rows(values.swapaxes(1, 2), by_u.swapaxes(1, 2)))
-    return Rows.joined([_summed(parts) for parts in sums.values()])
-
-
-def _summed(parts: list[Rows]) -> Rows:
-    from scipy.special import logsumexp  # noqa: PLC0415  (slow to import: kept off the start-up path)
-
-    values = np.concatenate([rows.values for rows in parts], axis=2)
-    by_u = np.concatenate([rows.by_u for rows in parts], axis=2)
-    total = logsumexp(-values, axis=2, keepdims=True)
-    share = np.exp(-values - total)
-    by = (share[..., None] * by_u).sum(axis=2)
-    return Rows(-total.ravel() / np.log(10), by.reshape(total.size, -1) / np.log(10))
 
 
 def _between(design: SmoothDesign, pair: Pair, of: _OfPairs) -> Rows:

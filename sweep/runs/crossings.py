@@ -13,12 +13,11 @@ import pyarrow as pa
 
 from ..base.types import DesignCurves, delayed
 from ..camera.model import SceneModel
-from ..camera.setup import Setup
-from ..designs.block import CurveBlock
-from ..metrics.batch import Batch
-from ..metrics.brightness import error_of
 from ..metrics.columns.chromatic import CHROMATIC_ERROR
-from ..metrics.columns.confusion import STATE_ERROR, state_errors
+from ..metrics.columns.confusion import STATE_ERROR
+from ..metrics.evaluate import evaluate_some
+from ..metrics.quantity import RequestedQuantities
+from ..metrics.registry import quantities_of
 from ..spectra.lights import class_pairs, pair_name
 from ..study import Study
 from ..study.axes import series_of
@@ -67,20 +66,14 @@ class ErrorsBetween:
 
     def __init__(self, scenes: Between, curves: DesignCurves, states: tuple[str, ...]) -> None:
         self._scenes, self._curves, self._states = scenes, curves, states
-        self._of_equal: dict[float, float] = {}
+        known = quantities_of(RequestedQuantities(scenes.setup.lights.classes, states))
+        of_pairs = [known[pair_name(CHROMATIC_ERROR, pair)] for pair in class_pairs(states)]
+        self._quantities = {STATE_ERROR: [known[STATE_ERROR]], CHROMATIC_ERROR: of_pairs}
 
     def at(self, number: float, quantity: str) -> float:
         """Return the error of lamps of equal brightness, or of any, which is no smaller."""
-        setup = self._scenes.at(number)
-        if number not in self._of_equal:
-            self._of_equal[number] = float(state_errors(self._batch(setup))[0])
-        if quantity == STATE_ERROR:
-            return self._of_equal[number]
-        dprimes = self._batch(setup).over_brightness()[1]
-        return max(self._of_equal[number], *(float(error_of(dprime[0])) for dprime in dprimes.values()))
-
-    def _batch(self, setup: Setup) -> Batch:
-        return Batch(SceneModel(setup), CurveBlock(self._curves), self._states, any_brightness=True)
+        model = SceneModel(self._scenes.at(number))
+        return max(evaluate_some(model, self._curves, self._quantities[quantity], self._states).values())
 
 
 def _of_design(

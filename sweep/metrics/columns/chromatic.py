@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from functools import partial
 
 import numpy as np
 
-from ...base.types import Bool, BoolArray, PerDesign
+from ...base.types import PerDesign
 from ...camera.brightness import room_dn, room_of
 from ...spectra.lights import Pair, class_pairs, pair_name
-from ..batch import Batch, CaseReadings
+from ..batch import Batch, CaseReadings, DistanceKind
 from ..brightness import error_of
 from ..chromatic import chromatic_along, chromatic_rows, chromatic_separations
 from ..metric import Metric
@@ -61,11 +60,9 @@ class ChromaticSeparation(Metric):
         closed = {pair: np.where(distances[pair] <= holds_dn, distances[pair], np.nan) for pair in pairs}
         return {pair_name(CHROMATIC_CSD, pair): values for pair, values in closed.items()}
 
-    def of_batch(self, batch: Batch) -> Columns:
-        """Compute columns that have no closed form from brightness curves."""
-        closed = {pair: batch.columns[pair_name(CHROMATIC_CSD, pair)] for pair in batch.pairs}
-        found = completed(closed, lambda missing: batch.over_brightness(missing)[0])
-        return {pair_name(CHROMATIC_CSD, pair): distances for pair, distances in found.items()}
+    def of_cases(self, batch: Batch) -> Columns:
+        """Compute columns of designs that have no closed form from brightness curves."""
+        return completed(batch, CHROMATIC_CSD, "DN")
 
 
 def in_closed_form(readings: CaseReadings) -> dict[Pair, PerDesign]:
@@ -88,15 +85,14 @@ def room(readings: CaseReadings) -> PerDesign:
     return _room(readings, np.maximum(readings.values.max(axis=1), others.max(initial=-np.inf)), least_dn)
 
 
-def completed(
-    closed: Mapping[Pair, PerDesign], walk: Callable[[Bool[BoolArray, " designs"]], dict[Pair, PerDesign]]
-) -> dict[Pair, PerDesign]:
-    """Return distances with those that have no closed form from brightness curves."""
+def completed(batch: Batch, metric: str, kind: DistanceKind) -> Columns:
+    """Return distances in each case, of designs that have no closed form everywhere from brightness curves."""
+    closed = {pair: batch.by_case[pair_name(metric, pair)] for pair in batch.pairs}
     if not closed:
         return {}
-    missing = np.any([np.isnan(values) for values in closed.values()], axis=0)
-    walked = walk(missing)
-    return {pair: np.where(missing, walked[pair], values) for pair, values in closed.items()}
+    missing = np.any([np.isnan(values).any(axis=0) for values in closed.values()], axis=0)
+    walked = batch.walked(kind, missing)
+    return {pair_name(metric, pair): np.where(missing, walked[pair], values) for pair, values in closed.items()}
 
 
 def _along(readings: CaseReadings) -> tuple[dict[Pair, PerDesign], PerDesign]:
@@ -159,13 +155,18 @@ class ChromaticConfusion(Metric):
             )
         )
 
-    def of_batch(self, batch: Batch) -> Columns:
-        """Compute the columns from brightness curves; errors are at least those of equal brightness, if known."""
-        columns: Columns = {}
+    def of_cases(self, batch: Batch) -> Columns:
+        """Compute d' in each case from brightness curves."""
         if not batch.any_brightness:
             return {}
-        for pair, dprime in batch.over_brightness()[1].items():
-            error, equal = error_of(dprime), batch.columns.get(pair_name(ERROR, pair))
-            columns[pair_name(CHROMATIC_DPRIME, pair)] = dprime
+        walked = batch.walked("noise", np.ones(batch.size, dtype=bool))
+        return {pair_name(CHROMATIC_DPRIME, pair): dprime for pair, dprime in walked.items()}
+
+    def of_batch(self, batch: Batch) -> Columns:
+        """Compute errors from the smallest d'; they are at least those of equal brightness, if known."""
+        columns: Columns = {}
+        for pair in class_pairs(list(batch.states)) if batch.any_brightness else ():
+            error = error_of(batch.columns[pair_name(CHROMATIC_DPRIME, pair)])
+            equal = batch.columns.get(pair_name(ERROR, pair))
             columns[pair_name(CHROMATIC_ERROR, pair)] = error if equal is None else np.maximum(error, equal)
         return columns

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
 
-from ...base.types import FloatArray, MemberNumbers, PerDesign
+from ...base.types import Array, Float, PerDesign
 from ...camera.noise import errors
 from ...camera.readout import NoisyReadout
 from ...spectra.lights import Pair, class_pairs, pair_name
@@ -23,7 +23,7 @@ from ..discrimination import (
 )
 from ..metric import Metric
 from ..quantity import Columns, Quantity, RequestedQuantities
-from ..smooth_noise import bound_rows, error_decades, pair_rows
+from ..smooth_noise import error_decades, pair_rows
 
 CNR, D_PRIME, ERROR, ERROR_BOUND = "cnr", "dprime", "error", "error_bound"
 STATE_ERROR, STATE_ERROR_BOUND = "state_error", "state_error_bound"
@@ -32,14 +32,14 @@ _MEANINGS = {
     D_PRIME: "smallest distance in units of the noise (d') over the pairs of two types: the Mahalanobis distance "
     "that is discussed for IEEE P2020",
     ERROR: "largest probability that noise turns a signal of one of two types into one of the other, pair by pair; "
-    "in a patch of few pixels within 6.5 % of the exact sum over digital numbers",
+    "in a patch of few pixels within 6.5 % of the exact sum over digital numbers, of many the error of Gaussians",
     ERROR_BOUND: "bound on how often the best rule takes a signal of one of two types for the other, for the worst "
     "signal",
     STATE_ERROR: "error of the worst pair of states: how often noise makes one of two look like the other",
     STATE_ERROR_BOUND: "bound on how often the best rule misclassifies, for the worst signal",
 }
 _TOLD = {CNR: "contrast to noise", D_PRIME: "d'"}
-_ByPair = dict[Pair, FloatArray]
+_ByPair = dict[Pair, Float[Array, "cases designs"]]
 _LESS = (ERROR, ERROR_BOUND, STATE_ERROR, STATE_ERROR_BOUND)
 
 
@@ -62,33 +62,31 @@ class Confusion(Metric):
             *(_quantity(metric, metric, requested.states) for metric in (STATE_ERROR, STATE_ERROR_BOUND)),
         )
 
-    def of_batch(self, batch: Batch) -> Columns:
-        """Compute exact sums over the digital numbers of a few pixels, else Gaussian errors or bounds."""
+    def of_cases(self, batch: Batch) -> Columns:
+        """Compute exact sums over the digital numbers of a few pixels, else Gaussian errors, and bounds beside both."""
         if not batch.noisy:
             return {}
         read, members = batch.read_with_noise, batch.confused
         mean, variance, _ = NoiseShape.of_cases(read)
-        error, bound, state_bound = _errors(batch, members)
-        columns: Columns = {}
+        exact = _exact(batch)
+        columns = _gaussian_bounds(batch) if exact is None and batch.bounds else _exact_bounds(exact or [])
+        errors: _ByPair = {}
         for pair in class_pairs(list(members)):
-            pair_members = members[pair[0]], members[pair[1]]
-            for metric, quantity in ((CNR, contrast_to_noise), (D_PRIME, detectability)):
-                values = quantity(mean, variance, *pair_members)
-                columns[pair_name(metric, pair)] = values.reshape(read.mean.shape[:2]).min(axis=1)
-            columns[pair_name(ERROR, pair)] = error[pair]
-            columns[pair_name(ERROR_BOUND, pair)] = bound[pair]
-        columns[STATE_ERROR] = np.max(list(error.values()), axis=0)
-        columns[STATE_ERROR_BOUND] = state_bound
+            of_pair = mean, variance, members[pair[0]], members[pair[1]]
+            columns[pair_name(CNR, pair)] = _in_cases(contrast_to_noise(*of_pair), read)
+            columns[pair_name(D_PRIME, pair)] = _in_cases(detectability(*of_pair), read)
+            if exact is None:
+                errors[pair] = _in_cases(pairwise_error(*of_pair), read)
+            else:
+                errors[pair] = np.array([case.error[pair] for case in exact])
+            columns[pair_name(ERROR, pair)] = errors[pair]
+        columns[STATE_ERROR] = np.max(list(errors.values()), axis=0)
         return columns
 
 
 def _quantity(metric: str, name: str, types: tuple[str, ...]) -> Quantity:
-    less, pairs = metric in _LESS, class_pairs(types)
-    if metric in (ERROR_BOUND, STATE_ERROR_BOUND):
-        smooth = partial(bound_rows, types=types)
-    else:
-        of = {CNR: contrast, D_PRIME: dprime}.get(metric, error_decades)
-        smooth = partial(pair_rows, of=of, pairs=pairs, squared=not less)
+    less, pairs, is_bound = metric in _LESS, class_pairs(types), metric in (ERROR_BOUND, STATE_ERROR_BOUND)
+    of = {CNR: contrast, D_PRIME: dprime}.get(metric, error_decades)
     return Quantity(
         name=name,
         metric=metric,
@@ -97,21 +95,18 @@ def _quantity(metric: str, name: str, types: tuple[str, ...]) -> Quantity:
         states=types,
         label=f"{'/'.join(types)} {_TOLD[metric]}" if metric in _TOLD else "",
         direction="less" if less else "more",
-        goal=True,
+        goal=not is_bound,
+        constrained=not is_bound,
         nominal=True,  # each shift would take an evaluation with noise
         infinite=True,  # signals without noise are separated with certainty
         scale="log10" if less else "squared",
         distance_kind="noise" if metric == D_PRIME else "",
-        smooth=smooth,
+        smooth=None if is_bound else partial(pair_rows, of=of, pairs=pairs, squared=not less),
     )
 
 
-def state_errors(batch: Batch) -> PerDesign:
-    """Return the error of the worst pair of states alone."""
-    exact, members = _exact(batch), batch.confused
-    if exact is not None:
-        return np.asarray(np.max([error for case in exact for error in case.error.values()], axis=0), dtype=float)
-    return np.asarray(np.max(list(_gaussian(batch.read_with_noise, members).values()), axis=0), dtype=float)
+def _in_cases(values: PerDesign, read: NoisyReadout) -> Float[Array, "cases designs"]:
+    return values.reshape(read.mean.shape[:2]).T
 
 
 def _exact(batch: Batch) -> list[errors.Errors] | None:
@@ -125,27 +120,18 @@ def _exact(batch: Batch) -> list[errors.Errors] | None:
     return [errors.errors(case, pixels, readout.pixel, batch.confused, light) for case in electrons]
 
 
-def _gaussian(read: NoisyReadout, members: Mapping[str, MemberNumbers]) -> _ByPair:
-    """Return the error of each pair, Gaussian or a bound: the largest over the cases."""
-    mean, variance, shape = NoiseShape.of_cases(read)
-    return {
-        (a, b): pairwise_error(mean, variance, members[a], members[b], shape).reshape(read.mean.shape[:2]).max(axis=1)
-        for a, b in class_pairs(list(members))
-    }
+def _exact_bounds(exact: Sequence[errors.Errors]) -> Columns:
+    """Return the bounds of exact sums in each case."""
+    if not exact:
+        return {}
+    columns = {pair_name(ERROR_BOUND, pair): np.array([case.bound[pair] for case in exact]) for pair in exact[0].bound}
+    return columns | {STATE_ERROR_BOUND: np.array([case.state_bound for case in exact])}
 
 
-def _errors(batch: Batch, members: Mapping[str, MemberNumbers]) -> tuple[_ByPair, _ByPair, PerDesign]:
-    """Return error and bound of each pair, and the bound of all states, the largest over the cases."""
-    exact, pairs = _exact(batch), class_pairs(list(members))
-    if exact is not None:
-        return (
-            {pair: np.max([errors.error[pair] for errors in exact], axis=0) for pair in pairs},
-            {pair: np.max([errors.bound[pair] for errors in exact], axis=0) for pair in pairs},
-            np.max([errors.state_bound for errors in exact], axis=0),
-        )
+def _gaussian_bounds(batch: Batch) -> Columns:
+    """Return the bounds of many pixels in each case."""
     read = batch.read_with_noise
     mean, variance, shape = NoiseShape.of_cases(read)
-    bounds, state_bound = error_bounds(mean, variance, members, shape)
-    cases = read.mean.shape[:2]
-    bound = {pair: values.reshape(cases).max(axis=1) for pair, values in bounds.items()}
-    return _gaussian(read, members), bound, state_bound.reshape(cases).max(axis=1)
+    bounds, state_bound = error_bounds(mean, variance, batch.confused, shape)
+    columns = {pair_name(ERROR_BOUND, pair): _in_cases(values, read) for pair, values in bounds.items()}
+    return columns | {STATE_ERROR_BOUND: _in_cases(state_bound, read)}

@@ -21,8 +21,7 @@ PIXEL_CSD, CHROMATIC_PIXEL_CSD = "pixel_csd", "chromatic_pixel_csd"
 _BY_PIXEL = {CSD: PIXEL_CSD, CHROMATIC_CSD: CHROMATIC_PIXEL_CSD}
 _COUNTED = (
     "with each channel counted as often as it has pixels (per four pixels, those of RGGB's tile), and not once: the "
-    "mean of two pixels has half the variance of one; where phases, field positions or moments count, the smallest "
-    "over their lattice"
+    "mean of two pixels has half the variance of one"
 )
 _ONCE = ColorSeparation()
 
@@ -51,11 +50,9 @@ class PixelSeparation(Metric):
                 columns[pair_name(CHROMATIC_PIXEL_CSD, pair)] = closed
         return columns
 
-    def of_batch(self, batch: Batch) -> Columns:
-        """Compute columns that have no closed form from brightness curves."""
-        closed = {pair: batch.columns[pair_name(CHROMATIC_PIXEL_CSD, pair)] for pair in batch.pairs}
-        found = completed(closed, batch.over_brightness_by_pixel)
-        return {pair_name(CHROMATIC_PIXEL_CSD, pair): distances for pair, distances in found.items()}
+    def of_cases(self, batch: Batch) -> Columns:
+        """Compute columns of designs that have no closed form from brightness curves."""
+        return completed(batch, CHROMATIC_PIXEL_CSD, "pixel")
 
 
 def _by_pixel(once: Quantity) -> Quantity:

@@ -51,7 +51,7 @@ class Probabilities(Metric):
             for pair in class_pairs(requested.states)
         )
 
-    def of_batch(self, batch: Batch) -> Columns:
+    def of_cases(self, batch: Batch) -> Columns:
         """Compute the columns from mean and variance of the digital numbers."""
         if not (batch.noisy and batch.probabilities):
             return {}
@@ -60,7 +60,7 @@ class Probabilities(Metric):
         for pair in class_pairs(list(members)):
             pair_members = members[pair[0]], members[pair[1]]
             detected = detection(mean - batch.setup.camera.pixel.offset_dn, variance, *pair_members)
-            columns[pair_name(CTA, pair)] = detected.reshape(read.mean.shape[:2]).min(axis=1)
+            columns[pair_name(CTA, pair)] = detected.reshape(read.mean.shape[:2]).T
         return columns
 
 
