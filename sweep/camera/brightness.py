@@ -93,11 +93,12 @@ class LampReadings:
         """True for lamps that fill a pixel of any channel, of an HDR pixel all its captures."""
         lit_e, dark_e = self.full_e
         full = np.zeros(self.n_signals, dtype=bool)
-        for curve, at in self.pixel_curves():
+        for curve, at in self.pixel_curves:
             seen = at[self.readout.weights[0].max(axis=1)[at] > _SEEN * self.readout.weights[0].max()]
             full |= (lit_e[:, seen] + dark_e[seen] >= curve.knees_e[-1]).any(axis=1)
         return full
 
+    @cached_property
     def pixel_curves(self) -> list[tuple[PixelCurve, Int[IndexArray, " _"]]]:
         """Return what pixels read over their electrons, for groups of elements."""
         return [(pixel_curve(self.readout.pixel, light, noisy=self.noisy), at) for light, at in groups_of(self.light)]
@@ -110,7 +111,7 @@ class LampReadings:
             return self.moments(signals, factors)[0]
         if self.noisy:
             return self._of_table(signals, factors, spread=False)[0]
-        full_e, curves = self._full_e_at(signals, factors), self.pixel_curves()
+        full_e, curves = self._full_e_at(signals, factors), self.pixel_curves
         mean = curves[0][0].mean(full_e)
         for curve, at in curves[1:]:
             mean[..., at] = curve.mean(full_e[..., at])
@@ -145,7 +146,7 @@ class LampReadings:
         (lit_e, dark_e), weights = self.full_e, (self.readout.weights[0], self.readout.spread_weights[0])
         shape = (*factors.shape, weights[0].shape[1])
         mean, variance = np.zeros(shape), np.zeros(shape if spread else (0, *shape[1:]))
-        for curve, at in self.pixel_curves():
+        for curve, at in self.pixel_curves:
             of_pixels = weights[0][at], weights[1][at]
             curve.table.add_moments(lit_e[signals][:, at], dark_e[at], factors, of_pixels, mean, variance)
         return mean, variance
@@ -160,7 +161,7 @@ class LampReadings:
         lit_e, dark_e = self.full_e
         full_e = lit_e[signals] * factors[:, None] + dark_e
         by_mean, by_variance = np.empty(full_e.shape), np.empty(full_e.shape)
-        for curve, at in self.pixel_curves():
+        for curve, at in self.pixel_curves:
             by_mean[:, at], by_variance[:, at] = curve.slopes(full_e[:, at])
         return by_mean, by_variance
 
@@ -207,7 +208,7 @@ class LampReadings:
         weights = self.readout.weights[0]
         seen = weights.max(axis=1) > _SEEN * weights.max()
         lit_e, dark_e = lit_e[:, seen], dark_e[seen]
-        curves = [(curve, np.flatnonzero(np.isin(np.flatnonzero(seen), at))) for curve, at in self.pixel_curves()]
+        curves = [(curve, np.flatnonzero(np.isin(np.flatnonzero(seen), at))) for curve, at in self.pixel_curves]
         brightest_e = np.maximum(lit_e.max(axis=1, keepdims=True), 1e-300)
         full, knees, around = [], [], []
         deviations = np.linspace(-_AROUND_KNEE, _AROUND_KNEE, 4 * _AROUND_KNEE * steps + 1)

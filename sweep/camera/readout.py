@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.types import Array, Bool, BoolArray, DesignCases, DesignPixels, Float, IndexArray, Int, PerDesign, SameShape
 from .noise import merge, table
-from .noise.pixel_curve import groups_of, pixel_curve, same_electrons
+from .noise.pixel_curve import PixelCurve, groups_of, pixel_curve, same_electrons
 from .noise.rounding import DITHERED_DN, MANY_STEPS, rounded
 from .pixel import Pixel, unquantized
 from .response import PixelResponse
@@ -136,18 +136,35 @@ class Readout:
 
     def _merged_means(self, electrons: Float[Array, "captures designs cases signals pixels"]) -> DesignPixels:
         """Return means of merged values: from a table where exposures have their fixed share of the electrons."""
-        light = self.capture_light_of(electrons)
-        full_e = electrons[0] / light[0]
-        if not all(
-            same_electrons(of_one, full_e, share)
-            for of_one, share in zip(electrons[1:], self.capture_light[1:], strict=True)
-        ):
-            return merge.merged(electrons, light, self.pixel).mean
-        (first, _), *others = groups_of(self.capture_light)
-        means = pixel_curve(self.pixel, first, noisy=True).mean(full_e)
-        for of_elements, at in others:
-            means[..., at] = pixel_curve(self.pixel, of_elements, noisy=True).mean(full_e[..., at])
+        if (full_e := self._full_e(electrons)) is None:
+            return merge.merged(electrons, self.capture_light_of(electrons), self.pixel).mean
+        means = np.empty(full_e.shape)
+        for curve, at in self._curves:
+            means[..., at] = curve.mean(full_e[..., at])
         return means
+
+    def _merged_moments(
+        self, electrons: Float[Array, "captures designs cases signals pixels"]
+    ) -> tuple[DesignPixels, DesignPixels]:
+        """Return means and variances of merged values, from where means are."""
+        if (full_e := self._full_e(electrons)) is None:
+            values = merge.merged(electrons, self.capture_light_of(electrons), self.pixel)
+            return values.mean, values.variance
+        means, variances = np.empty(full_e.shape), np.empty(full_e.shape)
+        for curve, at in self._curves:
+            means[..., at], variances[..., at] = curve.moments(full_e[..., at])
+        return means, variances
+
+    @property
+    def _curves(self) -> list[tuple[PixelCurve, Int[IndexArray, " _elements"]]]:
+        """What groups of elements with the same light read over the electrons of a pixel of full sensitivity."""
+        return [(pixel_curve(self.pixel, light, noisy=True), at) for light, at in groups_of(self.capture_light)]
+
+    def _full_e(self, electrons: Float[Array, "captures designs cases signals pixels"]) -> DesignPixels | None:
+        """Return electrons of a pixel of full sensitivity; None where exposures have no fixed share of them."""
+        full_e = electrons[0] / self.capture_light_of(electrons)[0]
+        shares = zip(electrons[1:], self.capture_light[1:], strict=True)
+        return full_e if all(same_electrons(of_one, full_e, share) for of_one, share in shares) else None
 
     def capture_light_of(self, electrons: Float[Array, "captures ... pixels"]) -> Float[Array, "captures ... pixels"]:
         """Return the relative light of exposures, broadcast to their electrons."""
@@ -180,9 +197,9 @@ class Readout:
         `electrons`: expected electrons; elements are pixels. Of an HDR pixel those of each exposure, on the first axis.
         """
         if self.pixel.captures:
-            merged = merge.merged(electrons, self.capture_light_of(electrons), self.pixel)
-            mean, variance = self.folded(self._merged_means(electrons)), self.spread(merged.variance)
-            return (mean, variance, *self._shape_of_merged(merged, electrons, variance))
+            mean, variance = self._merged_moments(electrons)
+            spread = self.spread(variance)
+            return (self.folded(mean), spread, *self._shape_of_merged(electrons, spread))
         dn, variance_dn = self.transfer(electrons), self.variance_dn(electrons)
         # A digital number that is the same in all but one of a billion readouts: what is left of its noise is
         # rounding of the arithmetic, by which two signals would seem separated with certainty.
@@ -224,14 +241,11 @@ class Readout:
         return is_gaussian(variance, heaviest, cut, self.pixel), reach_dn(electrons, self.pixel) * heaviest
 
     def _shape_of_merged(
-        self,
-        pixels: merge.Merged,
-        electrons: Float[Array, "captures designs cases signals pixels"],
-        variance: DesignCases,
+        self, electrons: Float[Array, "captures designs cases signals pixels"], variance: DesignCases
     ) -> tuple[Bool[BoolArray, "designs cases signals channels"], DesignCases]:
         """Return `gaussian` and `reach_dn` of `NoisyReadout` for HDR pixels."""
         light = self.capture_light_of(electrons)
-        gaussian, reach_dn = merge.shape_of_noise(electrons, light, self.pixel, pixels.certain)
+        gaussian, reach_dn = merge.shape_of_noise(electrons, light, self.pixel)
         others = self._weighed((~gaussian).astype(float), (self.weights > 0).astype(float))
         return others == 0, reach_dn.max(axis=-1, keepdims=True) * self._heaviest(variance)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -50,11 +51,13 @@ def evaluate(
     family: Family | None = None,
     points: DesignParameters | None = None,
     images: SeededVision | None = None,
+    refined: Collection[str] | None = None,
 ) -> Columns:
     """Evaluate a batch of designs as the camera reads them out.
 
     `metrics`: those whose columns are wanted, beside the CSDs; `chromatic`: the pairs whose chromatic CSD is wanted;
-    left out, all of them; `points`: parameters of designs of the `family`, for the columns that these determine.
+    left out, all of them; `points`: parameters of designs of the `family`, for the columns that these determine;
+    `refined`: columns that are, and no others are wanted.
 
     CSDs are the smallest over sampling phases, field positions and moments of a pulse; ``best_phase_csd_<a>_<b>`` is
     the largest over the phases of the smallest over the moments. Where all phases or field positions count, distances
@@ -64,7 +67,7 @@ def evaluate(
     pairs = class_pairs(model.setup.lights.classes) if chromatic is None else chromatic
     needs = {metric.needs for metric in metrics} if states else set()
     wanted = "noise" in needs, "any brightness" in needs
-    batch = Batch(model, block, states, tuple(pairs), probabilities, family, points, images, *wanted)
+    batch = Batch(model, block, states, tuple(pairs), probabilities, family, points, images, *wanted, refined is None)
     others = [metric for metric in metrics if not isinstance(metric, ColorSeparation | UserColumns)]
     of_readings = [_CSD, *others, *map(UserColumns, user_metrics)]
     requested = RequestedQuantities(
@@ -81,77 +84,80 @@ def evaluate(
     quantities = quantities_of(requested)
     batch.columns = over_cases(model, batch.by_case, quantities) | {EXPOSURE: batch.exposure_s}
     if can_refine(model.setup):
-        for sought in (_of_readings(batch, readings, of_readings), _under_noise(batch, others)):
-            refine(sought, model, batch.by_case, batch.columns, quantities)
-        refine(_of_any_brightness(batch), batch.bright_model, batch.by_case, batch.columns, quantities)
+        wanted_names = frozenset(batch.by_case if refined is None else refined)
+        for sought, of in (
+            (_of_readings(batch, readings, of_readings, wanted_names), model),
+            (_under_noise(batch, others, wanted_names), model),
+            (_of_any_brightness(batch, wanted_names), batch.bright_model),
+        ):
+            refine(sought, of, batch.by_case, batch.columns, quantities)
     # Last those of any brightness: their errors are at least those of equal brightness.
     for metric in sorted(others, key=lambda metric: metric.needs == "any brightness"):
         batch.columns |= metric.of_batch(batch)
     return batch.columns
 
 
-def _of_readings(batch: Batch, names: Sequence[str], metrics: Sequence[Metric]) -> list[Sought]:
+def _of_readings(batch: Batch, names: Sequence[str], metrics: Sequence[Metric], wanted: frozenset[str]) -> list[Sought]:
     """Return what is sought of each design's readings; chromatic distances where they have a closed form."""
     csds = {csd_name(pair) for pair in class_pairs(batch.setup.lights.classes)}
 
     def read(design: int, model: SceneModel) -> Columns:
-        return _by_case(batch.of(model, design), metrics)
+        return _by_case(replace(batch.of(model, design), noisy=False), metrics)
 
     sought = []
-    for design in batch.finite:
+    for design in batch.finite if wanted & set(names) else ():
         walked = {
             pair_name(CHROMATIC[kind], pair) for kind in CHROMATIC for pair in batch.walks.get((design, kind), {})
         }
-        own = tuple(name for name in names if name not in walked)
+        own = tuple(name for name in names if name in wanted and name not in walked)
         best = tuple(number for number, name in enumerate(own) if name in csds)
-        sought.append(Sought(design, batch.exposure_s[design], own, partial(read, design), fine=True, best=best))
+        if own:
+            sought.append(Sought(design, batch.exposure_s[design], own, partial(read, design), fine=True, best=best))
     return sought
 
 
-def _under_noise(batch: Batch, metrics: Sequence[Metric]) -> list[Sought]:
+def _under_noise(batch: Batch, metrics: Sequence[Metric], wanted: Collection[str]) -> list[Sought]:
     """Return what is sought of each design under noise: contrasts and errors, not the bounds on them."""
-    if not batch.noisy:
-        return []
-    noisy = [metric for metric in metrics if metric.needs == "noise"]
+    noisy = [metric for metric in metrics if metric.needs == "noise"] if batch.noisy else []
 
     def read(design: int, model: SceneModel) -> Columns:
         at = batch.of(model, design)
         return {name: values for metric in noisy for name, values in metric.of_cases(at).items()}
 
     pairs = class_pairs(list(batch.states))
-    names = (*(pair_name(metric, pair) for metric in (CNR, D_PRIME, ERROR) for pair in pairs), STATE_ERROR)
-    return [Sought(design, batch.exposure_s[design], names, partial(read, design)) for design in batch.finite]
+    known = (*(pair_name(metric, pair) for metric in (CNR, D_PRIME, ERROR) for pair in pairs), STATE_ERROR)
+    names = tuple(name for name in known if noisy and name in wanted)
+    return [Sought(design, batch.exposure_s[design], names, partial(read, design)) for design in batch.finite if names]
 
 
-def _of_any_brightness(batch: Batch) -> list[Sought]:
+def _of_any_brightness(batch: Batch, wanted: Collection[str]) -> list[Sought]:
     """Return what is sought of each two types of lamps of any brightness in a design, each for itself."""
+
+    def read(design: int, kind: DistanceKind, name: str, walk: Walk, model: SceneModel) -> Columns:
+        return {name: batch.followed(model, design, kind, walk)[:, None]}
+
     sought = []
     for (design, kind), walks in batch.walks.items():
         for pair, walk in walks.items():
             name = pair_name(CHROMATIC[kind], pair)
-
-            def read(
-                model: SceneModel, of: tuple[int, DistanceKind, str, Walk] = (design, kind, name, walk)
-            ) -> Columns:
-                design, kind, name, walk = of
-                return {name: batch.followed(model, design, kind, walk)[:, None]}
-
-            if walk.distances.min() > 0:
-                sought.append(Sought(design, batch.exposure_s[design], (name,), read))
+            if name in wanted and walk.distances.min() > 0:
+                of_pair = partial(read, design, kind, name, walk)
+                sought.append(Sought(design, batch.exposure_s[design], (name,), of_pair))
     return sought
 
 
 def evaluate_some(
     model: SceneModel, curves: DesignCurves, quantities: Sequence[Quantity], states: Sequence[str]
 ) -> dict[str, float]:
-    """Return quantities of one design, by no more metrics than they need."""
-    wanted = {quantity.metric for quantity in quantities}
-    if CHROMATIC_ERROR in wanted:
-        wanted.add(ERROR)  # the least of it
+    """Return quantities of one design, by no more than they need."""
+    metrics, names = {quantity.metric for quantity in quantities}, {quantity.name for quantity in quantities}
+    if CHROMATIC_ERROR in metrics:  # that of the smallest d', and at least that of equal brightness
+        metrics.add(ERROR)
+        names |= {name.replace(CHROMATIC_ERROR, of) for name in names for of in (CHROMATIC_DPRIME, ERROR)}
     requested = RequestedQuantities(model.setup.lights.classes, tuple(states), flicker=True)
-    owners = [metric for metric in METRICS if wanted & {of.metric for of in metric.quantities(requested)}]
+    owners = [metric for metric in METRICS if metrics & {of.metric for of in metric.quantities(requested)}]
     chromatic = [quantity.pair for quantity in quantities if quantity.metric in CHROMATIC.values() and quantity.pair]
-    columns = evaluate(model, curves, states, metrics=owners, chromatic=chromatic)
+    columns = evaluate(model, curves, states, metrics=owners, chromatic=chromatic, refined=names)
     return {quantity.name: float(columns[quantity.name][0]) for quantity in quantities}
 
 

@@ -62,7 +62,10 @@ class PlanFacts(_Facts):
 
 
 class CheckFacts(_Facts):
-    """Rows of a run that were compared with the reference settings; the largest difference of a CSD, and where."""
+    """Rows of a run that were compared with the reference settings: the largest difference of a separation, and where.
+
+    `other`: the column not in DN that differs most of what is allowed, `largest_share` by how much, relative.
+    """
 
     rows: int
     design_id: int
@@ -70,21 +73,28 @@ class CheckFacts(_Facts):
     quantity: str
     largest_dn: float
     allowed_dn: float
+    other: str = ""
+    largest_share: float = 0.0
+    allowed_share: float = 1.0
 
     @property
     def passed(self) -> bool:
         """True if no difference is larger than allowed, except for rounding of the arithmetic."""
-        return self.largest_dn <= self.allowed_dn * (1 + 1e-9) + 1e-9
+        in_dn = self.largest_dn <= self.allowed_dn * (1 + 1e-9) + 1e-9
+        return in_dn and self.largest_share <= self.allowed_share
 
     @property
     def sentence(self) -> str:
         """Result in words."""
         rows = "1 row differs" if self.rows == 1 else f"{self.rows:,} rows differ"
         where = f"{self.quantity} of design {self.design_id} in {self.scenario}"
-        return (
+        said = (
             f"Checked: {rows} from the reference settings by at most {self.largest_dn:.2g} DN ({where}; "
-            f"allowed {self.allowed_dn:.3g} DN)."
+            f"allowed {self.allowed_dn:.3g} DN)"
         )
+        if self.largest_share > self.allowed_share:
+            said += f", and by {self.largest_share:.2%} in {self.other} (allowed {self.allowed_share:.2%})"
+        return f"{said}."
 
 
 class SearchFacts(_Facts):

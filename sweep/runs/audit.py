@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Hashable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -25,15 +26,16 @@ from .check import compared_rows
 
 _SHARE = 0.01
 """Share of the rows that are audited beside the front, plain CFAs and named designs."""
-_COLUMNS = ("design_id", "filter_id", "scenario", "plan", "allowed_dn", "realized_dn", "quantity")
+_KEYS = ("design_id", "filter_id", "scenario", "plan")
+_COLUMNS = (*_KEYS, "allowed_dn", "realized_dn", "quantity", "allowed_share", "realized_share", "other")
 
 
 @dataclass(frozen=True)
 class Audit:
     """Result of an audit.
 
-    `rows`: a row per audited design with its id, scenario and plan, the largest error of any CSD, the error that is
-    allowed, DN, and the column that has the largest error. `n_designs`: of the whole run.
+    `rows`: a row per audited design with its id, scenario and plan, the largest error of a separation, the error that
+    is allowed, DN, and the column that has it; the same of other columns, relative. `n_designs`: of the whole run.
     """
 
     rows: pd.DataFrame
@@ -42,7 +44,8 @@ class Audit:
     @property
     def broken(self) -> pd.DataFrame:
         """Rows whose error is larger than allowed, or not a number; rounding of the arithmetic is not counted."""
-        return self.rows[~(self.rows["realized_dn"] <= self.rows["allowed_dn"] * (1 + 1e-9) + 1e-9)]
+        in_dn = self.rows["realized_dn"] <= self.rows["allowed_dn"] * (1 + 1e-9) + 1e-9
+        return self.rows[~(in_dn & (self.rows["realized_share"] <= self.rows["allowed_share"]))]
 
     @property
     def lines(self) -> list[str]:
@@ -58,23 +61,23 @@ class Audit:
     @property
     def issues(self) -> list[ValidationIssue]:
         """The largest error of each scenario with errors that are too large."""
-        excess = self.broken.assign(excess=self.broken["realized_dn"].fillna(np.inf) - self.broken["allowed_dn"])
-        worst = excess.sort_values("excess", ascending=False).drop_duplicates("scenario")
-        return [
-            ValidationIssue(
-                f"design {row['design_id']}: {row['quantity']} is off by more than allowed",
-                key=str(row["scenario"]),
-                value=f"{row['realized_dn']:.6g} DN",
-                allowed=f"at most {row['allowed_dn']:.6g} DN",
-            )
-            for row in worst.to_dict("records")
-        ]
+        excess = self.broken["realized_dn"].fillna(np.inf) - self.broken["allowed_dn"]
+        worst = self.broken.assign(excess=excess).sort_values("excess", ascending=False).drop_duplicates("scenario")
+        return [_issue(row) for row in worst.to_dict("records")]
 
     def answer(self, folder: Path) -> Answer:
         """Return the result of the audit of a run in a folder."""
         facts = {"folder": str(folder), "designs": self.n_designs, "rows": self.rows.to_dict("records")}
         problem = ErrorBoundExceededError(self.issues) if self.issues else None
         return Answer([*self.lines, f"Files: {folder}/: {AUDIT}."], facts, problem)
+
+
+def _issue(row: Mapping[Hashable, Any]) -> ValidationIssue:
+    column, realized, allowed = row["other"], f"{row['realized_share']:.3%}", f"{row['allowed_share']:.3%}"
+    if not row["realized_dn"] <= row["allowed_dn"] * (1 + 1e-9) + 1e-9:
+        column, realized, allowed = row["quantity"], f"{row['realized_dn']:.6g} DN", f"{row['allowed_dn']:.6g} DN"
+    problem = f"design {row['design_id']}: {column} is off by more than allowed"
+    return ValidationIssue(problem, key=str(row["scenario"]), value=realized, allowed=f"at most {allowed}")
 
 
 def sampled(table: pd.DataFrame, on_front: Collection[int]) -> pd.DataFrame:

@@ -15,18 +15,22 @@ import pyarrow.parquet as pq
 
 from ..base.types import delayed
 from ..camera.accuracy import REFERENCE
-from ..camera.model import SceneModel
 from ..camera.setup import Setup
+from ..designs.block import CurveBlock
 from ..designs.space import Space
-from ..metrics.columns.chromatic import CHROMATIC_CSD, ChromaticSeparation
-from ..metrics.evaluate import evaluate
-from ..metrics.quantity import WORST_CASE
+from ..metrics.columns.chromatic import CHROMATIC_CSD
+from ..metrics.columns.color_separation import CSD
+from ..metrics.places import oriented
+from ..metrics.quantity import DN, Quantity
+from ..metrics.registry import METRICS
 from ..results.dataset import part_paths
 from ..results.designs import row_space
 from ..results.facts import CheckFacts
 from ..results.tables import word_mask
+from ..spectra.lights import class_pairs, pair_name
 from ..study import Study
-from .routes import text_of, worst_cases
+from .routes import Rules, Wanted, columns_of_points, text_of
+from .rows import rules_of
 from .workers import Workers
 
 _AT_ONCE = 64
@@ -34,65 +38,109 @@ _AT_ONCE = 64
 _MOST_ROWS, _ENOUGH_ROWS = 200, 5000
 """Rows of a check at the end of a run, at most; parts are read until they have so many to choose from."""
 
+_SHARE, _SAME = 1e-2, 1e-6
+"""Difference of a column that is allowed, relative: of one that is not in DN, and of one that no light determines."""
+_CHROMATIC_SHARE = 1e-3
+"""The same of distances of lamps of any brightness, beside the tolerance."""
+_IMAGES = "images"
+"""What metrics need that are drawn by the study's seed alone, and not compared."""
+
 Row = Mapping[str, Any]
 
 
 def compared_rows(study: Study, rows: Sequence[Row]) -> Iterator[list[dict[str, Any]]]:
     """Compare rows of the result table with the reference, one block of designs of a space and scene at a time.
 
-    Returns `design_id`, `filter_id`, `scenario`, `plan`, `allowed_dn`, `realized_dn` (largest difference of any CSD,
-    infinite if only one is a number), and its `quantity`.
+    Returns `design_id`, `filter_id`, `scenario`, `plan`; `quantity`, `realized_dn`, `allowed_dn`: of columns in DN, the
+    one whose difference is the largest part of what is allowed, infinite if only one is a number; `other`,
+    `realized_share`, `allowed_share`: the same of other columns, relative, of errors of the d' that stands for them.
     """
     groups: dict[tuple[int, str], tuple[Space, list[Row]]] = {}
     for row in rows:
         space = row_space(study, row)
         groups.setdefault((id(space), row["scenario"]), (space, []))[1].append(row)
+    rules = rules_of(study)
     for (_, scenario), (space, group) in groups.items():
         for start in range(0, len(group), _AT_ONCE):
-            yield _compared(study, space, scenario, group[start : start + _AT_ONCE])
+            yield _compared(study, rules, space, scenario, group[start : start + _AT_ONCE])
 
 
-def _compared(study: Study, space: Space, scenario: str, rows: Sequence[Row]) -> list[dict[str, Any]]:
+def _compared(study: Study, rules: Rules, space: Space, scenario: str, rows: Sequence[Row]) -> list[dict[str, Any]]:
     points = np.array([[row[name] for name in space.parameters] for row in rows], dtype=float)
     setup = study.setup(space, scenario)
-    model = SceneModel(replace(setup.with_all_effects, accuracy=REFERENCE))
-    # Chromatic distances are the worst of the lattice alone, which differs between settings.
-    of_lattice = setup.all_phases or setup.all_heights or setup.scene.drive is not None
-    compared = [of for of in study.quantities.values() if of.metric == CHROMATIC_CSD and not of_lattice]
-    compared += [quantity for quantity in study.quantities.values() if quantity.has_error_bound]
-    csds = [quantity for quantity in compared if quantity.name in rows[0]]
-    chromatic = [of.pair for of in csds if of.metric == CHROMATIC_CSD and of.pair is not None]
-    nominal = evaluate(
-        model, space.curves(points, study.grid.size), metrics=[ChromaticSeparation()], chromatic=chromatic
+    reference = replace(setup.with_all_effects, accuracy=REFERENCE)
+    needs = {name: metric.needs for metric in METRICS for name in (q.name for q in metric.quantities(rules.requested))}
+    named = {name: of for name, of in rules.quantities.items() if name in rows[0]}
+    compared = {name: of for name, of in named.items() if needs.get(of.of or name) != _IMAGES}
+    wanted = Wanted.of(compared, rules.requested, rules.schema)
+    exact = columns_of_points(
+        space, points, CurveBlock(space.curves(points, study.grid.size)), reference, rules, wanted
     )
-    worst = [quantity for quantity in csds if quantity.extreme == WORST_CASE]
-    exact = {quantity.name: nominal[quantity.name] for quantity in csds if quantity not in worst}
-    if worst:
-        exact |= worst_cases(space, model, points, nominal, worst, study.tolerance)
-    differences = []
-    for name, values in exact.items():
-        stored = np.array([row[name] for row in rows], dtype=float)
-        # A column that the scene does not have is missing in both; one that is missing in one of them is an issue.
-        both_missing = np.isnan(stored) & np.isnan(values)
-        differences.append(np.nan_to_num(np.where(both_missing, 0.0, np.abs(values - stored)), nan=np.inf))
-    realized, names = np.stack(differences), list(exact)
-    allowed = _allowed_dn(setup, study.plans[scenario].tolerance_dn if study.plans else study.section.tolerance_dn)
-    return [
-        {key: row[key] for key in ("design_id", "filter_id", "scenario", "plan")}
-        | {"allowed_dn": allowed, "realized_dn": float(realized[at, index]), "quantity": names[at]}
-        for index, (row, at) in enumerate(zip(rows, realized.argmax(axis=0), strict=True))
-    ]
+    tolerance_dn = study.plans[scenario].tolerance_dn if study.plans else study.section.tolerance_dn
+    allowed_dn = _allowed_dn(setup, tolerance_dn)
+    result = [{key: row[key] for key in ("design_id", "filter_id", "scenario", "plan")} for row in rows]
+    in_dn = {name for name, of in compared.items() if of.unit == DN and of.pair is not None}
+    for (what, realized, allowed), names in (
+        (("quantity", "realized_dn", "allowed_dn"), in_dn & exact.keys()),
+        (("other", "realized_share", "allowed_share"), (compared.keys() - in_dn) & exact.keys()),
+    ):
+        for index, row in enumerate(rows):
+            differences = []
+            for name in sorted(names):
+                pair = row[name], float(exact[name][index])
+                if name in in_dn:
+                    more = _CHROMATIC_SHARE * abs(pair[1]) * (name.find("chromatic") >= 0)
+                    differences.append((_difference(*pair), allowed_dn + more, name))
+                else:
+                    bound = _allowed_share(compared[name], needs, row, allowed_dn)
+                    differences.append((_share(compared[name], *pair), bound, name))
+            worst = max(differences, key=lambda of: of[0] / of[1], default=(0.0, 1.0, ""))
+            result[index] |= dict(zip((realized, allowed, what), worst, strict=True))
+    return result
+
+
+def _difference(stored: float, exact: float) -> float:
+    """Return the difference of two values; a column that the scene does not have is missing in both."""
+    if stored == exact or (math.isnan(stored) and math.isnan(exact)):
+        return 0.0
+    difference = abs(stored - exact)
+    return math.inf if math.isnan(difference) else difference
+
+
+def _share(quantity: Quantity, stored: float, exact: float) -> float:
+    """Return the relative difference of two values, of errors that of the d' which stands for them."""
+    if quantity.scale == "log10" and not math.isnan(stored + exact):
+        stored, exact = oriented(quantity, np.array([stored, exact])).tolist()
+    difference = _difference(stored, exact)
+    size = max(abs(stored), abs(exact))
+    return difference / size if 0 < difference < math.inf else difference
+
+
+def _allowed_share(quantity: Quantity, needs: Mapping[str, str], row: Row, allowed_dn: float) -> float:
+    """Return the relative difference of a column that is no issue.
+
+    Of a figure of one pair under noise also that of its distance in DN which the tolerance allows.
+    """
+    if needs.get(quantity.of or quantity.name) in ("filters", "parameters"):
+        return _SAME
+    pairs = [quantity.pair] if quantity.pair is not None else class_pairs(quantity.states)
+    metric = CHROMATIC_CSD if "chromatic" in quantity.name else CSD
+    known = [row.get(pair_name(metric, pair), math.nan) for pair in pairs if quantity.states]
+    least = min((distance for distance in known if distance > 0), default=math.inf)
+    return _SHARE + allowed_dn / least
 
 
 def _allowed_dn(setup: Setup, tolerance_dn: float) -> float:
-    """Return the difference of a CSD from the reference that is no issue, DN.
+    """Return the difference of a separation from the reference that is no issue, DN.
 
     That is the tolerance. A readout in whole numbers without noise steps by up to sqrt(channels) DN between
-    neighboring samples: with images of a light, moments of a pulse or all field positions, that is added.
+    neighboring samples, and by 2 DN with every pixel counted: with images of a light, moments of a pulse or all field
+    positions, the larger one is added.
     """
     scene, steps = setup.scene, setup.scene.noise is None and setup.computes("quantization")
     sampled = scene.target is not None or scene.drive is not None or setup.all_heights
-    return tolerance_dn + (math.sqrt(len(setup.camera.mosaic.channels)) if steps and sampled else 0.0)
+    channels = len(setup.camera.mosaic.channels)
+    return tolerance_dn + (max(math.sqrt(channels), 2.0) if steps and sampled else 0.0)
 
 
 def check_run(study: Study, folder: Path, seconds: float, pool: Workers) -> tuple[CheckFacts | None, list[str]]:
@@ -110,9 +158,12 @@ def check_run(study: Study, folder: Path, seconds: float, pool: Workers) -> tupl
         warnings += issues
     if not rows:
         return None, warnings
-    shown = max(rows, key=lambda row: (row["realized_dn"] > row["allowed_dn"], row["realized_dn"]))
-    keys = {key: shown[key] for key in ("design_id", "scenario", "quantity", "allowed_dn")}
-    return CheckFacts(rows=len(rows), largest_dn=shown["realized_dn"], **keys), warnings
+    of_dn = max(rows, key=lambda row: (row["realized_dn"] > row["allowed_dn"], row["realized_dn"]))
+    of_share = max(rows, key=lambda row: row["realized_share"] / row["allowed_share"])
+    keys = {key: of_dn[key] for key in ("design_id", "scenario", "quantity", "allowed_dn")}
+    keys |= {key: of_share[key] for key in ("other", "allowed_share")}
+    largest = {"largest_dn": of_dn["realized_dn"], "largest_share": of_share["realized_share"]}
+    return CheckFacts(rows=len(rows), **largest, **keys), warnings
 
 
 def _checked(study: Study, rows: Sequence[Row], seconds: float) -> tuple[list[dict[str, Any]], list[str]]:

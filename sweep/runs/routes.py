@@ -13,7 +13,7 @@ from ..base.types import DesignNumbers, DesignParameters
 from ..camera.model import SceneModel, scene_model
 from ..camera.plan import Plan
 from ..camera.setup import Setup
-from ..designs.block import CurveBlock, edges_of_some
+from ..designs.block import Block, CurveBlock, edges_of_some
 from ..designs.space import Space
 from ..designs.tolerance import AS_DESIGNED, NONE, Tolerance
 from ..metrics.bound import Bound
@@ -127,10 +127,16 @@ def text_of(error: Exception) -> str:
 
 def _columns(space: Space, numbers: DesignNumbers, setup: Setup, rules: Rules, wanted: Wanted) -> Columns:
     """Return the quantities of a block of designs."""
-    size, requested, points = setup.camera.grid.size, rules.requested, space.points_of(numbers)
-    model = scene_model(setup)
-    edges = edges_of_some(space, numbers)
-    designs = CurveBlock(space.curves(points, size)) if edges is None else edges
+    points, edges = space.points_of(numbers), edges_of_some(space, numbers)
+    designs = CurveBlock(space.curves(points, setup.camera.grid.size)) if edges is None else edges
+    return columns_of_points(space, points, designs, setup, rules, wanted)
+
+
+def columns_of_points(
+    space: Space, points: DesignParameters, designs: Block, setup: Setup, rules: Rules, wanted: Wanted
+) -> Columns:
+    """Return the quantities of designs of a space."""
+    model, requested = scene_model(setup), rules.requested
     columns = evaluate(
         model,
         designs,

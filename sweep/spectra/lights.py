@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -17,9 +17,17 @@ Pair = tuple[str, str]
 """Two signal types."""
 
 
+_COLORS = ("green", "yellow", "orange", "red")
+
+
 def class_pairs(classes: Sequence[str]) -> tuple[Pair, ...]:
     """Return all unordered pairs of signal types."""
     return tuple(combinations(classes, 2))
+
+
+def in_order(types: Iterable[str]) -> list[str]:
+    """Return signal types in the order in which columns name them: colors of signals, then others by name."""
+    return sorted(types, key=lambda kind: (_COLORS.index(kind) if kind in _COLORS else len(_COLORS), kind))
 
 
 def pair_name(what: str, pair: Pair) -> str:
@@ -75,11 +83,13 @@ def make_lights(
     photon_ratio: float | None = None,
     surrogate: bool = False,
 ) -> Lights:
-    """Group photon spectra into a data set with equal photon counts.
+    """Group photon spectra into a data set with equal photon counts, type by type in the order of `in_order`.
 
     `photon_ratio`: K; left out, that of peak-normalized spectra; `surrogate`: True for modeled spectra. Raises
     DataError if a light has no photons on the grid.
     """
+    types_in_order = in_order({kind for _, kind, _ in signals})
+    signals = sorted(signals, key=lambda signal: types_in_order.index(signal[1]))
     photons = equal_photons(grid, np.stack([spectrum for _, _, spectrum in signals]))
     ratio = peak_normalized_ratio(grid, photons) if photon_ratio is None else photon_ratio
     names, types = tuple(n for n, _, _ in signals), tuple(t for _, t, _ in signals)

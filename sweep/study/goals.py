@@ -14,6 +14,7 @@ from ..camera.scene import WhitePatchExposure
 from ..designs.family import ChoosingFamily
 from ..designs.space import Space
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY, SENSITIVITY
+from ..metrics.objective import Objective
 from ..metrics.quantity import DN, OF_A_SHARE, WORST_CASE, Quantity, RequestedQuantities
 from ..metrics.registry import quantities_of
 from ..search.solver import ALGORITHMS, DIRECT, GRADIENT, ONE_START
@@ -30,6 +31,26 @@ _MOST_LIGHT = 10.0
 """Light of a modified channel over that of its base that anyone may want; larger bounds are percentages."""
 _LEAST_ERROR = 1e-12
 """Smallest error that is stated where errors are no exact sums."""
+
+
+def with_pairs_in_order(section: StudySection, requested: RequestedQuantities) -> StudySection:
+    """Return the study with the two types in names of its goals as columns name them: a pair has no order."""
+    every = replace(
+        requested, states=requested.classes, any_place=True, edge_shift=True, population=True, wanted_yield=1.0
+    )
+    known = quantities_of(every)
+    swapped = {}
+    for name, quantity in known.items():
+        if quantity.pair is not None:
+            first, second = quantity.pair
+            swapped[name.replace(f"_{first}_{second}", f"_{second}_{first}")] = name
+    swapped = {name: column for name, column in swapped.items() if name not in known}
+    rule, weights = section.objective.rule.name, section.objective.weights
+    objective = Objective(**{rule: {swapped.get(name, name): weight for name, weight in weights.items()}})
+    constraints = {swapped.get(name, name): bound for name, bound in section.constraints.items()}
+    if len(constraints) < len(section.constraints):
+        return section
+    return section.model_copy(update={"objective": objective, "constraints": constraints})
 
 
 def brightness_note(section: StudySection, requested: RequestedQuantities) -> str | None:

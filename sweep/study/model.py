@@ -30,7 +30,7 @@ from ..metrics.separation import csd_name
 from ..metrics.user_metrics import UserMetric
 from ..search.problem import Problem
 from ..spectra.colorants import Colorants
-from ..spectra.lights import Lights, Pair, class_pairs
+from ..spectra.lights import Lights, Pair, class_pairs, in_order
 from ..spectra.spectrum import WavelengthGrid
 from ..spectra.tasks import StudyTasks
 from ..vision.section import SeededVision
@@ -313,4 +313,4 @@ def requested_quantities(
 
 def _states(section: StudySection, lights: Lights) -> tuple[str, ...]:
     recognition = section.recognition
-    return () if recognition is None else tuple(recognition.states or lights.classes)
+    return () if recognition is None else tuple(in_order(recognition.states or lights.classes))

@@ -12,7 +12,7 @@ from ..metrics.quantity import RequestedQuantities
 from ..metrics.registry import quantities_of
 from ..metrics.user_metrics import UserMetric
 from . import checks
-from .goals import brightness_note, check_goals, check_searched, search_of
+from .goals import brightness_note, check_goals, check_searched, search_of, with_pairs_in_order
 from .lights import check_luminances, check_range, lights_of, with_light_files, with_population
 from .model import Search, Study, requested_quantities
 from .schema import CfaSection, StudySection
@@ -69,6 +69,7 @@ def resolve(section: StudySection, sources: Sources) -> Study:
     search = search_of(section, spaces, sources)
     if lights is not None:
         requested = requested_quantities(section, lights, tasks, metrics or ())
+        section = with_pairs_in_order(section, requested)
         sources.refuse(*checks.check_lights(section, lights, mosaics, requested), *check_luminances(section, lights))
         if metrics is not None and (tasks is not None or section.tasks is None):
             sources.refuse(*_goal_faults(section, metrics, requested, spaces, search, sources))

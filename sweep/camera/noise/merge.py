@@ -39,7 +39,7 @@ class Merged:
     """Merged values.
 
     `mean`, `variance`: mean, DN of the first capture, and variance, DN^2; `certain`: True where the same captures are
-    used in all but 1e-12 of the readouts.
+    used in all but 1e-12 of the readouts of a pixel of the mean gain.
     """
 
     mean: SameShape
@@ -114,15 +114,14 @@ def _over_gains(electrons: PerCapture, light: PerCapture, pixel: Pixel) -> Merge
     weights = np.exp(-0.5 * z**2) / np.exp(-0.5 * z**2).sum()
     mean = square = spread = np.zeros(electrons.shape[1:])
     about = _merged(electrons, light, pixel)
-    certain, at_once = about.certain, max(1, _HELD // max(1, electrons.size))
+    at_once = max(1, _HELD // max(1, electrons.size))
     for start in range(0, z.size, at_once):
         part = slice(start, start + at_once)
         gains = (1 + pixel.prnu * z[part]).reshape(-1, *(1,) * (electrons.ndim - 1))
         block = _merged(electrons[:, None] * gains, light[:, None], pixel)
         for weight, value, variance in zip(weights[part], block.mean - about.mean, block.variance, strict=True):
             mean, square, spread = mean + weight * value, square + weight * value**2, spread + weight * variance
-        certain = certain & block.certain.all(axis=0)
-    return Merged(about.mean + mean, spread + square - mean**2, certain)
+    return Merged(about.mean + mean, spread + square - mean**2, about.certain)
 
 
 def _merged(electrons: PerCapture, light: PerCapture, pixel: Pixel) -> Merged:
@@ -162,14 +161,16 @@ def _combined(
 
 
 def shape_of_noise(
-    electrons: PerCapture, light: PerCapture, pixel: Pixel, certain: Bool[BoolArray, "*batch"]
+    electrons: PerCapture, light: PerCapture, pixel: Pixel
 ) -> tuple[Bool[BoolArray, "*batch"], SameShape]:
     """Return the shape of the noise of merged values.
 
     Returns `gaussian`: True where the noise may be taken as Gaussian; `reach_dn`: largest distance from the mean with a
     probability above 1e-15, DN of the first capture.
     """
-    gaussian, reach_dn = certain.copy(), np.zeros(certain.shape)
+    least, most = (electrons * (1 + sign * DRAWN * pixel.prnu) for sign in (-1, 1))
+    low, high = (_merged(of_gain, light, pixel).certain for of_gain in (least, most))
+    gaussian, reach_dn = low & high, np.zeros(electrons.shape[1:])
     for at, exposure in enumerate(pixel.exposures):
         expected = electrons[at]
         for number in exposure.numbers:
@@ -181,7 +182,7 @@ def shape_of_noise(
             dithered = capture.dn_per_e * capture.read_noise_e >= DITHERED_DN
             fine = (expected >= low_e) & (expected <= high_e)
             fine &= dithered | (capture.dn_per_e * noise_e >= MANY_STEPS**0.5)
-            gaussian &= fine | ~used
+            gaussian &= (fine | ~used) & ((most[at] < limit_e) | (least[at] > limit_e))
             reach_e = (
                 9 * (np.sqrt(expected) + capture.prnu * expected + capture.read_noise_e) + 27 + 1 / capture.dn_per_e
             )

@@ -47,8 +47,8 @@ class Method(Section):
             rows = "1 row" if facts.check.rows == 1 else f"{facts.check.rows:,} rows"
             differ = "differs" if facts.check.rows == 1 else "differ"
             lines.append(
-                f"Checked: {rows} computed again at reference settings {differ} by at most {digits(facts.check.largest_dn)} DN; "
-                f"{number(facts.check.allowed_dn)} DN is allowed."
+                f"Checked: {rows} computed again at reference settings {differ} by at most {digits(facts.check.largest_dn)} DN "
+                f"({number(facts.check.allowed_dn)} DN is allowed) and {number(100 * facts.check.largest_share)} % of other figures."
             )
         if output.audited is not None:
             lines.append(
