@@ -22,7 +22,7 @@ from .setup import Setup
 
 _LEAST_E = 0.05
 """Electrons of the brightest pixel at the dimmest node beside dark."""
-_RATIO, _RATIO_OF_MANY = 1.25, 1.12
+_RATIO, _RATIO_OF_MANY = 1.25, 1.06
 """Ratio of neighboring nodes, and from where the first of many pixels is full."""
 _AROUND_KNEE = 6
 """Standard deviations of the noise on either side of a knee, of which each half has a node."""

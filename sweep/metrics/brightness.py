@@ -20,7 +20,7 @@ from ..camera.setup import Setup
 
 LEAST_DN2 = 1e-9
 """Least variance in units of which a distance is taken, DN^2."""
-_MARGINS = (1.7, 1.05, 1.01)
+_MARGINS = (1.3, 1.05, 1.01)
 """Pairs are refined, again and again, that come as near as this times the nearest squared distance of all."""
 _FOLLOWED = 1.1
 """Pairs that come as near as this times the nearest squared distance are looked at in other cases, too."""
@@ -266,7 +266,7 @@ class Walk:
             found.append(of_cases.nearest(first, second, noise=noise, margin=_MARGINS[0], nearest=least))
             least = min(least, float(found[-1].squared.min(initial=np.inf)))
         coarse = [points.subset(points.squared <= _FOLLOWED * least) for points in found]
-        for margin in _MARGINS:
+        for margin in _MARGINS if least > 0 else ():
             most = margin * min(float(points.squared.min(initial=np.inf)) for points in found)
             found = [
                 of_cases.refined(points.subset(points.squared <= most), noise=noise)

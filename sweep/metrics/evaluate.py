@@ -151,9 +151,10 @@ def evaluate_some(
 ) -> dict[str, float]:
     """Return quantities of one design, by no more than they need."""
     metrics, names = {quantity.metric for quantity in quantities}, {quantity.name for quantity in quantities}
-    if CHROMATIC_ERROR in metrics:  # that of the smallest d', and at least that of equal brightness
-        metrics.add(ERROR)
-        names |= {name.replace(CHROMATIC_ERROR, of) for name in names for of in (CHROMATIC_DPRIME, ERROR)}
+    if CHROMATIC_ERROR in metrics:
+        names |= {name.replace(CHROMATIC_ERROR, CHROMATIC_DPRIME) for name in names}
+        if model.readout.few_pixels is not None:  # exact sums may be larger
+            metrics.add(ERROR)
     requested = RequestedQuantities(model.setup.lights.classes, tuple(states), flicker=True)
     owners = [metric for metric in METRICS if metrics & {of.metric for of in metric.quantities(requested)}]
     chromatic = [quantity.pair for quantity in quantities if quantity.metric in CHROMATIC.values() and quantity.pair]

@@ -26,7 +26,7 @@ _FINER_MOMENTS, _MOMENT_ROUNDS, _MOMENTS_FINER = 8, 3, 4
 HEIGHT_ROUNDS = 4
 _TOGETHER = 64
 """Designs that are refined side by side."""
-_FLAT_DN, _FLAT_STEPS_DN, _FLAT = 0.05, 1.0, 1e-4
+_FLAT_DN, _FLAT_STEPS_DN, _FLAT = 0.05, 1.0, 3e-4
 """A start whose neighbors all differ from it by less is refined no further; the second where whole numbers step, the
 third, relative, of other values."""
 _MOST = 1e300
@@ -144,22 +144,22 @@ class _Refinement:
             extremes = self._over_phases()
             if pulsed:
                 extremes = [self._pulsed(design, *extremes[design]) for design in everything]
-            self._put(columns, extremes, best=True)
+            self._put(columns, [least for least, _ in extremes], best=True)
         elif pulsed and not setup.all_heights:
             own = [*model.own_views()]
             least = [self._both_ends(design, self._over_pulse(design, own)[:, None])[:, 0] for design in everything]
-            self._put(columns, [(values, np.empty(0)) for values in least], best=model.n_cases == 1)
+            self._put(columns, least, best=model.n_cases == 1)
         if setup.all_heights and fine:
             heights, on_lattice = np.array(model.heights), []
             for design, of in enumerate(self.group):
                 of_heights = self._on_lattice(design).reshape(len(of.names), heights.size, -1).min(axis=2)
                 on_lattice.append(self._both_ends(design, of_heights))
             extremes = self._extremes(Lattice.along(heights, HEIGHT_ROUNDS), on_lattice, self._at_heights)
-            self._put(columns, extremes, best=model.n_cases == heights.size)
+            self._put(columns, [least for least, _ in extremes], best=model.n_cases == heights.size)
 
-    def _put(self, columns: Columns, extremes: Sequence[_Extremes], *, best: bool) -> None:
+    def _put(self, columns: Columns, extremes: Sequence[PerValue], *, best: bool) -> None:
         """Put the smallest of each value, where it is smaller than what is known, and the largest, into the columns."""
-        for of, (found, _) in zip(self.group, extremes, strict=True):
+        for of, found in zip(self.group, extremes, strict=True):
             for name, value in zip(of.names, found[: len(of.names)], strict=True):
                 known = oriented(self.quantities[name], columns[name][of.design : of.design + 1])
                 if value < known[0]:
@@ -168,7 +168,7 @@ class _Refinement:
                 if best:
                     columns[BEST_PHASE + of.names[number]][of.design] = -value
 
-    def _both_ends(self, design: int, values: _Values) -> _Values:
+    def _both_ends(self, design: int, values: _Values) -> Float[Array, "ends _places"]:
         return np.concatenate([values, -values[list(self.group[design].best)]])
 
     def _flat(self, design: int, values: _Values) -> PerValue:
@@ -200,9 +200,10 @@ class _Refinement:
         on_lattice = []
         for design, of in enumerate(self.group):
             of_phases = self._on_lattice(design).reshape(len(of.names), heights, len(phases), -1).min(axis=(1, 3))
-            least = np.full((len(lattice.places), len(of.names)), _MOST)
-            np.minimum.at(least, which, of_phases.T)
-            on_lattice.append(self._both_ends(design, least.T))
+            both = self._both_ends(design, of_phases)
+            least = np.full((len(lattice.places), len(both)), _MOST)
+            np.minimum.at(least, which, both.T)
+            on_lattice.append(least.T)
         return self._extremes(lattice, on_lattice, self._at_phases)
 
     def _at_phases(self, designs: list[int], places: list[Float[Array, "_places axes"]]) -> list[_Values]:
@@ -225,7 +226,7 @@ class _Refinement:
                     known[row][:, begin + wanted] = of_phases.min(axis=(1, 3))
             begin += len(block)
         return [
-            self._both_ends(design, values[:, numbers].min(axis=1))
+            self._both_ends(design, values)[:, numbers].min(axis=1)
             for design, values, numbers in zip(designs, known, numbers_of, strict=True)
         ]
 

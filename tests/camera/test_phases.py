@@ -14,7 +14,7 @@ from sweep.camera.accuracy import STANDARD
 from sweep.camera.model import SceneModel
 from sweep.camera.phases import (
     different_phases,
-    fine_lattice,
+    lattice_of,
     lattice_px,
     read_at,
     scene_phases,
@@ -73,7 +73,7 @@ def brute_force(made: DesignScene, how: str) -> dict[str, tuple[float, float]]:
     if light.readout == "mean":
         phases = different_phases(setup, phases)[0]
     model = SceneModel(setup)
-    response = model.read(made.curves, [*model.views(phases)])[0][0]
+    response = model.at([*model.views(phases)]).read(made.curves)[0][0]
     ends = {}
     for pair, distances in separations(response, setup.members).items():
         each = distances.reshape(len(phases), -1).min(axis=1)
@@ -117,7 +117,7 @@ def test_mirrored_phases_have_equal_readouts(name: str, readout: str) -> None:
     assert len(few) == (MIRRORED[name] if readout == "mean" else len(every))
     model = SceneModel(made.setup)
     assert model.n_cases == len(few)
-    own, whole = (model.read_with_noise(made.curves, [*model.views(phases)]) for phases in (few, every))
+    own, whole = (model.at([*model.views(phases)]).read_with_noise(made.curves) for phases in (few, every))
     np.testing.assert_allclose(own.mean[:, which], whole.mean, rtol=0, atol=1e-9)
     np.testing.assert_allclose(own.variance[:, which], whole.variance, rtol=1e-9)
 
@@ -152,7 +152,7 @@ def test_finer_steps_find_no_worse_an_extreme_of_a_smooth_function(finest_phase_
     def value(centers_px: np.ndarray) -> np.ndarray:
         return 1000 * ((np.mod(centers_px - [0.83, 1.37] + 1, 2) - 1) ** 2).sum(axis=1)[None]
 
-    assert 0 <= refined(fine_lattice(setup), value) <= 1000 * finest_phase_px**2 / 2 * (1 + 1e-9)
+    assert 0 <= refined(lattice_of(setup, finer=True), value) <= 1000 * finest_phase_px**2 / 2 * (1 + 1e-9)
 
 
 def test_a_kink_is_found_as_exactly_as_a_smooth_extreme() -> None:
@@ -163,4 +163,4 @@ def test_a_kink_is_found_as_exactly_as_a_smooth_extreme() -> None:
     def value(centers_px: np.ndarray) -> np.ndarray:
         return 3000 * np.abs(np.mod(centers_px - [0.8337, 1.3713] + 2, 4) - 2).max(axis=1)[None]
 
-    assert refined(fine_lattice(setup), value) < 0.2
+    assert refined(lattice_of(setup, finer=True), value) < 0.2

@@ -120,7 +120,6 @@ def test_a_bound_of_many_pixels_holds_where_they_are_few_too(pixels: int) -> Non
         reach_e = 9 * (np.sqrt(electrons) + pixel.read_noise_e) + 27
         reach = np.minimum(pixel.dn_per_e * reach_e + 1, pixel.full_scale_dn) / pixels
         shape = NoiseShape(np.zeros(mean.shape, dtype=bool), reach)
-        assert pairwise_error(mean, variance, ONE, OTHER, shape)[0] >= least
         assert error_bounds(mean, variance, {"one": ONE, "other": OTHER}, shape)[1][0] >= least
 
 

@@ -58,7 +58,7 @@ def filters(problem: Problem, n: int) -> np.ndarray:
 def test_each_error_without_upper_bound_has_a_reason() -> None:
     problem = problem_in("chart")
     without = [q for q in problem.quantities.values() if q.states and q.goal and not q.has_limit]
-    errors = {"error", "error_bound", "state_error", "state_error_bound", "chromatic_error"}
+    errors = {"error", "state_error", "chromatic_error"}
     assert {q.metric for q in without} == {"cnr", "chromatic_dprime", *errors}
     for quantity in without:
         rule = "least" if quantity.direction == "less" else "minimum"

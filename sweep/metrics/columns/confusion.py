@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from ...base.types import Array, Float, PerDesign
+from ...base.types import Array, Float
 from ...camera.noise import errors
 from ...camera.readout import NoisyReadout
 from ...spectra.lights import Pair, class_pairs, pair_name
@@ -105,7 +105,7 @@ def _quantity(metric: str, name: str, types: tuple[str, ...]) -> Quantity:
     )
 
 
-def _in_cases(values: PerDesign, read: NoisyReadout) -> Float[Array, "cases designs"]:
+def _in_cases(values: Float[Array, " rows"], read: NoisyReadout) -> Float[Array, "cases designs"]:
     return values.reshape(read.mean.shape[:2]).T
 
 
