@@ -16,7 +16,14 @@ from typing import TYPE_CHECKING, Any
 
 from .. import runs as runner
 from ..base.answer import Answer
-from ..base.errors import ErrorBoundExceededError, InterruptedRunError, OutputError, SweepError, ValidationIssue
+from ..base.errors import (
+    ErrorBoundExceededError,
+    InfeasibleError,
+    InterruptedRunError,
+    OutputError,
+    SweepError,
+    ValidationIssue,
+)
 from ..base.types import Progress, in_turn, silent
 from ..results.answers import Answers
 from ..results.dataset import encoded_part, part_name
@@ -327,8 +334,10 @@ def _finish(folder: Path, began_s: float, *, repair: bool = False, parallel: Par
     result = read_output(folder)
     make_report(result, repair=repair, parallel=parallel)
     lines, check = summary_lines(result, time.monotonic() - began_s), result.provenance.check
-    problem = None
+    problem: SweepError | None = None
     if check is not None and not check.passed:
         problem = ErrorBoundExceededError(ValidationIssue(check.sentence.removesuffix("."), key=check.scenario))
+    elif result.none_feasible and (result.table["status"] == "ok").any():
+        problem = InfeasibleError(ValidationIssue("no design meets every constraint", str(folder)))
     facts = result.provenance.model_dump(mode="json")
     return Answer([*lines], {"folder": str(folder), **{key: facts[key] for key in _JSON_KEYS}}, problem)

@@ -18,6 +18,7 @@ from ..results.output import Output
 from ..results.tables import MANIFEST, REPORT, RESULTS, SEARCHED, SWEPT, csv_of, encoded, is_drawn
 from .explorer import explorer_data
 from .hold import holds_for, saturation_limits
+from .leaders import label
 from .pages import page, script
 from .panels import Picture
 from .published import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
@@ -41,7 +42,8 @@ from .sections.tasks import Tasks
 from .sections.tiles import AllTiles
 from .sections.trade_off import TradeOff
 from .sections.uncertain import Uncertain
-from .terms import format_constraints, unknown_lines
+from .series import scene_in_words
+from .terms import edges_in_words, edges_of, format_constraints, unknown_lines
 from .words import joined, quantity, quoted, scaled
 
 ORDER: tuple[type[Section], ...] = (
@@ -101,13 +103,13 @@ def sections_of(output: Output) -> tuple[Section | None, list[Section]]:
 
 def answer_of(output: Output) -> list[str]:
     """Return the answer to the study's question, a sentence each; `**` around the numbers that decide."""
-    searched = output.kind(SWEPT, SEARCHED)
-    if len(searched) and output.best.empty:
-        failed = searched[searched["status"] != "ok"]
-        if len(failed) == len(searched):
-            return [f"Every design failed: {failed['status'].iloc[0]}."]
+    if output.none_feasible:
+        searched = output.kind(SWEPT, SEARCHED)
+        if (searched["status"] != "ok").all():
+            return [f"Every design failed: {searched['status'].iloc[0]}."]
         under = format_constraints(output)
-        return [f"No design meets every constraint{f': {under}' if under else ''}.", *unknown_lines(output)]
+        none = f"No design meets every constraint{f': {under}' if under else ''}."
+        return [none, *_nearest_to_feasible(output), *unknown_lines(output)]
     lead, _ = sections_of(output)
     sentences = [] if lead is None else lead.answer
     first, *rest = sentences[:_MOST_ANSWERS] or [_of_scenes(output)]
@@ -116,6 +118,20 @@ def answer_of(output: Output) -> list[str]:
         if " DN" in first or "\u00a0DN" in first
         else [first, *(scaled(output, line) if at == 0 else line for at, line in enumerate(rest))]
     )
+
+
+def _nearest_to_feasible(output: Output) -> list[str]:
+    """Return the design that comes nearest to the constraints, in a sentence."""
+    rows = output.kind(SWEPT, SEARCHED).dropna(subset=["violation"])
+    if rows.empty:
+        return []
+    nearest = rows.loc[rows["violation"].idxmin()]
+    what = ", ".join(
+        f"{output.words(name)} {output.columns[name].formatted(nearest[name])}" for name in output.constraints
+    )
+    where = "" if len(output.scenarios) == 1 else f" in {scene_in_words(str(nearest['scenario']))}"
+    edges = edges_in_words(edges_of(nearest)).replace("**", "")
+    return [f"The nearest is {label(nearest)}{f' ({edges})' if edges else ''}{where}: {what}."]
 
 
 def _of_scenes(output: Output) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.types import Bool, BoolArray
-from .words import joined
+from .words import inward, joined
 from .words import number as number_of
 
 if TYPE_CHECKING:
@@ -110,20 +110,16 @@ class Numbers:
             return f"up to {self.at(stop)}"
         return f"from {self.at(start)} on" if last else f"from {self.at(start)} to {self.at(stop)}"
 
-    def about(self, number: float) -> str:
-        """Return a number between computed ones, with two digits."""
-        return self.with_unit(float(f"{number:.2g}"))
-
     def between(self, start: int, stop: int, low: float | None, high: float | None) -> str:
-        """Return a range in words whose ends lie between computed numbers, or at these where a line has no crossing."""
+        """Return a range in words: refined ends, rounded inward, or computed numbers where none is known."""
         if low is None and high is None:
             return self.span(start, stop)
         first, last = start == 0, stop == len(self.x) - 1
-        if high is None:
-            return f"from about {self.about(low or 0.0)}{' on' if last else f' to {self.at(stop)}'}"
-        if low is None:
-            return f"{'up' if first else f'from {self.at(start)}'} to about {self.about(high)}"
-        return f"from about {self.about(low)} to {self.about(high)}"
+        begin = self.at(start) if low is None else self.with_unit(inward(low, up=True, digits=2))
+        end = self.at(stop) if high is None else self.with_unit(inward(high, up=False, digits=2))
+        if first and low is None:
+            return f"up to {end}"
+        return f"from {begin} on" if last and high is None else f"from {begin} to {end}"
 
     def where(self, mask: Bool[BoolArray, " numbers"]) -> str:
         """Return the computed numbers at which something holds, in words."""

@@ -171,9 +171,11 @@ def inward_share(share: float) -> float:
     return math.ceil(1000 * share - 1e-9) / 1000
 
 
-def inward(value: float, *, up: bool) -> float:
-    """Return a number with three digits, rounded to one side."""
-    unit = 10.0 ** (math.floor(math.log10(abs(value))) - 2) if value else 1.0
+def inward(value: float, *, up: bool, digits: int = 3) -> float:
+    """Return a number with a few digits, rounded to one side."""
+    if value == 0 or not math.isfinite(value):
+        return value
+    unit = 10.0 ** (math.floor(math.log10(abs(value))) + 1 - digits)
     return (math.ceil if up else math.floor)(value / unit * (1 - 1e-12)) * unit
 
 

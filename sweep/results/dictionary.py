@@ -143,7 +143,8 @@ FILES = {
     "(`red_limit_x`, `red_limit_y`) and distance (`red_limit_dn`), the same of reds toward the yellow "
     "(`yellow_limit_nm`), and from which peak on the distance is below the one that the study wants "
     "(`wanted_limit_nm`); 630 where that holds at the first red, empty where it does not up to 60 nm from there, "
-    "or 20 nm from an end of the wavelengths",
+    "or 20 nm from an end of the wavelengths; and its distance over RGGB's (`deepest_ratio`) at the deepest peak of "
+    "the study's reds (`deepest_nm`)",
     files.LEFT_OUT: "where each light is left out of a search in turn: the objective (of a worst case the nominal "
     "quantity, too), signal_type, signal, the optimum that was `seen`, the same design `with_it`, and the `fall`",
     files.SENSOR_MAP: "where a scene has a `field`, for each plain CFA, named design and answer of the search: "
@@ -167,10 +168,11 @@ FILES = {
     + ", ".join(files.tiles_schema(["<parameters>"]).names),
     files.CURVES: "a row per curve and wavelength: " + ", ".join(SCHEMA.names),
     files.POINTS: "points of the clouds: design_id, signal_type, signal, channel, dn",
-    files.CROSSINGS: "where a study with `recognition` has scenarios that differ in one number: the numbers `at` which "
-    "the error of a plain CFA, named design or answer of the search is the allowed one, with all effects, the "
-    "`error` there, and whether it `rises` beyond; `quantity`: `state_error` of lamps of equal brightness, or "
-    "`chromatic_error` of lamps of any",
+    files.CROSSINGS: "where scenarios differ in one number: the numbers `at` which a range of a plain CFA, named "
+    "design or answer of the search ends, with all effects. With `recognition`, where an error is the allowed one "
+    "(`quantity`: `state_error` of lamps of equal brightness, or `chromatic_error` of lamps of any), and the `error` "
+    "there; and where the separation is that of another design (`against`), and its `value`. `rises`: it is larger "
+    "beyond",
     files.SATURATED: "for each plain CFA, named design and answer of the search (`design_id`), how many of the "
     "`signals` fill a pixel of any channel (`full_signals`), of an HDR pixel all its captures",
     files.WORST: "where scenarios differ in one number, and lamps are pulsed or the search maximizes the worst of the "

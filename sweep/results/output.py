@@ -19,7 +19,7 @@ from ..camera.mosaic import Mosaic
 from ..metrics.bound import Bound
 from ..metrics.columns.exposure import EXPOSURE
 from ..metrics.objective import Objective
-from ..metrics.quantity import Column
+from ..metrics.quantity import YIELD, Column
 from ..study import StudySection, folder_name
 from . import tables as files
 from .curves import SCHEMA as CURVES_SCHEMA
@@ -191,6 +191,11 @@ class Output:
             candidates.assign(leading=leading).sort_values(keys, ascending=[False] * 4 + [True]).drop(columns="leading")
         )
 
+    @cached_property
+    def none_feasible(self) -> bool:
+        """True if designs were swept or searched, and none of them meets every constraint."""
+        return len(self.kind(SWEPT, SEARCHED)) > 0 and self.best.empty
+
     def mosaic(self, cfa: str) -> Mosaic:
         """Return the mosaic of a CFA."""
         tile = self.study.cfas[cfa].tile
@@ -259,6 +264,8 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
     for name in (files.LIMITED_BY, files.ROBUSTNESS):
         if name in more:
             table = table.merge(more[name].drop(columns="filter_id", errors="ignore"), on="design_id", how="left")
+    if files.YIELDS in more:
+        _put_judged(table, more[files.YIELDS])
     try:
         curves = KeptCurves.of_table(read_table(folder / files.CURVES))
     except ValueError as error:
@@ -289,6 +296,14 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         yields=more.get(files.YIELDS),
         vision={name: more[name] for name in files.VISION_TABLES if name in more},
     )
+
+
+def _put_judged(table: pd.DataFrame, yields: pd.DataFrame) -> None:
+    """Put the yields of other draws in the place of those that chose the designs, where they were computed."""
+    rows = {design_id: at for at, design_id in table["design_id"].items()}
+    for known in yields.to_dict("records"):
+        if known["design_id"] in rows:
+            table.loc[rows[known["design_id"]], YIELD + known["quantity"]] = known["dn"]
 
 
 def _mapping(path: Path, parse: Callable[[str], Any]) -> dict[str, Any]:

@@ -132,12 +132,13 @@ class Selection:
         return ShownRows(self.reduced(table), sampled(swept, min(most, MOST_POINTS)), counted(table))
 
     def reduced(self, table: pa.Table) -> pa.Table:
-        """Select front, best and leading rows of each CFA and scenario; what is no sweep is kept.
+        """Select front, best and leading rows of each CFA and scenario, or the nearest to be feasible; named ones stay.
 
         `pareto` marks the front of any part of a run's rows, so that it may be applied again to several results.
         """
         is_named, eligible = word_mask(table, "kind", *NAMED_KINDS), table[ON_FRONT].to_numpy()
         feasible = table["feasible"].to_numpy()
+        violation = np.nan_to_num(table["violation"].to_numpy(), nan=np.inf)
         selected = [np.flatnonzero(is_named), leading_rows(table, self.front[0], ~is_named)]
         for at in row_groups(table).values():
             swept = at[~is_named[at]]
@@ -146,6 +147,8 @@ class Selection:
             among = np.zeros(table.num_rows, dtype=bool)
             among[swept] = feasible[swept]
             selected.append(best_at(table, self.order, BEST_PER_CFA, among))
+            if swept.size and not feasible[swept].any():
+                selected.append(swept[[violation[swept].argmin()]])
         return table.take(np.unique(np.concatenate(selected)).astype(np.int64)).combine_chunks()
 
     def _values(self, table: pa.Table) -> Float[Array, "rows objectives"]:

@@ -1,27 +1,30 @@
-"""Usable ranges of designs: the numbers between two scenarios at which an error is the allowed one."""
+"""Ends of ranges: numbers between two scenarios at which an error is the allowed one, or two designs change places."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
+from itertools import combinations, pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
+from pydantic import ValidationError
 
-from ..base.types import DesignCurves, delayed
+from ..base.types import Array, DesignCurves, Float, delayed
 from ..camera.model import SceneModel
 from ..metrics.columns.chromatic import CHROMATIC_ERROR
 from ..metrics.columns.confusion import STATE_ERROR
 from ..metrics.evaluate import evaluate_some
-from ..metrics.quantity import RequestedQuantities
+from ..metrics.quantity import Quantity, RequestedQuantities
 from ..metrics.registry import quantities_of
+from ..results.tables import RGGB
 from ..spectra.lights import class_pairs, pair_name
 from ..study import Study
 from ..study.axes import series_of
-from .analysis import Analysis, Calls, designs_between
+from .analysis import Analysis, Calls, DesignBetween, designs_between
 from .between import Between, inner_numbers, or_nan
 
 if TYPE_CHECKING:
@@ -36,21 +39,95 @@ _NEAR = 2.5
 """Between two scenarios whose d' are both so many times the allowed one, or less, errors are not looked for."""
 _SCHEMA = pa.schema(
     [("design_id", pa.int64())]
-    + [(name, pa.string()) for name in ("name", "series", "key", "quantity")]
-    + [(name, pa.float64()) for name in ("at", "error")]
+    + [(name, pa.string()) for name in ("name", "series", "key", "quantity", "against")]
+    + [(name, pa.float64()) for name in ("at", "error", "value")]
     + [("rises", pa.bool_())]
 )
 
 
 def _calls(study: Study, rows: pd.DataFrame) -> Calls:
-    """Find all numbers at which an error of a design passes the allowed one, with all effects.
+    """Find all numbers at which a range ends, with all effects.
 
-    One row per series of scenarios (`series`, `key`), design, kind of error (`quantity`: lamps of equal brightness, or
-    of any) and crossing: `rises` if the error is larger beyond `at`.
+    One row per series of scenarios (`series`, `key`), design, `quantity` and crossing. Of errors (of lamps of equal
+    brightness, or of any) those at which it is the allowed one; of the separation of the front those at which it is
+    that of another design (`against`) that leads beside it, or of RGGB. `rises`: it is larger beyond `at`.
     """
+    designs = [*designs_between(study, rows)]
+    if study.section.recognition is not None:
+        yield from _error_calls(study, designs)
+    column = study.trade_off[0]
+    quantity = quantities_of(RequestedQuantities(study.lights.classes, study.states)).get(column)
+    if quantity is not None:
+        yield from _swap_calls(study, designs, quantity)
+
+
+def _swap_calls(study: Study, designs: Sequence[DesignBetween], quantity: Quantity) -> Calls:
+    values: dict[tuple[str, str], dict[str, DesignBetween]] = {}
+    for design in designs:
+        values.setdefault((design.key["series"], design.key["key"]), {})[design.key["name"]] = design
+    for of_series in values.values():
+        known = {name: _along(design, quantity.name) for name, design in of_series.items()}
+        most = np.max([*known.values()], axis=0)
+        numbers = [*next(iter(of_series.values())).numbers.values()]
+        for first, second in combinations(of_series, 2):
+            apart = known[first] - known[second]
+            leads = np.maximum(known[first], known[second]) >= most
+            for at in np.flatnonzero(apart[:-1] * apart[1:] < 0):
+                if RGGB in (first, second) or leads[at : at + 2].all():
+                    swap = Swap(quantity, study.states, (of_series[first], of_series[second]))
+                    key = of_series[first].key | {"quantity": quantity.name, "against": second}
+                    yield key, delayed(swap.row, *numbers[at : at + 2], *apart[at : at + 2].tolist())
+
+
+def _along(design: DesignBetween, column: str) -> Float[Array, " numbers"]:
+    """Return a column of a design at the numbers of its series."""
+    by_scene = design.rows.set_index("scenario")[column]
+    return by_scene.reindex(list(design.numbers)).to_numpy(dtype=float)
+
+
+@dataclass(frozen=True)
+class Swap:
+    """Two designs that change places between two numbers."""
+
+    quantity: Quantity
+    states: tuple[str, ...]
+    designs: tuple[DesignBetween, DesignBetween]
+
+    def row(self, low: float, high: float, apart_low: float, apart_high: float) -> list[dict[str, Any]]:
+        """Return the number at which both have the same value; none where no study may have a scene between."""
+        from scipy.optimize import brentq  # noqa: PLC0415  (few studies ask for it)
+
+        by_ratio, known = low > 0, {0.0: apart_low, 1.0: apart_high}
+
+        def number(share: float) -> float:
+            return low * (high / low) ** share if by_ratio else low + share * (high - low)
+
+        def apart(share: float) -> float:
+            if share not in known:
+                first, second = self._values(number(share))
+                known[share] = first - second
+            return known[share]
+
+        size = math.log(high / low) if by_ratio else 1.0
+        try:
+            share = float(brentq(apart, 0.0, 1.0, xtol=_CLOSE / size, disp=False))
+            value = self._values(number(share))[0]
+        except ValidationError:
+            return []
+        return [{"at": number(share), "value": value, "rises": apart_high > 0}]
+
+    def _values(self, number: float) -> tuple[float, float]:
+        first, second = (
+            evaluate_some(SceneModel(of.scenes.at(number)), of.curves, [self.quantity], self.states)
+            for of in self.designs
+        )
+        return first[self.quantity.name], second[self.quantity.name]
+
+
+def _error_calls(study: Study, designs: Sequence[DesignBetween]) -> Calls:
     recognition = study.section.recognition
     assert recognition is not None
-    for design in designs_between(study, rows):
+    for design in designs:
         of_any = [pair_name(CHROMATIC_ERROR, pair) for pair in class_pairs(study.states)]
         by_scene = design.rows.set_index("scenario")
         errors = by_scene[[STATE_ERROR]].assign(**{CHROMATIC_ERROR: by_scene[of_any].max(axis=1)})
@@ -133,7 +210,7 @@ def crossings_of(
 
 
 def _is_asked(study: Study) -> bool:
-    return study.section.recognition is not None and bool(series_of(study.scenarios))
+    return bool(series_of(study.scenarios))
 
 
-USABLE_RANGES = Analysis("where designs stop being usable", _is_asked, lambda _: _SCHEMA, _calls)
+RANGES = Analysis("where ranges end", _is_asked, lambda _: _SCHEMA, _calls)

@@ -34,7 +34,7 @@ from ..study import Study
 from .allowed_lamps import ALLOWED_LAMPS
 from .analysis import Analysis
 from .colors import error_against_noise_table
-from .crossings import USABLE_RANGES
+from .crossings import RANGES
 from .details import OVER_SENSOR, Details, limited_by_table
 from .handovers import CAPTURES_FULL
 from .moved_lamps import MOVED_LAMPS
@@ -90,7 +90,7 @@ _ANALYSES = {
     SENSOR_MAP: OVER_SENSOR,
     HANDOVERS: CAPTURES_FULL,
     WORST: WORST_VALUES,
-    CROSSINGS: USABLE_RANGES,
+    CROSSINGS: RANGES,
 }
 
 

@@ -26,7 +26,8 @@ _STEP_NM, _STEPS = 0.1, 600
 """Steps in which reds move, and how many."""
 _MARGIN_NM = 20.0
 """Peaks so near an end of the grid are left out: it would cut the LED."""
-_NUMBERS = ("red_limit_nm", "red_limit_x", "red_limit_y", "red_limit_dn", "yellow_limit_nm", "wanted_limit_nm")
+_NUMBERS = ("red_limit_nm", "red_limit_x", "red_limit_y", "red_limit_dn", "yellow_limit_nm", "wanted_limit_nm",
+            "deepest_nm", "deepest_ratio")  # fmt: skip
 _SCHEMA = pa.schema(
     [
         ("design_id", pa.int64()),
@@ -51,6 +52,7 @@ def _calls(study: Study, rows: pd.DataFrame) -> Calls:
     `red_limit_nm` is the peak from which on the least distance of a red to the study's yellows is less than RGGB's at
     the same red, with its color, x and y, and the distance there; `yellow_limit_nm` the same toward the yellow;
     `wanted_limit_nm` the peak from which on it is below the distance that the study wants. None: not up to 60 nm away.
+    `deepest_ratio` is its distance over RGGB's at the deepest peak of the study's own reds.
     """
     designs = [*named_designs(study, rows)]
     rggb = next((one for one in designs if one.row["name"] == RGGB), None)
@@ -70,11 +72,18 @@ def _limits(design: NamedDesign, rggb: NamedDesign, wanted_dn: float | None) -> 
         grid = design.setup.camera.grid
         reds = moved(shape, peaks_nm, grid)
         own, its = _nearest(design, reds), _nearest(rggb, reds)
+        peaks_of_study = design.setup.lights.photons[design.setup.members[PAIR[1]]].argmax(axis=1)
+        deepest = int(np.abs(peaks_nm - grid.nodes_nm[peaks_of_study.max()]).argmin())
         inside = (peaks_nm >= grid.start_nm + _MARGIN_NM) & (peaks_nm <= grid.stop_nm - _MARGIN_NM)
         for quantity in (CSD, CHROMATIC_CSD):
             below = inside & (own[quantity] < its[quantity])
             red, yellow = _first(below[_STEPS:]), _first(below[_STEPS::-1])
             row: dict[str, Any] = {"shape": name, "quantity": f"{quantity}_{'_'.join(PAIR)}"}
+            if its[quantity][deepest] > 0:
+                row |= {
+                    "deepest_nm": peaks_nm[deepest],
+                    "deepest_ratio": own[quantity][deepest] / its[quantity][deepest],
+                }
             if red is not None:
                 peak = peaks_nm[_STEPS + red]
                 x, y = chromaticity(VISIBLE, moved(shape, np.array([peak]), VISIBLE))[0]

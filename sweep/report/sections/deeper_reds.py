@@ -12,7 +12,7 @@ from ...results.tables import RGGB
 from ...spectra.moved_leds import FIRST_NM
 from ..leaders import answering, label
 from ..section import Section, Table
-from ..words import quantity, quoted
+from ..words import against_in_words, quantity, quoted
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,8 @@ class Limit:
     dn: float
     yellow_nm: float
     wanted_nm: float
+    deepest_nm: float
+    deepest_ratio: float
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,8 @@ class DeeperReds(Section):
         if output.lamp_limits is None or best is None:
             return
         known = output.lamp_limits[output.lamp_limits["design_id"] == best["design_id"]]
-        numbers = ["red_limit_nm", "red_limit_x", "red_limit_y", "red_limit_dn", "yellow_limit_nm", "wanted_limit_nm"]
+        numbers = ["red_limit_nm", "red_limit_x", "red_limit_y", "red_limit_dn", "yellow_limit_nm", "wanted_limit_nm",
+                   "deepest_nm", "deepest_ratio"]  # fmt: skip
         limits = tuple(
             Limit(row["shape"], quantity(output.columns[row["quantity"]]), *(float(row[name]) for name in numbers))
             for row in known.to_dict("records")
@@ -64,6 +67,18 @@ class DeeperReds(Section):
             f"At the same red, {quoted(self.name)} has less {kinds[0]} than {RGGB} {ends[0]}, by the LED's shape"
             f"{''.join(more)}."
         ]
+
+    @property
+    def deepest(self) -> str:
+        """What the design has at the deepest red of the study, in a sentence."""
+        first = self.limits_of[0].words
+        known = [one for one in self.limits_of if one.words == first and np.isfinite(one.deepest_ratio)]
+        if not known:
+            return ""
+        ends = [min(known, key=lambda one: one.deepest_ratio), max(known, key=lambda one: one.deepest_ratio)]
+        parts = list(dict.fromkeys(against_in_words(one.deepest_ratio, 1.0, RGGB) for one in ends))
+        span = f"{parts[0].removesuffix(f' than {RGGB}')} to {parts[-1]}" if len(parts) > 1 else parts[0]
+        return f" At the same red of {_nm(known[0].deepest_nm)} it has {span}, by the LED's shape."
 
     @property
     def table(self) -> Table | None:

@@ -12,6 +12,8 @@ from ..section import Section
 from ..words import digits, number, quantity
 
 _MOST_NOTES = 4
+_SEEN = 1e-5
+"""A relative difference that is told."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +48,10 @@ class Method(Section):
         if facts.check is not None:
             rows = "1 row" if facts.check.rows == 1 else f"{facts.check.rows:,} rows"
             differ = "differs" if facts.check.rows == 1 else "differ"
+            others = f", and other figures by {number(100 * facts.check.largest_share)} %"
             lines.append(
-                f"Checked: {rows} computed again at reference settings {differ} by at most {digits(facts.check.largest_dn)} DN "
-                f"({number(facts.check.allowed_dn)} DN is allowed) and {number(100 * facts.check.largest_share)} % of other figures."
+                f"Checked: {rows} computed again at reference settings {differ} by at most {digits(facts.check.largest_dn)} DN; "
+                f"{number(facts.check.allowed_dn)} DN is allowed{others if facts.check.largest_share > _SEEN else ''}."
             )
         if output.audited is not None:
             lines.append(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -33,7 +33,8 @@ class Noise(Section):
     """Errors of the worst two states over a number, for lamps of unknown brightness and of equal brightness.
 
     `ranges`: where each design has at most the allowed error, with refined ends; `steady`: the same of equally bright
-    lamps, in words; `strokes`, `full`: where channels hand over to their next capture, and where the last one is full.
+    lamps, in words; `strokes`, `full`: where channels hand over to their next capture, and where the last one is full;
+    `further`: the answers over other numbers of the study.
     """
 
     numbers: Numbers
@@ -47,6 +48,7 @@ class Noise(Section):
     marked: str
     light: Mapping[str, float]
     hero: str
+    further: tuple[str, ...] = ()
 
     leads = True
 
@@ -58,7 +60,7 @@ class Noise(Section):
             return
         rows, allowed = _with_worst_error(output), recognition.error_max
         light = {str(row["name"]): float(row[CFA_SENSITIVITY]) for row in rows.to_dict("records")}
-        answers = answering(output)
+        answers, sections = answering(output), list[Noise]()
         for (base, key), scenarios in series_of(output.study.scenarios).items():
             numbers = Numbers(base, key, tuple(scenarios.values()))
             x = np.array(numbers.x)
@@ -75,19 +77,13 @@ class Noise(Section):
             if errors:
                 strokes, full, kind = _handovers(output, base, key, numbers)
                 hero = "" if answers is None or label(answers) not in errors else label(answers)
-                yield cls(
-                    numbers,
-                    allowed,
-                    tuple(recognition.states or output.curves.bundles),
-                    errors,
-                    ranges,
-                    steady,
-                    strokes,
-                    full,
-                    kind,
-                    light,
-                    hero,
-                )
+                states = tuple(recognition.states or output.curves.bundles)
+                handovers = strokes, full, kind
+                sections.append(cls(numbers, allowed, states, errors, ranges, steady, *handovers, light, hero))
+        if sections:
+            others = tuple(section.in_short for section in sections[1:])
+            yield replace(sections[0], further=others)
+            yield from sections[1:]
 
     @property
     def title(self) -> str:
@@ -97,22 +93,38 @@ class Noise(Section):
     @property
     def answer(self) -> list[str]:
         """Where RGGB, the answering design and the one with the widest range have at most the allowed error."""
-        widest = sorted(self.ranges, key=lambda name: -self._width(name))
-        shown = [name for name in widest if name in (RGGB, self.hero) or name == widest[0]]
-        groups: dict[str, list[str]] = {}
-        for name in shown:
-            groups.setdefault(ranges_in_words(self.numbers, self.ranges[name]), []).append(name)
-        parts = [f"**{where}** with {joined([quoted(name) for name in names])}" for where, names in groups.items()]
         rarely, what = one_in(self.allowed).replace("1 in", "1 error in"), joined([*self.states])
-        rest = [name for name in widest if name not in shown]
-        lines = [
-            f"{what.capitalize()} lamps of unknown brightness are told apart with at most {rarely} {'; '.join(parts)}."
-        ]
+        lines = [f"{what.capitalize()} lamps of unknown brightness are told apart with at most {rarely} {self._where}."]
+        rest = [name for name in self._widest if name not in self._shown]
         if rest:
             lines.append(
                 f"Others: {'; '.join(f'{quoted(n)} {ranges_in_words(self.numbers, self.ranges[n])}' for n in rest)}."
             )
+        if self.further:
+            lines.append(" ".join(self.further))
         return lines
+
+    @property
+    def in_short(self) -> str:
+        """The answer, as one of several over other numbers."""
+        return f"Over {self.numbers.name}: {self._where}."
+
+    @property
+    def _widest(self) -> list[str]:
+        return sorted(self.ranges, key=lambda name: -self._width(name))
+
+    @property
+    def _shown(self) -> list[str]:
+        widest = self._widest
+        return [name for name in widest if name in (RGGB, self.hero) or name == widest[0]]
+
+    @property
+    def _where(self) -> str:
+        groups: dict[str, list[str]] = {}
+        for name in self._shown:
+            groups.setdefault(ranges_in_words(self.numbers, self.ranges[name]), []).append(name)
+        parts = [f"**{where}** with {joined([quoted(name) for name in names])}" for where, names in groups.items()]
+        return "; ".join(parts)
 
     def _width(self, name: str) -> float:
         """Return how much of the numbers is in a design's ranges, on the axis of the figure."""
@@ -198,24 +210,22 @@ def usable_ranges(
 
 
 def ranges_in_words(numbers: Numbers, ranges: tuple[tuple[float, float], ...]) -> str:
-    """Return ranges in words, their ends rounded inward."""
+    """Return ranges in words, their ends rounded inward; an end of what was computed is said to be one."""
     if not ranges:
         return "nowhere"
-    parts = []
+    parts, first, last = [], numbers.bare(numbers.x[0]), numbers.at(len(numbers.x) - 1)
     for low, high in ranges:
+        start, stop = inward(low, up=True), inward(high, up=False)
         if math.isinf(low) and math.isinf(high):
-            parts.append(f"from {numbers.bare(numbers.x[0])} to {numbers.at(len(numbers.x) - 1)}")
+            parts.append(f"at all computed, {first} to {last}")
         elif math.isinf(low):
-            parts.append(f"up to {numbers.with_unit(inward(high, up=False))}")
+            parts.append(f"at all computed, {first} to {numbers.with_unit(stop)}")
         elif math.isinf(high):
-            parts.append(f"from {numbers.with_unit(inward(low, up=True))}")
+            parts.append(f"from {numbers.with_unit(start)} to {last}, the last computed")
+        elif start < stop:
+            parts.append(f"{digits(numbers.factor * start)} to {numbers.with_unit(stop)}")
         else:
-            start, stop = inward(low, up=True), inward(high, up=False)
-            parts.append(
-                f"{digits(numbers.factor * start)} to {numbers.with_unit(stop)}"
-                if start < stop
-                else f"near {numbers.with_unit((low + high) / 2)}"
-            )
+            parts.append(f"near {numbers.with_unit((low + high) / 2)}")
     return joined(parts)
 
 

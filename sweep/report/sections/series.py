@@ -28,8 +28,6 @@ _LEAST = 1.0
 """DN; who separates less is not said to lead."""
 _LEAST_DRAWN = 0.3
 _SEEN = 1e-9
-_STEEP = 100.0
-"""Between computed scenes whose values differ by this factor no crossing is told."""
 _MOST_RANGES = 4
 _MOST_COLUMNS = 4
 
@@ -41,7 +39,7 @@ class Series(Section):
     `among`: the series, where several are over one number; `bests`: values at the best sampling phase; `searched`: the
     hero was searched for its worst value here; `missed`: the largest share of phases of a pulsed lamp that a CFA does
     not see, and `dark_s`, how long the lamp is dark; `worst`: worst values, also between the scenes, and where they are; `edges`: of the hero,
-    in words; `pulses`: of the lamps.
+    in words; `pulses`: of the lamps; `swaps`: numbers at which two designs change places, and their value there.
     """
 
     column: Column
@@ -57,6 +55,7 @@ class Series(Section):
     worst: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     edges: str = ""
     pulses: str = ""
+    swaps: Mapping[tuple[str, str], tuple[tuple[float, float], ...]] = field(default_factory=dict)
 
     leads = True
 
@@ -105,6 +104,7 @@ class Series(Section):
                         worst,
                         edges,
                         pulses,
+                        _swaps(output, base, key),
                     )
                 )
         yield from sorted(
@@ -148,32 +148,23 @@ class Series(Section):
     def _least(self) -> float:
         return _LEAST if self.column.unit == DN else 0.0
 
-    def _crossing(self, first: Values, second: Values, at: int) -> tuple[float, float] | None:
-        """Return where two lines of the figure cross after a computed number, and how high, or None."""
-        x = np.array(self.numbers.x)[at : at + 2]
-        mine, its = first[at : at + 2], second[at : at + 2]
-        log = self.column.unit == DN and self._vanishes
-        if not np.isfinite([*mine, *its]).all():
+    def _swap(self, first: str, second: str, at: int) -> tuple[float, float] | None:
+        """Return where two designs change places after a computed number, and their value there, or None."""
+        low, high = self.numbers.x[at : at + 2]
+        if self.missed is not None and (self.missed[at : at + 2] > _SEEN).any():
             return None
-        if log and not all(0 < max(y) < _STEEP * min(y) for y in (mine, its)):
-            return None
-        across = np.log(x) if self.numbers.log else x
-        apart = (np.log(mine) - np.log(its)) if log else mine - its
-        if apart[0] * apart[1] >= 0 or (self.missed is not None and (self.missed[at : at + 2] > _SEEN).any()):
-            return None
-        share = float(apart[0] / (apart[0] - apart[1]))
-        number = float(across[0] + share * (across[1] - across[0]))
-        height = float(np.log(its[0]) + share * np.log(its[1] / its[0]) if log else its[0] + share * (its[1] - its[0]))
-        return float(np.exp(number)) if self.numbers.log else number, float(np.exp(height)) if log else height
+        known = (*self.swaps.get((first, second), ()), *self.swaps.get((second, first), ()))
+        return next((swap for swap in known if low <= swap[0] <= high), None)
 
-    def _where(self, mine: Values, its: Values) -> str:
-        """Return in words where one line has at least what another has, between computed numbers by straight lines."""
-        mask, parts = np.nan_to_num(mine, nan=-np.inf) >= np.nan_to_num(its, nan=-np.inf), []
+    def _where(self, first: str, second: str) -> str:
+        """Return in words where one design has at least what another has."""
+        mine, its = (np.nan_to_num(self.values[name], nan=-np.inf) for name in (first, second))
+        mask, parts = mine >= its, []
         for run in np.split(np.arange(mask.size), np.flatnonzero(np.diff(mask)) + 1):
             start, stop = int(run[0]), int(run[-1])
             if not mask[start]:
                 continue
-            ends = [None if end in (-1, mask.size - 1) else self._crossing(mine, its, end) for end in (start - 1, stop)]
+            ends = [None if end in (-1, mask.size - 1) else self._swap(first, second, end) for end in (start - 1, stop)]
             parts.append(self.numbers.between(start, stop, *(None if end is None else end[0] for end in ends)))
         return joined(parts)
 
@@ -196,8 +187,7 @@ class Series(Section):
             yield f"{kinds.capitalize()} are 1 DN or more apart {'; '.join(parts)}."
 
     def _from_least(self, name: str) -> str:
-        y = self.values[name]
-        return self._where(y, np.full_like(y, _LEAST)) or "nowhere"
+        return self.numbers.where(np.nan_to_num(self.values[name]) >= _LEAST) or "nowhere"
 
     def _of_pulses(self) -> Iterator[str]:
         if self.missed is None or not (self.missed > _SEEN).any():
@@ -253,7 +243,7 @@ class Series(Section):
             ends = []
             for other, end in ((at - 1, start - 1), (at + 1, stop)):
                 name = leads[other][0] if 0 <= other < len(leads) else None
-                crossed = None if name is None else self._crossing(self.values[leader], self.values[name], end)
+                crossed = None if name is None else self._swap(leader, name, end)
                 ends.append(None if crossed is None else crossed[0])
             verb = "" if told else f" {self._verb}"
             told += 1
@@ -296,7 +286,7 @@ class Series(Section):
         reached = np.maximum(mine, its) >= self._least
         if (below & reached).any():
             where = (
-                self._where(its, mine)
+                self._where(RGGB, self.hero)
                 if reached.all() and not (mine == its).any()
                 else self.numbers.where(below & reached)
             )
@@ -311,7 +301,7 @@ class Series(Section):
         lines = {}
         for name, y in self.values.items():
             drawn = np.maximum(np.nan_to_num(y, nan=_LEAST_DRAWN), _LEAST_DRAWN) if self._vanishes else y
-            lines[name] = self._with_worst(name, Line(x, np.where(seen, drawn, np.nan), self.bests.get(name)))
+            lines[name] = self._with_ends(name, Line(x, np.where(seen, drawn, np.nan), self.bests.get(name)))
         rings = self._rings()
         level, band, panels = (_LEAST, "1 DN") if self._vanishes and not pulsed else None, None, list[Panel]()
         if self.missed is not None and pulsed:
@@ -337,7 +327,7 @@ class Series(Section):
             if self.bests
             else []
         )
-        parts += ["Rings: where the filter passes RGGB, by straight lines between computed scenes."] if rings else []
+        parts += ["Rings: where the filter passes RGGB."] if rings else []
         parts += ["Rings with names: the least of the whole range."] if self.searched else []
         words = f"{quantity(self.column)} / {unit}" if unit else quantity(self.column)
         panels.append(
@@ -354,21 +344,25 @@ class Series(Section):
         mine, its = self.values.get(self.hero), self.values.get(RGGB)
         if mine is None or its is None or self.hero == RGGB:
             return ()
-        found = [self._crossing(mine, its, at) for at in range(len(self.numbers.x) - 1)]
+        found = [self._swap(self.hero, RGGB, at) for at in range(len(self.numbers.x) - 1)]
         text = not self.searched
         return tuple(
-            Ring(self.numbers.factor * one[0], one[1], self.numbers.about(one[0]) if text else "")
+            Ring(self.numbers.factor * one[0], one[1], self.numbers.with_unit(one[0]) if text else "")
             for one in found
             if one is not None and one[1] >= self._least
         )
 
-    def _with_worst(self, name: str, line: Line) -> Line:
-        """Return a line with its worst place, if the series was searched for that."""
-        if not self.searched or name not in self.worst or line.upper is not None:
-            return line
-        value, number = self.worst[name]
-        at = int(np.searchsorted(line.x, self.numbers.factor * number))
-        return Line(np.insert(line.x, at, self.numbers.factor * number), np.insert(line.y, at, value))
+    def _with_ends(self, name: str, line: Line) -> Line:
+        """Return a line with what its rings show: where the filter passes RGGB, and of a search the worst place."""
+        more = [(ring.x, ring.y) for ring in self._rings()] if name in (self.hero, RGGB) else []
+        if self.searched and name in self.worst:
+            value, number = self.worst[name]
+            more.append((self.numbers.factor * number, value))
+        x = np.concatenate([line.x, [at for at, _ in more]])
+        order = np.argsort(x, kind="stable")
+        y = np.concatenate([line.y, [value for _, value in more]])
+        upper = None if line.upper is None else np.interp(x, line.x, line.upper)[order]
+        return Line(x[order], y[order], upper)
 
     def _least_rings(self) -> Iterator[Ring]:
         """Yield the worst places of the filter and of RGGB."""
@@ -419,6 +413,18 @@ def _worst(output: Output, base: str, key: str) -> dict[str, tuple[float, float]
         (output.worst["series"] == base) & (output.worst["key"] == key) & (output.worst["quantity"] == output.goal.name)
     ]
     return {str(row["name"]): (float(row["value"]), float(row["at"])) for row in known.dropna().to_dict("records")}
+
+
+def _swaps(output: Output, base: str, key: str) -> dict[tuple[str, str], tuple[tuple[float, float], ...]]:
+    """Return the numbers of a series at which designs change places, and their separation there."""
+    if output.crossings is None or "against" not in output.crossings:
+        return {}
+    known = output.crossings.dropna(subset=["against"])
+    known = known[(known["series"] == base) & (known["key"] == key)]
+    return {
+        (str(first), str(second)): tuple(zip(part["at"].astype(float), part["value"].astype(float), strict=True))
+        for (first, second), part in known.groupby(["name", "against"], sort=False)
+    }
 
 
 def _missed(output: Output, scenarios: Mapping[str, float]) -> tuple[Values | None, float | None]:

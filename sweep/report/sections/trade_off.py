@@ -45,6 +45,7 @@ from ..terms import (
     response_of,
 )
 from ..words import against_in_words, amount, article, joined, lamps, of_column, quantity, quoted
+from .deeper_reds import DeeperReds
 
 Values = Float[Array, " wavelengths"]
 _MOST_CLOUD, _MOST_LESS = 400, 5
@@ -65,7 +66,7 @@ class TradeOff(Section):
 
     `found`: how it was found, for a sentence; `edges`: of stopbands, nm; `notes`: colorants and the like; `over`: what
     its separation is the worst of; `where`: scene, if there are several; `tile`: the plain CFA of its own tile; `kept`: constrained figures beside the lamps; `bound`: of any filter in its pixel, `below`:
-    the curve that it replaces, and the constraints that the bound leaves out; `own`: an objective that is to be the least, in its own unit; `more`: a design that separates more, and what it misses; `less`: other designs where RGGB itself is best.
+    the curve that it replaces, and the constraints that the bound leaves out; `own`: an objective that is to be the least, in its own unit; `more`: a design that separates more, and what it misses; `less`: other designs where RGGB itself is best; `deepest`: what the design has at the deepest red.
     """
 
     column: Column
@@ -95,6 +96,7 @@ class TradeOff(Section):
     own: tuple[str, ...] = ()
     by_pixel: tuple[float, float] | None = None
     less: tuple[Side, ...] = ()
+    deepest: str = ""
 
     heading = "What it buys"
     leads = True
@@ -149,6 +151,7 @@ class TradeOff(Section):
             own=tuple(_least(output, best, rggb)),
             by_pixel=_by_pixel(column, best, rggb),
             less=() if rggb is not None else tuple(sorted((_side(column, row) for row in shown), key=lambda one: -one.separation)[:_MOST_LESS]),
+            deepest=next((reds.deepest for reds in DeeperReds.of(output) if isinstance(reds, DeeperReds)), ""),
             light_of="a sensor without filters" if sensor.has_clear else f"{sensor.reference} pixels alone",
         )  # fmt: skip
 
@@ -210,7 +213,7 @@ class TradeOff(Section):
             lines.append(
                 f"With every pixel counted, as noise sees them, it separates by {of_column(self.column, mine)}{beside}."
             )
-        lines += [f"The nearest pair is {lamps(self.lamps)}."] if self.lamps else []
+        lines += [f"The nearest pair is {lamps(self.lamps)}.{self.deepest}"] if self.lamps else []
         if self.bound is not None:
             share = amount(self.best.separation / self.bound, "share") if self.bound > 0 else ""
             lines.append(
