@@ -18,6 +18,8 @@ from ..spectra.formats import files_in, read_curves
 from ..spectra.lights import Lights
 from ..spectra.spectrum import Curves, Quantity
 from ..spectra.units import FITTING, Use, stated_quantity, used_as
+from ..study import Study
+from ..study.shipped import shipped_folder
 from .channels import NEW, RATIO, Layout, layout_of, sensor_file
 from .filter_evaluation import (
     PLAIN_TILE,
@@ -28,8 +30,10 @@ from .filter_evaluation import (
     evaluate_filter,
     with_base,
 )
-from .loading import CurveSource, lights, make_study, sensor_source
+from .loading import CurveSource, lights, load_study, make_study, sensor_source
 
+_ASKED = "stopband"
+"""Study of the package whose constraints a filter from a file is held against."""
 _OF_A_RUN = ("manifest.json", "provenance.json")
 
 
@@ -170,7 +174,14 @@ def filter_of_file(path: Path, options: EvaluateOptions) -> FilterUnderTest:
     with_filter = CurveSource({**sensor.keys, "files": [*sensor.keys["files"], entry]}, sensor.curves)
     spectra, types = _lights_and_types(options.lights or "tl16", options.of_lights)
     curve_names = _curve_names(qe, with_base(mosaic, {channel: base}).name, mosaic)
-    return FilterUnderTest(mosaic, {channel: base}, with_filter, spectra, types, curve_names, keys, (note,))
+    asked = mosaic, {channel: base}, with_filter, spectra, types, curve_names, keys, (note,)
+    return FilterUnderTest(*asked, study=_shipped_study())
+
+
+def _shipped_study() -> Study | None:
+    """Return the study of the package whose constraints a filter is held against; None without its files."""
+    folder = shipped_folder()
+    return None if folder is None else load_study(folder / f"{_ASKED}.yaml").study
 
 
 def _use_of(curves: Curves, column: str, options: EvaluateOptions) -> tuple[Use, Quantity | None]:
@@ -214,7 +225,8 @@ def filter_of_run(folder: Path, design: str | int | None, options: EvaluateOptio
     keys = {"pixel": study.section.pixel, "scenarios": scene, "wavelengths": study.grid}
     note = f"{folder}: {row['name'] or design} of {space.cfa}, in scenario {row['scenario']}"
     bases = dict(space.filter.bases)
-    return FilterUnderTest(mosaic, bases, sensor, spectra, types, curve_names, keys, (note,), space.filter.technology)
+    technology = space.filter.technology
+    return FilterUnderTest(mosaic, bases, sensor, spectra, types, curve_names, keys, (note,), technology, study)
 
 
 def _curves_of(source: CurveSource, keys: Mapping[str, Any]) -> SensorCurves:

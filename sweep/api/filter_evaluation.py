@@ -16,6 +16,7 @@ from ..camera.exposure import may_be_brightest
 from ..camera.mosaic import Mosaic
 from ..designs.space import Space
 from ..designs.technology import Technology
+from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY, reference_of
 from ..metrics.quantity import Column, Columns
 from ..metrics.separation import csd_name
@@ -61,6 +62,7 @@ class FilterUnderTest:
     keys: Mapping[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     technology: Technology | None = None
+    study: Study | None = None
 
     @property
     def pair(self) -> Pair:
@@ -98,6 +100,10 @@ class FilterEvaluation:
         Further CSDs of the printed table.
     technology : Technology, optional
         Physical principle of the filter.
+    constraints : mapping of str to Bound
+        Constraints of the study `of_study`, which the filter is held against.
+    of_study : str
+        Name of that study.
     """
 
     study: Study = field(repr=False)
@@ -111,6 +117,21 @@ class FilterEvaluation:
     notes: tuple[str, ...]
     others: tuple[Column, ...] = ()
     technology: Technology | None = None
+    constraints: Mapping[str, Bound] = field(default_factory=dict)
+    of_study: str = ""
+
+    @property
+    def violated(self) -> list[str]:
+        """Constraints that the filter does not meet in a scenario, or of which it is not known, each with its value."""
+        missed = []
+        for name, bound in self.constraints.items():
+            for scene, cfa, columns in self.rows:
+                value = columns.get(name, np.array([np.nan]))
+                if cfa == self.cfa and not (bound.violation(value) <= FEASIBLE).all():
+                    where = f" in {scene}" if len(self.study.scenarios) > 1 else ""
+                    known = f"{value[0]:.4g}" if np.isfinite(value[0]) else "unknown"
+                    missed.append(f"{name} {known}{where} ({bound})")
+        return missed
 
     @cached_property
     def table(self) -> pd.DataFrame:
@@ -143,6 +164,8 @@ class FilterEvaluation:
             "before_quantization_dn": self.before_quantization_dn,
             "gap": self.gap,
             "no_limit": self.no_limit,
+            "constraints_of": self.of_study,
+            "violated": self.violated,
             "notes": self.notes,
         }
 
@@ -158,6 +181,10 @@ class FilterEvaluation:
         for scene in scenes:
             rows = {cfa: columns for name, cfa, columns in self.rows if name == scene}
             yield from _aligned(rows, (self.goal, *self.others), scene if len(scenes) > 1 else "CFA")
+        if self.constraints:
+            met = f"not met: {', '.join(self.violated)}" if self.violated else "met"
+            stated = ", ".join(f"{name} {bound}" for name, bound in self.constraints.items())
+            yield f"Constraints of the study {self.of_study} ({stated}): {met}."
         if brightest := self.study.sensor.brightest:
             yield f"Light: 1 = {reference_of(brightest)}."
         if self.limit is None or self.before_quantization_dn is None:
@@ -216,8 +243,10 @@ def evaluate_filter(filter_: FilterUnderTest) -> FilterEvaluation:
     goal = next(column for column in columns if column.pair == filter_.pair)
     further = tuple(column for column in columns if column is not goal)
     notes = (*filter_.notes, *study.warnings)
-    technology = filter_.technology
-    return FilterEvaluation(study, tuple(rows), goal, changed, csd_dn, limit, below, reason, notes, further, technology)
+    of = filter_.study
+    constraints, name = ({}, "") if of is None else (dict(of.constraints), of.name)
+    result = study, tuple(rows), goal, changed, csd_dn, limit, below, reason, notes, further, filter_.technology
+    return FilterEvaluation(*result, constraints, name)
 
 
 def _rows(mosaic: Mosaic) -> list[list[str]]:

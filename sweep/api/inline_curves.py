@@ -12,7 +12,7 @@ from ..base.errors import DataError, ValidationIssue
 from ..base.types import Array, Float, FloatArray, PerSample, PerWavelength
 from ..spectra import formats
 from ..spectra.spectrum import Curves, WavelengthGrid, check_samples, resample
-from ..spectra.units import Use, used_as
+from ..spectra.units import FITTING, Use, used_as
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -113,6 +113,22 @@ def on_grid(
         return resample(*curves.samples(name), grid)[None]
     except DataError as error:
         raise _named(error, name) from None
+
+
+def filter_on_grid(
+    name: str, curve: CurveLike, grid: WavelengthGrid, base: PerWavelength, relative_to: PerWavelength | None
+) -> Float[Array, "curves wavelengths"]:
+    """Bring filters to a grid as QE: a file of no QE has transmissions, of the curve that the filter replaces (`base`).
+
+    `relative_to`: all values are transmissions of this curve.
+    """
+    if relative_to is not None:
+        return on_grid(name, curve, grid, "filter") * relative_to
+    if isinstance(curve, str | Path):
+        told = to_curves(name, curve).units[name].quantity
+        if told not in FITTING["sensor"]:
+            return on_grid(name, curve, grid, "filter") * base
+    return on_grid(name, curve, grid)
 
 
 def _checked(name: str, wavelength_nm: Any, values: Any) -> tuple[PerSample, Mapping[str, PerSample]]:

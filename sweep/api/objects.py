@@ -16,7 +16,7 @@ from ..designs.space import Space
 from ..metrics.quantity import Column, Quantity
 from ..search.limit import Limit
 from ..study import Study
-from .inline_curves import CurveLike, on_grid, wavelength_table
+from .inline_curves import CurveLike, filter_on_grid, on_grid, wavelength_table
 from .own_designs import are_parameters, designs_of_curves, designs_of_parameters, evaluate_spaces, plain_and_named
 from .user_filters import (
     any_filter_search,
@@ -140,7 +140,8 @@ class LoadedStudy:
         base : str, optional
             Curve that the filter replaces, where the study does not state it.
         relative_to : str, optional
-            The values are transmissions, to be multiplied by this curve of the sensor. Left out, they are QE.
+            The values are transmissions, to be multiplied by this curve of the sensor. Left out, they are QE, but for
+            those of a file that does not say so: these are transmissions of the curve that the filter replaces.
         **filters : CurveLike or number
             Curve of each modified channel, ``evaluate(N=curve)``, or rows of curves for many filters, ndarray of shape
             (n_filters, n_wavelengths). Or parameters of a family that the study has, ``evaluate(left_nm=600,
@@ -166,16 +167,16 @@ class LoadedStudy:
         if are_parameters(study, filters):
             return evaluate_spaces(study, [designs_of_parameters(study, cfa, filters)], scenarios)
         channels = {name: cast(CurveLike, curve) for name, curve in filters.items()}
-        factor = 1.0 if relative_to is None else study.sensor.curve(relative_to)
+        factor = None if relative_to is None else study.sensor.curve(relative_to)
+        chosen = find_cfa(study, list(channels)) if cfa is None else known_cfa(study, cfa, list(channels))
+        bases = replaced_curves(study, chosen, list(channels), base)
+        replaced = {name: study.sensor.curve(curve) for name, curve in bases.items()}
         rows = {
-            name: on_grid(name, curve, study.grid, "sensor" if relative_to is None else "filter") * factor
-            for name, curve in channels.items()
+            name: filter_on_grid(name, curve, study.grid, replaced[name], factor) for name, curve in channels.items()
         }
         if len({len(curves) for curves in rows.values()}) > 1:
             counts = {name: len(curves) for name, curves in rows.items()}
             raise SweepError(ValidationIssue("different numbers of filters", value=counts))
-        chosen = find_cfa(study, list(channels)) if cfa is None else known_cfa(study, cfa, list(channels))
-        bases = replaced_curves(study, chosen, list(channels), base)
         curves = np.stack([*rows.values()], axis=1)
         return evaluate_spaces(study, [designs_of_curves(study, chosen, bases, curves)], scenarios)
 

@@ -125,13 +125,13 @@ def _nearest_to_feasible(output: Output) -> list[str]:
     rows = output.kind(SWEPT, SEARCHED).dropna(subset=["violation"])
     if rows.empty:
         return []
-    nearest = rows.loc[rows["violation"].idxmin()]
-    what = ", ".join(
-        f"{output.words(name)} {output.columns[name].formatted(nearest[name])}" for name in output.constraints
-    )
+    nearest = rows.sort_values("violation", kind="stable").iloc[0].to_dict()
+    figures = []
+    for name in output.constraints:
+        figures.append(f"{output.words(name)} {output.columns[name].formatted(nearest[name])}")
     where = "" if len(output.scenarios) == 1 else f" in {scene_in_words(str(nearest['scenario']))}"
     edges = edges_in_words(edges_of(nearest)).replace("**", "")
-    return [f"The nearest is {label(nearest)}{f' ({edges})' if edges else ''}{where}: {what}."]
+    return [f"The nearest is {label(nearest)}{f' ({edges})' if edges else ''}{where}: {', '.join(figures)}."]
 
 
 def _of_scenes(output: Output) -> str:
