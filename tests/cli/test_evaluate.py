@@ -139,3 +139,15 @@ def test_evaluate_loads_no_unneeded_modules(own: Path) -> None:
         "jinja2",
         "moocore",
     }
+
+
+def test_a_filter_is_held_against_the_constraints_of_a_study_and_read_alike_in_python(own: Path) -> None:
+    code, said, _ = commanded("evaluate", own)
+    assert code == 0
+    table = sweep.load_study("stopband").evaluate(N=own)
+    (line,) = (line for line in said.splitlines() if line.startswith("Constraints of the study stopband"))
+    assert table.violated[0] == "sensitivity, slope_per_nm"
+    assert f"not met: sensitivity {table.sensitivity[0]:.4g} (>= 0.9)" in line
+    assert rows(said)["RYNCy"][0] == f"{table.csd_yellow_red[0]:.1f}"
+    wide = csv(own.parent, "wavelength_nm,T", np.array([400.0, 700.0]), np.array([95.0, 95.0]), name="wide.csv")
+    assert "(sensitivity >= 0.9, slope_per_nm <= 0.06): met." in commanded("evaluate", wide)[1]

@@ -23,7 +23,7 @@ SEARCHED = (
 """Those with a search."""
 SLOW = (
     "chromatic",
-    "fog",
+    "hdr",
     "dye",
     "band",
     "dual",
@@ -31,8 +31,6 @@ SLOW = (
     "freeform",
     "producible",
     "rccb",
-    "exposure",
-    "night",
     "distance",
     "accuracy",
     "scorecard",

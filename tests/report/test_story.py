@@ -28,7 +28,7 @@ from ..build import output_of, sentences_of
 from ..conftest import FinishedFolder
 from .shipped import EVERY
 
-OF_SERIES = ("noise", "fog", "exposure", "night", "distance")
+OF_SERIES = ("noise", "hdr", "distance")
 
 
 def whole(folder: Path) -> pd.DataFrame:
@@ -103,9 +103,14 @@ DN = Column(name="csd_yellow_red", metric="csd", meaning="x", unit="DN", label="
 SOME = some.lists(some.sampled_from([0.0, 0.4, 1.0, 2.0, 35.0, 35.0, 139.0, 1e5]), min_size=4, max_size=4)
 
 
-def series_of(lines: dict[str, list[float]], x: tuple[float, ...]) -> Series:
+def series_of(
+    lines: dict[str, list[float]],
+    x: tuple[float, ...],
+    swaps: dict[tuple[str, str], tuple[tuple[float, float]]] | None = None,
+) -> Series:
     values = {name: np.array(y, dtype=float) for name, y in lines.items()}
-    return Series(DN, Numbers("road", "distance_m", x), "", values, {}, dict.fromkeys(lines, 0.5), next(iter(lines)))
+    numbers, light = Numbers("road", "distance_m", x), dict.fromkeys(lines, 0.5)
+    return Series(DN, numbers, "", values, {}, light, next(iter(lines)), swaps=swaps or {})
 
 
 @settings(deadline=None, derandomize=True)
@@ -126,10 +131,6 @@ def test_who_leads_has_the_most_at_each_number_of_its_range(lines: dict[str, lis
     assert series.picture is not None
     assert series.table is not None
     assert len(series.table.rows) == len(lines)
-    for ring in series.picture.panels[-1].rings:  # type: ignore[attr-defined]
-        heights = [np.interp(ring.x, series.numbers.x, lines[name]) for name in (series.hero, "RGGB")]
-        if min(map(min, lines.values())) >= 1:  # of other lines logarithms are drawn
-            assert heights == pytest.approx([ring.y, ring.y])
 
 
 @pytest.mark.parametrize(
@@ -137,8 +138,8 @@ def test_who_leads_has_the_most_at_each_number_of_its_range(lines: dict[str, lis
     [
         (
             {"A": [90, 81, 61], "B": [80, 77, 68]},
-            "Over distance, **A** separates yellow from red lamps most up to about 240 m (90.0 DN at 100 m; B 80.0 DN); **B** from "
-            "about 240 m on (68.0 DN at 300 m; A 61.0 DN).",
+            "Over distance, **A** separates yellow from red lamps most up to 240 m (90.0 DN at 100 m; B 80.0 DN); **B** from "
+            "250 m on (68.0 DN at 300 m; A 61.0 DN).",
         ),
         (
             {"A": [0.2, 9, 8], "B": [0.1, 2, 8]},
@@ -152,7 +153,8 @@ def test_who_leads_has_the_most_at_each_number_of_its_range(lines: dict[str, lis
     ],
 )
 def test_a_series_says_who_leads_from_where_to_where(lines: dict[str, list[float]], said: str) -> None:
-    *_, sentence = series_of(lines, (100.0, 200.0, 300.0)).answer
+    """A promise ends inside what was computed: A and B change places at 245 m."""
+    *_, sentence = series_of(lines, (100.0, 200.0, 300.0), {("A", "B"): ((245.0, 71.0),)}).answer
     assert sentence.replace("\u00a0", " ") == said
 
 

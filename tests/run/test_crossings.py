@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
+from ruamel.yaml import YAML
 
 import sweep
 from sweep.metrics.columns.confusion import STATE_ERROR
 from sweep.runs.crossings import crossings_of
 
-from ..build import output_of
+from ..build import output_of, sentences_of
 
 STUDY = """
 study: noisy
@@ -60,3 +62,30 @@ def test_an_error_that_comes_back_between_two_numbers_is_found() -> None:
 
 def test_nothing_is_looked_for_between_whole_numbers(tmp_path: Path) -> None:
     assert crossings(tmp_path, f"dim: {{{LEVEL % 0.5}, each: {{pixel.bits: [4, 12]}}}}").empty
+
+
+def test_designs_change_places_where_both_have_the_same_separation(tmp_path: Path) -> None:
+    """A distance between two computed ones, with all phases of the mosaic."""
+    text = """
+study: far
+sensor: ar0820
+lights: tl16
+pixel: {read_noise_e: 2, offset_dn: 168, crosstalk: 0.01}
+scenarios:
+  road: {target: {fov_deg: 60, phase_px: any}, optics: {f_number: 2}, noise: true, each: {target.distance_m: [270, 300]}}
+cfas: [RGGB, RYNCy]
+designs:
+  mine: {cfa: RYNCy, channel: N, base: Y, to: G, at: {left_nm: 612.89, left_width_nm: 5.92, right_nm: 651.18, right_width_nm: 6.25}}
+"""
+    output = output_of(tmp_path, text)
+    (row,) = pd.read_parquet(output.folder / "crossings.parquet").to_dict("records")
+    assert (row["name"], row["against"], row["quantity"], row["rises"]) == ("RGGB", "mine", "csd_yellow_red", True)
+    assert row["at"] == pytest.approx(284, rel=5e-3)
+    there = sweep.make_study(**yaml_of(text.replace("[270, 300]", f"[{row['at']}]"))).evaluate()
+    assert there.csd_yellow_red.to_numpy() == pytest.approx(row["value"], rel=2e-3)
+    assert "has less than RGGB from 290 m on" in " ".join(sentences_of(output)).replace("\u00a0", " ")
+
+
+def yaml_of(text: str) -> dict[str, Any]:
+    keys: dict[str, Any] = YAML(typ="safe").load(text)
+    return keys

@@ -15,6 +15,7 @@ from sweep.designs.tolerance import NONE
 from sweep.metrics.drawn import draws_of
 from sweep.metrics.drawn_sensors import RandomSensors, searched_sample
 from sweep.metrics.members import population_model
+from sweep.results.output import read_output
 from sweep.search.gradients import Model
 from sweep.search.problem import Problem, SearchRun
 from sweep.search.solver import search_from, smooth_objective
@@ -73,6 +74,8 @@ def test_a_yield_of_random_sensors_is_that_of_own_draws(tmp_path: Path) -> None:
     assert 0.9 <= (own >= found).mean() <= 0.925
     assert judged["draws"] == 20_000
     assert judged["dn_low"] <= judged["dn"] <= judged["dn_high"]
+    shown = read_output(tmp_path / "out").table["yield_csd_yellow_red"].iloc[0]
+    assert shown == judged["dn"] != found  # pages say what other draws have
     assert judged["dn"] == pytest.approx(np.quantile(own, 0.1), abs=2 * (judged["dn_high"] - judged["dn_low"]))
 
 
