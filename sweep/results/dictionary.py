@@ -63,8 +63,8 @@ _OF_A_SHARE = (
     "rounding, with all effects; no limit is computed of it, and a limit of others leaves a constraint on it out"
 )
 _OWN = (
-    "a metric of the study's `metrics`, the worst over moments and phases of the lattice; its error is not checked: "
-    "the tolerance in DN is of CSDs"
+    "a metric of the study's `metrics`, the worst over moments and phases; its error is not checked: the tolerance in "
+    "DN is of CSDs"
 )
 _WITHOUT_CLEAR = f"; without a clear pixel 1 = {reference_of('<name>')}"
 KEYS = tuple(name for names in (*_KEYS, *_VERDICTS) for name in names)

@@ -20,6 +20,7 @@ from ..designs.block import CurveBlock
 from ..designs.space import Space
 from ..metrics.columns.chromatic import CHROMATIC_CSD
 from ..metrics.columns.color_separation import CSD
+from ..metrics.objective import COMBINED
 from ..metrics.places import oriented
 from ..metrics.quantity import DN, Quantity
 from ..metrics.registry import METRICS
@@ -43,7 +44,7 @@ _SHARE, _SAME = 1e-2, 1e-6
 _CHROMATIC_SHARE = 1e-3
 """The same of distances of lamps of any brightness, beside the tolerance."""
 _IMAGES = "images"
-"""What metrics need that are drawn by the study's seed alone, and not compared."""
+"""What metrics need that are drawn by the study's seed alone: they are not compared, nor are metrics of user code."""
 
 Row = Mapping[str, Any]
 
@@ -71,8 +72,12 @@ def _compared(study: Study, rules: Rules, space: Space, scenario: str, rows: Seq
     reference = replace(setup.with_all_effects, accuracy=REFERENCE)
     needs = {name: metric.needs for metric in METRICS for name in (q.name for q in metric.quantities(rules.requested))}
     named = {name: of for name, of in rules.quantities.items() if name in rows[0]}
-    compared = {name: of for name, of in named.items() if needs.get(of.of or name) != _IMAGES}
-    wanted = Wanted.of(compared, rules.requested, rules.schema)
+    images = {name for name, of in named.items() if needs.get(of.of or name) == _IMAGES}
+    if images & set(study.objective.weights):
+        images.add(COMBINED)
+    computed = {name: of for name, of in named.items() if name not in images}
+    compared = {name: of for name, of in computed.items() if of.needs != "own"}
+    wanted = Wanted.of(computed, rules.requested, rules.schema)
     exact = columns_of_points(
         space, points, CurveBlock(space.curves(points, study.grid.size)), reference, rules, wanted
     )
