@@ -22,7 +22,7 @@ def tiny(tmp_path_factory: pytest.TempPathFactory) -> sweep.LoadedStudy:
 def test_forms_of_a_curve_are_one(tiny: sweep.LoadedStudy, tmp_path: Path) -> None:
     curve = 0.8 * tiny.curve("Y")
     path = tmp_path / "one.csv"
-    curve.rename("x").to_csv(path)
+    curve.rename("x (QE)").to_csv(path)
     pair = (curve.index.to_numpy(), curve.to_numpy())
     tables = [tiny.evaluate(N=form) for form in (curve, pair, curve.to_numpy(), path, str(path))]
     tables.append(tiny.evaluate(N=np.full(301, 0.8), relative_to="Y"))

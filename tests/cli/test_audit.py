@@ -61,6 +61,7 @@ def test_every_csd_is_compared(run: tuple[Study, pd.DataFrame, set[int]]) -> Non
 def broken_audit() -> Audit:
     columns = {"design_id": [3, 4, 7], "scenario": ["chart"] * 3, "plan": "x", "allowed_dn": 0.1}
     realized = {"realized_dn": [0.05, 1.4, 0.3], "quantity": "worst_csd_yellow_red"}
+    realized |= {"realized_share": 0.0, "allowed_share": 0.01, "other": "sensitivity"}
     return Audit(pd.DataFrame(columns | realized), 1000)
 
 

@@ -68,10 +68,10 @@ def test_lights_from_files(tmp_path: Path) -> None:
     (tmp_path / "led.csv").write_text("wavelength_nm,r,g\n390,0,1\n400,0,1\n500,0,1\n600,0,0\n640,1,0\n700,0,0\n")
     text = f"study: s\nsensor: ar0820\n{LIGHT_FILE}cfas: [RGGB]\nobjective: csd_red_green\n"
     study = load(tmp_path, text)
-    assert study.lights.classes == ("red", "green")
+    assert study.lights.classes == ("green", "red")
     assert any("lie outside the wavelength grid" in warning for warning in study.warnings)
     # energy times wavelength is photons: the red triangle is symmetric in neither
-    red = study.lights.photons[0]
+    red = study.lights.photons[1]
     assert red[235] / red[240] == pytest.approx(35 / 40 * 635 / 640, rel=1e-3)
     (tmp_path / "led.csv").write_text("wavelength_nm,r,g\n400,0,1\n700,0,0\n")
     assert "no photons" in issues(tmp_path, text)[0]
