@@ -16,6 +16,7 @@ from .words import joined, number, quoted
 _FULL = "full_signals"
 _MOST_NAMED = 3
 _PIXELS = {"R": "red", "G": "green", "B": "blue", "Y": "yellow", "Cy": "cyan", "C": "clear", "W": "clear"}
+_READ = {"mean": "as the mean over the lamp's image", "center": "at the center of the lamp's image"}
 
 
 def holds_for(output: Output, curves: str = "") -> str:
@@ -99,9 +100,12 @@ def _camera(output: Output) -> str:
 
 def scene_conditions(scenes: list[Scene]) -> str:
     """Return distance, brightness, exposure and the like, over all scenes."""
-    far = [scene.target.distance_m for scene in scenes if scene.target is not None]
+    targets = [scene.target for scene in scenes if scene.target is not None]
+    far = [target.distance_m for target in targets]
     parts = [f"lamps {_span(far, 'm')} away"] if far else ["lamps that fill the field"]
     parts += ["or that fill the field"] if 0 < len(far) < len(scenes) else []
+    if far:
+        parts.append(f"read {' or '.join(dict.fromkeys(_READ[target.readout] for target in targets))}")
     lamps = [scene.intensity_cd for scene in scenes if scene.intensity_cd is not None]
     parts.append(f"of {_span(lamps, 'cd')}" if lamps else "of equal photons")
     fixed = [s.exposure.exposure_s for s in scenes if not isinstance(s.exposure, WhitePatchExposure)]

@@ -54,6 +54,20 @@ def test_the_nearest_of_hundreds_of_near_pairs_is_found(
     assert evaluate(scene_model(setup), curves, study.states)[column][0] == pytest.approx(expected, rel=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("name", "scenario", "design"),
+    [("fog", "day visibility_m=150", "RGGB"), ("exposure", "night exposure_s=0.002", "best stopband")],
+)
+def test_no_bound_stands_in_a_column_of_errors(name: str, scenario: str, design: str, tmp_path: Path) -> None:
+    """Whole lamps of which few pixels are full: none of 768,000 simulated discs was taken for the other color."""
+    study = mean_study(name, tmp_path)
+    setup, curves = scene_of(study, scenario, design)
+    found = evaluate(scene_model(setup), curves, study.states)
+    for column in ("error_yellow_red", "state_error", "chromatic_error_yellow_red"):
+        assert found[column][0] < 1e-9
+    assert found["error_bound_yellow_red"][0] > 1e-3
+
+
 def assert_no_distance_is_above_a_scan(setup: Setup, curves: np.ndarray, seed: int, *, by_pixel: bool = True) -> None:
     """All pairs of types, in a few cases of the scene, in DN, by pixel, and in units of the noise."""
     cases = [*scene_model(setup.over_brightness).lamps(curves)]
