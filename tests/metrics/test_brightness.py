@@ -15,6 +15,7 @@ from sweep.camera.noise import merge, table
 from sweep.camera.pixel import Pixel
 from sweep.camera.setup import Setup
 from sweep.metrics.evaluate import evaluate
+from sweep.spectra.lights import Pair, class_pairs, pair_name
 from sweep.study import Study, load_study
 
 from ..hard import random_scenes
@@ -126,10 +127,10 @@ class Lamps:
         return result * pixel.dn_per_e + pixel.offset_dn
 
 
-def scanned(lamps: Lamps, *, noise: bool) -> float:
+def scanned(lamps: Lamps, pair: Pair, *, noise: bool) -> float:
     """The smallest distance to a lamp of 2,000 brightnesses; of the nearest of these, again between their neighbors."""
     members, least = lamps.setup.members, np.inf
-    for own, other in (PAIR, PAIR[::-1]):
+    for own, other in (pair, pair[::-1]):
         mean, variance = (values[:, None] for values in lamps.read(members[own], np.ones(1)))
 
         def squared(factors: np.ndarray) -> np.ndarray:
@@ -177,9 +178,11 @@ def test_no_chromatic_figure_is_above_a_scan_nor_below(first: int) -> None:
         found = evaluate(scene_model(setup), curves, PAIR if lamps.noisy else ())
         channels = len(setup.camera.mosaic.channels)
         rounding = 0.0 if lamps.noisy or setup.camera.pixel.captures else np.sqrt(channels)
-        for name, noise in (("chromatic_csd_yellow_red", False), ("chromatic_dprime_yellow_red", True)):
+        asked = [("chromatic_csd", pair, False) for pair in class_pairs(list(setup.members))]
+        for metric, pair, noise in (*asked, ("chromatic_dprime", PAIR, True)):
+            name = pair_name(metric, pair)
             if name in found and (lamps.noisy or not noise):
-                expected, value = scanned(lamps, noise=noise), float(found[name][0])
+                expected, value = scanned(lamps, pair, noise=noise), float(found[name][0])
                 # Of an HDR pixel, means are those of a table, good for 0.002 of their noise.
                 slack = (
                     0.005 if noise else 1e-3 + rounding + (0.02 if lamps.noisy and setup.camera.pixel.captures else 0)

@@ -20,7 +20,7 @@ from ..hard.scenes import scene
 from .brightness_scan import smallest
 
 STUDIES = Path(__file__).parents[2] / "studies"
-_MOST_CASES = 3
+_MOST_CASES = 2
 PUBLISHED = [
     ("hdr", "lamp intensity_cd=1000", "RYYCy", "chromatic_csd_green_red", 341_007.25),
     ("hdr", "lamp intensity_cd=177.827941004", "best stopband", "chromatic_dprime_yellow_red", 40.05),
@@ -116,6 +116,5 @@ def test_no_distance_of_the_shipped_studies_is_above_a_scan(name: str) -> None:
     study = load_study(STUDIES / f"{name}.yaml")
     rng = np.random.default_rng(len(name))
     designs = [space.name for space in study.spaces if space.kind in ("reference", "design")]
-    for _ in range(2):
-        setup, curves = scene_of(study, str(rng.choice(list(study.scenarios))), str(rng.choice(designs)))
-        assert_no_distance_is_above_a_scan(setup, curves, int(rng.integers(100)))
+    setup, curves = scene_of(study, str(rng.choice(list(study.scenarios))), str(rng.choice(designs)))
+    assert_no_distance_is_above_a_scan(setup, curves, int(rng.integers(100)))
