@@ -45,7 +45,6 @@ needs_reference = pytest.mark.skipif(
 
 
 FEWER = {
-    "fog": {"[50, 75, 100, 150, 200, 300, 500, 1000, 2000, 5000, 10000]": "[50, 300, 10000]"},
     "stopband": {
         "starts: 16": "starts: 4",
         "front: {min: 0.80, max: 1.0, count: 21}": "front: {min: 0.80, max: 1.0, count: 4}",

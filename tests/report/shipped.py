@@ -23,7 +23,6 @@ SEARCHED = (
 """Those with a search."""
 SLOW = (
     "chromatic",
-    "hdr",
     "dye",
     "band",
     "dual",

@@ -11,7 +11,7 @@ from ..conftest import FinishedFolder
 from .pages import needs_browser
 
 pytestmark = needs_browser
-NAMES = ["stopband", *(pytest.param(name, marks=pytest.mark.slow) for name in ("noise", "hdr", "paper", "distance"))]
+NAMES = ["stopband", *(pytest.param(name, marks=pytest.mark.slow) for name in ("noise", "paper", "distance"))]
 MOST_WORDS, MOST_FIGURES, MOST_HEIGHT, MOST_BYTES = 1_200, 6, 7_000, 1_500_000
 
 

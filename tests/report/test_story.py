@@ -28,7 +28,7 @@ from ..build import output_of, sentences_of
 from ..conftest import FinishedFolder
 from .shipped import EVERY
 
-OF_SERIES = ("noise", "hdr", "distance")
+OF_SERIES = ("noise", "distance")
 
 
 def whole(folder: Path) -> pd.DataFrame:

@@ -114,7 +114,7 @@ def test_the_folder_itself_may_be_a_link(few: Study, expected: pd.DataFrame, tmp
     pd.testing.assert_frame_equal(rows(tmp_path / "disk"), expected)
 
 
-@pytest.mark.parametrize("study", ["stopband", pytest.param("hdr", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("study", ["stopband", pytest.param("distance", marks=pytest.mark.slow)])
 def test_names_that_reports_give_are_known(finished: FinishedFolder, study: str) -> None:
     """A picture of a new name is to be added to the names of a run's files."""
     folder = finished(study)
