@@ -94,7 +94,7 @@ def _compared(study: Study, rules: Rules, space: Space, scenario: str, rows: Seq
             for name in sorted(names):
                 pair = row[name], float(exact[name][index])
                 if name in in_dn:
-                    more = _CHROMATIC_SHARE * abs(pair[1]) * (name.find("chromatic") >= 0)
+                    more = _CHROMATIC_SHARE * abs(pair[1]) * ("chromatic" in name)
                     differences.append((_difference(*pair), allowed_dn + more, name))
                 else:
                     bound = _allowed_share(compared[name], needs, row, allowed_dn)
