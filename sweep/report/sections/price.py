@@ -22,7 +22,7 @@ from ..words import amount, change, effect, of_column, quantity
 
 _TASKS = ("color_delta_e_mean_d65", "low_light_lux_led", "low_light_lux_a")
 _MOST = 10
-COUNTED = "By pixel, RGGB's two greens count as two, as noise sees them; the CSD counts each channel once."
+COUNTED = "By pixel, RGGB's two greens count as two."
 
 
 @dataclass(frozen=True)
