@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from sweep.base.types import in_turn
+from sweep.runs.rows import rules_of
 from sweep.runs.search import run_search
 from sweep.study import load_study
 
@@ -67,7 +68,7 @@ def test_the_figure_of_measured_films_is_that_of_a_search(tmp_path: Path) -> Non
     )
     loaded = load_study(tmp_path / "films.yaml")
     assert loaded.search is not None
-    answer = run_search(loaded, loaded.search, in_turn, lambda *_: None)
+    answer = run_search(loaded, loaded.search, rules_of(loaded), in_turn, lambda *_: None)
     assert answer.choice is not None
     assert answer.best.objective >= answer.choice.tried[answer.choice.best].objective * (1 - 1e-9)
     said = f"The best single one has {answer.best.objective:.1f}, "

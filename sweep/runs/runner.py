@@ -215,9 +215,11 @@ class _Run:
         cached_calls = self._kept("search")
         try:
             if self.study.search.tiles:
-                self.over_tiles = run_tile_search(self.study, self.study.search, cached_calls, self.progress)
+                self.over_tiles = run_tile_search(
+                    self.study, self.study.search, self.rules, cached_calls, self.progress
+                )
                 return self.over_tiles.answer
-            return run_search(self.study, self.study.search, cached_calls, self.progress)
+            return run_search(self.study, self.study.search, self.rules, cached_calls, self.progress)
         except UpperBoundExceededError:
             cached_calls.drop_limits()
             raise

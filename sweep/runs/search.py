@@ -26,6 +26,7 @@ from ..search.solver import extreme_value, refinement_of, search_from, smooth_ob
 from ..search.trade_off import Effort, FrontPoint, calls_at_levels, check_proof, gap_of, trade_off
 from ..study import Search, Study
 from ..study.axes import series_of
+from .as_read import Reading, best_as_read
 from .between import Between, between, minima_between, or_nan
 from .routes import Rules
 from .rows import Rows, rows_of
@@ -66,7 +67,7 @@ class SearchAnswer:
         return None if self.limit is None else gap_of(self.best, self.limit)
 
 
-def run_search(study: Study, search: Search, parallel: Parallel, progress: Progress) -> SearchAnswer:
+def run_search(study: Study, search: Search, rules: Rules, parallel: Parallel, progress: Progress) -> SearchAnswer:
     """Search from Sobol points and the best combination; the evaluations are shared evenly among the starts.
 
     A derivative-free search ends near its optimum at best: where derivatives exist, SLSQP continues from there, with
@@ -105,10 +106,13 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
     best = best_feasible([e for run in runs for e in run.log])
     if best is None:
         raise _infeasible(study, problem, starts[:_REACH_STARTS], per_start)
-    limit, worst, added = next(answers) if limited else None, 0, 0
+    limit, worst, last = next(answers) if limited else None, 0, runs
     if series and (scenes := _series(study, search)) is not None:
-        best, more, added = _over_series(problem, scenes, best, runs, effort, parallel, progress)
-        runs += more
+        problem, best, more = _over_series(problem, scenes, best, runs, effort, parallel, progress)
+        runs, last = runs + more, more or runs
+    reading = Reading.of(study, search, rules)
+    if (run := best_as_read(problem, reading, last, effort, parallel)) is not None:
+        runs, best = [*runs, run], run.log[-1]
     if series:
         alone = [problem.in_scenario(number) for number in range(len(search.scenarios))]
         worst = int(np.argmin([smooth_objective(scene_problem, best.x) for scene_problem in alone]))
@@ -118,7 +122,17 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
     check_proof(best, limit)
     front = trade_off(problem, search.levels, effort, answers, parallel, progress, limited=limited)
     return SearchAnswer(
-        search, search.scenarios[worst], tuple(runs), best, limit, no_limit, front, choice, refinement, added, n_starts
+        search,
+        search.scenarios[worst],
+        tuple(runs),
+        best,
+        limit,
+        no_limit,
+        front,
+        choice,
+        refinement,
+        len(problem.scenes) - len(search.scenarios),
+        n_starts,
     )
 
 
@@ -139,9 +153,9 @@ def _over_series(
     effort: Effort,
     parallel: Parallel,
     progress: Progress,
-) -> tuple[Evaluation, list[SearchRun], int]:
+) -> tuple[Problem, Evaluation, list[SearchRun]]:
     """Search for the worst value over all numbers of a series: add the scenes where the answer is worse, and go on."""
-    algorithm, more, added = effort.refinement or effort.algorithm, list[SearchRun](), 0
+    algorithm, more = effort.refinement or effort.algorithm, list[SearchRun]()
     others = [e for run in runs if (e := best_feasible(run.log)) is not None and e.objective < best.objective]
     other = max(others, key=lambda e: e.objective, default=best)
     evaluations = min(effort.evaluations, _MOST_HELD)
@@ -152,7 +166,7 @@ def _over_series(
         if not worse:
             break
         scenes = [(series[0].at(at), problem.family) for at in worse]
-        problem, added = replace(problem, others=(*problem.others, *scenes)), added + len(scenes)
+        problem = replace(problem, others=(*problem.others, *scenes))
         starts = [problem.to_unit(design.x) for design in (best, other)]
         first = len(runs) + len(more)
         calls = [
@@ -162,7 +176,7 @@ def _over_series(
         more += parallel(calls)
         found = best_feasible([e for run in more[-len(calls) :] for e in run.log])
         best = best if found is None else found
-    return best, more, added
+    return problem, best, more
 
 
 def _worst_scenes(

@@ -20,6 +20,8 @@ from ..search.tiles import SEARCHED, Tiles, search_tiles
 from ..search.trade_off import Effort, check_proof
 from ..spectra.lights import pair_name
 from ..study import Search, Study
+from .as_read import Reading, best_as_read
+from .routes import Rules
 from .search import SearchAnswer
 
 
@@ -36,7 +38,7 @@ class TileAnswer:
     tiles: Tiles
 
 
-def run_tile_search(study: Study, search: Search, parallel: Parallel, progress: Progress) -> TileAnswer:
+def run_tile_search(study: Study, search: Search, rules: Rules, parallel: Parallel, progress: Progress) -> TileAnswer:
     """Search over tiles, and then from every start in the best one.
 
     Raises InfeasibleError if no tile has a feasible filter. Raises UpperBoundExceededError if a filter exceeds the
@@ -61,8 +63,10 @@ def run_tile_search(study: Study, search: Search, parallel: Parallel, progress: 
     *runs, limit = parallel([*calls, delayed(limit_of, problem)]) if no_limit is None else (*parallel(calls), None)
     best = best_feasible([found, *(e for run in runs for e in run.log)])
     assert best is not None
-    check_proof(best, limit)
     of_best = replace(search, space=search.tiles[winner], tiles=())
+    run = best_as_read(problem, Reading.of(study, of_best, rules), runs, effort, parallel)
+    runs, best = (runs, best) if run is None else ([*runs, run], run.log[-1])
+    check_proof(best, limit)
     answer = SearchAnswer(of_best, search.scenario, tuple(runs), best, limit, no_limit, front=(), starts=len(starts))
     return TileAnswer(answer, search, problems, tiles)
 

@@ -15,6 +15,7 @@ from sweep.base.errors import InfeasibleError
 from sweep.designs.families.stopband import Stopband
 from sweep.metrics.bound import FEASIBLE, Bound
 from sweep.metrics.objective import Objective
+from sweep.runs.rows import rules_of
 from sweep.runs.search import run_search
 from sweep.search.gradients import BACK_OFF
 from sweep.search.limit import limit_of
@@ -202,7 +203,9 @@ def infeasible_study() -> Result:
     shape = rise(wave, 605.0, 10.0) - rise(wave, 650.0, 10.0)
     exact = float(1 - ((y - g) * shape).sum() / y.sum())
     try:
-        run_search(study, study.search, lambda tasks: (call(*a, **k) for call, a, k in tasks), lambda *_: None)
+        run_search(
+            study, study.search, rules_of(study), lambda tasks: (call(*a, **k) for call, a, k in tasks), lambda *_: None
+        )
     except InfeasibleError as error:
         text = str(error)
     else:

@@ -1,0 +1,160 @@
+"""Answer of a search that meets its constraints also as the camera reads it out: rounded, clipped and noisy."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..base.types import FloatArray, Parallel, delayed
+from ..camera.setup import Setup
+from ..designs.space import Space
+from ..designs.ungridded import PairedDesigns, sobol_points
+from ..metrics.bound import FEASIBLE, Bound, total_violation
+from ..metrics.quantity import Columns
+from ..search.problem import Evaluation, Problem, SearchRun, best_feasible
+from ..search.solver import search_from, smooth_evaluation
+from ..search.trade_off import Effort
+from ..study import Search, Study
+from .routes import Rules, Wanted, quantities_at
+
+_MOST_TIGHTENED = 8
+"""Searches with constraints tightened by what the readout takes from the answer before."""
+_AT_ONCE = 64
+"""Designs that are read out together."""
+_NEAR = (0.03, 0.01, 0.003, 0.001, 0.0003)
+"""Half sides of the boxes around the best design in which others are tried, as shares of the space's box."""
+_ROUNDS = 3
+"""Times that each of these boxes is tried, each time around the best design."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Design as it is read out: least objective, largest violation, and by how much it misses each constraint."""
+
+    objective: float
+    violation: float
+    missed: dict[str, float]
+
+    @property
+    def feasible(self) -> bool:
+        """True if every constraint is met."""
+        return self.violation <= FEASIBLE
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How the designs of a search are read out, in each of its scenarios."""
+
+    space: Space
+    setups: tuple[Setup, ...]
+    rules: Rules
+
+    @classmethod
+    def of(cls, study: Study, search: Search, rules: Rules) -> Reading:
+        """Return how the designs of a search are read out."""
+        setups = tuple(study.setup(search.space, scenario) for scenario in search.scenarios)
+        return cls(search.space, setups, rules)
+
+    def columns(self, points: Sequence[FloatArray]) -> Iterator[Columns]:
+        """Yield the values of objective and constraints in each scenario; NaN where a design fails."""
+        rules, quantities = self.rules, self.rules.quantities
+        names = {*rules.constraints, *rules.objective.weights, rules.objective.column}
+        names |= {quantities[name].of for name in names}
+        asked = {name: quantity for name, quantity in quantities.items() if name in names}
+        wanted = Wanted.of(asked, rules.requested, rules.shown)
+        axes = tuple(tuple(map(float, values)) for values in np.transpose(points))
+        space = replace(self.space, axes=axes, rows=PairedDesigns(len(points)))
+        for setup in self.setups:
+            yield quantities_at(space, np.arange(len(points)), setup, rules, wanted)[0]
+
+
+def verdicts(reading: Reading, points: Sequence[FloatArray]) -> list[Verdict]:
+    """Return the designs as they are read out; the worst of each value over the scenarios."""
+    constraints, n = reading.rules.constraints, len(points)
+    objective, violation, missed = np.full(n, np.inf), np.zeros(n), {name: np.zeros(n) for name in constraints}
+    for columns in reading.columns(points):
+        objective = np.minimum(objective, columns[reading.rules.objective.column])
+        violation = np.maximum(violation, total_violation(columns, constraints, np.zeros(n)))
+        for name, bound in constraints.items():
+            missed[name] = np.maximum(missed[name], bound.violation(columns[name]) * bound.scale)
+    return [
+        Verdict(float(objective[i]), float(violation[i]), {name: float(by[i]) for name, by in missed.items()})
+        for i in range(n)
+    ]
+
+
+def tried_near(problem: Problem, reading: Reading, best: Evaluation, seed: int) -> list[Evaluation]:
+    """Return feasible designs near one, before and after readout; each is read out as better than the last one."""
+    free, found = problem.free.size, [best]
+    (at_best,) = verdicts(reading, [best.x])
+    for number, half in enumerate(np.repeat(_NEAR, _ROUNDS)):
+        offsets = half * (2 * sobol_points(free, _AT_ONCE, seed + number) - 1)
+        points = problem.from_unit(np.clip(problem.to_unit(found[-1].x) + offsets, 0.0, 1.0))
+        read = verdicts(reading, list(points))
+        for i in sorted(range(len(points)), key=lambda i: -read[i].objective):
+            if not read[i].feasible or read[i].objective <= at_best.objective:
+                continue
+            evaluation = smooth_evaluation(problem, points[i])
+            if evaluation.feasible:
+                found.append(evaluation)
+                at_best = read[i]
+                break
+    return found[1:]
+
+
+def best_as_read(
+    problem: Problem, reading: Reading, runs: Sequence[SearchRun], effort: Effort, parallel: Parallel
+) -> SearchRun | None:
+    """Return further evaluations, the last one of which is the best that is feasible as it is read out.
+
+    None if that is the best of `runs`, or if no design was found: then the answer is the best before readout.
+    """
+    log = [evaluation for run in runs for evaluation in run.log if evaluation.feasible]
+    log = sorted({evaluation.x.tobytes(): evaluation for evaluation in log}.values(), key=lambda e: -e.objective)
+    (verdict,) = next(iter(parallel([delayed(verdicts, reading, [log[0].x])])))
+    if verdict.feasible:
+        return None
+    nearest, tighter, found, best = log[0], problem, list[Evaluation](), None
+    algorithm = effort.refinement or effort.algorithm
+    for _ in range(_MOST_TIGHTENED):
+        tighter = replace(tighter, constraints=_tightened(tighter, verdict.missed))
+        call = delayed(search_from, tighter, len(runs), problem.to_unit(nearest.x), algorithm, effort.evaluations)
+        (run,) = parallel([call])
+        if (inside := best_feasible(run.log)) is None:
+            break
+        nearest = smooth_evaluation(problem, inside.x)
+        found.append(nearest)
+        ((verdict,),) = parallel([delayed(verdicts, reading, [nearest.x])])
+        if verdict.feasible:
+            best = nearest
+            break
+    for at in range(0, len(log), _AT_ONCE):
+        if best is not None and log[at].objective <= best.objective:
+            break
+        some = log[at : at + _AT_ONCE]
+        (read,) = parallel([delayed(verdicts, reading, [evaluation.x for evaluation in some])])
+        good = [evaluation for evaluation, verdict in zip(some, read, strict=True) if verdict.feasible]
+        best = max([*good, *([] if best is None else [best])], key=lambda e: e.objective, default=None)
+        if good:
+            break
+    if best is None:
+        return None
+    (nearby,) = parallel([delayed(tried_near, problem, reading, best, effort.seed)])
+    return SearchRun(len(runs), "as read out", [*found, best, *nearby])
+
+
+def _tightened(problem: Problem, missed: Mapping[str, float]) -> dict[str, Bound]:
+    """Return constraints that ask for as much more as a design misses; of a probability, for as many times less."""
+    constraints = dict(problem.constraints)
+    for name, amount in missed.items():
+        low, high = constraints[name].min, constraints[name].max
+        if high is not None and problem.quantities[name].scale == "log10":
+            high *= high / (high + amount)
+        elif high is not None:
+            high -= amount
+        low = None if low is None else low + amount
+        if low is None or high is None or low <= high:
+            constraints[name] = Bound(min=low, max=high)
+    return constraints
