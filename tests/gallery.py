@@ -25,6 +25,8 @@ STUDIES = Path(__file__).parent.parent / "studies"
 
 PICTURES = (
     "stopband",
+    "least_loss",
+    "least_loss_by_pixel",
     "tiles",
     "chromatic",
     "freeform",

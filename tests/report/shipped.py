@@ -8,6 +8,8 @@ FAST = ("stopband",)
 LONG = ("robust", "noise", "angle")
 SEARCHED = (
     "stopband",
+    "least_loss",
+    "least_loss_by_pixel",
     "chromatic",
     "robust",
     "angle",
@@ -22,6 +24,8 @@ SEARCHED = (
 )
 """Those with a search."""
 SLOW = (
+    "least_loss",
+    "least_loss_by_pixel",
     "chromatic",
     "dye",
     "band",

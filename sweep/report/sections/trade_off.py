@@ -12,7 +12,7 @@ from ...metrics.columns.chromatic import CHROMATIC_CSD
 from ...metrics.columns.color_separation import CSD
 from ...metrics.columns.confusion import CNR, D_PRIME
 from ...metrics.columns.pixel_separation import CHROMATIC_PIXEL_CSD, PIXEL_CSD
-from ...metrics.columns.sensitivity import CFA_SENSITIVITY
+from ...metrics.columns.sensitivity import CFA_SENSITIVITY, SENSITIVITY
 from ...metrics.columns.tasks import PREFIX
 from ...metrics.limiting import limited_by_name
 from ...metrics.quantity import OF_A_SHARE, WORST_CASE, Column
@@ -66,7 +66,7 @@ class TradeOff(Section):
 
     `found`: how it was found, for a sentence; `edges`: of stopbands, nm; `notes`: colorants and the like; `over`: what
     its separation is the worst of; `where`: scene, if there are several; `tile`: the plain CFA of its own tile; `kept`: constrained figures beside the lamps; `bound`: of any filter in its pixel, `below`:
-    the curve that it replaces, and the constraints that the bound leaves out; `own`: an objective that is to be the least, in its own unit; `more`: a design that separates more, and what it misses; `less`: other designs where RGGB itself is best; `deepest`: what the design has at the deepest red.
+    the curve that it replaces, and the constraints that the bound leaves out; `own`: an objective that is to be the least, in its own unit; `lost`: the light that filters take from their pixels, the best one's first, where least loss is the objective; `more`: a design that separates more, and what it misses; `less`: other designs where RGGB itself is best; `deepest`: what the design has at the deepest red.
     """
 
     column: Column
@@ -94,6 +94,7 @@ class TradeOff(Section):
     bounds: Pairs | None
     light_of: str
     own: tuple[str, ...] = ()
+    lost: tuple[str, ...] = ()
     by_pixel: tuple[float, float] | None = None
     less: tuple[Side, ...] = ()
     deepest: str = ""
@@ -136,7 +137,7 @@ class TradeOff(Section):
             rggb=None if rggb is None else _side(column, rggb),
             tile=_tile(output, best),
             kept=tuple(_kept(output, best, rggb)),
-            equal=_equal(output, best, shown),
+            equal=_equal(output, best, [row for row in shown if rggb is None or label(row) != label(rggb)]),
             lamps=_limited(output, best),
             bound=bound,
             below=_below(output, best),
@@ -149,6 +150,7 @@ class TradeOff(Section):
             traced=_line(output, scenario, "objective", best),
             bounds=_line(output, scenario, "limit", best) if bounds_figure(output, scenario, str(best["cfa"])) else None,
             own=tuple(_least(output, best, rggb)),
+            lost=tuple(_lost(output, best, [*shown, *leaders.others])),
             by_pixel=_by_pixel(column, best, rggb),
             less=() if rggb is not None else tuple(sorted((_side(column, row) for row in shown), key=lambda one: -one.separation)[:_MOST_LESS]),
             deepest=next((reds.deepest for reds in DeeperReds.of(output) if isinstance(reds, DeeperReds)), ""),
@@ -174,6 +176,10 @@ class TradeOff(Section):
         )
         if rggb is not None and (against := against_in_words(best.separation, rggb.separation, rggb.name)):
             beside = f", **{against}**{beside}"
+        if self.lost:
+            least, *of_others = self.lost
+            beside_it = f" ({', '.join(of_others)})" if of_others else ""
+            text += f" takes **{least}** of the light of its pixel{beside_it}, and"
         if self.own:
             text += f" has {joined([*self.own])}"
         elif self.column.pair is None or self.column.metric in (D_PRIME, CNR):
@@ -388,6 +394,16 @@ def _least(output: Output, best: Row, rggb: Row | None) -> Iterator[str]:
         column = output.columns[name]
         beside = "" if rggb is None else f" ({label(rggb)}: {of_column(column, float(rggb[name]))})"
         yield f"{article(quantity(column))} of **{of_column(column, float(best[name]))}**{beside}"
+
+
+def _lost(output: Output, best: Row, others: list[Row]) -> Iterator[str]:
+    """Yield the light that feasible filters take from their pixels, where the objective is to take the least."""
+    if output.goal.name == SENSITIVITY:
+        yield amount(1 - float(best[SENSITIVITY]), "share")
+        for row in others:
+            if row["feasible"] and np.isfinite(row[SENSITIVITY]):
+                name = "best swept" if row["kind"] == SWEPT else label(row)
+                yield f"{name} in {row['cfa']}: {amount(1 - float(row[SENSITIVITY]), 'share')}"
 
 
 def _below(output: Output, best: Row) -> str:
