@@ -4,7 +4,8 @@
 # make slow                  run the tests that take longer, and the other cases of these
 # make oldest                run the tests with the oldest versions that pyproject.toml allows, in .venv-oldest
 # make check                 ruff, mypy --strict
-# make accuracy              run the hard cases, measure what accuracy costs in time, outputs/accuracy/accuracy.png
+# make accuracy              run the hard cases, measure what accuracy costs in time, and print the tables of README.md
+#                            and tests/README.md anew
 # make tables              print the tables of studies/guide/reference.md and outputs/README.md, and the schema, anew
 # make gallery              run every study, draw studies/figures and studies/guide/gallery.md anew, and compare the
 #                            figures in the text with their runs (20 minutes)
@@ -46,6 +47,7 @@ oldest: $(OLDEST)/.oldest
 accuracy: $(VENV)/.ready-dev
 	$(BIN)/python -m pytest tests/hard/test_hard_cases.py -m "slow or not slow" --hard-cases outputs/accuracy/hard_cases.json
 	$(ONE_THREAD) $(BIN)/sweep accuracy studies/accuracy.yaml $(ARGS)
+	$(BIN)/python -m tests.accuracy_tables outputs/accuracy
 
 check: $(VENV)/.ready-dev
 	$(BIN)/ruff check sweep tests

@@ -39,9 +39,6 @@ SHARED = ROOT.parent / "shared"
 needs_measured = pytest.mark.skipif(
     not (SHARED / "data").is_dir(), reason="the measured curves (../shared/data) are not on this machine"
 )
-needs_reference = pytest.mark.skipif(
-    not (SHARED / "reference").is_dir(), reason="the ISETCam run (../shared/reference) is not on this machine"
-)
 
 
 FEWER = {

@@ -8,7 +8,7 @@ from pydantic import Field, ValidatorFunctionWrapHandler, WrapValidator
 
 from ..base.types import Section
 
-Preset = Literal["fast", "standard", "reference"]
+Preset = Literal["standard", "reference"]
 
 
 class Accuracy(Section):
@@ -40,7 +40,6 @@ class Accuracy(Section):
 
 STANDARD = Accuracy()
 PRESETS: dict[str, Accuracy] = {
-    "fast": Accuracy(finest_phase_px=0.0, field_positions=9, rays=16, psf_step_nm=10.0, pwm_moments=5),
     "standard": STANDARD,
     "reference": Accuracy(
         phases_per_px=64,
@@ -69,4 +68,4 @@ AccuracySection = Annotated[
     Accuracy,
     WrapValidator(_from_preset, json_schema_input_type=Preset | Accuracy),
 ]
-"""The `accuracy` key of a study: `fast`, `standard`, `reference`, or settings with an optional `preset`."""
+"""The `accuracy` key of a study: `standard`, `reference`, or settings with an optional `preset`."""

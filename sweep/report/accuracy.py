@@ -1,16 +1,15 @@
-"""Cost of accuracy in time: error of a CSD and time of each preset, in each scene of a study."""
+"""Cost of accuracy in time: error of a CSD and time of each setting, in each scene of a study."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,7 +19,7 @@ from threadpoolctl import threadpool_limits
 from ..base.answer import Answer
 from ..base.errors import SweepError, ValidationIssue
 from ..base.types import Array, DesignNumbers, Float, Progress
-from ..camera.accuracy import PRESETS, Accuracy
+from ..camera.accuracy import PRESETS, Accuracy, Preset
 from ..camera.model import SceneModel
 from ..camera.setup import Setup
 from ..designs.block import CurveBlock, edges_of_some
@@ -37,7 +36,10 @@ from .accuracy_figure import draw_accuracy
 from .look import png_of, svg_of
 from .pages import aligned
 
-_MOST_DESIGNS = 17
+_MOST_DESIGNS = 9
+_WHOLE_NM = 1e-6
+STEPS_NM = (10.0, 5.0, 2.0, 1.0, 0.5, 0.25)
+"""Steps of the wavelengths that are measured, the finest last."""
 _WARM = Accuracy(phases_per_px=1, finest_phase_px=0.25, field_positions=2, pwm_moments=2)
 
 
@@ -54,48 +56,70 @@ class Measured:
     following_s: float
 
 
-def measure_accuracy(
-    study: Study, output: Path, progress: Progress, *, presets: Sequence[str] = tuple(PRESETS)
-) -> Answer:
-    """Measure error and time of presets in each scene; write a table and a figure.
+@dataclass(frozen=True)
+class Setting:
+    """Setting that is measured: a preset, on wavelengths of a step."""
 
-    Every effect is computed. The error is the largest difference of any CSD from the preset `reference`, over up to 17
-    designs spread over the study's largest space. Each measurement is made in a process of its own, one after the
-    other, with nothing but imports and machine code there before.
+    preset: Preset
+    step_nm: float
+
+    def named(self, own_nm: float) -> str:
+        """Return its name in a study with a step of its own: the preset's there, else the step."""
+        if self.step_nm == own_nm:
+            return self.preset
+        return f"{self.step_nm:g} nm" if self.preset == "standard" else f"{self.preset}, {self.step_nm:g} nm"
+
+
+def settings_of(own_nm: float, steps_nm: Sequence[float]) -> list[Setting]:
+    """Return the settings that are measured, the finest last: it is what errors are told against."""
+    steps = sorted({own_nm, *steps_nm}, reverse=True)
+    by_step = [Setting("standard", step_nm) for step_nm in steps]
+    return [*by_step, *(Setting("reference", step_nm) for step_nm in dict.fromkeys((own_nm, steps[-1])))]
+
+
+def measure_accuracy(
+    at_step: Callable[[float | None], Study], output: Path, progress: Progress, *, steps_nm: Sequence[float] = STEPS_NM
+) -> Answer:
+    """Measure error and time of presets, and of steps of the wavelengths, in each scene; write a table and a figure.
+
+    Every effect is computed. The error is the largest difference of any CSD from the preset `reference` at the finest
+    step, over up to 9 designs spread over the study's largest space. Each measurement is made in a process of its own,
+    one after the other, with nothing but imports and machine code there before.
+
+    `at_step`: the study with a step of its wavelengths, or with its own; only steps that divide its range are measured.
     """
-    jobs = [(scenario, preset) for scenario in study.scenarios for preset in dict.fromkeys((*presets, "reference"))]
-    space, measured = max(study.spaces, key=lambda space: space.size), dict[tuple[str, str], Measured]()
-    numbers = spread(space.size)[:_MOST_DESIGNS]
-    for done, (scenario, preset) in enumerate(jobs):
+    own = at_step(None)
+    whole = [step_nm for step_nm in steps_nm if abs(math.remainder(own.grid.span_nm, step_nm)) < _WHOLE_NM]
+    settings = settings_of(own.grid.step_nm, whole)
+    studies = {each.step_nm: at_step(each.step_nm) for each in settings}
+    at = max(range(len(own.spaces)), key=lambda number: own.spaces[number].size)
+    numbers = spread(own.spaces[at].size)[:_MOST_DESIGNS]
+    jobs, measured = [(scenario, each) for scenario in own.scenarios for each in settings], list[Measured]()
+    for done, (scenario, setting) in enumerate(jobs):
         progress("measurements", done, len(jobs))
-        setup = replace(study.setup(space, scenario).with_all_effects, accuracy=PRESETS[preset])
-        measured[scenario, preset] = _in_new_process(setup, space, numbers)
+        study = studies[setting.step_nm]
+        setup = replace(study.setup(study.spaces[at], scenario).with_all_effects, accuracy=PRESETS[setting.preset])
+        measured.append(_in_new_process(setup, study.spaces[at], numbers))
     progress("measurements", len(jobs), len(jobs))
-    table = pd.DataFrame(_rows(measured, numbers.size))
+    rows = []
+    for start in range(0, len(jobs), len(settings)):
+        of_scene = measured[start : start + len(settings)]
+        for (scenario, setting), one in zip(jobs[start : start + len(settings)], of_scene, strict=True):
+            row = {"scenario": scenario, "setting": setting.named(own.grid.step_nm), "step_nm": setting.step_nm}
+            row["error_dn"] = float(np.abs(one.csds - of_scene[-1].csds).max(initial=0.0))
+            rows.append(row | {"first_s": one.first_s, "following_s": one.following_s, "designs": numbers.size})
+    table = pd.DataFrame(rows)
     write_table(pa.Table.from_pandas(table, preserve_index=False), output / "accuracy.parquet")
-    figure = draw_accuracy(table, study.name)
+    figure = draw_accuracy(table, own.name)
     write_bytes(png_of(figure), output / "accuracy.png")
-    write_bytes(svg_of(figure, "accuracy", "Error over time of each preset.").encode(), output / "accuracy.svg")
+    write_bytes(svg_of(figure, "accuracy", "Error over time of each setting.").encode(), output / "accuracy.svg")
     lines = [*aligned(_in_words(table)), f"Files: {output}/: accuracy.parquet, accuracy.png, accuracy.svg."]
     return Answer(lines, {"folder": str(output), "measured": table.to_dict("records")})
 
 
-def _rows(of_all: dict[tuple[str, str], Measured], n_designs: int) -> Iterator[dict[str, Any]]:
-    for (scenario, preset), measured in of_all.items():
-        yield {
-            "scenario": scenario,
-            "preset": preset,
-            "error_dn": float(np.abs(measured.csds - of_all[scenario, "reference"].csds).max(initial=0.0)),
-            "first_s": measured.first_s,
-            "following_s": measured.following_s,
-            "designs": n_designs,
-            "total_s": measured.first_s + (n_designs - 1) * (measured.following_s if n_designs > 1 else 0.0),
-        }
-
-
 def _in_words(table: pd.DataFrame) -> pd.DataFrame:
     """Return the table with digits that a person reads."""
-    shown = table[["scenario", "preset"]].copy()
+    shown = table[["scenario", "setting"]].copy()
     shown["error / DN"] = table["error_dn"].map("{:.2g}".format)
     for name, title in (("first_s", "first design / ms"), ("following_s", "each following / ms")):
         shown[title] = (1e3 * table[name]).map("{:.3g}".format)

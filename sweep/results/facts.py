@@ -65,6 +65,7 @@ class CheckFacts(_Facts):
     """Rows of a run that were compared with the reference settings: the largest difference of a separation, and where.
 
     `other`: the column not in DN that differs most of what is allowed, `largest_share` by how much, relative.
+    `slower`: how many times as long a design takes at the reference settings.
     """
 
     rows: int
@@ -76,6 +77,7 @@ class CheckFacts(_Facts):
     other: str = ""
     largest_share: float = 0.0
     allowed_share: float = 1.0
+    slower: float
 
     @property
     def passed(self) -> bool:

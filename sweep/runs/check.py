@@ -54,7 +54,8 @@ def compared_rows(study: Study, rows: Sequence[Row]) -> Iterator[list[dict[str, 
 
     Returns `design_id`, `filter_id`, `scenario`, `plan`; `quantity`, `realized_dn`, `allowed_dn`: of columns in DN, the
     one whose difference is the largest part of what is allowed, infinite if only one is a number; `other`,
-    `realized_share`, `allowed_share`: the same of other columns, relative, of errors of the d' that stands for them.
+    `realized_share`, `allowed_share`: the same of other columns, relative, of errors of the d' that stands for them;
+    `own_s`, `reference_s`: time of the block as the study computes it, and at the reference.
     """
     groups: dict[tuple[int, str], tuple[Space, list[Row]]] = {}
     for row in rows:
@@ -78,12 +79,16 @@ def _compared(study: Study, rules: Rules, space: Space, scenario: str, rows: Seq
     computed = {name: of for name, of in named.items() if name not in images}
     compared = {name: of for name, of in computed.items() if of.needs != "own"}
     wanted = Wanted.of(computed, rules.requested, rules.schema)
-    exact = columns_of_points(
-        space, points, CurveBlock(space.curves(points, study.grid.size)), reference, rules, wanted
-    )
+    block = CurveBlock(space.curves(points, study.grid.size))
+    times = [time.perf_counter()]
+    for each in (setup, reference):
+        exact = columns_of_points(space, points, block, each, rules, wanted)
+        times.append(time.perf_counter())
     tolerance_dn = study.plans[scenario].tolerance_dn if study.plans else study.section.tolerance_dn
     allowed_dn = _allowed_dn(setup, tolerance_dn)
+    own_s, reference_s = np.diff(times).tolist()
     result = [{key: row[key] for key in ("design_id", "filter_id", "scenario", "plan")} for row in rows]
+    result = [row | {"own_s": own_s, "reference_s": reference_s} for row in result]
     in_dn = {name for name, of in compared.items() if of.unit == DN and of.pair is not None}
     for (what, realized, allowed), names in (
         (("quantity", "realized_dn", "allowed_dn"), in_dn & exact.keys()),
@@ -168,7 +173,10 @@ def check_run(study: Study, folder: Path, seconds: float, pool: Workers) -> tupl
     keys = {key: of_dn[key] for key in ("design_id", "scenario", "quantity", "allowed_dn")}
     keys |= {key: of_share[key] for key in ("other", "allowed_share")}
     largest = {"largest_dn": of_dn["realized_dn"], "largest_share": of_share["realized_share"]}
-    return CheckFacts(rows=len(rows), **largest, **keys), warnings
+    # Of each scene the first row in each worker also takes what is computed once.
+    warm = [row for row in rows if not row["first"]] or rows
+    slower = sum(row["reference_s"] for row in warm) / sum(row["own_s"] for row in warm)
+    return CheckFacts(rows=len(rows), slower=slower, **largest, **keys), warnings
 
 
 def _checked(study: Study, rows: Sequence[Row], seconds: float) -> tuple[list[dict[str, Any]], list[str]]:
@@ -176,10 +184,12 @@ def _checked(study: Study, rows: Sequence[Row], seconds: float) -> tuple[list[di
     ended = time.monotonic() + seconds
     result: list[dict[str, Any]] = []
     warnings: list[str] = []
+    seen = set[str]()
     for row in rows:
         try:
             for compared in compared_rows(study, [row]):
-                result += compared
+                result += [checked | {"first": row["scenario"] not in seen} for checked in compared]
+                seen.add(row["scenario"])
         except Exception as error:  # a finished run must not be lost to its check
             warnings.append(f"design {row['design_id']} cannot be computed at the reference settings: {text_of(error)}")
         if time.monotonic() > ended:

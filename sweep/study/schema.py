@@ -308,7 +308,7 @@ class StudySection(Section):
     tolerance_dn: Annotated[float, Field(ge=1e-12, le=1e12)] = 0.1
     """By how much the simulation may change any CSD, DN."""
     accuracy: AccuracySection = STANDARD
-    """Sampling of the camera model: `fast`, `standard`, `reference`, or a mapping of settings."""
+    """Sampling of the camera model: `standard`, `reference`, or a mapping of settings."""
     geometry: Annotated[dict[Name, Geometry], Field(max_length=1000)] = {}
     """Distances at which the size of a light on the sensor is told, by name."""
     cfas: Annotated[

@@ -1,4 +1,4 @@
-"""`sweep accuracy`: error and time of presets."""
+"""`sweep accuracy`: error and time of presets and of steps."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 
 from sweep.report.accuracy import measure_accuracy
 from sweep.runs.dry_run import spread
-from sweep.study import load_study
+from sweep.study import Study, load_study
 
 from ..build import stopband_study
 
@@ -31,15 +31,22 @@ scenarios:
 def test_presets_are_measured_in_every_scene(tmp_path: Path) -> None:
     path, progress = tmp_path / "two.yaml", list[tuple[str, int, int]]()
     path.write_text(TWO_SCENES)
-    measure_accuracy(load_study(path), tmp_path, lambda *call: progress.append(call), presets=["fast"])
-    table = pd.read_parquet(tmp_path / "accuracy.parquet").set_index(["scenario", "preset"])
-    assert list(table.index) == [(scene, name) for scene in ("chart", "anywhere") for name in ("fast", "reference")]
-    assert (table["error_dn"].xs("reference", level="preset") == 0).all()
-    assert table.loc[("anywhere", "fast"), "error_dn"] > table.loc[("chart", "fast"), "error_dn"]
-    assert (table["total_s"] > table["first_s"]).all()
+
+    def at_step(step_nm: float | None) -> Study:
+        return load_study(path, changes={"wavelengths.step_nm": step_nm} if step_nm else {})
+
+    measure_accuracy(at_step, tmp_path, lambda *call: progress.append(call), steps_nm=[10.0])
+    table = pd.read_parquet(tmp_path / "accuracy.parquet").set_index(["scenario", "setting"])
+    names = ("10 nm", "standard", "reference")
+    assert list(table.index) == [(scene, name) for scene in ("chart", "anywhere") for name in names]
+    error_dn = table["error_dn"].unstack("setting")
+    assert (error_dn["reference"] == 0).all()
+    assert (error_dn["10 nm"] > error_dn["standard"]).all()
+    assert error_dn.loc["anywhere", "standard"] > error_dn.loc["chart", "standard"]
+    assert (table["following_s"] > 0).all()
     assert (table["designs"] == 2).all()
-    assert progress[0] == ("measurements", 0, 4)
-    assert progress[-1] == ("measurements", 4, 4)
+    assert progress[0] == ("measurements", 0, 6)
+    assert progress[-1] == ("measurements", 6, 6)
     assert (tmp_path / "accuracy.png").is_file()
 
 

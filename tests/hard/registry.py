@@ -34,9 +34,10 @@ class Result:
 
 @dataclass(frozen=True)
 class HardCase:
-    """A case: its name, oracle, derivation of the allowed error, and whether it takes seconds."""
+    """A case: its name, what it is a case of, oracle, derivation of the allowed error, whether it takes seconds."""
 
     name: str
+    kind: str
     oracle: str
     why: str
     run: Callable[[], Result]
@@ -53,7 +54,8 @@ def hard_case(name: str, *, slow: bool = False) -> Callable[[Callable[[], Result
         oracle, _, why = " ".join((run.__doc__ or "").split()).partition(". Allowed: ")
         if not oracle or not why:
             raise TypeError(f"{name}: the docstring must name the oracle and derive the allowed error")
-        CASES.append(HardCase(name, oracle, why.removesuffix("."), mp.workdps(50)(run), slow))
+        kind = run.__module__.rpartition("cases_")[2]
+        CASES.append(HardCase(name, kind, oracle, why.removesuffix("."), mp.workdps(50)(run), slow))
         return run
 
     return register

@@ -22,7 +22,14 @@ def json_number(value: float) -> float | str:
     "case", [pytest.param(case, id=case.name, marks=[pytest.mark.slow] if case.slow else []) for case in CASES]
 )
 def test_hard_case(case: HardCase, hard_case_rows: list[dict[str, object]]) -> None:
-    row = {"case": case.name, "oracle": case.oracle, "error": "raised", "allowed": 0.0, "why": case.why}
+    row = {
+        "case": case.name,
+        "kind": case.kind,
+        "oracle": case.oracle,
+        "error": "raised",
+        "allowed": 0.0,
+        "why": case.why,
+    }
     hard_case_rows.append(row)
     result = case.run()
     row |= {"error": json_number(float(result.error)), "allowed": json_number(float(result.allowed))}

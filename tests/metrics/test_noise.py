@@ -136,7 +136,7 @@ def test_the_summary_of_a_noisy_study(tmp_path: Path) -> None:
     output = read_output(tmp_path / "out")
     (section,) = Noise.of(output)
     assert isinstance(section, Noise)
-    told = re.fullmatch(r"from ([\d.]+)\s%", section.steady["RGGB"])
+    told = re.fullmatch(r"from ([\d.]+)\s% to 50\s%, the last computed", section.steady["RGGB"])
     assert told is not None
     # Computed again there, a little brighter and a little dimmer.
     brighter, dimmer = (_worst_error(path, float(told[1]) / 100 * share) for share in (1.005, 0.985))

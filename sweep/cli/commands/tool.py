@@ -20,14 +20,18 @@ def accuracy(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Measure what accuracy costs: error and time of each preset, in each scene of a study."""
+    """Measure what accuracy costs: error and time of each preset, and of steps of the wavelengths, in each scene."""
     from ...report.accuracy import measure_accuracy
-    from ...study import folder_name, load_study
+    from ...study import Study, folder_name, load_study
     from ...study.shipped import study_path
 
-    loaded = load_study(study_path(study), data)
+    path = study_path(study)
+
+    def at_step(step_nm: float | None) -> Study:
+        return load_study(path, data, changes={} if step_nm is None else {"wavelengths.step_nm": step_nm})
+
     with ProgressDisplay(quiet=quiet) as display:
-        answer = measure_accuracy(loaded, output / folder_name(loaded.name), display.update)
+        answer = measure_accuracy(at_step, output / folder_name(at_step(None).name), display.update)
     print_answer(answer, as_json=as_json, quiet=quiet)
 
 

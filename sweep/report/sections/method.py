@@ -51,7 +51,8 @@ class Method(Section):
             others = f", and other figures by {number(100 * facts.check.largest_share)} %"
             lines.append(
                 f"Checked: {rows} computed again at reference settings {differ} by at most {digits(facts.check.largest_dn)} DN; "
-                f"{number(facts.check.allowed_dn)} DN is allowed{others if facts.check.largest_share > _SEEN else ''}."
+                f"{number(facts.check.allowed_dn)} DN is allowed{others if facts.check.largest_share > _SEEN else ''}. "
+                f"A design takes {facts.check.slower:.2g} times as long there."
             )
         if output.audited is not None:
             lines.append(
