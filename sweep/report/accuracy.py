@@ -36,7 +36,7 @@ from .accuracy_figure import draw_accuracy
 from .look import png_of, svg_of
 from .pages import aligned
 
-_MOST_DESIGNS = 9
+_MOST_DESIGNS = 5
 _WHOLE_NM = 1e-6
 STEPS_NM = (10.0, 5.0, 2.0, 1.0, 0.5, 0.25)
 """Steps of the wavelengths that are measured, the finest last."""
@@ -83,7 +83,7 @@ def measure_accuracy(
     """Measure error and time of presets, and of steps of the wavelengths, in each scene; write a table and a figure.
 
     Every effect is computed. The error is the largest difference of any CSD from the preset `reference` at the finest
-    step, over up to 9 designs spread over the study's largest space. Each measurement is made in a process of its own,
+    step, over up to 5 designs spread over the study's largest space. Each measurement is made in a process of its own,
     one after the other, with nothing but imports and machine code there before.
 
     `at_step`: the study with a step of its wavelengths, or with its own; only steps that divide its range are measured.

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.types import FloatArray, Parallel, delayed
+from ..base.types import FloatArray, Progress
 from ..camera.setup import Setup
 from ..designs.space import Space
 from ..designs.ungridded import PairedDesigns, sobol_points
@@ -85,11 +85,67 @@ def verdicts(reading: Reading, points: Sequence[FloatArray]) -> list[Verdict]:
     ]
 
 
-def tried_near(problem: Problem, reading: Reading, best: Evaluation, seed: int) -> list[Evaluation]:
+def best_as_read(
+    problem: Problem, reading: Reading, runs: Sequence[SearchRun], effort: Effort, progress: Progress
+) -> SearchRun | None:
+    """Return further evaluations, the last one of which is the best that is feasible as it is read out.
+
+    None if that is the best of `runs`, or if no design was found: then the answer is the best before readout. Workers
+    are not asked: they may be at the levels of the front.
+    """
+    log = [evaluation for run in runs for evaluation in run.log if evaluation.feasible]
+    log = sorted({evaluation.x.tobytes(): evaluation for evaluation in log}.values(), key=lambda e: -e.objective)
+    found, feasible = _tightened(problem, reading, log[0], len(runs), effort)
+    if feasible and not found:
+        return None
+    best = found.pop() if feasible else _first_feasible(reading, log, progress)
+    if best is None:
+        return None
+    nearby = _tried_near(problem, reading, best, effort.seed, progress)
+    return SearchRun(len(runs), "as read out", [*found, best, *nearby])
+
+
+def _tightened(
+    problem: Problem, reading: Reading, first: Evaluation, start: int, effort: Effort
+) -> tuple[list[Evaluation], bool]:
+    """Search with constraints that ask for as much more as the answer before misses when it is read out.
+
+    Returns the answers, none if the first design is feasible, and whether the last one is.
+    """
+    (verdict,) = verdicts(reading, [first.x])
+    found, tighter, nearest = list[Evaluation](), problem, first
+    while not verdict.feasible and len(found) < _MOST_TIGHTENED:
+        tighter = replace(tighter, constraints=_asking_more(tighter, verdict.missed))
+        algorithm = effort.refinement or effort.algorithm
+        run = search_from(tighter, start, problem.to_unit(nearest.x), algorithm, effort.evaluations)
+        if (inside := best_feasible(run.log)) is None:
+            break
+        nearest = smooth_evaluation(problem, inside.x)
+        found.append(nearest)
+        (verdict,) = verdicts(reading, [nearest.x])
+    return found, verdict.feasible
+
+
+def _first_feasible(reading: Reading, log: Sequence[Evaluation], progress: Progress) -> Evaluation | None:
+    """Return the first design of a log that is feasible as it is read out."""
+    for at in range(0, len(log), _AT_ONCE):
+        progress("designs read out", at, len(log))
+        some = log[at : at + _AT_ONCE]
+        for evaluation, verdict in zip(some, verdicts(reading, [each.x for each in some]), strict=True):
+            if verdict.feasible:
+                return evaluation
+    return None
+
+
+def _tried_near(
+    problem: Problem, reading: Reading, best: Evaluation, seed: int, progress: Progress
+) -> list[Evaluation]:
     """Return feasible designs near one, before and after readout; each is read out as better than the last one."""
     free, found = problem.free.size, [best]
     (at_best,) = verdicts(reading, [best.x])
-    for number, half in enumerate(np.repeat(_NEAR, _ROUNDS)):
+    boxes = np.repeat(_NEAR, _ROUNDS)
+    for number, half in enumerate(boxes):
+        progress("designs near the answer", number + 1, boxes.size)
         offsets = half * (2 * sobol_points(free, _AT_ONCE, seed + number) - 1)
         points = problem.from_unit(np.clip(problem.to_unit(found[-1].x) + offsets, 0.0, 1.0))
         read = verdicts(reading, list(points))
@@ -104,48 +160,7 @@ def tried_near(problem: Problem, reading: Reading, best: Evaluation, seed: int) 
     return found[1:]
 
 
-def best_as_read(
-    problem: Problem, reading: Reading, runs: Sequence[SearchRun], effort: Effort, parallel: Parallel
-) -> SearchRun | None:
-    """Return further evaluations, the last one of which is the best that is feasible as it is read out.
-
-    None if that is the best of `runs`, or if no design was found: then the answer is the best before readout.
-    """
-    log = [evaluation for run in runs for evaluation in run.log if evaluation.feasible]
-    log = sorted({evaluation.x.tobytes(): evaluation for evaluation in log}.values(), key=lambda e: -e.objective)
-    (verdict,) = next(iter(parallel([delayed(verdicts, reading, [log[0].x])])))
-    if verdict.feasible:
-        return None
-    nearest, tighter, found, best = log[0], problem, list[Evaluation](), None
-    algorithm = effort.refinement or effort.algorithm
-    for _ in range(_MOST_TIGHTENED):
-        tighter = replace(tighter, constraints=_tightened(tighter, verdict.missed))
-        call = delayed(search_from, tighter, len(runs), problem.to_unit(nearest.x), algorithm, effort.evaluations)
-        (run,) = parallel([call])
-        if (inside := best_feasible(run.log)) is None:
-            break
-        nearest = smooth_evaluation(problem, inside.x)
-        found.append(nearest)
-        ((verdict,),) = parallel([delayed(verdicts, reading, [nearest.x])])
-        if verdict.feasible:
-            best = nearest
-            break
-    for at in range(0, len(log), _AT_ONCE):
-        if best is not None and log[at].objective <= best.objective:
-            break
-        some = log[at : at + _AT_ONCE]
-        (read,) = parallel([delayed(verdicts, reading, [evaluation.x for evaluation in some])])
-        good = [evaluation for evaluation, verdict in zip(some, read, strict=True) if verdict.feasible]
-        best = max([*good, *([] if best is None else [best])], key=lambda e: e.objective, default=None)
-        if good:
-            break
-    if best is None:
-        return None
-    (nearby,) = parallel([delayed(tried_near, problem, reading, best, effort.seed)])
-    return SearchRun(len(runs), "as read out", [*found, best, *nearby])
-
-
-def _tightened(problem: Problem, missed: Mapping[str, float]) -> dict[str, Bound]:
+def _asking_more(problem: Problem, missed: Mapping[str, float]) -> dict[str, Bound]:
     """Return constraints that ask for as much more as a design misses; of a probability, for as many times less."""
     constraints = dict(problem.constraints)
     for name, amount in missed.items():

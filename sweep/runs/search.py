@@ -111,7 +111,7 @@ def run_search(study: Study, search: Search, rules: Rules, parallel: Parallel, p
         problem, best, more = _over_series(problem, scenes, best, runs, effort, parallel, progress)
         runs, last = runs + more, more or runs
     reading = Reading.of(study, search, rules)
-    if (run := best_as_read(problem, reading, last, effort, parallel)) is not None:
+    if (run := best_as_read(problem, reading, last, effort, progress)) is not None:
         runs, best = [*runs, run], run.log[-1]
     if series:
         alone = [problem.in_scenario(number) for number in range(len(search.scenarios))]

@@ -64,7 +64,7 @@ def run_tile_search(study: Study, search: Search, rules: Rules, parallel: Parall
     best = best_feasible([found, *(e for run in runs for e in run.log)])
     assert best is not None
     of_best = replace(search, space=search.tiles[winner], tiles=())
-    run = best_as_read(problem, Reading.of(study, of_best, rules), runs, effort, parallel)
+    run = best_as_read(problem, Reading.of(study, of_best, rules), runs, effort, progress)
     runs, best = (runs, best) if run is None else ([*runs, run], run.log[-1])
     check_proof(best, limit)
     answer = SearchAnswer(of_best, search.scenario, tuple(runs), best, limit, no_limit, front=(), starts=len(starts))

@@ -65,7 +65,9 @@ def touching_discs() -> Result:
     """
     radii = [0.5, 1.5, 2.5, math.sqrt(0.5), math.sqrt(4.5), 10.5]
     near = [float(v) for r in radii for v in (np.nextafter(r, 0), r, np.nextafter(r, 99), r * (1 + 1e-12))]
-    return share_result([(x, y, 0.5, r) for r in near for x, y in ((round(r), 0.0), (1.0, 1.0), (0.0, round(r - 0.5)))])
+    return share_result(
+        [(x, y, 0.5, r) for r in near for x, y in ((float(round(r)), 0.0), (1.0, 1.0), (0.0, float(round(r - 0.5))))]
+    )
 
 
 @hard_case("discs half a pixel off, up to 64 pixels of radius")
