@@ -157,7 +157,7 @@ def _warm_up(setup: Setup, space: Space) -> None:
     optics = setup.scene.optics.model_copy(update={"f_number": 1.1 * setup.scene.optics.f_number})
     elsewhere = setup.scene.model_copy(update={"optics": optics})
     chart = elsewhere.model_copy(update={"target": None, "field": None})
-    for scene, n_designs in ((chart, 512), (elsewhere, 2)):
+    for scene, n_designs in ((chart, 64), (elsewhere, 2)):
         model = SceneModel(replace(setup, scene=scene, accuracy=_WARM))
         _evaluated(model, single, np.zeros(n_designs, dtype=np.intp))
 
