@@ -4,8 +4,8 @@
 # make slow                  run the tests that take longer, and the other cases of these
 # make oldest                run the tests with the oldest versions that pyproject.toml allows, in .venv-oldest
 # make check                 ruff, mypy --strict
-# make accuracy              run the hard cases, measure what accuracy costs in time, and print the tables of README.md
-#                            and tests/README.md anew
+# make accuracy              run the hard cases, measure what accuracy costs in time, and print the tables of
+#                            tests/README.md anew
 # make tables              print the tables of studies/guide/reference.md and outputs/README.md, and the schema, anew
 # make gallery              run every study, draw studies/figures and studies/guide/gallery.md anew, and compare the
 #                            figures in the text with their runs (20 minutes)

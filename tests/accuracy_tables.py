@@ -1,4 +1,4 @@
-"""What accuracy costs, and the hard cases, as tables: `make accuracy` writes them into README.md and tests/README.md."""
+"""What accuracy costs, and the hard cases, as tables: `make accuracy` writes them into tests/README.md."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def cost_table(measured: pd.DataFrame) -> list[str]:
         ratio = rows["seconds"] / of_standard
         name = f"`{setting}`" if setting in ("standard", "reference") else f"`wavelengths: {{step_nm: {setting[:-3]}}}`"
         lines.append(
-            f"| {name} | {rows['error_dn'].max():.2g} DN | {rows['seconds'].max():.2g} s "
+            f"| {name} | {_error(rows['error_dn'].max())} DN | {rows['seconds'].max():.1f} s "
             f"| {ratio.min():.2g} to {ratio.max():.2g} |"
         )
     return lines
@@ -49,7 +49,7 @@ def scene_table(measured: pd.DataFrame) -> list[str]:
     settings = list(dict.fromkeys(measured["setting"]))
     lines = [f"| scene | {' | '.join(settings)} |", f"| --- |{' --- |' * len(settings)}"]
     for scenario, rows in measured.groupby("scenario", sort=False):
-        cells = [f"{row['error_dn']:.1g} DN, {1e3 * row['following_s']:.2g} ms" for row in rows.to_dict("records")]
+        cells = [f"{_error(row['error_dn'])} DN, {1e3 * row['following_s']:,.0f} ms" for row in rows.to_dict("records")]
         lines.append(f"| {scenario} | {' | '.join(cells)} |")
     return lines
 
@@ -74,7 +74,8 @@ def hard_table(cases: list[dict[str, Any]]) -> list[str]:
 
 
 def _error(value: float | str) -> str:
-    return value if isinstance(value, str) else f"{value:.2g}"
+    """Two significant digits, whole from 10 on."""
+    return value if isinstance(value, str) else f"{value:.0f}" if 10 <= value < 1e6 else f"{value:.2g}"
 
 
 def with_block(text: str, name: str, lines: list[str]) -> str:
@@ -89,11 +90,9 @@ def main(folder: Path) -> None:
     """Print the tables of a folder that `make accuracy` made, and copy its picture."""
     measured = pd.read_parquet(folder / "accuracy.parquet")
     cases = json.loads((folder / "hard_cases.json").read_text())
-    readme, tests = ROOT / "README.md", ROOT / "tests" / "README.md"
-    within = f"{len(cases)} [hard cases](tests/README.md#hard-cases) stay within the errors that are derived for them."
-    text = with_block(readme.read_text(), "cost", [*cost_table(measured), "", within])
-    readme.write_text(text)
-    text = with_block(tests.read_text(), "scenes", scene_table(measured))
+    tests = ROOT / "tests" / "README.md"
+    text = with_block(tests.read_text(), "cost", cost_table(measured))
+    text = with_block(text, "scenes", scene_table(measured))
     tests.write_text(with_block(text, "hard cases", hard_table(cases)))
     with Image.open(folder / "accuracy.png") as picture:
         small = picture.convert("RGB")

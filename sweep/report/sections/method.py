@@ -50,9 +50,9 @@ class Method(Section):
             differ = "differs" if facts.check.rows == 1 else "differ"
             others = f", and other figures by {number(100 * facts.check.largest_share)} %"
             lines.append(
-                f"Checked: {rows} computed again at reference settings {differ} by at most {digits(facts.check.largest_dn)} DN; "
-                f"{number(facts.check.allowed_dn)} DN is allowed{others if facts.check.largest_share > _SEEN else ''}. "
-                f"A design takes {facts.check.slower:.2g} times as long there."
+                f"Checked: {rows} at reference settings ({facts.check.slower:.2g} times as long) {differ} by at most "
+                f"{digits(facts.check.largest_dn)} DN; {number(facts.check.allowed_dn)} DN is allowed"
+                f"{others if facts.check.largest_share > _SEEN else ''}."
             )
         if output.audited is not None:
             lines.append(
