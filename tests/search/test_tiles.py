@@ -84,8 +84,7 @@ def test_the_best_of_few_tiles_is_that_of_a_search_in_each(tmp_path: Path, objec
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("light", [0.5, 0.6])
-@pytest.mark.parametrize("objective", ["csd_yellow_red", "chromatic_csd_yellow_red"])
+@pytest.mark.parametrize(("objective", "light"), [("csd_yellow_red", 0.6), ("chromatic_csd_yellow_red", 0.5)])
 def test_the_best_of_more_tiles_is_that_of_a_search_in_each(tmp_path: Path, objective: str, light: float) -> None:
     changes = ("min: 0.4", f"min: {light}"), ("chromatic_csd_yellow_red", objective)
     check_against_brute_force(*found(tiles_study(tmp_path, "R, C, Y, Cy", *changes)))
