@@ -38,6 +38,7 @@ from .pages import aligned
 
 _MOST_DESIGNS = 5
 _WHOLE_NM = 1e-6
+"""A range that is so near to whole steps is of whole steps."""
 STEPS_NM = (10.0, 5.0, 2.0, 1.0, 0.5, 0.25)
 """Steps of the wavelengths that are measured, the finest last."""
 _WARM = Accuracy(phases_per_px=1, finest_phase_px=0.25, field_positions=2, pwm_moments=2)

@@ -21,7 +21,8 @@ def draw_accuracy(table: pd.DataFrame, name: str) -> Figure:
         color, error_dn = CURVE_CYCLE[number % len(CURVE_CYCLE)], rows["error_dn"].clip(lower=_LEAST_DN)
         seconds = rows["following_s"].fillna(rows["first_s"])
         steps = ~rows["setting"].str.startswith("reference")
-        axes.plot(seconds[steps], error_dn[steps], ".-", color=color, linewidth=0.8, label=str(scenario))
+        line = ".-" if number < len(CURVE_CYCLE) else ".--"
+        axes.plot(seconds[steps], error_dn[steps], line, color=color, linewidth=0.8, label=str(scenario))
         for preset, marker in _PRESETS.items():
             at = rows["setting"] == preset
             axes.plot(seconds[at], error_dn[at], marker, color=color, markersize=7, markerfacecolor="none")
