@@ -24,6 +24,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from bench_ratios import BLOCK, median_s
 from build import large
+from scipy.integrate import trapezoid
 from scipy.spatial.distance import cdist
 
 from sweep.camera.model import SceneModel
@@ -48,8 +49,9 @@ def script(setup: Setup, target: np.ndarray, points: np.ndarray) -> np.ndarray:
     """
     (modified,) = setup.camera.modified
     wave, base = setup.camera.grid.nodes_nm, setup.camera.qe[modified]
-    scale = 0.95 * 4095 * setup.lights.photon_ratio / (setup.camera.qe.sum(axis=1).max() / wave.size)
+    scale = 0.95 * 4095 * setup.lights.photon_ratio / (trapezoid(setup.camera.qe).max() / (wave.size - 1))
     signals = setup.lights.photons * scale
+    signals[:, [0, -1]] /= 2  # half a bin at each end of the range
     fixed = np.floor(setup.camera.qe @ signals.T + 0.5)
     members = list(setup.members.values())
     pairs = [(a, b) for at, a in enumerate(members) for b in members[at + 1 :]]

@@ -280,7 +280,9 @@ def _upper_bound(
             qe[setup.camera.modified[0]] = ceiling
             with_ceiling = any_filter_search(study, setup.with_camera(qe=qe))
             problem = with_lower_bound(with_ceiling, CFA_SENSITIVITY, light)
-            if exposed and may_be_brightest(problem.setup, float(curve.sum() / ceiling.sum())):
+            if exposed and may_be_brightest(
+                problem.setup, float(study.grid.integrate(curve) / study.grid.integrate(ceiling))
+            ):
                 return None, None, "", "the filter is the brightest on white, and sets the exposure"
             limit, reason = upper_bound_or_reason(with_exposure_unchanged(problem) if exposed else problem)
             if limit is not None:

@@ -156,7 +156,7 @@ def make_study(
     [35.0, 8.0]
     >>> stopband = sweep.make_study(cfas=["RGGB", "RYNCy"], channel="N", base="Y", to="G")
     >>> stopband.evaluate(left_nm=613, right_nm=651, left_width_nm=6, right_width_nm=6).csd_yellow_red.round().tolist()
-    [235.0]
+    [234.0]
     """
     document = {"study": study, "sensor": sensor, "lights": lights, **_with_filter(keys)}
     curves: dict[str, Curves] = {}
@@ -255,7 +255,7 @@ def sensor(
     >>> sensor = sweep.sensor("ar0820", N=(nm, np.where(abs(nm - 630) < 15, 0.2, 1)), relative_to="Y")
     >>> study = sweep.make_study(sensor=sensor, cfas=["RYYCy", "RYNCy"])
     >>> study.evaluate().csd_yellow_red.round().tolist()
-    [31.0, 194.0]
+    [31.0, 193.0]
     """
     if source is None or isinstance(source, Path | str):
         return sensor_source(source, channels, relative_to=relative_to, name=name, clear=clear)
@@ -324,7 +324,7 @@ def lights(
     >>> leds = pd.DataFrame({k: np.exp(-((nm - c) / 12.0) ** 2) for k, c in [("amber", 592), ("ruby", 636)]}, index=nm)
     >>> lights = sweep.lights(leds, types={"yellow": ["amber"], "red": ["ruby"]})
     >>> sweep.make_study(lights=lights, cfas=["RGGB"]).evaluate().csd_yellow_red.round().tolist()
-    [180.0]
+    [182.0]
     """
     signals = None if types is None else {kind: list(columns) for kind, columns in types.items()}
     if _is_table(source):

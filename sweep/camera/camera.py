@@ -64,9 +64,9 @@ class Camera:
         return self.qe[channel] if channel in self.modified else self.clear_qe
 
     @property
-    def area_step_m2_nm(self) -> float:
-        """Light-sensitive area times wavelength step, m2 nm: electrons/s per unit of irradiance times QE."""
-        return self.grid.step_nm * self.pixel.area_m2
+    def area_bins_m2_nm(self) -> PerWavelength:
+        """Light-sensitive area times width of each bin, m2 nm: electrons/s per unit of irradiance times QE."""
+        return self.grid.bins_nm * self.pixel.area_m2
 
     @property
     def longest_distance_dn(self) -> float:

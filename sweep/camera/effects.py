@@ -41,7 +41,7 @@ class Box:
     def _exposures_s(self) -> tuple[float, float]:
         """Shortest and longest exposure time, s."""
         setup = self.setup
-        white = white_irradiance(setup) * setup.camera.area_step_m2_nm
+        white = white_irradiance(setup) * setup.camera.area_bins_m2_nm
         modified = list(setup.camera.modified)
         ends = [exposure_times(setup, (qe[modified] @ white)[None])[0] for qe in (self.high, self.low)]
         return float(ends[0]), float(ends[1])
@@ -71,15 +71,16 @@ class Box:
     def brightest_signal_dn(self) -> float:
         """Largest unclipped response of any channel to a signal whose image is whole, without pedestal, DN."""
         camera = self.setup.camera
-        dn = camera.area_step_m2_nm * self._exposures_s[1] * self.light_range[1] * camera.pixel.dn_per_e
-        return float((signal_irradiance(self.setup) @ self._highest.T).max() * dn)
+        dn = self._exposures_s[1] * self.light_range[1] * camera.pixel.dn_per_e
+        signals = signal_irradiance(self.setup) * camera.area_bins_m2_nm
+        return float((signals @ self._highest.T).max() * dn)
 
     @cached_property
     def brightest_pixel_dn(self) -> float:
         """`brightest_signal_dn` with background and dark current, DN."""
         setup, time_s = self.setup, self._exposures_s[1]
         camera = setup.camera
-        background = (self._highest @ background_irradiance(setup)).max() * camera.area_step_m2_nm
+        background = (self._highest @ (background_irradiance(setup) * camera.area_bins_m2_nm)).max()
         return self.brightest_signal_dn + float(background + camera.pixel.dark_e_per_s) * time_s * camera.pixel.dn_per_e
 
     @property

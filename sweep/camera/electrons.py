@@ -31,8 +31,8 @@ class FieldPosition:
         nodes_nm, irradiance = camera.grid.nodes_nm, scene_irradiance(setup)
         fixed, modified = list(camera.fixed), list(camera.modified)
         self.angular = AngularResponse(setup)
-        self.signals = irradiance.signals * camera.area_step_m2_nm * path_factor(setup, nodes_nm)
-        background = irradiance.background * camera.area_step_m2_nm * path_factor(setup, nodes_nm, background=True)
+        self.signals = irradiance.signals * camera.area_bins_m2_nm * path_factor(setup, nodes_nm)
+        background = irradiance.background * camera.area_bins_m2_nm * path_factor(setup, nodes_nm, background=True)
         self.background = self.angular.light(np.repeat(background[None], len(modified), axis=0), modified)
         self.fixed_background = self.angular.curves(camera.qe[fixed], fixed) @ background
 

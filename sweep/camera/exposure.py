@@ -27,12 +27,12 @@ def white_irradiance(setup: Setup) -> PerWavelength:
     if isinstance(scenario.exposure, WhitePatchExposure) and scenario.exposure.photon_ratio is not None:
         ratio = scenario.exposure.photon_ratio
     radiance = scenario.photon_radiance * irradiance_factor(scenario.optics)
-    return np.full(grid.size, radiance / (ratio * grid.size * grid.step_nm))
+    return np.full(grid.size, radiance / (ratio * grid.span_nm))
 
 
 def fixed_white(setup: Setup) -> float:
     """Return electrons/s on the white patch of the brightest channel that no design modifies."""
-    rates = setup.camera.qe[list(setup.camera.fixed)] @ white_irradiance(setup) * setup.camera.area_step_m2_nm
+    rates = setup.camera.qe[list(setup.camera.fixed)] @ (white_irradiance(setup) * setup.camera.area_bins_m2_nm)
     return float(rates.max(initial=0.0))
 
 
@@ -56,7 +56,7 @@ def exposure_times(
 def may_be_brightest(setup: Setup, most: float = 1.0) -> bool:
     """Return whether a modified channel below its base curve may be the brightest on white and set the exposure.
 
-    `most`: largest sensitivity of the channel: the sum of its curve over that of its base.
+    `most`: largest sensitivity of the channel: the integral of its curve over that of its base.
     """
     return isinstance(setup.scene.exposure, WhitePatchExposure) and not largest_sensitivity_not_brightest(setup) >= most
 
@@ -66,14 +66,14 @@ def largest_sensitivity_not_brightest(setup: Setup) -> float:
 
     Infinite for dark base curves.
     """
-    camera, rates = setup.camera, setup.camera.qe.sum(axis=1)
+    camera, rates = setup.camera, setup.camera.grid.integrate(setup.camera.qe)
     fixed_rate, modified = (rates[list(channels)].max(initial=0.0) for channels in (camera.fixed, camera.modified))
     return float(fixed_rate / modified) if modified > 0 else np.inf
 
 
 def exposed_at(setup: Setup, sensitivity: float) -> Setup:
     """Return the setup with the exposure time that it has where the only modified channel has a sensitivity."""
-    white = setup.camera.base_qe.sum(axis=1) * (sensitivity * white_irradiance(setup)[0] * setup.camera.area_step_m2_nm)
+    white = setup.camera.base_qe @ (sensitivity * white_irradiance(setup) * setup.camera.area_bins_m2_nm)
     (time_s,) = exposure_times(setup, white[None])
     scene = setup.scene.model_copy(update={"exposure": FixedExposure(exposure_s=float(time_s))})
     return replace(setup, scene=scene)

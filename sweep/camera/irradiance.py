@@ -75,7 +75,7 @@ def _uniform(setup: Setup, luminance_cd_m2: float) -> PerWavelength:
     grid = setup.camera.grid
     if not luminance_cd_m2:
         return np.zeros(grid.size)
-    flat = np.full((1, grid.size), 1 / (grid.size * grid.step_nm))
+    flat = np.full((1, grid.size), 1 / grid.span_nm)
     radiance = luminance_cd_m2 / luminance_per_photon_radiance(grid, flat)[0]
     return np.asarray(flat[0] * radiance * irradiance_factor(setup.scene.optics), dtype=float)
 

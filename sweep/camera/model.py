@@ -141,7 +141,7 @@ class SceneModel:
     @cached_property
     def _white(self) -> tuple[FloatArray, float]:
         """Electrons/s on the white patch per unit of QE, and in the brightest channel that no design modifies."""
-        return white_irradiance(self.setup) * self.setup.camera.area_step_m2_nm, fixed_white(self.setup)
+        return white_irradiance(self.setup) * self.setup.camera.area_bins_m2_nm, fixed_white(self.setup)
 
     @property
     def own_moments(self) -> bool:

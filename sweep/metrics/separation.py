@@ -21,7 +21,6 @@ from ..base.types import (
     MemberNumbers,
     PerChannel,
     PerDesign,
-    PerWavelength,
     SameShape,
 )
 from ..camera.mosaic import Mosaic
@@ -209,12 +208,14 @@ def _squared(first: Float[Array, "pairs channels"], second: Float[Array, "pairs 
 
 
 def cfa_sensitivity(
-    total_qe: Float[Array, "*batch channels"], counts: Int[IndexArray, " channels"], clear_qe: PerWavelength
+    total_qe: Float[Array, "*batch channels"],
+    counts: Int[IndexArray, " channels"],
+    total_clear: Float[Array, ""] | float,
 ) -> SameShape:
-    """Return the total QE, averaged over the pixels of the tile, relative to the clear pixel.
+    """Return the integral of the QE, averaged over the pixels of the tile, relative to that of the clear pixel.
 
     `counts`: pixels of each channel per tile. 1 for a sensor without color filters.
     """
     weighted = np.moveaxis(total_qe * counts, -1, 0)
     mean = sum(weighted[1:], start=weighted[0]) / counts.sum()  # few channels of many designs
-    return np.asarray(mean / clear_qe.sum(dtype=float), dtype=float)
+    return np.asarray(mean / total_clear, dtype=float)

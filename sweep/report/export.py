@@ -148,7 +148,8 @@ def _verify(
     """Compare the modified channels with what the run kept of them, and with the row's sensitivity."""
     check_kept(output, output.curves.designs.get(int(row["design_id"]), {}), modified)
     if modified:
-        ratio = sum(values.sum() for values in modified.values()) / sum(base.sum() for base in base_qe.values())
+        kept, whole = (output.study.wavelengths.integrate(np.array([*qe.values()])).sum() for qe in (modified, base_qe))
+        ratio = float(kept / whole)
         if not abs(ratio - row["sensitivity"]) <= _ROUNDING * max(1.0, ratio):
             problem = "computed again, the sensitivity differs from the run"
             raise OutputError(ValidationIssue(problem, str(output.folder), allowed="the version of that run"))

@@ -95,7 +95,7 @@ def _on_sensors(
     parts = [slice(start, start + _TOGETHER) for start in range(0, len(drawn), _TOGETHER)]
     csds = {pair: np.concatenate([smooth_csd(free, drawn[part], pair) for part in parts]) for pair in pairs}
     counts = camera.mosaic.counts
-    light = drawn.sum(axis=2) @ (counts / counts.sum())
+    light = camera.grid.integrate(drawn) @ (counts / counts.sum())
     return csds, light, {pair: _at_least(free, designed, pair, errors) for pair in pairs} if errors.linear else {}
 
 

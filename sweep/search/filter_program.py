@@ -168,7 +168,8 @@ class FilterProgram:
         row, least = np.zeros_like(self.base), 0.0
         bound = self.problem.constraints.get(SENSITIVITY)
         if bound is not None and bound.min is not None:
-            row, least = 1 / self.base.sum() + row, bound.min - FEASIBLE * bound.scale
+            grid = model.setup.camera.grid
+            row, least = grid.bins_nm / grid.integrate(self.base), bound.min - FEASIBLE * bound.scale
         others = np.delete(model.variance(self.base[None, None])[0], model.setup.camera.modified[0], axis=2)
         return least_variance(model, self.base, self._box, row, least), others
 

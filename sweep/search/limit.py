@@ -100,14 +100,18 @@ def _limit_of_exposures(
     """
     stated, most = problem.constraints.get(SENSITIVITY), _most_sensitive(problem)
     least = 0.0 if stated is None or stated.min is None else stated.min
-    dim = largest_sensitivity_not_brightest(problem.setup)
+    dim, grid = largest_sensitivity_not_brightest(problem.setup), problem.setup.camera.grid
     relaxed = _relaxed(problem)[0]
 
     def part(a: float, b: float) -> _Part:
         within = replace(problem, constraints={**problem.constraints, SENSITIVITY: Bound.model_construct(min=a, max=b)})
         exposed = replace(within, setup=exposed_at(problem.setup, max(0.0, a - 2 * FEASIBLE)))
         limit = _limit_of(exposed, tolerance_dn, most_programs, [max(s, a) for s in sensitivities])
-        share = 0.0 if limit.curve is None else float(limit.curve.sum() / problem.setup.camera.base_qe.sum())
+        share = (
+            0.0
+            if limit.curve is None
+            else float(grid.integrate(limit.curve) / grid.integrate(problem.setup.camera.base_qe[0]))
+        )
         if limit.curve is not None and share > max(a, dim):  # at its own exposure
             own = replace(relaxed, setup=exposed_at(problem.setup, share))
             limit = replace(limit, attained=_attained(own, limit.curve, _pool_of(own).least(limit.curve)))

@@ -81,12 +81,18 @@ def luminance_per_photon_radiance(
     return np.asarray(LUMINOUS_EFFICACY_LM_W * grid.integrate(power * _observer(grid)[3]), dtype=float)
 
 
+def tristimulus(grid: WavelengthGrid, photons: Float[Array, "spectra wavelengths"]) -> Float[Array, "spectra 3"]:
+    """Return CIE 1931 X, Y, Z of photon spectra, photons per nm, without a factor of all."""
+    energy = energy_from_photons(grid.nodes_nm, photons) * grid.bins_nm
+    return np.asarray(energy @ color_matching(grid).T, dtype=float)
+
+
 def chromaticity(grid: WavelengthGrid, photons: Float[Array, "spectra wavelengths"]) -> Float[Array, "spectra 2"]:
     """Return CIE 1931 x, y of photon spectra.
 
     `photons`: photon spectra, photons per nm. NaN for invisible spectra. NaN for invisible spectra.
     """
-    xyz = energy_from_photons(grid.nodes_nm, photons) @ color_matching(grid).T
+    xyz = tristimulus(grid, photons)
     return np.asarray(xyz[:, :2] / xyz.sum(axis=1, keepdims=True), dtype=float)
 
 
@@ -97,7 +103,7 @@ def display_colors(grid: WavelengthGrid, photons: Float[Array, "spectra waveleng
 
     `photons`: photon spectra, photons per nm.
     """
-    xyz = energy_from_photons(grid.nodes_nm, photons) @ color_matching(grid).T
+    xyz = tristimulus(grid, photons)
     seen = xyz.max(axis=1) > 0
     colors = np.full((len(xyz), 3), _GRAY)
     linear = np.clip(xyz[seen] / xyz[seen].max(axis=1, keepdims=True) @ XYZ_TO_RGB.T, 0, None)

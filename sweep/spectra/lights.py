@@ -71,7 +71,7 @@ def peak_normalized_ratio(grid: WavelengthGrid, photons: Float[Array, "signals w
     over the span of the grid.
     """
     peak_one = photons / photons.max(axis=1, keepdims=True)
-    return float(np.median(grid.integrate(peak_one))) / (grid.size * grid.step_nm)
+    return float(np.median(grid.integrate(peak_one))) / grid.span_nm
 
 
 def make_lights(

@@ -43,9 +43,9 @@ _MOST_STEPS = 20_000
 
 
 class WavelengthGrid(Section):
-    """Equidistant wavelengths; each node stands for a bin of `step_nm` centered on it.
+    """Equidistant wavelengths; each node stands for a bin of `step_nm` centered on it, the ends for half a bin.
 
-    400 to 700 nm at 1 nm are 301 bins, so a flat spectrum of height 1 integrates to 301 nm, as in ISETCam.
+    So a flat spectrum of height 1 integrates to `stop_nm` - `start_nm`, whatever the step.
     """
 
     start_nm: Positive = 400.0
@@ -85,6 +85,13 @@ class WavelengthGrid(Section):
         """Width of the range, nm."""
         return self.stop_nm - self.start_nm
 
+    @property
+    def bins_nm(self) -> PerWavelength:
+        """Width of the bin of each node, nm; their sum is the range."""
+        bins = np.full(self.size, self.step_nm)
+        bins[[0, -1]] /= 2
+        return bins
+
     def integrate(self, values: Float[Array, "*batch nodes"]) -> SameShape:
         """Sum value times bin width over the last axis.
 
@@ -98,7 +105,7 @@ class WavelengthGrid(Section):
         ndarray of shape (...)
             Integrals.
         """
-        return np.asarray(values.sum(axis=-1) * self.step_nm, dtype=float)
+        return np.asarray(values @ self.bins_nm, dtype=float)
 
 
 @dataclass(frozen=True)
@@ -262,11 +269,11 @@ def resample(
         gridded[np.abs(nodes - wave[0]) <= slack] = data[0]
         gridded[np.abs(nodes - wave[-1]) <= slack] = data[-1]
         return gridded
-    low = np.clip(nodes - grid.step_nm / 2, wave[0], wave[-1])
-    high = np.clip(nodes + grid.step_nm / 2, wave[0], wave[-1])
+    low = np.clip(np.maximum(nodes - grid.step_nm / 2, nodes[0]), wave[0], wave[-1])
+    high = np.clip(np.minimum(nodes + grid.step_nm / 2, nodes[-1]), wave[0], wave[-1])
     width = high - low
     area = _integral_to(wave, data, high) - _integral_to(wave, data, low)
-    return np.divide(area, width, out=np.zeros_like(area), where=width > 0)
+    return np.asarray(np.divide(area, width, out=np.zeros_like(area), where=width > 0), dtype=float)
 
 
 def integral_between(wavelength_nm: PerWavelength, values: PerWavelength, low_nm: float, high_nm: float) -> float:

@@ -17,6 +17,7 @@ from ..metrics.columns.sensitivity import CFA_SENSITIVITY, SENSITIVITY
 from ..metrics.objective import Objective
 from ..metrics.quantity import DN, OF_A_SHARE, WORST_CASE, Quantity, RequestedQuantities
 from ..metrics.registry import quantities_of
+from ..metrics.separation import cfa_sensitivity
 from ..search.solver import ALGORITHMS, DIRECT, GRADIENT, ONE_START
 from .axes import Axis
 from .document import KeyPath
@@ -347,9 +348,9 @@ def _most(study: Study, space: Space, scenario: str) -> Iterator[tuple[str, floa
     perturbed = [space.filter.family.perturbed(production_error) for production_error in study.tolerance.places]
     top = np.max([family.hull(low, high)[1] for family in perturbed], axis=0)
     counts, modified = setup.camera.mosaic.counts, list(setup.camera.modified)
-    qe = setup.camera.qe.copy()
+    qe, grid = setup.camera.qe.copy(), setup.camera.grid
     qe[modified] = top
-    yield SENSITIVITY, float(top.sum() / setup.camera.base_qe.sum())
-    yield CFA_SENSITIVITY, float((qe.sum(axis=1) * counts).sum() / (counts.sum() * setup.camera.clear_qe.sum()))
+    yield SENSITIVITY, float(grid.integrate(top).sum() / grid.integrate(setup.camera.base_qe).sum())
+    yield CFA_SENSITIVITY, float(cfa_sensitivity(grid.integrate(qe), counts, grid.integrate(setup.camera.clear_qe)))
     for name, rows in space.filter.family.dimensions.items():
         yield name, float(np.maximum(rows * low, rows * high).sum(axis=1).min())

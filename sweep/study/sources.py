@@ -154,7 +154,7 @@ class Sources:
             self.warnings.append(
                 f"{entry.file}: {column}: {outside:.1%} of its photons lie outside the wavelength grid and are cut off"
             )
-        sampled = float(self.grid.integrate(values)) - step_nm * float(values[0] + values[-1]) / 2
+        sampled = float(self.grid.integrate(values))
         if abs(sampled - inside) > _MISCOUNTED * total:
             self.warnings.append(
                 f"{entry.file}: {column}: sampled every {step_nm:g} nm it has {sampled / total:.1%} of its photons "

@@ -14,6 +14,7 @@ from ..camera.sensor import SensorCurves
 from ..designs.space import Space
 from ..spectra.builtin.task_sets import THERMAL_K, is_surface, separation_task, shipped, spectra_of_group, task_groups
 from ..spectra.formats import is_curve_file
+from ..spectra.spectrum import WavelengthGrid
 from ..spectra.tasks import ILLUMINANTS, SHIPPED, Conditions, GriddedTask, StudyTasks
 from ..spectra.units import Use
 from .document import KeyPath
@@ -163,7 +164,7 @@ def check_tasks_in_scenes(
         )
     for name, scene in section.scenarios.items():
         pixel = scene.pixel_of(section.pixel)
-        electrons = max(_most_electrons(tasks, scene, pixel, sensor, section.wavelengths.step_nm))
+        electrons = max(_most_electrons(tasks, scene, pixel, sensor, section.wavelengths))
         most = min(pixel.well_e, pixel.full_scale_dn / pixel.dn_per_e)
         if electrons > most:
             value = f"{electrons:.3g} electrons in scenario {name}"
@@ -171,11 +172,11 @@ def check_tasks_in_scenes(
 
 
 def _most_electrons(
-    tasks: StudyTasks, scene: Scene, pixel: Pixel, sensor: SensorCurves, step_nm: float
+    tasks: StudyTasks, scene: Scene, pixel: Pixel, sensor: SensorCurves, grid: WavelengthGrid
 ) -> Iterator[float]:
     """Yield the electrons of the brightest patch of each task behind the sensor's brightest curve."""
-    factor = irradiance_factor(scene.optics) * pixel.area_m2 * step_nm * tasks.conditions.exposure_s
-    brightest: FloatArray = np.max(list(sensor.qe.values()), axis=0)
+    factor = irradiance_factor(scene.optics) * pixel.area_m2 * tasks.conditions.exposure_s
+    brightest: FloatArray = np.max(list(sensor.qe.values()), axis=0) * grid.bins_nm
     for task in tasks.tasks:
         if task.photons is not None:
             yield float((task.photons * scene.photon_radiance @ brightest).max()) * factor

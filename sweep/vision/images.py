@@ -181,7 +181,8 @@ class HeadCamera:
         """Return electrons/s of images with spectra, through each pixel's filter, with crosstalk."""
         setup = self.setup
         on_knots = linear_basis(setup.camera.grid.nodes_nm, knots_nm)
-        weight = np.einsum("cw,sw,kw->cks", self.qe, spectra, on_knots, optimize=True) * setup.camera.area_step_m2_nm
+        seen = self.qe * setup.camera.area_bins_m2_nm
+        weight = np.einsum("cw,sw,kw->cks", seen, spectra, on_knots, optimize=True)
         electrons = np.empty((len(light), len(spectra), *self._channel.shape))
         for channel in range(len(self.qe)):
             in_channel = self._channel == channel

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.types import Array, Float
-from ..spectra.color import XYZ_TO_RGB, color_matching, srgb_gamma
-from ..spectra.spectrum import WavelengthGrid, energy_from_photons
+from ..spectra.color import XYZ_TO_RGB, srgb_gamma, tristimulus
+from ..spectra.spectrum import WavelengthGrid
 from .materials import ambient_light, chart_reflectances
 from .section import Illuminant
 
@@ -39,12 +39,11 @@ def isp_of(grid: WavelengthGrid, qe: Float[Array, "channels wavelengths"], light
     channel is taken as full scale.
     """
     chart = chart_reflectances(grid)
-    response = chart * ambient_light(grid, light) @ qe.T
-    white = ambient_light(grid, light) @ qe.T
+    ambient = ambient_light(grid, light) * grid.bins_nm
+    response, white = chart * ambient @ qe.T, ambient @ qe.T
     response, white = response / white, white / white.max()
-    day = energy_from_photons(grid.nodes_nm, ambient_light(grid, _DISPLAY)[None])[0]
-    matching = color_matching(grid)
-    xyz = chart * day @ matching.T / (day @ matching[1])
+    day = ambient_light(grid, _DISPLAY)
+    xyz = tristimulus(grid, chart * day) / tristimulus(grid, day[None])[0, 1]
     target = xyz @ XYZ_TO_RGB.T
     matrix = np.linalg.lstsq(response, target, rcond=None)[0].T
     return Isp(white, np.asarray(matrix / matrix.sum(axis=1, keepdims=True), dtype=float))

@@ -65,12 +65,12 @@ def test_electrons_of_a_flat_light() -> None:
     pixel = Pixel(pitch_um=2.0, fill_factor=0.5)
     qe = np.full((2, 301), 0.25)
     grid, factor = WavelengthGrid(), irradiance_factor(Optics())
-    light = Lights("flat", ("flat",), ("flat",), np.full((1, 301), 1 / 301), 1.0, "", True)
-    scenario = Scene(photon_radiance=1e15 * 301 / factor, exposure=FixedExposure(exposure_s=1.0))
+    light = Lights("flat", ("flat",), ("flat",), np.full((1, 301), 1 / 300), 1.0, "", True)
+    scenario = Scene(photon_radiance=1e15 * 300 / factor, exposure=FixedExposure(exposure_s=1.0))
     setup = Setup(Camera(grid, Mosaic.from_rows("RB", [["R", "B"]]), qe, (), qe[0], pixel), light, scenario)
     rate = next(SceneModel(setup).views()).electrons.rates(np.empty((1, 0, 301)))
-    # 1e15 photons/s/m^2/nm x 301 nm x 0.25 x 2e-12 m^2
-    np.testing.assert_allclose(rate, 1e15 * 301 * 0.25 * 2e-12, rtol=1e-13)
+    # 1e15 photons/s/m^2/nm x 300 nm x 0.25 x 2e-12 m^2
+    np.testing.assert_allclose(rate, 1e15 * 300 * 0.25 * 2e-12, rtol=1e-13)
 
 
 @pytest.mark.parametrize("width", [0.0, 5e-324, 1e-300])

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
+from scipy.integrate import quad, trapezoid
 from scipy.optimize import minimize_scalar
 from scipy.spatial.distance import cdist
 from scipy.stats import norm
@@ -142,7 +142,7 @@ def chromatic_error(made: Made, quantity: Quantity) -> list[float]:
 
 def sensitivity(made: Made, _: Quantity) -> list[float]:
     base = made.setup.camera.qe[made.setup.camera.modified[0]]
-    return [curve[0].sum() / base.sum() for curve in made.curves]
+    return [trapezoid(curve[0]) / trapezoid(base) for curve in made.curves]
 
 
 def cfa_sensitivity(made: Made, _: Quantity) -> list[float]:
@@ -151,7 +151,7 @@ def cfa_sensitivity(made: Made, _: Quantity) -> list[float]:
     for curve in made.curves:
         qe = made.setup.camera.qe.copy()
         qe[made.setup.camera.modified[0]] = curve[0]
-        found.append(np.mean([qe[channel].sum() for channel in tile]) / made.setup.camera.clear_qe.sum())
+        found.append(np.mean([trapezoid(qe[channel]) for channel in tile]) / trapezoid(made.setup.camera.clear_qe))
     return found
 
 

@@ -12,6 +12,7 @@ import colour
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.integrate import trapezoid
 from scipy.spatial.distance import cdist
 
 from sweep.camera.sensor import BUILT_IN_SENSORS
@@ -299,8 +300,8 @@ def distance_dn(tint: float) -> float:
     # 30 cd/m^2, flat in photons: 683 lm/W times V and the energy of a photon, h c / wavelength.
     photopic = colour.SDS_LEFS["CIE 1924 Photopic Standard Observer"]
     seen = np.interp(nodes, photopic.wavelengths, photopic.values, left=0, right=0)
-    flat = 30 / (683 * (seen * 6.62607015e-34 * 299792458 / (nodes * 1e-9)).sum())
-    dn = dn_per_radiance * (2e18 * grid.step_nm * lights.photons @ qe.T + flat * qe.sum(axis=1))
+    flat = 30 / (683 * trapezoid(seen * 6.62607015e-34 * 299792458 / (nodes * 1e-9)))
+    dn = dn_per_radiance * (2e18 * trapezoid(lights.photons[:, None] * qe) + flat * trapezoid(qe))
     read = np.floor(dn + 0.5)
     return float(cdist(read[lights.members["yellow"]], read[lights.members["red"]]).min())
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
 import mpmath as mp
 import numpy as np
+from scipy.integrate import trapezoid
 
 from sweep.camera.camera import Camera
 from sweep.camera.model import SceneModel
@@ -39,6 +41,12 @@ def lines(*nodes: int) -> np.ndarray:
 
 def lights_of(types: tuple[str, ...], photons: np.ndarray) -> Lights:
     return Lights("lines", tuple(f"{t}{i}" for i, t in enumerate(types)), types, photons, RATIO, "", True)
+
+
+def halved_ends(values: Iterable[float]) -> list[float]:
+    """Values with half of the first and the last one."""
+    first, *inner, last = map(float, values)
+    return [first / 2, *inner, last / 2]
 
 
 def random_qe(seed: int, channels: int) -> np.ndarray:
@@ -130,14 +138,14 @@ def broad_metamers() -> Result:
     rng = np.random.default_rng(4)
     qe = rng.integers(1, 2**10, (3, N)) / 2.0**10
     first = rng.integers(2**8, 2**9, N) / 2.0**9
-    # A direction of integers that no filter sees: from the 3 x 4 system at the first four nodes.
-    a = (qe[:, :4] * 2**10).astype(int).tolist()
+    # A direction of integers that no filter sees: from the 3 x 4 system at four nodes.
+    a = (qe[:, 1:5] * 2**10).astype(int).tolist()
     null = [
         (-1) ** j * int(mp.nint(mp.det(mp.matrix([[r[k] for k in range(4) if k != j] for r in a])))) for j in range(4)
     ]
     second = first.copy()
-    second[:4] += np.array([float(mp.mpf(v) / max(map(abs, null)) / 8) for v in null])
-    photons = np.stack([first, second]) / (first.sum() * GRID.step_nm)
+    second[1:5] += np.array([float(mp.mpf(v) / max(map(abs, null)) / 8) for v in null])
+    photons = np.stack([first, second]) / trapezoid(first, dx=GRID.step_nm)
     setup = made(qe, lights_of(PAIR, photons), {"exposure": {"kind": "fixed", "exposure_s": 1e-3}})
     found = smooth_csd(setup, plain(setup), PAIR)[0]
     response = float(smooth_response(setup, plain(setup)).max())
@@ -180,11 +188,11 @@ def exposures() -> Result:
 
 @hard_case("lights from 1e-290 to 1e270 photons under the white-patch exposure")
 def radiances() -> Result:
-    """Level x full scale x K x QE over the brightest channel's mean, in 50 digits. Allowed: the exposure cancels the
+    """Level x full scale x K x QE over the brightest channel's mean, half a bin at each end, in 50 digits. Allowed: the exposure cancels the
     light: 61-term sums and 16 roundings of each response, 64 eps of it.
     """
     qe, results = random_qe(7, 3), []
-    top = max(sum(mp.mpf(float(v)) for v in row) / N for row in qe)
+    top = max(sum(mp.mpf(float(v)) for v in halved_ends(row)) / (N - 1) for row in qe)
     scale = mp.mpf(0.95) * 4095 * mp.mpf(RATIO) / top
     points = [[scale * mp.mpf(float(row[node])) for row in qe] for node in (YELLOW, RED)]
     exact = mp.sqrt(sum((a - b) ** 2 for a, b in zip(*points, strict=True)))
@@ -263,15 +271,15 @@ def float32_curves() -> Result:
     base, counts = narrow.camera.qe[2], narrow.camera.mosaic.counts
     results = []
     for index, curve in enumerate(small[:, 0]):
-        total = math.fsum(map(float, curve))
+        total = math.fsum(halved_ends(curve))
         whole = math.fsum(
-            c * math.fsum(map(float, q))
+            c * math.fsum(halved_ends(q))
             for c, q in zip(counts, (*narrow.camera.qe[:2], curve, narrow.camera.qe[3]), strict=True)
         )
         steps = [abs(float(b) - float(a)) for a, b in pairwise(curve)]
         exact = {
-            "sensitivity": total / math.fsum(map(float, base)),
-            "cfa_sensitivity": whole / 4 / math.fsum([0.9] * N),
+            "sensitivity": total / math.fsum(halved_ends(base)),
+            "cfa_sensitivity": whole / 4 / math.fsum(halved_ends([0.9] * N)),
             "slope_per_nm": max(steps) / GRID.step_nm,
             "min_transmission": min(float(a) / float(b) for a, b in zip(curve, base, strict=True)),
         }

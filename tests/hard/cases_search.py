@@ -9,6 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+from scipy.integrate import trapezoid
 from scipy.optimize import brentq
 
 from sweep.base.errors import InfeasibleError
@@ -30,6 +31,8 @@ from .registry import EPS, Result, hard_case, outcome, worst
 
 GAIN = float(electrons_per_s(1.0)) * 2e-3 * 0.4095
 """DN of a signal per QE."""
+STEPS = N - 1
+"""Widths of the range in steps: its ends have half a bin each."""
 OPEN = 12
 """Nodes inside the band from 602.5 to 662.5 nm."""
 X_TOLERANCE = 1e-9
@@ -62,16 +65,16 @@ def on_the_sensitivity() -> Result:
     """
     results = []
     for least in (0.8085, 0.9, 0.99, 0.9999):
-        depth = (1 - least) * N / OPEN
+        depth = (1 - least) * STEPS / OPEN
         # Where next to nothing may be taken, depth 0 is stationary: there the conservative two may stay.
         for algorithm in ("SLSQP", "MMA", "CCSAQ") if least < 0.999 else ("SLSQP",):
             best = best_of(depth_problem({"sensitivity": Bound(min=least)}), 4, 300, algorithm)
-            room = HAIR * N / OPEN + X_TOLERANCE
+            room = HAIR * STEPS / OPEN + X_TOLERANCE
             slope = GAIN * 0.25 * depth / math.sqrt(FIXED_PART + (0.5 * depth) ** 2)
             results.append(
                 (abs(best.objective - csd_of(depth)), slope * room + 0.25 * GAIN * room**2 + 16 * EPS * GAIN)
             )
-            results.append((max(0.0, least - (1 - best.x[4] * OPEN / N)), FEASIBLE * least + 16 * EPS))
+            results.append((max(0.0, least - (1 - best.x[4] * OPEN / STEPS)), FEASIBLE * least + 16 * EPS))
     return worst(results)
 
 
@@ -79,7 +82,7 @@ def on_the_sensitivity() -> Result:
 def nothing_to_give() -> Result:
     """Closed form: depth 0. Allowed: a depth within what counts as feasible, 1e-9, moves the CSD by its square."""
     best = best_of(depth_problem({"sensitivity": Bound(min=1.0)}), 4, 300)
-    depth = FEASIBLE * N / OPEN
+    depth = FEASIBLE * STEPS / OPEN
     return Result(abs(best.objective - csd_of(0.0)), csd_of(depth) - csd_of(0.0) + 16 * EPS * GAIN)
 
 
@@ -93,8 +96,8 @@ def on_the_separation() -> Result:
         least = csd_of(depth)
         best = best_of(depth_problem({"csd_yellow_red": Bound(min=least)}, "sensitivity"), 4, 300)
         slope = GAIN * 0.25 * depth / math.sqrt(FIXED_PART + (0.5 * depth) ** 2)
-        room = (HAIR * least / slope + X_TOLERANCE) * OPEN / N
-        results.append((abs(best.objective - (1 - depth * OPEN / N)), 1.01 * room + 16 * EPS))
+        room = (HAIR * least / slope + X_TOLERANCE) * OPEN / STEPS
+        results.append((abs(best.objective - (1 - depth * OPEN / STEPS)), 1.01 * room + 16 * EPS))
     return worst(results)
 
 
@@ -124,7 +127,7 @@ def edge_on_the_constraint() -> Result:
         return GAIN * float(np.linalg.norm(curves @ ((photons[0] - photons[1]) * GRID.step_nm)))
 
     def light(left: float) -> float:
-        return float(n_of(left).sum() / (0.5 * N))
+        return float(trapezoid(n_of(left)) / (0.5 * STEPS))
 
     least = 0.9
     at = brentq(lambda left: light(left) - least, 570.0, 660.0, xtol=1e-12)
@@ -148,7 +151,7 @@ def limit_of_two_lines() -> Result:
     """
     results = []
     for nodes in (0.25, 0.5, 0.875, 1.0, 5.0):
-        least = 1 - nodes / N
+        least = 1 - nodes / STEPS
         found = limit_of(depth_problem({"sensitivity": Bound(min=least)}))
         exact = csd_of(min(nodes, 1.0))
         results.append((max(0.0, exact - found.attained, found.proven - exact), 1e-3 + 1e-6))
@@ -165,8 +168,8 @@ def best_values() -> Result:
     shallow = replace(depth_problem({}), low=np.array([602.5, 0.0, 662.5, 0.0, 0.3]))
     results = []
     for name, bound, exact in (
-        ("sensitivity", Bound(min=0.99), 1 - 0.3 * OPEN / N),
-        ("sensitivity", Bound(max=0.1), 1 - OPEN / N),
+        ("sensitivity", Bound(min=0.99), 1 - 0.3 * OPEN / STEPS),
+        ("sensitivity", Bound(max=0.1), 1 - OPEN / STEPS),
         ("csd_yellow_red", Bound(min=1e4), csd_of(1.0)),
         ("min_transmission", Bound(min=0.9), 0.7),
     ):
@@ -201,7 +204,7 @@ def infeasible_study() -> Result:
         study = load_study(path)
     y, g, wave = study.sensor.qe["Y"], study.sensor.qe["G"], study.grid.nodes_nm
     shape = rise(wave, 605.0, 10.0) - rise(wave, 650.0, 10.0)
-    exact = float(1 - ((y - g) * shape).sum() / y.sum())
+    exact = float(1 - trapezoid((y - g) * shape) / trapezoid(y))
     try:
         run_search(
             study, study.search, rules_of(study), lambda tasks: (call(*a, **k) for call, a, k in tasks), lambda *_: None

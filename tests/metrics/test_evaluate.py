@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 from sweep.camera.camera import Camera
 from sweep.camera.linear import linear_model
@@ -40,9 +41,9 @@ def setup(name: str = "RYNCy", scenario: Scene | None = None, base: str = "Y") -
 
 def by_hand(qe: dict[str, np.ndarray], level: float, ratio: float) -> np.ndarray:
     """design.md's DN_c(signal) = level 4095 K sum(S q_c) / max_c' sum(W q_c'), S and W of equal photons."""
-    white = {c: q.mean() for c, q in qe.items()}
+    white = {c: trapezoid(q) / 300 for c, q in qe.items()}
     top = max(white.values())
-    rows = [[level * 4095 * ratio * (s * q).sum() / top for q in qe.values()] for s in LIGHTS.photons]
+    rows = [[level * 4095 * ratio * trapezoid(s * q) / top for q in qe.values()] for s in LIGHTS.photons]
     return np.array(rows)
 
 
@@ -58,7 +59,7 @@ def test_response_is_the_papers_exposure(level: float, ratio: float | None) -> N
 def test_a_plain_cfa_has_a_sensitivity_and_its_filter_none() -> None:
     plain = evaluate(scene_model(setup("RGGB")), np.empty((1, 0, 301)))
     assert np.isnan(plain["sensitivity"][0])
-    rggb = (SENSOR.qe["R"] + 2 * SENSOR.qe["G"] + SENSOR.qe["B"]).sum() / 4 / SENSOR.qe["C"].sum()
+    rggb = trapezoid(SENSOR.qe["R"] + 2 * SENSOR.qe["G"] + SENSOR.qe["B"]) / 4 / trapezoid(SENSOR.qe["C"])
     assert plain["cfa_sensitivity"][0] == pytest.approx(rggb, rel=1e-13, abs=0)
 
 

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 from scipy.optimize import minimize
 
 from sweep.metrics.members import population_model
@@ -43,13 +44,18 @@ def worst(name: str) -> np.ndarray:
     return population_model(replace(PROBLEM.setup, lights=lights)).worst(curves, [("yellow", "red")])["csd_yellow_red"]
 
 
+HALVED = np.ones(WAVE.size)
+HALVED[[0, -1]] = 0.5
+"""Each end of the range has half a bin."""
+
+
 def responses(spectra: np.ndarray) -> np.ndarray:
     """DN of spectra, [n_designs, n, n_channels], from the white patch: RYNCy's brightest plain channel sets it."""
     qe, grid = STUDY.sensor.qe, STUDY.grid
-    dn = 0.95 * 4095 * STUDY.lights.photon_ratio * grid.size / max(qe[name].sum() for name in ("R", "Y", "Cy"))
+    dn = 0.95 * 4095 * STUDY.lights.photon_ratio * grid.span_nm / max(trapezoid(qe[name]) for name in ("R", "Y", "Cy"))
     plain = np.stack([qe[name] for name in ("R", "Y", "Cy")])
     curves = [np.vstack([plain, curve]) for curve in PROBLEM.family.curves(DESIGNS)]
-    return np.stack([spectra @ each.T for each in curves]) * dn
+    return np.stack([(spectra * HALVED) @ each.T for each in curves]) * dn
 
 
 def shifted(photons: np.ndarray, nm: float, width: float = 1.0) -> np.ndarray:

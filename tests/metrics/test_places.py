@@ -103,7 +103,7 @@ def test_counting_every_pixel_changes_nothing_where_each_is_a_channel(tmp_path: 
     found = evaluate(SceneModel(setup), curves)
     for a, b in class_pairs(setup.lights.classes):
         assert found[f"pixel_csd_{a}_{b}"] == pytest.approx(found[f"csd_{a}_{b}"], rel=1e-12)
-    assert found["csd_green_yellow"][0] == pytest.approx(195.6, abs=0.1)
+    assert found["csd_green_yellow"][0] == pytest.approx(195.7, abs=0.1)
 
 
 def test_the_distance_of_a_lamp_at_any_place_is_the_smallest_of_its_phases() -> None:
@@ -112,4 +112,4 @@ def test_the_distance_of_a_lamp_at_any_place_is_the_smallest_of_its_phases() -> 
     space = next(space for space in study.spaces if space.name == "best stopband")
     model = SceneModel(study.setup(space, "road distance_m=150"))
     found = evaluate(model, space.curves(space.points(0, 1), study.grid.size))
-    assert found["pixel_csd_yellow_red"][0] == pytest.approx(171.72, abs=0.05)
+    assert found["pixel_csd_yellow_red"][0] == pytest.approx(171.23, abs=0.05)

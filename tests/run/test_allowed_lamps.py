@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.integrate import trapezoid
 
 from sweep.report import make_report
 from sweep.results.tables import REGIONS_MAP
@@ -35,9 +36,9 @@ def test_a_map_is_that_of_every_pair_read_out(tmp_path: Path) -> None:
 
     def read(peak: float, fwhm: float, channels: tuple[str, ...] = ("R", "G", "B")) -> np.ndarray:
         qe = np.stack([study.sensor.qe[name] for name in channels])
-        scale = 0.95 * 4095 * study.lights.photon_ratio * study.grid.size / qe.sum(axis=1).max()
+        scale = 0.95 * 4095 * study.lights.photon_ratio * study.grid.span_nm / trapezoid(qe).max()
         photons = 1 / np.cosh((wave - peak) * 2 * np.arccosh(2) / fwhm)
-        return np.asarray(np.rint(photons / photons.sum() @ qe.T * scale))
+        return np.asarray(np.rint(trapezoid(photons * qe) / trapezoid(photons) * scale))
 
     def far_apart(
         yellow: tuple[float, float], red: tuple[float, float], channels: tuple[str, ...]

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
+from scipy.integrate import trapezoid
 from scipy.optimize import brentq
 
 from sweep.designs.tolerance import Tolerance
@@ -55,7 +56,7 @@ def brute_force(study: Study, n: int, seed: int, thickness: float = 0.0) -> np.n
     rng, lights, grid = np.random.default_rng(seed), study.lights, study.grid
     wave, qe = grid.nodes_nm, study.sensor.qe
     plain = np.stack([qe[name] for name in ("R", "Y", "Cy")])
-    dn = 0.95 * 4095 * lights.photon_ratio * grid.size / plain.sum(axis=1).max()
+    dn = 0.95 * 4095 * lights.photon_ratio * grid.span_nm / trapezoid(plain).max()
     moved = np.lib.stride_tricks.sliding_window_view(np.pad(lights.photons, ((0, 0), (20, 20))), wave.size, axis=1)
     found = []
     for size in np.full(n // 500, 500):
@@ -70,7 +71,7 @@ def brute_force(study: Study, n: int, seed: int, thickness: float = 0.0) -> np.n
             signal, below = rng.choice(lights.members[kind], size), np.floor(nm).astype(int)
             share = (nm - below)[:, None]
             spectra = (1 - share) * moved[signal, 20 - below] + share * moved[signal, 19 - below]
-            points.append(np.column_stack([spectra @ plain.T, (spectra * filters).sum(axis=1)]) * dn)
+            points.append(np.column_stack([trapezoid(spectra[:, None] * plain), trapezoid(spectra * filters)]) * dn)
         found.append(np.linalg.norm(points[0] - points[1], axis=1))
     return np.concatenate(found)
 

@@ -42,6 +42,13 @@ search: {starts: 4, max_evaluations: 400}
 """
 
 
+def halved(values: np.ndarray) -> np.ndarray:
+    """Values on the wavelengths with half of the first and the last one, whose bins are half as wide."""
+    weighted = np.array(values, dtype=float)
+    weighted[..., [0, -1]] /= 2
+    return weighted
+
+
 def write_study(folder: Path, step_nm: float) -> Path:
     """Yellow at 600 nm between two reds at 560 and 640 nm, seen through a ramp from 520 to 680 nm."""
     wave = np.arange(400, 701)
@@ -128,8 +135,8 @@ def milp_limit(problem: Problem, t: float) -> float:
             LinearConstraint(np.hstack([-apart, np.diag(below), -rate]), needed, np.inf),
             LinearConstraint(np.hstack([step, none]), -slope, slope),
             LinearConstraint(
-                np.concatenate([np.ones(size), np.zeros(n + 1)]),
-                problem.constraints["sensitivity"].min * base.sum(),
+                np.concatenate([halved(np.ones(size)), np.zeros(n + 1)]),
+                problem.constraints["sensitivity"].min * halved(base).sum(),
                 np.inf,
             ),
         ],
@@ -162,7 +169,7 @@ def random_problem(template: Problem, seed: int) -> Problem:
             for count, ends in zip(counts, ((480, 640), (500, 680)), strict=True)
         ]
     )
-    photons /= photons.sum(axis=1, keepdims=True) * template.setup.camera.grid.step_nm
+    photons /= halved(photons).sum(axis=1, keepdims=True) * template.setup.camera.grid.step_nm
     types = ("yellow",) * counts[0] + ("red",) * counts[1]
     lights = replace(template.setup.lights, names=tuple(map(str, range(counts.sum()))), types=types, photons=photons)
     base = np.interp(wave, np.linspace(400, 700, 7), rng.uniform(0.05, 0.85, 7))
@@ -184,8 +191,8 @@ def random_problem(template: Problem, seed: int) -> Problem:
 def bounded_slopes(base: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Rows and least values of a sensitivity of 0.9 and slopes of 0.06 per nm on a grid of 1 nm: rows @ N >= least."""
     step = np.diff(np.eye(base.size), axis=0)
-    rows = np.concatenate([np.ones((1, base.size)), step, -step])
-    return rows, np.append(0.9 * base.sum(), np.full(2 * len(step), -0.06))
+    rows = np.concatenate([halved(np.ones((1, base.size))), step, -step])
+    return rows, np.append(0.9 * halved(base).sum(), np.full(2 * len(step), -0.06))
 
 
 def linear_margin(by_qe: np.ndarray, needed: np.ndarray, base: np.ndarray) -> float:

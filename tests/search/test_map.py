@@ -73,7 +73,7 @@ def test_the_report_says_how_wide_a_band_may_be(folder: Path) -> None:
     (edges,) = Edges.of(output)
     assert edges.answer == list(map_lines(output))
     (line,) = map_lines(output)
-    found = re.search(r"\(139 DN\) is of (\d+) nm FWHM \(rounded down\), near (\d+) nm, with an absorbance of 0", line)
+    found = re.search(r"\(140 DN\) is of (\d+) nm FWHM \(rounded down\), near (\d+) nm, with an absorbance of 0", line)
     assert found is not None
     fwhm_nm, peak_nm = map(float, found.groups())
     assert (fwhm_nm, peak_nm) == (44, 636)

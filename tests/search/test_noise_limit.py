@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 from scipy.optimize import linprog
 
 from sweep.base.errors import SweepError
@@ -18,6 +19,7 @@ from sweep.search.least_noise import least_variance
 from sweep.search.limit import limit_of, reason_without_bound
 from sweep.search.problem import Problem
 
+from .limit_oracles import halved
 from .problems import YELLOW_RED, best_of, noisy_problem
 
 GOAL = Objective(minimum={"dprime_yellow_red": 1.0})
@@ -50,7 +52,7 @@ def filters(problem: Problem, n: int) -> np.ndarray:
         for _ in range(rng.integers(1, 4)):
             start = rng.integers(0, base.size)
             share[start : start + rng.integers(1, 60)] = rng.uniform(0, 1)
-        if (share @ base) / base.sum() >= 0.9:
+        if trapezoid(share * base) / trapezoid(base) >= 0.9:
             found.append(share * base)
     return np.array(found)
 
@@ -75,7 +77,7 @@ def test_no_filter_has_less_noise_or_a_larger_d_prime(scene: str) -> None:
     problem = problem_in(scene)
     imager, base = linear_model(problem.setup), problem.setup.camera.base_qe[0]
     curves = filters(problem, 200)[:, None]
-    row, channel = np.ones_like(base) / base.sum(), problem.setup.camera.modified[0]
+    row, channel = halved(np.ones_like(base)) / halved(base).sum(), problem.setup.camera.modified[0]
     least = least_variance(imager, base, (np.zeros_like(base), base), row, 0.9)
     assert (imager.variance(curves)[..., channel] >= least).all()
     limit = limit_of(problem)
@@ -92,7 +94,7 @@ def test_the_least_light_is_that_of_a_linear_program() -> None:
     problem = problem_in("chart")
     imager, base = linear_model(problem.setup), problem.setup.camera.base_qe[0]
     row, channel, gain = (
-        np.ones_like(base) / base.sum(),
+        halved(np.ones_like(base)) / halved(base).sum(),
         problem.setup.camera.modified[0],
         problem.setup.camera.pixel.dn_per_e,
     )

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 from sweep.designs.tolerance import NONE, ProductionError, Tolerance
 from sweep.metrics.bound import Bound
@@ -88,9 +89,9 @@ def moved(curve: np.ndarray, shift: int) -> np.ndarray:
 def apart(curve: np.ndarray) -> np.ndarray:
     """By how much each yellow light is above each red one in N, DN, in closed form; ndarray[n_yellow * n_red]."""
     qe, lights, grid = STUDY.sensor.qe, STUDY.lights, STUDY.grid
-    brightest = max(qe[name].sum() for name in ("R", "Y", "Cy"))
-    dn = 0.95 * 4095 * lights.photon_ratio * grid.size * grid.step_nm / brightest
-    yellow, red = (lights.photons[lights.members[kind]] @ curve * dn for kind in YELLOW_RED)
+    brightest = max(trapezoid(qe[name]) for name in ("R", "Y", "Cy"))
+    dn = 0.95 * 4095 * lights.photon_ratio * grid.span_nm / brightest
+    yellow, red = (trapezoid(lights.photons[lights.members[kind]] * curve) * dn for kind in YELLOW_RED)
     return (yellow[:, None] - red).ravel()
 
 

@@ -207,14 +207,14 @@ search: {algorithm: ORIG_DIRECT_L, starts: 4, max_evaluations: 100, front: {min:
 
 
 def test_a_global_search_takes_one_start_and_ends_at_the_optimum_of_gradients(tmp_path: Path) -> None:
-    """Of SLSQP, MMA and differential evolution, 234.9 DN; the global search alone finds 178 DN in 2,000 evaluations."""
+    """Of SLSQP, MMA and differential evolution, 234.2 DN; the global search alone finds 178 DN in 2,000 evaluations."""
     study = load(tmp_path, CASE)
     assert study.search is not None
     ran(study, tmp_path / "out", 1)
     output, log = read_output(tmp_path / "out"), pd.read_parquet(tmp_path / "out" / "search.parquet")
     facts = output.provenance.search
     assert facts is not None
-    assert facts.best_smooth_objective == pytest.approx(234.9, abs=0.1)
+    assert facts.best_smooth_objective == pytest.approx(234.2, abs=0.1)
     assert facts.endings[0] == "maxeval_reached"
     assert facts.endings[1] in CONVERGED
     at_levels = log["sensitivity_min"].notna()

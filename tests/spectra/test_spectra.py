@@ -69,9 +69,9 @@ def test_linear_takes_the_interpolant_at_the_nodes() -> None:
 
 @given(st.lists(st.just(0.0) | st.floats(1e-90, 1e6), min_size=2, max_size=40), st.integers(0, 2**32 - 1))
 def test_mean_keeps_the_integral(values: list[float], seed: int) -> None:
-    # A source on [399.5, 700.5] covers every bin whole, so the integral is kept to rounding.
-    inner = np.random.default_rng(seed).uniform(399.6, 700.4, len(values))
-    wave = np.unique(np.concatenate([[399.5], inner, [700.5]]))
+    # A source on the whole range, so the integral is kept to rounding.
+    inner = np.random.default_rng(seed).uniform(400.1, 699.9, len(values))
+    wave = np.unique(np.concatenate([[400.0], inner, [700.0]]))
     data = np.resize(values, wave.size)
     found = GRID.integrate(resample(wave, data, GRID, "mean"))
     assert found == pytest.approx(np.trapezoid(data, wave), rel=1e-9, abs=1e-6)

@@ -70,7 +70,7 @@ def test_photon_ratio_of_peak_normalized_boxes() -> None:
     boxes = np.zeros((3, 301))
     for row, width in enumerate((20, 30, 70)):
         boxes[row, 100 : 100 + width] = 7.0
-    assert peak_normalized_ratio(GRID, boxes) == pytest.approx(30 / 301, rel=1e-14)
+    assert peak_normalized_ratio(GRID, boxes) == pytest.approx(30 / 300, rel=1e-14)
 
 
 @given(st.lists(st.tuples(st.floats(0.5, 90), st.floats(0, 1)), min_size=3, max_size=12), st.integers(0, 3))

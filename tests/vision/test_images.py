@@ -71,13 +71,15 @@ def brute_force(requested: Vision, scenes: Scenes, at: int) -> np.ndarray:
     shapes += [x**2 + (y - (1.5 * up - tall / 2) * across) ** 2 <= (across / 2) ** 2 for up in range(len(lenses))]
     covered = [shape.reshape(size * fine, finer, size * fine, finer).mean(axis=(1, 3)) for shape in shapes]
     layers = [black - ground, dark - black, *(lens - dark for lens in lenses)]
+    widths_nm = np.full(grid.size, grid.step_nm)
+    widths_nm[[0, -1]] /= 2
     for w, wavelength_um in enumerate(grid.nodes_nm * 1e-3):
         scene = ground[w] + sum(share * layer[w] for share, layer in zip(covered, layers, strict=True))
         s = np.minimum(frequency * wavelength_um * 2.0, 1.0)
         otf = 2 / math.pi * (np.arccos(s) - s * np.sqrt(1 - s**2))
         image = np.fft.ifft2(np.fft.fft2(scene) * otf).real
         pixels = image.reshape(size, fine, size, fine).mean(axis=(1, 3))
-        electrons += pixels * setup.camera.qe[tile, w] * grid.step_nm * math.pi / 17 * (2.1e-6) ** 2 * level.exposure_s
+        electrons += pixels * setup.camera.qe[tile, w] * widths_nm[w] * math.pi / 17 * (2.1e-6) ** 2 * level.exposure_s
     around = sum(np.roll(electrons, shift, axis) for shift in (-1, 1) for axis in (0, 1))
     mixed = 0.99 * electrons + 0.0025 * around
     inner = slice(-start, -start + requested.crop_px)

@@ -69,25 +69,29 @@ class Sensitivity(Metric):
 def sensitivities(setup: Setup, block: Block) -> Columns:
     """Return the sensitivities of designs."""
     modified, counts = list(setup.camera.modified), setup.camera.mosaic.counts
-    indicators = np.repeat(
-        np.eye(len(modified)), setup.camera.grid.size, axis=0
-    )  # the sum over wavelengths of each channel
-    totals = block.product(indicators, np.arange(setup.camera.grid.size)) if modified else np.empty((len(block), 0))
+    grid = setup.camera.grid
+    integrals = np.asarray(np.kron(np.eye(len(modified)), grid.bins_nm[:, None]), dtype=float)
+    totals = block.product(integrals, np.arange(grid.size)) if modified else np.empty((len(block), 0))
     every = np.empty((len(block), len(counts)))
-    every[:] = setup.camera.qe.sum(axis=1, dtype=float)
+    every[:] = grid.integrate(setup.camera.qe)
     every[:, modified] = totals
-    base_qe = np.asarray(setup.camera.base_qe, dtype=float)
-    sensitivity = totals.sum(axis=1) / base_qe.sum() if modified else np.full(len(block), np.nan)
-    return {SENSITIVITY: sensitivity, CFA_SENSITIVITY: cfa_sensitivity(every, counts, setup.camera.clear_qe)}
+    sensitivity = (
+        totals.sum(axis=1) / grid.integrate(setup.camera.base_qe).sum() if modified else np.full(len(block), np.nan)
+    )
+    return {
+        SENSITIVITY: sensitivity,
+        CFA_SENSITIVITY: cfa_sensitivity(every, counts, grid.integrate(setup.camera.clear_qe)),
+    }
 
 
 def sensitivities_gradient(setup: Setup, curves_gradient: CurvesGradient) -> Columns:
     """Return exact derivatives of `sensitivity` and `cfa_sensitivity`."""
-    total = curves_gradient.sum(axis=-1)
-    counts = setup.camera.mosaic.counts
+    grid, counts = setup.camera.grid, setup.camera.mosaic.counts
+    total = grid.integrate(curves_gradient)
+    clear_light = counts.sum() * grid.integrate(setup.camera.clear_qe)
     return {
-        SENSITIVITY: total.sum(axis=1) / setup.camera.base_qe.sum(),
-        CFA_SENSITIVITY: total @ counts[list(setup.camera.modified)] / (counts.sum() * setup.camera.clear_qe.sum()),
+        SENSITIVITY: total.sum(axis=1) / grid.integrate(setup.camera.base_qe).sum(),
+        CFA_SENSITIVITY: total @ counts[list(setup.camera.modified)] / clear_light,
     }
 
 
@@ -115,16 +119,17 @@ def _row(design: SmoothDesign, *, name: str) -> Rows:
 
 def _modified_share(setup: Setup) -> LinearRows:
     """Return the linear rows of the sensitivity of the only modified channel."""
-    base = setup.camera.base_qe[0]
-    return _one_row(np.full(base.size, 1 / base.sum()))
+    grid = setup.camera.grid
+    return _one_row(grid.bins_nm / grid.integrate(setup.camera.base_qe[0]))
 
 
 def _whole_share(setup: Setup) -> LinearRows:
     """Return the linear rows of the CFA sensitivity."""
     counts, modified = setup.camera.mosaic.counts, setup.camera.modified[0]
-    clear_light = counts.sum() * setup.camera.clear_qe.sum()
-    others = float(np.delete(setup.camera.qe.sum(axis=1) * counts, modified).sum())
-    return _one_row(np.full(setup.camera.grid.size, counts[modified] / clear_light), others / clear_light)
+    grid = setup.camera.grid
+    clear_light = counts.sum() * grid.integrate(setup.camera.clear_qe)
+    others = float(np.delete(grid.integrate(setup.camera.qe) * counts, modified).sum())
+    return _one_row(grid.bins_nm * (counts[modified] / clear_light), others / clear_light)
 
 
 def _one_row(weights: PerRow, constant: float = 0.0) -> LinearRows:

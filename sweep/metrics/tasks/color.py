@@ -70,13 +70,13 @@ class PatchCamera:
         `photons`: radiance, photons/s/sr/m2/nm.
         """
         setup = self.setup
-        factor = irradiance_factor(setup.scene.optics) * setup.camera.area_step_m2_nm * exposure_s
+        photons = photons * (irradiance_factor(setup.scene.optics) * exposure_s * setup.camera.area_bins_m2_nm)
         shape = (len(self.modified), *photons.shape[:-1], len(setup.camera.qe))
         electrons = np.empty(shape, dtype=self.modified.dtype)
-        electrons[...] = photons @ setup.camera.qe.T * factor
+        electrons[...] = photons @ setup.camera.qe.T
         flat = photons.reshape(-1, photons.shape[-1])
         for at, channel in enumerate(setup.camera.modified):
-            electrons[..., channel] = (self.modified[:, at] @ flat.T).reshape(shape[:-1]) * factor
+            electrons[..., channel] = (self.modified[:, at] @ flat.T).reshape(shape[:-1])
         return electrons
 
     @property

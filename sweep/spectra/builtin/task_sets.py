@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ...base.types import Array, Float, FloatArray, PerWavelength
-from ..color import color_matching, luminance_per_photon_radiance
-from ..spectrum import WavelengthGrid, energy_from_photons, equal_photons, photons_from_energy
+from ..color import luminance_per_photon_radiance, tristimulus
+from ..spectrum import WavelengthGrid, equal_photons, photons_from_energy
 from ..tasks import ILLUMINANTS, Chart, GriddedTask, TaskColumns
 from . import spectra, surrogate_spectra
 from .data_sets.tl16 import lights
@@ -68,13 +68,12 @@ def spectra_of_group(grid: WavelengthGrid, name: str, most: int | None = None) -
 
 def chart(grid: WavelengthGrid, reflectances: Float[Array, "patches wavelengths"], lights: Sequence[str]) -> Chart:
     """Return patches under lights of 1 lx."""
-    matching = color_matching(grid)
     photons, gray, xyz, white = [], [], [], []
     for name in lights:
         light = equal_photons(grid, illuminant(grid, name)[None])[0]
         of_white = light / (np.pi * luminance_per_photon_radiance(grid, light[None])[0])  # 1 lx: a luminance of 1 / pi
         patch_photons = np.concatenate([reflectances, np.ones((1, grid.size))]) * of_white
-        patch_xyz = energy_from_photons(grid.nodes_nm, patch_photons) @ matching.T
+        patch_xyz = tristimulus(grid, patch_photons)
         photons.append(patch_photons[:-1])
         gray.append(_GRAY * of_white)
         xyz.append(patch_xyz[:-1] / patch_xyz[-1, 1])
